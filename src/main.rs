@@ -1,0 +1,2 @@
+//! afmid, the command line.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Calibration and noise control: sensitivity, spring constant, delay, thermal spectra.

@@ -1,0 +1,1 @@
+//! Averages over aligned events, and what their spread says.

@@ -1,0 +1,1 @@
+//! Event extraction: snap-off and snap-to-contact.

@@ -1,0 +1,1 @@
+//! The force that acted: the input of the identification.

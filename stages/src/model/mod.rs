@@ -1,0 +1,1 @@
+//! Parametric estimates: prediction error method, modes, zeros.

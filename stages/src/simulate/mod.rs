@@ -1,0 +1,1 @@
+//! An AFM in the time domain.

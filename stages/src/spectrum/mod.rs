@@ -1,0 +1,1 @@
+//! Parameter-free estimates: windows, periodograms, ETFE, smoothing.
