@@ -1,1 +1,23 @@
-//! The engine of afmid.
+//! The engine of afmid: stages with typed ports, TOML configs, a checked graph, a parallel runner, a content-addressed cache
+//! and an HDF5 store. It knows no physics.
+//!
+//! ```text
+//! config (TOML) -> graph (checked) -> runner (rayon) -> cache (one artifact file per stage) -> result file (one HDF5)
+//! ```
+//!
+//! A stage is a parameter struct that implements [`Stage`]; [`Entry::of`] makes it a row of the [`Registry`]. What travels
+//! between stages is an [`Artifact`]: one of five shapes, whatever it means.
+
+pub mod artifact;
+pub mod error;
+pub mod recording;
+pub mod runner;
+pub mod stage;
+
+pub use artifact::{
+    Array, Artifact, Attribute, Axis, Column, Document, Matrix, Shape, Shaped, StateSpace, Table, Values, Variable,
+};
+pub use error::StageError;
+pub use recording::{Channel, Record, Recording, Source};
+pub use runner::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};
+pub use stage::{Caching, Context, DynStage, Entry, Example, Port, PortSpec, Ports, Registry, Spec, Stage};

@@ -1,0 +1,68 @@
+//! What a stage may ask of the runner.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// What a stage may ask of the runner: its seed, its folder, a place for warnings and progress.
+pub struct Context<'a> {
+    base: PathBuf,
+    seed: u64,
+    warnings: Mutex<Vec<String>>,
+    progress: &'a dyn Progress,
+}
+
+/// Where progress goes. Implementations are called from several threads.
+pub trait Progress: Send + Sync {
+    /// `total` items of work lie ahead in a stage.
+    fn expect(&self, total: u64);
+    /// One is done.
+    fn tick(&self);
+}
+
+/// Progress that nobody looks at.
+#[derive(Debug, Clone, Copy)]
+pub struct NoProgress;
+
+impl Progress for NoProgress {
+    fn expect(&self, _total: u64) {}
+    fn tick(&self) {}
+}
+
+impl<'a> Context<'a> {
+    /// A context for one run of one stage.
+    pub fn new(base: &Path, seed: u64, progress: &'a dyn Progress) -> Self {
+        Self { base: base.to_owned(), seed, warnings: Mutex::new(Vec::new()), progress }
+    }
+
+    /// The folder of the config file: relative paths in parameters start there.
+    pub fn base(&self) -> &Path {
+        &self.base
+    }
+
+    /// The seed of this stage, derived from the pipeline's seed and the stage's id.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Keeps a warning as data: it is stored with the result and shown. Say what was found, with numbers, and what to do.
+    ///
+    /// Call it in a fixed order (not from parallel work): warnings are part of the result.
+    pub fn warn(&self, text: impl Into<String>) {
+        self.warnings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text.into());
+    }
+
+    /// Announces items of work; call [`Context::tick`] for each, from any thread.
+    pub fn expect(&self, total: usize) {
+        self.progress.expect(total as u64);
+    }
+
+    /// One item is done.
+    pub fn tick(&self) {
+        self.progress.tick();
+    }
+
+    /// The warnings so far.
+    pub fn into_warnings(self) -> Vec<String> {
+        self.warnings.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,99 @@
+//! A row of the registry: a stage without its type.
+
+use std::path::{Path, PathBuf};
+
+use schemars::{Schema, SchemaGenerator};
+use serde_json::Value;
+
+use super::{Context, Example, Ports, Spec, Stage};
+use crate::error::StageError;
+
+/// A stage with its parameters, without its type.
+pub trait DynStage: Send + Sync {
+    /// Name, version, ports.
+    fn spec(&self) -> &'static Spec;
+    /// All parameters, defaults filled in.
+    fn params(&self) -> Result<Value, StageError>;
+    /// See [`Stage::check`].
+    fn check(&self) -> Result<(), StageError>;
+    /// See [`Stage::sources`].
+    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError>;
+    /// See [`Stage::location_params`].
+    fn location_params(&self) -> &'static [&'static str];
+    /// See [`Stage::run`].
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError>;
+}
+
+impl<S: Stage> DynStage for S {
+    fn spec(&self) -> &'static Spec {
+        const { &S::SPEC }
+    }
+
+    fn params(&self) -> Result<Value, StageError> {
+        serde_json::to_value(self)
+            .map_err(|error| StageError::new(format!("parameters cannot be written as JSON: {error}")))
+    }
+
+    fn check(&self) -> Result<(), StageError> {
+        Stage::check(self)
+    }
+
+    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+        Stage::sources(self, base)
+    }
+
+    fn location_params(&self) -> &'static [&'static str] {
+        S::location_params()
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        Stage::run(self, inputs, cx)
+    }
+}
+
+/// Parameters that do not deserialise: where in `params`, and why.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct ParamError {
+    /// Path within `params`, such as `files[2]`; empty or `.` for the whole.
+    pub path: String,
+    /// What was found and what was wanted.
+    pub message: String,
+}
+
+/// A row of the registry: everything that configs, docs, lists and tests need to know of a stage.
+#[derive(Clone, Copy)]
+pub struct Entry {
+    /// Name, version, ports.
+    pub spec: &'static Spec,
+    /// Makes the stage from its `params` table.
+    pub parse: fn(toml::Table) -> Result<Box<dyn DynStage>, ParamError>,
+    /// JSON Schema of its parameters; the description is the stage's documentation.
+    pub schema: fn(&mut SchemaGenerator) -> Schema,
+    /// Its examples.
+    pub examples: fn() -> Vec<Example>,
+}
+
+impl std::fmt::Debug for Entry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Entry").field(&self.spec.name).finish()
+    }
+}
+
+impl Entry {
+    /// The row of stage `S`.
+    pub const fn of<S: Stage>() -> Self {
+        Self {
+            spec: const { &S::SPEC },
+            parse: parse::<S>,
+            schema: |generator| S::json_schema(generator),
+            examples: S::examples,
+        }
+    }
+}
+
+fn parse<S: Stage>(params: toml::Table) -> Result<Box<dyn DynStage>, ParamError> {
+    serde_path_to_error::deserialize::<_, S>(params)
+        .map(|stage| Box::new(stage) as Box<dyn DynStage>)
+        .map_err(|error| ParamError { path: error.path().to_string(), message: error.inner().message().to_owned() })
+}
