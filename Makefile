@@ -1,11 +1,35 @@
 # The two commands: `make demo` runs the main job, `make test` passes the tests.
-.PHONY: deps demo test lint ci
+.PHONY: deps test-deps demo test lint
 
 CMAKE_VERSION = 3.31.6
 
+# What a plain `cargo build --release` needs beside cargo and a C compiler.
 deps: .tools/bin/cmake
 
-# HDF5 is built from source and wants CMake >= 3.26: the system's if it is new enough, PyPI's otherwise.
+# The readers that the tests open results with.
+test-deps: deps .tools/readers
+
+# Simulates an archive, runs the paper's pipeline on it, prints the modal table beside the truth, writes result and report.
+demo: deps
+	cargo build --release --locked
+	./target/release/afmid run configs/simulate-demo.toml -o results/simulate-demo.h5
+	./target/release/afmid run configs/paper.toml -o results/paper.h5
+	./target/release/afmid report results/paper.h5 -o results/paper.html
+	./target/release/afmid show results/paper.h5 modes
+
+test: test-deps
+	cargo test --workspace --locked
+
+lint: deps
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+
+# HDF5 is built from source and wants CMake >= 3.26; PyPI's is newer than many systems'.
 .tools/bin/cmake:
 	python3 -m venv .tools
 	.tools/bin/pip install --quiet --disable-pip-version-check cmake==$(CMAKE_VERSION)
+
+.tools/readers: tests/requirements.txt | .tools/bin/cmake
+	.tools/bin/pip install --quiet --disable-pip-version-check -r tests/requirements.txt
+	touch .tools/readers

@@ -14,6 +14,7 @@ pub use document::Document;
 pub use state_space::{Matrix, StateSpace};
 pub use table::{Column, ColumnValues, Table};
 
+use crate::error::StageError;
 use crate::recording::Recording;
 
 /// The shape of an artifact, without its data: what graph checks compare.
@@ -68,6 +69,16 @@ impl Artifact {
             Self::Table(_) => Shape::Table,
             Self::StateSpace(_) => Shape::StateSpace,
             Self::Document(_) => Shape::Document,
+        }
+    }
+
+    /// Checks that its parts fit together. Errors: which do not.
+    pub fn validate(&self) -> Result<(), StageError> {
+        match self {
+            Self::Array(array) => array.validate(),
+            Self::Table(table) => table.validate(),
+            Self::StateSpace(model) => model.validate(),
+            Self::Recording(_) | Self::Document(_) => Ok(()),
         }
     }
 }

@@ -1,0 +1,187 @@
+//! One run of a plan.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use super::error::RunError;
+use super::keys::plan_node;
+use super::result::{RunInfo, RunResult, StageRecord, StageResult};
+use super::schedule::{Board, Outcome, run_graph};
+use crate::cache::Cache;
+use crate::error::StageError;
+use crate::graph::{Node, Plan};
+use crate::stage::{Caching, Context, Ports, Progress};
+
+/// Who watches a run. Called from several threads.
+pub trait Observer: Send + Sync {
+    /// A stage begins; its progress goes to what is returned.
+    fn begin(&self, id: &str) -> Box<dyn Progress + '_>;
+    /// A stage has ended, or its result came from the cache.
+    fn end(&self, id: &str, cached: bool, took: Duration, warnings: &[String]);
+}
+
+/// Nobody watches.
+#[derive(Debug, Clone, Copy)]
+pub struct Quiet;
+
+impl Observer for Quiet {
+    fn begin(&self, _id: &str) -> Box<dyn Progress + '_> {
+        Box::new(crate::stage::NoProgress)
+    }
+
+    fn end(&self, _id: &str, _cached: bool, _took: Duration, _warnings: &[String]) {}
+}
+
+/// How a plan is run.
+pub struct Options<'a> {
+    /// The folder of the config: relative paths start there.
+    pub base: PathBuf,
+    /// Where stage results are kept.
+    pub cache: &'a Cache,
+    /// Ignore what the cache holds (results are still put there).
+    pub fresh: bool,
+    /// The program and its version, for the record.
+    pub program: String,
+    /// `--set` arguments, for the record.
+    pub overrides: Vec<String>,
+    /// Who watches.
+    pub observer: &'a dyn Observer,
+}
+
+struct Finished {
+    record: StageRecord,
+    seconds: f64,
+    cached: bool,
+}
+
+/// Runs a plan: each stage as soon as its inputs are there, in parallel on the current rayon pool.
+///
+/// Each result is in the cache, synced, before a stage that needs it begins: a kill loses nothing that was finished.
+/// Errors: all stages that failed, in the plan's order; independent stages are finished first.
+pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError>> {
+    let (started, clock) = (jiff::Timestamp::now(), Instant::now());
+    let needs: Vec<Vec<usize>> = plan
+        .nodes
+        .iter()
+        .map(|node| {
+            let mut sources: Vec<usize> = node.inputs.iter().map(|wire| wire.node).collect();
+            sources.sort_unstable();
+            sources.dedup();
+            sources
+        })
+        .collect();
+    let outcomes = run_graph(&needs, |index, board| step(plan, &plan.nodes[index], options, board));
+    let (mut stages, mut times, mut errors) = (Vec::new(), Vec::new(), Vec::new());
+    for outcome in outcomes {
+        match outcome {
+            Outcome::Done(finished) => {
+                times.push((finished.record.id.clone(), finished.seconds, finished.cached));
+                stages.push(finished.record);
+            }
+            Outcome::Failed(error) => errors.push(error),
+            Outcome::Skipped => {}
+        }
+    }
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let info = RunInfo {
+        started_at: started.strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
+        seconds: clock.elapsed().as_secs_f64(),
+        host: host_name(),
+        threads: rayon::current_num_threads(),
+        stages: times,
+    };
+    Ok(RunResult {
+        name: plan.name().to_owned(),
+        seed: plan.seed(),
+        config: plan.config_text().to_owned(),
+        overrides: options.overrides.clone(),
+        program: options.program.clone(),
+        stages,
+        info,
+    })
+}
+
+fn step(plan: &Plan, node: &Node, options: &Options<'_>, board: &Board<Finished, RunError>) -> Result<Finished, RunError> {
+    let clock = Instant::now();
+    let fail = |error: StageError| RunError { id: node.id.clone(), uses: node.uses.clone(), error };
+    let upstream = |index: usize| board.done(index).map(|finished| finished.record.key.clone());
+    let planned = plan_node(plan, node, &options.base, &upstream)?;
+    let stored = node.stage.spec().caching == Caching::Stored;
+    let hit = if stored && !options.fresh { options.cache.get(&planned.key) } else { None };
+    let cached = hit.is_some();
+    let result = match hit {
+        Some(result) => result,
+        None => {
+            let result = execute(node, options, board, planned.seed.unwrap_or_default())?;
+            if stored {
+                options.cache.put(&planned.key, &result).map_err(fail)?;
+            }
+            result
+        }
+    };
+    let took = clock.elapsed();
+    options.observer.end(&node.id, cached, took, &result.warnings);
+    let wires = node
+        .inputs
+        .iter()
+        .map(|wire| (wire.port.to_owned(), plan.nodes[wire.node].id.clone(), wire.output.to_owned()))
+        .collect();
+    let record = StageRecord {
+        id: node.id.clone(),
+        uses: node.uses.clone(),
+        version: node.stage.spec().version,
+        params: node.params.clone(),
+        wires,
+        seed: planned.seed,
+        key: planned.key,
+        sources: planned.sources,
+        result,
+    };
+    Ok(Finished { record, seconds: took.as_secs_f64(), cached })
+}
+
+/// Runs the stage itself and checks what it made: the ports it declares, with the shapes that it declares.
+fn execute(node: &Node, options: &Options<'_>, board: &Board<Finished, RunError>, seed: u64) -> Result<StageResult, RunError> {
+    let fail = |error: StageError| RunError { id: node.id.clone(), uses: node.uses.clone(), error };
+    let mut inputs = Ports::new();
+    for wire in &node.inputs {
+        let artifact = board.done(wire.node).and_then(|finished| finished.record.result.outputs.artifact(wire.output));
+        let missing = || StageError::new(format!("the source of port `{}` made no `{}`", wire.port, wire.output));
+        inputs.insert(wire.port, artifact.ok_or_else(missing).map_err(fail)?.clone());
+    }
+    let progress = options.observer.begin(&node.id);
+    let context = Context::new(&options.base, seed, progress.as_ref());
+    let outputs = node.stage.run(&inputs, &context).map_err(fail)?;
+    check_outputs(node, &outputs).map_err(fail)?;
+    Ok(StageResult { outputs, warnings: context.into_warnings() })
+}
+
+fn check_outputs(node: &Node, outputs: &Ports) -> Result<(), StageError> {
+    let spec = node.stage.spec();
+    for port in spec.outputs {
+        match outputs.artifact(port.name) {
+            Some(artifact) if artifact.shape() == port.shape => artifact.validate().map_err(|error| error.on(port.name))?,
+            Some(artifact) => {
+                let (found, wanted) = (artifact.shape().name(), port.shape.name());
+                return Err(StageError::new(format!("the stage made a {found}, it declares a {wanted}")).on(port.name));
+            }
+            None if port.optional => {}
+            None => return Err(StageError::new("the stage declares this output and did not make it").on(port.name)),
+        }
+    }
+    match outputs.iter().find(|(name, _)| !spec.outputs.iter().any(|port| port.name == *name)) {
+        Some((name, _)) => Err(StageError::new(format!("the stage made `{name}`, which it does not declare"))),
+        None => Ok(()),
+    }
+}
+
+fn host_name() -> String {
+    std::env::var("HOSTNAME")
+        .ok()
+        .or_else(|| std::fs::read_to_string("/etc/hostname").ok())
+        .map(|name| name.trim().to_owned())
+        .filter(|name| !name.is_empty())
+        .unwrap_or_else(|| "unknown".to_owned())
+}
