@@ -14,6 +14,9 @@ pub mod recording;
 pub mod runner;
 pub mod stage;
 
+// what a crate with stages of its own derives with: the same versions as the engine
+pub use {schemars, serde, serde_json, toml};
+
 pub use artifact::{
     Array, Artifact, Attribute, Axis, Column, Document, Matrix, Shape, Shaped, StateSpace, Table, Values, Variable,
 };
