@@ -1,1 +1,15 @@
 //! The force that acted: the input of the identification.
+//!
+//! Nobody measures the force in the contact. At a rupture it is known all the same: before it the lever bends quasi-statically
+//! under the load, after it there is none. Both lines are extrapolated to the moment `t0`, and their difference is the input,
+//! in volts of static deflection, so that the quasi-static gain is one.
+
+mod error;
+mod extrapolate;
+mod line;
+mod onset;
+
+pub use error::ForceError;
+pub use extrapolate::{Event, Extrapolation, ExtrapolationSettings, Pair, ZeroLine, extrapolate, pair};
+pub use line::{Line, Weighting, fit_line};
+pub use onset::{Onset, OnsetSettings, find_onset};

@@ -1,1 +1,37 @@
-//! An AFM in the time domain.
+//! An AFM in the time domain: force, lever, detector, recorder, each in its own file.
+//!
+//! [`ModalLever`] and [`Contact`] make the two linear regimes of [`AfmSystem`]; [`simulate_motion`] propagates them exactly
+//! along a [`TriangleRamp`] and switches at the events; [`Microscope::record`] adds [`ReadoutNoise`] and the [`Adc`].
+//! [`PhaseProblem`] chooses start phases so that an archive holds a stated number of events.
+
+mod adc;
+mod afm_system;
+mod contact;
+mod detector;
+mod discretisation;
+mod error;
+mod lever;
+mod motion;
+mod phases;
+mod propagator;
+mod ramp;
+mod readout_noise;
+mod recorder;
+mod square;
+
+#[cfg(test)]
+mod tests;
+
+pub use adc::Adc;
+pub use afm_system::{AfmSystem, BOLTZMANN_J_PER_K};
+pub use contact::{ADHESION_CUT, Contact};
+pub use detector::Detector;
+pub use discretisation::{LinearSystem, Step};
+pub use error::SimulateError;
+pub use lever::{ModalLever, Mode};
+pub use motion::{ContactEvent, Drive, EventKind, Motion, Sampling, simulate_motion};
+pub use phases::{PhaseProblem, RecordPlan, Target};
+pub use ramp::TriangleRamp;
+pub use readout_noise::{Drift, PINK_LOWEST_HZ, ReadoutNoise};
+pub use recorder::{Microscope, PiezoMonitor, Place, RecordedEvent, Scatter, SimulatedRecord, archive_stream, counted};
+pub use square::Square;

@@ -1,0 +1,211 @@
+//! What is left of each event when amplitude, offset and loading slopes are taken out: the noise.
+
+use rayon::prelude::*;
+
+use super::{EnsembleError, Rows};
+
+/// How each event differs from the mean, and the noise that remains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scatter {
+    /// Amplitude relative to the mean, per event; their mean is one.
+    pub amplitude: Vec<f64>,
+    /// Offset against the mean, per event, in the rows' unit.
+    pub offset: Vec<f64>,
+    /// Root mean square of the remainder, per event.
+    pub rms: Vec<f64>,
+    /// Variance of the noise of one event, per sample.
+    pub noise_variance: Vec<f64>,
+    /// Remainders, row-major `[chosen event, time]`.
+    pub residual: Vec<f64>,
+}
+
+impl Scatter {
+    /// Standard error of the mean per sample: the noise alone, adhesion scatter left out.
+    pub fn standard_error(&self) -> Vec<f64> {
+        let n = self.amplitude.len() as f64;
+        self.noise_variance.iter().map(|v| (v / n).sqrt()).collect()
+    }
+}
+
+/// Regresses each chosen event on the mean, a constant, and a ramp on either side of the event.
+///
+/// # Model
+/// `y_i(t) = a_i m(t) + b_i + c_i min(t, 0) + d_i max(t, 0) + e_i(t)`, `t = 0` at sample `zero`. A stronger adhesion makes
+/// the whole ringing larger (`a_i`), but not the slope at which the piezo loads the lever (`c_i`, `d_i`); records wander
+/// by an offset (`b_i`). None of this is noise.
+///
+/// # Method
+/// Least squares by twice repeated Gram-Schmidt on the four columns (a ramp with less than eight samples is left out).
+/// Noise variance: sum of squares over `n - 1`, since the mean holds a share of each event, times `T / (T - p)` for the
+/// `p` coefficients per event.
+///
+/// # Shapes
+/// `rows` `[event, time]`, `mean` `[time]`; results per chosen event or `[time]`.
+///
+/// # Units
+/// Those of the rows; amplitude is a ratio.
+///
+/// # Accuracy
+/// The variance of one sample has a relative standard error of `sqrt(2 / (n - 1))`. Noise slower than the window is partly
+/// taken for an offset or a ramp.
+///
+/// # Errors
+/// Fewer than two events, fewer than sixteen samples, an index outside, or a constant mean.
+pub fn scatter(rows: Rows<'_>, chosen: &[usize], mean: &[f64], zero: usize) -> Result<Scatter, EnsembleError> {
+    rows.check(chosen)?;
+    if chosen.len() < 2 {
+        return Err(EnsembleError::TooFewEvents { got: chosen.len(), wanted: 2, purpose: "a noise variance" });
+    }
+    let samples = rows.samples();
+    if samples < 16 || mean.len() != samples {
+        return Err(EnsembleError::TooFewSamples { got: samples.min(mean.len()), wanted: 16, purpose: "a regression" });
+    }
+    let basis = Basis::new(mean, zero)?;
+    let fits: Vec<(f64, f64, Vec<f64>)> = chosen.par_iter().map(|&i| basis.project(rows.row(i))).collect();
+    let n = chosen.len() as f64;
+    let freedom = samples as f64 / (samples - basis.columns.len()) as f64 / (n - 1.0);
+    let mut noise_variance = vec![0.0; samples];
+    for (_, _, residual) in &fits {
+        for (v, e) in noise_variance.iter_mut().zip(residual) {
+            *v += e * e * freedom;
+        }
+    }
+    let rms = fits.iter().map(|f| (f.2.iter().map(|e| e * e).sum::<f64>() / samples as f64).sqrt()).collect();
+    Ok(Scatter {
+        amplitude: fits.iter().map(|f| f.0).collect(),
+        offset: fits.iter().map(|f| f.1).collect(),
+        rms,
+        noise_variance,
+        residual: fits.into_iter().flat_map(|f| f.2).collect(),
+    })
+}
+
+/// Orthonormal columns: constant, ramps, and the mean last, so that its coefficient is read off directly.
+struct Basis {
+    columns: Vec<Vec<f64>>,
+    /// Part of the mean outside the other columns.
+    mean_norm: f64,
+    /// Value of the mean and of its reconstruction's constant part at `t = 0`.
+    mean: Vec<f64>,
+    samples: usize,
+}
+
+impl Basis {
+    fn new(mean: &[f64], zero: usize) -> Result<Self, EnsembleError> {
+        let samples = mean.len();
+        let scale = samples as f64;
+        let time = |k: usize| (k as f64 - zero as f64) / scale;
+        let mut raw = vec![vec![1.0; samples]];
+        if zero >= 8 {
+            raw.push((0..samples).map(|k| time(k).min(0.0)).collect());
+        }
+        if zero + 8 < samples {
+            raw.push((0..samples).map(|k| time(k).max(0.0)).collect());
+        }
+        raw.push(mean.to_vec());
+        let size = dot(mean, mean).sqrt();
+        let mut columns: Vec<Vec<f64>> = Vec::with_capacity(raw.len());
+        let mut norm = 0.0;
+        for mut column in raw {
+            // twice is enough (Giraud, Langou, Rozloznik 2005)
+            for _ in 0..2 {
+                for q in &columns {
+                    let c = dot(q, &column);
+                    column.iter_mut().zip(q).for_each(|(v, q)| *v -= c * q);
+                }
+            }
+            norm = dot(&column, &column).sqrt();
+            if norm > 0.0 {
+                column.iter_mut().for_each(|v| *v /= norm);
+            }
+            columns.push(column);
+        }
+        // rounding of the projections leaves eps * size * a few
+        if norm.partial_cmp(&(1e-12 * size)) != Some(std::cmp::Ordering::Greater) {
+            return Err(EnsembleError::NoShape);
+        }
+        Ok(Self { columns, mean_norm: norm, mean: mean.to_vec(), samples })
+    }
+
+    /// Amplitude, offset and remainder of one event.
+    fn project(&self, row: &[f64]) -> (f64, f64, Vec<f64>) {
+        let mut residual = row.to_vec();
+        let mut amplitude = 0.0;
+        for q in &self.columns {
+            let c = dot(q, &residual);
+            residual.iter_mut().zip(q).for_each(|(v, q)| *v -= c * q);
+            amplitude = c / self.mean_norm;
+        }
+        // the ramps have no constant part by convention: the offset is the mean difference of what amplitude leaves
+        let offset = row.iter().zip(&self.mean).map(|(y, m)| y - amplitude * m).sum::<f64>() / self.samples as f64;
+        (amplitude, offset, residual)
+    }
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ensemble::moments;
+    use crate::fixture::{Lever, white_noise};
+
+    /// Events of the paper's lever: adhesion scatters by 20 %, offsets by 4 mV, loading slopes stay.
+    fn events(count: usize, seed: u64, noise: f64) -> (Vec<f64>, Vec<f64>, usize) {
+        let samples = 4096;
+        let shape = Lever::paper().release(samples, 800.0, -0.9);
+        let amplitude: Vec<f64> = white_noise(count, 0.2, seed).iter().map(|a| 1.0 + a).collect();
+        let offset = white_noise(count, 4e-3, seed + 100);
+        let mut values = Vec::new();
+        for i in 0..count {
+            let e = white_noise(samples, noise, seed * 1000 + i as u64);
+            values.extend((0..samples).map(|k| {
+                let load = 4.5e-6 * (800.0 - k as f64).max(0.0);
+                amplitude[i] * shape[k] + load + offset[i] + e[k]
+            }));
+        }
+        (values, amplitude, samples)
+    }
+
+    #[test]
+    fn adhesion_scatter_is_not_noise() {
+        for seed in 1..4 {
+            let (values, truth, samples) = events(24, seed, 1.2e-3);
+            let rows = Rows::new(&values, samples).unwrap();
+            let mean = moments(rows, &rows.all()).unwrap();
+            let got = scatter(rows, &rows.all(), &mean.mean, 800).unwrap();
+            let variance = got.noise_variance.iter().sum::<f64>() / samples as f64;
+            // 24 * 4096 independent squares: 4 sigma = 4 * sqrt(2 / 98304)
+            assert!((variance / 1.44e-6 - 1.0).abs() < 0.018, "seed {seed}: {variance:e}");
+            let average = truth.iter().sum::<f64>() / 24.0;
+            for (a, t) in got.amplitude.iter().zip(&truth) {
+                // noise 1.2e-3 against a shape of norm 0.3 sqrt(4096) = 19: sigma 6e-5, 5 sigma of 24
+                assert!((a - t / average).abs() < 4e-4);
+            }
+            // the plain variance is dominated by the amplitudes: 0.2^2 * 0.9^2 before the release
+            assert!(mean.variance[10] > 5000.0 * 1.44e-6);
+            let error = got.standard_error();
+            assert!((error[3000] - (got.noise_variance[3000] / 24.0).sqrt()).abs() < 1e-18);
+        }
+    }
+
+    #[test]
+    fn without_noise_nothing_is_left() {
+        let (values, _, samples) = events(6, 3, 0.0);
+        let rows = Rows::new(&values, samples).unwrap();
+        let mean = moments(rows, &rows.all()).unwrap();
+        let got = scatter(rows, &rows.all(), &mean.mean, 800).unwrap();
+        // rounding of values of order one
+        assert!(got.residual.iter().all(|e| e.abs() < 1e-13));
+    }
+
+    #[test]
+    fn a_constant_mean_has_no_shape() {
+        let values = vec![1.0; 64];
+        let rows = Rows::new(&values, 32).unwrap();
+        assert_eq!(scatter(rows, &[0, 1], &[1.0; 32], 16).unwrap_err(), EnsembleError::NoShape);
+        assert!(matches!(scatter(rows, &[0], &[1.0; 32], 16), Err(EnsembleError::TooFewEvents { .. })));
+    }
+}
