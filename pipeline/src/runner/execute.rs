@@ -116,7 +116,7 @@ fn step(plan: &Plan, node: &Node, options: &Options<'_>, board: &Board<Finished,
         None => {
             let result = execute(node, options, board, planned.seed.unwrap_or_default())?;
             if stored {
-                options.cache.put(&planned.key, &result).map_err(fail)?;
+                options.cache.put(&planned.key, &result).map_err(|error| fail(error.into()))?;
             }
             result
         }

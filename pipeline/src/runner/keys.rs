@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde_json::Value;
+use rayon::prelude::*;
 
 use super::error::RunError;
 use super::result::SourceFile;
@@ -37,25 +37,32 @@ pub struct StagePlan {
 pub(super) fn plan_node(plan: &Plan, node: &Node, base: &Path, upstream: &dyn Fn(usize) -> Option<String>) -> Result<StagePlan, RunError> {
     let fail = |error: StageError| RunError { id: node.id.clone(), uses: node.uses.clone(), error };
     let spec = node.stage.spec();
-    let mut sources = Vec::new();
-    for path in node.stage.sources(base).map_err(fail)? {
-        let hash = hash_file(&path).map_err(fail)?;
-        sources.push(SourceFile { path: path.display().to_string(), size: hash.size, blake3: hash.blake3 });
-    }
+    let sources = node.stage.sources(base).map_err(fail)?.par_iter().map(|path| source_file(path)).collect::<Result<Vec<_>, _>>();
+    let sources = sources.map_err(fail)?;
     let seed = spec.seeded.then(|| stage_seed(plan.seed(), &node.id));
-    let mut inputs = Vec::new();
+    let mut wires = Vec::new();
     for wire in &node.inputs {
         let missing = || fail(StageError::new(format!("port `{}`: its source has no key yet", wire.port)));
-        inputs.push((wire.port.to_owned(), upstream(wire.node).ok_or_else(missing)?, wire.output.to_owned()));
+        wires.push((wire.port.to_owned(), upstream(wire.node).ok_or_else(missing)?, wire.output.to_owned()));
     }
-    let mut params = node.params.clone();
-    if let Value::Object(map) = &mut params {
-        for name in node.stage.location_params() {
-            map.remove(*name);
-        }
-    }
-    let key = key(&KeyParts { name: spec.name, version: spec.version, params: &params, seed, sources: &sources, inputs: &inputs });
+    wires.sort();
+    let key = key(&KeyParts {
+        stage: spec.name,
+        version: spec.version,
+        params: &node.params,
+        location_params: node.stage.location_params(),
+        seed,
+        sources: &sources,
+        upstream: &wires,
+    });
     Ok(StagePlan { key, seed, sources })
+}
+
+fn source_file(path: &Path) -> Result<SourceFile, StageError> {
+    let size = std::fs::metadata(path)
+        .map_err(|error| StageError::new(format!("the file cannot be looked at: {error}")).at(path))?
+        .len();
+    Ok(SourceFile { path: path.display().to_string(), size, blake3: hash_file(path)? })
 }
 
 /// What a run would do with a stage, and why.
