@@ -9,7 +9,9 @@
 //! between stages is an [`Artifact`]: one of five shapes, whatever it means.
 
 pub mod artifact;
+pub mod config;
 pub mod error;
+pub mod graph;
 pub mod recording;
 pub mod runner;
 pub mod stage;
@@ -20,7 +22,9 @@ pub use {schemars, serde, serde_json, toml};
 pub use artifact::{
     Array, Artifact, Attribute, Axis, Column, Document, Matrix, Shape, Shaped, StateSpace, Table, Values, Variable,
 };
+pub use config::{Config, Problem};
 pub use error::StageError;
+pub use graph::{Node, Plan, Wire};
 pub use recording::{Channel, Record, Recording, Source};
 pub use runner::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};
 pub use stage::{Caching, Context, DynStage, Entry, Example, Port, PortSpec, Ports, Registry, Spec, Stage};

@@ -1,0 +1,58 @@
+//! From text to a TOML document with places.
+
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::problem::Problem;
+
+/// A parsed document and its problems. `usable` is false if the syntax is so broken that further checks would mislead.
+pub(super) struct Document<'a> {
+    pub root: DeTable<'a>,
+    pub usable: bool,
+}
+
+/// Parses the text, with all syntax errors at once.
+pub(super) fn parse<'a>(text: &'a str, problems: &mut Vec<Problem>) -> Document<'a> {
+    let (root, errors) = DeTable::parse_recoverable(text);
+    let root = root.into_inner();
+    let mut usable = true;
+    for error in errors {
+        let span = error.span().unwrap_or_default();
+        if error.message() == "duplicate key" {
+            problems.push(duplicate(text, &root, span));
+        } else {
+            usable = false;
+            let message = error.message().replace(", expected ", ", wanted ");
+            problems.push(Problem::new(message, span, "here").help("a config is TOML: https://toml.io"));
+        }
+    }
+    Document { root, usable }
+}
+
+/// A key that is given twice; within `inputs`, a port that is wired twice.
+fn duplicate(text: &str, root: &DeTable<'_>, span: Range<usize>) -> Problem {
+    let key = text.get(span.clone()).unwrap_or_default();
+    let stages = root.get("stage").and_then(|stages| stages.get_ref().as_array());
+    let is_input = stages.into_iter().flatten().filter_map(|stage| stage.get_ref().get("inputs")).any(|inputs| {
+        let own = inputs.span();
+        own.contains(&span.start) || entries_after_header(inputs).any(|entry| within(text, own.end, entry, &span))
+    });
+    if is_input {
+        return Problem::new(format!("port `{key}` is wired twice"), span, "wired before")
+            .help("a port takes one wire: remove one");
+    }
+    Problem::new(format!("the key `{key}` is given twice"), span, "given before").help("remove one")
+}
+
+fn entries_after_header<'a>(inputs: &'a Spanned<DeValue<'_>>) -> impl Iterator<Item = Range<usize>> + 'a {
+    inputs.get_ref().as_table().into_iter().flatten().map(|(key, _)| key.span())
+}
+
+/// Whether `span` follows `entry` in the table whose header ends at `header`, before another header.
+fn within(text: &str, header: usize, entry: Range<usize>, span: &Range<usize>) -> bool {
+    header <= entry.start
+        && entry.start < span.start
+        && text.get(entry.end..span.start).is_some_and(|between| !between.contains("\n["))
+}

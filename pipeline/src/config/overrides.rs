@@ -1,0 +1,179 @@
+//! `--set ID.PARAM=VALUE`.
+
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::RESERVED_ID;
+use super::place::Place;
+use super::problem::{Origin, Problem};
+use super::read::Config;
+use super::suggest::did_you_mean;
+use super::value::plain;
+use super::{pipeline, stage};
+
+/// A `--set` argument: a parameter's path and its new value.
+#[derive(Debug, Clone)]
+pub struct Override {
+    /// As it was typed.
+    pub(super) text: String,
+    /// Stage id, then the path within `params`; with the bytes of each step.
+    path: Vec<(String, Range<usize>)>,
+    /// The value.
+    value: toml::Value,
+    /// Where the value lies.
+    place: Place,
+}
+
+const FORM: &str = "write `--set ID.PARAM=VALUE`, such as `--set fit.order=11`";
+
+impl Override {
+    /// Parses `ID.PARAM=VALUE`; VALUE is TOML, and PARAM may lead into a table (`ID.a.b`). Errors: another form.
+    pub fn parse(text: &str) -> Result<Self, Problem> {
+        let Some(equals) = equals_sign(text) else {
+            return Err(problem(text, "the argument has no `=`", 0..text.len(), "wanted ID.PARAM=VALUE", FORM));
+        };
+        let path = path(text, equals)?;
+        let offset = equals + 1;
+        let (rest, pad) = trimmed(&text[offset..]);
+        let value = DeValue::parse(rest).map_err(|error| {
+            let at = offset + pad;
+            if rest.starts_with(char::is_alphabetic) {
+                let message = format!("`{rest}` is not a TOML value");
+                return problem(text, &message, at..at + rest.len(), "not TOML", &value_help(rest));
+            }
+            let span = error.span().map_or(at..text.len(), |span| span.start + at..span.end + at);
+            problem(text, &error.message().replace(", expected ", ", wanted "), span, "not TOML", &value_help(rest))
+        })?;
+        let mut problems = Vec::new();
+        let place = Place::of(&value, offset + pad);
+        let plain = plain(&value, &mut problems);
+        match problems.pop() {
+            Some(wrong) => {
+                let span = wrong.span.start + offset + pad..wrong.span.end + offset + pad;
+                Err(wrong.at((Origin::Argument(text.to_owned()), span)))
+            }
+            None => Ok(Self { text: text.to_owned(), path, value: plain, place }),
+        }
+    }
+
+    /// Where this argument set the parameter at `path`, if it did.
+    pub(super) fn locate(&self, path: &[String], key: bool) -> Option<(Origin, Range<usize>)> {
+        let own = self.path.get(1..).unwrap_or_default();
+        let shared = own.iter().zip(path).take_while(|((step, _), wanted)| step == *wanted).count();
+        let span = if path.is_empty() || shared < own.len().min(path.len()) {
+            return None;
+        } else if path.len() > own.len() {
+            let (span, place, depth) = self.place.find(&path[own.len()..]);
+            if key && depth > 0 { span } else { place.value.clone() }
+        } else if key || path.len() < own.len() {
+            own[path.len() - 1].1.clone()
+        } else {
+            self.place.value.clone()
+        };
+        Some((Origin::Argument(self.text.clone()), span))
+    }
+}
+
+/// Applies an argument. Errors: an unknown stage; a path through something that is not a table.
+pub(super) fn apply(set: Override, config: &mut Config) -> Result<(), Problem> {
+    let Some((id, id_span)) = set.path.first().cloned() else { return Ok(()) };
+    if id == RESERVED_ID {
+        return apply_to_pipeline(&set, config);
+    }
+    let stage = stage::find(&mut config.stages, &id)
+        .map_err(|help| problem(&set.text, &format!("there is no stage `{id}`"), id_span, "unknown stage", &help))?;
+    let [_, steps @ .., (last, _)] = set.path.as_slice() else {
+        return Err(problem(&set.text, "the argument names no parameter", 0..id.len(), "wanted ID.PARAM", FORM));
+    };
+    let mut table = &mut stage.params;
+    for (step, span) in steps {
+        let entry = table.entry(step.clone()).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+        table = match entry {
+            toml::Value::Table(inner) => inner,
+            other => {
+                let message = format!("`{step}` of stage `{id}`: found {}, wanted a table", other.type_str());
+                return Err(problem(&set.text, &message, span.clone(), "not a table", "set it as a whole"));
+            }
+        };
+    }
+    table.insert(last.clone(), set.value.clone());
+    stage.overrides.push(set);
+    Ok(())
+}
+
+fn apply_to_pipeline(set: &Override, config: &mut Config) -> Result<(), Problem> {
+    let [_, (key, span)] = set.path.as_slice() else {
+        let span = 0..set.path.last().map_or(0, |(_, span)| span.end);
+        return Err(problem(&set.text, "wanted `pipeline.seed` or `pipeline.name`", span, "not a key", FORM));
+    };
+    let start = set.place.value.start;
+    let value = DeValue::parse(set.text.get(set.place.value.clone()).unwrap_or_default())
+        .unwrap_or_else(|_| Spanned::new(0..0, DeValue::Boolean(false)));
+    let here = |wrong: Problem| {
+        let span = wrong.span.start + start..wrong.span.end + start;
+        wrong.at((Origin::Argument(set.text.clone()), span))
+    };
+    match key.as_str() {
+        "seed" => config.seed = pipeline::seed(&value).map_err(here)?,
+        "name" => config.name = pipeline::name(&value).map_err(here)?,
+        other => {
+            let help = did_you_mean(other, "key", pipeline::KEYS.into_iter());
+            let message = format!("[pipeline] has no key `{other}`");
+            return Err(problem(&set.text, &message, span.clone(), "unknown key", &help));
+        }
+    }
+    Ok(())
+}
+
+/// Where the first `=` outside quotes lies.
+fn equals_sign(text: &str) -> Option<usize> {
+    let mut quote = None;
+    for (place, c) in text.char_indices() {
+        match (c, quote) {
+            ('"' | '\'', None) => quote = Some(c),
+            (c, Some(open)) if c == open => quote = None,
+            ('=', None) => return Some(place),
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The dotted key before the `=`, as TOML reads it.
+fn path(text: &str, equals: usize) -> Result<Vec<(String, Range<usize>)>, Problem> {
+    let wrong = |span| problem(text, "found no dotted key before the `=`", span, "wanted ID.PARAM", FORM);
+    let key = &text[..equals];
+    let line = format!("{key}=0");
+    if key.contains(['\n', '\r', '#', '[', '{']) {
+        return Err(wrong(0..equals));
+    }
+    let root = DeTable::parse(&line).map_err(|_| wrong(0..equals))?.into_inner();
+    let (mut path, mut table) = (Vec::new(), &root);
+    while let Some((key, value)) = table.iter().next() {
+        path.push((key.get_ref().to_string(), key.span()));
+        match value.get_ref().as_table() {
+            Some(inner) => table = inner,
+            None => break,
+        }
+    }
+    if path.is_empty() { Err(wrong(0..equals)) } else { Ok(path) }
+}
+
+/// The value without white space around it, and how much was before it.
+fn trimmed(text: &str) -> (&str, usize) {
+    let rest = text.trim_start();
+    (rest.trim_end(), text.len() - rest.len())
+}
+
+fn value_help(rest: &str) -> String {
+    if rest.is_empty() {
+        return FORM.to_owned();
+    }
+    format!("VALUE is TOML: text needs quotes of its own, as in `--set ID.PARAM='{rest:?}'`")
+}
+
+fn problem(text: &str, message: &str, span: Range<usize>, label: &str, help: &str) -> Problem {
+    Problem::new(message, span.clone(), label).at((Origin::Argument(text.to_owned()), span)).help(help)
+}

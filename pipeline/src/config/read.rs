@@ -1,0 +1,112 @@
+//! The first step: from text to tables.
+
+use std::path::Path;
+
+use toml::de::DeTable;
+
+use super::document;
+use super::overrides::{self, Override};
+use super::pipeline::{self, Pipeline};
+use super::problem::Problem;
+use super::stage::{self, StageDecl};
+use super::suggest::did_you_mean;
+use super::{name, value};
+
+/// A config: what the text says, before any stage is looked up.
+#[derive(Debug, Clone, Default)]
+pub struct Config {
+    /// `[pipeline] name`.
+    pub name: String,
+    /// `[pipeline] seed`.
+    pub seed: u64,
+    /// The stages, in the order of the text.
+    pub stages: Vec<StageDecl>,
+    /// The text, byte for byte.
+    pub text: String,
+    /// The file's name, as messages show it.
+    pub file: String,
+    /// The `--set` arguments, in order.
+    pub overrides: Vec<String>,
+}
+
+const TABLES: [&str; 4] = ["pipeline", "stage", "sweep", "plugins"];
+
+impl Config {
+    /// Parses a config and applies `--set` arguments (`ID.PARAM=VALUE`, VALUE in TOML). Errors: all problems that can be seen
+    /// without a registry; [`crate::graph::load`] reports them together with those of the graph.
+    pub fn parse(file: &str, text: &str, arguments: &[String]) -> Result<Self, Vec<Problem>> {
+        let (config, mut problems, _) = Self::read(file, text, arguments);
+        Problem::sort(&mut problems, arguments);
+        if problems.is_empty() { Ok(config) } else { Err(problems) }
+    }
+
+    /// As [`Config::parse`], keeping what could be read beside the problems; `false` if further checks would mislead.
+    pub(crate) fn read(file: &str, text: &str, arguments: &[String]) -> (Self, Vec<Problem>, bool) {
+        let mut problems = Vec::new();
+        let document = document::parse(text, &mut problems);
+        let (file, text, overrides) = (file.to_owned(), text.to_owned(), arguments.to_vec());
+        let mut config = Self { text, file, overrides, ..Self::default() };
+        if !document.usable {
+            return (config, problems, false);
+        }
+        config.fill(&document.root, &mut problems);
+        name::check(&config.stages, &mut problems);
+        for argument in arguments {
+            if let Err(problem) = Override::parse(argument).and_then(|set| overrides::apply(set, &mut config)) {
+                problems.push(problem);
+            }
+        }
+        (config, problems, true)
+    }
+
+    /// The folder of the config: relative paths in parameters start there.
+    pub fn base(&self) -> &Path {
+        match Path::new(&self.file).parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        }
+    }
+
+    fn fill(&mut self, root: &DeTable<'_>, problems: &mut Vec<Problem>) {
+        let Pipeline { name, seed } = match root.get("pipeline") {
+            Some(table) => pipeline::read(table, problems),
+            None => {
+                let problem = Problem::new("the config has no [pipeline] table", 0..0, "begins here");
+                problems.push(problem.help("begin it with `[pipeline]` and `name = \"...\"`"));
+                Pipeline::default()
+            }
+        };
+        (self.name, self.seed) = (name, seed);
+        self.stages = stages(root, problems);
+        for (key, value) in root {
+            match key.get_ref().as_ref() {
+                "pipeline" | "stage" => {}
+                table @ ("sweep" | "plugins") => {
+                    let message = format!("[{table}] is not supported yet");
+                    let help = format!("this version runs one set of built-in stages: remove the table `{table}`");
+                    problems.push(Problem::new(message, value.span(), "not supported yet").help(help));
+                }
+                other => {
+                    let help = did_you_mean(other, "table", TABLES.into_iter());
+                    let message = format!("a config has no table `{other}`");
+                    problems.push(Problem::new(message, key.span(), "unknown table").help(help));
+                }
+            }
+        }
+    }
+}
+
+fn stages(root: &DeTable<'_>, problems: &mut Vec<Problem>) -> Vec<StageDecl> {
+    let Some(stages) = root.get("stage") else {
+        let problem = Problem::new("the config has no [[stage]]", 0..0, "begins here");
+        problems.push(problem.help("add a `[[stage]]` table with `id` and `uses`"));
+        return Vec::new();
+    };
+    let Some(tables) = stages.get_ref().as_array() else {
+        let message = format!("`stage`: found {}, wanted an array of tables", value::found(stages.get_ref()));
+        let help = "write [[stage]] with two brackets on each side";
+        problems.push(Problem::new(message, stages.span(), "one table").help(help));
+        return Vec::new();
+    };
+    tables.iter().enumerate().filter_map(|(index, table)| stage::read(index, table, problems)).collect()
+}

@@ -1,0 +1,46 @@
+//! "Did you mean": the nearest of the names that exist.
+
+/// The candidate nearest to a word, if one is near: a misspelling of up to a third of its letters, another case, `-` for `_`, or
+/// the last part of a dotted name.
+///
+/// ```
+/// use afmid_pipeline::config::nearest;
+/// assert_eq!(nearest("fiels", ["files", "channel"]), Some("files"));
+/// assert_eq!(nearest("correlation", ["events.correlation", "io.records"]), Some("events.correlation"));
+/// assert_eq!(nearest("order", ["files", "channel"]), None);
+/// ```
+pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let wanted = normal(word);
+    let limit = (wanted.chars().count() / 3).max(1);
+    candidates
+        .into_iter()
+        .filter_map(|candidate| {
+            let have = normal(candidate);
+            let last = have.rsplit('.').next().unwrap_or(&have);
+            let tail = if wanted.contains('.') { usize::MAX } else { strsim::damerau_levenshtein(&wanted, last) };
+            let distance = strsim::damerau_levenshtein(&wanted, &have).min(tail);
+            (distance <= limit).then_some((distance, candidate))
+        })
+        .min_by_key(|&(distance, _)| distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// Help for a word that does not exist: the nearest candidate, or what there is.
+pub(crate) fn did_you_mean<'a>(word: &str, what: &str, candidates: impl Iterator<Item = &'a str> + Clone) -> String {
+    match nearest(word, candidates.clone()) {
+        Some(candidate) => format!("did you mean `{candidate}`?"),
+        None => match list(candidates) {
+            names if names.is_empty() => format!("there is no {what}"),
+            names => format!("there is: {names}"),
+        },
+    }
+}
+
+/// Names in backquotes, separated by commas.
+pub(crate) fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+fn normal(word: &str) -> String {
+    word.to_lowercase().replace('-', "_")
+}

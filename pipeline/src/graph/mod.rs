@@ -1,0 +1,9 @@
+//! The graph: stages looked up, parameters read, wires checked and ordered, before any data is opened.
+
+mod order;
+mod plan;
+mod render;
+mod wiring;
+
+pub use plan::{Node, Plan, Wire, load, plan};
+pub use render::Format;

@@ -1,0 +1,34 @@
+//! Configs and graphs, checked with small stages of their own.
+
+mod config;
+mod graph;
+mod robustness;
+mod stages;
+
+use afmid_pipeline::Problem;
+use afmid_pipeline::config::Origin;
+
+/// The text under the caret.
+fn marked<'a>(text: &'a str, problem: &'a Problem) -> &'a str {
+    match &problem.origin {
+        Origin::Config => &text[problem.span.clone()],
+        Origin::Argument(argument) => &argument[problem.span.clone()],
+    }
+}
+
+/// Problems as `text under the caret | message | help`.
+fn lines(text: &str, problems: &[Problem]) -> Vec<String> {
+    let line = |problem: &Problem| {
+        format!("{} | {} | {}", marked(text, problem), problem.message, problem.help.as_deref().unwrap_or("-"))
+    };
+    problems.iter().map(line).collect()
+}
+
+/// What planning this text with these `--set` arguments finds wrong.
+fn wrong(text: &str, arguments: &[&str]) -> Vec<String> {
+    let arguments: Vec<String> = arguments.iter().map(|&argument| argument.to_owned()).collect();
+    match afmid_pipeline::graph::load("test.toml", text, &arguments, &stages::registry()) {
+        Ok(_) => Vec::new(),
+        Err(problems) => lines(text, &problems),
+    }
+}
