@@ -9,10 +9,12 @@
 //! between stages is an [`Artifact`]: one of five shapes, whatever it means.
 
 pub mod artifact;
+pub mod cache;
 pub mod error;
 pub mod recording;
 pub mod runner;
 pub mod stage;
+pub mod store;
 
 pub use artifact::{
     Array, Artifact, Attribute, Axis, Column, Document, Matrix, Shape, Shaped, StateSpace, Table, Values, Variable,
