@@ -7,6 +7,9 @@ mod recent;
 mod source;
 mod write;
 
+#[cfg(test)]
+mod tests;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 
