@@ -10,9 +10,11 @@
 
 pub mod artifact;
 pub mod config;
+pub mod conformance;
 pub mod error;
 pub mod graph;
 pub mod recording;
+pub mod reference;
 pub mod runner;
 pub mod stage;
 
