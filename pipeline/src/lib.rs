@@ -11,9 +11,11 @@
 pub mod artifact;
 pub mod cache;
 pub mod config;
+pub mod conformance;
 pub mod error;
 pub mod graph;
 pub mod recording;
+pub mod reference;
 pub mod runner;
 pub mod stage;
 pub mod store;
