@@ -1,0 +1,17 @@
+//! Prediction error method: the innovations form of Eq. 8, fitted by minimum one-step prediction error.
+
+mod covariance;
+mod gradient;
+mod identify;
+mod optimiser;
+mod parametrisation;
+mod predictor;
+mod projection;
+mod starts;
+#[cfg(test)]
+mod tests;
+
+pub use covariance::ResidualColour;
+pub use identify::{Experiment, Identified, PemOptions, Verdict, identify};
+pub use optimiser::Ending;
+pub(crate) use parametrisation::{Coefficients, roots, section_order};
