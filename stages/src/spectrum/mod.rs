@@ -20,5 +20,5 @@ pub use local_polynomial::{PolynomialSettings, local_polynomial};
 pub use local_rational::{RationalSettings, local_rational};
 pub use neighbours::{Bins, Smoothed, SuppressedLine};
 pub use power::{PowerSpectrum, power_spectrum};
-pub use ratio::{EndTreatment, Etfe, EtfeSettings, Intersample, etfe};
+pub use ratio::{EndTreatment, Etfe, EtfeSettings, Intersample, difference, etfe};
 pub use taper::{Taper, TaperGains, taper, taper_gains};
