@@ -26,7 +26,7 @@ pub use contact_slope::{ContactSlope, SlopeStretch, contact_slope, contact_stret
 pub use error::CalibrationError;
 pub use free_stretches::{FreeRule, FreeStretches, free_stretches, stretches_between};
 pub use half_sample_mode::{half_sample_mode, median};
-pub use onset_delay::{OnsetDelay, OnsetRule, OrderedOnset, onset_delay};
+pub use onset_delay::{OnsetDelay, OnsetRule, onset_delay};
 pub use sensitivity_model::{Estimate, Sensitivity, SlopeGauge, sensitivity};
 pub use spring_constant::{SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, ringdown_s, spring_constant};
 pub use stability::{Stability, stability};

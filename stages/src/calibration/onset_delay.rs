@@ -1,61 +1,65 @@
-//! What an averaged snap-off can say about the delay: an upper bound by causality, and a family of onsets.
+//! What an averaged snap-off can say about the delay: the total lag, and a bound by causality.
 
 use super::error::CalibrationError;
+use super::sensitivity_model::Estimate;
+use faer::c64;
 
 /// What is known of the onset and the delay. All times on the average's own axis, s.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnsetDelay {
     /// First sustained departure from the line before the event: rupture plus delay cannot be later (causality).
     pub latest_s: f64,
-    /// Onset plus delay for each assumed order of the first rise, where the data bear it.
-    pub by_order: Vec<OrderedOnset>,
-    /// Earliest and latest of the bearable onsets: the ambiguity of t0 plus delay.
-    pub range_s: (f64, f64),
-}
-
-/// An onset under the assumption that the response first rises as `(t - t0)^order`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OrderedOnset {
-    /// Order of the first rise: 2 for a bare lever under a force step, one more per detector pole.
-    pub order: u32,
-    /// t0 plus delay, s.
-    pub onset_s: f64,
-    /// chi-square per degree of freedom of the rise.
-    pub misfit: f64,
+    /// Rupture + delay + the detector poles' phase lag at mode 1: what the phase of mode 1 measures.
+    pub total_lag_s: Estimate,
+    /// The given poles' phase lag at mode 1, s; 0 without poles.
+    pub pole_lag_s: f64,
+    /// Rupture + delay: the total lag less the poles'. Without poles an upper bound like `latest_s`.
+    pub onset_and_delay_s: Estimate,
+    /// Mode 1 as fitted: frequency (undamped), Hz, and quality factor.
+    pub mode_1: (f64, f64),
 }
 
 /// Settings.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct OnsetRule {
     /// Departure in standard errors that counts, sustained over `sustained_samples`.
     pub threshold: f64,
     /// See above.
     pub sustained_samples: usize,
-    /// Share of the step up to which the first rise is a power law.
-    pub rise_share: f64,
-    /// Largest number of detector poles considered.
-    pub most_poles: u32,
+    /// First guess of mode 1, Hz.
+    pub frequency_hz: f64,
+    /// First guess of its quality factor.
+    pub quality_factor: f64,
+    /// The ringing is fitted from this long after the departure, s.
+    pub skip_s: f64,
+    /// Detector poles, Hz, as far as they are known.
+    pub detector_pole_hz: Vec<f64>,
 }
 
 /// What the average says.
 ///
 /// # Model
-/// A delay `exp(-s T)` and a later t0 are the same signal: from the response alone only their sum is seen, and no lower bound exists without
-/// a model of the rise (a chain of fast poles mimics a delay). Causality gives an upper bound: the sum is not later than the first departure.
-/// For a stated order m of the rise, `y = c (t - t0)^m`, the sum is an ordinary parameter.
+/// A delay `exp(-s T)` and a later rupture are the same signal: only their sum shows. Two things are known of it. Causality: it is not later
+/// than the first departure from the line before. Phase: mode 1 of a released lever rings as
+/// `Re[(1 - i sigma/w) D(p) e^{p (t - t0 - T)}]` with `p = -sigma + i w`, so its phase gives `t0 + T - arg D(p) / w`, where the detector's
+/// poles lag by about the sum of their time constants. Poles above the bandwidth are in turn a delay: the sum is known only as
+/// well as they are. t0 and T apart are not knowable from the response.
 ///
 /// # Method
-/// Line through the first half of the stretch before `search_from`; first sample from which `sustained_samples` in a row
-/// depart by `threshold` standard errors in the same sense; for each order, linear regression of `|y|^(1/m)` on time over the samples from there
-/// to `rise_share` of the step, of which the zero is t0.
+/// Line through the first three quarters of the stretch before time 0; first sample from which `sustained_samples` depart by `threshold` standard
+/// errors in one sense; Gauss-Newton on `f1, Q1`, offset and complex amplitude over the ringing.
+///
+/// # Accuracy
+/// Standard errors are those of white noise of the given size. Other modes leak by their share over their distance in line widths: 3 ns for the
+/// paper's lever.
 ///
 /// # Errors
-/// Lengths differ; no departure; fewer than three samples on the rise for every order.
+/// Lengths differ; no departure; the fit of mode 1 does not settle.
 pub fn onset_delay(
     time_s: &[f64],
     mean: &[f64],
     standard_error: &[f64],
-    rule: OnsetRule,
+    rule: &OnsetRule,
 ) -> Result<OnsetDelay, CalibrationError> {
     if mean.len() != time_s.len() || standard_error.len() != time_s.len() || time_s.len() < 64 {
         let wanted = format!("{} and at least 64, as the time axis", time_s.len());
@@ -65,46 +69,65 @@ pub fn onset_delay(
             wanted,
         });
     }
-    let before = time_s.iter().take_while(|t| **t < 0.0).count();
-    let baseline = Baseline::fit(time_s, mean, before * 3 / 4).ok_or(CalibrationError::TooLittle {
+    let (first, load) = departure(time_s, mean, standard_error, rule)?;
+    let latest_s = time_s.get(first).copied().unwrap_or(f64::NAN);
+    let begin = time_s.iter().take_while(|t| **t < latest_s + rule.skip_s).count();
+    let ringing = (time_s.get(begin..).unwrap_or_default(), mean.get(begin..).unwrap_or_default());
+    let noise = standard_error.get(begin..).unwrap_or_default();
+    let noise = (noise.iter().map(|s| s * s).sum::<f64>() / noise.len().max(1) as f64).sqrt();
+    let mode = RingingMode::fit(ringing.0, ringing.1, noise, rule)?;
+    let (sigma, w) = (mode.decay_per_s, mode.angular_per_s);
+    // the release rings up from a negative load: its amplitude carries the load's sign
+    let amplitude = mode.amplitude * load.signum();
+    let total = -(amplitude.arg() + (sigma / w).atan()) / w;
+    let pole = c64::new(-sigma, w);
+    let detector: c64 = rule.detector_pole_hz.iter().fold(c64::new(1.0, 0.0), |d, hz| {
+        let p = std::f64::consts::TAU * hz;
+        d * c64::new(p, 0.0) / (pole + p)
+    });
+    let pole_lag_s = -detector.arg() / w;
+    let std = mode.phase_std / w;
+    let undamped = w.hypot(sigma);
+    Ok(OnsetDelay {
+        latest_s,
+        total_lag_s: Estimate { value: total, std },
+        pole_lag_s,
+        onset_and_delay_s: Estimate { value: total - pole_lag_s, std },
+        mode_1: (undamped / std::f64::consts::TAU, undamped / (2.0 * sigma)),
+    })
+}
+
+/// Index of the first sustained departure, and the level before minus the level at the end (the load).
+fn departure(time: &[f64], mean: &[f64], error: &[f64], rule: &OnsetRule) -> Result<(usize, f64), CalibrationError> {
+    let before = time.iter().take_while(|t| **t < 0.0).count() * 3 / 4;
+    let baseline = Baseline::fit(time, mean, before).ok_or(CalibrationError::TooLittle {
         what: "samples before the event",
         found: before,
         wanted: 32,
-        hint: "the average must begin before its onset (time 0)",
+        hint: "the average must begin well before its onset (time 0)",
     })?;
-    let rest: Vec<f64> = time_s.iter().zip(mean).map(|(t, y)| y - baseline.at(*t)).collect();
-    let level: Vec<f64> = rest.iter().zip(standard_error).map(|(y, s)| y / s.max(baseline.noise / 4.0)).collect();
-    let start = before * 3 / 4;
-    let departs = |k: usize| {
-        level
-            .get(k..k + rule.sustained_samples)
-            .is_some_and(|run| run.iter().all(|z| *z > rule.threshold) || run.iter().all(|z| *z < -rule.threshold))
-    };
-    let first = (start..level.len()).find(|&k| departs(k)).ok_or(CalibrationError::TooLittle {
-        what: "sustained departures from the line before the event",
-        found: 0,
-        wanted: 1,
-        hint: "lower threshold, or average more events",
-    })?;
-    let step = rest.iter().skip(first).take(64).fold(0.0f64, |top, y| top.max(y.abs()));
-    let end = (first..rest.len()).find(|&k| rest[k].abs() > rule.rise_share * step).unwrap_or(rest.len());
-    let latest_s = time_s[first];
-    let rise: Vec<(f64, f64, f64)> =
-        (first..end).map(|k| (time_s[k], rest[k].abs(), standard_error[k].max(baseline.noise / 4.0))).collect();
-    let by_order: Vec<OrderedOnset> =
-        (2..=2 + rule.most_poles).filter_map(|order| ordered(order, &rise, latest_s)).collect();
-    if by_order.is_empty() {
-        let hint = "raise rise_share: the first rise is shorter than three samples";
-        return Err(CalibrationError::TooLittle {
-            what: "samples on the first rise",
-            found: rise.len(),
-            wanted: 3,
-            hint,
-        });
-    }
-    let onsets = || by_order.iter().map(|o| o.onset_s);
-    let range_s = (onsets().fold(f64::INFINITY, f64::min), onsets().fold(f64::NEG_INFINITY, f64::max));
-    Ok(OnsetDelay { latest_s, by_order, range_s })
+    let scores: Vec<f64> = time
+        .iter()
+        .zip(mean)
+        .zip(error)
+        .map(|((t, y), s)| (y - baseline.at(*t)) / s.max(0.25 * baseline.noise).max(f64::MIN_POSITIVE))
+        .collect();
+    let departs = |run: &[f64]| run.iter().all(|z| *z > rule.threshold) || run.iter().all(|z| *z < -rule.threshold);
+    let first = scores
+        .windows(rule.sustained_samples.max(1))
+        .enumerate()
+        .skip(before)
+        .find(|(_, run)| departs(run))
+        .map(|(k, _)| k)
+        .ok_or(CalibrationError::TooLittle {
+            what: "sustained departures from the line before the event",
+            found: 0,
+            wanted: 1,
+            hint: "lower threshold, or average more events",
+        })?;
+    let tail = mean.get(mean.len() * 3 / 4..).unwrap_or_default();
+    let rest = tail.iter().sum::<f64>() / tail.len().max(1) as f64;
+    Ok((first, baseline.at(time.get(first).copied().unwrap_or(0.0)) - rest))
 }
 
 struct Baseline {
@@ -133,23 +156,63 @@ impl Baseline {
     }
 }
 
-/// The onset of one order: weighted line through `y^(1/m)`, whose error is `sigma y^(1/m - 1) / m`.
-fn ordered(order: u32, rise: &[(f64, f64, f64)], latest_s: f64) -> Option<OrderedOnset> {
-    if rise.len() < 3 {
-        return None;
+struct RingingMode {
+    decay_per_s: f64,
+    angular_per_s: f64,
+    amplitude: c64,
+    phase_std: f64,
+}
+
+impl RingingMode {
+    /// `y = offset + Re[C e^{p t}]`: Gauss-Newton on Re C, Im C, offset, sigma, w.
+    fn fit(time: &[f64], values: &[f64], noise: f64, rule: &OnsetRule) -> Result<Self, CalibrationError> {
+        let failed = |reason| CalibrationError::Fit { near_hz: rule.frequency_hz, reason };
+        if values.len() < 64 {
+            return Err(failed("fewer than 64 samples of ringing"));
+        }
+        let undamped = std::f64::consts::TAU * rule.frequency_hz;
+        let mut p = [0.0, 0.0, 0.0, undamped / (2.0 * rule.quality_factor), undamped];
+        for iteration in 0..50 {
+            let (mut normal, mut gradient) = ([[0.0; 5]; 5], [0.0; 5]);
+            for (t, y) in time.iter().zip(values) {
+                let decay = (-p[3] * t).exp();
+                let (sin, cos) = (p[4] * t).sin_cos();
+                let (c, s) = (decay * cos, decay * sin);
+                let model = p[2] + p[0] * c - p[1] * s;
+                let row = [c, -s, 1.0, -t * (p[0] * c - p[1] * s), -t * (p[0] * s + p[1] * c)];
+                for i in 0..5 {
+                    gradient[i] += row[i] * (y - model);
+                    (0..5).for_each(|j| normal[i][j] += row[i] * row[j]);
+                }
+            }
+            // the first pass is linear: amplitude and offset at the guessed pole
+            if iteration == 0 {
+                for i in 3..5 {
+                    gradient[i] = 0.0;
+                    (0..5).for_each(|j| (normal[i][j], normal[j][i]) = (0.0, 0.0));
+                    normal[i][i] = 1.0;
+                }
+            }
+            let inverse =
+                super::thermal_peak::inverse(normal).ok_or_else(|| failed("the ringing's equations are singular"))?;
+            let step: [f64; 5] = std::array::from_fn(|i| inverse[i].iter().zip(&gradient).map(|(a, g)| a * g).sum());
+            (0..5).for_each(|i| p[i] += step[i]);
+            if !(p[3] > 0.0 && p[4] > 0.0 && p.iter().all(|v| v.is_finite())) {
+                return Err(failed("mode 1 left the range of decaying oscillations: give a better frequency_hz"));
+            }
+            if iteration > 1 && step[4].abs() < 1e-10 * p[4] && step[3].abs() < 1e-8 * p[3] {
+                let square = p[0].hypot(p[1]).powi(2);
+                // d arg C = (Re C dIm - Im C dRe) / |C|^2
+                let (a, b) = (-p[1] / square, p[0] / square);
+                let variance = a * a * inverse[0][0] + 2.0 * a * b * inverse[0][1] + b * b * inverse[1][1];
+                return Ok(Self {
+                    decay_per_s: p[3],
+                    angular_per_s: p[4],
+                    amplitude: c64::new(p[0], p[1]),
+                    phase_std: noise * variance.sqrt(),
+                });
+            }
+        }
+        Err(failed("50 iterations were not enough: give a better frequency_hz and quality_factor"))
     }
-    let power = 1.0 / f64::from(order);
-    let points: Vec<(f64, f64, f64)> = rise
-        .iter()
-        .map(|(t, y, s)| (t - latest_s, y.powf(power), (s * power * y.powf(power - 1.0)).powi(-2)))
-        .collect();
-    let weight: f64 = points.iter().map(|p| p.2).sum();
-    let (mean_t, mean_y) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.2 * p.0 / weight, m.1 + p.2 * p.1 / weight));
-    let covariance: f64 = points.iter().map(|p| p.2 * (p.0 - mean_t) * (p.1 - mean_y)).sum();
-    let slope = covariance / points.iter().map(|p| p.2 * (p.0 - mean_t).powi(2)).sum::<f64>();
-    let square: f64 = points.iter().map(|p| p.2 * (p.1 - mean_y - slope * (p.0 - mean_t)).powi(2)).sum();
-    let onset_s = latest_s + mean_t - mean_y / slope;
-    let misfit = square / (points.len() - 2) as f64;
-    // causality: an onset after the first departure is no onset
-    (onset_s.is_finite() && onset_s <= latest_s && slope > 0.0).then_some(OrderedOnset { order, onset_s, misfit })
 }
