@@ -137,7 +137,7 @@ pub(super) fn signal_rows(ensemble: &Array) -> Result<(Rows<'_>, &str), StageErr
 }
 
 /// The sample of the onset, as events are aligned to it.
-pub(super) fn onset_sample(array: &Array) -> Result<usize, StageError> {
+pub(crate) fn onset_sample(array: &Array) -> Result<usize, StageError> {
     let onset = array.number("onset_sample")?;
     if onset >= 0.0 && onset.fract() == 0.0 {
         Ok(onset as usize)

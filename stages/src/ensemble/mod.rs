@@ -18,6 +18,7 @@ mod shape_drift;
 mod split;
 
 pub use average::Average;
+pub(crate) use average::onset_sample;
 pub use drift::Drift;
 pub use error::EnsembleError;
 pub use moments::{Moments, moments};
@@ -28,3 +29,9 @@ pub use split::{Split, split_halves};
 
 /// The stages of this domain.
 pub const STAGES: &[Entry] = &[Entry::of::<Average>(), Entry::of::<Drift>()];
+
+#[cfg(test)]
+#[test]
+fn examples_hold() {
+    example::run_examples(STAGES);
+}
