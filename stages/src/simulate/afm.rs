@@ -3,12 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::cache::replace_file;
-use afmid_pipeline::recording::{
-    Codes, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native,
-};
-use afmid_pipeline::{
-    Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError,
-};
+use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native};
+use afmid_pipeline::store::StoreError;
+use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::archive::{Archive, ArchiveLayout};
 use super::recorder::{Microscope, PiezoMonitor, RecordedEvent, Scatter, SimulatedRecord};
 use super::truth::{Truth, counts, record_truth};
-use super::{Adc, Contact, Detector, ModalLever, Mode, RampShape, ReadoutNoise, Target, TriangleRamp};
+use super::{Adc, Contact, Detector, ModalLever, Mode, ReadoutNoise, Target, TriangleRamp};
 
 /// Simulates force curves of an atomic force microscope in the time domain and writes them as native records.
 ///
@@ -184,7 +181,9 @@ impl Stage for Afm {
             ("detector_shares", self.detector_shares.len()),
         ] {
             if found != modes {
-                return Err(StageError::new(format!("`{name}` has {found} values, `frequencies_hz` {modes}: one per mode")));
+                return Err(StageError::new(format!(
+                    "`{name}` has {found} values, `frequencies_hz` {modes}: one per mode"
+                )));
             }
         }
         if self.compression > 9 {
@@ -231,7 +230,9 @@ impl Stage for Afm {
         };
         let saturated: usize = written.iter().map(|(_, _, saturated)| saturated).sum();
         if saturated > 0 {
-            cx.warn(format!("{saturated} deflection codes lie at a limit of the converter: lower sensitivity_v_per_m or raise lsb_v"));
+            cx.warn(format!(
+                "{saturated} deflection codes lie at a limit of the converter: lower sensitivity_v_per_m or raise lsb_v"
+            ));
         }
         let summary = serde_json::json!({
             "records": self.records,
@@ -379,9 +380,17 @@ fn write_truth(path: &Path, truth: &Truth) -> Result<(), StageError> {
     let mut text = serde_json::to_string_pretty(truth)
         .map_err(|error| StageError::new(format!("the truth cannot be written as JSON: {error}")))?;
     text.push('\n');
-    let failed = |error: &dyn std::fmt::Display| StageError::new(format!("the truth cannot be written: {error}")).at(path);
-    let temporary = path.with_extension("json.part");
-    std::fs::write(&temporary, text).map_err(|error| failed(&error))?;
-    std::fs::File::open(&temporary).and_then(|file| file.sync_all()).map_err(|error| failed(&error))?;
-    std::fs::rename(&temporary, path).map_err(|error| failed(&error))
+    replace_file(path, |temporary| {
+        std::fs::write(temporary, text).map_err(|error| StoreError {
+            file: path.to_owned(),
+            place: String::new(),
+            problem: format!("cannot be written: {error}"),
+            help: None,
+        })
+    })
+    .map_err(|error| StageError::from_error(error).at(path))
 }
+
+#[cfg(test)]
+#[path = "afm_tests.rs"]
+mod tests;

@@ -88,7 +88,13 @@ pub fn counts(records: &[Vec<RecordedEvent>]) -> Counts {
 }
 
 /// One record's truth.
-pub fn record_truth(archive: &Archive, record: usize, file: String, saturated: usize, events: &[RecordedEvent]) -> RecordTruth {
+pub fn record_truth(
+    archive: &Archive,
+    record: usize,
+    file: String,
+    saturated: usize,
+    events: &[RecordedEvent],
+) -> RecordTruth {
     RecordTruth {
         file,
         phase: archive.phases.get(record).copied().unwrap_or(f64::NAN),
