@@ -132,6 +132,21 @@ pub(crate) fn least_squares(matrix: &Mat<f64>, rhs: &Mat<f64>, tolerance: f64) -
     Ok(product(svd.v.as_ref().get(.., ..rank), projected.as_ref()))
 }
 
+/// `matrix^-1 rhs` for a square, well-conditioned matrix.
+pub(crate) fn solve(matrix: Mat<f64>, rhs: &Mat<f64>) -> Mat<f64> {
+    let n = matrix.nrows();
+    let qr = Qr::new(matrix);
+    let (r, mut x) = (qr.r(), rhs.clone());
+    qr.apply_transpose(x.as_mut());
+    for j in 0..x.ncols() {
+        for i in (0..n).rev() {
+            let known: f64 = (i + 1..n).map(|k| r[(i, k)] * x[(k, j)]).sum();
+            x[(i, j)] = (x[(i, j)] - known) / r[(i, i)];
+        }
+    }
+    x
+}
+
 /// `lhs rhs`.
 pub(crate) fn product(lhs: MatRef<'_, f64>, rhs: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = Mat::zeros(lhs.nrows(), rhs.ncols());

@@ -26,7 +26,7 @@ use super::{EndTreatment, EtfeSettings, Intersample, etfe};
 /// Source: Stark et al. 2005, Eqs. 5 to 7 and 10; Ljung, System Identification, 1999, ch. 6.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct EtfeStage {
+pub struct Etfe {
     /// Bins above are undefined, in Hz, above 0. Default: 1.2 MHz; beyond the paper's fourth mode the response falls below the noise.
     pub bandwidth_hz: f64,
     /// Bins are undefined where the force is smaller than this share of its median over 32 bins on either side, 0 to below 1.
@@ -48,7 +48,7 @@ pub enum IntersampleKind {
     Sampled,
 }
 
-impl Default for EtfeStage {
+impl Default for Etfe {
     fn default() -> Self {
         Self { bandwidth_hz: 1.2e6, vanishing_ratio: 0.05, intersample: IntersampleKind::Held, normalise: true }
     }
@@ -59,7 +59,7 @@ pub(super) const ETFE: Port<Array> =
 pub(super) const SUMMARY: Port<Document> =
     Port::new("summary", "summary", "what is defined, and the quasi-static gain");
 
-impl Stage for EtfeStage {
+impl Stage for Etfe {
     const SPEC: Spec = Spec {
         name: "spectrum.etfe",
         version: 1,

@@ -6,7 +6,7 @@ use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Axis, Context, Example, Ports, Stage, StageError};
 use rustfft::num_complex::Complex64;
 
-use super::etfe::{ETFE, EtfeStage};
+use super::etfe::{ETFE, Etfe};
 use super::periodogram::PERIODOGRAM;
 use super::smoothing::SMOOTHED;
 use super::window::{PAIR, WINDOWED, Window, WindowKind};
@@ -61,7 +61,7 @@ pub(super) fn etfe() -> Vec<Example> {
             let worst = worst_error(outputs.get(&ETFE)).map_err(|error| error.to_string())?;
             // exp(-a t) at the end of the window is 1e-6; folding at 400 kHz is (f / (fs - f))^2 * 1.5 = 1 %
             if worst < 0.02 {
-                Ok(format!("It agrees with the closed form to {:.1} %.", 100.0 * worst))
+                Ok(format!("It agrees with the closed form to {:.4} %.", 100.0 * worst))
             } else {
                 Err(format!("worst relative error {worst}"))
             }
@@ -93,7 +93,7 @@ fn peak_kept(outputs: &Ports, limit: f64) -> Result<String, String> {
     let truth = lever(bin * SAMPLE_RATE_HZ / SAMPLES as f64).norm();
     let change = transfer.get(bin as usize).map_or(f64::NAN, |g| g.norm() / truth - 1.0);
     if change.abs() < limit {
-        Ok(format!("The peak is kept to {:.2} %.", 100.0 * change.abs()))
+        Ok(format!("The peak is kept to {:.4} %.", 100.0 * change.abs()))
     } else {
         Err(format!("the peak changed by {change}"))
     }
@@ -102,7 +102,7 @@ fn peak_kept(outputs: &Ports, limit: f64) -> Result<String, String> {
 fn smoothing_inputs() -> Result<Ports, StageError> {
     let windowed = prepared(WindowKind::Rectangular, true)?;
     let cx = Context::new(std::path::Path::new("."), 0, &NoProgress);
-    EtfeStage { bandwidth_hz: 400e3, ..EtfeStage::default() }.run(&Ports::new().with(&PAIR, windowed), &cx)
+    Etfe { bandwidth_hz: 400e3, ..Etfe::default() }.run(&Ports::new().with(&PAIR, windowed), &cx)
 }
 
 fn prepared(kind: WindowKind, differenced: bool) -> Result<Array, StageError> {

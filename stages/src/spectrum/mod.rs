@@ -22,21 +22,24 @@ mod taper;
 mod window;
 
 pub use error::SpectrumError;
-pub use etfe::{EtfeStage, IntersampleKind};
+pub use etfe::{Etfe, IntersampleKind};
 pub use fourier::{bin_frequencies, transform};
 pub use local_polynomial::{PolynomialSettings, local_polynomial};
 pub use local_rational::{RationalSettings, local_rational};
 pub use neighbours::{Bins, Smoothed, SuppressedLine};
 pub use periodogram::Periodogram;
 pub use power::{PowerSpectrum, power_spectrum};
-pub use ratio::{EndTreatment, Etfe, EtfeSettings, Intersample, difference, etfe};
+pub use ratio::{EndTreatment, EtfeSettings, Intersample, TransferEstimate, difference, etfe};
 pub use smoothing::{LineParams, Smoothing, SmoothingMethod, TransientChoice};
 pub use taper::{Taper, TaperGains, taper, taper_gains};
 pub use window::{Window, WindowKind};
 
 /// The stages of this domain.
 pub const STAGES: &[Entry] =
-    &[Entry::of::<Window>(), Entry::of::<Periodogram>(), Entry::of::<EtfeStage>(), Entry::of::<Smoothing>()];
+    &[Entry::of::<Window>(), Entry::of::<Periodogram>(), Entry::of::<Etfe>(), Entry::of::<Smoothing>()];
+
+#[cfg(test)]
+mod chain_tests;
 
 #[cfg(test)]
 #[test]

@@ -46,7 +46,7 @@ pub struct EtfeSettings {
 
 /// The estimate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Etfe {
+pub struct TransferEstimate {
     /// Bins in hertz.
     pub frequency_hz: Vec<f64>,
     /// `Y / U`; NaN where undefined.
@@ -92,7 +92,12 @@ const MEDIAN_REACH: usize = 32;
 ///
 /// # Source
 /// Stark et al. 2005, Eqs. 5 to 7 and 10; Ljung, System Identification, ch. 6.
-pub fn etfe(force: &[f64], response: &[f64], noise_std: &[f64], settings: EtfeSettings) -> Result<Etfe, SpectrumError> {
+pub fn etfe(
+    force: &[f64],
+    response: &[f64],
+    noise_std: &[f64],
+    settings: EtfeSettings,
+) -> Result<TransferEstimate, SpectrumError> {
     check(force, response, noise_std, settings)?;
     let n = force.len();
     let differenced = settings.ends == EndTreatment::Differenced;
@@ -108,7 +113,8 @@ pub fn etfe(force: &[f64], response: &[f64], noise_std: &[f64], settings: EtfeSe
 
     let frequency_hz = bin_frequencies(n, settings.sample_rate_hz);
     let undefined = Complex64::new(f64::NAN, f64::NAN);
-    let mut result = Etfe { frequency_hz, transfer: Vec::new(), variance: Vec::new(), static_gain, vanishing: 0 };
+    let mut result =
+        TransferEstimate { frequency_hz, transfer: Vec::new(), variance: Vec::new(), static_gain, vanishing: 0 };
     for k in 0..u.len() {
         let inside = result.frequency_hz[k] <= settings.bandwidth_hz;
         let power = u[k].norm_sqr();

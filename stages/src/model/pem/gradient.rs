@@ -5,33 +5,63 @@
 
 use faer::Mat;
 
-use super::parametrisation::{Coefficients, section_order, slopes};
+use super::parametrisation::{Coefficients, section_order, sections, slopes};
 use super::predictor::{Problem, all_pole, delayed};
+
+/// How the errors are whitened.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Noise {
+    /// Not at all: K = 0, output error.
+    White,
+    /// By `prod a / c` of these coefficients, whatever the poles at hand.
+    Frozen(Vec<Coefficients>, Vec<Coefficients>),
+    /// By `prod a / c`, a at hand and c from these coordinates, which are estimated along.
+    Free(Vec<f64>),
+}
 
 /// What enters the predictor nonlinearly, in unbounded coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Point {
     /// Coordinates of the poles (a).
     pub poles: Vec<f64>,
-    /// Coordinates of the predictor's poles (c); `None`: c = a, that is K = 0 (output error).
-    pub predictor: Option<Vec<f64>>,
+    /// How the errors are whitened.
+    pub noise: Noise,
 }
 
 impl Point {
     /// How many coordinates.
     pub fn len(&self) -> usize {
-        self.poles.len() + self.predictor.as_ref().map_or(0, Vec::len)
+        self.poles.len() + self.free().len()
     }
 
     /// All coordinates, poles first.
     pub fn coordinates(&self) -> Vec<f64> {
-        self.poles.iter().chain(self.predictor.iter().flatten()).copied().collect()
+        self.poles.iter().chain(self.free()).copied().collect()
+    }
+
+    fn free(&self) -> &[f64] {
+        if let Noise::Free(c) = &self.noise { c } else { &[] }
+    }
+
+    /// Coefficients of the poles.
+    pub fn a(&self) -> Vec<Coefficients> {
+        sections(&self.poles)
+    }
+
+    /// Numerator and denominator of the whitening filter at this point.
+    pub fn whitening(&self) -> (Vec<Coefficients>, Vec<Coefficients>) {
+        match &self.noise {
+            Noise::White => (Vec::new(), Vec::new()),
+            Noise::Frozen(a, c) => (a.clone(), c.clone()),
+            Noise::Free(c) => (self.a(), sections(c)),
+        }
     }
 
     /// The point with other coordinates, in the same order.
     pub fn at(&self, coordinates: &[f64]) -> Self {
         let (poles, rest) = coordinates.split_at(self.poles.len());
-        Self { poles: poles.to_vec(), predictor: self.predictor.as_ref().map(|_| rest.to_vec()) }
+        let noise = if let Noise::Free(_) = self.noise { Noise::Free(rest.to_vec()) } else { self.noise.clone() };
+        Self { poles: poles.to_vec(), noise }
     }
 }
 
@@ -45,18 +75,19 @@ pub(crate) fn residual(regressors: &Mat<f64>, theta: &[f64]) -> Vec<f64> {
     e
 }
 
-/// Derivatives of e to the coefficients: a1, a2 of each section, then c1, c2 unless `c` is `None`; rows x n or 2n.
+/// Derivatives of e to the coefficients: a1, a2 of each section, then c1, c2 if these are free; rows x n or 2n.
 ///
-/// With K = 0 the filters a/c cancel: the derivative of the whitening is left out.
+/// Unless the whitening is free, it does not move with the poles.
 pub(crate) fn coefficient_jacobian(
     problem: &Problem,
-    a: &[Coefficients],
-    c: Option<&[Coefficients]>,
+    point: &Point,
     regressors: &Mat<f64>,
     theta: &[f64],
     e: &[f64],
 ) -> Mat<f64> {
     let n = problem.order;
+    let a = point.a();
+    let c = if let Noise::Free(c) = &point.noise { Some(sections(c)) } else { None };
     let mut jacobian = Mat::zeros(problem.rows(), if c.is_some() { 2 * n } else { n });
     let mut top = 0;
     for (index, (_, y)) in problem.experiments.iter().enumerate() {
@@ -76,7 +107,7 @@ pub(crate) fn coefficient_jacobian(
                 delayed(&mut jacobian, top, 2 * i + j, &sensitivity, j + 1);
             }
         }
-        for (i, &section) in c.unwrap_or_default().iter().enumerate() {
+        for (i, &section) in c.iter().flatten().enumerate() {
             let sensitivity = all_pole(section, e[rows.clone()].iter().map(|e| -e));
             for j in 0..section_order(n, i) {
                 delayed(&mut jacobian, top, n + 2 * i + j, &sensitivity, j + 1);
@@ -89,9 +120,8 @@ pub(crate) fn coefficient_jacobian(
 
 /// Chain rule from coefficients to coordinates, in place.
 pub(crate) fn to_coordinates(jacobian: &mut Mat<f64>, point: &Point) {
-    let parts = std::iter::once(&point.poles).chain(point.predictor.iter());
     let mut column = 0;
-    for coordinates in parts {
+    for coordinates in [point.poles.as_slice(), point.free()] {
         for p in coordinates.chunks(2) {
             let [d11, d12, d22] = slopes(p);
             for row in 0..jacobian.nrows() {

@@ -1,13 +1,16 @@
 //! The prediction error method, from data to model.
 
 use faer::{Mat, c64};
+use realfft::RealFftPlanner;
 
 use super::covariance::{ResidualColour, covariance};
-use super::gradient::coefficient_jacobian;
+use super::gradient::{Noise, Point};
+use super::noise::{gain, intensities};
 use super::optimiser::{Ending, Limits, State, minimise};
-use super::parametrisation::{LIMIT, roots, section_order, sections};
+use super::parametrisation::{LIMIT, coordinates, roots, section_order, sections};
 use super::predictor::Problem;
 use super::starts::{best, candidates};
+use super::tangent::Tangent;
 use crate::model::error::{ModelError, finite};
 use crate::model::innovations::{InnovationsModel, Section, kalman_gains};
 use crate::model::subspace::Subspace;
@@ -34,9 +37,9 @@ pub struct PemOptions {
     pub offset: bool,
     /// Estimate a linear drift of y per experiment; default true: averaged records wander.
     pub slope: bool,
-    /// Estimate the Kalman gain; default true. False: K = 0, output error.
-    pub noise_model: bool,
-    /// Share of the residual in the tangent space that counts as zero gradient; default 1e-5: a thousandth of a standard error at 8192 samples.
+    /// How the Kalman gain is parametrised; default thermal.
+    pub noise: NoiseModel,
+    /// Share of the residual in the tangent space that counts as zero gradient; default 1e-4: a hundredth of a standard error at 8192 samples.
     pub gradient_tolerance: f64,
     /// How the covariance treats the residual; default its own spectrum.
     pub colour: ResidualColour,
@@ -50,11 +53,22 @@ impl Default for PemOptions {
             max_iterations: 60,
             offset: true,
             slope: true,
-            noise_model: true,
-            gradient_tolerance: 1e-5,
+            noise: NoiseModel::Thermal,
+            gradient_tolerance: 1e-4,
             colour: ResidualColour::Spectrum,
         }
     }
+}
+
+/// How the Kalman gain is parametrised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoiseModel {
+    /// K = 0: output error.
+    White,
+    /// K from the intensities of white output noise and of white forces on the sections (thermal noise): one parameter per section.
+    Thermal,
+    /// K free: n parameters.
+    Free,
 }
 
 /// How the iteration ended.
@@ -127,9 +141,52 @@ pub fn identify(
         experiments.iter().max_by_key(|experiment| experiment.output.len()).ok_or(ModelError::NoExperiment)?;
     let subspace = Subspace::new(longest.input, longest.output, options.block_rows)?;
     let limits = Limits { iterations: options.max_iterations, gradient: options.gradient_tolerance };
-    let start = best(&problem, &candidates(&subspace, options.order)?, options.noise_model, limits)?;
-    let state = minimise(&problem, start, limits)?;
+    let start = best(&problem, &candidates(&subspace, options.order)?, limits)?;
+    let mut state = minimise(&problem, start, limits)?;
+    match options.noise {
+        NoiseModel::White => {}
+        NoiseModel::Thermal => {
+            for _ in 0..THERMAL_ROUNDS {
+                let noise = thermal_noise(&problem, &state)?;
+                let next = State::new(&problem, Point { poles: state.point.poles.clone(), noise })?;
+                state = State { iterations: state.iterations, ..next };
+                state = minimise(&problem, state, limits)?;
+            }
+            // K belongs to the final poles: one more linear solution with exactly that predictor
+            if let Noise::Frozen(_, c) = &state.point.noise {
+                let noise = Noise::Frozen(state.point.a(), c.clone());
+                let point = Point { poles: state.point.poles.clone(), noise };
+                let State { iterations, ending, gradient, .. } = state;
+                state = State { iterations, ending, gradient, ..State::new(&problem, point)? };
+            }
+        }
+        NoiseModel::Free => {
+            let poles = state.point.poles.clone();
+            let next = State::new(&problem, Point { noise: Noise::Free(poles.clone()), poles })?;
+            state = minimise(&problem, State { iterations: state.iterations, ..next }, limits)?;
+        }
+    }
     conclude(&problem, &state, sample_time_s, options, subspace.singular_values().to_vec())
+}
+
+/// Rounds of noise, then poles: the second changes either by a fraction of its error, the third by less than a hundredth.
+const THERMAL_ROUNDS: usize = 3;
+
+/// Whitening by the noise that the residual shows.
+fn thermal_noise(problem: &Problem, state: &State) -> Result<Noise, ModelError> {
+    let tangent = Tangent::new(&full_jacobian(problem, state))?;
+    let e = state.residual();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let mut top = 0;
+    let mut spectra = Vec::new();
+    for (_, y) in &problem.experiments {
+        spectra.push((tangent.spectra(&e, top, y.len(), &mut planner), y.len()));
+        top += y.len();
+    }
+    let a = state.point.a();
+    let intensities = intensities(&a, &state.point.whitening(), &spectra);
+    let (_, predictor) = gain(problem.order, &a, &intensities)?;
+    Ok(Noise::Frozen(a, sections(&coordinates(&predictor))))
 }
 
 fn checked<'a>(
@@ -180,11 +237,15 @@ fn conclude(
 ) -> Result<Identified, ModelError> {
     let n = problem.order;
     let theta = &state.projection.theta;
-    let a = sections(&state.point.poles);
-    let c = state.point.predictor.as_deref().map(sections);
-    let gains = match &c {
-        Some(c) => kalman_gains(n, &a, c)?,
-        None => vec![[0.0; 2]; a.len()],
+    let a = state.point.a();
+    let c = match &state.point.noise {
+        Noise::White => a.clone(),
+        Noise::Frozen(_, c) => c.clone(),
+        Noise::Free(c) => sections(c),
+    };
+    let gains = match &state.point.noise {
+        Noise::White => vec![[0.0; 2]; a.len()],
+        _ => kalman_gains(n, &a, &c)?,
     };
     let model = InnovationsModel {
         sections: (0..a.len())
@@ -228,7 +289,7 @@ fn conclude(
         innovation_variance: state.projection.cost / freedom as f64,
         residuals,
         covariance,
-        predictor_poles: c.unwrap_or(a).iter().enumerate().flat_map(|(i, &c)| roots(c, section_order(n, i))).collect(),
+        predictor_poles: c.iter().enumerate().flat_map(|(i, &c)| roots(c, section_order(n, i))).collect(),
         singular_values,
         verdict: Verdict {
             ending: state.ending,
@@ -252,17 +313,22 @@ fn parameter_covariance(
     colour: ResidualColour,
 ) -> Result<Mat<f64>, ModelError> {
     let n = problem.order;
-    let a = sections(&state.point.poles);
-    let c = state.point.predictor.as_deref().map(sections);
-    let nonlinear = coefficient_jacobian(problem, &a, c.as_deref(), &state.regressors, &state.projection.theta, e);
+    let jacobian = full_jacobian(problem, state);
+    let lengths: Vec<usize> = problem.experiments.iter().map(|(_, y)| y.len()).collect();
+    let all = covariance(&jacobian, e, &lengths, colour)?;
+    let linear = jacobian.ncols() - problem.columns();
+    let kept: Vec<usize> = (0..n).chain(linear..linear + n + 1).collect();
+    Ok(Mat::from_fn(2 * n + 1, 2 * n + 1, |i, j| all[(kept[i], kept[j])]))
+}
+
+/// Derivatives of e to all a, free c, then all linear parameters.
+fn full_jacobian(problem: &Problem, state: &State) -> Mat<f64> {
+    let nonlinear = state.coefficient_jacobian(problem);
     let (rows, q, p) = (nonlinear.nrows(), nonlinear.ncols(), problem.columns());
     let mut jacobian = Mat::zeros(rows, q + p);
     jacobian.as_mut().get_mut(.., ..q).copy_from(&nonlinear);
     for j in 0..p {
         jacobian.col_mut(q + j).iter_mut().zip(state.regressors.col(j).iter()).for_each(|(t, x)| *t = -x);
     }
-    let lengths: Vec<usize> = problem.experiments.iter().map(|(_, y)| y.len()).collect();
-    let all = covariance(&jacobian, e, &lengths, colour)?;
-    let kept: Vec<usize> = (0..n).chain(q..q + n + 1).collect();
-    Ok(Mat::from_fn(2 * n + 1, 2 * n + 1, |i, j| all[(kept[i], kept[j])]))
+    jacobian
 }

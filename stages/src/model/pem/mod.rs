@@ -3,15 +3,18 @@
 mod covariance;
 mod gradient;
 mod identify;
+mod noise;
 mod optimiser;
 mod parametrisation;
 mod predictor;
 mod projection;
 mod starts;
+mod tangent;
 #[cfg(test)]
 mod tests;
 
 pub use covariance::ResidualColour;
-pub use identify::{Experiment, Identified, PemOptions, Verdict, identify};
+pub use identify::{Experiment, Identified, NoiseModel, PemOptions, Verdict, identify};
 pub use optimiser::Ending;
 pub(crate) use parametrisation::{Coefficients, roots, section_order};
+pub(crate) use predictor::all_pole;

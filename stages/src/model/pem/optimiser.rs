@@ -6,7 +6,7 @@
 use faer::Mat;
 
 use super::gradient::{Point, coefficient_jacobian, residual, to_coordinates};
-use super::parametrisation::{LIMIT, sections};
+use super::parametrisation::LIMIT;
 use super::predictor::Problem;
 use super::projection::Projection;
 use crate::model::error::ModelError;
@@ -46,9 +46,7 @@ pub(crate) struct State {
 impl State {
     /// Evaluates a point. Errors: no finite prediction errors there.
     pub fn new(problem: &Problem, point: Point) -> Result<Self, ModelError> {
-        let a = sections(&point.poles);
-        let c = point.predictor.as_deref().map_or_else(|| a.clone(), sections);
-        let regressors = problem.regressors(&a, &c);
+        let regressors = problem.regressors(&point.a(), &point.whitening());
         let projection = Projection::new(&regressors)?;
         Ok(Self { point, regressors, projection, gradient: f64::NAN, iterations: 0, ending: Ending::IterationLimit })
     }
@@ -60,13 +58,14 @@ impl State {
 
     /// Kaufman's Jacobian in coordinates, not yet projected.
     fn jacobian(&self, problem: &Problem) -> Mat<f64> {
-        let a = sections(&self.point.poles);
-        let c = self.point.predictor.as_deref().map(sections);
-        let e = self.residual();
-        let theta = &self.projection.theta;
-        let mut jacobian = coefficient_jacobian(problem, &a, c.as_deref(), &self.regressors, theta, &e);
+        let mut jacobian = self.coefficient_jacobian(problem);
         to_coordinates(&mut jacobian, &self.point);
         jacobian
+    }
+
+    /// Derivatives of the residual to the coefficients of poles and, where free, predictor.
+    pub fn coefficient_jacobian(&self, problem: &Problem) -> Mat<f64> {
+        coefficient_jacobian(problem, &self.point, &self.regressors, &self.projection.theta, &self.residual())
     }
 }
 

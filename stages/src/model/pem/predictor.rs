@@ -44,14 +44,14 @@ impl Problem<'_> {
         self.order + 1 + index * self.nuisances()
     }
 
-    /// Filtered regressors, and the filtered output as the last column: rows x (columns + 1).
+    /// Regressors filtered by `prod whitening.0 / whitening.1`, and the filtered output as the last column: rows x (columns + 1).
     ///
     /// Order of states within a section: observer form, `x1+ = -a1 x1 + x2 + b1 u`, `x2+ = -a2 x1 + b2 u`, `y = x1`.
-    pub fn regressors(&self, a: &[Coefficients], c: &[Coefficients]) -> Mat<f64> {
+    pub fn regressors(&self, a: &[Coefficients], whitening: &(Vec<Coefficients>, Vec<Coefficients>)) -> Mat<f64> {
         let mut matrix = Mat::zeros(self.rows(), self.columns() + 1);
         let mut top = 0;
         for (index, (u, y)) in self.experiments.iter().enumerate() {
-            let signals = whiten(a, c, lanes(u, y));
+            let signals = whiten(&whitening.0, &whitening.1, lanes(u, y));
             self.fill(&mut matrix, top, index, &signals, a);
             top += y.len();
         }

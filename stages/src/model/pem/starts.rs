@@ -5,7 +5,7 @@
 
 use faer::c64;
 
-use super::gradient::Point;
+use super::gradient::{Noise, Point};
 use super::optimiser::{Limits, State, minimise};
 use super::parametrisation::coordinates;
 use super::predictor::Problem;
@@ -36,19 +36,12 @@ pub(crate) fn candidates(subspace: &Subspace, order: usize) -> Result<Vec<Vec<c6
     Ok(starts)
 }
 
-/// Best state after a few iterations from the most promising starts.
-pub(crate) fn best(
-    problem: &Problem,
-    starts: &[Vec<c64>],
-    free_noise: bool,
-    limits: Limits,
-) -> Result<State, ModelError> {
+/// Best output-error state after a few iterations from the most promising starts.
+pub(crate) fn best(problem: &Problem, starts: &[Vec<c64>], limits: Limits) -> Result<State, ModelError> {
     let mut states = Vec::new();
     let mut failure = ModelError::Degenerate("no start could be evaluated");
     for poles in starts {
-        let poles = coordinates(poles);
-        let predictor = free_noise.then(|| poles.clone());
-        match State::new(problem, Point { poles, predictor }) {
+        match State::new(problem, Point { poles: coordinates(poles), noise: Noise::White }) {
             Ok(state) => states.push(state),
             Err(error) => failure = error,
         }

@@ -49,7 +49,7 @@ fn release() -> Vec<f64> {
 }
 
 /// Differences of a noise-free release, and their estimate.
-fn differenced() -> Etfe {
+fn differenced() -> TransferEstimate {
     etfe(&difference(&step(N)), &difference(&release()), &[0.0; N], settings(EndTreatment::Differenced)).unwrap()
 }
 
