@@ -58,16 +58,21 @@ pub struct Windows {
 
 /// Cuts aligned windows out of segments with the detected onset at sample `onset`.
 ///
-/// Method: 1. windows at the aligned positions; 2. the onset of their average, whose noise is the root of their number smaller: the first
+/// # Method
+/// 1. windows at the aligned positions; 2. the onset of their average, whose noise is the root of their number smaller: the first
 /// sustained departure beyond 4 standard deviations, for 4 samples; all windows move by it as one, in whole samples; 3. lines before and after (its second half)
 /// give the jump of the average; each event's own is its share of it, by the amplitude of the correlation; 4. each event is
 /// regressed on the average of the others and 1, after the onset, for the quality.
 /// `loaded_before`: a snap-off is free after the onset, a snap-to-contact before: there the offset is read.
-/// Shapes: segments with [`WindowSettings::margins`] round `onset`, one [`Aligned`] each.
-/// Units: as the segments; positions in samples.
-/// Accuracy: interpolation 5e-5 of the jump at the onset, 1e-6 elsewhere (see [`fractional_shift`](super::fractional_shift)); the onset is late by the
+/// # Shapes
+/// Segments with [`WindowSettings::margins`] round `onset`, one [`Aligned`] each.
+/// # Units
+/// As the segments; positions in samples.
+/// # Accuracy
+/// Interpolation 5e-5 of the jump at the onset, 1e-6 elsewhere (see [`fractional_shift`](super::fractional_shift)); the onset is late by the
 /// samples that the signal stays within the average's noise, one to three, alike in all events.
-/// Errors: none; segments shorter than that are padded with their end values.
+/// # Errors
+/// None; segments shorter than that are padded with their end values.
 pub fn cut_windows(
     segments: &[Vec<f64>],
     onset: usize,

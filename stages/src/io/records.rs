@@ -13,15 +13,22 @@ use super::file_patterns::matching_files;
 
 /// Opens native HDF5 records by pattern.
 ///
-/// Model: file attributes `sample_rate_hz`, `started_at`; one dataset per channel; value = stored * scale_factor + add_offset.
-/// Method: files in natural order; nothing but attributes is read here, samples are streamed by the stages that need them. Sample rate and unit
+/// # Model
+/// File attributes `sample_rate_hz`, `started_at`; one dataset per channel; value = stored * scale_factor + add_offset.
+/// # Method
+/// Files in natural order; nothing but attributes is read here, samples are streamed by the stages that need them. Sample rate and unit
 /// must agree over all files; other lengths are reported.
-/// Shapes: one record per file, with the roles `deflection` and, where the file has it, `piezo`.
-/// Units: the channels' own.
-/// Accuracy: codes stay codes: nothing is rounded.
-/// Errors: a pattern without a match; files that are no HDF5, cut short or damaged; a missing channel or attribute; rates or units that differ; a rate too low for
+/// # Shapes
+/// One record per file, with the roles `deflection` and, where the file has it, `piezo`.
+/// # Units
+/// The channels' own.
+/// # Accuracy
+/// Codes stay codes: nothing is rounded.
+/// # Errors
+/// A pattern without a match; files that are no HDF5, cut short or damaged; a missing channel or attribute; rates or units that differ; a rate too low for
 /// a ringdown.
-/// Source: the CF conventions for scale_factor and add_offset.
+/// # Source
+/// The CF conventions for scale_factor and add_offset.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Records {
