@@ -42,8 +42,8 @@ impl CrossCorrelator {
     /// # Model
     /// `signal[n + lag] = a template[n] + b + noise`, a > 0.
     /// # Method
-    /// `r(lag) = sum (t - mean t) s[n + lag] / (|t - mean t| |s - local mean s|)`; numerators by one circular FFT correlation (long
-    /// enough that nothing wraps), local energies by running sums; the peak refined by a parabola through three points.
+    /// `r(lag) = sum (t - mean t) s[n + lag] / (|t - mean t| |s - local mean s|)`; numerators by one circular FFT correlation
+    /// (long enough that nothing wraps), local energies by running sums; the peak refined by a parabola through three points.
     /// # Accuracy
     /// Whole samples certain, fractions to some hundredths: refine with [`refine_shift`](super::refine_shift).
     /// # Shapes

@@ -36,11 +36,11 @@ impl Curve {
             let top = on + (off - on) * 2 / 5;
             let top_level = -0.04 + CONTACT_SLOPE * (top - on) as f64;
             let slope_down = (self.load - top_level) / (off - top) as f64;
-            for k in on..off {
+            for (k, y) in y.iter_mut().enumerate().take(off).skip(on) {
                 let x = (k - on) as f64;
                 let swing = 0.04 * (-x / 80.0).exp() * (TAU * x / 30.0).cos();
                 let up = CONTACT_SLOPE * x.min((top - on) as f64);
-                y[k] = -0.04 + swing + up + if k > top { slope_down * (k - top) as f64 } else { 0.0 };
+                *y = -0.04 + swing + up + if k > top { slope_down * (k - top) as f64 } else { 0.0 };
             }
             let rest = (n + 1) * self.cycle - off;
             for k in 0..rest {
