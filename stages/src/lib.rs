@@ -14,10 +14,12 @@ use afmid_pipeline::{Entry, Registry};
 
 /// The stages of every domain that has any: one line each.
 const DOMAINS: &[&[Entry]] = &[
+    calibration::STAGES,
     ensemble::STAGES,
     events::STAGES,
     force::STAGES,
     io::STAGES,
+    model::STAGES,
     simulate::STAGES,
     spectrum::STAGES,
 ];
