@@ -13,6 +13,7 @@ use afmid_pipeline::stage::DoubleName;
 use afmid_pipeline::{Entry, Registry};
 
 /// The stages of every domain that has any: one line each.
+#[rustfmt::skip]
 const DOMAINS: &[&[Entry]] = &[
     calibration::STAGES,
     ensemble::STAGES,
