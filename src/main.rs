@@ -1,2 +1,4 @@
 //! afmid, the command line.
+mod report;
+
 fn main() {}
