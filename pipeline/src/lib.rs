@@ -9,12 +9,16 @@
 //! between stages is an [`Artifact`]: one of five shapes, whatever it means.
 
 pub mod artifact;
+pub mod cache;
 pub mod config;
+pub mod conformance;
 pub mod error;
 pub mod graph;
 pub mod recording;
+pub mod reference;
 pub mod runner;
 pub mod stage;
+pub mod store;
 
 // what a crate with stages of its own derives with: the same versions as the engine
 pub use {schemars, serde, serde_json, toml};

@@ -1,7 +1,22 @@
 //! Recordings: lazy, re-readable record files. They are streamed, never held whole.
 
+mod chunk;
+mod hash;
+mod native;
+mod recent;
+mod source;
+mod write;
+
+#[cfg(test)]
+mod tests;
+
 use std::path::PathBuf;
 use std::sync::Arc;
+
+pub use hash::hash_file;
+pub use native::{Wanted, open_native};
+pub(crate) use source::DeferredSource;
+pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
 
 use crate::error::StageError;
 

@@ -11,5 +11,5 @@ pub struct RunError {
     /// Its name in the registry.
     pub uses: String,
     /// Why.
-    pub error: StageError,
+    pub error: Box<StageError>,
 }

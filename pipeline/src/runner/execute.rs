@@ -70,7 +70,14 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
             sources
         })
         .collect();
-    let outcomes = run_graph(&needs, |index, board| step(plan, &plan.nodes[index], options, board));
+    let outcomes = run_graph(&needs, |index, board| {
+        let node = &plan.nodes[index];
+        step(plan, node, options, board).map_err(|error| RunError {
+            id: node.id.clone(),
+            uses: node.uses.clone(),
+            error: Box::new(error),
+        })
+    });
     let (mut stages, mut times, mut errors) = (Vec::new(), Vec::new(), Vec::new());
     for outcome in outcomes {
         match outcome {
@@ -103,9 +110,13 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
     })
 }
 
-fn step(plan: &Plan, node: &Node, options: &Options<'_>, board: &Board<Finished, RunError>) -> Result<Finished, RunError> {
+fn step(
+    plan: &Plan,
+    node: &Node,
+    options: &Options<'_>,
+    board: &Board<Finished, RunError>,
+) -> Result<Finished, StageError> {
     let clock = Instant::now();
-    let fail = |error: StageError| RunError { id: node.id.clone(), uses: node.uses.clone(), error };
     let upstream = |index: usize| board.done(index).map(|finished| finished.record.key.clone());
     let planned = plan_node(plan, node, &options.base, &upstream)?;
     let stored = node.stage.spec().caching == Caching::Stored;
@@ -116,7 +127,7 @@ fn step(plan: &Plan, node: &Node, options: &Options<'_>, board: &Board<Finished,
         None => {
             let result = execute(node, options, board, planned.seed.unwrap_or_default())?;
             if stored {
-                options.cache.put(&planned.key, &result).map_err(|error| fail(error.into()))?;
+                options.cache.put(&planned.key, &result)?;
             }
             result
         }
@@ -143,18 +154,22 @@ fn step(plan: &Plan, node: &Node, options: &Options<'_>, board: &Board<Finished,
 }
 
 /// Runs the stage itself and checks what it made: the ports it declares, with the shapes that it declares.
-fn execute(node: &Node, options: &Options<'_>, board: &Board<Finished, RunError>, seed: u64) -> Result<StageResult, RunError> {
-    let fail = |error: StageError| RunError { id: node.id.clone(), uses: node.uses.clone(), error };
+fn execute(
+    node: &Node,
+    options: &Options<'_>,
+    board: &Board<Finished, RunError>,
+    seed: u64,
+) -> Result<StageResult, StageError> {
     let mut inputs = Ports::new();
     for wire in &node.inputs {
         let artifact = board.done(wire.node).and_then(|finished| finished.record.result.outputs.artifact(wire.output));
         let missing = || StageError::new(format!("the source of port `{}` made no `{}`", wire.port, wire.output));
-        inputs.insert(wire.port, artifact.ok_or_else(missing).map_err(fail)?.clone());
+        inputs.insert(wire.port, artifact.ok_or_else(missing)?.clone());
     }
     let progress = options.observer.begin(&node.id);
     let context = Context::new(&options.base, seed, progress.as_ref());
-    let outputs = node.stage.run(&inputs, &context).map_err(fail)?;
-    check_outputs(node, &outputs).map_err(fail)?;
+    let outputs = node.stage.run(&inputs, &context)?;
+    check_outputs(node, &outputs)?;
     Ok(StageResult { outputs, warnings: context.into_warnings() })
 }
 
@@ -162,7 +177,9 @@ fn check_outputs(node: &Node, outputs: &Ports) -> Result<(), StageError> {
     let spec = node.stage.spec();
     for port in spec.outputs {
         match outputs.artifact(port.name) {
-            Some(artifact) if artifact.shape() == port.shape => artifact.validate().map_err(|error| error.on(port.name))?,
+            Some(artifact) if artifact.shape() == port.shape => {
+                artifact.validate().map_err(|error| error.on(port.name))?
+            }
             Some(artifact) => {
                 let (found, wanted) = (artifact.shape().name(), port.shape.name());
                 return Err(StageError::new(format!("the stage made a {found}, it declares a {wanted}")).on(port.name));

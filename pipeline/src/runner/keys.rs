@@ -4,7 +4,6 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::error::RunError;
 use super::result::SourceFile;
 use crate::cache::{Cache, KeyParts, key};
 use crate::error::StageError;
@@ -34,15 +33,19 @@ pub struct StagePlan {
 }
 
 /// Works out a node's key from its parameters, its files and the keys of what it needs.
-pub(super) fn plan_node(plan: &Plan, node: &Node, base: &Path, upstream: &dyn Fn(usize) -> Option<String>) -> Result<StagePlan, RunError> {
-    let fail = |error: StageError| RunError { id: node.id.clone(), uses: node.uses.clone(), error };
+pub(super) fn plan_node(
+    plan: &Plan,
+    node: &Node,
+    base: &Path,
+    upstream: &dyn Fn(usize) -> Option<String>,
+) -> Result<StagePlan, StageError> {
     let spec = node.stage.spec();
-    let sources = node.stage.sources(base).map_err(fail)?.par_iter().map(|path| source_file(path)).collect::<Result<Vec<_>, _>>();
-    let sources = sources.map_err(fail)?;
+    let sources = node.stage.sources(base)?.par_iter().map(|path| source_file(path)).collect::<Result<Vec<_>, _>>();
+    let sources = sources?;
     let seed = spec.seeded.then(|| stage_seed(plan.seed(), &node.id));
     let mut wires = Vec::new();
     for wire in &node.inputs {
-        let missing = || fail(StageError::new(format!("port `{}`: its source has no key yet", wire.port)));
+        let missing = || StageError::new(format!("port `{}`: its source has no key yet", wire.port));
         wires.push((wire.port.to_owned(), upstream(wire.node).ok_or_else(missing)?, wire.output.to_owned()));
     }
     wires.sort();

@@ -2,6 +2,7 @@
 
 mod config;
 mod graph;
+mod reference;
 mod robustness;
 mod stages;
 

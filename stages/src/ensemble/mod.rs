@@ -5,16 +5,33 @@
 //! millivolts) and by the slope with which the piezo loads the lever; what is left is noise, and only this enters standard
 //! errors.
 
+use afmid_pipeline::Entry;
+
+mod average;
+mod drift;
 mod error;
+pub(crate) mod example;
 mod moments;
 mod rows;
 mod scatter;
 mod shape_drift;
 mod split;
 
+pub use average::Average;
+pub(crate) use average::onset_sample;
+pub use drift::Drift;
 pub use error::EnsembleError;
 pub use moments::{Moments, moments};
 pub use rows::Rows;
 pub use scatter::{Scatter, scatter};
 pub use shape_drift::{DriftSettings, ShapeDrift, SubEnsemble, shape_drift};
 pub use split::{Split, split_halves};
+
+/// The stages of this domain.
+pub const STAGES: &[Entry] = &[Entry::of::<Average>(), Entry::of::<Drift>()];
+
+#[cfg(test)]
+#[test]
+fn examples_hold() {
+    example::run_examples(STAGES);
+}

@@ -11,6 +11,8 @@ pub struct Scatter {
     pub amplitude: Vec<f64>,
     /// Offset against the mean, per event, in the rows' unit.
     pub offset: Vec<f64>,
+    /// How much later than the mean, per event, in samples: what alignment has left.
+    pub lag: Vec<f64>,
     /// Root mean square of the remainder, per event.
     pub rms: Vec<f64>,
     /// Variance of the noise of one event, per sample.
@@ -27,15 +29,16 @@ impl Scatter {
     }
 }
 
-/// Regresses each chosen event on the mean, a constant, and a ramp on either side of the event.
+/// Regresses each chosen event on the mean, its slope, a constant, and a ramp on either side of the event.
 ///
 /// # Model
-/// `y_i(t) = a_i m(t) + b_i + c_i min(t, 0) + d_i max(t, 0) + e_i(t)`, `t = 0` at sample `zero`. A stronger adhesion makes
-/// the whole ringing larger (`a_i`), but not the slope at which the piezo loads the lever (`c_i`, `d_i`); records wander
-/// by an offset (`b_i`). None of this is noise.
+/// `y_i(t) = a_i (m(t) - l_i m'(t)) + b_i + c_i min(t, 0) + d_i max(t, 0) + e_i(t)`, `t = 0` at sample `zero`. A stronger adhesion
+/// makes the whole ringing larger (`a_i`), but not the slope at which the piezo loads the lever (`c_i`, `d_i`); records wander
+/// by an offset (`b_i`), and alignment leaves a fraction of a sample (`l_i`). None of this is noise.
 ///
 /// # Method
-/// Least squares by twice repeated Gram-Schmidt on the four columns (a ramp with less than eight samples is left out).
+/// Least squares by twice repeated Gram-Schmidt on the five columns (a ramp with less than eight samples is left out, and
+/// so is a slope that vanishes); `m'` by central differences.
 /// Noise variance: sum of squares over `n - 1`, since the mean holds a share of each event, times `T / (T - p)` for the
 /// `p` coefficients per event.
 ///
@@ -61,84 +64,106 @@ pub fn scatter(rows: Rows<'_>, chosen: &[usize], mean: &[f64], zero: usize) -> R
         return Err(EnsembleError::TooFewSamples { got: samples.min(mean.len()), wanted: 16, purpose: "a regression" });
     }
     let basis = Basis::new(mean, zero)?;
-    let fits: Vec<(f64, f64, Vec<f64>)> = chosen.par_iter().map(|&i| basis.project(rows.row(i))).collect();
+    let fits: Vec<Fit> = chosen.par_iter().map(|&i| basis.project(rows.row(i))).collect();
     let n = chosen.len() as f64;
     let freedom = samples as f64 / (samples - basis.columns.len()) as f64 / (n - 1.0);
     let mut noise_variance = vec![0.0; samples];
-    for (_, _, residual) in &fits {
-        for (v, e) in noise_variance.iter_mut().zip(residual) {
+    for fit in &fits {
+        for (v, e) in noise_variance.iter_mut().zip(&fit.residual) {
             *v += e * e * freedom;
         }
     }
-    let rms = fits.iter().map(|f| (f.2.iter().map(|e| e * e).sum::<f64>() / samples as f64).sqrt()).collect();
     Ok(Scatter {
-        amplitude: fits.iter().map(|f| f.0).collect(),
-        offset: fits.iter().map(|f| f.1).collect(),
-        rms,
+        amplitude: fits.iter().map(|f| f.amplitude).collect(),
+        offset: fits.iter().map(|f| f.offset).collect(),
+        lag: fits.iter().map(|f| f.lag).collect(),
+        rms: fits.iter().map(|f| (dot(&f.residual, &f.residual) / samples as f64).sqrt()).collect(),
         noise_variance,
-        residual: fits.into_iter().flat_map(|f| f.2).collect(),
+        residual: fits.into_iter().flat_map(|f| f.residual).collect(),
     })
 }
 
-/// Orthonormal columns: constant, ramps, and the mean last, so that its coefficient is read off directly.
-struct Basis {
-    columns: Vec<Vec<f64>>,
-    /// Part of the mean outside the other columns.
-    mean_norm: f64,
-    /// Value of the mean and of its reconstruction's constant part at `t = 0`.
-    mean: Vec<f64>,
-    samples: usize,
+/// One event against the mean.
+struct Fit {
+    amplitude: f64,
+    offset: f64,
+    lag: f64,
+    residual: Vec<f64>,
 }
 
-impl Basis {
-    fn new(mean: &[f64], zero: usize) -> Result<Self, EnsembleError> {
+/// Orthonormal columns: constant, ramps, the mean, and its slope last.
+struct Basis<'a> {
+    mean: &'a [f64],
+    columns: Vec<Vec<f64>>,
+    /// Number of the mean's column; the slope's, if any, follows.
+    shape: usize,
+    /// Norm of what each of the two adds to the columns before, and the slope's share along the mean's column.
+    shape_norm: f64,
+    slope_norm: f64,
+    slope_share: f64,
+}
+
+impl<'a> Basis<'a> {
+    fn new(mean: &'a [f64], zero: usize) -> Result<Self, EnsembleError> {
         let samples = mean.len();
-        let scale = samples as f64;
-        let time = |k: usize| (k as f64 - zero as f64) / scale;
-        let mut raw = vec![vec![1.0; samples]];
+        let time = |k: usize| (k as f64 - zero as f64) / samples as f64;
+        let mut columns = Vec::new();
+        orthogonalise(&mut columns, vec![1.0; samples]);
         if zero >= 8 {
-            raw.push((0..samples).map(|k| time(k).min(0.0)).collect());
+            orthogonalise(&mut columns, (0..samples).map(|k| time(k).min(0.0)).collect());
         }
         if zero + 8 < samples {
-            raw.push((0..samples).map(|k| time(k).max(0.0)).collect());
+            orthogonalise(&mut columns, (0..samples).map(|k| time(k).max(0.0)).collect());
         }
-        raw.push(mean.to_vec());
-        let size = dot(mean, mean).sqrt();
-        let mut columns: Vec<Vec<f64>> = Vec::with_capacity(raw.len());
-        let mut norm = 0.0;
-        for mut column in raw {
-            // twice is enough (Giraud, Langou, Rozloznik 2005)
-            for _ in 0..2 {
-                for q in &columns {
-                    let c = dot(q, &column);
-                    column.iter_mut().zip(q).for_each(|(v, q)| *v -= c * q);
-                }
-            }
-            norm = dot(&column, &column).sqrt();
-            if norm > 0.0 {
-                column.iter_mut().for_each(|v| *v /= norm);
-            }
-            columns.push(column);
-        }
+        let shape = columns.len();
+        let shape_norm = orthogonalise(&mut columns, mean.to_vec());
         // rounding of the projections leaves eps * size * a few
-        if norm.partial_cmp(&(1e-12 * size)) != Some(std::cmp::Ordering::Greater) {
+        if columns.len() == shape {
             return Err(EnsembleError::NoShape);
         }
-        Ok(Self { columns, mean_norm: norm, mean: mean.to_vec(), samples })
+        let at = |k: usize| mean[k.min(samples - 1)];
+        let slope: Vec<f64> = (0..samples).map(|k| 0.5 * (at(k + 1) - at(k.saturating_sub(1)))).collect();
+        let slope_share = dot(&columns[shape], &slope);
+        let slope_norm = orthogonalise(&mut columns, slope);
+        Ok(Self { mean, columns, shape, shape_norm, slope_norm, slope_share })
     }
 
-    /// Amplitude, offset and remainder of one event.
-    fn project(&self, row: &[f64]) -> (f64, f64, Vec<f64>) {
+    fn project(&self, row: &[f64]) -> Fit {
         let mut residual = row.to_vec();
-        let mut amplitude = 0.0;
-        for q in &self.columns {
+        let mut share = [0.0; 2];
+        for (number, q) in self.columns.iter().enumerate() {
             let c = dot(q, &residual);
             residual.iter_mut().zip(q).for_each(|(v, q)| *v -= c * q);
-            amplitude = c / self.mean_norm;
+            if number >= self.shape {
+                share[number - self.shape] = c;
+            }
         }
-        // the ramps have no constant part by convention: the offset is the mean difference of what amplitude leaves
-        let offset = row.iter().zip(&self.mean).map(|(y, m)| y - amplitude * m).sum::<f64>() / self.samples as f64;
-        (amplitude, offset, residual)
+        // back-substitution through the last two columns
+        let along_slope = if self.slope_norm > 0.0 { share[1] / self.slope_norm } else { 0.0 };
+        let amplitude = (share[0] - along_slope * self.slope_share) / self.shape_norm;
+        let lag = if amplitude == 0.0 { 0.0 } else { -along_slope / amplitude };
+        let offset = row.iter().zip(self.mean).map(|(y, m)| y - amplitude * m).sum::<f64>() / row.len() as f64;
+        Fit { amplitude, offset, lag, residual }
+    }
+}
+
+/// Appends what `column` adds to the others, normalised, and returns its norm; zero, and nothing appended, if it adds nothing.
+fn orthogonalise(columns: &mut Vec<Vec<f64>>, mut column: Vec<f64>) -> f64 {
+    let size = dot(&column, &column).sqrt();
+    // twice is enough (Giraud, Langou, Rozloznik 2005)
+    for _ in 0..2 {
+        for q in columns.iter() {
+            let c = dot(q, &column);
+            column.iter_mut().zip(q).for_each(|(v, q)| *v -= c * q);
+        }
+    }
+    let norm = dot(&column, &column).sqrt();
+    if norm > 1e-12 * size {
+        column.iter_mut().for_each(|v| *v /= norm);
+        columns.push(column);
+        norm
+    } else {
+        0.0
     }
 }
 
@@ -199,6 +224,24 @@ mod tests {
         let got = scatter(rows, &rows.all(), &mean.mean, 800).unwrap();
         // rounding of values of order one
         assert!(got.residual.iter().all(|e| e.abs() < 1e-13));
+    }
+
+    #[test]
+    fn a_fraction_of_a_sample_is_not_noise() {
+        let samples = 4096;
+        let jitter = white_noise(16, 0.2, 5);
+        let values: Vec<f64> = jitter.iter().flat_map(|j| Lever::paper().release(samples, 800.5 + j, -0.9)).collect();
+        let rows = Rows::new(&values, samples).unwrap();
+        let mean = moments(rows, &rows.all()).unwrap();
+        let got = scatter(rows, &rows.all(), &mean.mean, 800).unwrap();
+        let centre = jitter.iter().sum::<f64>() / 16.0;
+        for (lag, j) in got.lag.iter().zip(&jitter) {
+            // second order: half a squared lag times the curvature, and central differences at the fourth mode
+            assert!((lag - (j - centre)).abs() < 0.1, "{lag} {}", j - centre);
+        }
+        let noise = (got.noise_variance.iter().sum::<f64>() / samples as f64).sqrt();
+        let plain = (mean.variance.iter().sum::<f64>() / samples as f64).sqrt();
+        assert!(noise < 0.15 * plain, "{noise:e} {plain:e}");
     }
 
     #[test]

@@ -195,13 +195,13 @@ mod tests {
         let samples = 2048;
         let mut values = Vec::new();
         let scatter = white_noise(count, 0.1, seed);
-        for i in 0..count {
+        for (i, own) in scatter.iter().enumerate() {
             let mut lever = Lever::paper();
             let at = i as f64 / (count - 1) as f64;
             lever.frequency_hz.iter_mut().for_each(|f| *f *= 1.0 + drift * (at - 0.5));
-            let shape = lever.release(samples, 300.0, -0.9 * (1.0 + scatter[i] + 0.2 * at));
+            let shape = lever.release(samples, 300.0, -0.9 * (1.0 + own + 0.2 * at));
             let noise = white_noise(samples, 1.2e-3, seed * 977 + i as u64);
-            values.extend(shape.iter().zip(noise).map(|(y, e)| y + e + 4e-3 * scatter[i]));
+            values.extend(shape.iter().zip(noise).map(|(y, e)| y + e + 4e-3 * own));
         }
         (values, samples)
     }

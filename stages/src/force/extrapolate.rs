@@ -36,7 +36,7 @@ pub struct ExtrapolationSettings {
 
 /// Lines before and after, and the load between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extrapolation {
+pub struct Lines {
     /// Line before the event.
     pub before: Line,
     /// Line after the event, ringing weighted away.
@@ -96,7 +96,7 @@ pub fn extrapolate(
     standard_error: &[f64],
     settings: ExtrapolationSettings,
     t0: Option<Onset>,
-) -> Result<Extrapolation, ForceError> {
+) -> Result<Lines, ForceError> {
     if mean.len() != standard_error.len() {
         return Err(ForceError::Lengths { mean: mean.len(), standard_error: standard_error.len() });
     }
@@ -135,7 +135,7 @@ pub fn extrapolate(
         return Err(ForceError::NoLoad { load, sigmas: load.abs() / load_std });
     }
     let load_slope = if snap_off { before.slope - after.slope } else { after.slope - before.slope };
-    Ok(Extrapolation { before, after, onset, load, load_std, load_slope, rms_before })
+    Ok(Lines { before, after, onset, load, load_std, load_slope, rms_before })
 }
 
 /// Input and response on the grid of the mean.
@@ -150,7 +150,7 @@ pub fn extrapolate(
 ///
 /// # Units
 /// Those of the mean: the quasi-static gain from force to response is one.
-pub fn pair(mean: &[f64], lines: &Extrapolation, event: Event) -> Pair {
+pub fn pair(mean: &[f64], lines: &Lines, event: Event) -> Pair {
     let (zero, loaded) = match event {
         Event::SnapOff => (lines.after, lines.before),
         Event::SnapIn => (lines.before, lines.after),

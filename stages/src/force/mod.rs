@@ -4,12 +4,26 @@
 //! under the load, after it there is none. Both lines are extrapolated to the moment `t0`, and their difference is the input,
 //! in volts of static deflection, so that the quasi-static gain is one.
 
+use afmid_pipeline::Entry;
+
 mod error;
+mod example;
 mod extrapolate;
+mod extrapolation;
 mod line;
 mod onset;
 
 pub use error::ForceError;
-pub use extrapolate::{Event, Extrapolation, ExtrapolationSettings, Pair, ZeroLine, extrapolate, pair};
+pub use extrapolate::{Event, ExtrapolationSettings, Lines, Pair, ZeroLine, extrapolate, pair};
+pub use extrapolation::{Extrapolation, ZeroLineKind};
 pub use line::{Line, Weighting, fit_line};
 pub use onset::{Onset, OnsetSettings, find_onset};
+
+/// The stages of this domain.
+pub const STAGES: &[Entry] = &[Entry::of::<Extrapolation>()];
+
+#[cfg(test)]
+#[test]
+fn examples_hold() {
+    crate::ensemble::example::run_examples(STAGES);
+}

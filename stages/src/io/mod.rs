@@ -1,1 +1,23 @@
 //! Loading: records from files.
+
+use afmid_pipeline::Entry;
+
+mod census;
+mod code_census;
+mod consistency;
+mod file_patterns;
+mod memory;
+mod natural_order;
+mod records;
+mod records_example;
+
+pub use census::Census;
+pub use code_census::{CensusSettings, ChannelCensus, Found};
+pub use consistency::{Consistency, check_consistency};
+pub use file_patterns::matching_files;
+pub use memory::{MemorySource, memory_channel, memory_record};
+pub use natural_order::natural_order;
+pub use records::Records;
+
+/// The stages of this domain.
+pub const STAGES: &[Entry] = &[Entry::of::<Records>(), Entry::of::<Census>()];

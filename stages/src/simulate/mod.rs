@@ -5,7 +5,9 @@
 //! [`PhaseProblem`] chooses start phases so that an archive holds a stated number of events.
 
 mod adc;
+mod afm;
 mod afm_system;
+mod archive;
 mod contact;
 mod detector;
 mod discretisation;
@@ -18,12 +20,15 @@ mod ramp;
 mod readout_noise;
 mod recorder;
 mod square;
+mod truth;
 
 #[cfg(test)]
 mod tests;
 
 pub use adc::Adc;
+pub use afm::Afm;
 pub use afm_system::{AfmSystem, BOLTZMANN_J_PER_K};
+pub use archive::{Archive, ArchiveLayout};
 pub use contact::{ADHESION_CUT, Contact};
 pub use detector::Detector;
 pub use discretisation::{LinearSystem, Step};
@@ -35,3 +40,9 @@ pub use ramp::TriangleRamp;
 pub use readout_noise::{Drift, PINK_LOWEST_HZ, ReadoutNoise};
 pub use recorder::{Microscope, PiezoMonitor, Place, RecordedEvent, Scatter, SimulatedRecord, archive_stream, counted};
 pub use square::Square;
+pub use truth::{Counts, EventTruth, RecordTruth, Truth};
+
+use afmid_pipeline::Entry;
+
+/// The stages of this domain.
+pub const STAGES: &[Entry] = &[Entry::of::<Afm>()];

@@ -1,0 +1,153 @@
+//! A stage's examples run, and what they make is what the stage declares.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::same::difference;
+use crate::error::StageError;
+use crate::stage::{Context, DynStage, Entry, Example, NoProgress, PortSpec, Ports};
+
+/// The seed of every example.
+const SEED: u64 = 1;
+
+/// Runs an example in a folder of its own, which is removed again: its outputs. Errors: why it does not run.
+pub fn run_example(entry: &Entry, example: &Example) -> Result<Ports, String> {
+    let stage = instance(entry, example)?;
+    let inputs = (example.inputs)().map_err(|error| format!("inputs: {error}"))?;
+    run(stage.as_ref(), &inputs)
+}
+
+/// Checks that there is an example, that each runs with the declared ports and makes the declared ports, and that the truth comes out.
+pub fn examples_hold(entry: &Entry) -> Vec<String> {
+    let examples = (entry.examples)();
+    if examples.is_empty() {
+        return vec!["there is no example".to_owned()];
+    }
+    let mut violations = Vec::new();
+    for example in &examples {
+        let outcome = holds(entry, example).err();
+        violations.extend(outcome.map(|why| format!("example {:?}: {why}", example.title)));
+    }
+    violations
+}
+
+/// Checks that a parameter nobody knows is refused by its name.
+pub fn unknown_key_refused(entry: &Entry) -> Vec<String> {
+    const KEY: &str = "a_parameter_that_nobody_knows";
+    let mut violations = Vec::new();
+    for example in (entry.examples)() {
+        let Ok(mut params) = example.params.parse::<toml::Table>() else { continue };
+        params.insert(KEY.to_owned(), toml::Value::Boolean(true));
+        match (entry.parse)(params) {
+            Err(error) if error.message.contains(KEY) => {}
+            Err(error) => violations.push(format!("an unknown parameter is refused without its name: {error}")),
+            Ok(_) => violations.push("an unknown parameter is accepted: add `deny_unknown_fields`".to_owned()),
+        }
+    }
+    violations
+}
+
+/// Checks that each example gives the same bits twice, and on one thread as on four.
+pub fn repeatable(entry: &Entry) -> Vec<String> {
+    let mut violations = Vec::new();
+    for example in (entry.examples)() {
+        let runs = [1, 4, 4].map(|threads| on_threads(threads, || run_example(entry, &example)));
+        let [Ok(one), Ok(four), Ok(again)] = runs else {
+            violations.push(format!("example {:?} does not always run", example.title));
+            continue;
+        };
+        if let Some(place) = difference(&four, &again) {
+            violations.push(format!("example {:?} gives other numbers the second time: {place}", example.title));
+        } else if let Some(place) = difference(&one, &four) {
+            violations.push(format!("example {:?} gives other numbers on one thread: {place}", example.title));
+        }
+    }
+    violations
+}
+
+fn instance(entry: &Entry, example: &Example) -> Result<Box<dyn DynStage>, String> {
+    let params: toml::Table = example.params.parse().map_err(|error| format!("params are not TOML: {error}"))?;
+    let stage = (entry.parse)(params).map_err(|error| format!("params: at {}: {error}", error.path))?;
+    stage.check().map_err(|error| format!("params: {error}"))?;
+    Ok(stage)
+}
+
+fn run(stage: &dyn DynStage, inputs: &Ports) -> Result<Ports, String> {
+    let folder = Folder::new().map_err(|error| format!("no temporary folder: {error}"))?;
+    stage.run(inputs, &Context::new(&folder.0, SEED, &NoProgress)).map_err(|error| error.to_string())
+}
+
+fn holds(entry: &Entry, example: &Example) -> Result<(), String> {
+    let inputs = (example.inputs)().map_err(|error| format!("inputs: {error}"))?;
+    as_declared("input", entry.spec.inputs, &inputs)?;
+    let stage = instance(entry, example)?;
+    resolved_parameters_are_parameters(entry, stage.as_ref())?;
+    let outputs = run(stage.as_ref(), &inputs)?;
+    as_declared("output", entry.spec.outputs, &outputs)?;
+    (example.expect)(&outputs).map(|_| ())
+}
+
+/// Every artifact is on a declared port, has its shape and is whole; every required port has one.
+fn as_declared(what: &str, ports: &[PortSpec], have: &Ports) -> Result<(), String> {
+    for (name, artifact) in have.iter() {
+        let Some(port) = ports.iter().find(|port| port.name == name) else {
+            return Err(format!("the {what} `{name}` is not declared"));
+        };
+        if artifact.shape() != port.shape {
+            let (found, wanted) = (artifact.shape().name(), port.shape.name());
+            return Err(format!("the {what} `{name}` is declared as a {wanted}, it is a {found}"));
+        }
+        artifact.validate().map_err(|error: StageError| format!("the {what} `{name}`: {error}"))?;
+    }
+    match ports.iter().find(|port| !port.optional && have.artifact(port.name).is_none()) {
+        Some(port) => Err(format!("the {what} `{}` is declared and not there", port.name)),
+        None => Ok(()),
+    }
+}
+
+/// What a result records as parameters must make the same stage again.
+fn resolved_parameters_are_parameters(entry: &Entry, stage: &dyn DynStage) -> Result<(), String> {
+    let resolved = stage.params().map_err(|error| error.to_string())?;
+    let table = toml::Table::try_from(without_nulls(resolved.clone())).map_err(|error| format!("params: {error}"))?;
+    let again = (entry.parse)(table).map_err(|error| format!("its own parameters are refused: {error}"))?;
+    let again = again.params().map_err(|error| error.to_string())?;
+    if again == resolved { Ok(()) } else { Err(format!("parameters change when read again: {resolved} to {again}")) }
+}
+
+/// TOML knows no null: a parameter that is none is left out.
+fn without_nulls(value: serde_json::Value) -> serde_json::Value {
+    use serde_json::Value;
+    match value {
+        Value::Object(entries) => {
+            let entries = entries.into_iter().filter(|(_, value)| !value.is_null());
+            Value::Object(entries.map(|(key, value)| (key, without_nulls(value))).collect())
+        }
+        Value::Array(values) => Value::Array(values.into_iter().map(without_nulls).collect()),
+        scalar => scalar,
+    }
+}
+
+fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T, String> + Send) -> Result<T, String> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| error.to_string())?;
+    pool.install(work)
+}
+
+/// A folder that goes away again.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> std::io::Result<Self> {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let name = format!("afmid-example-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let path = std::env::temp_dir().join(name);
+        std::fs::create_dir_all(&path)?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // what is left behind lies in the system's temporary folder
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}

@@ -1,0 +1,18 @@
+//! What every stage must keep, as checks over its row of the registry: built-in or not, one loop tests them all.
+
+mod documented;
+mod example;
+mod same;
+
+pub use documented::documented;
+pub use example::{examples_hold, repeatable, run_example, unknown_key_refused};
+pub use same::difference;
+
+use crate::stage::Entry;
+
+/// All checks on one stage: what it does not keep, in words. A test prints them and wants none.
+pub fn violations(entry: &Entry) -> Vec<String> {
+    let checks: [fn(&Entry) -> Vec<String>; 4] = [documented, examples_hold, unknown_key_refused, repeatable];
+    let name = entry.spec.name;
+    checks.iter().flat_map(|check| check(entry)).map(|violation| format!("{name}: {violation}")).collect()
+}

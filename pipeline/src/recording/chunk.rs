@@ -1,0 +1,116 @@
+//! Storage chunks of HDF5 datasets: undo the filters and turn bytes into samples, outside HDF5's global lock.
+
+use std::io::Read;
+
+use flate2::read::ZlibDecoder;
+
+use super::Raw;
+
+/// The type of stored samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SampleType {
+    Int8,
+    UInt8,
+    Int16,
+    UInt16,
+    Int32,
+    UInt32,
+    Float32,
+    Float64,
+}
+
+impl SampleType {
+    pub(super) const fn bytes(self) -> usize {
+        match self {
+            Self::Int8 | Self::UInt8 => 1,
+            Self::Int16 | Self::UInt16 => 2,
+            Self::Int32 | Self::UInt32 | Self::Float32 => 4,
+            Self::Float64 => 8,
+        }
+    }
+
+    /// Samples from bytes; a rest shorter than a sample is left out. Types that [`Raw`] lacks take the next wider one.
+    pub(super) fn decode(self, bytes: &[u8], big_endian: bool) -> Raw {
+        macro_rules! decode {
+            ($from:ty as $to:ty) => {
+                bytes
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .map(|&sample| {
+                        <$to>::from(if big_endian {
+                            <$from>::from_be_bytes(sample)
+                        } else {
+                            <$from>::from_le_bytes(sample)
+                        })
+                    })
+                    .collect()
+            };
+        }
+        match self {
+            Self::Int8 => Raw::Int16(decode!(i8 as i16)),
+            Self::UInt8 => Raw::Int16(decode!(u8 as i16)),
+            Self::Int16 => Raw::Int16(decode!(i16 as i16)),
+            Self::UInt16 => Raw::Int32(decode!(u16 as i32)),
+            Self::Int32 => Raw::Int32(decode!(i32 as i32)),
+            Self::UInt32 => Raw::Float64(decode!(u32 as f64)),
+            Self::Float32 => Raw::Float32(decode!(f32 as f32)),
+            Self::Float64 => Raw::Float64(decode!(f64 as f64)),
+        }
+    }
+}
+
+/// A filter that can be undone here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ChunkFilter {
+    Deflate,
+    Shuffle,
+}
+
+/// Undoes a chunk's filters, the last one first; bit i of `skipped` says that filter i was not applied to this chunk.
+///
+/// Errors: the bytes do not inflate to exactly `wanted` bytes.
+pub(super) fn undo_filters(
+    stored: Vec<u8>,
+    filters: &[ChunkFilter],
+    skipped: u32,
+    sample_bytes: usize,
+    wanted: usize,
+) -> Result<Vec<u8>, String> {
+    let mut bytes = stored;
+    for (index, filter) in filters.iter().enumerate().rev() {
+        if index < 32 && skipped & (1 << index) != 0 {
+            continue;
+        }
+        bytes = match filter {
+            ChunkFilter::Deflate => inflate(&bytes, wanted)?,
+            ChunkFilter::Shuffle => unshuffle(&bytes, sample_bytes),
+        };
+    }
+    if bytes.len() == wanted { Ok(bytes) } else { Err(format!("a chunk holds {} bytes, wanted {wanted}", bytes.len())) }
+}
+
+fn inflate(bytes: &[u8], wanted: usize) -> Result<Vec<u8>, String> {
+    let mut inflated = Vec::with_capacity(wanted);
+    // one byte more than wanted: a longer stream is an error, not a memory hog
+    let mut stream = ZlibDecoder::new(bytes).take(wanted as u64 + 1);
+    stream.read_to_end(&mut inflated).map_err(|error| format!("a chunk does not inflate: {error}"))?;
+    if inflated.len() == wanted { Ok(inflated) } else { Err("a chunk inflates to another size".to_owned()) }
+}
+
+/// HDF5's shuffle stores all first bytes, then all second bytes...; a rest shorter than a sample stays at the end.
+fn unshuffle(bytes: &[u8], sample_bytes: usize) -> Vec<u8> {
+    let samples = bytes.len() / sample_bytes.max(1);
+    if sample_bytes < 2 || samples == 0 {
+        return bytes.to_vec();
+    }
+    let whole = samples * sample_bytes;
+    let mut plain = vec![0; bytes.len()];
+    plain[whole..].copy_from_slice(&bytes[whole..]);
+    for (place, plane) in bytes[..whole].chunks_exact(samples).enumerate() {
+        for (sample, &byte) in plain[..whole].chunks_exact_mut(sample_bytes).zip(plane) {
+            sample[place] = byte;
+        }
+    }
+    plain
+}

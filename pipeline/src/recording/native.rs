@@ -1,0 +1,277 @@
+//! Native records: HDF5, one dataset per channel.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use hdf5::dataset::Layout;
+use hdf5::datatype::ByteOrder;
+use hdf5::filters::Filter;
+use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
+use hdf5::{Dataset, File, Group, Location};
+
+use super::chunk::{ChunkFilter, SampleType};
+use super::hash::hash_file;
+use super::recent::source_number;
+use super::source::{ChunkPlace, Hdf5Source, Place};
+use super::{Channel, Record};
+use crate::error::StageError;
+use crate::store::read::{check_size, open_file, read_texts};
+
+/// A channel to look for in a record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Wanted<'a> {
+    /// What it is to the stages: `deflection`, `piezo`.
+    pub role: &'a str,
+    /// Where it lies: `/deflection`.
+    pub location: &'a str,
+    /// Whether a record without it is an error; otherwise the record simply lacks the role.
+    pub required: bool,
+}
+
+/// Opens a native record.
+///
+/// Model: file attributes `sample_rate_hz` and, if known, `started_at`; one one-dimensional dataset per channel (integers or
+/// floats, contiguous or chunked) with attributes `units`, and, if not 1, 0, empty and none, `scale_factor`, `add_offset`,
+/// `long_name`, `_FillValue`. value = stored * scale_factor + add_offset.
+///
+/// Errors: no file, not HDF5, cut short, damaged; an attribute or a required channel is missing or of another type.
+pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
+    let file = open_file(path)?;
+    let sample_rate_hz = number_attribute(&file, "/", "sample_rate_hz").map_err(|error| {
+        error
+            .at(path)
+            .help("native records state it as a file attribute: h5py.File(name, 'a').attrs['sample_rate_hz'] = 5e6")
+    })?;
+    if !(sample_rate_hz.is_finite() && sample_rate_hz > 0.0) {
+        return Err(StageError::new(format!("sample_rate_hz is {sample_rate_hz}, wanted a positive number")).at(path));
+    }
+    let mut channels = Vec::with_capacity(wanted.len());
+    for channel in wanted {
+        if let Some(dataset) = find(&file, path, channel)? {
+            channels.push(open_channel(&dataset, path, channel).map_err(|error| error.at(path))?);
+        }
+    }
+    Ok(Record {
+        name: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+        path: path.to_owned(),
+        size: size_of_file(path)?,
+        blake3: hash_file(path)?,
+        sample_rate_hz,
+        started_at: text_attribute(&file, "started_at").unwrap_or_default(),
+        channels,
+    })
+}
+
+fn size_of_file(path: &Path) -> Result<u64, StageError> {
+    std::fs::metadata(path)
+        .map(|metadata| metadata.len())
+        .map_err(|error| StageError::new(format!("the file cannot be read: {error}")).at(path))
+}
+
+fn find(file: &File, path: &Path, wanted: &Wanted) -> Result<Option<Dataset>, StageError> {
+    match file.dataset(wanted.location) {
+        Ok(dataset) => Ok(Some(dataset)),
+        Err(_) if !wanted.required && !file.link_exists(wanted.location) => Ok(None),
+        Err(_) => {
+            let have = datasets(file);
+            let problem = if file.group(wanted.location).is_ok() {
+                format!("`{}` is a group, wanted a dataset", wanted.location)
+            } else {
+                format!("there is no channel `{}`", wanted.location)
+            };
+            let listed = if have.is_empty() { "no dataset at all".to_owned() } else { have.join(", ") };
+            Err(StageError::new(format!("{problem}; the file has: {listed}"))
+                .at(path)
+                .help("set `channel` to one of them"))
+        }
+    }
+}
+
+/// Paths of the datasets of a file, two levels deep: for messages.
+fn datasets(file: &File) -> Vec<String> {
+    let list = |group: &Group| -> Vec<String> {
+        group.datasets().unwrap_or_default().iter().map(|dataset| dataset.name()).collect()
+    };
+    let mut names = list(file);
+    for group in file.groups().unwrap_or_default() {
+        names.extend(list(&group));
+    }
+    names
+}
+
+fn open_channel(dataset: &Dataset, path: &Path, wanted: &Wanted) -> Result<Channel, StageError> {
+    let location = wanted.location;
+    let source = describe(dataset, path, location)?;
+    let unit = text_attribute(dataset, "units").ok_or_else(|| {
+        StageError::new(format!("{location}: the attribute `units` is missing"))
+            .help("state the unit of stored * scale_factor + add_offset, such as `V`")
+    })?;
+    let optional = |name: &str, otherwise: f64| -> Result<f64, StageError> {
+        if has_attribute(dataset, name) { number_attribute(dataset, location, name) } else { Ok(otherwise) }
+    };
+    let (scale_factor, add_offset) = (optional("scale_factor", 1.0)?, optional("add_offset", 0.0)?);
+    if !scale_factor.is_finite() || scale_factor == 0.0 || !add_offset.is_finite() {
+        return Err(StageError::new(format!(
+            "{location}: scale_factor is {scale_factor} and add_offset {add_offset}, wanted finite numbers, the first not 0"
+        )));
+    }
+    let fill = ["_FillValue", "missing_value"].into_iter().find(|name| has_attribute(dataset, name));
+    Ok(Channel {
+        role: wanted.role.to_owned(),
+        location: location.to_owned(),
+        samples: source.samples,
+        unit,
+        long_name: text_attribute(dataset, "long_name").unwrap_or_default(),
+        scale_factor,
+        add_offset,
+        fill_code: fill.map(|name| number_attribute(dataset, location, name)).transpose()?,
+        source: Arc::new(source),
+    })
+}
+
+/// Opens one dataset of a file as a source of samples. Errors: as [`open_native`].
+pub(super) fn open_source(path: &Path, location: &str) -> Result<Hdf5Source, StageError> {
+    let file = open_file(path)?;
+    let dataset =
+        file.dataset(location).map_err(|_| StageError::new(format!("there is no channel `{location}`")).at(path))?;
+    describe(&dataset, path, location).map_err(|error| error.at(path))
+}
+
+fn describe(dataset: &Dataset, path: &Path, location: &str) -> Result<Hdf5Source, StageError> {
+    let fail = |problem: String| StageError::new(format!("{location}: {problem}"));
+    let hdf5 = |error: hdf5::Error| fail(format!("damaged: {error}"));
+    let shape = dataset.get_shape().map_err(hdf5)?;
+    let [samples] = shape[..] else {
+        let found = if shape.is_empty() { "a single value".to_owned() } else { format!("the shape {shape:?}") };
+        return Err(fail(format!("found {found}, wanted one dimension, time")));
+    };
+    let dtype = dataset.dtype().map_err(hdf5)?;
+    let kind = dtype.to_descriptor().ok().and_then(|descriptor| sample_type(&descriptor)).ok_or_else(|| {
+        let found =
+            dtype.to_descriptor().map_or_else(|_| format!("{} bytes", dtype.size()), |kind| format!("{kind:?}"));
+        fail(format!("found samples of type {found}, wanted integers of up to 32 bits or 32- or 64-bit floats"))
+            .help("store the converter's codes as int16 with scale_factor and add_offset")
+    })?;
+    check_size(dataset, kind.bytes()).map_err(|error| fail(error.problem))?;
+    let big_endian = matches!(dtype.byte_order(), ByteOrder::BigEndian);
+    let file_size = size_of_file(path)?;
+    let place = locate(dataset, kind, samples, file_size).map_err(fail)?;
+    Ok(Hdf5Source {
+        path: path.to_owned(),
+        file_size,
+        location: location.to_owned(),
+        samples,
+        kind,
+        big_endian,
+        place,
+        number: source_number(),
+    })
+}
+
+fn sample_type(descriptor: &TypeDescriptor) -> Option<SampleType> {
+    use TypeDescriptor as T;
+    Some(match descriptor {
+        T::Integer(IntSize::U1) => SampleType::Int8,
+        T::Unsigned(IntSize::U1) => SampleType::UInt8,
+        T::Integer(IntSize::U2) => SampleType::Int16,
+        T::Unsigned(IntSize::U2) => SampleType::UInt16,
+        T::Integer(IntSize::U4) => SampleType::Int32,
+        T::Unsigned(IntSize::U4) => SampleType::UInt32,
+        T::Float(FloatSize::U4) => SampleType::Float32,
+        T::Float(FloatSize::U8) => SampleType::Float64,
+        _ => return None,
+    })
+}
+
+/// Asks HDF5 where the samples lie. Errors: a place outside the file.
+fn locate(dataset: &Dataset, kind: SampleType, samples: usize, file_size: u64) -> Result<Place, String> {
+    let creation = dataset.dcpl().map_err(|error| format!("damaged: {error}"))?;
+    let inside = |offset: u64, bytes: u64| match offset.checked_add(bytes) {
+        Some(end) if end <= file_size => Ok(()),
+        _ => Err(format!("samples at byte {offset}, the file ends at {file_size}: it is cut short or damaged")),
+    };
+    match creation.layout() {
+        Layout::Contiguous => match dataset.offset() {
+            Some(offset) => {
+                inside(offset, samples as u64 * kind.bytes() as u64)?;
+                Ok(Place::Contiguous { offset })
+            }
+            None => Ok(Place::Library),
+        },
+        Layout::Chunked => {
+            let Some(filters) = known_filters(&creation.filters()) else { return Ok(Place::Library) };
+            let Some(&[length]) = creation.chunk().as_deref().filter(|chunk| chunk.len() == 1) else {
+                return Err("damaged: the chunks have another rank than the dataset".to_owned());
+            };
+            let Some(chunks) = chunk_places(dataset, length, samples) else { return Ok(Place::Library) };
+            for chunk in &chunks {
+                inside(chunk.offset, chunk.bytes as u64)?;
+                // deflate shrinks by at most 1032 to 1
+                if (length as u64).saturating_mul(kind.bytes() as u64) > (chunk.bytes as u64 + 1).saturating_mul(1100) {
+                    return Err(format!("damaged: a chunk of {length} samples in {} bytes", chunk.bytes));
+                }
+            }
+            Ok(Place::Chunked { length, chunks, filters })
+        }
+        _ => Ok(Place::Library),
+    }
+}
+
+fn known_filters(filters: &[Filter]) -> Option<Vec<ChunkFilter>> {
+    filters
+        .iter()
+        .map(|filter| match filter {
+            Filter::Deflate(_) => Some(ChunkFilter::Deflate),
+            Filter::Shuffle => Some(ChunkFilter::Shuffle),
+            _ => None,
+        })
+        .collect()
+}
+
+/// The places of all chunks, in order; none if one was never written (it reads as the fill value).
+fn chunk_places(dataset: &Dataset, length: usize, samples: usize) -> Option<Vec<ChunkPlace>> {
+    let count = samples.checked_div(length)? + usize::from(!samples.is_multiple_of(length));
+    // every chunk takes an entry in the file: a larger count is a damaged header
+    if dataset.num_chunks()? != count {
+        return None;
+    }
+    let mut places = vec![None; count];
+    let visited = dataset.chunks_visit(|chunk| {
+        let index = chunk.offset.first().map(|&first| first as usize / length);
+        if let Some(place) = index.and_then(|index| places.get_mut(index)) {
+            *place =
+                Some(ChunkPlace { offset: chunk.addr, bytes: chunk.size as usize, skipped_filters: chunk.filter_mask });
+        }
+        0
+    });
+    visited.ok()?;
+    places.into_iter().collect()
+}
+
+fn has_attribute(owner: &Location, name: &str) -> bool {
+    owner.attr(name).is_ok()
+}
+
+/// A text attribute of any kind; none if it is missing or not text.
+fn text_attribute(owner: &Location, name: &str) -> Option<String> {
+    let attribute = owner.attr(name).ok()?;
+    read_texts(&attribute).ok()?.into_iter().next()
+}
+
+/// A number of any type in an attribute with one value.
+fn number_attribute(owner: &Location, place: &str, name: &str) -> Result<f64, StageError> {
+    let fail = |problem: String| StageError::new(format!("{place}: the attribute `{name}` {problem}"));
+    let attribute = owner.attr(name).map_err(|_| fail("is missing".to_owned()))?;
+    let kind = attribute.dtype().and_then(|dtype| dtype.to_descriptor());
+    let numeric = matches!(
+        kind,
+        Ok(TypeDescriptor::Integer(_)
+            | TypeDescriptor::Unsigned(_)
+            | TypeDescriptor::Float(FloatSize::U4 | FloatSize::U8))
+    );
+    if !numeric || attribute.size() != 1 {
+        return Err(fail("is not a single number".to_owned()));
+    }
+    let values = attribute.read_raw::<f64>().map_err(|error| fail(format!("cannot be read: {error}")))?;
+    values.first().copied().ok_or_else(|| fail("is empty".to_owned()))
+}

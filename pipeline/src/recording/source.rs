@@ -1,0 +1,194 @@
+//! Samples of one HDF5 dataset: HDF5 says where they lie, everything else is plain file reading on the caller's thread.
+
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use super::chunk::{ChunkFilter, SampleType, undo_filters};
+use super::recent;
+use super::{Raw, Source};
+use crate::error::StageError;
+use crate::store::read::open_file;
+
+/// Samples read at once through the library, under its global lock: short enough to let others in between.
+const LIBRARY_SLICE: usize = 1 << 16;
+
+/// Where the samples lie.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Place {
+    /// One stretch of the file.
+    Contiguous {
+        /// Byte offset in the file.
+        offset: u64,
+    },
+    /// Chunks of equal length, each filtered on its own.
+    Chunked {
+        /// Samples per chunk.
+        length: usize,
+        /// In order of their samples.
+        chunks: Vec<ChunkPlace>,
+        /// In the order in which they were applied.
+        filters: Vec<ChunkFilter>,
+    },
+    /// Somewhere only the library finds them: rare filters, compact or virtual layouts, chunks never written.
+    Library,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct ChunkPlace {
+    pub(super) offset: u64,
+    pub(super) bytes: usize,
+    pub(super) skipped_filters: u32,
+}
+
+/// A [`Source`] over one HDF5 dataset. Holds no handle between reads.
+#[derive(Debug)]
+pub(super) struct Hdf5Source {
+    pub(super) path: PathBuf,
+    pub(super) file_size: u64,
+    pub(super) location: String,
+    pub(super) samples: usize,
+    pub(super) kind: SampleType,
+    pub(super) big_endian: bool,
+    pub(super) place: Place,
+    pub(super) number: u64,
+}
+
+impl Source for Hdf5Source {
+    fn read(&self, start: usize, count: usize) -> Result<Raw, StageError> {
+        let end = start.checked_add(count).filter(|&end| end <= self.samples).ok_or_else(|| {
+            self.error(format!("samples {start} to {start} + {count} asked for, there are {}", self.samples))
+        })?;
+        if count == 0 {
+            return Ok(self.kind.decode(&[], self.big_endian));
+        }
+        if self.place == Place::Library {
+            return self.read_by_library(start, end);
+        }
+        let file = self.open()?;
+        let bytes = match &self.place {
+            Place::Contiguous { offset } => {
+                self.read_bytes(&file, offset + (start * self.kind.bytes()) as u64, count * self.kind.bytes())?
+            }
+            Place::Chunked { length, chunks, filters } => {
+                self.read_chunks(&file, start, end, *length, chunks, filters)?
+            }
+            Place::Library => Vec::new(),
+        };
+        Ok(self.kind.decode(&bytes, self.big_endian))
+    }
+
+    fn preferred_samples(&self) -> usize {
+        match &self.place {
+            Place::Chunked { length, .. } => (*length).max(1),
+            Place::Contiguous { .. } | Place::Library => LIBRARY_SLICE,
+        }
+    }
+}
+
+impl Hdf5Source {
+    fn error(&self, problem: impl std::fmt::Display) -> StageError {
+        StageError::new(format!("{}: {problem}", self.location)).at(&self.path)
+    }
+
+    fn open(&self) -> Result<File, StageError> {
+        let fail = |error: std::io::Error| self.error(format!("the file cannot be read: {error}"));
+        let file = File::open(&self.path).map_err(fail)?;
+        let size = file.metadata().map_err(fail)?.len();
+        if size != self.file_size {
+            return Err(self
+                .error(format!("the file has {size} bytes, it had {} when it was opened", self.file_size))
+                .help("wait until nothing writes to it, then run again"));
+        }
+        Ok(file)
+    }
+
+    fn read_bytes(&self, file: &File, offset: u64, count: usize) -> Result<Vec<u8>, StageError> {
+        let mut bytes = vec![0; count];
+        file.read_exact_at(&mut bytes, offset)
+            .map_err(|error| self.error(format!("{count} bytes at {offset} cannot be read: {error}")))?;
+        Ok(bytes)
+    }
+
+    fn read_chunks(
+        &self,
+        file: &File,
+        start: usize,
+        end: usize,
+        length: usize,
+        chunks: &[ChunkPlace],
+        filters: &[ChunkFilter],
+    ) -> Result<Vec<u8>, StageError> {
+        let sample = self.kind.bytes();
+        let mut bytes = Vec::with_capacity((end - start) * sample);
+        for index in start / length..=(end - 1) / length {
+            let place = chunks.get(index).ok_or_else(|| self.error(format!("chunk {index} is missing")))?;
+            let chunk = recent::chunk((self.number, index), || {
+                let stored = self.read_bytes(file, place.offset, place.bytes)?;
+                undo_filters(stored, filters, place.skipped_filters, sample, length * sample)
+                    .map_err(|problem| self.error(format!("damaged near sample {}: {problem}", index * length)))
+            })?;
+            let first = index * length;
+            let (from, to) = (start.max(first) - first, end.min(first + length) - first);
+            bytes.extend_from_slice(&chunk[from * sample..to * sample]);
+        }
+        Ok(bytes)
+    }
+
+    fn read_by_library(&self, start: usize, end: usize) -> Result<Raw, StageError> {
+        macro_rules! slices {
+            ($stored:ty, $kind:ident) => {{
+                let mut samples = Vec::with_capacity(end - start);
+                for from in (start..end).step_by(LIBRARY_SLICE) {
+                    let to = end.min(from.saturating_add(LIBRARY_SLICE));
+                    let slice = self.read_slice::<$stored>(from, to)?;
+                    samples.extend(slice);
+                }
+                Raw::$kind(samples)
+            }};
+        }
+        Ok(match self.kind {
+            SampleType::Int8 | SampleType::UInt8 | SampleType::Int16 => slices!(i16, Int16),
+            SampleType::UInt16 | SampleType::Int32 => slices!(i32, Int32),
+            SampleType::Float32 => slices!(f32, Float32),
+            SampleType::UInt32 | SampleType::Float64 => slices!(f64, Float64),
+        })
+    }
+
+    fn read_slice<T: hdf5::H5Type>(&self, from: usize, to: usize) -> Result<Vec<T>, StageError> {
+        let file = open_file(&self.path)?;
+        let fail = |error: hdf5::Error| self.error(format!("samples {from} to {to} cannot be read: {error}"));
+        let dataset = file.dataset(&self.location).map_err(fail)?;
+        Ok(dataset.read_slice_1d::<T, _>(from..to).map_err(fail)?.into_raw_vec_and_offset().0)
+    }
+}
+
+/// A channel of a stored recording: its file is opened when samples are asked for.
+#[derive(Debug)]
+pub(crate) struct DeferredSource {
+    path: PathBuf,
+    file_size: u64,
+    location: String,
+    samples: usize,
+    source: OnceLock<Hdf5Source>,
+}
+
+impl DeferredSource {
+    pub(crate) fn new(path: &Path, file_size: u64, location: &str, samples: usize) -> Self {
+        Self { path: path.to_owned(), file_size, location: location.to_owned(), samples, source: OnceLock::new() }
+    }
+}
+
+impl Source for DeferredSource {
+    fn read(&self, start: usize, count: usize) -> Result<Raw, StageError> {
+        if let Some(source) = self.source.get() {
+            return source.read(start, count);
+        }
+        let source = super::native::open_source(&self.path, &self.location)?;
+        if source.file_size != self.file_size || source.samples != self.samples {
+            return Err(source.error("the file is not the one that was recorded: its size differs"));
+        }
+        self.source.get_or_init(|| source).read(start, count)
+    }
+}

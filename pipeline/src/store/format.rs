@@ -1,0 +1,33 @@
+//! What kind of file it is, and of which version.
+
+use hdf5::{File, Group};
+
+use super::error::{Result, StoreError};
+use super::{read, write};
+
+/// Version of the layout of stage and result files; part of every cache key.
+pub const FORMAT_VERSION: u32 = 1;
+
+const FORMAT: &str = "afmid_format";
+const VERSION: &str = "afmid_format_version";
+
+pub(super) fn write_format(root: &Group, format: &str) -> Result<()> {
+    write::text_attribute(root, FORMAT, format)?;
+    write::attribute(root, VERSION, &FORMAT_VERSION)
+}
+
+/// Errors: another kind of file, or another version.
+pub(super) fn check_format(file: &File, wanted: &str) -> Result<()> {
+    let found = read::text_attribute(file, FORMAT).map_err(|_| {
+        StoreError::new(format!("HDF5, but not an afmid {wanted} file: it has no `{FORMAT}` attribute"))
+    })?;
+    if found != wanted {
+        return Err(StoreError::new(format!("found an afmid {found} file, wanted a {wanted} file")));
+    }
+    let version: u32 = read::attribute(file, VERSION)?;
+    if version != FORMAT_VERSION {
+        return Err(StoreError::new(format!("found format version {version}, wanted {FORMAT_VERSION}"))
+            .help("run the pipeline again with this program, or read the file with the program that wrote it"));
+    }
+    Ok(())
+}

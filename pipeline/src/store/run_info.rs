@@ -1,0 +1,41 @@
+//! `/entry/run`: when and where.
+
+use hdf5::Group;
+
+use super::error::{Result, StoreError};
+use super::{read, write};
+use crate::runner::RunInfo;
+
+pub(super) fn write_run_info(parent: &Group, name: &str, info: &RunInfo) -> Result<()> {
+    let group = write::nexus_group(parent, name, "NXcollection")?;
+    write::text(&group, "started_at", &info.started_at)?;
+    let seconds = write::scalar(&group, "seconds", info.seconds)?;
+    write::text_attribute(&seconds, "units", "s")?;
+    write::text(&group, "host", &info.host)?;
+    write::scalar(&group, "threads", info.threads as u64)?;
+    let stages = &info.stages;
+    write::texts(&group, "stage", &stages.iter().map(|stage| stage.0.as_str()).collect::<Vec<_>>())?;
+    let seconds: Vec<f64> = stages.iter().map(|stage| stage.1).collect();
+    let seconds = write::dataset(&group, "stage_seconds", &[stages.len()], &seconds)?;
+    write::text_attribute(&seconds, "units", "s")?;
+    let cached: Vec<i8> = stages.iter().map(|stage| i8::from(stage.2)).collect();
+    let cached = write::dataset(&group, "stage_from_cache", &[stages.len()], &cached)?;
+    write::text_attribute(&cached, "dtype", "bool")
+}
+
+pub(super) fn read_run_info(parent: &Group, name: &str) -> Result<RunInfo> {
+    let group = read::group(parent, name)?;
+    let names = read::texts(&group, "stage")?;
+    let seconds: Vec<f64> = read::numbers(&group, "stage_seconds")?;
+    let cached: Vec<i8> = read::numbers(&group, "stage_from_cache")?;
+    if names.len() != seconds.len() || names.len() != cached.len() {
+        return Err(StoreError::new("the lists of stages differ in length").at(group.name()));
+    }
+    Ok(RunInfo {
+        started_at: read::text(&group, "started_at")?,
+        seconds: read::number(&group, "seconds")?,
+        host: read::text(&group, "host")?,
+        threads: read::number::<u64>(&group, "threads")? as usize,
+        stages: names.into_iter().zip(seconds).zip(cached).map(|((id, time), hit)| (id, time, hit != 0)).collect(),
+    })
+}

@@ -1,0 +1,109 @@
+//! Deterministic HDF5 writing: no times, contiguous datasets, text as variable-length UTF-8.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use hdf5::file::{FileCloseDegree, LibraryVersion};
+use hdf5::types::VarLenUnicode;
+use hdf5::{Dataset, File, Group, H5Type, Location};
+use ndarray::ArrayView;
+
+use super::error::{Result, StoreError};
+
+/// Bytes before the HDF5 part of a stage file: room for its checksum.
+pub(super) const USER_BLOCK: u64 = 512;
+
+/// Creates an HDF5 file whose bytes depend on its contents alone. Errors: it exists, or the folder cannot be written.
+///
+/// The format is HDF5 1.8's (checksummed object headers, attributes of any size): every reader of the last fifteen years.
+pub(crate) fn create_file(path: &Path, user_block: u64) -> Result<File> {
+    File::with_options()
+        .with_fapl(|access| {
+            // the earliest close would leave the file writable while a handle lives: here that is an error
+            access.fclose_degree(FileCloseDegree::Semi).libver_bounds(LibraryVersion::V18, LibraryVersion::V110)
+        })
+        .with_fcpl(|creation| creation.obj_track_times(false).userblock(user_block))
+        .create_excl(path)
+        .map_err(|error| StoreError::from(error).file(path))
+}
+
+pub(crate) fn group(parent: &Group, name: &str) -> Result<Group> {
+    check_name(name)?;
+    let group = parent.create_group_builder().obj_track_times(false).create(name);
+    group.map_err(|error| StoreError::from(error).at(path_of(parent, name)))
+}
+
+/// A group with its NeXus class.
+pub(super) fn nexus_group(parent: &Group, name: &str, class: &str) -> Result<Group> {
+    let group = group(parent, name)?;
+    text_attribute(&group, "NX_class", class)?;
+    Ok(group)
+}
+
+/// A contiguous dataset of numbers, row-major.
+///
+/// Contiguous and raw: measured at 8 times the speed of gzip for 10 to 20 % more bytes (noise does not compress).
+pub(crate) fn dataset<T: H5Type>(parent: &Group, name: &str, shape: &[usize], values: &[T]) -> Result<Dataset> {
+    check_name(name)?;
+    let wrap = |error: hdf5::Error| StoreError::from(error).at(path_of(parent, name));
+    let view = ArrayView::from_shape(shape, values)
+        .map_err(|error| StoreError::new(format!("{} values do not fill {shape:?}: {error}", values.len())))?;
+    let dataset = parent.new_dataset::<T>().obj_track_times(false).shape(shape).create(name).map_err(wrap)?;
+    if !values.is_empty() {
+        dataset.write(view).map_err(wrap)?;
+    }
+    Ok(dataset)
+}
+
+pub(super) fn scalar<T: H5Type>(parent: &Group, name: &str, value: T) -> Result<Dataset> {
+    dataset(parent, name, &[], &[value])
+}
+
+pub(super) fn text(parent: &Group, name: &str, value: &str) -> Result<Dataset> {
+    scalar(parent, name, unicode(value).map_err(|error| error.at(path_of(parent, name)))?)
+}
+
+pub(super) fn texts<S: AsRef<str>>(parent: &Group, name: &str, values: &[S]) -> Result<Dataset> {
+    let values: Result<Vec<VarLenUnicode>> = values.iter().map(|value| unicode(value.as_ref())).collect();
+    let values = values.map_err(|error| error.at(path_of(parent, name)))?;
+    dataset(parent, name, &[values.len()], &values)
+}
+
+pub(crate) fn attribute<T: H5Type>(owner: &Location, name: &str, value: &T) -> Result<()> {
+    let wrap = |error: hdf5::Error| StoreError::from(error).at(format!("{}@{name}", owner.name()));
+    owner.new_attr::<T>().create(name).map_err(wrap)?.write_scalar(value).map_err(wrap)
+}
+
+pub(crate) fn text_attribute(owner: &Location, name: &str, value: &str) -> Result<()> {
+    let value = unicode(value).map_err(|error| error.at(format!("{}@{name}", owner.name())))?;
+    attribute(owner, name, &value)
+}
+
+pub(super) fn texts_attribute<S: AsRef<str>>(owner: &Location, name: &str, values: &[S]) -> Result<()> {
+    let wrap = |error: hdf5::Error| StoreError::from(error).at(format!("{}@{name}", owner.name()));
+    let values: Vec<VarLenUnicode> = values.iter().map(|value| unicode(value.as_ref())).collect::<Result<_>>()?;
+    let attribute = owner.new_attr::<VarLenUnicode>().shape([values.len()]).create(name).map_err(wrap)?;
+    attribute.write_raw(&values).map_err(wrap)
+}
+
+/// HDF5 text ends at the first NUL, so one inside cannot be stored.
+fn unicode(value: &str) -> Result<VarLenUnicode> {
+    VarLenUnicode::from_str(value).map_err(|_| {
+        StoreError::new(format!("the text {:?} holds a NUL character", value.chars().take(40).collect::<String>()))
+            .help("remove it: HDF5 text ends at the first NUL")
+    })
+}
+
+/// A name that HDF5 takes as one link, not as a path.
+pub(crate) fn check_name(name: &str) -> Result<()> {
+    if name.is_empty() || name == "." || name == ".." || name.contains(['/', '\0']) {
+        return Err(StoreError::new(format!("{name:?} cannot be the name of an HDF5 object"))
+            .help("names are not empty, not `.`, and hold no `/`"));
+    }
+    Ok(())
+}
+
+pub(super) fn path_of(parent: &Group, name: &str) -> String {
+    let parent = parent.name();
+    if parent == "/" { format!("/{name}") } else { format!("{parent}/{name}") }
+}

@@ -1,0 +1,218 @@
+//! What an averaged snap-off can say about the delay: the total lag, and a bound by causality.
+
+use super::error::CalibrationError;
+use super::sensitivity_model::Estimate;
+use faer::c64;
+
+/// What is known of the onset and the delay. All times on the average's own axis, s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnsetDelay {
+    /// First sustained departure from the line before the event: rupture plus delay cannot be later (causality).
+    pub latest_s: f64,
+    /// Rupture + delay + the detector poles' phase lag at mode 1: what the phase of mode 1 measures.
+    pub total_lag_s: Estimate,
+    /// The given poles' phase lag at mode 1, s; 0 without poles.
+    pub pole_lag_s: f64,
+    /// Rupture + delay: the total lag less the poles'. Without poles an upper bound like `latest_s`.
+    pub onset_and_delay_s: Estimate,
+    /// Mode 1 as fitted: frequency (undamped), Hz, and quality factor.
+    pub mode_1: (f64, f64),
+}
+
+/// Settings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OnsetRule {
+    /// Departure in standard errors that counts, sustained over `sustained_samples`.
+    pub threshold: f64,
+    /// See above.
+    pub sustained_samples: usize,
+    /// First guess of mode 1, Hz.
+    pub frequency_hz: f64,
+    /// First guess of its quality factor.
+    pub quality_factor: f64,
+    /// The ringing is fitted from this long after the departure, s.
+    pub skip_s: f64,
+    /// Detector poles, Hz, as far as they are known.
+    pub detector_pole_hz: Vec<f64>,
+}
+
+/// What the average says.
+///
+/// # Model
+/// A delay `exp(-s T)` and a later rupture are the same signal: only their sum shows. Two things are known of it. Causality: it is not later
+/// than the first departure from the line before. Phase: mode 1 of a released lever rings as
+/// `Re[(1 - i sigma/w) D(p) e^{p (t - t0 - T)}]` with `p = -sigma + i w`, so its phase gives `t0 + T - arg D(p) / w`, where the detector's
+/// poles lag by about the sum of their time constants. Poles above the bandwidth are in turn a delay: the sum is known only as
+/// well as they are. t0 and T apart are not knowable from the response.
+///
+/// # Method
+/// Line through the first three quarters of the stretch before time 0; first sample from which `sustained_samples` depart by `threshold` standard
+/// errors in one sense; Gauss-Newton on `f1, Q1`, offset and complex amplitude over the ringing.
+///
+/// # Accuracy
+/// Standard errors are those of white noise of the given size. Other modes leak by their share over their distance in line widths: 3 ns for the
+/// paper's lever.
+///
+/// # Errors
+/// Lengths differ; no departure; the fit of mode 1 does not settle.
+pub fn onset_delay(
+    time_s: &[f64],
+    mean: &[f64],
+    standard_error: &[f64],
+    rule: &OnsetRule,
+) -> Result<OnsetDelay, CalibrationError> {
+    if mean.len() != time_s.len() || standard_error.len() != time_s.len() || time_s.len() < 64 {
+        let wanted = format!("{} and at least 64, as the time axis", time_s.len());
+        return Err(CalibrationError::Length {
+            what: "averaged event",
+            got: mean.len().min(standard_error.len()),
+            wanted,
+        });
+    }
+    let (first, load) = departure(time_s, mean, standard_error, rule)?;
+    let latest_s = time_s.get(first).copied().unwrap_or(f64::NAN);
+    let begin = time_s.iter().take_while(|t| **t < latest_s + rule.skip_s).count();
+    let ringing = (time_s.get(begin..).unwrap_or_default(), mean.get(begin..).unwrap_or_default());
+    let noise = standard_error.get(begin..).unwrap_or_default();
+    let noise = (noise.iter().map(|s| s * s).sum::<f64>() / noise.len().max(1) as f64).sqrt();
+    let mode = RingingMode::fit(ringing.0, ringing.1, noise, rule)?;
+    let (sigma, w) = (mode.decay_per_s, mode.angular_per_s);
+    // the release rings up from a negative load: its amplitude carries the load's sign
+    let amplitude = mode.amplitude * load.signum();
+    let total = -(amplitude.arg() + (sigma / w).atan()) / w;
+    let pole = c64::new(-sigma, w);
+    let detector: c64 = rule.detector_pole_hz.iter().fold(c64::new(1.0, 0.0), |d, hz| {
+        let p = std::f64::consts::TAU * hz;
+        d * c64::new(p, 0.0) / (pole + p)
+    });
+    let pole_lag_s = -detector.arg() / w;
+    let std = mode.phase_std / w;
+    let undamped = w.hypot(sigma);
+    Ok(OnsetDelay {
+        latest_s,
+        total_lag_s: Estimate { value: total, std },
+        pole_lag_s,
+        onset_and_delay_s: Estimate { value: total - pole_lag_s, std },
+        mode_1: (undamped / std::f64::consts::TAU, undamped / (2.0 * sigma)),
+    })
+}
+
+/// Index of the first sustained departure, and the level before minus the level at the end (the load).
+fn departure(time: &[f64], mean: &[f64], error: &[f64], rule: &OnsetRule) -> Result<(usize, f64), CalibrationError> {
+    let before = time.iter().take_while(|t| **t < 0.0).count() * 3 / 4;
+    let baseline = Baseline::fit(time, mean, before).ok_or(CalibrationError::TooLittle {
+        what: "samples before the event",
+        found: before,
+        wanted: 32,
+        hint: "the average must begin well before its onset (time 0)",
+    })?;
+    let scores: Vec<f64> = time
+        .iter()
+        .zip(mean)
+        .zip(error)
+        .map(|((t, y), s)| (y - baseline.at(*t)) / s.max(0.25 * baseline.noise).max(f64::MIN_POSITIVE))
+        .collect();
+    let departs = |run: &[f64]| run.iter().all(|z| *z > rule.threshold) || run.iter().all(|z| *z < -rule.threshold);
+    let first = scores
+        .windows(rule.sustained_samples.max(1))
+        .enumerate()
+        .skip(before)
+        .find(|(_, run)| departs(run))
+        .map(|(k, _)| k)
+        .ok_or(CalibrationError::TooLittle {
+            what: "sustained departures from the line before the event",
+            found: 0,
+            wanted: 1,
+            hint: "lower threshold, or average more events",
+        })?;
+    let tail = mean.get(mean.len() * 3 / 4..).unwrap_or_default();
+    let rest = tail.iter().sum::<f64>() / tail.len().max(1) as f64;
+    Ok((first, baseline.at(time.get(first).copied().unwrap_or(0.0)) - rest))
+}
+
+struct Baseline {
+    centre: f64,
+    level: f64,
+    slope: f64,
+    noise: f64,
+}
+
+impl Baseline {
+    fn fit(time: &[f64], values: &[f64], count: usize) -> Option<Self> {
+        let (time, values) = (time.get(..count)?, values.get(..count)?);
+        if count < 32 {
+            return None;
+        }
+        let n = count as f64;
+        let (centre, level) = (time.iter().sum::<f64>() / n, values.iter().sum::<f64>() / n);
+        let square: f64 = time.iter().map(|t| (t - centre).powi(2)).sum();
+        let slope = time.iter().zip(values).map(|(t, y)| (t - centre) * (y - level)).sum::<f64>() / square;
+        let rest: f64 = time.iter().zip(values).map(|(t, y)| (y - level - slope * (t - centre)).powi(2)).sum();
+        Some(Self { centre, level, slope, noise: (rest / n).sqrt() })
+    }
+
+    fn at(&self, time: f64) -> f64 {
+        self.level + self.slope * (time - self.centre)
+    }
+}
+
+struct RingingMode {
+    decay_per_s: f64,
+    angular_per_s: f64,
+    amplitude: c64,
+    phase_std: f64,
+}
+
+impl RingingMode {
+    /// `y = offset + Re[C e^{p t}]`: Gauss-Newton on Re C, Im C, offset, sigma, w.
+    fn fit(time: &[f64], values: &[f64], noise: f64, rule: &OnsetRule) -> Result<Self, CalibrationError> {
+        let failed = |reason| CalibrationError::Fit { near_hz: rule.frequency_hz, reason };
+        if values.len() < 64 {
+            return Err(failed("fewer than 64 samples of ringing"));
+        }
+        let undamped = std::f64::consts::TAU * rule.frequency_hz;
+        let mut p = [0.0, 0.0, 0.0, undamped / (2.0 * rule.quality_factor), undamped];
+        for iteration in 0..50 {
+            let (mut normal, mut gradient) = ([[0.0; 5]; 5], [0.0; 5]);
+            for (t, y) in time.iter().zip(values) {
+                let decay = (-p[3] * t).exp();
+                let (sin, cos) = (p[4] * t).sin_cos();
+                let (c, s) = (decay * cos, decay * sin);
+                let model = p[2] + p[0] * c - p[1] * s;
+                let row = [c, -s, 1.0, -t * (p[0] * c - p[1] * s), -t * (p[0] * s + p[1] * c)];
+                for i in 0..5 {
+                    gradient[i] += row[i] * (y - model);
+                    (0..5).for_each(|j| normal[i][j] += row[i] * row[j]);
+                }
+            }
+            // the first pass is linear: amplitude and offset at the guessed pole
+            if iteration == 0 {
+                for i in 3..5 {
+                    gradient[i] = 0.0;
+                    (0..5).for_each(|j| (normal[i][j], normal[j][i]) = (0.0, 0.0));
+                    normal[i][i] = 1.0;
+                }
+            }
+            let inverse =
+                super::thermal_peak::inverse(normal).ok_or_else(|| failed("the ringing's equations are singular"))?;
+            let step: [f64; 5] = std::array::from_fn(|i| inverse[i].iter().zip(&gradient).map(|(a, g)| a * g).sum());
+            (0..5).for_each(|i| p[i] += step[i]);
+            if !(p[3] > 0.0 && p[4] > 0.0 && p.iter().all(|v| v.is_finite())) {
+                return Err(failed("mode 1 left the range of decaying oscillations: give a better frequency_hz"));
+            }
+            if iteration > 1 && step[4].abs() < 1e-10 * p[4] && step[3].abs() < 1e-8 * p[3] {
+                let square = p[0].hypot(p[1]).powi(2);
+                // d arg C = (Re C dIm - Im C dRe) / |C|^2
+                let (a, b) = (-p[1] / square, p[0] / square);
+                let variance = a * a * inverse[0][0] + 2.0 * a * b * inverse[0][1] + b * b * inverse[1][1];
+                return Ok(Self {
+                    decay_per_s: p[3],
+                    angular_per_s: p[4],
+                    amplitude: c64::new(p[0], p[1]),
+                    phase_std: noise * variance.sqrt(),
+                });
+            }
+        }
+        Err(failed("50 iterations were not enough: give a better frequency_hz and quality_factor"))
+    }
+}

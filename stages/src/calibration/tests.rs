@@ -1,0 +1,221 @@
+//! Calibration kernels on simulated records with known truth.
+
+use super::*;
+use crate::fixture::{Lever as ClosedForm, white_noise};
+use crate::simulate::{
+    Adc, Contact, Detector, Microscope, ModalLever, Mode, PhaseProblem, PiezoMonitor, Place, ReadoutNoise, Scatter,
+    SimulatedRecord, Target, TriangleRamp, archive_stream,
+};
+
+const TEMPERATURE_K: f64 = 295.0;
+/// `c_slope_1^2 / c_tip_1` of the simulated lever.
+const FACTOR: f64 = 0.8979 * 0.8979 / 0.9713;
+
+fn microscope() -> Microscope {
+    let closed = ClosedForm::paper();
+    let tip_shares = [0.9713, 0.0247, 0.0032, 0.0008];
+    let modes = (0..4)
+        .map(|i| Mode {
+            frequency_hz: closed.frequency_hz[i],
+            quality_factor: closed.quality_factor[i],
+            tip_share: tip_shares[i],
+            detector_share: closed.static_share[i],
+        })
+        .collect();
+    Microscope {
+        lever: ModalLever { stiffness_n_per_m: 3.8, modes },
+        contact: Contact {
+            stiffness_n_per_m: 60.0,
+            damping_n_s_per_m: 8e-6,
+            snap_in_gap_m: 4e-9,
+            adhesion_n: 330e-9,
+            adhesion_scatter: 0.06,
+        },
+        detector: Detector { sensitivity_v_per_m: 1e7, pole_hz: closed.detector_pole_hz, delay_s: 0.0 },
+        noise: ReadoutNoise { white_v: 1.2e-3, pink_v: 0.3e-3, drift_v: 4e-3 },
+        adc: Adc { bits: 12, lsb_v: 0.977e-3 },
+        monitor: PiezoMonitor { m_per_v: 25e-9, lsb_v: 4.88e-3, white_v: 5e-4 },
+        ramp: TriangleRamp { frequency_hz: 5.58, range_m: 200e-9, phase: 0.0 },
+        temperature_k: TEMPERATURE_K,
+        sample_rate_hz: 5e6,
+    }
+}
+
+fn archive(records: usize, seed: u64) -> Vec<SimulatedRecord> {
+    let microscope = microscope();
+    let samples = 900_000;
+    let place = |record| Place { record, records, samples, margin_samples: 10_000, seed };
+    let scatter = Scatter { surface_m: -22e-9, surface_std_m: 3e-9 };
+    let plans: Vec<_> = (0..records).map(|r| microscope.plan(scatter, place(r))).collect();
+    let problem = PhaseProblem {
+        ramp: microscope.ramp,
+        contact: microscope.contact,
+        stiffness_n_per_m: 3.8,
+        duration_s: samples as f64 / 5e6,
+        margin_s: 2e-3,
+    };
+    let mut rng = archive_stream(seed);
+    let target = Target { snap_ins: Some(records), snap_offs: Some(records) };
+    let phases = problem.solve(&plans, target, &mut rng).unwrap();
+    let drift = microscope.noise.drift(&mut rng);
+    (0..records).map(|r| microscope.record(&plans[r], phases[r], &drift, place(r))).collect()
+}
+
+fn volts(codes: &[i16], lsb_v: f64) -> Vec<f64> {
+    codes.iter().map(|&code| f64::from(code) * lsb_v).collect()
+}
+
+const RULE: FreeRule = FreeRule { settle_samples: 25_000, guard_samples: 2500, shortest_samples: 16_384 };
+const SEARCH: PeakSearch = PeakSearch { lowest_hz: 10e3, highest_hz: 150e3, band: 2.5 };
+
+#[test]
+fn calibration_finds_the_simulated_truth() {
+    let records = archive(6, 11);
+    let mut welch = Welch::new(16_384, 5e6).unwrap();
+    let mut stretches = Vec::new();
+    let mut off_events = 0;
+    for record in &records {
+        let (deflection, piezo) = (volts(&record.deflection, 0.977e-3), volts(&record.piezo, 4.88e-3));
+        let mut blocks = Blocks::new(512);
+        blocks.push(&deflection, &piezo);
+        let free = free_stretches(&blocks, RULE).unwrap();
+        assert!(!free.stretches.is_empty());
+        for stretch in &free.stretches {
+            // none may touch a held tip
+            let held_in = |e: &&crate::simulate::RecordedEvent| stretch.contains(&(e.sample as usize));
+            off_events += record.events.iter().filter(held_in).count();
+            welch.push(&deflection[stretch.clone()]);
+        }
+        stretches.extend(contact_stretches(&blocks, &free).unwrap());
+    }
+    assert_eq!(off_events, 0);
+    let slope = contact_slope(&stretches).unwrap();
+    let gauge = SlopeGauge {
+        piezo_m_per_v: Estimate { value: 25e-9, std: 0.0 },
+        contact_stiffness_n_per_m: Some(60.0),
+        stiffness_n_per_m: Some(3.8),
+    };
+    let found = sensitivity(&slope, gauge).unwrap();
+    println!("slope {slope:?}\nsensitivity {found:?}");
+    assert!(slope.slope_v_per_v < 0.0);
+    // 0.1 % absolute, 4 standard errors (12 stretches)
+    let corrected = found.corrected_v_per_m;
+    assert!((corrected.value - 1e7).abs() < 5.0 * corrected.std, "{corrected:?}");
+    assert!(corrected.std < 2e4, "{corrected:?}");
+    assert!((found.apparent_v_per_m.value / 1e7 - 60.0 / 63.8).abs() < 5e-3);
+
+    let average = welch.average().unwrap();
+    let peak = thermal_peak(&average, SEARCH).unwrap();
+    println!("{} segments, {peak:?}", average.segments);
+    // 4 standard errors each
+    assert!((peak.frequency_hz - 46.3e3).abs() < 4.0 * peak.frequency_std_hz, "{peak:?}");
+    assert!((peak.quality_factor - 40.8).abs() < 4.0 * peak.quality_factor_std, "{peak:?}");
+    let thermal = ThermalGauge {
+        sensitivity_v_per_m: found.apparent_v_per_m,
+        contact_stiffness_n_per_m: Some(60.0),
+        temperature_k: Estimate { value: TEMPERATURE_K, std: 0.0 },
+        mode_shape_factor: Estimate { value: FACTOR, std: 0.0 },
+        detector_pole_hz: ClosedForm::paper().detector_pole_hz,
+    };
+    let variance = Estimate { value: peak.variance_v2, std: peak.variance_std_v2 };
+    let k = spring_constant(peak.frequency_hz, variance, &thermal).unwrap();
+    println!("{k:?}");
+    let stiffness = k.stiffness_n_per_m;
+    assert!((stiffness.value - 3.8).abs() < 4.0 * stiffness.std, "{k:?}");
+    assert!(stiffness.std < 0.05 * 3.8, "{k:?}");
+}
+
+/// A thermal peak over white and 1/f noise: two-sided recursion of a damped oscillator driven by white force.
+fn oscillator(samples: usize, frequency_hz: f64, quality: f64, rate: f64, seed: u64) -> Vec<f64> {
+    let w = std::f64::consts::TAU * frequency_hz / rate;
+    let decay = (-w / (2.0 * quality)).exp();
+    let turn = w * (1.0 - 1.0 / (4.0 * quality * quality)).sqrt();
+    let (drive, white) = (white_noise(samples, 1.0, seed), white_noise(samples, 1.0, seed + 1000));
+    let (mut re, mut im) = (0.0, 0.0);
+    let mut out = Vec::with_capacity(samples);
+    // rotating decaying phasor with noise on both components: variance 1 of the real part, spectrum a Lorentzian
+    let kick = (1.0 - decay * decay).sqrt();
+    let other = white_noise(samples, 1.0, seed + 2000);
+    for k in 0..samples {
+        (re, im) = (
+            decay * (re * turn.cos() - im * turn.sin()) + kick * drive[k],
+            decay * (re * turn.sin() + im * turn.cos()) + kick * other[k],
+        );
+        out.push(re + 2.0 * white[k]);
+    }
+    out
+}
+
+#[test]
+fn thermal_peak_errors_are_honest() {
+    let mut scores = Vec::new();
+    for seed in 0..30 {
+        let mut welch = Welch::new(2048, 1e6).unwrap();
+        welch.push(&oscillator(120_000, 50e3, 60.0, 1e6, seed));
+        let peak =
+            thermal_peak(&welch.average().unwrap(), PeakSearch { lowest_hz: 10e3, highest_hz: 150e3, band: 2.0 })
+                .unwrap();
+        scores.push([
+            (peak.frequency_hz - 50e3) / peak.frequency_std_hz,
+            (peak.quality_factor - 60.0) / peak.quality_factor_std,
+            (peak.variance_v2 - 1.0) / peak.variance_std_v2,
+        ]);
+    }
+    for i in 0..3 {
+        let mean = scores.iter().map(|s| s[i]).sum::<f64>() / 30.0;
+        let std = (scores.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>() / 29.0).sqrt();
+        println!("{i}: mean {mean:.2}, std {std:.2}");
+        // mean of 30: 0.18 each, and the phasor is an oscillator only to 1/(4 Q^2) and 1/Q in its skirts: 4 sigma
+        assert!(mean.abs() < 0.75, "{i}: {mean}");
+        // standard deviation of 30: 13 %, 3.5 sigma
+        assert!((0.55..1.5).contains(&std), "{i}: {std}");
+    }
+}
+
+#[test]
+fn a_line_in_the_band_is_left_out() {
+    let mut signal = oscillator(120_000, 50e3, 60.0, 1e6, 3);
+    for (k, x) in signal.iter_mut().enumerate() {
+        *x += 0.4 * (std::f64::consts::TAU * 0.0613 * k as f64).sin();
+    }
+    let mut welch = Welch::new(2048, 1e6).unwrap();
+    welch.push(&signal);
+    let peak =
+        thermal_peak(&welch.average().unwrap(), PeakSearch { lowest_hz: 10e3, highest_hz: 150e3, band: 2.0 }).unwrap();
+    assert!(peak.lines_hz.iter().any(|f| (f - 61.3e3).abs() < 1e3), "{:?}", peak.lines_hz);
+    // the line's 0.08 must not be counted: 4 standard errors
+    assert!((peak.variance_v2 - 1.0).abs() < 4.0 * peak.variance_std_v2, "{peak:?}");
+}
+
+#[test]
+fn delay_is_bounded_by_causality_and_known_with_the_poles() {
+    let closed = ClosedForm::paper();
+    for seed in 0..5 {
+        let (samples, t0) = (4096, 1000.37);
+        let release = closed.release(samples, t0, -0.868);
+        let noise = white_noise(samples, 1.3e-4, seed);
+        let mean: Vec<f64> = release.iter().zip(&noise).map(|(r, n)| r + n).collect();
+        let time: Vec<f64> = (0..samples).map(|k| (k as f64 - 1000.0) / 5e6).collect();
+        let mut rule = OnsetRule {
+            threshold: 5.0,
+            sustained_samples: 3,
+            frequency_hz: 46e3,
+            quality_factor: 35.0,
+            skip_s: 2e-5,
+            detector_pole_hz: vec![],
+        };
+        let error = vec![1.3e-4; samples];
+        let found = onset_delay(&time, &mean, &error, &rule).unwrap();
+        let truth = 0.37 / 5e6;
+        // three poles and 87 nm: seen within 3 samples
+        assert!(truth <= found.latest_s && found.latest_s < truth + 3.0 / 5e6, "{found:?}");
+        // without poles the sum is late by the poles' time constants: 122 + 84 + 66 ns
+        assert!((found.onset_and_delay_s.value - truth - 272.5e-9).abs() < 4e-9, "{found:?}");
+        rule.detector_pole_hz = closed.detector_pole_hz.clone();
+        let found = onset_delay(&time, &mean, &error, &rule).unwrap();
+        // 3 ns of leakage from mode 2, and 4 standard errors of 0.05 ns
+        assert!((found.onset_and_delay_s.value - truth).abs() < 4e-9, "{found:?}");
+        assert!(found.onset_and_delay_s.std < 0.3e-9, "{found:?}");
+        assert!((found.mode_1.0 - 46.3e3).abs() < 5.0 && (found.mode_1.1 - 40.8).abs() < 0.2, "{found:?}");
+    }
+}

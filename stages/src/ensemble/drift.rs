@@ -1,0 +1,129 @@
+//! The stage `ensemble.drift`.
+
+use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::average::{onset_sample, signal_rows};
+use super::{DriftSettings, ShapeDrift, SubEnsemble, shape_drift};
+
+/// Asks whether the shape of the events changes slowly over the archive.
+///
+/// Model: without drift, what is left of the events after amplitude, offset, ramps and lag are taken out may be put in any order.
+/// Method: the squared norm of the remainders' linear, quadratic and cubic trend over the event index, against the same for random
+/// orders: a permutation test. Beside it, ordered and randomised sub-ensembles, each correlated with the mean of all other events.
+/// Shapes: one row per sub-ensemble in `groups`.
+/// Units: correlation coefficients and probabilities.
+/// Accuracy: the p-value is at least 1 / (1 + permutations); its standard error is sqrt(p (1 - p) / permutations).
+/// Errors: fewer than eight events, or than two per group.
+/// Source: Stark et al. 2005, section Data processing; Phipson and Smyth, Stat. Appl. Genet. Mol. Biol. 9 (2010) 39.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Drift {
+    /// Sub-ensembles of either kind, 2 to 1000. Default: 4; some twenty events each in an archive like the paper's.
+    pub groups: usize,
+    /// Random orders, 99 to 100000. Default: 999; a p-value of one per cent then has a standard error of a third of itself.
+    pub permutations: usize,
+    /// A smaller p-value is a warning, 0 to 1. Default: 0.01.
+    pub alarm_p_value: f64,
+}
+
+impl Default for Drift {
+    fn default() -> Self {
+        Self { groups: 4, permutations: 999, alarm_p_value: 0.01 }
+    }
+}
+
+const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "aligned events in the order of the archive");
+const GROUPS: Port<Table> =
+    Port::new("groups", "drift", "correlation of ordered and random sub-ensembles with the rest");
+const SUMMARY: Port<Document> =
+    Port::new("summary", "summary", "p-value of no drift, and the range of the correlations");
+
+impl Stage for Drift {
+    const SPEC: Spec = Spec {
+        name: "ensemble.drift",
+        version: 1,
+        summary: "compares ordered with random sub-ensembles: does the shape change over the archive?",
+        inputs: &[ENSEMBLE.spec()],
+        outputs: &[GROUPS.spec(), SUMMARY.spec()],
+        caching: Caching::Stored,
+        seeded: true,
+        source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        if !(2..=1000).contains(&self.groups) {
+            return Err(StageError::new(format!("`groups` is {}, wanted 2 to 1000", self.groups)));
+        }
+        if !(99..=100_000).contains(&self.permutations) {
+            return Err(StageError::new(format!("`permutations` is {}, wanted 99 to 100000", self.permutations)));
+        }
+        if !(0.0..=1.0).contains(&self.alarm_p_value) {
+            return Err(StageError::new(format!("`alarm_p_value` is {}, wanted 0 to 1", self.alarm_p_value)));
+        }
+        Ok(())
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let ensemble = inputs.get(&ENSEMBLE)?;
+        let (rows, _) = signal_rows(ensemble)?;
+        let settings = DriftSettings { groups: self.groups, permutations: self.permutations, seed: cx.seed() };
+        let found = shape_drift(rows, onset_sample(ensemble)?, settings).map_err(StageError::from_error)?;
+        if found.p_value < self.alarm_p_value {
+            cx.warn(format!(
+                "the shape of the events drifts over the archive: p = {:.4}, {:.1} standard deviations from random order",
+                found.p_value, found.z_score
+            ));
+        }
+        let summary = summary(&found, rows.count(), self.permutations)?;
+        Ok(Ports::new().with(&GROUPS, table(&found.groups)).with(&SUMMARY, summary))
+    }
+
+    fn examples() -> Vec<Example> {
+        vec![Example {
+            title: "Events that only scatter in amplitude do not drift",
+            params: "groups = 3",
+            inputs: || Ok(Ports::new().with(&ENSEMBLE, super::example::ensemble())),
+            expect: |outputs| {
+                let summary = outputs.get(&SUMMARY).map_err(|error| error.to_string())?;
+                match summary.0["p_value"].as_f64() {
+                    // a stationary archive falls below by chance once in fifty
+                    Some(p) if p > 0.02 => Ok(format!("No drift: p = {p:.2}.")),
+                    other => Err(format!("p_value {other:?}")),
+                }
+            },
+        }]
+    }
+}
+
+fn table(groups: &[SubEnsemble]) -> Table {
+    let order = |g: &SubEnsemble| if g.ordered { "ordered" } else { "random" }.to_owned();
+    Table::new()
+        .with("order", "", "how its events were chosen", groups.iter().map(order).collect::<Vec<String>>())
+        .with("group", "1", "number of the group", groups.iter().map(|g| g.group as i64).collect::<Vec<_>>())
+        .with("events", "1", "events in it", groups.iter().map(|g| g.count as i64).collect::<Vec<_>>())
+        .with(
+            "correlation",
+            "1",
+            "correlation of its mean with the mean of all other events",
+            groups.iter().map(|g| g.correlation).collect::<Vec<_>>(),
+        )
+}
+
+fn summary(found: &ShapeDrift, events: usize, permutations: usize) -> Result<Document, StageError> {
+    let range = |ordered: bool| {
+        let of = found.groups.iter().filter(|g| g.ordered == ordered).map(|g| g.correlation);
+        let (low, high) = of.fold((1.0, -1.0), |(low, high): (f64, f64), c| (low.min(c), high.max(c)));
+        json!({ "lowest": low, "highest": high })
+    };
+    Document::new(&json!({
+        "events": events,
+        "p_value": found.p_value,
+        "z_score": found.z_score,
+        "permutations": permutations,
+        "correlation_ordered": range(true),
+        "correlation_random": range(false),
+    }))
+}

@@ -1,0 +1,78 @@
+//! Inputs of the stages' examples: one resonance in closed form.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use afmid_pipeline::{Array, Axis};
+
+/// Sample rate of the examples.
+pub(crate) const SAMPLE_RATE_HZ: f64 = 5e6;
+/// Resonance of the examples.
+pub(crate) const FREQUENCY_HZ: f64 = 120e3;
+/// Its quality factor.
+pub(crate) const QUALITY_FACTOR: f64 = 20.0;
+/// Load before the release, in volts.
+pub(crate) const LOAD_V: f64 = -0.8;
+/// Sample of the release.
+pub(crate) const T0: usize = 256;
+
+/// `load` held until sample `t0`, then `load exp(-a t) (cos(w t) + (a / w) sin(w t))`.
+pub(crate) fn release(samples: usize, t0: usize, load: f64) -> Vec<f64> {
+    let w0 = std::f64::consts::TAU * FREQUENCY_HZ;
+    let a = 0.5 * w0 / QUALITY_FACTOR;
+    let w = (w0 * w0 - a * a).sqrt();
+    (0..samples)
+        .map(|k| {
+            let t = k.saturating_sub(t0) as f64 / SAMPLE_RATE_HZ;
+            load * (-a * t).exp() * ((w * t).cos() + a / w * (w * t).sin())
+        })
+        .collect()
+}
+
+/// Twelve releases of 4096 samples whose amplitudes scatter by a tenth, in noise of one millivolt.
+pub(crate) fn ensemble() -> Array {
+    let (count, samples) = (12, 4096);
+    let mut rng = ChaCha8Rng::seed_from_u64(2005);
+    let mut gauss = || -> f64 { StandardNormal.sample(&mut rng) };
+    let mut values = Vec::with_capacity(count * samples);
+    for _ in 0..count {
+        let (amplitude, offset) = (1.0 + 0.1 * gauss(), 4e-3 * gauss());
+        values.extend(release(samples, T0, LOAD_V).iter().map(|y| amplitude * y + offset + 1e-3 * gauss()));
+    }
+    let time = (0..samples).map(|k| (k as f64 - T0 as f64) / SAMPLE_RATE_HZ).collect();
+    Array::over(vec![
+        Axis::new("event", "1", "event", (0..count).map(|k| k as f64).collect()),
+        Axis::new("time", "s", "time after the onset", time),
+    ])
+    .with("signal", "V", "deflection signal", &["event", "time"], values)
+    .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
+    .attribute("onset_sample", T0)
+    .attribute("kind", "snap-off")
+}
+
+/// Runs all examples of a list of stages on one context each.
+#[cfg(test)]
+pub(crate) fn run_examples(stages: &[afmid_pipeline::Entry]) {
+    use afmid_pipeline::stage::NoProgress;
+    for entry in stages {
+        let examples = (entry.examples)();
+        assert!(!examples.is_empty(), "{}: no example", entry.spec.name);
+        for example in examples {
+            let params = afmid_pipeline::toml::from_str(example.params).unwrap();
+            let stage = (entry.parse)(params).unwrap();
+            stage.check().unwrap();
+            let cx = afmid_pipeline::Context::new(std::path::Path::new("."), 7, &NoProgress);
+            let outputs = stage.run(&(example.inputs)().unwrap(), &cx).unwrap();
+            for (name, artifact) in outputs.iter() {
+                artifact.validate().unwrap_or_else(|error| panic!("{}.{name}: {error}", entry.spec.name));
+            }
+            let names: Vec<&str> = outputs.iter().map(|(name, _)| name).collect();
+            let declared: Vec<&str> = entry.spec.outputs.iter().map(|port| port.name).collect();
+            assert_eq!(names, declared, "{}", entry.spec.name);
+            let said = (example.expect)(&outputs);
+            assert!(said.is_ok(), "{} `{}`: {said:?}", entry.spec.name, example.title);
+            println!("{}: {} {:?}", entry.spec.name, said.unwrap(), cx.into_warnings());
+        }
+    }
+}

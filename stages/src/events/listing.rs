@@ -1,0 +1,206 @@
+//! Events as artifacts: ensemble, table, summary.
+
+use afmid_pipeline::{Array, Axis, Document, Record, StageError, Table};
+use serde::Serialize;
+
+use super::detection::EventKind;
+use super::extraction::Refused;
+use super::window::EventWindow;
+
+/// An event of the ensemble with its record.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Kept {
+    record: usize,
+    /// Onset as a position in the record.
+    position: f64,
+    saturated: usize,
+    event: EventWindow,
+}
+
+/// Everything that was seen.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Listed {
+    kept: Vec<Kept>,
+    /// Refused or rejected, with the record.
+    pub(super) refused: Vec<(usize, Refused)>,
+    /// Iterations of the averaging.
+    pub(super) iterations: usize,
+}
+
+impl Listed {
+    /// Adds an event of the ensemble; `place` is its record, its segment's start and its saturated samples.
+    pub(super) fn keep(&mut self, place: (usize, usize, usize), event: EventWindow) {
+        let (record, start, saturated) = place;
+        self.kept.push(Kept { record, position: start as f64 + event.onset, saturated, event });
+    }
+
+    /// Adds an event that does not belong.
+    pub(super) fn reject(&mut self, place: (usize, usize, usize), onset: usize, reason: String) {
+        self.refused.push((place.0, Refused { index: Some(place.1 + onset), reason }));
+        // stable: events of one record in order of time
+        self.refused.sort_by_key(|(record, refused)| (*record, refused.index));
+    }
+}
+
+/// Aligned events over event and time; time 0 is the onset.
+pub(super) fn ensemble_array(listed: &Listed, rate: f64, onset_sample: usize, kind: EventKind, unit: &str) -> Array {
+    let kept = &listed.kept;
+    let samples = kept.first().map_or(0, |first| first.event.values.len());
+    let time = (0..samples).map(|k| (k as f64 - onset_sample as f64) / rate).collect();
+    let mut signal = Vec::with_capacity(kept.len() * samples);
+    kept.iter().for_each(|kept| signal.extend_from_slice(&kept.event.values));
+    let each = |value: &dyn Fn(&Kept) -> f64| -> Vec<f64> { kept.iter().map(value).collect() };
+    Array::over(vec![
+        Axis::new("event", "1", "event", (0..kept.len()).map(|k| k as f64).collect()),
+        Axis::new("time", "s", "time after the onset", time),
+    ])
+    .with("signal", unit, "deflection signal", &["event", "time"], signal)
+    .with(
+        "record",
+        "1",
+        "number of the record",
+        &["event"],
+        kept.iter().map(|kept| kept.record as i64).collect::<Vec<_>>(),
+    )
+    .with("onset", "s", "time of the onset in its record", &["event"], each(&|kept| kept.position / rate))
+    .with("amplitude", unit, "jump of level at the onset", &["event"], each(&|kept| kept.event.amplitude))
+    .with("offset", unit, "level without force at the onset", &["event"], each(&|kept| kept.event.offset))
+    .with(
+        "noise",
+        unit,
+        "standard deviation of the noise before the onset",
+        &["event"],
+        each(&|kept| kept.event.noise_std),
+    )
+    .attribute("sample_rate_hz", rate)
+    .attribute("onset_sample", onset_sample)
+    .attribute("kind", kind_name(kind))
+}
+
+/// One row per event that was seen and per record without any, by record and time.
+pub(super) fn events_table(listed: &Listed, records: &[Record], rate: f64, unit: &str) -> Table {
+    let mut rows: Vec<Row> = (0..).zip(&listed.kept).map(|(number, kept)| Row::kept(kept, number, rate)).collect();
+    rows.extend(listed.refused.iter().map(|(record, refused)| Row::refused(*record, refused, rate)));
+    rows.sort_by(|a, b| a.record.cmp(&b.record).then(a.index.cmp(&b.index)));
+    let text = |value: &dyn Fn(&Row) -> String| -> Vec<String> { rows.iter().map(value).collect() };
+    let whole = |value: &dyn Fn(&Row) -> i64| -> Vec<i64> { rows.iter().map(value).collect() };
+    let real = |value: &dyn Fn(&Row) -> f64| -> Vec<f64> { rows.iter().map(value).collect() };
+    let name = |row: &Row| records.get(row.record).map_or(String::new(), |record| record.name.clone());
+    Table::new()
+        .with("record", "", "file name of the record", text(&name))
+        .with("event", "1", "place in the ensemble; -1 if it is not in it", whole(&|row| row.event))
+        .with("index", "1", "sample of the onset; -1 if none was seen", whole(&|row| row.index))
+        .with("shift", "1", "what the onset lies after that sample, in samples", real(&|row| row.shift))
+        .with("time_s", "s", "time of the onset in the record", real(&|row| row.time_s))
+        .with("amplitude", unit, "jump of level at the onset", real(&|row| row.amplitude))
+        .with("correlation", "1", "correlation with the average of the others", real(&|row| row.correlation))
+        .with("quality", "1", "residual against the others over the noise; 1 is ideal", real(&|row| row.quality))
+        .with("saturated", "1", "samples at the end of the range", whole(&|row| row.saturated))
+        .with("rejected", "", "why it is not in the ensemble; empty if it is", text(&|row| row.reason.clone()))
+}
+
+struct Row {
+    record: usize,
+    event: i64,
+    index: i64,
+    shift: f64,
+    time_s: f64,
+    amplitude: f64,
+    correlation: f64,
+    quality: f64,
+    saturated: i64,
+    reason: String,
+}
+
+impl Row {
+    fn kept(kept: &Kept, number: i64, rate: f64) -> Self {
+        let index = kept.position.round();
+        Self {
+            record: kept.record,
+            event: number,
+            index: index as i64,
+            shift: kept.position - index,
+            time_s: kept.position / rate,
+            amplitude: kept.event.amplitude,
+            correlation: kept.event.correlation,
+            quality: kept.event.quality,
+            saturated: kept.saturated as i64,
+            reason: String::new(),
+        }
+    }
+
+    fn refused(record: usize, refused: &Refused, rate: f64) -> Self {
+        Self {
+            record,
+            event: -1,
+            index: refused.index.map_or(-1, |index| index as i64),
+            shift: f64::NAN,
+            time_s: refused.index.map_or(f64::NAN, |index| index as f64 / rate),
+            amplitude: f64::NAN,
+            correlation: f64::NAN,
+            quality: f64::NAN,
+            saturated: 0,
+            reason: refused.reason.clone(),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Summary {
+    events: Events,
+}
+
+#[derive(Serialize)]
+struct Events {
+    kind: &'static str,
+    records: usize,
+    found: usize,
+    rejected: Vec<Rejected>,
+    iterations: usize,
+    worst_correlation: Option<f64>,
+    amplitude_mean: Option<f64>,
+    amplitude_std: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Rejected {
+    record: String,
+    index: Option<usize>,
+    reason: String,
+}
+
+/// How many events were found, and what was rejected.
+pub(super) fn summary(listed: &Listed, records: &[Record], kind: EventKind) -> Result<Document, StageError> {
+    let amplitudes: Vec<f64> = listed.kept.iter().map(|kept| kept.event.amplitude).collect();
+    let n = amplitudes.len() as f64;
+    let mean = amplitudes.iter().sum::<f64>() / n;
+    let variance = amplitudes.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let name = |record: usize| records.get(record).map_or(String::new(), |record| record.name.clone());
+    Document::new(&Summary {
+        events: Events {
+            kind: kind_name(kind),
+            records: records.len(),
+            found: listed.kept.len(),
+            rejected: listed
+                .refused
+                .iter()
+                .map(|(record, refused)| Rejected {
+                    record: name(*record),
+                    index: refused.index,
+                    reason: refused.reason.clone(),
+                })
+                .collect(),
+            iterations: listed.iterations,
+            worst_correlation: listed.kept.iter().map(|kept| kept.event.correlation).min_by(f64::total_cmp),
+            amplitude_mean: Some(mean).filter(|value| value.is_finite()),
+            amplitude_std: Some(variance.sqrt()).filter(|value| value.is_finite()),
+        },
+    })
+}
+
+fn kind_name(kind: EventKind) -> &'static str {
+    match kind {
+        EventKind::SnapOff => "snap-off",
+        EventKind::SnapIn => "snap-in",
+    }
+}

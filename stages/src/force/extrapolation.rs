@@ -1,0 +1,269 @@
+//! The stage `force.extrapolation`.
+
+use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::{Event, ExtrapolationSettings, Lines, Onset, OnsetSettings, ZeroLine, extrapolate, pair};
+
+/// Derives the force that acted from the averaged event: input and response of the identification.
+///
+/// Model: at a snap-off the lever follows the load along a line before t0 and rings about the line without force after it; the force is
+/// the difference of the lines before t0 and zero from t0 on. At a snap-in the force is zero before t0, then a step and a ramp as
+/// the piezo goes on: the true contact force is not linear, and this is only the line about which the signal rings.
+/// Method: a uniform line before the event, a Hann-weighted one after it, which suppresses ringing without a model of it. t0 is the last
+/// sample that still lies on the line before: the largest that leaves the transfer function causal. It is found once, from all events,
+/// and used for both halves; each half has its own lines. Each value of the force is held until the next sample.
+/// Shapes: `force`, `response`, `standard_error` over time since t0; the same with `_identification` and `_verification`.
+/// Units: volts of static deflection, so that the transfer function is one at rest; `force_newton` where stiffness and sensitivity are given.
+/// Accuracy: the load's standard error counts the noise of the mean and its correlation over a window, not slower drift. t0 has an ambiguity of
+/// some samples, reported: an earlier t0 is the same as a delay.
+/// Errors: no departure near the onset, lines shorter than 32 samples, a load that does not stand out from the noise.
+/// Source: Stark et al. 2005, section Data processing and Fig. 2(d).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Extrapolation {
+    /// Time left out between the line before and the onset, 0 to 1 s. Default: 10 us, ten times what t0 may be off.
+    pub guard_s: f64,
+    /// How far t0 may lie from the onset of the ensemble, above 0 to 1 s. Default: 10 us.
+    pub reach_s: f64,
+    /// A departure counts above this many standard deviations of the mean about its line, 2 to 100. Default: 4; noise alone crosses it once in 16000
+    /// samples, and only a few are looked at.
+    pub departure_sigma: f64,
+    /// Share of the load by which the signal must leave the line to be the event, 0.001 to 0.9. Default: 0.1.
+    pub sure_share: f64,
+    /// Line without force: `linear` (offset and slope) or `constant`. Default: linear, since crosstalk of the piezo makes a slope.
+    pub zero_line: ZeroLineKind,
+    /// t0 in seconds after the ensemble's onset, moved to the next sample, instead of the largest causal one. Default: none.
+    pub t0_s: Option<f64>,
+    /// Spring constant in N/m, above 0, for a force in newtons; it comes before the calibration's. Default: none.
+    pub stiffness_n_per_m: Option<f64>,
+    /// Optical lever sensitivity in metres of deflection per volt, above 0; it comes before the calibration's. Default: none.
+    pub sensitivity_m_per_v: Option<f64>,
+}
+
+/// Shape of the line without force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ZeroLineKind {
+    /// Offset and slope.
+    Linear,
+    /// Offset alone.
+    Constant,
+}
+
+impl Default for Extrapolation {
+    fn default() -> Self {
+        Self {
+            guard_s: 10e-6,
+            reach_s: 10e-6,
+            departure_sigma: 4.0,
+            sure_share: 0.1,
+            zero_line: ZeroLineKind::Linear,
+            t0_s: None,
+            stiffness_n_per_m: None,
+            sensitivity_m_per_v: None,
+        }
+    }
+}
+
+pub(super) const AVERAGE: Port<Array> = Port::new("average", "average", "averaged events, whole and halves");
+const CALIBRATION: Port<Document> =
+    Port::optional("calibration", "calibration", "stiffness_n_per_m and sensitivity_m_per_v, for newtons");
+pub(super) const PAIR: Port<Array> =
+    Port::new("pair", "pair", "force and response over time since t0, whole and halves");
+pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "load at the event, t0 and its ambiguity");
+
+impl Stage for Extrapolation {
+    const SPEC: Spec = Spec {
+        name: "force.extrapolation",
+        version: 1,
+        summary: "derives force input and response from the lines before and after the averaged event",
+        inputs: &[AVERAGE.spec(), CALIBRATION.spec()],
+        outputs: &[PAIR.spec(), SUMMARY.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing, Fig. 2(d)",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        within("guard_s", self.guard_s, 0.0, 1.0)?;
+        within("reach_s", self.reach_s, f64::MIN_POSITIVE, 1.0)?;
+        within("departure_sigma", self.departure_sigma, 2.0, 100.0)?;
+        within("sure_share", self.sure_share, 0.001, 0.9)?;
+        within("t0_s", self.t0_s.unwrap_or(0.0), -1.0, 1.0)?;
+        within("stiffness_n_per_m", self.stiffness_n_per_m.unwrap_or(1.0), f64::MIN_POSITIVE, f64::MAX)?;
+        within("sensitivity_m_per_v", self.sensitivity_m_per_v.unwrap_or(1.0), f64::MIN_POSITIVE, f64::MAX)
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let average = inputs.get(&AVERAGE)?;
+        let scale = self.newtons_per_volt(inputs.find(&CALIBRATION)?)?;
+        let rate = average.number("sample_rate_hz")?;
+        let onset = crate::ensemble::onset_sample(average)?;
+        let event = event_kind(average)?;
+        let settings = self.settings(event, onset, rate);
+        let (mean, error) = (average.real("mean")?, average.real("standard_error")?);
+        let causal = extrapolate(mean, error, settings, None);
+        let lines = match self.given_onset(onset, rate) {
+            None => causal.map_err(StageError::from_error)?,
+            Some(given) => {
+                if let Ok(causal) =
+                    causal.as_ref().map(|lines| lines.onset).map(|c| given.latest.saturating_sub(c.latest))
+                    && causal > 0
+                {
+                    cx.warn(format!(
+                        "t0_s lies {causal} samples after the last one on the line: the response comes first"
+                    ));
+                }
+                extrapolate(mean, error, settings, Some(given)).map_err(StageError::from_error)?
+            }
+        };
+        let t0 = lines.onset.latest;
+        if t0 >= mean.len() {
+            return Err(StageError::new(format!("t0 is sample {t0} of a window of {}", mean.len())));
+        }
+        let time = (0..mean.len()).map(|k| (k as f64 - t0 as f64) / rate).collect();
+        let mut result = Array::over(vec![Axis::new("time", "s", "time since t0", time)]);
+        let mut halves = Vec::new();
+        for suffix in ["", "_identification", "_verification"] {
+            let Ok(mean) = average.real(&format!("mean{suffix}")) else { continue };
+            let error = average.real(&format!("standard_error{suffix}"))?;
+            let own = match suffix {
+                "" => lines,
+                _ => extrapolate(mean, error, settings, Some(lines.onset)).map_err(StageError::from_error)?,
+            };
+            result = add_pair(result, suffix, mean, error, &own, event, scale);
+            halves.push((suffix, own));
+            if let Some(count) = average.attributes.get(&format!("count{suffix}")) {
+                result.attributes.insert(format!("count{suffix}"), count.clone());
+            }
+        }
+        let ambiguity = lines.onset.ambiguity() / rate;
+        result = result
+            .attribute("sample_rate_hz", rate)
+            .attribute("t0_sample", t0)
+            .attribute("t0_ambiguity_s", ambiguity)
+            .attribute("kind", if event == Event::SnapOff { "snap-off" } else { "snap-in" })
+            .attribute("load_v", lines.load)
+            .attribute("load_std_v", lines.load_std);
+        let summary = summary(&halves, event, onset, rate, scale)?;
+        Ok(Ports::new().with(&PAIR, result).with(&SUMMARY, summary))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::example::examples()
+    }
+}
+
+impl Extrapolation {
+    fn settings(&self, event: Event, near: usize, rate: f64) -> ExtrapolationSettings {
+        let samples = |seconds: f64| (seconds * rate).ceil() as usize;
+        ExtrapolationSettings {
+            event,
+            zero_line: match self.zero_line {
+                ZeroLineKind::Linear => ZeroLine::Linear,
+                ZeroLineKind::Constant => ZeroLine::Constant,
+            },
+            guard: samples(self.guard_s),
+            onset: OnsetSettings {
+                near,
+                reach: samples(self.reach_s),
+                departure_sigma: self.departure_sigma,
+                sure_share: self.sure_share,
+            },
+        }
+    }
+
+    fn given_onset(&self, near: usize, rate: f64) -> Option<Onset> {
+        let sample = (near as f64 + (self.t0_s? * rate).round()).max(0.0);
+        Some(Onset { latest: sample as usize, earliest: sample })
+    }
+
+    /// Stiffness times sensitivity, from the parameters or the calibration.
+    fn newtons_per_volt(&self, calibration: Option<&Document>) -> Result<Option<f64>, StageError> {
+        let stiffness = self.stiffness_n_per_m.or_else(|| calibrated(calibration, "stiffness_n_per_m"));
+        let sensitivity = self.sensitivity_m_per_v.or_else(|| calibrated(calibration, "sensitivity_m_per_v"));
+        match (stiffness, sensitivity) {
+            (Some(stiffness), Some(sensitivity)) => Ok(Some(stiffness * sensitivity)),
+            (None, None) => Ok(None),
+            _ => Err(StageError::new(
+                "a force in newtons wants both `stiffness_n_per_m` and `sensitivity_m_per_v`, found one",
+            )
+            .help("give the other as a parameter, or wire a calibration that has both")),
+        }
+    }
+}
+
+/// A number of the calibration, plain or as `{ "value": ... }`.
+fn calibrated(calibration: Option<&Document>, name: &str) -> Option<f64> {
+    let found = calibration?.0.get(name)?;
+    found.as_f64().or_else(|| found.get("value")?.as_f64())
+}
+
+fn event_kind(average: &Array) -> Result<Event, StageError> {
+    match average.attributes.get("kind").and_then(|kind| kind.as_str()) {
+        Some("snap-off") => Ok(Event::SnapOff),
+        Some("snap-in") => Ok(Event::SnapIn),
+        other => Err(StageError::new(format!("attribute `kind` is {other:?}, wanted `snap-off` or `snap-in`"))),
+    }
+}
+
+fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), StageError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")))
+}
+
+fn add_pair(
+    to: Array,
+    suffix: &str,
+    mean: &[f64],
+    error: &[f64],
+    lines: &Lines,
+    event: Event,
+    newtons_per_volt: Option<f64>,
+) -> Array {
+    let pair = pair(mean, lines, event);
+    let newtons: Option<Vec<f64>> = newtons_per_volt.map(|scale| pair.force.iter().map(|u| scale * u).collect());
+    let over = &["time"];
+    let to = to
+        .with(&format!("response{suffix}"), "V", "deflection above the zero-force line", over, pair.response)
+        .with(&format!("force{suffix}"), "V", "force, as the static deflection that it causes", over, pair.force)
+        .with(&format!("standard_error{suffix}"), "V", "standard error of the response", over, error.to_vec());
+    match newtons {
+        Some(newtons) => to.with(&format!("force_newton{suffix}"), "N", "force on the tip", over, newtons),
+        None => to,
+    }
+}
+
+fn summary(
+    halves: &[(&str, Lines)],
+    event: Event,
+    onset: usize,
+    rate: f64,
+    scale: Option<f64>,
+) -> Result<Document, StageError> {
+    let Some((_, whole)) = halves.first() else { return Err(StageError::new("there is no average")) };
+    let with_std = |value: f64, std: f64, unit: &str| json!({ "value": value, "std": std, "unit": unit });
+    let half = |suffix: &str| {
+        halves.iter().find(|h| h.0 == suffix).map_or(Value::Null, |h| with_std(h.1.load, h.1.load_std, "V"))
+    };
+    let zero = if event == Event::SnapOff { whole.after } else { whole.before };
+    Document::new(&json!({
+        "kind": if event == Event::SnapOff { "snap-off" } else { "snap-in" },
+        "load": with_std(whole.load, whole.load_std, "V"),
+        "load_identification": half("_identification"),
+        "load_verification": half("_verification"),
+        "force": scale.map(|scale| with_std(scale * whole.load, scale.abs() * whole.load_std, "N")),
+        "load_rate_v_per_s": whole.load_slope * rate,
+        "t0_s": (whole.onset.latest as f64 - onset as f64) / rate,
+        "t0_sample": whole.onset.latest,
+        "t0_ambiguity_s": whole.onset.ambiguity() / rate,
+        "zero_line_v": zero.at(whole.onset.latest as f64),
+        "zero_line_v_per_s": zero.slope * rate,
+        "noise_before_v": whole.rms_before,
+    }))
+}

@@ -1,0 +1,157 @@
+//! Whether records belong together.
+
+use afmid_pipeline::{Record, StageError};
+
+/// What records have in common.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Consistency {
+    /// Samples per second of all.
+    pub sample_rate_hz: f64,
+    /// Unit of all deflections.
+    pub unit: String,
+    /// Samples of all deflections together.
+    pub samples: usize,
+    /// Of the shortest deflection.
+    pub shortest_samples: usize,
+    /// Of the longest.
+    pub longest_samples: usize,
+    /// What differs but may: for warnings.
+    pub remarks: Vec<String>,
+}
+
+/// Checks records against the first one.
+///
+/// Method: sample rates must agree to 1e-6, units of each channel exactly; lengths, scale factors and the presence of a piezo channel may differ and are remarked on. Channels of
+/// one record must be of one length.
+/// Errors: no record; a rate or unit that differs, with both files; an empty record; channels of different lengths.
+pub fn check_consistency(records: &[Record]) -> Result<Consistency, StageError> {
+    let first = records.first().ok_or_else(|| StageError::new("there is no record"))?;
+    let deflection = first.channel("deflection")?;
+    let (mut samples, mut shortest, mut longest) = (0, first, first);
+    for record in records {
+        if (record.sample_rate_hz / first.sample_rate_hz - 1.0).abs() > 1e-6 {
+            return Err(differs(first, record, "samples per second", &first.sample_rate_hz, &record.sample_rate_hz));
+        }
+        samples += checked_length(record)?;
+        for channel in &record.channels {
+            if let Ok(same) = first.channel(&channel.role)
+                && same.unit != channel.unit
+            {
+                let what = format!("as unit of the {}", channel.role);
+                return Err(differs(first, record, &what, &same.unit, &channel.unit));
+            }
+        }
+        let length = record.channel("deflection")?.samples;
+        shortest = if length < shortest.channel("deflection")?.samples { record } else { shortest };
+        longest = if length > longest.channel("deflection")?.samples { record } else { longest };
+    }
+    let lengths = [shortest.channel("deflection")?.samples, longest.channel("deflection")?.samples];
+    let mut remarks = Vec::new();
+    if lengths[0] != lengths[1] {
+        remarks.push(format!(
+            "the records differ in length: from {} samples ({}) to {} ({})",
+            lengths[0], shortest.name, lengths[1], longest.name
+        ));
+    }
+    if let Some(other) = records.iter().find(|record| {
+        record.channel("deflection").is_ok_and(|channel| channel.scale_factor != deflection.scale_factor)
+    }) {
+        remarks.push(format!(
+            "the scale factor changes within the archive: {} {} per code in {}, {} in {}",
+            deflection.scale_factor,
+            deflection.unit,
+            first.name,
+            other.channel("deflection")?.scale_factor,
+            other.name
+        ));
+    }
+    let without = records.iter().filter(|record| record.channel("piezo").is_err()).count();
+    if without > 0 && without < records.len() {
+        remarks.push(format!("{without} of {} records have no piezo channel", records.len()));
+    }
+    Ok(Consistency {
+        sample_rate_hz: first.sample_rate_hz,
+        unit: deflection.unit.clone(),
+        samples,
+        shortest_samples: lengths[0],
+        longest_samples: lengths[1],
+        remarks,
+    })
+}
+
+fn checked_length(record: &Record) -> Result<usize, StageError> {
+    let length = record.channel("deflection")?.samples;
+    if length == 0 {
+        return Err(StageError::new("the record holds no sample")
+            .at(&record.path)
+            .help("remove the file from `files`"));
+    }
+    match record.channels.iter().find(|channel| channel.samples != length) {
+        Some(other) => Err(StageError::new(format!(
+            "the deflection has {length} samples, {} has {}: one record wants one length",
+            other.location, other.samples
+        ))
+        .at(&record.path)),
+        None => Ok(length),
+    }
+}
+
+fn differs(
+    first: &Record,
+    other: &Record,
+    what: &str,
+    a: &dyn std::fmt::Display,
+    b: &dyn std::fmt::Display,
+) -> StageError {
+    StageError::new(format!("{} has {a} {what}, {} has {b}", first.name, other.name))
+        .at(&other.path)
+        .help("records of one analysis must agree: analyse them apart, or correct the attribute that is wrong")
+}
+
+#[cfg(test)]
+mod tests {
+    use afmid_pipeline::recording::Raw;
+
+    use super::*;
+    use crate::io::{memory_channel, memory_record};
+
+    fn record(name: &str, rate: f64, samples: usize) -> Record {
+        memory_record(name, rate, vec![memory_channel("deflection", Raw::Int16(vec![0; samples]), 1e-3)])
+    }
+
+    #[test]
+    fn equal_records_pass_without_a_remark() {
+        let found = check_consistency(&[record("a", 5e6, 100), record("b", 5e6, 100)]).unwrap();
+        assert_eq!((found.samples, found.sample_rate_hz, found.remarks.len()), (200, 5e6, 0));
+    }
+
+    #[test]
+    fn other_rates_and_units_are_errors_that_name_both_files() {
+        let text = check_consistency(&[record("a.h5", 5e6, 9), record("b.h5", 2e6, 9)]).unwrap_err().to_string();
+        assert!(text.contains("a.h5 has 5000000 samples per second, b.h5 has 2000000"), "{text}");
+        let mut other = record("b.h5", 5e6, 9);
+        other.channels[0].unit = "nm".to_owned();
+        let text = check_consistency(&[record("a.h5", 5e6, 9), other]).unwrap_err().to_string();
+        assert!(text.contains("a.h5 has V as unit of the deflection, b.h5 has nm"), "{text}");
+    }
+
+    #[test]
+    fn other_lengths_scales_and_missing_piezo_are_remarks() {
+        let mut other = record("b.h5", 5e6, 50);
+        other.channels[0].scale_factor = 2e-3;
+        other.channels.push(memory_channel("piezo", Raw::Int16(vec![0; 50]), 1.0));
+        let remarks = check_consistency(&[record("a.h5", 5e6, 100), other]).unwrap().remarks;
+        assert!(remarks[0].contains("from 50 samples (b.h5) to 100 (a.h5)"), "{remarks:?}");
+        assert!(remarks[1].contains("0.001 V per code in a.h5, 0.002 in b.h5"), "{remarks:?}");
+        assert!(remarks[2].contains("1 of 2"), "{remarks:?}");
+    }
+
+    #[test]
+    fn empty_records_unequal_channels_and_no_record_are_errors() {
+        assert!(check_consistency(&[]).is_err());
+        assert!(check_consistency(&[record("a", 5e6, 0)]).is_err());
+        let mut odd = record("a", 5e6, 10);
+        odd.channels.push(memory_channel("piezo", Raw::Int16(vec![0; 9]), 1.0));
+        assert!(check_consistency(&[odd]).unwrap_err().to_string().contains("10 samples, /piezo has 9"));
+    }
+}

@@ -1,0 +1,130 @@
+//! Files by pattern.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::StageError;
+use glob::{MatchOptions, Pattern, glob_with};
+
+use super::natural_order::natural_order;
+
+/// The files that match `patterns`, relative to `base`, each once: patterns in their order, the matches of each in natural order.
+///
+/// Method: `*`, `?`, `[...]` and `**` as in a shell, names that begin with a dot not matched by them; a pattern that names a folder means its `*.h5`.
+/// Errors: a pattern that is none, a folder that cannot be read, or one without a match: with the pattern, the folder that was looked at, and what is there.
+pub fn matching_files(patterns: &[String], base: &Path) -> Result<Vec<PathBuf>, StageError> {
+    let mut files: Vec<PathBuf> = Vec::new();
+    for pattern in patterns {
+        let mut matches = matches_of(pattern, base)?;
+        if matches.is_empty() {
+            return Err(no_match(pattern, base));
+        }
+        matches.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
+        for file in matches {
+            if !files.contains(&file) {
+                files.push(file);
+            }
+        }
+    }
+    Ok(files)
+}
+
+fn matches_of(pattern: &str, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+    let whole = base.join(pattern);
+    if whole.is_file() {
+        return Ok(vec![whole]);
+    }
+    // special characters in the folder of the config are no pattern; an absolute pattern replaces the folder
+    let mut text = match Path::new(pattern).is_absolute() {
+        true => pattern.to_owned(),
+        false => format!("{}/{pattern}", Pattern::escape(&base.to_string_lossy())),
+    };
+    if whole.is_dir() {
+        text = format!("{}/*.h5", Pattern::escape(&whole.to_string_lossy()));
+    }
+    let options =
+        MatchOptions { require_literal_leading_dot: true, require_literal_separator: true, ..MatchOptions::new() };
+    let paths = glob_with(&text, options)
+        .map_err(|error| StageError::new(format!("`{pattern}` is no file pattern: {}", error.msg)).caused_by(error))?;
+    let mut files = Vec::new();
+    for path in paths {
+        let path = path.map_err(|error| {
+            let place = error.path().to_owned();
+            StageError::new(format!("a folder of the pattern `{pattern}` cannot be read: {}", error.error())).at(place)
+        })?;
+        if path.is_file() {
+            files.push(path);
+        }
+    }
+    Ok(files)
+}
+
+fn no_match(pattern: &str, base: &Path) -> StageError {
+    // the deepest folder before the first special character
+    let plain: PathBuf = Path::new(pattern)
+        .components()
+        .take_while(|part| !part.as_os_str().to_string_lossy().contains(['*', '?', '[']))
+        .collect();
+    let whole = base.join(&plain);
+    let folder =
+        if plain == Path::new(pattern) && !whole.is_dir() { whole.parent().unwrap_or(base).to_owned() } else { whole };
+    let there = match std::fs::read_dir(&folder) {
+        Err(error) => format!("it cannot be listed: {error}"),
+        Ok(entries) => {
+            let mut names: Vec<String> =
+                entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+            names.sort_by(|a, b| natural_order(a, b));
+            match &names[..] {
+                [] => "it is empty".to_owned(),
+                [one] => format!("it holds `{one}`"),
+                [first, .., last] => format!("it holds {} entries, from `{first}` to `{last}`", names.len()),
+            }
+        }
+    };
+    StageError::new(format!("no file matches `{pattern}`: looked in {}; {there}", folder.display()))
+        .help("paths in a config, and in --set, are relative to the config file's folder")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(name: &str, files: &[&str]) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("afmid-patterns-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(folder.join("sub")).unwrap();
+        for file in files {
+            std::fs::write(folder.join(file), b"").unwrap();
+        }
+        folder
+    }
+
+    fn names(patterns: &[&str], base: &Path) -> Vec<String> {
+        let patterns: Vec<String> = patterns.iter().map(|&pattern| pattern.to_owned()).collect();
+        let files = matching_files(&patterns, base).unwrap();
+        files.iter().map(|file| file.file_name().unwrap().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn files_come_once_and_in_natural_order() {
+        let base = folder("[odd] name", &["r10.h5", "r9.h5", "other.txt", ".hidden.h5", "sub/s1.h5"]);
+        assert_eq!(names(&["*.h5"], &base), ["r9.h5", "r10.h5"]);
+        assert_eq!(names(&["r10.h5", "*.h5", "sub"], &base), ["r10.h5", "r9.h5", "s1.h5"]);
+        assert_eq!(names(&["sub/../r9.h5"], &base), ["r9.h5"]);
+        let absolute = base.join("sub").join("*.h5").to_string_lossy().replace("[odd]", "?odd?");
+        assert_eq!(names(&[&absolute], Path::new("/")), ["s1.h5"]);
+        std::fs::remove_dir_all(base).unwrap();
+    }
+
+    #[test]
+    fn no_match_says_where_it_looked_and_what_is_there() {
+        let base = folder("none", &["a.txt", "b.txt"]);
+        let said = |pattern: &str| matching_files(&[pattern.to_owned()], &base).unwrap_err().to_string();
+        let text = said("*.h5");
+        assert!(text.contains("`*.h5`") && text.contains(&base.display().to_string()), "{text}");
+        assert!(text.contains("3 entries, from `a.txt` to `sub`"), "{text}");
+        assert!(said("sub/*.h5").contains("it is empty"), "{}", said("sub/*.h5"));
+        assert!(said("nowhere/x*.h5").contains("cannot be listed"), "{}", said("nowhere/x*.h5"));
+        assert!(said("a.h5").contains("3 entries"), "{}", said("a.h5"));
+        assert!(said("[").contains("no file pattern"), "{}", said("["));
+        std::fs::remove_dir_all(base).unwrap();
+    }
+}

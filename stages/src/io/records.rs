@@ -1,0 +1,203 @@
+//! The stage `io.records`.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::recording::{Wanted, open_native};
+use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::consistency::{Consistency, check_consistency};
+use super::file_patterns::matching_files;
+
+/// Opens native HDF5 records by pattern.
+///
+/// Model: file attributes `sample_rate_hz`, `started_at`; one dataset per channel; value = stored * scale_factor + add_offset.
+/// Method: files in natural order; nothing but attributes is read here, samples are streamed by the stages that need them. Sample rate and unit
+/// must agree over all files; other lengths are reported.
+/// Shapes: one record per file, with the roles `deflection` and, where the file has it, `piezo`.
+/// Units: the channels' own.
+/// Accuracy: codes stay codes: nothing is rounded.
+/// Errors: a pattern without a match; files that are no HDF5, cut short or damaged; a missing channel or attribute; rates or units that differ; a rate too low for
+/// a ringdown.
+/// Source: the CF conventions for scale_factor and add_offset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Records {
+    /// Files, as patterns relative to the config file (`archive/*.h5`); a folder means its `*.h5`. Required.
+    pub files: Vec<String>,
+    /// Dataset of the deflection signal. Default: `/deflection`.
+    pub channel: String,
+    /// Dataset of the piezo monitor, used where a file has it; empty: not looked for. Default: `/piezo`.
+    pub piezo_channel: String,
+    /// Least sample rate, in Hz, 0 or more. Default: 200000: twenty samples in a period of a 10 kHz lever, the softest in use; slower archives are force
+    /// curves, low-pass filtered, without a ringdown.
+    pub min_sample_rate_hz: f64,
+    /// Leave out files that cannot be opened, with a warning, instead of stopping. Default: false.
+    pub skip_unreadable: bool,
+}
+
+impl Default for Records {
+    fn default() -> Self {
+        Self {
+            files: Vec::new(),
+            channel: "/deflection".to_owned(),
+            piezo_channel: "/piezo".to_owned(),
+            min_sample_rate_hz: 200e3,
+            skip_unreadable: false,
+        }
+    }
+}
+
+const RECORDS: Port<Recording> = Port::new("records", "records", "the records, in natural order of their paths");
+const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many records, how long, at what rate");
+
+impl Stage for Records {
+    const SPEC: Spec = Spec {
+        name: "io.records",
+        version: 1,
+        summary: "opens native HDF5 records by pattern and checks that they belong together",
+        inputs: &[],
+        outputs: &[RECORDS.spec(), SUMMARY.spec()],
+        caching: Caching::Always,
+        seeded: false,
+        source: "CF conventions 1.11, section 8.1 (packed data)",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        if self.files.is_empty() {
+            return Err(StageError::new("`files` is empty, wanted at least one pattern such as \"archive/*.h5\""));
+        }
+        if self.channel.is_empty() {
+            return Err(StageError::new("`channel` is empty, wanted a dataset such as \"/deflection\""));
+        }
+        if !(self.min_sample_rate_hz >= 0.0 && self.min_sample_rate_hz.is_finite()) {
+            return Err(StageError::new(format!(
+                "`min_sample_rate_hz` is {}, wanted 0 or more",
+                self.min_sample_rate_hz
+            )));
+        }
+        Ok(())
+    }
+
+    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+        matching_files(&self.files, base)
+    }
+
+    fn location_params() -> &'static [&'static str] {
+        &["files"]
+    }
+
+    fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let paths = self.sources(cx.base())?;
+        cx.expect(paths.len());
+        let opened: Vec<Result<Record, StageError>> = paths
+            .par_iter()
+            .map(|path| {
+                let record = self.open(path);
+                cx.tick();
+                record
+            })
+            .collect();
+        let records = self.readable(opened, cx)?;
+        let consistency = check_consistency(&records)?;
+        if consistency.sample_rate_hz < self.min_sample_rate_hz {
+            return Err(too_slow(&records, consistency.sample_rate_hz, self.min_sample_rate_hz));
+        }
+        consistency.remarks.iter().for_each(|remark| cx.warn(remark));
+        let summary = Document::new(&Summary::new(&records, &consistency))?;
+        Ok(Ports::new().with(&RECORDS, Recording { records }).with(&SUMMARY, summary))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::records_example::examples()
+    }
+}
+
+impl Records {
+    fn open(&self, path: &Path) -> Result<Record, StageError> {
+        let mut wanted = vec![Wanted { role: "deflection", location: &self.channel, required: true }];
+        if !self.piezo_channel.is_empty() {
+            wanted.push(Wanted { role: "piezo", location: &self.piezo_channel, required: false });
+        }
+        open_native(path, &wanted)
+    }
+
+    /// The records that could be opened. Errors: some could not, and these are not to be skipped; or none could.
+    fn readable(&self, opened: Vec<Result<Record, StageError>>, cx: &Context) -> Result<Vec<Record>, StageError> {
+        let total = opened.len();
+        let (mut records, mut failures) = (Vec::new(), Vec::new());
+        for result in opened {
+            match result {
+                Ok(record) => records.push(record),
+                Err(error) => failures.push(error),
+            }
+        }
+        if self.skip_unreadable && !records.is_empty() {
+            failures.iter().for_each(|error| cx.warn(format!("a record is left out: {error}")));
+            return Ok(records);
+        }
+        let count = failures.len();
+        let Some(mut first) = failures.into_iter().next() else { return Ok(records) };
+        if count > 1 {
+            first.problem = format!("{} (the first of {count} unreadable among {total} files)", first.problem);
+        }
+        if first.help.is_none() {
+            first.help = Some("mend or remove it, or set `skip_unreadable = true`".to_owned());
+        }
+        Err(first)
+    }
+}
+
+fn too_slow(records: &[Record], found_hz: f64, wanted_hz: f64) -> StageError {
+    let error = StageError::new(format!(
+        "the records have {found_hz} samples per second, wanted at least {wanted_hz}: too slow to carry a ringdown. A lever rings at 10 kHz to 1 MHz; at this \
+         rate the recorder's filter has removed it, only the force curve is left"
+    ))
+    .help("use the fast acquisition of the same experiment; if the resonator really is this slow, lower `min_sample_rate_hz`");
+    match records.first() {
+        Some(record) => error.at(&record.path),
+        None => error,
+    }
+}
+
+#[derive(Serialize)]
+struct Summary {
+    records: usize,
+    sample_rate_hz: f64,
+    unit: String,
+    samples: usize,
+    duration_s: f64,
+    shortest_samples: usize,
+    longest_samples: usize,
+    with_piezo: usize,
+    bytes: u64,
+    first: String,
+    last: String,
+    started_at: Option<String>,
+}
+
+impl Summary {
+    fn new(records: &[Record], consistency: &Consistency) -> Self {
+        let name = |record: Option<&Record>| record.map_or(String::new(), |record| record.name.clone());
+        Self {
+            records: records.len(),
+            sample_rate_hz: consistency.sample_rate_hz,
+            unit: consistency.unit.clone(),
+            samples: consistency.samples,
+            duration_s: consistency.samples as f64 / consistency.sample_rate_hz,
+            shortest_samples: consistency.shortest_samples,
+            longest_samples: consistency.longest_samples,
+            with_piezo: records.iter().filter(|record| record.channel("piezo").is_ok()).count(),
+            bytes: records.iter().map(|record| record.size).sum(),
+            first: name(records.first()),
+            last: name(records.last()),
+            started_at: records.first().map(|record| record.started_at.clone()).filter(|text| !text.is_empty()),
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "records_tests.rs"]
+mod tests;

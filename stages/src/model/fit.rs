@@ -1,0 +1,190 @@
+//! FIT %: how much of a response a model explains, and how much noise allows.
+
+use faer::Mat;
+
+use super::error::{ModelError, finite};
+use super::innovations::InnovationsModel;
+use super::orthogonal::{Qr, Svd};
+use super::pem::{Coefficients, all_pole};
+
+/// `100 (1 - |y - yhat| / |y - mean(y)|)`. Errors: lengths, values that are not finite, a constant y.
+pub fn fit_percent(y: &[f64], estimate: &[f64]) -> Result<f64, ModelError> {
+    if y.len() != estimate.len() {
+        return Err(ModelError::Length { what: "estimate", found: estimate.len(), wanted: y.len() });
+    }
+    finite("estimate", estimate)?;
+    let error = y.iter().zip(estimate).map(|(y, x)| (y - x).powi(2)).sum::<f64>();
+    Ok(100.0 * (1.0 - (error / variation(y)?).sqrt()))
+}
+
+/// `|y - mean(y)|^2`. Errors: y is constant or not finite.
+fn variation(y: &[f64]) -> Result<f64, ModelError> {
+    finite("output", y)?;
+    let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
+    let variation = y.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+    if variation > 0.0 { Ok(variation) } else { Err(ModelError::ConstantOutput) }
+}
+
+/// Which nuisances of a data set are fitted again when a frozen model is judged on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Nuisances {
+    /// Constant offset of y.
+    pub offset: bool,
+    /// Linear drift of y.
+    pub slope: bool,
+}
+
+/// A frozen model's simulation of a data set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulation {
+    /// The simulated response, nuisances included.
+    pub response: Vec<f64>,
+    /// x0 that fits best.
+    pub initial_state: Vec<f64>,
+    /// Offset of y at the window's centre.
+    pub offset: f64,
+    /// Drift of y over half the window.
+    pub drift: f64,
+    /// FIT % of the simulation.
+    pub fit_percent: f64,
+}
+
+/// Simulates `u` through a frozen model and fits initial state, offset and drift to `y`.
+///
+/// # Model
+/// `y = G u + C A^t x0 + offset + drift t`, with `t` from -1 to 1 over the window.
+/// # Method
+/// Linear least squares by QR and singular values.
+/// # Shapes
+/// u, y: N samples.
+/// # Units
+/// Those of y.
+/// # Accuracy
+/// Exact; n + 2 nuisances of N samples raise the FIT by a share of `(n + 2) / 2N` of what is missing.
+/// # Errors
+/// Lengths, values that are not finite, a constant y.
+/// # Source
+/// L. Ljung, System Identification (1999), section 16.5.
+pub fn simulate_held_out(
+    model: &InnovationsModel,
+    u: &[f64],
+    y: &[f64],
+    nuisances: Nuisances,
+) -> Result<Simulation, ModelError> {
+    if u.len() != y.len() {
+        return Err(ModelError::Length { what: "input", found: u.len(), wanted: y.len() });
+    }
+    finite("input", u)?;
+    variation(y)?;
+    let n = model.order();
+    let forced = model.simulate(u, &vec![0.0; n])?;
+    let matrix = nuisance_matrix(model, y.len(), nuisances);
+    let p = matrix.ncols();
+    let mut stacked = Mat::zeros(y.len(), p + 1);
+    stacked.as_mut().get_mut(.., ..p).copy_from(&matrix);
+    stacked.col_mut(p).iter_mut().zip(y.iter().zip(&forced)).for_each(|(t, (y, g))| *t = y - g);
+    let r = Qr::new(stacked).r();
+    let size = r.nrows().min(p);
+    let svd = Svd::new(&r.as_ref().get(..size, ..p).to_owned())?;
+    let rank = svd.rank(1e-13);
+    let along: Vec<f64> =
+        (0..rank).map(|k| (0..size).map(|i| svd.u[(i, k)] * r[(i, p)]).sum::<f64>() / svd.s[k]).collect();
+    let theta: Vec<f64> = (0..p).map(|j| (0..rank).map(|k| svd.v[(j, k)] * along[k]).sum()).collect();
+    let mut response = forced;
+    for (j, value) in theta.iter().enumerate() {
+        response.iter_mut().zip(matrix.col(j).iter()).for_each(|(g, x)| *g += value * x);
+    }
+    let fit_percent = fit_percent(y, &response)?;
+    Ok(Simulation {
+        response,
+        initial_state: theta[..n].to_vec(),
+        offset: if nuisances.offset { theta[n] } else { 0.0 },
+        drift: if nuisances.slope { theta[n + usize::from(nuisances.offset)] } else { 0.0 },
+        fit_percent,
+    })
+}
+
+/// Free responses from each state, one, ramp: N x (n + nuisances).
+fn nuisance_matrix(model: &InnovationsModel, samples: usize, nuisances: Nuisances) -> Mat<f64> {
+    let n = model.order();
+    let mut matrix = Mat::zeros(samples, n + usize::from(nuisances.offset) + usize::from(nuisances.slope));
+    let mut first = 0;
+    for section in &model.sections {
+        let a: Coefficients = section.a;
+        let free = all_pole(a, (0..samples).map(|t| if t == 0 { 1.0 } else { 0.0 }));
+        for j in 0..section.order {
+            matrix.col_mut(first + j).iter_mut().skip(j).zip(&free).for_each(|(m, x)| *m = *x);
+        }
+        first += section.order;
+    }
+    let centre = 0.5 * (samples as f64 - 1.0).max(1.0);
+    if nuisances.offset {
+        matrix.col_mut(n).iter_mut().for_each(|m| *m = 1.0);
+    }
+    if nuisances.slope {
+        let column = n + usize::from(nuisances.offset);
+        matrix.col_mut(column).iter_mut().enumerate().for_each(|(t, m)| *m = (t as f64 - centre) / centre);
+    }
+    matrix
+}
+
+/// FIT % of a perfect model, given the standard error of y: `100 (1 - sqrt(sum se^2) / |y - mean(y)|)`.
+///
+/// `standard_error` must be that of the noise alone: scatter of the events' amplitudes, which the input carries as well, is first taken out
+/// ([`scale_free_standard_error`]). Errors: lengths, values that are not finite, a constant y.
+pub fn noise_ceiling_percent(y: &[f64], standard_error: &[f64]) -> Result<f64, ModelError> {
+    if y.len() != standard_error.len() {
+        return Err(ModelError::Length { what: "standard error", found: standard_error.len(), wanted: y.len() });
+    }
+    finite("standard error", standard_error)?;
+    let noise = standard_error.iter().map(|se| se * se).sum::<f64>();
+    Ok(100.0 * (1.0 - (noise / variation(y)?).sqrt()))
+}
+
+/// A mean's standard error without the events' common scatter in amplitude.
+///
+/// # Model
+/// `se(t)^2 = v + s^2 y(t)^2`: noise that is the same all along, and a relative scatter s of the amplitude (per root of the number of events).
+/// # Method
+/// Weighted least squares for v and s^2, weights `1 / fitted^2` (a variance estimate's scatter is proportional to itself), iterated; then
+/// `se^2 - s^2 y^2` sample by sample, at least zero.
+/// # Shapes
+/// N samples; result `(se, s)`.
+/// # Units
+/// Those of y.
+/// # Accuracy
+/// Sample by sample that of se; summed over a window a fraction of a per cent.
+/// # Errors
+/// Lengths, values that are not finite.
+/// # Source
+/// R. Carroll and D. Ruppert, Transformation and Weighting in Regression (1988), chapter 3.
+pub fn scale_free_standard_error(y: &[f64], standard_error: &[f64]) -> Result<(Vec<f64>, f64), ModelError> {
+    if y.len() != standard_error.len() {
+        return Err(ModelError::Length { what: "standard error", found: standard_error.len(), wanted: y.len() });
+    }
+    finite("output", y)?;
+    finite("standard error", standard_error)?;
+    let points: Vec<(f64, f64)> = y.iter().zip(standard_error).map(|(y, se)| (y * y, se * se)).collect();
+    let mean = points.iter().map(|point| point.1).sum::<f64>() / points.len().max(1) as f64;
+    let (mut level, mut slope) = (mean, 0.0);
+    for _ in 0..20 {
+        let floor = 1e-3 * mean;
+        let [mut w, mut wx, mut wy, mut wxx, mut wxy] = [0.0; 5];
+        for &(x, v) in &points {
+            let weight = (level + slope * x).max(floor).powi(-2);
+            w += weight;
+            wx += weight * x;
+            wy += weight * v;
+            wxx += weight * x * x;
+            wxy += weight * x * v;
+        }
+        let determinant = w * wxx - wx * wx;
+        if !(determinant > 1e-12 * w * wxx) {
+            break;
+        }
+        slope = ((w * wxy - wx * wy) / determinant).max(0.0);
+        level = ((wy - slope * wx) / w).max(floor);
+    }
+    let free = points.iter().map(|(x, v)| (v - slope * x).max(0.0).sqrt()).collect();
+    Ok((free, slope.sqrt()))
+}

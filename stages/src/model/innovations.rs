@@ -1,0 +1,248 @@
+//! The innovations form as parallel sections: simulation, prediction, transfer function.
+
+use faer::{Mat, c64};
+
+use super::error::ModelError;
+use super::pem::{Coefficients, roots, section_order};
+
+/// A section in observer form: `x1+ = -a1 x1 + x2 + b1 u + k1 e`, `x2+ = -a2 x1 + b2 u + k2 e`, output x1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Section {
+    /// Order: 2, or 1 (then the second entries are zero).
+    pub order: usize,
+    /// Denominator `z^2 + a1 z + a2` (order 1: `z + a1`).
+    pub a: [f64; 2],
+    /// Input gains.
+    pub b: [f64; 2],
+    /// Kalman gains.
+    pub k: [f64; 2],
+}
+
+impl Section {
+    /// `C (zI - A)^-1 B` of this section alone.
+    pub fn transfer(&self, z: c64) -> c64 {
+        match self.order {
+            1 => self.b[0] / (z + self.a[0]),
+            _ => (z * self.b[0] + self.b[1]) / self.denominator(z),
+        }
+    }
+
+    /// `z^2 + a1 z + a2` or `z + a1`.
+    pub fn denominator(&self, z: c64) -> c64 {
+        match self.order {
+            1 => z + self.a[0],
+            _ => (z + self.a[0]) * z + self.a[1],
+        }
+    }
+
+    /// Derivative of [`Section::transfer`] to z.
+    pub fn transfer_slope(&self, z: c64) -> c64 {
+        let d = self.denominator(z);
+        match self.order {
+            1 => -self.b[0] / (d * d),
+            _ => (self.b[0] - self.transfer(z) * (z * 2.0 + self.a[0])) / d,
+        }
+    }
+
+    /// Its poles: a pair, two real ones or one.
+    pub fn poles(&self) -> Vec<c64> {
+        roots(self.a, self.order)
+    }
+}
+
+/// A discrete model in innovations form (Eq. 8), one input, one output, block-diagonal.
+///
+/// Model: `x(t+Ts) = A x + B u + K e`, `y = C x + D u + e`; A is the direct sum of the sections, `C = [1 0 1 0 ...]`.
+/// Shapes: order n, states in the sections' order. Units: those of y over those of u for B and D.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InnovationsModel {
+    /// The sections; all of order 2, but the last of an odd order.
+    pub sections: Vec<Section>,
+    /// D.
+    pub feedthrough: f64,
+    /// Ts in seconds.
+    pub sample_time_s: f64,
+}
+
+impl InnovationsModel {
+    /// Number of states.
+    pub fn order(&self) -> usize {
+        self.sections.iter().map(|section| section.order).sum()
+    }
+
+    /// Free parameters of the deterministic part, 2n + 1: all a, all b, D.
+    pub fn parameters(&self) -> Vec<f64> {
+        let mut values: Vec<f64> = self.sections.iter().flat_map(|s| s.a[..s.order].to_vec()).collect();
+        values.extend(self.sections.iter().flat_map(|s| s.b[..s.order].to_vec()));
+        values.push(self.feedthrough);
+        values
+    }
+
+    /// `C (zI - A)^-1 B + D`.
+    pub fn transfer(&self, z: c64) -> c64 {
+        self.sections.iter().map(|section| section.transfer(z)).fold(c64::new(self.feedthrough, 0.0), |sum, g| sum + g)
+    }
+
+    /// Derivative of [`InnovationsModel::transfer`] to z.
+    pub fn transfer_slope(&self, z: c64) -> c64 {
+        self.sections.iter().map(|section| section.transfer_slope(z)).fold(c64::new(0.0, 0.0), |sum, g| sum + g)
+    }
+
+    /// Derivatives of [`InnovationsModel::transfer`] to [`InnovationsModel::parameters`].
+    pub fn transfer_sensitivities(&self, z: c64) -> Vec<c64> {
+        let powers =
+            |section: &Section| if section.order == 1 { vec![c64::new(1.0, 0.0)] } else { vec![z, c64::new(1.0, 0.0)] };
+        let to_a = self.sections.iter().flat_map(|s| {
+            let factor = -s.transfer(z) / s.denominator(z);
+            powers(s).into_iter().map(move |power| power * factor)
+        });
+        let to_b = self.sections.iter().flat_map(|s| {
+            let d = s.denominator(z);
+            powers(s).into_iter().map(move |power| power / d)
+        });
+        to_a.chain(to_b).chain(std::iter::once(c64::new(1.0, 0.0))).collect()
+    }
+
+    /// `(A, B, C, K)` in full.
+    pub fn matrices(&self) -> (Mat<f64>, Vec<f64>, Vec<f64>, Vec<f64>) {
+        let n = self.order();
+        let (mut a, mut b, mut c, mut k) = (Mat::zeros(n, n), vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let mut first = 0;
+        for section in &self.sections {
+            c[first] = 1.0;
+            for j in 0..section.order {
+                a[(first + j, first)] = -section.a[j];
+                b[first + j] = section.b[j];
+                k[first + j] = section.k[j];
+            }
+            if section.order == 2 {
+                a[(first, first + 1)] = 1.0;
+            }
+            first += section.order;
+        }
+        (a, b, c, k)
+    }
+
+    /// The model of these matrices, in the layout of [`InnovationsModel::matrices`]. Errors: shapes, or another structure of A or C.
+    pub fn from_matrices(
+        a: &Mat<f64>,
+        b: &[f64],
+        k: &[f64],
+        feedthrough: f64,
+        sample_time_s: f64,
+    ) -> Result<Self, ModelError> {
+        let n = b.len();
+        if a.shape() != (n, n) || k.len() != n {
+            return Err(ModelError::Length { what: "B or K", found: k.len().min(n), wanted: a.nrows() });
+        }
+        let sections = (0..n.div_ceil(2))
+            .map(|i| {
+                let (order, first) = (section_order(n, i), 2 * i);
+                let pick = |values: &dyn Fn(usize) -> f64| [values(0), if order == 2 { values(1) } else { 0.0 }];
+                Section {
+                    order,
+                    a: pick(&|j| -a[(first + j, first)]),
+                    b: pick(&|j| b[first + j]),
+                    k: pick(&|j| k[first + j]),
+                }
+            })
+            .collect();
+        let model = Self { sections, feedthrough, sample_time_s };
+        if model.matrices().0 != *a {
+            return Err(ModelError::Degenerate("the state matrix is not a direct sum of sections in observer form"));
+        }
+        Ok(model)
+    }
+
+    /// Response to u from the initial state x0, without noise: N samples.
+    pub fn simulate(&self, u: &[f64], x0: &[f64]) -> Result<Vec<f64>, ModelError> {
+        self.run(u, None, x0)
+    }
+
+    /// One-step predictions of y (offset and slope already removed) from u and the past of y: N samples.
+    pub fn predict(&self, u: &[f64], y: &[f64], x0: &[f64]) -> Result<Vec<f64>, ModelError> {
+        if y.len() != u.len() {
+            return Err(ModelError::Length { what: "input", found: u.len(), wanted: y.len() });
+        }
+        self.run(u, Some(y), x0)
+    }
+
+    fn run(&self, u: &[f64], y: Option<&[f64]>, x0: &[f64]) -> Result<Vec<f64>, ModelError> {
+        if x0.len() != self.order() {
+            return Err(ModelError::Length { what: "initial state", found: x0.len(), wanted: self.order() });
+        }
+        let mut state: Vec<[f64; 2]> = x0.chunks(2).map(|x| [x[0], x.get(1).copied().unwrap_or(0.0)]).collect();
+        Ok(u.iter()
+            .enumerate()
+            .map(|(t, &u)| {
+                let output = state.iter().map(|x| x[0]).sum::<f64>() + self.feedthrough * u;
+                let e = y.map_or(0.0, |y| y[t] - output);
+                for (x, s) in state.iter_mut().zip(&self.sections) {
+                    let next = -s.a[0] * x[0] + x[1] + s.b[0] * u + s.k[0] * e;
+                    *x = [next, -s.a[1] * x[0] + s.b[1] * u + s.k[1] * e];
+                }
+                output
+            })
+            .collect())
+    }
+}
+
+/// Kalman gains from predictor poles: partial fractions of `prod c_i / prod a_i - 1`.
+///
+/// Method: `k_i = prod_l c_l / prod_(l /= i) a_l` modulo `a_i`, in the ring of polynomials modulo `a_i`: exact for real, complex and double
+/// poles within a section. Errors: two sections share a pole.
+pub(crate) fn kalman_gains(order: usize, a: &[Coefficients], c: &[Coefficients]) -> Result<Vec<[f64; 2]>, ModelError> {
+    (0..a.len())
+        .map(|i| {
+            let ring = Ring { a: a[i], order: section_order(order, i) };
+            let mut gain = ring.one();
+            for l in 0..a.len() {
+                let factor = section_order(order, l);
+                gain = ring.times(gain, ring.reduce(c[l], factor));
+                if l != i {
+                    gain = ring.times(gain, ring.inverse(ring.reduce(a[l], factor))?);
+                }
+            }
+            let gain = if ring.order == 1 { [gain[1], 0.0] } else { gain };
+            if gain.iter().all(|value| value.is_finite()) { Ok(gain) } else { Err(SHARED_POLE) }
+        })
+        .collect()
+}
+
+const SHARED_POLE: ModelError = ModelError::Degenerate("two sections share a pole: lower the order");
+
+/// Polynomials `alpha z + beta` modulo `z^2 + a1 z + a2` (order 1: numbers, at `z = -a1`).
+struct Ring {
+    a: Coefficients,
+    order: usize,
+}
+
+impl Ring {
+    fn one(&self) -> [f64; 2] {
+        [0.0, 1.0]
+    }
+
+    /// A monic polynomial of order 1 or 2, reduced.
+    fn reduce(&self, p: Coefficients, order: usize) -> [f64; 2] {
+        match (self.order, order) {
+            (1, 1) => [0.0, p[0] - self.a[0]],
+            (1, _) => [0.0, (self.a[0] - p[0]) * self.a[0] + p[1]],
+            (_, 1) => [1.0, p[0]],
+            _ => [p[0] - self.a[0], p[1] - self.a[1]],
+        }
+    }
+
+    fn times(&self, x: [f64; 2], y: [f64; 2]) -> [f64; 2] {
+        let square = x[0] * y[0];
+        [x[0] * y[1] + x[1] * y[0] - self.a[0] * square, x[1] * y[1] - self.a[1] * square]
+    }
+
+    fn inverse(&self, x: [f64; 2]) -> Result<[f64; 2], ModelError> {
+        let norm = if self.order == 1 {
+            return if x[1] == 0.0 { Err(SHARED_POLE) } else { Ok([0.0, 1.0 / x[1]]) };
+        } else {
+            x[1] * x[1] - self.a[0] * x[0] * x[1] + self.a[1] * x[0] * x[0]
+        };
+        if norm == 0.0 { Err(SHARED_POLE) } else { Ok([-x[0] / norm, (x[1] - self.a[0] * x[0]) / norm]) }
+    }
+}

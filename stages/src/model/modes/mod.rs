@@ -1,0 +1,9 @@
+//! Modal extraction: poles and zeros in continuous terms, static shares, frequency response, each with its standard error.
+
+mod map;
+mod poles;
+mod response;
+
+pub use map::Root;
+pub use poles::{ModeCriteria, Pole, PoleKind, poles, zeros};
+pub use response::{ResponsePoint, response};

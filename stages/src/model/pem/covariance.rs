@@ -1,0 +1,90 @@
+//! Covariance of the estimates, whatever the colour of the residual.
+//!
+//! `cov = J^+ Omega J^+T` with J the Jacobian to all parameters and Omega the autocovariance of the errors, diagonal in frequency. Its spectrum is
+//! the residual's local mean over the share that the fit left of it: near a resonance the fit absorbs a good part of the noise, and a residual
+//! taken at face value would promise too much.
+
+use faer::Mat;
+use realfft::RealFftPlanner;
+
+use super::tangent::{Spectra, Tangent};
+use crate::model::error::ModelError;
+use crate::model::orthogonal::product;
+
+/// Bins averaged on each side, as a share of N: 33 bins at 8192 samples, which give a standard error to 9 %.
+const SMOOTHING_SHARE: usize = 512;
+
+/// How the residual enters the covariance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResidualColour {
+    /// The residual's own smoothed spectrum: honest also where the model left 1/f noise.
+    Spectrum,
+    /// White: the textbook formula.
+    White,
+}
+
+/// Covariance of the parameters of `jacobian` (rows of all experiments x parameters), e of the same rows, split at `lengths`.
+pub(crate) fn covariance(
+    jacobian: &Mat<f64>,
+    e: &[f64],
+    lengths: &[usize],
+    colour: ResidualColour,
+) -> Result<Mat<f64>, ModelError> {
+    let tangent = Tangent::new(jacobian)?;
+    let rank = tangent.spread.ncols();
+    let mut meat = Mat::zeros(rank, rank);
+    match colour {
+        ResidualColour::White => {
+            let variance = e.iter().map(|e| e * e).sum::<f64>() / (e.len() - rank) as f64;
+            (0..rank).for_each(|k| meat[(k, k)] = variance);
+        }
+        ResidualColour::Spectrum => {
+            let mut planner = RealFftPlanner::<f64>::new();
+            let mut top = 0;
+            for &length in lengths {
+                meat += coloured(&tangent.spectra(e, top, length, &mut planner), length);
+                top += length;
+            }
+        }
+    }
+    let half = product(tangent.spread.as_ref(), meat.as_ref());
+    Ok(product(half.as_ref(), tangent.spread.transpose()))
+}
+
+/// `W^T Omega W` of one experiment.
+fn coloured(spectra: &Spectra, length: usize) -> Mat<f64> {
+    let density = smoothed(spectra, length);
+    let bins = density.len();
+    let rank = spectra.basis.len();
+    let mut weighted = Mat::zeros(2 * bins, rank);
+    for (k, direction) in spectra.basis.iter().enumerate() {
+        for (i, (value, density)) in direction.iter().zip(&density).enumerate() {
+            // one-sided: all bins but the first and, for even N, the last stand for two
+            let both = if i == 0 || 2 * i == length { 1.0 } else { 2.0 };
+            let weight = (both * density).sqrt();
+            weighted[(2 * i, k)] = weight * value.re;
+            weighted[(2 * i + 1, k)] = weight * value.im;
+        }
+    }
+    product(weighted.transpose(), weighted.as_ref())
+}
+
+/// Power of the errors by bin: local sums of the residual's over those of the remaining shares.
+fn smoothed(spectra: &Spectra, length: usize) -> Vec<f64> {
+    let reach = (length / SMOOTHING_SHARE).max(1);
+    let bins = spectra.periodogram.len();
+    let sums = |values: &[f64]| {
+        let mut sums = vec![0.0; bins + 1];
+        values.iter().enumerate().for_each(|(i, value)| sums[i + 1] = sums[i] + value);
+        sums
+    };
+    let (power, remaining) = (sums(&spectra.periodogram), sums(&spectra.remaining));
+    (0..bins)
+        .map(|i| {
+            let (low, high) = (i.saturating_sub(reach), (i + reach + 1).min(bins));
+            // a stretch absorbed to nine tenths says too little of its own level: do not divide by less
+            let left = (remaining[high] - remaining[low]).max(0.1 * (high - low) as f64);
+            (power[high] - power[low]) / left
+        })
+        .collect()
+}

@@ -1,0 +1,334 @@
+//! The prediction error method, from data to model.
+
+use faer::{Mat, c64};
+use realfft::RealFftPlanner;
+
+use super::covariance::{ResidualColour, covariance};
+use super::gradient::{Noise, Point};
+use super::noise::{gain, intensities};
+use super::optimiser::{Ending, Limits, State, minimise};
+use super::parametrisation::{LIMIT, coordinates, roots, section_order, sections};
+use super::predictor::Problem;
+use super::starts::{best, candidates};
+use super::tangent::Tangent;
+use crate::model::error::{ModelError, finite};
+use crate::model::innovations::{InnovationsModel, Section, kalman_gains};
+use crate::model::subspace::Subspace;
+
+/// One record of input and output, equally sampled.
+#[derive(Debug, Clone, Copy)]
+pub struct Experiment<'a> {
+    /// u, N samples.
+    pub input: &'a [f64],
+    /// y, N samples.
+    pub output: &'a [f64],
+}
+
+/// What is estimated, and how far the iteration goes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PemOptions {
+    /// Order n of the model, at least 1; default 11 (the paper: four modes, three detector poles).
+    pub order: usize,
+    /// Rows of the Hankel matrix of the start, more than the order; default 60.
+    pub block_rows: usize,
+    /// Most iterations, at least 1; default 60 (20 are usual).
+    pub max_iterations: usize,
+    /// Estimate a constant offset of y per experiment; default true.
+    pub offset: bool,
+    /// Estimate a linear drift of y per experiment; default true: averaged records wander.
+    pub slope: bool,
+    /// How the Kalman gain is parametrised; default thermal.
+    pub noise: NoiseModel,
+    /// Share of the residual in the tangent space that counts as zero gradient; default 1e-4: a hundredth of a standard error at 8192 samples.
+    pub gradient_tolerance: f64,
+    /// How the covariance treats the residual; default its own spectrum.
+    pub colour: ResidualColour,
+}
+
+impl Default for PemOptions {
+    fn default() -> Self {
+        Self {
+            order: 11,
+            block_rows: 60,
+            max_iterations: 60,
+            offset: true,
+            slope: true,
+            noise: NoiseModel::Thermal,
+            gradient_tolerance: 1e-4,
+            colour: ResidualColour::Spectrum,
+        }
+    }
+}
+
+/// How the Kalman gain is parametrised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoiseModel {
+    /// K = 0: output error.
+    White,
+    /// K from the intensities of white output noise and of white forces on the sections (thermal noise): one parameter per section.
+    Thermal,
+    /// K free: n parameters.
+    Free,
+}
+
+/// How the iteration ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Verdict {
+    /// Why it ended.
+    pub ending: Ending,
+    /// Whether the result is a minimum: gradient small against the residual, or the residual rounding alone.
+    pub converged: bool,
+    /// Accepted steps, from the best start on.
+    pub iterations: usize,
+    /// Norm of the residual's part in the tangent space over the residual's norm; times `sqrt(N)`: standard errors from the minimum.
+    pub gradient: f64,
+    /// Coordinates at the limit of the parametrisation (undamped within any window).
+    pub at_limit: usize,
+}
+
+/// A model with everything that its estimate yields.
+#[derive(Debug, Clone)]
+pub struct Identified {
+    /// The model: A and A - K C stable.
+    pub model: InnovationsModel,
+    /// x0 of each experiment.
+    pub initial_states: Vec<Vec<f64>>,
+    /// Offset of y of each experiment, at its centre.
+    pub offsets: Vec<f64>,
+    /// Drift of y of each experiment, per second.
+    pub slopes: Vec<f64>,
+    /// Prediction errors of each experiment.
+    pub residuals: Vec<Vec<f64>>,
+    /// Mean square of e, corrected for the number of parameters.
+    pub innovation_variance: f64,
+    /// Covariance of [`InnovationsModel::parameters`].
+    pub covariance: Mat<f64>,
+    /// Poles of the predictor, eigenvalues of A - K C: the zeros of the noise model.
+    pub predictor_poles: Vec<c64>,
+    /// Singular values of the start's Hankel matrix.
+    pub singular_values: Vec<f64>,
+    /// How the iteration ended.
+    pub verdict: Verdict,
+}
+
+/// Identifies a model in innovations form by minimising its one-step prediction errors.
+///
+/// # Model
+/// Eq. 8: `x(t+Ts) = A x + B u + K e`, `y = C x + D u + e + offset + slope t`; x0, offset and slope per experiment.
+/// # Method
+/// Parallel sections of second order in reflection coefficients (stable by construction, A as well as A - K C, and without
+/// redundancy); b, D, x0, offset and slope eliminated by variable projection; Levenberg-Marquardt with analytic sensitivities on the rest,
+/// from several subspace starts. Cost per iteration: about `2 N (3 n)^2` operations.
+/// # Shapes
+/// N samples per experiment; any number of experiments.
+/// # Units
+/// Those of u and y.
+/// # Accuracy
+/// Maximum likelihood for Gaussian e: the Cramer-Rao bound is reached where the noise is white plus thermal (same poles). Noise-free
+/// data are recovered to rounding. The covariance allows for a coloured residual.
+/// # Errors
+/// Lengths, samples that are not finite, too few samples, parameters out of range, a constant output, no finite fit. No convergence is
+/// no error: see the verdict.
+/// # Source
+/// L. Ljung, System Identification (1999), chapters 7 and 10; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1.
+pub fn identify(
+    experiments: &[Experiment<'_>],
+    sample_time_s: f64,
+    options: &PemOptions,
+) -> Result<Identified, ModelError> {
+    let problem = checked(experiments, sample_time_s, options)?;
+    let longest =
+        experiments.iter().max_by_key(|experiment| experiment.output.len()).ok_or(ModelError::NoExperiment)?;
+    let subspace = Subspace::new(longest.input, longest.output, options.block_rows)?;
+    let limits = Limits { iterations: options.max_iterations, gradient: options.gradient_tolerance };
+    let start = best(&problem, &candidates(&subspace, options.order)?, limits)?;
+    let mut state = minimise(&problem, start, limits)?;
+    match options.noise {
+        NoiseModel::White => {}
+        NoiseModel::Thermal => {
+            for _ in 0..THERMAL_ROUNDS {
+                let noise = thermal_noise(&problem, &state)?;
+                let next = State::new(&problem, Point { poles: state.point.poles.clone(), noise })?;
+                state = State { iterations: state.iterations, ..next };
+                state = minimise(&problem, state, limits)?;
+            }
+            // K belongs to the final poles: one more linear solution with exactly that predictor
+            if let Noise::Frozen(_, c) = &state.point.noise {
+                let noise = Noise::Frozen(state.point.a(), c.clone());
+                let point = Point { poles: state.point.poles.clone(), noise };
+                let State { iterations, ending, gradient, .. } = state;
+                state = State { iterations, ending, gradient, ..State::new(&problem, point)? };
+            }
+        }
+        NoiseModel::Free => {
+            let poles = state.point.poles.clone();
+            let next = State::new(&problem, Point { noise: Noise::Free(poles.clone()), poles })?;
+            state = minimise(&problem, State { iterations: state.iterations, ..next }, limits)?;
+        }
+    }
+    conclude(&problem, &state, sample_time_s, options, subspace.singular_values().to_vec())
+}
+
+/// Rounds of noise, then poles: the second changes either by a fraction of its error, the third by less than a hundredth.
+const THERMAL_ROUNDS: usize = 3;
+
+/// Whitening by the noise that the residual shows.
+fn thermal_noise(problem: &Problem, state: &State) -> Result<Noise, ModelError> {
+    let tangent = Tangent::new(&full_jacobian(problem, state))?;
+    let e = state.residual();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let mut top = 0;
+    let mut spectra = Vec::new();
+    for (_, y) in &problem.experiments {
+        spectra.push((tangent.spectra(&e, top, y.len(), &mut planner), y.len()));
+        top += y.len();
+    }
+    let a = state.point.a();
+    let intensities = intensities(&a, &state.point.whitening(), &spectra);
+    let (_, predictor) = gain(problem.order, &a, &intensities)?;
+    Ok(Noise::Frozen(a, sections(&coordinates(&predictor))))
+}
+
+fn checked<'a>(
+    experiments: &[Experiment<'a>],
+    sample_time_s: f64,
+    options: &PemOptions,
+) -> Result<Problem<'a>, ModelError> {
+    let range = |name, found: usize, ok, wanted| {
+        if ok { Ok(()) } else { Err(ModelError::Parameter { name, found: found as f64, wanted }) }
+    };
+    range("order", options.order, options.order >= 1, "at least 1")?;
+    range("block_rows", options.block_rows, options.block_rows > options.order, "more than the order")?;
+    range("max_iterations", options.max_iterations, options.max_iterations >= 1, "at least 1")?;
+    if !(sample_time_s > 0.0 && sample_time_s.is_finite()) {
+        return Err(ModelError::Parameter { name: "sample_time_s", found: sample_time_s, wanted: "positive" });
+    }
+    if experiments.is_empty() {
+        return Err(ModelError::NoExperiment);
+    }
+    for Experiment { input, output } in experiments {
+        if input.len() != output.len() {
+            return Err(ModelError::Length { what: "input", found: input.len(), wanted: output.len() });
+        }
+        finite("input", input)?;
+        finite("output", output)?;
+        let wanted = (3 * options.block_rows).max(6 * options.order + 6);
+        if output.len() < wanted {
+            return Err(ModelError::TooShort { found: output.len(), wanted });
+        }
+        if output.iter().all(|y| *y == output[0]) {
+            return Err(ModelError::ConstantOutput);
+        }
+    }
+    Ok(Problem {
+        experiments: experiments.iter().map(|experiment| (experiment.input, experiment.output)).collect(),
+        order: options.order,
+        offset: options.offset,
+        slope: options.slope,
+    })
+}
+
+fn conclude(
+    problem: &Problem,
+    state: &State,
+    sample_time_s: f64,
+    options: &PemOptions,
+    singular_values: Vec<f64>,
+) -> Result<Identified, ModelError> {
+    let n = problem.order;
+    let theta = &state.projection.theta;
+    let a = state.point.a();
+    let c = match &state.point.noise {
+        Noise::White => a.clone(),
+        Noise::Frozen(_, c) => c.clone(),
+        Noise::Free(c) => sections(c),
+    };
+    let gains = match &state.point.noise {
+        Noise::White => vec![[0.0; 2]; a.len()],
+        _ => kalman_gains(n, &a, &c)?,
+    };
+    let model = InnovationsModel {
+        sections: (0..a.len())
+            .map(|i| {
+                let order = section_order(n, i);
+                Section {
+                    order,
+                    a: a[i],
+                    b: [theta[2 * i], if order == 2 { theta[2 * i + 1] } else { 0.0 }],
+                    k: gains[i],
+                }
+            })
+            .collect(),
+        feedthrough: theta[n],
+        sample_time_s,
+    };
+    let e = state.residual();
+    let covariance = parameter_covariance(problem, state, &e, options.colour)?;
+    let own = |index: usize, entry: usize| theta[problem.nuisance_column(index) + entry];
+    let count = problem.experiments.len();
+    let lengths: Vec<usize> = problem.experiments.iter().map(|(_, y)| y.len()).collect();
+    let half = |index: usize| 0.5 * (lengths[index] as f64 - 1.0) * sample_time_s;
+    let freedom = e.len().saturating_sub(state.point.len() + problem.columns()).max(1);
+    let mut rest = e.as_slice();
+    let residuals = lengths
+        .iter()
+        .map(|&length| {
+            let (head, tail) = rest.split_at(length);
+            rest = tail;
+            head.to_vec()
+        })
+        .collect();
+    let at_limit = state.point.coordinates().iter().filter(|p| p.abs() >= LIMIT).count();
+    Ok(Identified {
+        model,
+        initial_states: (0..count).map(|i| (0..n).map(|j| own(i, j)).collect()).collect(),
+        offsets: (0..count).map(|i| if problem.offset { own(i, n) } else { 0.0 }).collect(),
+        slopes: (0..count)
+            .map(|i| if problem.slope { own(i, n + usize::from(problem.offset)) / half(i) } else { 0.0 })
+            .collect(),
+        innovation_variance: state.projection.cost / freedom as f64,
+        residuals,
+        covariance,
+        predictor_poles: c.iter().enumerate().flat_map(|(i, &c)| roots(c, section_order(n, i))).collect(),
+        singular_values,
+        verdict: Verdict {
+            ending: state.ending,
+            converged: matches!(state.ending, Ending::Minimum | Ending::Exact)
+                || (state.ending == Ending::Stalled && state.gradient < STALLED_GRADIENT),
+            iterations: state.iterations,
+            gradient: state.gradient,
+            at_limit,
+        },
+    })
+}
+
+/// Gradient share below which a stalled iteration counts as converged: a tenth of a standard error at 8192 samples.
+const STALLED_GRADIENT: f64 = 1e-3;
+
+/// Covariance of all a, all b, D; everything else (c, x0, offset, slope) is estimated along and left out.
+fn parameter_covariance(
+    problem: &Problem,
+    state: &State,
+    e: &[f64],
+    colour: ResidualColour,
+) -> Result<Mat<f64>, ModelError> {
+    let n = problem.order;
+    let jacobian = full_jacobian(problem, state);
+    let lengths: Vec<usize> = problem.experiments.iter().map(|(_, y)| y.len()).collect();
+    let all = covariance(&jacobian, e, &lengths, colour)?;
+    let linear = jacobian.ncols() - problem.columns();
+    let kept: Vec<usize> = (0..n).chain(linear..linear + n + 1).collect();
+    Ok(Mat::from_fn(2 * n + 1, 2 * n + 1, |i, j| all[(kept[i], kept[j])]))
+}
+
+/// Derivatives of e to all a, free c, then all linear parameters.
+fn full_jacobian(problem: &Problem, state: &State) -> Mat<f64> {
+    let nonlinear = state.coefficient_jacobian(problem);
+    let (rows, q, p) = (nonlinear.nrows(), nonlinear.ncols(), problem.columns());
+    let mut jacobian = Mat::zeros(rows, q + p);
+    jacobian.as_mut().get_mut(.., ..q).copy_from(&nonlinear);
+    for j in 0..p {
+        jacobian.col_mut(q + j).iter_mut().zip(state.regressors.col(j).iter()).for_each(|(t, x)| *t = -x);
+    }
+    jacobian
+}

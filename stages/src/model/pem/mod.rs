@@ -1,0 +1,20 @@
+//! Prediction error method: the innovations form of Eq. 8, fitted by minimum one-step prediction error.
+
+mod covariance;
+mod gradient;
+mod identify;
+mod noise;
+mod optimiser;
+mod parametrisation;
+mod predictor;
+mod projection;
+mod starts;
+mod tangent;
+#[cfg(test)]
+mod tests;
+
+pub use covariance::ResidualColour;
+pub use identify::{Experiment, Identified, NoiseModel, PemOptions, Verdict, identify};
+pub use optimiser::Ending;
+pub(crate) use parametrisation::{Coefficients, roots, section_order};
+pub(crate) use predictor::all_pole;

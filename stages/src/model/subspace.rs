@@ -1,0 +1,130 @@
+//! Subspace identification: poles from the column space of a block Hankel matrix.
+
+use faer::{Mat, c64};
+
+use super::error::{ModelError, finite};
+use super::orthogonal::{Qr, Svd, eigenvalues, least_squares, product};
+
+/// The dominant column space of the output's Hankel matrix, the input's row space removed.
+///
+/// # Model
+/// `x(t+1) = A x(t) + B u(t)`, `y(t) = C x(t) + D u(t) + v(t)`, v white; an offset of y is allowed.
+/// # Method
+/// MOESP: `Y_f` (block rows x windows) is projected onto the orthogonal complement of the row space of `[1; U_f]`, by QR; the left
+/// singular vectors of what remains span the observability matrix, and A follows from its shift invariance. A released ramp does not
+/// excite persistently: only the directions that `U_f` really spans are removed, and the free decay, which remains, carries A.
+/// # Shapes
+/// u, y: N samples; singular values: `block_rows`.
+/// # Units
+/// Poles in the z plane.
+/// # Accuracy
+/// Consistent for white v as N grows; a few standard errors of the prediction error estimate on averaged releases: start values.
+/// # Errors
+/// Unequal lengths, samples that are not finite, fewer than `3 block_rows` samples, a decomposition without convergence.
+/// # Source
+/// M. Verhaegen and P. Dewilde, Int. J. Control 56 (1992) 1187; L. Ljung, System Identification (1999), section 10.6.
+#[derive(Debug, Clone)]
+pub struct Subspace {
+    left: Mat<f64>,
+    singular_values: Vec<f64>,
+}
+
+/// Energy of an input direction, as a share of the strongest, below which it counts as not excited: well above a Gram matrix's rounding.
+const INPUT_TOLERANCE: f64 = 1e-12;
+
+impl Subspace {
+    /// Builds the projected Hankel matrix with `block_rows` rows (at least 2) and decomposes it.
+    pub fn new(u: &[f64], y: &[f64], block_rows: usize) -> Result<Self, ModelError> {
+        if u.len() != y.len() {
+            return Err(ModelError::Length { what: "input", found: u.len(), wanted: y.len() });
+        }
+        if block_rows < 2 {
+            return Err(ModelError::Parameter { name: "block_rows", found: block_rows as f64, wanted: "at least 2" });
+        }
+        if y.len() < 3 * block_rows {
+            return Err(ModelError::TooShort { found: y.len(), wanted: 3 * block_rows });
+        }
+        finite("input", u)?;
+        finite("output", y)?;
+        let windows = y.len() - block_rows + 1;
+        let basis = input_basis(u, block_rows)?;
+        let removed = basis.ncols();
+        let mut stacked = Mat::zeros(windows, removed + block_rows);
+        stacked.as_mut().get_mut(.., ..removed).copy_from(&basis);
+        for j in 0..block_rows {
+            stacked.col_mut(removed + j).iter_mut().zip(&y[j..]).for_each(|(h, y)| *h = *y);
+        }
+        let r = Qr::new(stacked).r();
+        let size = r.nrows().min(removed + block_rows);
+        let remaining = r.as_ref().get(removed..size, removed..).transpose().to_owned();
+        let svd = Svd::new(&remaining)?;
+        Ok(Self { left: svd.u, singular_values: svd.s })
+    }
+
+    /// Singular values, descending: their fall shows the order.
+    pub fn singular_values(&self) -> &[f64] {
+        &self.singular_values
+    }
+
+    /// Largest order that shift invariance can give.
+    pub fn max_order(&self) -> usize {
+        self.left.nrows().saturating_sub(1).min(self.left.ncols())
+    }
+
+    /// Poles of the model of order `order` (1 to [`Subspace::max_order`]); they need not be stable.
+    pub fn poles(&self, order: usize) -> Result<Vec<c64>, ModelError> {
+        if order == 0 || order > self.max_order() {
+            return Err(ModelError::Parameter { name: "order", found: order as f64, wanted: "1 to block rows - 1" });
+        }
+        let rows = self.left.nrows();
+        let upper = self.left.as_ref().get(..rows - 1, ..order).to_owned();
+        let lower = self.left.as_ref().get(1.., ..order).to_owned();
+        eigenvalues(&least_squares(&upper, &lower, f64::EPSILON)?)
+    }
+}
+
+/// Columns that span the rows of `[1; U_f]`, from the eigenvectors of their Gram matrix: windows x rank.
+fn input_basis(u: &[f64], block_rows: usize) -> Result<Mat<f64>, ModelError> {
+    let windows = u.len() - block_rows + 1;
+    let peak = u.iter().fold(0.0_f64, |peak, u| peak.max(u.abs()));
+    let level = if peak > 0.0 { peak } else { 1.0 };
+    let column = |j: usize, t: usize| if j == 0 { 1.0 } else { u[t + j - 1] / level };
+    let gram = gram(u, block_rows, level);
+    let svd = Svd::new(&gram)?;
+    let rank = svd.rank(INPUT_TOLERANCE);
+    let stacked = Mat::from_fn(windows, block_rows + 1, |t, j| column(j, t));
+    let mut basis = product(stacked.as_ref(), svd.u.as_ref().get(.., ..rank));
+    for k in 0..rank {
+        let norm = svd.s[k].sqrt();
+        basis.col_mut(k).iter_mut().for_each(|value| *value /= norm);
+    }
+    Ok(basis)
+}
+
+/// `[1; U_f] [1; U_f]^T`, each diagonal by a running sum: N operations per diagonal instead of N per entry.
+fn gram(u: &[f64], block_rows: usize, level: f64) -> Mat<f64> {
+    let windows = u.len() - block_rows + 1;
+    let scaled: Vec<f64> = u.iter().map(|u| u / level).collect();
+    let mut gram = Mat::zeros(block_rows + 1, block_rows + 1);
+    gram[(0, 0)] = windows as f64;
+    let mut sum: f64 = scaled[..windows].iter().sum();
+    for j in 0..block_rows {
+        gram[(0, j + 1)] = sum;
+        gram[(j + 1, 0)] = sum;
+        if j + 1 < block_rows {
+            sum += scaled[windows + j] - scaled[j];
+        }
+    }
+    for lag in 0..block_rows {
+        let product = |t: usize| scaled[t] * scaled[t + lag];
+        let mut sum: f64 = (0..windows).map(product).sum();
+        for i in 0..block_rows - lag {
+            gram[(i + 1, i + lag + 1)] = sum;
+            gram[(i + lag + 1, i + 1)] = sum;
+            if i + lag + 1 < block_rows {
+                sum += product(windows + i) - product(i);
+            }
+        }
+    }
+    gram
+}

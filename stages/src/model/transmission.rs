@@ -1,0 +1,69 @@
+//! Transmission zeros of a discrete model.
+
+use faer::{Mat, c64};
+
+use super::error::ModelError;
+use super::innovations::InnovationsModel;
+use super::orthogonal::{eigenvalues, least_squares};
+
+/// Where the pencil is inverted: real, outside the unit circle, so neither pole nor (nearly ever) zero.
+const SHIFT: f64 = 1.25;
+/// Zeros beyond this radius are the feedthrough's rounding, not the system's.
+const LARGEST: f64 = 1e6;
+
+/// Finite invariant zeros of `(A, B, C, D)`.
+///
+/// # Model
+/// z with `det [A - zI, B; C, D] = 0`.
+/// # Method
+/// The pencil `M - z N` is inverted at a shift: eigenvalues `1 / (z - shift)` of `(M - shift N)^-1 N`, so a vanishing D needs no special case
+/// (infinite zeros become 0). Each zero is then polished by Newton's method on `G(z) / G'(z)`.
+/// # Shapes
+/// At most n zeros, conjugates exact and together, the upper one first.
+/// # Units
+/// The z plane.
+/// # Accuracy
+/// Rounding, for zeros that are apart from each other and from poles.
+/// # Errors
+/// The system is identically zero, or no convergence.
+/// # Source
+/// A. Emami-Naeini and P. Van Dooren, Automatica 18 (1982) 415.
+pub fn transmission_zeros(model: &InnovationsModel) -> Result<Vec<c64>, ModelError> {
+    let n = model.order();
+    let (a, b, c, _) = model.matrices();
+    let shifted = Mat::from_fn(n + 1, n + 1, |i, j| match (i < n, j < n) {
+        (true, true) => a[(i, j)] - if i == j { SHIFT } else { 0.0 },
+        (true, false) => b[i],
+        (false, true) => c[j],
+        (false, false) => model.feedthrough,
+    });
+    let right = Mat::from_fn(n + 1, n, |i, j| if i == j { 1.0 } else { 0.0 });
+    let solved = least_squares(&shifted, &right, f64::EPSILON)?;
+    let inverted = eigenvalues(&solved.as_ref().get(..n, ..).to_owned())?;
+    let mut zeros = Vec::new();
+    for value in inverted.into_iter().filter(|value| value.norm() > 1.0 / LARGEST && value.im <= 0.0) {
+        // 1 / (z - shift) has the opposite imaginary sign
+        let zero = polished(model, SHIFT + value.inv());
+        if value.im < 0.0 {
+            zeros.extend([zero, zero.conj()]);
+        } else {
+            zeros.push(zero);
+        }
+    }
+    Ok(zeros)
+}
+
+/// Newton's method while it reduces `|G|`; a conjugate pair stays a pair.
+fn polished(model: &InnovationsModel, start: c64) -> c64 {
+    let mut zero = start;
+    let mut level = model.transfer(zero).norm();
+    for _ in 0..8 {
+        let next = zero - model.transfer(zero) / model.transfer_slope(zero);
+        let trial = model.transfer(next).norm();
+        if !(trial < level) || (start.im > 0.0) != (next.im > 0.0) {
+            break;
+        }
+        (zero, level) = (next, trial);
+    }
+    zero
+}

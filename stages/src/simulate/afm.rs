@@ -1,0 +1,396 @@
+//! The stage `simulate.afm`.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::cache::replace_file;
+use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native};
+use afmid_pipeline::store::StoreError;
+use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::archive::{Archive, ArchiveLayout};
+use super::recorder::{Microscope, PiezoMonitor, RecordedEvent, Scatter, SimulatedRecord};
+use super::truth::{Truth, counts, record_truth};
+use super::{Adc, Contact, Detector, ModalLever, Mode, ReadoutNoise, Target, TriangleRamp};
+
+/// Simulates force curves of an atomic force microscope in the time domain and writes them as native records.
+///
+/// # Model
+/// A modal lever (point force at the tip), a piezo ramp, a tip-sample contact with adhesion as nonlinear output feedback, thermal
+/// force on every mode, detector poles and delay, white, 1/f and slowly wandering noise of the readout, a converter.
+/// # Method
+/// Between events the system is linear: exact propagation by matrix exponentials with exact noise covariances; events are located to 1e-8 of a
+/// sample. Start phases of the ramp are solved for, so that the archive holds the stated numbers of events.
+/// # Shapes
+/// `records` files of `samples` samples in the folder `out`, channels `deflection` and `piezo`; the truth in `out`.truth.json.
+/// # Units
+/// SI; channels in volts. Deflection away from the sample is positive.
+/// # Accuracy
+/// No integration error. The inertia of the moving base is left out; crossings of a threshold and back within one sample are missed.
+/// # Errors
+/// Parameters out of range, event totals out of reach, a folder that holds other records already.
+/// # Source
+/// Stark et al., Rev. Sci. Instrum. 2005, Fig. 1 and section Setup; C. F. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Afm {
+    /// Folder for the records, relative to the config; created if missing. The truth is written beside it as `NAME.truth.json`.
+    /// Default: `simulated`.
+    pub out: PathBuf,
+    /// Number of records, at least 1. Default: 12.
+    pub records: usize,
+    /// Samples per record, at least 1. Default: 900000 (one cycle of the ramp at 5 MS/s).
+    pub samples: usize,
+    /// Sample rate in Hz, above twice the highest mode. Default: 5e6, the paper's.
+    pub sample_rate_hz: f64,
+    /// Total number of counted snap-ins; absent: as the phases come. Default: absent.
+    pub snap_ins: Option<usize>,
+    /// Total number of counted snap-offs; absent: as the phases come. Default: absent.
+    pub snap_offs: Option<usize>,
+    /// Cycle position of the ramp at the start of each record, 0 (top, far away) to 1; absent: drawn and solved for the totals.
+    /// Default: absent.
+    pub phases: Option<Vec<f64>>,
+    /// An event counts if it lies at least this far from both ends of its record and from other events, samples; solved phases keep all
+    /// events out of this margin. Default: 20000, more than two windows of the paper.
+    pub margin_samples: usize,
+    /// Static stiffness of the lever at its tip in N/m, above 0. Default: 3.8, the paper's.
+    pub stiffness_n_per_m: f64,
+    /// Undamped natural frequencies of the modes in Hz, any number, above 0. Default: the paper's Table I.
+    pub frequencies_hz: Vec<f64>,
+    /// Quality factors, one per mode, above 0.5. Default: the paper's Table I.
+    pub quality_factors: Vec<f64>,
+    /// Shares of the static tip displacement, one per mode, above 0, sum 1. Default: a beam loaded at its end.
+    pub tip_shares: Vec<f64>,
+    /// Shares of the static detector signal, one per mode, sum 1. Default: the slope near the end of that beam.
+    pub detector_shares: Vec<f64>,
+    /// Contact stiffness in N/m, above 0. Default: 60.
+    pub contact_stiffness_n_per_m: f64,
+    /// Viscous damping of the contact in N s/m, not negative. Default: 8e-6 (the ringing against the sample dies in tens of microseconds).
+    pub contact_damping_n_s_per_m: f64,
+    /// Gap at which the tip is caught in m, above 0. Default: 4e-9.
+    pub snap_in_gap_m: f64,
+    /// Mean pull-off force in N; less three standard deviations it must exceed the catch, `contact_stiffness_n_per_m * snap_in_gap_m`.
+    /// Default: 330e-9, the paper's.
+    pub adhesion_n: f64,
+    /// Relative standard deviation of the pull-off force from event to event, 0 to 0.3; normal, cut at three. Default: 0.06.
+    pub adhesion_scatter: f64,
+    /// Mean height of the surface on the ramp's scale (0 in its middle) in m. Default: -22e-9: room for the pull-off above it.
+    pub surface_m: f64,
+    /// Standard deviation of the surface's height from record to record in m, not negative. Default: 3e-9.
+    pub surface_std_m: f64,
+    /// Cycles of the ramp per second in Hz, above 0. Default: 5.58, the paper's.
+    pub ramp_hz: f64,
+    /// Range of the ramp in m, above 0. Default: 200e-9, the paper's.
+    pub ramp_m: f64,
+    /// Travel per monitored volt in m/V, above 0. Default: 25e-9.
+    pub piezo_m_per_v: f64,
+    /// Volts per code of the piezo monitor, above 0. Default: 4.88e-3 (20 V over 12 bit).
+    pub piezo_lsb_v: f64,
+    /// White noise of the piezo monitor in V, not negative. Default: 5e-4.
+    pub piezo_white_v: f64,
+    /// Optical lever sensitivity in V per m of static tip deflection, above 0. Default: 1e7 (0.87 V at 330 nN).
+    pub sensitivity_v_per_m: f64,
+    /// Real poles of the detector in Hz, any number, above 0. Default: 1.3, 1.9 and 2.4 MHz.
+    pub detector_poles_hz: Vec<f64>,
+    /// Delay of the deflection channel in s, not negative. Default: 0.
+    pub delay_s: f64,
+    /// Temperature in K, not negative; 0 switches thermal motion off. Default: 295.
+    pub temperature_k: f64,
+    /// White noise of the readout in V, not negative. Default: 1.2e-3.
+    pub white_v: f64,
+    /// 1/f noise of the readout between 1 Hz and the Nyquist frequency in V, not negative. Default: 3e-4.
+    pub pink_v: f64,
+    /// Wander of the baseline over the archive in V, not negative. Default: 4e-3.
+    pub drift_v: f64,
+    /// Bits of the converter, 2 to 16. Default: 12, the paper's.
+    pub adc_bits: u32,
+    /// Volts per code, above 0. Default: 0.977e-3, the paper's.
+    pub lsb_v: f64,
+    /// Deflate level of the files, 0 (raw) to 9. Default: 4.
+    pub compression: u8,
+    /// Seed of all random numbers; absent: the pipeline's and the stage's id. Default: absent.
+    pub seed: Option<u64>,
+}
+
+impl Default for Afm {
+    fn default() -> Self {
+        Self {
+            out: PathBuf::from("simulated"),
+            records: 12,
+            samples: 900_000,
+            sample_rate_hz: 5e6,
+            snap_ins: None,
+            snap_offs: None,
+            phases: None,
+            margin_samples: 20_000,
+            stiffness_n_per_m: 3.8,
+            frequencies_hz: vec![46.3e3, 247.4e3, 580.8e3, 1051.2e3],
+            quality_factors: vec![40.8, 193.2, 358.0, 503.8],
+            tip_shares: vec![0.9713, 0.0247, 0.0032, 0.0008],
+            detector_shares: vec![0.8979, 0.0794, 0.0166, 0.0061],
+            contact_stiffness_n_per_m: 60.0,
+            contact_damping_n_s_per_m: 8e-6,
+            snap_in_gap_m: 4e-9,
+            adhesion_n: 330e-9,
+            adhesion_scatter: 0.06,
+            surface_m: -22e-9,
+            surface_std_m: 3e-9,
+            ramp_hz: 5.58,
+            ramp_m: 200e-9,
+            piezo_m_per_v: 25e-9,
+            piezo_lsb_v: 4.88e-3,
+            piezo_white_v: 5e-4,
+            sensitivity_v_per_m: 1e7,
+            detector_poles_hz: vec![1.3e6, 1.9e6, 2.4e6],
+            delay_s: 0.0,
+            temperature_k: 295.0,
+            white_v: 1.2e-3,
+            pink_v: 3e-4,
+            drift_v: 4e-3,
+            adc_bits: 12,
+            lsb_v: 0.977e-3,
+            compression: 4,
+            seed: None,
+        }
+    }
+}
+
+const RECORDS: Port<Recording> = Port::new("records", "records", "the records, channels `deflection` and `piezo`");
+const TRUTH: Port<Document> = Port::new("truth", "truth", "parameters, start phases and every event of the archive");
+const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many events the archive holds");
+
+impl Stage for Afm {
+    const SPEC: Spec = Spec {
+        name: "simulate.afm",
+        version: 1,
+        summary: "simulates force curves with snap-in, adhesion and snap-off, and writes them as native records",
+        inputs: &[],
+        outputs: &[RECORDS.spec(), TRUTH.spec(), SUMMARY.spec()],
+        caching: Caching::Always,
+        seeded: true,
+        source: "Stark et al., Rev. Sci. Instrum. 2005, Fig. 1; C. F. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        let modes = self.frequencies_hz.len();
+        for (name, found) in [
+            ("quality_factors", self.quality_factors.len()),
+            ("tip_shares", self.tip_shares.len()),
+            ("detector_shares", self.detector_shares.len()),
+        ] {
+            if found != modes {
+                return Err(StageError::new(format!(
+                    "`{name}` has {found} values, `frequencies_hz` {modes}: one per mode"
+                )));
+            }
+        }
+        if self.compression > 9 {
+            return Err(StageError::new(format!("`compression` is {}, wanted 0 to 9", self.compression)));
+        }
+        self.microscope().check().and_then(|()| self.layout(0).check()).map_err(StageError::from_error)
+    }
+
+    fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let folder = cx.base().join(&self.out);
+        let names: Vec<String> = (0..self.records).map(|record| format!("record_{record:04}.h5")).collect();
+        prepare(&folder, &names)?;
+        let seed = self.seed.unwrap_or_else(|| cx.seed());
+        let (microscope, layout) = (self.microscope(), self.layout(seed));
+        let archive = Archive::plan(&microscope, &layout).map_err(StageError::from_error)?;
+        cx.expect(self.records);
+        let written = names
+            .par_iter()
+            .enumerate()
+            .map(|(record, name)| {
+                let simulated = archive.simulate(&microscope, record);
+                let written = self.write(&folder.join(name), record, simulated);
+                cx.tick();
+                written
+            })
+            .collect::<Result<Vec<(Record, Vec<RecordedEvent>, usize)>, StageError>>()?;
+        let events: Vec<Vec<RecordedEvent>> = written.iter().map(|(_, events, _)| events.clone()).collect();
+        archive.verify(&events).map_err(StageError::from_error)?;
+        let records = names.iter().zip(&written).enumerate();
+        let truth = Truth {
+            parameters: serde_json::to_value(self)
+                .map_err(|error| StageError::new(format!("parameters cannot be written as JSON: {error}")))?,
+            seed,
+            counted_means: format!(
+                "at least {} samples from both ends of the record and from any other event",
+                self.margin_samples
+            ),
+            counts: counts(&events),
+            records: records
+                .map(|(record, (name, (_, events, saturated)))| {
+                    record_truth(&archive, record, name.clone(), *saturated, events)
+                })
+                .collect(),
+        };
+        let saturated: usize = written.iter().map(|(_, _, saturated)| saturated).sum();
+        if saturated > 0 {
+            cx.warn(format!(
+                "{saturated} deflection codes lie at a limit of the converter: lower sensitivity_v_per_m or raise lsb_v"
+            ));
+        }
+        let summary = serde_json::json!({
+            "records": self.records,
+            "events": truth.counts,
+            "saturated": saturated,
+            "out": self.out,
+        });
+        write_truth(&folder.with_extension("truth.json"), &truth)?;
+        let records = written.into_iter().map(|(record, ..)| record).collect();
+        Ok(Ports::new()
+            .with(&RECORDS, Recording { records })
+            .with(&TRUTH, Document::new(&truth)?)
+            .with(&SUMMARY, Document::new(&summary)?))
+    }
+
+    fn location_params() -> &'static [&'static str] {
+        &["out"]
+    }
+
+    fn examples() -> Vec<Example> {
+        vec![Example {
+            title: "two short records, each with one snap-off",
+            params: "records = 2\nsamples = 500000\nramp_hz = 10.0\nsnap_offs = 2\nseed = 5",
+            inputs: || Ok(Ports::new()),
+            expect,
+        }]
+    }
+}
+
+fn expect(outputs: &Ports) -> Result<String, String> {
+    let records = outputs.get(&RECORDS).map_err(|error| error.to_string())?;
+    let summary = outputs.get(&SUMMARY).map_err(|error| error.to_string())?;
+    let found = summary.0["events"]["snap_off"].as_u64();
+    match (records.records.len(), found) {
+        (2, Some(2)) => Ok("2 records with 2 snap-offs".to_owned()),
+        other => Err(format!("records and snap-offs: {other:?}, wanted 2 and 2")),
+    }
+}
+
+impl Afm {
+    /// The microscope that the parameters describe.
+    pub fn microscope(&self) -> Microscope {
+        let shares = self.tip_shares.iter().zip(&self.detector_shares);
+        let modes = self.frequencies_hz.iter().zip(&self.quality_factors).zip(shares);
+        Microscope {
+            lever: ModalLever {
+                stiffness_n_per_m: self.stiffness_n_per_m,
+                modes: modes
+                    .map(|((&frequency_hz, &quality_factor), (&tip_share, &detector_share))| Mode {
+                        frequency_hz,
+                        quality_factor,
+                        tip_share,
+                        detector_share,
+                    })
+                    .collect(),
+            },
+            contact: Contact {
+                stiffness_n_per_m: self.contact_stiffness_n_per_m,
+                damping_n_s_per_m: self.contact_damping_n_s_per_m,
+                snap_in_gap_m: self.snap_in_gap_m,
+                adhesion_n: self.adhesion_n,
+                adhesion_scatter: self.adhesion_scatter,
+            },
+            detector: Detector {
+                sensitivity_v_per_m: self.sensitivity_v_per_m,
+                pole_hz: self.detector_poles_hz.clone(),
+                delay_s: self.delay_s,
+            },
+            noise: ReadoutNoise { white_v: self.white_v, pink_v: self.pink_v, drift_v: self.drift_v },
+            adc: Adc { bits: self.adc_bits, lsb_v: self.lsb_v },
+            monitor: PiezoMonitor { m_per_v: self.piezo_m_per_v, lsb_v: self.piezo_lsb_v, white_v: self.piezo_white_v },
+            ramp: TriangleRamp { frequency_hz: self.ramp_hz, range_m: self.ramp_m, phase: 0.0 },
+            temperature_k: self.temperature_k,
+            sample_rate_hz: self.sample_rate_hz,
+        }
+    }
+
+    fn layout(&self, seed: u64) -> ArchiveLayout {
+        ArchiveLayout {
+            records: self.records,
+            samples: self.samples,
+            margin_samples: self.margin_samples,
+            target: Target { snap_ins: self.snap_ins, snap_offs: self.snap_offs },
+            phases: self.phases.clone(),
+            scatter: Scatter { surface_m: self.surface_m, surface_std_m: self.surface_std_m },
+            seed,
+        }
+    }
+
+    fn write(
+        &self,
+        path: &Path,
+        number: usize,
+        record: SimulatedRecord,
+    ) -> Result<(Record, Vec<RecordedEvent>, usize), StageError> {
+        let channel = |location: &str, codes: Vec<i16>, scale_factor: f64, long_name: &str| NativeChannel {
+            location: location.to_owned(),
+            codes: Codes::Int16(codes),
+            unit: "V".to_owned(),
+            scale_factor,
+            add_offset: 0.0,
+            long_name: long_name.to_owned(),
+        };
+        let native = NativeRecord {
+            sample_rate_hz: self.sample_rate_hz,
+            started_at: started_at(number),
+            channels: vec![
+                channel("deflection", record.deflection, self.lsb_v, "photodiode signal"),
+                channel("piezo", record.piezo, self.piezo_lsb_v, "z piezo monitor"),
+            ],
+        };
+        let storage = match self.compression {
+            0 => RecordStorage::Raw,
+            level => RecordStorage::Deflate(level),
+        };
+        write_native(path, &native, storage).map_err(|error| StageError::from_error(error).at(path))?;
+        let wanted = |role, location| Wanted { role, location, required: true };
+        let opened = open_native(path, &[wanted("deflection", "/deflection"), wanted("piezo", "/piezo")])?;
+        Ok((opened, record.events, record.saturated))
+    }
+}
+
+/// A fictitious start, one minute apart; the numbers must not depend on when the simulation ran.
+fn started_at(record: usize) -> String {
+    let minutes = 600 + record;
+    format!("2005-03-{:02}T{:02}:{:02}:00Z", 1 + minutes / 1440 % 31, minutes / 60 % 24, minutes % 60)
+}
+
+/// Makes the folder; refuses one that holds records of another archive, which a pattern would pick up together with the new ones.
+fn prepare(folder: &Path, names: &[String]) -> Result<(), StageError> {
+    let failed = |error: std::io::Error| StageError::new(format!("the folder cannot be used: {error}")).at(folder);
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let name = entry.map_err(failed)?.file_name().to_string_lossy().into_owned();
+        if name.ends_with(".h5") && !names.contains(&name) {
+            return Err(StageError::new(format!("the folder holds `{name}`, which is not of this archive"))
+                .at(folder)
+                .help("choose another `out`, or remove the old records"));
+        }
+    }
+    Ok(())
+}
+
+fn write_truth(path: &Path, truth: &Truth) -> Result<(), StageError> {
+    let mut text = serde_json::to_string_pretty(truth)
+        .map_err(|error| StageError::new(format!("the truth cannot be written as JSON: {error}")))?;
+    text.push('\n');
+    replace_file(path, |temporary| {
+        std::fs::write(temporary, text).map_err(|error| StoreError {
+            file: path.to_owned(),
+            place: String::new(),
+            problem: format!("cannot be written: {error}"),
+            help: None,
+        })
+    })
+    .map_err(|error| StageError::from_error(error).at(path))
+}
+
+#[cfg(test)]
+#[path = "afm_tests.rs"]
+mod tests;
