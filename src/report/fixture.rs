@@ -247,33 +247,42 @@ fn modes() -> StageRecord {
         })
         .chain([(-2.7, 0.0, 0.0, 0.5), (-0.3, 0.0, 0.0, 0.5)])
         .collect();
-    let table = |rows: &[(f64, f64, f64, f64)]| {
-        let column = |pick: fn(&(f64, f64, f64, f64)) -> f64| rows.iter().map(pick).collect::<Vec<f64>>();
-        Table::new()
-            .with("frequency_hz", "Hz", "abs(s) / 2 pi", column(|row| row.2))
-            .with("frequency_std_hz", "Hz", "its standard error", column(|row| row.2 * 4e-6))
-            .with("quality_factor", "1", "abs(s) / (-2 Re s)", column(|row| row.3))
-            .with("quality_factor_std", "1", "its standard error", column(|row| row.3 * 0.02))
-            .with("z_real", "1", "in the z plane", column(|row| row.0))
-            .with("z_imaginary", "1", "in the z plane", column(|row| row.1))
-    };
+    let both: Vec<(f64, f64, f64, f64)> = rows.iter().chain(&zeros).copied().collect();
+    let column = |pick: fn(&(f64, f64, f64, f64)) -> f64| both.iter().map(pick).collect::<Vec<f64>>();
+    let kinds = rows.iter().map(|_| "pole").chain(zeros.iter().map(|_| "zero")).map(str::to_owned).collect::<Vec<String>>();
+    let classes = both.iter().map(|row| if row.3 > 5.0 { "mechanical" } else { "detector" }.to_owned()).collect::<Vec<String>>();
+    let roots = Table::new()
+        .with("kind", "", "pole or zero", kinds)
+        .with("class", "", "what a pole belongs to", classes)
+        .with("frequency_hz", "Hz", "abs(s) / 2 pi", column(|row| row.2))
+        .with("frequency_std_hz", "Hz", "its standard error", column(|row| row.2 * 4e-6))
+        .with("quality_factor", "1", "abs(s) / (-2 Re s)", column(|row| row.3))
+        .with("quality_factor_std", "1", "its standard error", column(|row| row.3 * 0.02))
+        .with("z_re", "1", "in the z plane", column(|row| row.0))
+        .with("z_im", "1", "in the z plane", column(|row| row.1));
     let reference = [46.2e3, 247e3, 581e3, 1051e3];
     let list: Vec<Value> = MODES
         .iter()
-        .zip(reference)
-        .map(|((f, q, g), reference)| {
+        .map(|(f, q, g)| {
             json!({"frequency_hz": f * 1.000_002, "frequency_std_hz": f * 4e-6, "quality_factor": q * 1.003, "quality_factor_std": q * 0.004,
-                "static_share": g, "static_share_std": 1e-4, "reference_frequency_hz": reference, "reference_quality_factor": q})
+                "static_share": g, "static_share_std": 1e-4})
         })
         .collect();
-    let summary = Document(json!({"modes": list,
+    let compared: Vec<Value> = MODES
+        .iter()
+        .zip(reference)
+        .map(|((f, q, _), reference)| {
+            json!({"reference_frequency_hz": reference, "reference_quality_factor": q, "frequency_hz": f * 1.000_002, "quality_factor": q * 1.003})
+        })
+        .collect();
+    let summary = Document(json!({"modes": list, "reference": compared,
         "fit_percent": {"identification": 99.8312, "held_out": 99.8034, "noise_ceiling": 99.8411}}));
     stage(
         "modes",
         "model.modes",
         &[("model", "model")],
         json!({}),
-        vec![("poles", table(&rows).wrap()), ("zeros", table(&zeros).wrap()), ("summary", summary.wrap())],
+        vec![("roots", roots.wrap()), ("summary", summary.wrap())],
     )
 }
 

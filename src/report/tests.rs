@@ -136,12 +136,10 @@ fn empty_and_unknown_values_are_survived() {
         &["event", "time"],
         Vec::<f64>::new(),
     );
-    let roots = Table::new().with("z_real", "1", "", vec![f64::NAN, 1.0]).with(
-        "z_imaginary",
-        "1",
-        "",
-        vec![0.0, f64::INFINITY],
-    );
+    let roots = Table::new()
+        .with("kind", "", "", vec!["pole".to_owned(), "zero".to_owned()])
+        .with("z_re", "1", "", vec![f64::NAN, 1.0])
+        .with("z_im", "1", "", vec![0.0, f64::INFINITY]);
     let scalar = Array::default().with("one", "1", "", &[], vec![1.0]);
     let modes = Document(
         json!({"modes": [{"frequency_hz": null}, {}, 3], "fit_percent": null, "events": {"found": "many", "rejected": 7}}),
@@ -151,8 +149,8 @@ fn empty_and_unknown_values_are_survived() {
         ("unknown", unknown.wrap()),
         ("pair", pair.wrap()),
         ("none", none.wrap()),
-        ("poles", roots.wrap()),
-        ("zeros", Table::new().wrap()),
+        ("roots", roots.wrap()),
+        ("nothing", Table::new().wrap()),
         ("scalar", scalar.wrap()),
         ("model", StateSpace::default().wrap()),
         ("summary", modes.wrap()),

@@ -13,7 +13,7 @@ pub struct Sections {
 }
 
 impl Sections {
-    /// Takes a doc comment apart. A heading is one of [`HEADINGS`] as `# Method` or, at the start of a paragraph, as `Method:`.
+    /// Takes a doc comment apart. A heading is one of [`HEADINGS`] as `# Method` or, at the start of a line, as `Method:`.
     ///
     /// ```
     /// use afmid_pipeline::reference::Sections;
@@ -23,13 +23,12 @@ impl Sections {
     /// assert_eq!(doc.sections[1], ("Source", "any textbook".to_owned()));
     /// ```
     pub fn of(doc: &str) -> Self {
-        let (mut found, mut fresh, mut fenced) = (Self::default(), true, false);
+        let (mut found, mut fenced) = (Self::default(), false);
         for line in doc.lines() {
-            let heading = if fenced { None } else { heading(line, fresh) };
+            let heading = if fenced { None } else { heading(line) };
             if line.trim_start().starts_with("```") {
                 fenced = !fenced;
             }
-            fresh = line.trim().is_empty();
             match heading {
                 Some((name, rest)) => found.sections.push((name, rest.to_owned())),
                 None => {
@@ -53,11 +52,11 @@ impl Sections {
 }
 
 /// The heading that a line begins, and what follows it in the line.
-fn heading(line: &str, fresh: bool) -> Option<(&'static str, &str)> {
+fn heading(line: &str) -> Option<(&'static str, &str)> {
     let known = |word: &str| HEADINGS.into_iter().find(|heading| *heading == word);
     if let Some(title) = line.strip_prefix('#') {
         return known(title.trim_start_matches('#').trim()).map(|name| (name, ""));
     }
-    let (word, rest) = line.split_once(':').filter(|_| fresh)?;
+    let (word, rest) = line.split_once(':')?;
     known(word.trim()).map(|name| (name, rest.trim()))
 }

@@ -7,7 +7,8 @@ use crate::stage::{Entry, Registry};
 
 /// The index of all stages, in Markdown.
 pub fn index(registry: &Registry) -> String {
-    let mut text = "# Stages\n\nGenerated from the registry: `afmid stages --write docs/stages`. The same text: `afmid stages NAME`.\n".to_owned();
+    let mut text =
+        "# Stages\n\nGenerated from the registry by `afmid docs`; `afmid stages NAME` prints the same.\n".to_owned();
     let mut last = "";
     for entry in registry.entries() {
         let domain = domain(entry);

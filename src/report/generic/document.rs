@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 use super::ROWS;
-use crate::report::number::{UNKNOWN, integer, number};
+use crate::report::number::{UNKNOWN, integer, number, quantity};
 use crate::report::view::{Fact, Head, TableView};
 
 /// Splits a JSON document into facts (`events.found` = 24) and, for lists of objects, tables.
@@ -15,6 +15,7 @@ pub(crate) fn document_view(document: &Value) -> (Vec<Fact>, Vec<TableView>) {
 
 fn walk(path: &str, value: &Value, facts: &mut Vec<Fact>, tables: &mut Vec<TableView>) {
     match value {
+        Value::Object(map) if is_quantity(map) => facts.push(Fact::new(path, quantity_text(map))),
         Value::Object(map) => {
             for (key, value) in map {
                 let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
@@ -23,6 +24,21 @@ fn walk(path: &str, value: &Value, facts: &mut Vec<Fact>, tables: &mut Vec<Table
         }
         Value::Array(list) if list.iter().any(Value::is_object) => tables.push(objects(path, list)),
         other => facts.push(Fact::new(if path.is_empty() { "value" } else { path }, scalar(other))),
+    }
+}
+
+/// Whether an object is one number with its unit or error: `{ "value": 3.8, "std": 0.4, "unit": "N/m" }`.
+fn is_quantity(map: &Map<String, Value>) -> bool {
+    map.contains_key("value") && map.len() > 1 && map.keys().all(|key| matches!(key.as_str(), "value" | "std" | "unit"))
+}
+
+fn quantity_text(map: &Map<String, Value>) -> String {
+    let at = |name: &str| map.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let unit = map.get("unit").and_then(Value::as_str).unwrap_or_default();
+    match map.get("value") {
+        Some(Value::Number(_)) => quantity(at("value"), at("std"), unit),
+        Some(other) => scalar(other),
+        None => UNKNOWN.to_owned(),
     }
 }
 
@@ -62,6 +78,7 @@ fn scalar(value: &Value) -> String {
             let more = if list.len() > shown.len() { format!(", … ({} in all)", list.len()) } else { String::new() };
             format!("{}{more}", shown.join(", "))
         }
+        Value::Object(map) if is_quantity(map) => quantity_text(map),
         Value::Object(map) => {
             let parts: Vec<String> = map.iter().map(|(key, value)| format!("{key}: {}", scalar(value))).collect();
             parts.join(", ")
@@ -77,12 +94,13 @@ mod tests {
     fn lists_of_objects_become_tables_and_the_rest_facts() {
         let document = serde_json::json!({
             "events": {"found": 24, "rejected": [{"record": "a.h5", "reason": "no rupture"}, {"record": "b.h5", "extra": null}]},
-            "fit": 99.8123456, "ids": [1, 2], "none": [], "unknown": null,
+            "fit": 99.8123456, "k": {"value": 3.81, "std": 0.12, "unit": "N/m"}, "ids": [1, 2], "none": [], "unknown": null,
         });
         let (facts, tables) = document_view(&document);
         assert!(facts.contains(&Fact::new("events.found", "24")));
         assert!(facts.contains(&Fact::new("fit", "99.8123")));
         assert!(facts.contains(&Fact::new("ids", "1, 2")));
+        assert!(facts.contains(&Fact::new("k", "3.81(12) N/m")));
         assert!(facts.contains(&Fact::new("none", "none")));
         assert!(facts.contains(&Fact::new("unknown", "–")));
         assert_eq!(tables.len(), 1);

@@ -23,8 +23,10 @@ pub(crate) struct BodeCurve {
     pub series: String,
     pub frequency_hz: Vec<f64>,
     pub transfer: Vec<Complex64>,
-    /// Variance of the complex value, E|h - mean|^2; empty: unknown.
-    pub variance: Vec<f64>,
+    /// Standard error of the magnitude; empty: unknown.
+    pub magnitude_std: Vec<f64>,
+    /// Standard error of the phase in radians; empty: unknown.
+    pub phase_std_rad: Vec<f64>,
     pub stroke: Stroke,
     /// Smooth enough to unwrap its phase by itself.
     pub reference: bool,
@@ -35,12 +37,28 @@ impl BodeCurve {
     pub fn new(series: &str, frequency_hz: &[f64], transfer: &[Complex64], stroke: Stroke) -> Self {
         let (frequency_hz, transfer) =
             frequency_hz.iter().zip(transfer).filter(|(f, _)| **f > 0.0).map(|(f, h)| (*f, *h)).unzip();
-        Self { series: series.to_owned(), frequency_hz, transfer, variance: Vec::new(), stroke, reference: true }
+        Self { series: series.to_owned(), frequency_hz, transfer, magnitude_std: Vec::new(), phase_std_rad: Vec::new(), stroke, reference: true }
     }
 
-    /// With a variance for each of the frequencies that [`BodeCurve::new`] was given.
-    pub fn with_variance(mut self, frequency_hz: &[f64], variance: &[f64]) -> Self {
-        self.variance = frequency_hz.iter().zip(variance).filter(|(f, _)| **f > 0.0).map(|(_, v)| *v).collect();
+    /// With standard errors of magnitude and phase at each of the frequencies that [`BodeCurve::new`] was given.
+    pub fn with_errors(mut self, frequency_hz: &[f64], magnitude_std: &[f64], phase_std_rad: &[f64]) -> Self {
+        let shown = |values: &[f64]| frequency_hz.iter().zip(values).filter(|(f, _)| **f > 0.0).map(|(_, v)| *v).collect();
+        (self.magnitude_std, self.phase_std_rad) = (shown(magnitude_std), shown(phase_std_rad));
+        self
+    }
+
+    /// With a variance of the complex value, E|h - mean|^2, at each of the frequencies that [`BodeCurve::new`] was given: half of it lies
+    /// along h, half across.
+    pub fn with_variance(self, frequency_hz: &[f64], transfer: &[Complex64], variance: &[f64]) -> Self {
+        let error: Vec<f64> = variance.iter().map(|v| (0.5 * v).sqrt()).collect();
+        let turn: Vec<f64> = error.iter().zip(transfer).map(|(e, h)| e / h.norm()).collect();
+        self.with_errors(frequency_hz, &error, &turn)
+    }
+
+    /// Without errors.
+    pub fn plain(mut self) -> Self {
+        self.magnitude_std.clear();
+        self.phase_std_rad.clear();
         self
     }
 
@@ -51,8 +69,7 @@ impl BodeCurve {
     }
 }
 
-/// Magnitude above phase. The bands are `|h| +- 1.96 sqrt(variance / 2)`: the part of a circular error that lies along h; the
-/// phase's is the same over |h|.
+/// Magnitude above phase; bands where a curve has errors.
 pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> Figure {
     let reference = bode.curves.iter().rev().find(|curve| curve.reference).map(|curve| {
         let phases = unwrapped_degrees(&curve.transfer);
@@ -66,11 +83,11 @@ pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> 
             Some((f, phases)) => degrees_near(&curve.frequency_hz, &curve.transfer, (f, phases)),
             None => unwrapped_degrees(&curve.transfer),
         };
-        if curve.variance.len() == size.len() {
-            let error: Vec<f64> = curve.variance.iter().map(|v| BAND * (0.5 * v).sqrt()).collect();
-            magnitude = magnitude.with(band(curve, &size, &error));
-            // beyond a radian the phase is unknown
-            let turn: Vec<f64> = error.iter().zip(&size).map(|(e, h)| (e / h).min(1.0).to_degrees()).collect();
+        let times = |std: &[f64], factor: f64| -> Vec<f64> { std.iter().map(|std| factor * std).collect() };
+        if curve.magnitude_std.len() == size.len() && curve.phase_std_rad.len() == size.len() {
+            magnitude = magnitude.with(band(curve, &size, &times(&curve.magnitude_std, BAND)));
+            // an error of half a turn says that nothing is known of the phase
+            let turn = times(&curve.phase_std_rad, BAND).iter().map(|e| e.min(std::f64::consts::PI).to_degrees()).collect::<Vec<_>>();
             phase = phase.with(band(curve, &angle, &turn));
         }
         magnitude = magnitude.with(Mark::line(&curve.series, &curve.frequency_hz, &size, curve.stroke));

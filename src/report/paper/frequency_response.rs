@@ -43,8 +43,7 @@ pub(crate) fn coupled(run: &RunResult) -> Option<Figure> {
     {
         let mut best = free.swap_remove(best);
         best.stroke = Stroke::solid(Colour::Muted, 1.4);
-        best.variance.clear();
-        all.push(best);
+        all.push(best.plain());
     }
     all.extend(own);
     let caption =
@@ -109,8 +108,13 @@ fn array_curve(found: &Found<'_, Array>, kind: EventKind, prefix: &str) -> Optio
         // drawn without a band: its scatter shows its error
         return Some((role, curve.noisy()));
     }
-    let variance = real_over(found.value, "variance", axis);
-    Some((role, variance.map_or(curve.clone(), |variance| curve.with_variance(&axis.values, variance))))
+    let over = |name: &str| real_over(found.value, name, axis);
+    let curve = match (over("variance"), over("magnitude_std"), over("phase_std")) {
+        (_, Some(magnitude), Some(phase)) => curve.with_errors(&axis.values, magnitude, phase),
+        (Some(variance), _, _) => curve.with_variance(&axis.values, transfer, variance),
+        _ => curve,
+    };
+    Some((role, curve))
 }
 
 /// A curve computed from the model that the modes were taken from, else from the last model.

@@ -22,7 +22,16 @@ pub(crate) fn tables(run: &RunResult) -> Vec<TableView> {
 
 fn modal_table(found: &Found<'_, Document>, coupled: bool) -> Option<TableView> {
     let modes = found.value.0.get("modes")?.as_array()?;
-    let at = |mode: &Value, name: &str| mode.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let references = found.value.0.get("reference").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    // a mode's reference is the row that names the mode's own frequency
+    let reference = |mode: &Value, name: &str| {
+        let own = references.iter().find(|row| row.get("frequency_hz").is_some() && row.get("frequency_hz") == mode.get("frequency_hz"));
+        own.and_then(|row| row.get(name)).and_then(Value::as_f64).unwrap_or(f64::NAN)
+    };
+    let at = |mode: &Value, name: &str| match mode.get(name).and_then(Value::as_f64) {
+        Some(value) => value,
+        None => reference(mode, name),
+    };
     let has = |name: &str| modes.iter().any(|mode| at(mode, name).is_finite());
     let (f_ref, q_ref, share) = (has("reference_frequency_hz"), has("reference_quality_factor"), has("static_share"));
     let mut heads = vec![Head::number("mode", ""), Head::number("frequency", "")];

@@ -3,7 +3,7 @@
 use afmid_pipeline::{RunResult, Table};
 
 use crate::report::figure::{Axis, Colour, Ellipse, Figure, Mark, Marker, Panel, Points, Row};
-use crate::report::find::{EventKind, Found, all, event_kind};
+use crate::report::find::{EventKind, all, event_kind};
 use crate::report::number::{quantity, with_error};
 
 /// Poles or zeros of one model; of a complex pair the upper one.
@@ -29,17 +29,13 @@ pub(crate) fn figures(run: &RunResult) -> Vec<Figure> {
 }
 
 fn figure(run: &RunResult, kind: EventKind, id: &str, title: &str) -> Option<Figure> {
-    let of = |word: &str| {
-        let tables =
-            || all::<Table>(run).filter(|found| event_kind(run, found.stage) == kind && found.port.contains(word));
-        // the modal table's own stage first: others may list half-split fits
-        tables().find(|found| found.stage.id == "modes").or_else(|| tables().last()).and_then(|found| roots(&found))
-    };
-    let (poles, zeros) = (of("poles"), of("zeros"));
-    if poles.is_none() && zeros.is_none() {
+    let tables = || all::<Table>(run).filter(|found| event_kind(run, found.stage) == kind && found.value.real("z_re").is_ok());
+    // the stage that the modal table is read from first: others may list fits of a half
+    let found = tables().find(|found| found.stage.id == "modes").or_else(|| tables().last())?;
+    let (poles, zeros) = (roots(found.value, "pole")?, roots(found.value, "zero")?);
+    if poles.re.is_empty() && zeros.re.is_empty() {
         return None;
     }
-    let (poles, zeros) = (poles.unwrap_or_default(), zeros.unwrap_or_default());
     let sample_time_s =
         all::<afmid_pipeline::StateSpace>(run).map(|found| found.value.sample_time_s).find(|t| *t > 0.0);
     let mut panels = vec![(1.0, whole(&poles, &zeros))];
@@ -49,34 +45,31 @@ fn figure(run: &RunResult, kind: EventKind, id: &str, title: &str) -> Option<Fig
     Some(Figure::new(id, title, caption).row(Row { height: 400.0, panels }))
 }
 
-/// Reads a table of roots: columns `z_real` and `z_imaginary`, and what else there is.
-fn roots(found: &Found<'_, Table>) -> Option<Roots> {
-    let table = found.value;
-    let column = |name: &str| table.real(name).ok();
-    let (re, im) = (column("z_real")?, column("z_imaginary")?);
-    let unknown = vec![f64::NAN; re.len()];
-    let or_unknown = |name: &str| column(name).unwrap_or(&unknown);
+/// Reads the rows of one kind from a table of roots: `kind`, `z_re`, `z_im`, frequencies and quality factors with their errors.
+fn roots(table: &Table, kind: &str) -> Option<Roots> {
+    let rows: Vec<usize> = table.text("kind").ok()?.iter().enumerate().filter(|(_, have)| *have == kind).map(|(row, _)| row).collect();
+    let column = |name: &str| -> Option<Vec<f64>> {
+        let values = table.real(name).ok()?;
+        Some(rows.iter().map(|row| values.get(*row).copied().unwrap_or(f64::NAN)).collect())
+    };
+    let or_unknown = |name: &str| column(name).unwrap_or_else(|| vec![f64::NAN; rows.len()]);
+    let (re, im) = (column("z_re")?, column("z_im")?);
     let (f, f_std) = (or_unknown("frequency_hz"), or_unknown("frequency_std_hz"));
     let (q, q_std) = (or_unknown("quality_factor"), or_unknown("quality_factor_std"));
-    let titles = (0..re.len()).map(|k| {
-        let at = |values: &[f64]| values.get(k).copied().unwrap_or(f64::NAN);
-        format!("f = {}, Q = {}", quantity(at(f), at(f_std), "Hz"), with_error(at(q), at(q_std)))
-    });
-    let radius_std = match column("z_radius_std") {
-        Some(std) => std.to_vec(),
-        None => (0..re.len())
-            .map(|k| {
-                let at = |values: &[f64]| values.get(k).copied().unwrap_or(f64::NAN);
-                // 1 - |z| is nearly |arg z| / 2Q: the relative error of the distance is Q's
-                (1.0 - at(re).hypot(at(im))).abs() * at(q_std) / at(q).abs()
-            })
-            .collect(),
-    };
-    let covariance = match (column("z_real_std"), column("z_imaginary_std"), column("z_covariance")) {
-        (Some(re), Some(im), Some(both)) => re.iter().zip(im).zip(both).map(|((r, i), c)| (*r, *i, *c)).collect(),
+    let class = table.text("class").ok();
+    let (mut titles, mut radius_std) = (Vec::new(), Vec::new());
+    for (((((row, re), im), q), q_std), (f, f_std)) in rows.iter().zip(&re).zip(&im).zip(&q).zip(&q_std).zip(f.iter().zip(&f_std)) {
+        let class = class.and_then(|class| class.get(*row)).map_or("", String::as_str);
+        titles.push(format!("{class} {kind}: f = {}, Q = {}", quantity(*f, *f_std, "Hz"), with_error(*q, *q_std)));
+        // |z| = exp(Re s Ts), and Re s = -|s| / 2Q: the logarithm of |z| has the relative error of Q (that of f is small beside it)
+        let radius = re.hypot(*im);
+        radius_std.push((radius * radius.ln() * q_std / q).abs());
+    }
+    let covariance = match (column("z_re_std"), column("z_im_std"), column("z_covariance")) {
+        (Some(re), Some(im), Some(both)) => re.into_iter().zip(im).zip(both).map(|((r, i), c)| (r, i, c)).collect(),
         _ => Vec::new(),
     };
-    Some(Roots { re: re.to_vec(), im: im.to_vec(), titles: titles.collect(), radius_std, covariance })
+    Some(Roots { re, im, titles, radius_std, covariance })
 }
 
 fn points(series: &str, x: Vec<f64>, y: Vec<f64>, y_error: Vec<f64>, titles: Vec<String>) -> Mark {

@@ -1,0 +1,133 @@
+//! The arguments of the command line.
+
+use std::num::NonZeroU16;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Identifies dynamic systems from archived transients; at home in atomic force microscopy.
+#[derive(Debug, Parser)]
+#[command(name = "afmid", version, about, propagate_version = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a config, reusing what is still valid, and write a result file.
+    Run(RunArgs),
+    /// Check configs: everything that can be wrong without opening data, all errors at once.
+    Check {
+        /// The configs.
+        #[arg(required = true, value_name = "CONFIG")]
+        configs: Vec<PathBuf>,
+    },
+    /// Draw the graph of a config.
+    Graph {
+        /// The config and what changes it.
+        #[command(flatten)]
+        config: ConfigArgs,
+        /// How to draw it.
+        #[arg(long, value_enum, default_value = "text")]
+        format: GraphFormat,
+    },
+    /// Say which stages would run, and why.
+    Explain(ExplainArgs),
+    /// Show what a run found.
+    Show {
+        /// The result file.
+        result: PathBuf,
+        /// The stage; without it, the run as a whole.
+        id: Option<String>,
+        /// As JSON, alone on stdout.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write a run's page with its figures: one HTML file that needs no network.
+    Report(ReportArgs),
+    /// List the stages, or document one.
+    Stages {
+        /// The stage to document.
+        name: Option<String>,
+    },
+    /// Print the JSON Schema of a config.
+    Schema,
+    /// Write the generated documentation: the stages' pages and the schema of configs.
+    #[command(hide = true)]
+    Docs {
+        /// Where to.
+        #[arg(default_value = "docs")]
+        folder: PathBuf,
+        /// Write nothing; fail if something would change.
+        #[arg(long)]
+        check: bool,
+    },
+}
+
+/// A config and what changes it.
+#[derive(Debug, Args)]
+pub struct ConfigArgs {
+    /// The config.
+    pub config: PathBuf,
+    /// Set a parameter (or `pipeline.seed`); VALUE is TOML, so text needs quotes of its own.
+    #[arg(long = "set", value_name = "ID.PARAM=VALUE")]
+    pub set: Vec<String>,
+}
+
+/// How to run a config.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// The config and what changes it.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// The result file [default: the pipeline's name, in the working directory].
+    #[arg(short, long, value_name = "OUT.h5")]
+    pub output: Option<PathBuf>,
+    /// Threads [default: one per processor]; results don't depend on it.
+    #[arg(short, long, value_name = "N")]
+    pub jobs: Option<NonZeroU16>,
+    /// Reuse nothing.
+    #[arg(long)]
+    pub fresh: bool,
+    /// Where stage results are kept [default: $AFMID_CACHE, or `afmid` in the user's cache folder].
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+}
+
+/// What to report, and where to.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// The result file.
+    pub result: PathBuf,
+    /// The page [default: the result file's name with `.html`, in the working directory].
+    #[arg(short, long, value_name = "REPORT.html")]
+    pub output: Option<PathBuf>,
+    /// Also write every figure as an SVG file into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
+}
+
+/// What to explain.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// The config and what changes it.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Where stage results are kept, as for `run`.
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+}
+
+/// How to draw a graph.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum GraphFormat {
+    /// Aligned text.
+    Text,
+    /// Mermaid, which many Markdown viewers draw.
+    Mermaid,
+    /// Graphviz.
+    Dot,
+}

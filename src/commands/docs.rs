@@ -1,0 +1,48 @@
+//! `afmid docs`: the generated documentation, written or compared.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::reference::files;
+
+use super::schema;
+use crate::failure::Failure;
+
+/// Writes `FOLDER/stages/*.md` and `FOLDER/pipeline.schema.json`, or says what would change. Pages of stages that are gone are removed.
+pub fn run(folder: &Path, check: bool) -> Result<(), Failure> {
+    let stages = folder.join("stages");
+    let pages = files(&super::registry()?).map_err(|error| Failure::failed(error, None))?;
+    let mut wanted: Vec<(PathBuf, String)> = pages.into_iter().map(|(name, text)| (stages.join(name), text)).collect();
+    wanted.push((folder.join("pipeline.schema.json"), schema::text()?));
+    let stale = stale(&stages, &wanted);
+    let changed: Vec<&(PathBuf, String)> =
+        wanted.iter().filter(|(path, text)| fs::read_to_string(path).ok().as_ref() != Some(text)).collect();
+    if check {
+        let names: Vec<String> =
+            changed.iter().map(|(path, _)| path).chain(&stale).map(|path| path.display().to_string()).collect();
+        if names.is_empty() {
+            return Ok(());
+        }
+        let help = "write them with `cargo run -- docs`".to_owned();
+        return Err(Failure::failed(format!("the generated documentation is old: {}", names.join(", ")), Some(help)));
+    }
+    let fail = |path: &Path, error| Failure::failed(format!("{} cannot be written: {error}", path.display()), None);
+    fs::create_dir_all(&stages).map_err(|error| fail(&stages, error))?;
+    for (path, text) in changed {
+        fs::write(path, text).map_err(|error| fail(path, error))?;
+        println!("wrote {}", path.display());
+    }
+    for path in stale {
+        fs::remove_file(&path).map_err(|error| fail(&path, error))?;
+        println!("removed {}", path.display());
+    }
+    Ok(())
+}
+
+/// Pages that no stage has any more.
+fn stale(folder: &Path, wanted: &[(PathBuf, String)]) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut stale: Vec<PathBuf> = entries.filter(|path| wanted.iter().all(|(wanted, _)| wanted != path)).collect();
+    stale.sort();
+    stale
+}

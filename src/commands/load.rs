@@ -1,0 +1,26 @@
+//! From a config file to a plan.
+
+use std::path::Path;
+
+use afmid_pipeline::{Plan, Registry, graph};
+
+use crate::diagnostic::render;
+use crate::failure::{Failure, Message};
+
+/// Reads a config, applies `--set` arguments and plans it. Errors: the file cannot be read; everything that is wrong with it.
+pub fn load(path: &Path, set: &[String], registry: &Registry) -> Result<Plan, Failure> {
+    let file = path.display().to_string();
+    let text = read(path)?;
+    graph::load(&file, &text, set, registry)
+        .map_err(|problems| Failure::Usage(Message::Rendered(render(&file, &text, &problems))))
+}
+
+fn read(path: &Path) -> Result<String, Failure> {
+    let bytes = std::fs::read(path)
+        .map_err(|error| Failure::usage(format!("the config {} cannot be read: {error}", path.display()), None))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let place = error.utf8_error().valid_up_to();
+        let message = format!("the config {} is not UTF-8 text: byte {place} begins no character", path.display());
+        Failure::usage(message, Some("a config is a TOML file".to_owned()))
+    })
+}

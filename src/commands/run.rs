@@ -1,0 +1,98 @@
+//! `afmid run`: from a config to a result file.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::cache::{Cache, write_result};
+use afmid_pipeline::runner::{Options, RunError, run as run_plan};
+use afmid_pipeline::{Plan, RunResult};
+
+use super::load::load;
+use crate::cli::RunArgs;
+use crate::failure::{Failure, Message};
+use crate::progress::observer;
+
+/// Runs a config and writes its result file.
+pub fn run(args: &RunArgs) -> Result<(), Failure> {
+    let registry = super::registry()?;
+    let plan = load(&args.config.config, &args.config.set, &registry)?;
+    let output = args.output.clone().unwrap_or_else(|| default_output(plan.name()));
+    make_folder(&output)?;
+    let cache = open_cache(args.cache.as_deref())?;
+    let result = compute(&plan, args, &cache);
+    for note in cache.take_notes() {
+        eprintln!("note: {note}");
+    }
+    let result = result?;
+    write_result(&output, &result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    println!("{}: {}", output.display(), told(&result));
+    Ok(())
+}
+
+/// The cache that was asked for, or the user's.
+pub fn open_cache(folder: Option<&Path>) -> Result<Cache, Failure> {
+    let folder = folder.map_or_else(default_cache, Path::to_owned);
+    Cache::open(&folder).map_err(|error| Failure::usage(&error, error.help.clone()))
+}
+
+fn compute(plan: &Plan, args: &RunArgs, cache: &Cache) -> Result<RunResult, Failure> {
+    let observer = observer();
+    let options = Options {
+        base: plan.config.base().to_owned(),
+        cache,
+        fresh: args.fresh,
+        program: concat!("afmid ", env!("CARGO_PKG_VERSION")).to_owned(),
+        overrides: plan.config.overrides.clone(),
+        observer: observer.as_ref(),
+    };
+    // 0: as many as there are processors
+    let threads = args.jobs.map_or(0, |jobs| usize::from(jobs.get()));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| Failure::failed(format!("no threads can be started: {error}"), None))?;
+    pool.install(|| run_plan(plan, &options)).map_err(|errors| Failure::Failed(Message::Rendered(rendered(&errors))))
+}
+
+fn rendered(errors: &[RunError]) -> String {
+    let help = |error: &RunError| error.error.help.as_ref().map(|help| format!("  help: {help}\n")).unwrap_or_default();
+    errors.iter().map(|error| format!("error: {error}\n{}", help(error))).collect()
+}
+
+fn told(result: &RunResult) -> String {
+    let (count, seconds) = (result.stages.len(), result.info.seconds);
+    let reused = result.info.stages.iter().filter(|(_, _, cached)| *cached).count();
+    let warnings: usize = result.stages.iter().map(|stage| stage.result.warnings.len()).sum();
+    let mut text = format!("{count} stages in {seconds:.2} s");
+    if reused > 0 {
+        text.push_str(&format!(", {reused} reused"));
+    }
+    match warnings {
+        0 => {}
+        1 => text.push_str(", 1 warning"),
+        many => text.push_str(&format!(", {many} warnings")),
+    }
+    text
+}
+
+/// `NAME.h5` in the working directory.
+fn default_output(name: &str) -> PathBuf {
+    let keep = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '-' };
+    let name: String = name.chars().map(keep).collect();
+    PathBuf::from(format!("{}.h5", name.trim_start_matches('.')))
+}
+
+fn make_folder(output: &Path) -> Result<(), Failure> {
+    if output.is_dir() {
+        return Err(Failure::usage(format!("{} is a folder, wanted a file", output.display()), None));
+    }
+    let Some(folder) = output.parent().filter(|folder| !folder.as_os_str().is_empty()) else { return Ok(()) };
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::usage(format!("the folder {} cannot be made: {error}", folder.display()), None))
+}
+
+/// `$AFMID_CACHE`, or `afmid` in the user's cache folder.
+fn default_cache() -> PathBuf {
+    let folder = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    folder("AFMID_CACHE")
+        .or_else(|| folder("XDG_CACHE_HOME").map(|cache| cache.join("afmid")))
+        .or_else(|| folder("HOME").map(|home| home.join(".cache").join("afmid")))
+        .unwrap_or_else(|| PathBuf::from(".afmid-cache"))
+}

@@ -1,0 +1,73 @@
+//! `afmid show`: what a run found.
+
+use std::path::Path;
+
+use afmid_pipeline::Artifact;
+use afmid_pipeline::config::nearest;
+use afmid_pipeline::store::{ResultFile, StageSummary};
+use serde_json::{Map, Value};
+
+use crate::failure::Failure;
+use crate::show::{artifact_json, artifact_text, overview_json, overview_text, stage_head};
+
+/// The port whose document stands for a stage.
+const SUMMARY: &str = "summary";
+
+/// Shows a result file, or one of its stages, as text or as JSON.
+pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
+    if !path.is_file() {
+        return Err(Failure::usage(format!("there is no file {}", path.display()), None));
+    }
+    let file = ResultFile::open(path).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    let text = match (id, json) {
+        (None, false) => overview_text(&file),
+        (None, true) => pretty(&overview_json(&file))?,
+        (Some(id), json) => {
+            let stage = find(&file, id)?;
+            if json { pretty(&stage_json(&file, stage)?)? } else { stage_text(&file, stage)? }
+        }
+    };
+    print!("{text}");
+    Ok(())
+}
+
+fn find<'a>(file: &'a ResultFile, id: &str) -> Result<&'a StageSummary, Failure> {
+    file.stage(id).ok_or_else(|| {
+        let ids: Vec<&str> = file.stages().iter().map(|stage| stage.record.id.as_str()).collect();
+        let help = match nearest(id, ids.iter().copied()) {
+            Some(nearest) => format!("did you mean `{nearest}`?"),
+            None => format!("there is: {}", ids.join(", ")),
+        };
+        Failure::usage(format!("{} has no stage `{id}`", file.path().display()), Some(help))
+    })
+}
+
+fn artifact(file: &ResultFile, id: &str, port: &str) -> Result<Artifact, Failure> {
+    file.artifact(id, port).map_err(|error| Failure::failed(&error, error.help.clone()))
+}
+
+/// The stage's summary, or else all its artifacts by port.
+fn stage_json(file: &ResultFile, stage: &StageSummary) -> Result<Value, Failure> {
+    let id = &stage.record.id;
+    let mut ports = Map::new();
+    for (port, _) in &stage.ports {
+        match artifact(file, id, port)? {
+            Artifact::Document(document) if port == SUMMARY => return Ok(document.0.clone()),
+            artifact => ports.insert(port.clone(), artifact_json(&artifact)),
+        };
+    }
+    Ok(Value::Object(ports))
+}
+
+fn stage_text(file: &ResultFile, stage: &StageSummary) -> Result<String, Failure> {
+    let mut text = stage_head(&stage.record);
+    for (port, shape) in &stage.ports {
+        let artifact = artifact(file, &stage.record.id, port)?;
+        text.push_str(&format!("\n{port} ({})\n{}", shape.name(), artifact_text(&artifact)));
+    }
+    Ok(text)
+}
+
+fn pretty(value: &Value) -> Result<String, Failure> {
+    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(|error| Failure::failed(error, None))
+}

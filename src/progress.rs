@@ -1,0 +1,73 @@
+//! Progress on stderr: bars for people, lines for logs.
+
+use std::io::IsTerminal;
+use std::time::Duration;
+
+use afmid_pipeline::runner::Observer;
+use afmid_pipeline::stage::{NoProgress, Progress};
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+
+/// Who watches a run: bars if stderr is a terminal, lines elsewhere.
+pub fn observer() -> Box<dyn Observer> {
+    if std::io::stderr().is_terminal() { Box::new(Bars { bars: MultiProgress::new() }) } else { Box::new(Lines) }
+}
+
+struct Lines;
+
+impl Observer for Lines {
+    fn begin(&self, _id: &str) -> Box<dyn Progress + '_> {
+        Box::new(NoProgress)
+    }
+
+    fn end(&self, id: &str, cached: bool, took: Duration, warnings: &[String]) {
+        // one call, so that lines of several threads don't mix
+        eprint!("{}", lines(id, cached, took, warnings));
+    }
+}
+
+struct Bars {
+    bars: MultiProgress,
+}
+
+impl Observer for Bars {
+    fn begin(&self, id: &str) -> Box<dyn Progress + '_> {
+        let bar = self.bars.add(ProgressBar::no_length());
+        let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {elapsed}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_prefix(id.to_owned());
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Box::new(Bar { bars: &self.bars, bar })
+    }
+
+    fn end(&self, id: &str, cached: bool, took: Duration, warnings: &[String]) {
+        self.bars.suspend(|| eprint!("{}", lines(id, cached, took, warnings)));
+    }
+}
+
+struct Bar<'a> {
+    bars: &'a MultiProgress,
+    bar: ProgressBar,
+}
+
+impl Progress for Bar<'_> {
+    fn expect(&self, total: u64) {
+        self.bar.inc_length(total);
+    }
+
+    fn tick(&self) {
+        self.bar.inc(1);
+    }
+}
+
+impl Drop for Bar<'_> {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+        self.bars.remove(&self.bar);
+    }
+}
+
+fn lines(id: &str, cached: bool, took: Duration, warnings: &[String]) -> String {
+    let what = if cached { "reused".to_owned() } else { format!("{:.2} s", took.as_secs_f64()) };
+    let warnings: String = warnings.iter().map(|warning| format!("  warning: {warning}\n")).collect();
+    format!("{id}: {what}\n{warnings}")
+}

@@ -1,0 +1,142 @@
+//! Documents as text.
+
+use serde_json::{Map, Value};
+
+use super::grid::grid;
+use super::number::{number, std_name, with_std};
+
+/// A document as indented lines; lists of flat objects become tables.
+pub fn document_text(value: &Value) -> String {
+    let mut text = String::new();
+    match value {
+        Value::Object(entries) => write_object(entries, 0, &mut text),
+        other => write_value("", other, 0, &mut text),
+    }
+    text
+}
+
+fn write_object(entries: &Map<String, Value>, depth: usize, text: &mut String) {
+    let names = || entries.keys().map(String::as_str);
+    let partners: Vec<&str> = names().filter_map(|name| std_name(name, names())).collect();
+    for (name, value) in entries.iter().filter(|(name, _)| !partners.contains(&name.as_str())) {
+        match std_name(name, names()).and_then(|std| entries.get(std)) {
+            Some(std) if value.is_number() => {
+                text.push_str(&format!("{}{name}: {}\n", indent(depth), uncertain(value, std)));
+            }
+            _ => write_value(name, value, depth, text),
+        }
+    }
+}
+
+fn write_value(name: &str, value: &Value, depth: usize, text: &mut String) {
+    let head = if name.is_empty() { indent(depth) } else { format!("{}{name}: ", indent(depth)) };
+    match value {
+        Value::Object(entries) if !entries.is_empty() => {
+            text.push_str(&format!("{}\n", head.trim_end()));
+            write_object(entries, depth + 1, text);
+        }
+        Value::Array(values) if !values.is_empty() && values.iter().all(flat) => {
+            text.push_str(&format!("{}\n", head.trim_end()));
+            for line in grid(&table(values)).lines() {
+                text.push_str(&format!("{}{line}\n", indent(depth + 1)));
+            }
+        }
+        Value::Array(values) if values.iter().any(|value| value.is_object() || value.is_array()) => {
+            text.push_str(&format!("{}\n", head.trim_end()));
+            for (index, value) in values.iter().enumerate() {
+                write_value(&format!("[{index}]"), value, depth + 1, text);
+            }
+        }
+        scalar => text.push_str(&format!("{head}{}\n", scalar_text(scalar))),
+    }
+}
+
+/// Whether a value is an object without objects or lists of objects in it.
+fn flat(value: &Value) -> bool {
+    let simple = |value: &Value| match value {
+        Value::Object(_) => false,
+        Value::Array(values) => values.iter().all(|value| !value.is_object() && !value.is_array()),
+        _ => true,
+    };
+    value.as_object().is_some_and(|entries| !entries.is_empty() && entries.values().all(simple))
+}
+
+fn table(values: &[Value]) -> Vec<Vec<String>> {
+    let mut names: Vec<&str> = Vec::new();
+    for name in values.iter().filter_map(Value::as_object).flat_map(Map::keys) {
+        if !names.contains(&name.as_str()) {
+            names.push(name);
+        }
+    }
+    let std_of = |name: &str| std_name(name, names.iter().copied());
+    let partners: Vec<&str> = names.iter().filter_map(|name| std_of(name)).collect();
+    let shown: Vec<&str> = names.iter().copied().filter(|name| !partners.contains(name)).collect();
+    let mut rows: Vec<Vec<String>> = vec![shown.iter().map(|name| (*name).to_owned()).collect()];
+    for value in values {
+        let cell = |name: &&str| match std_of(name) {
+            Some(std) if value[*name].is_number() => uncertain(&value[*name], &value[std]),
+            _ => value.get(*name).map_or(String::new(), scalar_text),
+        };
+        rows.push(shown.iter().map(cell).collect());
+    }
+    rows
+}
+
+fn uncertain(value: &Value, std: &Value) -> String {
+    with_std(value.as_f64().unwrap_or(f64::NAN), std.as_f64().unwrap_or(f64::NAN))
+}
+
+fn scalar_text(value: &Value) -> String {
+    match value {
+        Value::Null => "-".to_owned(),
+        Value::Bool(flag) => if *flag { "yes" } else { "no" }.to_owned(),
+        Value::Number(value) if value.is_f64() => number(value.as_f64().unwrap_or(f64::NAN)),
+        Value::Number(value) => value.to_string(),
+        Value::String(text) => text.clone(),
+        Value::Array(values) if !values.is_empty() => values.iter().map(scalar_text).collect::<Vec<_>>().join(", "),
+        Value::Array(_) | Value::Object(_) => "none".to_owned(),
+    }
+}
+
+fn indent(depth: usize) -> String {
+    "  ".repeat(depth)
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::document_text;
+
+    #[test]
+    fn lists_of_objects_are_tables_and_errors_stand_in_brackets() {
+        let document = json!({
+            "modes": [
+                { "frequency_hz": 46300.1, "frequency_std_hz": 0.4, "quality_factor": 40.8, "quality_factor_std": 0.05 },
+                { "frequency_hz": 247000.0, "frequency_std_hz": 2.0, "quality_factor": null, "quality_factor_std": null }
+            ],
+            "fit_percent": { "held_out": 99.8, "noise_ceiling": null },
+            "rejected": [],
+            "gain": 2.0, "gain_std": 0.1,
+            "nested": [{ "a": { "b": true } }],
+            "names": ["x", "y"]
+        });
+        let expected = "\
+modes:
+  frequency_hz  quality_factor
+  46300.10(40)      40.800(50)
+  247000.0(20)               -
+fit_percent:
+  held_out: 99.8
+  noise_ceiling: -
+rejected: none
+gain: 2.00(10)
+nested:
+  [0]:
+    a:
+      b: yes
+names: x, y
+";
+        assert_eq!(document_text(&document), expected);
+    }
+}

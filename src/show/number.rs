@@ -1,0 +1,103 @@
+//! Numbers for people.
+
+/// A number with six significant digits; what is unknown (NaN) is `-`.
+pub fn number(value: f64) -> String {
+    if value.is_nan() {
+        return "-".to_owned();
+    }
+    if value == 0.0 || value.is_infinite() {
+        return format!("{value}");
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if (-4..7).contains(&exponent) {
+        let decimals = usize::try_from(5 - exponent).unwrap_or(0);
+        let text = format!("{value:.decimals$}");
+        return if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text };
+    }
+    let text = format!("{value:.5e}");
+    match text.split_once('e') {
+        Some((digits, power)) => format!("{}e{power}", digits.trim_end_matches('0').trim_end_matches('.')),
+        None => text,
+    }
+}
+
+/// A value with its standard deviation in its last two digits: `46300.10(40)` is 46300.10 +- 0.40.
+pub fn with_std(value: f64, std: f64) -> String {
+    if !value.is_finite() || !std.is_finite() || std <= 0.0 {
+        return number(value);
+    }
+    let exponent = value.abs().max(std).log10().floor() as i32;
+    let power = if (-4..7).contains(&exponent) { 0 } else { exponent };
+    let scale = 10f64.powi(-power);
+    let (scaled, std) = (value * scale, std * scale);
+    let decimals = 1 - std.log10().floor() as i32;
+    // beyond the digits of a float there is nothing to show
+    if decimals > 15 {
+        return number(value);
+    }
+    let unit = 10f64.powi(decimals);
+    let text = match usize::try_from(decimals) {
+        Ok(decimals) => format!("{scaled:.decimals$}({:.0})", std * unit),
+        Err(_) => format!("{:.0}({:.0})", (scaled * unit).round() / unit, (std * unit).round() / unit),
+    };
+    if power == 0 { text } else { format!("{text}e{power}") }
+}
+
+/// The name that holds the standard deviation of `name`: `frequency_std_hz` for `frequency_hz`, `quality_factor_std` for
+/// `quality_factor`.
+pub fn std_name<'a>(name: &str, mut names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    names.find(|other| {
+        let mut parts: Vec<&str> = other.split('_').collect();
+        let std = parts.iter().position(|part| *part == "std");
+        std.is_some_and(|std| {
+            parts.remove(std);
+            parts.join("_") == name
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_six_digits() {
+        let cases = [
+            (46300.123, "46300.1"),
+            (0.000_123_456_78, "0.000123457"),
+            (1.0, "1"),
+            (5e6, "5000000"),
+            (1.5e-9, "1.5e-9"),
+            (0.0, "0"),
+            (f64::NAN, "-"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn standard_deviations_stand_in_the_last_two_digits() {
+        let cases = [
+            (46300.123, 0.4, "46300.12(40)"),
+            (40.8, 0.05, "40.800(50)"),
+            (1234.4, 12.3, "1234(12)"),
+            (1234.5, 123.0, "1230(120)"),
+            (3.3e-7, 2e-9, "3.300(20)e-7"),
+            (0.0, 0.1, "0.00(10)"),
+            (2.0, f64::NAN, "2"),
+            (f64::NAN, 1.0, "-"),
+        ];
+        for (value, std, text) in cases {
+            assert_eq!(with_std(value, std), text);
+        }
+    }
+
+    #[test]
+    fn standard_deviations_are_found_by_name() {
+        let names = ["frequency_std_hz", "quality_factor_std"];
+        assert_eq!(std_name("frequency_hz", names.into_iter()), Some("frequency_std_hz"));
+        assert_eq!(std_name("quality_factor", names.into_iter()), Some("quality_factor_std"));
+        assert_eq!(std_name("delay_s", names.into_iter()), None);
+    }
+}

@@ -1,0 +1,70 @@
+//! What a result file holds.
+
+use afmid_pipeline::store::{ResultFile, StageSummary};
+use afmid_pipeline::{Shape, StageRecord};
+use serde_json::{Value, json};
+
+use super::grid::grid;
+
+/// The run, its stages with their artifacts, and all warnings.
+pub fn overview_text(file: &ResultFile) -> String {
+    let run = file.run();
+    let info = &run.info;
+    let mut text = format!("{} (seed {}), {}", run.name, run.seed, run.program);
+    if !info.started_at.is_empty() {
+        let (when, seconds, host, threads) = (&info.started_at, info.seconds, &info.host, info.threads);
+        text.push_str(&format!(", {when}, {seconds:.2} s on {threads} threads of {host}"));
+    }
+    text.push_str("\n\n");
+    let mut rows = vec![["stage", "uses", "artifacts"].map(str::to_owned).to_vec()];
+    for stage in file.stages() {
+        let ports: Vec<String> = stage.ports.iter().map(|(port, shape)| format!("{port} ({})", shape.name())).collect();
+        rows.push(vec![stage.record.id.clone(), stage.record.uses.clone(), ports.join(", ")]);
+    }
+    text.push_str(&grid(&rows));
+    let warnings: Vec<String> = file.stages().iter().flat_map(warnings).collect();
+    if !warnings.is_empty() {
+        text.push_str(&format!("\nwarnings\n{}", warnings.concat()));
+    }
+    text
+}
+
+fn warnings(stage: &StageSummary) -> Vec<String> {
+    let record = &stage.record;
+    record.result.warnings.iter().map(|warning| format!("  {}: {warning}\n", record.id)).collect()
+}
+
+/// The same for scripts.
+pub fn overview_json(file: &ResultFile) -> Value {
+    let run = file.run();
+    let artifact = |(port, shape): &(String, Shape)| json!({ "port": port, "shape": shape.name() });
+    let stage = |stage: &StageSummary| {
+        let record = &stage.record;
+        json!({
+            "id": record.id,
+            "uses": record.uses,
+            "version": record.version,
+            "artifacts": stage.ports.iter().map(artifact).collect::<Vec<_>>(),
+            "warnings": record.result.warnings,
+        })
+    };
+    json!({
+        "name": run.name,
+        "seed": run.seed,
+        "program": run.program,
+        "overrides": run.overrides,
+        "stages": file.stages().iter().map(stage).collect::<Vec<_>>(),
+    })
+}
+
+/// What a stage was, before its artifacts: name, version, wires, warnings.
+pub fn stage_head(record: &StageRecord) -> String {
+    let mut text = format!("{}: {} version {}\n", record.id, record.uses, record.version);
+    for (port, stage, output) in &record.wires {
+        text.push_str(&format!("  {port} <- {stage}.{output}\n"));
+    }
+    for warning in &record.result.warnings {
+        text.push_str(&format!("  warning: {warning}\n"));
+    }
+    text
+}
