@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
+use super::global_heap::HeapGuard;
 use crate::error::StageError;
 
 /// What tells two states of a file apart without reading it.
@@ -19,7 +20,7 @@ struct Stamp {
     device: u64,
 }
 
-static KNOWN: LazyLock<Mutex<HashMap<PathBuf, (Stamp, String)>>> = LazyLock::new(Mutex::default);
+static KNOWN: LazyLock<Mutex<HashMap<PathBuf, (Stamp, Inspected)>>> = LazyLock::new(Mutex::default);
 
 /// A file that changed this recently may change again within the same tick of its time stamp: not remembered.
 const SETTLED: Duration = Duration::from_secs(2);
@@ -28,6 +29,19 @@ const SETTLED: Duration = Duration::from_secs(2);
 ///
 /// Errors: the file cannot be read.
 pub fn hash_file(path: &Path) -> Result<String, StageError> {
+    inspect_file(path).map(|found| found.blake3)
+}
+
+/// What one pass through a file tells.
+#[derive(Debug, Clone)]
+pub(super) struct Inspected {
+    pub(super) blake3: String,
+    /// See [`HeapGuard`].
+    pub(super) endless: bool,
+}
+
+/// Hashes a file and looks for damage that the HDF5 library does not survive. Errors: the file cannot be read.
+pub(super) fn inspect_file(path: &Path) -> Result<Inspected, StageError> {
     let fail = |error: std::io::Error| StageError::new(format!("the file cannot be read: {error}")).at(path);
     let mut file = File::open(path).map_err(fail)?;
     let metadata = file.metadata().map_err(fail)?;
@@ -38,31 +52,33 @@ pub fn hash_file(path: &Path) -> Result<String, StageError> {
         device: metadata.dev(),
     };
     let key = std::path::absolute(path).map_err(fail)?;
-    let known = |map: &HashMap<PathBuf, (Stamp, String)>| {
-        map.get(&key).filter(|(have, _)| *have == stamp).map(|(_, hash)| hash.clone())
+    let known = |map: &HashMap<PathBuf, (Stamp, Inspected)>| {
+        map.get(&key).filter(|(have, _)| *have == stamp).map(|(_, found)| found.clone())
     };
-    if let Some(hash) = known(&KNOWN.lock().unwrap_or_else(PoisonError::into_inner)) {
-        return Ok(hash);
+    if let Some(found) = known(&KNOWN.lock().unwrap_or_else(PoisonError::into_inner)) {
+        return Ok(found);
     }
-    let hash = hash_reader(&mut file).map_err(fail)?;
+    let found = inspect(&mut file).map_err(fail)?;
     let settled = metadata
         .modified()
         .ok()
         .and_then(|modified| SystemTime::now().duration_since(modified).ok())
         .is_some_and(|age| age > SETTLED);
     if settled {
-        KNOWN.lock().unwrap_or_else(PoisonError::into_inner).insert(key, (stamp, hash.clone()));
+        KNOWN.lock().unwrap_or_else(PoisonError::into_inner).insert(key, (stamp, found.clone()));
     }
-    Ok(hash)
+    Ok(found)
 }
 
-fn hash_reader(file: &mut File) -> std::io::Result<String> {
-    let mut hasher = blake3::Hasher::new();
+fn inspect(file: &mut File) -> std::io::Result<Inspected> {
+    let (mut hasher, mut guard) = (blake3::Hasher::new(), HeapGuard::default());
     let mut buffer = vec![0; 1 << 18];
     loop {
-        match file.read(&mut buffer)? {
-            0 => return Ok(hasher.finalize().to_hex().to_string()),
-            count => hasher.update(&buffer[..count]),
-        };
+        let count = file.read(&mut buffer)?;
+        if count == 0 {
+            return Ok(Inspected { blake3: hasher.finalize().to_hex().to_string(), endless: guard.finish() });
+        }
+        hasher.update(&buffer[..count]);
+        guard.update(&buffer[..count]);
     }
 }

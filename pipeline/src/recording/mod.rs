@@ -1,6 +1,7 @@
 //! Recordings: lazy, re-readable record files. They are streamed, never held whole.
 
 mod chunk;
+mod global_heap;
 mod hash;
 mod native;
 mod recent;

@@ -10,7 +10,7 @@ use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5::{Dataset, File, Group, Location};
 
 use super::chunk::{ChunkFilter, SampleType};
-use super::hash::hash_file;
+use super::hash::inspect_file;
 use super::recent::source_number;
 use super::source::{ChunkPlace, Hdf5Source, Place};
 use super::{Channel, Record};
@@ -36,6 +36,11 @@ pub struct Wanted<'a> {
 ///
 /// Errors: no file, not HDF5, cut short, damaged; an attribute or a required channel is missing or of another type.
 pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
+    let size = size_of_file(path)?;
+    let inspected = inspect_file(path)?;
+    if inspected.endless {
+        return Err(StageError::new("damaged: a heap collection of the HDF5 file never ends").at(path));
+    }
     let file = open_file(path)?;
     let sample_rate_hz = number_attribute(&file, "/", "sample_rate_hz").map_err(|error| {
         error
@@ -54,8 +59,8 @@ pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError>
     Ok(Record {
         name: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         path: path.to_owned(),
-        size: size_of_file(path)?,
-        blake3: hash_file(path)?,
+        size,
+        blake3: inspected.blake3,
         sample_rate_hz,
         started_at: text_attribute(&file, "started_at").unwrap_or_default(),
         channels,

@@ -68,7 +68,7 @@ pub fn write_native(path: &Path, record: &NativeRecord, storage: RecordStorage) 
 }
 
 fn write_file(path: &Path, record: &NativeRecord, storage: RecordStorage) -> Result<(), StoreError> {
-    let file = write::create_file(path, 0)?;
+    let file = write::create_file(path)?;
     write::attribute(&file, "sample_rate_hz", &record.sample_rate_hz)?;
     write::text_attribute(&file, "started_at", &record.started_at)?;
     for channel in &record.channels {

@@ -7,6 +7,7 @@ use hdf5::{Container, Group, H5Type, Location};
 
 use super::error::{Result, StoreError};
 use super::read;
+use super::seal::check_seal;
 
 /// Left out: when and where a run took place.
 const LEFT_OUT: &str = "/entry/run";
@@ -23,10 +24,12 @@ pub struct Difference {
     pub what: String,
 }
 
-/// All differences between two HDF5 files except under `/entry/run`, by place. Numbers are compared bit by bit.
+/// All differences between two result files (or two stage files) except under `/entry/run`, by place. Numbers are compared bit by bit.
 ///
 /// Errors: a file cannot be read or is damaged.
 pub fn compare(a: &Path, b: &Path) -> std::result::Result<Vec<Difference>, StoreError> {
+    check_seal(a)?;
+    check_seal(b)?;
     let (left, right) = (read::open_file(a)?, read::open_file(b)?);
     let mut found = Vec::new();
     compare_groups(&left, &right, &mut found).map_err(|error| error.file(a))?;

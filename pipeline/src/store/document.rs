@@ -6,7 +6,8 @@ use super::error::{Result, StoreError};
 use super::{read, write};
 use crate::artifact::Document;
 
-const JSON: &str = "json";
+/// The field of NXnote that holds the text.
+const JSON: &str = "data";
 
 /// Writes a document as the NXnote group `name`.
 pub(super) fn write_document(parent: &Group, name: &str, document: &Document) -> Result<Group> {

@@ -7,12 +7,12 @@
 //! /entry                 NXentry, default = the stage to plot
 //! /entry/pipeline        name, config verbatim, overrides, seed, program
 //! /entry/run             when and where: the only group that comparisons leave out
-//! /entry/ID              NXprocess, one per stage, in the order of sequence_index
+//! /entry/ID              NXprocess, one per stage, in the order of sequence_index (what NeXus forbids in a name becomes `_`)
 //! /entry/ID/provenance   stage, version, parameters, wires, seed, key, sources, warnings
 //! /entry/ID/PORT         an artifact: NXdata (array, table), NXcollection (model, recording), NXnote (document)
 //! ```
 //!
-//! Same result, same bytes: no times are kept outside `/entry/run`.
+//! Behind the HDF5 part a last line seals the file with the hash of its bytes. Same result, same bytes: no times are kept outside `/entry/run`.
 
 mod array;
 mod compare;
@@ -21,21 +21,28 @@ mod document;
 mod error;
 mod format;
 mod layout;
+mod names;
 mod ports;
 pub(crate) mod read;
 mod recording;
 mod result_file;
+mod result_reader;
 mod run_info;
+mod seal;
 mod stage_file;
 mod state_space;
 mod table;
 pub(crate) mod write;
 
 #[cfg(test)]
-pub(crate) mod tests;
+pub(crate) mod fixture;
+#[cfg(test)]
+mod tests;
 
 pub use compare::{Difference, compare};
 pub use error::StoreError;
 pub use format::FORMAT_VERSION;
-pub use result_file::{RESERVED_PORTS, RESERVED_STAGE_IDS, ResultFile, StageSummary, read_result, write_result};
+pub use ports::PortSummary;
+pub use result_file::{RESERVED_PORTS, RESERVED_STAGE_IDS, write_result};
+pub use result_reader::{ResultFile, StageSummary, read_result};
 pub use stage_file::{read_stage, write_stage};

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::array::{read_array, write_array};
 use super::document::{read_document, write_document};
 use super::error::{Result, StoreError};
+use super::names::group_names;
 use super::recording::{read_recording, write_recording};
 use super::state_space::{read_state_space, write_state_space};
 use super::table::{read_table, write_table};
@@ -23,33 +24,49 @@ const SHAPE: &str = "afmid_shape";
 pub(super) struct StoredPort {
     pub(super) name: String,
     pub(super) shape: String,
+    /// Its group.
+    pub(super) group: String,
 }
 
 /// Writes every artifact into a group of its own under `parent`. Errors: an artifact that is not valid.
 pub(super) fn write_ports(parent: &Group, ports: &Ports) -> Result<()> {
     let mut stored = Vec::new();
-    for (name, artifact) in ports.iter() {
+    let places = group_names(ports.iter().map(|(name, _)| name));
+    for ((name, artifact), place) in ports.iter().zip(places) {
         let group = match artifact {
-            Artifact::Array(array) => write_array(parent, name, array),
-            Artifact::Table(table) => write_table(parent, name, table),
-            Artifact::StateSpace(model) => write_state_space(parent, name, model),
-            Artifact::Document(document) => write_document(parent, name, document),
-            Artifact::Recording(recording) => write_recording(parent, name, recording),
+            Artifact::Array(array) => write_array(parent, &place, array),
+            Artifact::Table(table) => write_table(parent, &place, table),
+            Artifact::StateSpace(model) => write_state_space(parent, &place, model),
+            Artifact::Document(document) => write_document(parent, &place, document),
+            Artifact::Recording(recording) => write_recording(parent, &place, recording),
         }?;
         let shape = artifact.shape().name();
         write::text_attribute(&group, SHAPE, shape)?;
-        stored.push(StoredPort { name: name.to_owned(), shape: shape.to_owned() });
+        stored.push(StoredPort { name: name.to_owned(), shape: shape.to_owned(), group: place });
     }
     let text = serde_json::to_string(&stored).map_err(|error| StoreError::new(error.to_string()))?;
     write::text_attribute(parent, PORTS, &text)
 }
 
-/// Names and shapes of the artifacts under `parent`, in order. Errors: damaged.
-pub(super) fn list_ports(parent: &Group) -> Result<Vec<(String, Shape)>> {
+/// An artifact in a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PortSummary {
+    /// Its port.
+    pub name: String,
+    /// Its shape.
+    pub shape: Shape,
+    /// Its group, relative to the stage's.
+    pub group: String,
+}
+
+/// The artifacts under `parent`, in order. Errors: damaged.
+pub(super) fn list_ports(parent: &Group) -> Result<Vec<PortSummary>> {
     let text = read::text_attribute(parent, PORTS)?;
     let stored: Vec<StoredPort> = serde_json::from_str(&text)
         .map_err(|error| StoreError::new(format!("the list of ports: {error}")).at(parent.name()))?;
-    stored.into_iter().map(|port| Ok((port.name, shape(parent, &port.shape)?))).collect()
+    let summary =
+        |port: StoredPort| Ok(PortSummary { shape: shape(parent, &port.shape)?, name: port.name, group: port.group });
+    stored.into_iter().map(summary).collect()
 }
 
 fn shape(parent: &Group, name: &str) -> Result<Shape> {
@@ -59,10 +76,10 @@ fn shape(parent: &Group, name: &str) -> Result<Shape> {
         .ok_or_else(|| StoreError::new(format!("an artifact of unknown shape `{name}`")).at(parent.name()))
 }
 
-/// Reads one artifact. Errors: there is none, or it is damaged.
-pub(super) fn read_port(parent: &Group, name: &str, shape: Shape) -> Result<Artifact> {
-    let group = read::group(parent, name)?;
-    Ok(match shape {
+/// Reads one artifact. Errors: it is missing or damaged.
+pub(super) fn read_port(parent: &Group, port: &PortSummary) -> Result<Artifact> {
+    let group = read::group(parent, &port.group)?;
+    Ok(match port.shape {
         Shape::Array => Artifact::Array(Arc::new(read_array(&group)?)),
         Shape::Table => Artifact::Table(Arc::new(read_table(&group)?)),
         Shape::StateSpace => Artifact::StateSpace(Arc::new(read_state_space(&group)?)),
@@ -74,9 +91,8 @@ pub(super) fn read_port(parent: &Group, name: &str, shape: Shape) -> Result<Arti
 /// Reads all artifacts, in order. Errors: one is missing or damaged.
 pub(super) fn read_ports(parent: &Group) -> Result<Ports> {
     let mut ports = Ports::new();
-    for (name, shape) in list_ports(parent)? {
-        let artifact = read_port(parent, &name, shape)?;
-        ports.insert(&name, artifact);
+    for port in list_ports(parent)? {
+        ports.insert(&port.name, read_port(parent, &port)?);
     }
     Ok(ports)
 }

@@ -1,172 +1,20 @@
-//! Round trips, damage, determinism.
+//! Round trips, damage, comparison, other readers.
 
-use std::collections::BTreeMap;
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::Arc;
 
 use num_complex::Complex64;
-use serde_json::json;
 
+use super::fixture::{Folder, run_result, stage_result};
 use super::*;
-use crate::artifact::{Array, Artifact, Attribute, Axis, Document, Matrix, StateSpace, Table};
-use crate::recording::{Channel, DeferredSource, Record, Recording};
-use crate::runner::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};
+use crate::artifact::{Array, Artifact, Axis, Document, Table};
+use crate::runner::{RunInfo, StageResult};
 use crate::stage::Ports;
 
-/// A folder that is removed again.
-pub(crate) struct Folder(pub(crate) PathBuf);
-
-impl Folder {
-    pub(crate) fn new(name: &str) -> Self {
-        use std::sync::atomic::{AtomicUsize, Ordering};
-        static COUNT: AtomicUsize = AtomicUsize::new(0);
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("afmid-{name}-{}-{count}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    pub(crate) fn file(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
-pub(crate) fn array() -> Array {
-    let samples = 5;
-    let ensemble: Vec<f64> = (0..3 * samples).map(|index| index as f64 * 0.1).collect();
-    Array::over(vec![
-        Axis::new("event", "1", "event", vec![0.0, 1.0, 2.0]),
-        Axis::new("time", "s", "time since the onset", (0..samples).map(|index| index as f64 * 2e-7).collect()),
-    ])
-    .with("response", "V", "photodiode signal", &["event", "time"], ensemble)
-    .with("mean", "V", "averaged signal", &["time"], vec![f64::NAN, f64::INFINITY, -0.0, f64::NEG_INFINITY, 1e-310])
-    .with("count", "1", "samples averaged", &["time"], vec![i64::MIN, 0, 1, 2, i64::MAX])
-    .with("gain", "1", "one number", &[], vec![2.5])
-    .attribute("bandwidth_hz", 2.5e5)
-    .attribute("signal", "a name that NeXus uses itself")
-    .attribute("unknown", f64::NAN)
-    .attribute("events", 3_usize)
-    .attribute("tapered", true)
-    .attribute("unit_text", "µ-Volt ü 漢 🙂")
-    .attribute("empty", "")
-}
-
-pub(crate) fn spectrum() -> Array {
-    let transfer: Vec<Complex64> = (0..4).map(|index| Complex64::new(f64::from(index), -0.0)).collect();
-    Array::over(vec![Axis::new("frequency", "Hz", "frequency", vec![0.0, 1e3, 2e3, 3e3])])
-        .with("transfer", "V/N", "transfer function", &["frequency"], transfer)
-        .with("variance", "V^2/N^2", "variance", &["frequency"], vec![1.0, 2.0, 3.0, f64::NAN])
-}
-
-pub(crate) fn table() -> Table {
-    let long = "x".repeat(70_000);
-    Table::new()
-        .with("record", "", "file", vec!["a.h5".to_owned(), String::new(), "ü漢🙂".to_owned(), long])
-        .with("frequency", "Hz", "frequency", vec![46.3e3, f64::NAN, f64::INFINITY, -0.0])
-        .with("row", "1", "a name that the scale would like", vec![1_i64, -2, i64::MAX, i64::MIN])
-        .with("accepted", "", "", vec![true, false, true, false])
-        .attribute("kind", "snap-off")
-}
-
-pub(crate) fn model() -> StateSpace {
-    StateSpace {
-        a: Matrix { rows: 2, columns: 2, values: vec![0.9, 0.1, -0.1, 0.9] },
-        b: Matrix::column(vec![1.0, 0.5]),
-        c: Matrix::row(vec![1.0, 0.0]),
-        d: Matrix { rows: 1, columns: 1, values: vec![0.0] },
-        k: Matrix::column(vec![0.1, 0.2]),
-        x0: vec![0.0, 1e-300],
-        sample_time_s: 2e-7,
-        innovation_variance: 1e-6,
-        parameter_names: vec!["a1".to_owned(), "a2".to_owned()],
-        parameters: vec![1.5, -0.7],
-        covariance: Matrix { rows: 2, columns: 2, values: vec![1.0, 0.1, 0.1, 2.0] },
-        attributes: BTreeMap::from([("converged".to_owned(), Attribute::Flag(true))]),
-    }
-}
-
-pub(crate) fn recording() -> Recording {
-    let channel = |path: &Path, role: &str, fill_code| Channel {
-        role: role.to_owned(),
-        location: format!("/{role}"),
-        samples: 900_000,
-        unit: "V".to_owned(),
-        long_name: "photodiode signal".to_owned(),
-        scale_factor: 0.000977,
-        add_offset: 0.0,
-        fill_code,
-        source: Arc::new(DeferredSource::new(path, 600_000, &format!("/{role}"), 900_000)),
-    };
-    let path = |index: usize| PathBuf::from(format!("archive/record_{index:04}.h5"));
-    let record = |index: usize| Record {
-        name: format!("record_{index:04}.h5"),
-        path: path(index),
-        size: 600_000,
-        blake3: "ab".repeat(32),
-        sample_rate_hz: 5e6,
-        started_at: "2005-03-01T10:00:00Z".to_owned(),
-        channels: vec![channel(&path(index), "deflection", Some(-32768.0)), channel(&path(index), "piezo", None)],
-    };
-    Recording { records: (0..3).map(record).collect() }
-}
-
-pub(crate) fn document() -> Document {
-    // 0.1 + 0.2 and the last number are read back wrongly by parsers that do not round correctly
-    Document(json!({"found": 24, "rejected": [{"record": "r.h5", "reason": "no rupture"}], "q": 0.1 + 0.2,
-        "f": 46300.10000000001, "none": null, "big": u64::MAX, "tiny": 5e-324, "text": "nul \u{0} and ü"}))
-}
-
-pub(crate) fn stage_result() -> StageResult {
-    let mut outputs = Ports::new();
-    outputs.insert("ensemble", Artifact::Array(Arc::new(array())));
-    outputs.insert("spectrum", Artifact::Array(Arc::new(spectrum())));
-    outputs.insert("events", Artifact::Table(Arc::new(table())));
-    outputs.insert("model", Artifact::StateSpace(Arc::new(model())));
-    outputs.insert("records", Artifact::Recording(Arc::new(recording())));
-    outputs.insert("summary", Artifact::Document(Arc::new(document())));
-    StageResult { outputs, warnings: vec!["the event lies under the taper".to_owned(), String::new()] }
-}
-
-pub(crate) fn run_result() -> RunResult {
-    let stage = |id: &str, wires: Vec<(String, String, String)>| StageRecord {
-        id: id.to_owned(),
-        uses: "events.correlation".to_owned(),
-        version: 3,
-        params: json!({"kind": "snap-off", "window_samples": 8192, "alpha": 0.1, "files": ["*.h5"], "strict": true, "none": null}),
-        wires,
-        seed: (id == "events").then_some(u64::MAX),
-        key: "cd".repeat(32),
-        sources: vec![SourceFile { path: "archive/a.h5".to_owned(), size: 12, blake3: "ef".repeat(32) }],
-        result: stage_result(),
-    };
-    RunResult {
-        name: "free-lever".to_owned(),
-        seed: 1,
-        config: "[pipeline]\nname = \"free-lever\" # ü\n".to_owned(),
-        overrides: vec!["events.kind=\"snap-in\"".to_owned()],
-        program: "0.1.0".to_owned(),
-        stages: vec![
-            stage("records", Vec::new()),
-            stage("events", vec![("records".to_owned(), "records".to_owned(), "records".to_owned())]),
-        ],
-        info: RunInfo {
-            started_at: "2026-01-01T00:00:00Z".to_owned(),
-            seconds: 1.5,
-            host: "host".to_owned(),
-            threads: 2,
-            stages: vec![("records".to_owned(), 0.5, false), ("events".to_owned(), 1.0, true)],
-        },
-    }
-}
-
 /// NaN-proof equality: the debug text tells every bit but a NaN's, which no stage uses.
-fn same(a: &impl std::fmt::Debug, b: &impl std::fmt::Debug) {
+fn same(a: &impl Debug, b: &impl Debug) {
     let (a, b) = (format!("{a:?}"), format!("{b:?}"));
     let differ = a.bytes().zip(b.bytes()).position(|(x, y)| x != y);
     let at = |text: &str| text.chars().skip(differ.unwrap_or(0).saturating_sub(60)).take(120).collect::<String>();
@@ -189,4 +37,218 @@ fn all_shapes_survive_a_result_file() {
     let run = run_result();
     write_result(&path, &run).unwrap();
     same(&read_result(&path).unwrap(), &run);
+}
+
+/// A linear congruential generator: random enough to vary sizes and bits.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 ^ (self.0 >> 29)
+    }
+
+    fn below(&mut self, limit: usize) -> usize {
+        (self.next() >> 33) as usize % limit
+    }
+
+    /// Any bit pattern but signalling NaNs, whose bits processors may change.
+    fn number(&mut self) -> f64 {
+        let value = f64::from_bits(self.next());
+        if value.is_nan() { f64::NAN } else { value }
+    }
+
+    fn text(&mut self) -> String {
+        let alphabet = ['a', 'Z', '0', ' ', '\n', '"', '\\', 'ü', '漢', '🙂', '\u{7f}', '/'];
+        let length = [0, 1, 5, 300][self.below(4)];
+        (0..length).map(|_| alphabet[self.below(alphabet.len())]).collect()
+    }
+}
+
+fn random_result(random: &mut Random) -> StageResult {
+    let lengths = [random.below(4), random.below(40)];
+    let axes = ["row", "time"].iter().zip(lengths).map(|(name, length)| {
+        Axis::new(name, &random.text(), &random.text(), (0..length).map(|_| random.number()).collect())
+    });
+    let mut array = Array::over(axes.collect());
+    for (index, dims) in [&["row", "time"][..], &["time"], &["row"], &[], &["time", "row"]].iter().enumerate() {
+        let count = dims.iter().map(|dim| lengths[usize::from(*dim == "time")]).product();
+        let (name, unit) = (format!("v{index}"), random.text());
+        array = match random.below(3) {
+            0 => array.with(&name, &unit, "", dims, (0..count).map(|_| random.number()).collect::<Vec<f64>>()),
+            1 => array.with(&name, &unit, "", dims, (0..count).map(|_| random.next() as i64).collect::<Vec<i64>>()),
+            _ => {
+                let values = (0..count).map(|_| Complex64::new(random.number(), random.number()));
+                array.with(&name, &unit, " (real part)", dims, values.collect::<Vec<_>>())
+            }
+        };
+    }
+    array = array
+        .attribute("", random.number())
+        .attribute(&random.text().replace('/', "|"), random.text())
+        .attribute("units", random.next() as i64)
+        .attribute("time_indices", random.below(2) == 0);
+    let rows = random.below(30);
+    let table = Table::new()
+        .with("text", "", "", (0..rows).map(|_| random.text()).collect::<Vec<_>>())
+        .with("flag", "", "", (0..rows).map(|_| random.below(2) == 0).collect::<Vec<_>>())
+        .with("real", "", "", (0..rows).map(|_| random.number()).collect::<Vec<_>>())
+        .with("row", "", "", (0..rows).map(|_| random.next() as i64).collect::<Vec<_>>());
+    let numbers: Vec<f64> = (0..rows).map(|_| f64::from_bits(random.next())).filter(|x| x.is_finite()).collect();
+    let mut outputs = Ports::new();
+    outputs.insert("array", Artifact::Array(Arc::new(array)));
+    outputs.insert("table", Artifact::Table(Arc::new(table)));
+    outputs.insert("document", Artifact::Document(Arc::new(Document(serde_json::json!(numbers)))));
+    StageResult { outputs, warnings: (0..random.below(3)).map(|_| random.text()).collect() }
+}
+
+#[test]
+fn random_artifacts_survive_bit_by_bit() {
+    let folder = Folder::new("random");
+    for seed in 0..60 {
+        let result = random_result(&mut Random(seed));
+        let path = folder.file(&format!("{seed}.h5"));
+        write_stage(&path, &result).unwrap();
+        same(&read_stage(&path).unwrap(), &result);
+    }
+}
+
+#[test]
+fn stages_and_artifacts_are_read_one_by_one() {
+    let folder = Folder::new("lazy");
+    let path = folder.file("a.h5");
+    write_result(&path, &run_result()).unwrap();
+    let file = ResultFile::open(&path).unwrap();
+    let ids: Vec<&str> = file.stages().iter().map(|stage| stage.record.id.as_str()).collect();
+    assert_eq!(ids, ["records", "free-lever.events_2", "events"]);
+    assert_eq!(file.run().config, run_result().config);
+    let artifact = file.artifact("events", "summary").unwrap();
+    same(&artifact, run_result().stages[2].result.outputs.artifact("summary").unwrap());
+    let error = file.artifact("event", "summary").unwrap_err().to_string();
+    assert!(error.contains("no stage `event`; there is: records, free-lever.events_2, events"), "{error}");
+    let error = file.artifact("events", "sumary").unwrap_err().to_string();
+    assert!(error.contains("no output `sumary`; it has: ensemble, "), "{error}");
+}
+
+#[test]
+fn what_cannot_be_stored_is_an_error_that_says_so() {
+    let folder = Folder::new("refused");
+    let says = |artifact: Artifact, word: &str| {
+        let path = folder.file("x.h5");
+        let mut outputs = Ports::new();
+        outputs.insert("port", artifact);
+        let error = write_stage(&path, &StageResult { outputs, warnings: Vec::new() }).unwrap_err();
+        assert!(error.to_string().contains(word) && error.to_string().contains("port"), "{error}");
+        std::fs::remove_file(&path).unwrap();
+    };
+    let array = |name: &str| Artifact::Array(Arc::new(Array::over(Vec::new()).with(name, "V", "", &[], vec![1.0])));
+    says(array("a/b"), "cannot be the name");
+    says(array(""), "cannot be the name");
+    says(Artifact::Array(Arc::new(Array::over(Vec::new()))), "without a variable");
+    let clash = Array::over(Vec::new()).with("x", "V", "", &[], vec![Complex64::new(1.0, 2.0)]).with(
+        "x_real",
+        "V",
+        "",
+        &[],
+        vec![1.0],
+    );
+    says(Artifact::Array(Arc::new(clash)), "x_real");
+    says(Artifact::Table(Arc::new(Table::new().with("a", "", "", vec!["nul \0".to_owned()]))), "NUL");
+    let ragged = Table::new().with("a", "", "", vec![1.0]).with("b", "", "", vec![1.0, 2.0]);
+    says(Artifact::Table(Arc::new(ragged)), "rows");
+}
+
+#[test]
+fn comparison_finds_each_difference_and_leaves_the_run_out() {
+    let folder = Folder::new("compare");
+    let (first, second) = (folder.file("a.h5"), folder.file("b.h5"));
+    write_result(&first, &run_result()).unwrap();
+    let mut run = run_result();
+    run.info = RunInfo { host: "elsewhere".to_owned(), seconds: 99.0, ..RunInfo::default() };
+    write_result(&second, &run).unwrap();
+    assert_eq!(compare(&first, &second).unwrap(), []);
+    std::fs::remove_file(&second).unwrap();
+
+    run.seed = 2;
+    let Some(Artifact::Array(array)) = run.stages[2].result.outputs.artifact("ensemble") else { panic!() };
+    let mut array = Array::clone(array);
+    if let crate::artifact::Values::Real(values) = &mut array.variables[1].values {
+        values[2] = 0.0; // was -0.0
+    }
+    array.attributes.remove("empty");
+    run.stages[2].result.outputs.insert("ensemble", Artifact::Array(Arc::new(array)));
+    run.stages[0].result.warnings.pop();
+    write_result(&second, &run).unwrap();
+    let found = compare(&first, &second).unwrap();
+    let places: Vec<&str> = found.iter().map(|difference| difference.place.as_str()).collect();
+    assert_eq!(
+        places,
+        [
+            "/entry/events/ensemble@empty",
+            "/entry/events/ensemble@afmid_layout",
+            "/entry/events/ensemble/mean",
+            "/entry/pipeline/seed",
+            "/entry/records/provenance/warnings",
+        ]
+    );
+    assert_eq!(found[2].what, "1 of 5 values differ, first at 2: -0.0 and 0.0");
+}
+
+#[test]
+fn a_damaged_or_foreign_result_file_is_an_error_never_a_panic() {
+    let folder = Folder::new("broken");
+    let (whole, path) = (folder.file("whole.h5"), folder.file("x.h5"));
+    write_result(&whole, &run_result()).unwrap();
+    let bytes = std::fs::read(&whole).unwrap();
+    let error = read_result(&folder.file("none.h5")).unwrap_err().to_string();
+    assert!(error.contains("none.h5") && error.contains("No such file"), "{error}");
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let error = read_result(&path).unwrap_err().to_string();
+    assert!(error.contains("cut short") && error.contains("x.h5"), "{error}");
+    std::fs::write(&path, b"[pipeline]").unwrap();
+    assert!(read_result(&path).unwrap_err().to_string().contains("not a file of afmid's"));
+    let mut random = Random(7);
+    for _ in 0..100 {
+        let mut damaged = bytes.clone();
+        damaged[random.below(bytes.len())] ^= 1 << random.below(8);
+        std::fs::write(&path, &damaged).unwrap();
+        let (read, compared) = (read_result(&path).unwrap_err(), compare(&whole, &path).unwrap_err());
+        assert!(read.file == path && compared.file == path, "{read} {compared}");
+        assert!(read.help.is_some());
+    }
+}
+
+#[test]
+fn another_version_and_another_kind_are_refused() {
+    let folder = Folder::new("version");
+    let path = folder.file("a.h5");
+    write_result(&path, &run_result()).unwrap();
+    {
+        let file = hdf5::File::open_rw(&path).unwrap();
+        file.attr("afmid_format_version").unwrap().write_scalar(&99_u32).unwrap();
+    }
+    let error = read_result(&path).unwrap_err().to_string();
+    assert!(error.contains("changed by another program"), "{error}");
+    super::seal::seal(&path).unwrap();
+    let error = read_result(&path).unwrap_err();
+    assert!(error.to_string().contains("found format version 99, wanted 1") && error.help.is_some(), "{error}");
+    let stage = folder.file("stage.h5");
+    write_stage(&stage, &stage_result()).unwrap();
+    let error = read_result(&stage).unwrap_err().to_string();
+    assert!(error.contains("found an afmid stage file, wanted a result file"), "{error}");
+    assert!(read_stage(&path).is_err());
+}
+
+/// The same script checks results of real runs; here it sees every shape, empty ones included.
+#[test]
+fn h5py_xarray_and_nxcheck_read_a_result_file() {
+    let folder = Folder::new("readers");
+    let path = folder.file("result.h5");
+    write_result(&path, &run_result()).unwrap();
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
+    let python = root.join(".tools/bin/python");
+    assert!(Path::new(&python).exists(), "the readers are missing: run `make test-deps`");
+    let output = Command::new(python).arg(root.join("tests/store_readers.py")).arg(&path).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
 }

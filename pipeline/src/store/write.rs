@@ -10,25 +10,22 @@ use ndarray::ArrayView;
 
 use super::error::{Result, StoreError};
 
-/// Bytes before the HDF5 part of a stage file: room for its checksum.
-pub(super) const USER_BLOCK: u64 = 512;
-
 /// Creates an HDF5 file whose bytes depend on its contents alone. Errors: it exists, or the folder cannot be written.
 ///
 /// The format is HDF5 1.8's (checksummed object headers, attributes of any size): every reader of the last fifteen years.
-pub(crate) fn create_file(path: &Path, user_block: u64) -> Result<File> {
+pub(crate) fn create_file(path: &Path) -> Result<File> {
     File::with_options()
         .with_fapl(|access| {
             // the earliest close would leave the file writable while a handle lives: here that is an error
             access.fclose_degree(FileCloseDegree::Semi).libver_bounds(LibraryVersion::V18, LibraryVersion::V110)
         })
-        .with_fcpl(|creation| creation.obj_track_times(false).userblock(user_block))
+        .with_fcpl(|creation| creation.obj_track_times(false))
         .create_excl(path)
         .map_err(|error| StoreError::from(error).file(path))
 }
 
 pub(crate) fn group(parent: &Group, name: &str) -> Result<Group> {
-    check_name(name)?;
+    check_name(name).map_err(|error| error.at(parent.name()))?;
     let group = parent.create_group_builder().obj_track_times(false).create(name);
     group.map_err(|error| StoreError::from(error).at(path_of(parent, name)))
 }
@@ -42,9 +39,9 @@ pub(super) fn nexus_group(parent: &Group, name: &str, class: &str) -> Result<Gro
 
 /// A contiguous dataset of numbers, row-major.
 ///
-/// Contiguous and raw: measured at 8 times the speed of gzip for 10 to 20 % more bytes (noise does not compress).
+/// Contiguous and raw: gzip takes a tenth off aligned ensembles and means (noise does not compress) at a tenth of the speed.
 pub(crate) fn dataset<T: H5Type>(parent: &Group, name: &str, shape: &[usize], values: &[T]) -> Result<Dataset> {
-    check_name(name)?;
+    check_name(name).map_err(|error| error.at(parent.name()))?;
     let wrap = |error: hdf5::Error| StoreError::from(error).at(path_of(parent, name));
     let view = ArrayView::from_shape(shape, values)
         .map_err(|error| StoreError::new(format!("{} values do not fill {shape:?}: {error}", values.len())))?;

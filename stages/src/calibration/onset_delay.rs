@@ -2,6 +2,7 @@
 
 use super::error::CalibrationError;
 use super::sensitivity_model::Estimate;
+use super::welch::Welch;
 use faer::c64;
 
 /// What is known of the onset and the delay. All times on the average's own axis, s.
@@ -26,10 +27,6 @@ pub struct OnsetRule {
     pub threshold: f64,
     /// See above.
     pub sustained_samples: usize,
-    /// First guess of mode 1, Hz.
-    pub frequency_hz: f64,
-    /// First guess of its quality factor.
-    pub quality_factor: f64,
     /// The ringing is fitted from this long after the departure, s.
     pub skip_s: f64,
     /// Detector poles, Hz, as far as they are known.
@@ -75,7 +72,7 @@ pub fn onset_delay(
     let ringing = (time_s.get(begin..).unwrap_or_default(), mean.get(begin..).unwrap_or_default());
     let noise = standard_error.get(begin..).unwrap_or_default();
     let noise = (noise.iter().map(|s| s * s).sum::<f64>() / noise.len().max(1) as f64).sqrt();
-    let mode = RingingMode::fit(ringing.0, ringing.1, noise, rule)?;
+    let mode = RingingMode::fit(ringing.0, ringing.1, noise)?;
     let (sigma, w) = (mode.decay_per_s, mode.angular_per_s);
     // the release rings up from a negative load: its amplitude carries the load's sign
     let amplitude = mode.amplitude * load.signum();
@@ -164,22 +161,42 @@ struct RingingMode {
 }
 
 impl RingingMode {
-    /// `y = offset + Re[C e^{p t}]`: Gauss-Newton on Re C, Im C, offset, sigma, w.
-    fn fit(time: &[f64], values: &[f64], noise: f64, rule: &OnsetRule) -> Result<Self, CalibrationError> {
-        let failed = |reason| CalibrationError::Fit { near_hz: rule.frequency_hz, reason };
-        if values.len() < 64 {
-            return Err(failed("fewer than 64 samples of ringing"));
+    /// `y = offset + Re[C e^{p t}]`: Gauss-Newton on Re C, Im C, offset, sigma, w, from the strongest line of the spectrum and the
+    /// best of a ladder of quality factors.
+    fn fit(time: &[f64], values: &[f64], noise: f64) -> Result<Self, CalibrationError> {
+        let guess_hz = strongest_line(time, values)?;
+        let mut best: Option<(f64, Self)> = None;
+        for quality in [5.0, 15.0, 40.0, 120.0, 400.0] {
+            if let Ok((misfit, mode)) = Self::from_guess(time, values, noise, guess_hz, quality)
+                && best.as_ref().is_none_or(|(least, _)| misfit < *least)
+            {
+                best = Some((misfit, mode));
+            }
         }
-        let undamped = std::f64::consts::TAU * rule.frequency_hz;
-        let mut p = [0.0, 0.0, 0.0, undamped / (2.0 * rule.quality_factor), undamped];
+        let reason = "no decaying oscillation fits the ringing";
+        best.map(|(_, mode)| mode).ok_or(CalibrationError::Fit { near_hz: guess_hz, reason })
+    }
+
+    /// The fit from one guess, with its residual sum of squares.
+    fn from_guess(
+        time: &[f64],
+        values: &[f64],
+        noise: f64,
+        guess_hz: f64,
+        quality: f64,
+    ) -> Result<(f64, Self), CalibrationError> {
+        let failed = |reason| CalibrationError::Fit { near_hz: guess_hz, reason };
+        let undamped = std::f64::consts::TAU * guess_hz;
+        let mut p = [0.0, 0.0, 0.0, undamped / (2.0 * quality), undamped];
         for iteration in 0..50 {
-            let (mut normal, mut gradient) = ([[0.0; 5]; 5], [0.0; 5]);
+            let (mut normal, mut gradient, mut misfit) = ([[0.0; 5]; 5], [0.0; 5], 0.0);
             for (t, y) in time.iter().zip(values) {
                 let decay = (-p[3] * t).exp();
                 let (sin, cos) = (p[4] * t).sin_cos();
                 let (c, s) = (decay * cos, decay * sin);
                 let model = p[2] + p[0] * c - p[1] * s;
                 let row = [c, -s, 1.0, -t * (p[0] * c - p[1] * s), -t * (p[0] * s + p[1] * c)];
+                misfit += (y - model).powi(2);
                 for i in 0..5 {
                     gradient[i] += row[i] * (y - model);
                     (0..5).for_each(|j| normal[i][j] += row[i] * row[j]);
@@ -198,21 +215,34 @@ impl RingingMode {
             let step: [f64; 5] = std::array::from_fn(|i| inverse[i].iter().zip(&gradient).map(|(a, g)| a * g).sum());
             (0..5).for_each(|i| p[i] += step[i]);
             if !(p[3] > 0.0 && p[4] > 0.0 && p.iter().all(|v| v.is_finite())) {
-                return Err(failed("mode 1 left the range of decaying oscillations: give a better frequency_hz"));
+                return Err(failed("mode 1 left the range of decaying oscillations"));
             }
             if iteration > 1 && step[4].abs() < 1e-10 * p[4] && step[3].abs() < 1e-8 * p[3] {
                 let square = p[0].hypot(p[1]).powi(2);
                 // d arg C = (Re C dIm - Im C dRe) / |C|^2
                 let (a, b) = (-p[1] / square, p[0] / square);
                 let variance = a * a * inverse[0][0] + 2.0 * a * b * inverse[0][1] + b * b * inverse[1][1];
-                return Ok(Self {
+                let mode = Self {
                     decay_per_s: p[3],
                     angular_per_s: p[4],
                     amplitude: c64::new(p[0], p[1]),
                     phase_std: noise * variance.sqrt(),
-                });
+                };
+                return Ok((misfit, mode));
             }
         }
-        Err(failed("50 iterations were not enough: give a better frequency_hz and quality_factor"))
+        Err(failed("50 iterations were not enough"))
     }
+}
+
+/// The frequency of the largest bin of the Hann periodogram, Hz.
+fn strongest_line(time: &[f64], values: &[f64]) -> Result<f64, CalibrationError> {
+    let even = values.len() & !1;
+    let (first, last) = (time.first().copied().unwrap_or(0.0), time.last().copied().unwrap_or(0.0));
+    let rate = (time.len().max(2) - 1) as f64 / (last - first);
+    let mut welch = Welch::new(even, rate)?;
+    welch.push(values.get(..even).unwrap_or_default());
+    let average = welch.average()?;
+    let bins = average.density_v2_per_hz.iter().enumerate().skip(2);
+    Ok(bins.max_by(|a, b| a.1.total_cmp(b.1)).map_or(0.0, |(k, _)| k as f64 * average.bin_hz))
 }

@@ -2,9 +2,10 @@
 
 use super::contact_slope::ContactSlope;
 use super::error::CalibrationError;
+use serde::{Deserialize, Serialize};
 
 /// A number with its standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The number.
     pub value: f64,

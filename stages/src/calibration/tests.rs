@@ -196,14 +196,7 @@ fn delay_is_bounded_by_causality_and_known_with_the_poles() {
         let noise = white_noise(samples, 1.3e-4, seed);
         let mean: Vec<f64> = release.iter().zip(&noise).map(|(r, n)| r + n).collect();
         let time: Vec<f64> = (0..samples).map(|k| (k as f64 - 1000.0) / 5e6).collect();
-        let mut rule = OnsetRule {
-            threshold: 5.0,
-            sustained_samples: 3,
-            frequency_hz: 46e3,
-            quality_factor: 35.0,
-            skip_s: 2e-5,
-            detector_pole_hz: vec![],
-        };
+        let mut rule = OnsetRule { threshold: 5.0, sustained_samples: 3, skip_s: 2e-5, detector_pole_hz: vec![] };
         let error = vec![1.3e-4; samples];
         let found = onset_delay(&time, &mean, &error, &rule).unwrap();
         let truth = 0.37 / 5e6;

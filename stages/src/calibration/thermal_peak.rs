@@ -42,6 +42,17 @@ pub struct ThermalPeak {
     pub dispersion: f64,
 }
 
+impl ThermalPeak {
+    /// The fitted density at `frequency_hz`, V^2/Hz (without the window's width).
+    pub fn density_v2_per_hz(&self, frequency_hz: f64) -> f64 {
+        let damping = self.frequency_hz / self.quality_factor;
+        let (f, f1) = (frequency_hz, self.frequency_hz);
+        let peak =
+            self.variance_v2 * 2.0 / PI * f1 * f1 * damping / ((f1 * f1 - f * f).powi(2) + (f * damping).powi(2));
+        peak + self.white_v2_per_hz + self.flicker_v2 / f.max(f64::MIN_POSITIVE)
+    }
+}
+
 /// ln of: peak variance, frequency, quality factor, white density, flicker.
 type Parameters = [f64; 5];
 

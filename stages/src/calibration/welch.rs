@@ -59,6 +59,11 @@ impl Welch {
         Self { sum: vec![0.0; self.sum.len()], segments: 0, ..self.clone() }
     }
 
+    /// Length of a segment.
+    pub fn segment_samples(&self) -> usize {
+        self.window.len()
+    }
+
     /// Adds all whole segments of a stretch.
     pub fn push(&mut self, stretch: &[f64]) {
         let n = self.window.len();

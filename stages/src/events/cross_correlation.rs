@@ -39,12 +39,17 @@ impl CrossCorrelator {
 
     /// Where `template` fits `signal` best.
     ///
-    /// Model: `signal[n + lag] = a template[n] + b + noise`, a > 0.
-    /// Method: `r(lag) = sum (t - mean t) s[n + lag] / (|t - mean t| |s - local mean s|)`; numerators by one circular FFT correlation (long
-    /// enough that nothing wraps), local energies by running sums; the peak refined by a parabola through three points.
-    /// Accuracy: whole samples certain, fractions to some hundredths: refine with [`refine_shift`](super::refine_shift).
-    /// Shapes: the lengths given to [`CrossCorrelator::new`].
-    /// Errors: `None` if lengths differ from these, a value is not finite, or either is constant.
+    /// # Model
+    /// `signal[n + lag] = a template[n] + b + noise`, a > 0.
+    /// # Method
+    /// `r(lag) = sum (t - mean t) s[n + lag] / (|t - mean t| |s - local mean s|)`; numerators by one circular FFT correlation
+    /// (long enough that nothing wraps), local energies by running sums; the peak refined by a parabola through three points.
+    /// # Accuracy
+    /// Whole samples certain, fractions to some hundredths: refine with [`refine_shift`](super::refine_shift).
+    /// # Shapes
+    /// The lengths given to [`CrossCorrelator::new`].
+    /// # Errors
+    /// `None` if lengths differ from these, a value is not finite, or either is constant.
     pub fn best_match(&self, template: &[f64], signal: &[f64]) -> Option<Match> {
         if template.len() != self.template_samples || signal.len() != self.signal_samples {
             return None;

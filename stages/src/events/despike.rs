@@ -1,11 +1,15 @@
 //! Spikes taken out of block means.
 
-/// Replaces outliers of one or two blocks by the line between their neighbours; returns their first blocks (crests of a ringing may be among them).
+/// Replaces outliers of one or two blocks by the line between their neighbours; returns their first blocks (crests of a ringing
+/// may be among them).
 ///
-/// Method: one or two blocks that differ from the line between their neighbours by more than `threshold`, in one direction, while those neighbours
-/// agree within it. An edge is kept: its sides differ.
-/// Shapes: `means` is changed in place.
-/// Units: `threshold` as `means`.
+/// # Method
+/// One or two blocks that differ from the line between their neighbours by more than `threshold`, in one direction, while those
+/// neighbours agree within it. An edge is kept: its sides differ.
+/// # Shapes
+/// `means` is changed in place.
+/// # Units
+/// `threshold` as `means`.
 pub fn despike(means: &mut [f32], threshold: f64) -> Vec<usize> {
     let mut spikes = Vec::new();
     let mut k = 1;

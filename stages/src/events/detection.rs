@@ -85,15 +85,23 @@ const RISE_BLOCKS: usize = 8;
 
 /// Finds snap-off and snap-to-contact events in the block means of one record.
 ///
-/// Model: the deflection is piecewise straight, with hum, 1/f drift and noise; an event is a sudden change of level (a kink of the piezo
+/// # Model
+/// The deflection is piecewise straight, with hum, 1/f drift and noise; an event is a sudden change of level (a kink of the piezo
 /// triangle changes the slope alone, a spike neither, a ringing only follows).
-/// Method: 0. Spikes of one or two blocks are bridged. 1. Steps `b[k+1] - b[k-1]`, less the local slope, that exceed `significance` times their median absolute deviation in this
-/// record; of a ringing only the first. 2. At each of them lines fitted before and after give the jump of level; it must exceed
-/// `significance` times its own scale over the record (so hum and drift raise the bar by what they do), the kink that the change of slope could
-/// feign, and 0.7 times the ringing (a released oscillator rings with at most 0.71 rms of its step). 3. Up is a snap-off; down, and followed by a rising slope, a
-/// snap-to-contact. All thresholds are relative to the record: nothing is tuned to volts.
-/// Units: `means` in the channel's unit, positions in blocks.
-/// Accuracy: finds jumps of 10 robust standard deviations of a block mean's step; the onset within two blocks.
+/// # Method
+/// Spikes of one or two blocks are bridged. Then:
+/// 1. Steps `b[k+1] - b[k-1]`, less the local slope, that exceed `significance` times their median absolute deviation in this
+///    record; of a ringing only the first.
+/// 2. At each of them lines fitted before and after give the jump of level. It must exceed `significance` times its own scale
+///    over the record (so hum and drift raise the bar by what they do), the jump that the change of slope could feign, and 0.7
+///    times the ringing (a released oscillator rings with at most 0.71 rms of its step).
+/// 3. Up is a snap-off; down, and followed by a rising slope, a snap-to-contact.
+///
+/// All thresholds are relative to the record: nothing is tuned to volts.
+/// # Units
+/// `means` in the channel's unit, positions in blocks.
+/// # Accuracy
+/// Finds jumps of 10 robust standard deviations of a block mean's step; the onset within two blocks.
 /// Cost: linear in the number of blocks.
 pub fn detect(means: &[f32], settings: &DetectionSettings) -> Detection {
     if means.len() < 3 {

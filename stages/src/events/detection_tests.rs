@@ -2,57 +2,8 @@ use std::f64::consts::TAU;
 
 use super::*;
 use crate::events::BlockMeans;
-use crate::fixture::{Lever, white_noise};
-
-const RATE: f64 = 5e6;
-const LSB: f64 = 0.977e-3;
-/// 22 V/s: 200 nm in half a cycle of 5.58 Hz at 1e7 V/m.
-const CONTACT_SLOPE: f64 = 22.0 / RATE;
-
-/// Force curves in volts: free, snap-in, contact up and down, rupture; `cycle` samples each.
-struct Curve {
-    cycle: usize,
-    cycles: usize,
-    rupture: bool,
-    load: f64,
-}
-
-impl Curve {
-    fn snap_in(&self, n: usize) -> usize {
-        n * self.cycle + self.cycle / 4
-    }
-
-    fn snap_off(&self, n: usize) -> usize {
-        n * self.cycle + self.cycle * 4 / 5
-    }
-
-    fn signal(&self) -> Vec<f64> {
-        let ring = Lever::paper().release(12_000, 0.0, -1.0);
-        let mut y = vec![0.0; self.cycle * self.cycles];
-        for n in 0..self.cycles {
-            let (on, off) = (self.snap_in(n), self.snap_off(n));
-            let top = on + (off - on) * 2 / 5;
-            let top_level = -0.04 + CONTACT_SLOPE * (top - on) as f64;
-            let slope_down = (self.load - top_level) / (off - top) as f64;
-            for k in on..off {
-                let x = (k - on) as f64;
-                let swing = 0.04 * (-x / 80.0).exp() * (TAU * x / 30.0).cos();
-                let up = CONTACT_SLOPE * x.min((top - on) as f64);
-                y[k] = -0.04 + swing + up + if k > top { slope_down * (k - top) as f64 } else { 0.0 };
-            }
-            let rest = (n + 1) * self.cycle - off;
-            for k in 0..rest {
-                let fading = self.load * (1.0 - k as f64 / rest as f64);
-                y[off + k] = if self.rupture { ring.get(k).map_or(0.0, |value| value * -self.load) } else { fading };
-            }
-        }
-        y
-    }
-}
-
-fn quantised(signal: &[f64], noise: f64, seed: u64) -> Vec<i16> {
-    signal.iter().zip(white_noise(signal.len(), noise, seed)).map(|(y, e)| ((y + e) / LSB).round() as i16).collect()
-}
+use crate::events::curves::{Curve, LSB, RATE, quantised};
+use crate::fixture::white_noise;
 
 fn run(codes: &[i16]) -> Detection {
     let mut means = BlockMeans::new(16, LSB, None);
@@ -78,7 +29,7 @@ fn both(curve: &Curve) -> Vec<(usize, EventKind)> {
 
 #[test]
 fn every_cycle_gives_a_snap_in_and_a_snap_off_and_turning_points_give_none() {
-    let curve = Curve { cycle: 200_000, cycles: 3, rupture: true, load: -0.9 };
+    let curve = Curve { cycle: 200_000, cycles: 3, rupture: true, load: -0.9, fraction: 0.0 };
     let signal = curve.signal();
     for seed in 0..4 {
         assert_found(&run(&quantised(&signal, 1.2e-3, seed)), &both(&curve));
@@ -89,7 +40,7 @@ fn every_cycle_gives_a_snap_in_and_a_snap_off_and_turning_points_give_none() {
 
 #[test]
 fn hum_drift_spikes_and_clipping_make_no_events() {
-    let curve = Curve { cycle: 300_000, cycles: 1, rupture: true, load: -0.9 };
+    let curve = Curve { cycle: 300_000, cycles: 1, rupture: true, load: -0.9, fraction: 0.0 };
     for seed in 0..4u64 {
         let phase = seed as f64;
         let mut wander = 0.0;
@@ -117,7 +68,7 @@ fn noise_alone_and_curves_without_rupture_hold_no_rupture() {
         assert_found(&run(&quantised(&vec![0.0; 200_000], 1.2e-3, seed)), &[]);
         assert_found(&run(&quantised(&vec![0.0; 200_000], 0.2, seed)), &[]);
     }
-    let curve = Curve { cycle: 300_000, cycles: 1, rupture: false, load: -0.5 };
+    let curve = Curve { cycle: 300_000, cycles: 1, rupture: false, load: -0.5, fraction: 0.0 };
     assert_found(&run(&quantised(&curve.signal(), 1.2e-3, 3)), &[(curve.snap_in(0), EventKind::SnapIn)]);
 }
 

@@ -71,10 +71,13 @@ struct Samples<'a> {
 
 /// Finds the events of one kind in one channel.
 ///
-/// Method: one pass over the chunks for the block means, [`detect`], then round each candidate the first sustained departure from the line
-/// before it. A window that leaves the record, holds another event, missing samples, or samples at the converter's full scale, is refused.
-/// Memory: the record's own samples as stored (at most 32 MB of int16; longer ones are read twice), and the segments.
-/// Errors: those of the channel's source.
+/// # Method
+/// One pass over the chunks for the block means, [`detect`], then round each candidate the first sustained departure from the
+/// line before it. A window that leaves the record, holds another event, missing samples, or samples at the converter's full
+/// scale, is refused. Memory: the record's own samples as stored (at most 32 MB of int16; longer ones are read twice), and the
+/// segments.
+/// # Errors
+/// Those of the channel's source.
 pub fn extract(channel: &Channel, settings: &ExtractionSettings) -> Result<Extraction, StageError> {
     let (samples, means) = scan(channel, settings.block_samples)?;
     let rounding_std = match samples.kept.as_ref().and_then(|chunks| chunks.first()) {

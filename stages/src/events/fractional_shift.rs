@@ -10,14 +10,21 @@ const KAISER_BETA: f64 = 10.0;
 
 /// `values` at the positions `start + k + shift`, `k = 0..count`, by windowed-sinc interpolation.
 ///
-/// Model: the signal has no content above 0.9 of half the sample rate. A release through three detector poles has so little there that the error at its
-/// onset is 5e-5 of the release, a twentieth of one event's noise (tested).
-/// Method: sinc times a Kaiser window (beta 10) over 64 samples; weights normalised to sum 1, so constants are kept exactly. A whole-sample shift copies. No feedback, so
-/// nothing but the 32 samples on either side matters, and an onset cannot ring further ahead than these.
-/// Shapes: needs `REACH` samples on either side of what is asked for; beyond the ends the edge value is held.
-/// Accuracy: a sine of up to 0.45 of the sample rate is reproduced to 1e-4 of its amplitude, up to 0.43 to 2e-5 (tested).
-/// Errors: none; an empty `values` gives zeros.
-/// Source: Smith and Gossett, ICASSP 1984, 19.4; Kaiser, IEEE ISCAS 1974, 20.
+/// # Model
+/// The signal has no content above 0.9 of half the sample rate. A release through three detector poles has so little there that
+/// the error at its onset is 5e-5 of the release, a twentieth of one event's noise (tested).
+/// # Method
+/// Sinc times a Kaiser window (beta 10) over 64 samples; weights normalised to sum 1, so constants are kept exactly. A
+/// whole-sample shift copies. No feedback, so nothing but the 32 samples on either side matters, and an onset cannot ring
+/// further ahead than these.
+/// # Shapes
+/// Needs `REACH` samples on either side of what is asked for; beyond the ends the edge value is held.
+/// # Accuracy
+/// A sine of up to 0.45 of the sample rate is reproduced to 1e-4 of its amplitude, up to 0.43 to 2e-5 (tested).
+/// # Errors
+/// None; an empty `values` gives zeros.
+/// # Source
+/// Smith and Gossett, ICASSP 1984, 19.4; Kaiser, IEEE ISCAS 1974, 20.
 pub fn fractional_shift(values: &[f64], start: usize, count: usize, shift: f64) -> Vec<f64> {
     let whole = shift.floor();
     let weights = interpolation_weights(shift - whole);
@@ -27,7 +34,9 @@ pub fn fractional_shift(values: &[f64], start: usize, count: usize, shift: f64) 
 
 /// The derivative per sample of the same interpolation, at `start + k`, `k = 0..count`.
 ///
-/// Method: the derivative of the kernel above. Accuracy: sines of up to 0.4 of the sample rate to 5e-5 of their amplitude per sample (tested).
+/// # Method
+/// The derivative of the kernel above. Accuracy: sines of up to 0.4 of the sample rate to 5e-5 of their amplitude per sample
+/// (tested).
 pub fn band_limited_derivative(values: &[f64], start: usize, count: usize) -> Vec<f64> {
     let half = 1e-3;
     let (ahead, behind) = (raw_weights(half), raw_weights(-half));

@@ -36,3 +36,8 @@ pub use window::{EventWindow, WindowSettings, Windows, cut_windows, quality_outl
 
 /// The stages of this domain.
 pub const STAGES: &[Entry] = &[Entry::of::<Correlation>()];
+
+#[cfg(test)]
+mod archive_tests;
+#[cfg(test)]
+pub(crate) mod curves;

@@ -33,7 +33,8 @@ pub struct Onset {
 
 /// Line through `values[range]` by least squares, refitted without the samples beyond 5 standard deviations (spikes).
 ///
-/// Errors: `None` with fewer than 8 finite samples, or a range beyond the end.
+/// # Errors
+/// `None` with fewer than 8 finite samples, or a range beyond the end.
 pub fn baseline(values: &[f64], range: Range<usize>) -> Option<Baseline> {
     let start = range.start as f64;
     let stretch = values.get(range)?;
@@ -75,14 +76,21 @@ fn fit(stretch: &[f64], start: f64, limit: f64, about: Option<&Baseline>) -> Opt
     Some(line)
 }
 
-/// The first sample in `search` from which `sustained` samples in a row lie on one side of the line before, each beyond `significance` times its noise.
+/// The first sample in `search` from which `sustained` samples in a row lie on one side of the line before, each beyond
+/// `significance` times its noise.
 ///
-/// Method: the line and its noise come from the `baseline_samples` before `search`. Not the steepest slope, which a slow detector or a heavy mode
-/// puts late; not a single sample, which a spike may be.
-/// Units: `noise_floor` as the values: the least noise to assume (rounding).
-/// Accuracy: late by the samples during which the signal is within the noise; two or three for one event of a lever with three detector poles.
-/// Errors: `None` if nothing departs, or too little lies before.
-/// Source: the sustained-threshold picker that is usual for the arrival of transients (Allen, Bull. Seismol. Soc. Am. 68 (1978) 1521).
+/// # Method
+/// The line and its noise come from the `baseline_samples` before `search`. Not the steepest slope, which a slow detector or a
+/// heavy mode puts late; not a single sample, which a spike may be.
+/// # Units
+/// `noise_floor` as the values: the least noise to assume (rounding).
+/// # Accuracy
+/// Late by the samples during which the signal is within the noise; two or three for one event of a lever with three detector
+/// poles.
+/// # Errors
+/// `None` if nothing departs, or too little lies before.
+/// # Source
+/// The sustained-threshold picker that is usual for the arrival of transients (Allen, Bull. Seismol. Soc. Am. 68 (1978) 1521).
 pub fn first_sustained_departure(
     values: &[f64],
     search: Range<usize>,

@@ -20,9 +20,11 @@ pub fn median(values: &mut [f64]) -> f64 {
 
 /// Median and robust standard deviation of the finite values; NaN if there are none. Overwrites `values`. Cost: O(n).
 ///
-/// Method: 1.4826 times the median absolute deviation, the standard deviation of a Gaussian; up to half of the values may be
+/// # Method
+/// 1.4826 times the median absolute deviation, the standard deviation of a Gaussian; up to half of the values may be
 /// arbitrary. Codes of a coarse converter make it 0 where more than half of the values agree: callers put a floor under it.
-/// Source: Hampel, J. Am. Stat. Assoc. 69 (1974) 383.
+/// # Source
+/// Hampel, J. Am. Stat. Assoc. 69 (1974) 383.
 pub fn median_and_scale(values: &mut [f64]) -> (f64, f64) {
     let center = median(values);
     for value in values.iter_mut() {

@@ -58,16 +58,24 @@ pub struct Windows {
 
 /// Cuts aligned windows out of segments with the detected onset at sample `onset`.
 ///
-/// Method: 1. windows at the aligned positions; 2. the onset of their average, whose noise is the root of their number smaller: the first
-/// sustained departure beyond 4 standard deviations, for 4 samples; all windows move by it as one, in whole samples; 3. lines before and after (its second half)
-/// give the jump of the average; each event's own is its share of it, by the amplitude of the correlation; 4. each event is
-/// regressed on the average of the others and 1, after the onset, for the quality.
+/// # Method
+/// 1. Windows at the aligned positions.
+/// 2. The onset of their average, whose noise is the root of their number smaller: the first sustained departure beyond 4
+///    standard deviations, for 4 samples; all windows move by it as one, in whole samples.
+/// 3. Lines before and after (its second half) give the jump of the average; each event's own is its share of it, by the
+///    amplitude of the correlation.
+/// 4. Each event is regressed on the average of the others and 1, after the onset, for the quality.
+///
 /// `loaded_before`: a snap-off is free after the onset, a snap-to-contact before: there the offset is read.
-/// Shapes: segments with [`WindowSettings::margins`] round `onset`, one [`Aligned`] each.
-/// Units: as the segments; positions in samples.
-/// Accuracy: interpolation 5e-5 of the jump at the onset, 1e-6 elsewhere (see [`fractional_shift`](super::fractional_shift)); the onset is late by the
-/// samples that the signal stays within the average's noise, one to three, alike in all events.
-/// Errors: none; segments shorter than that are padded with their end values.
+/// # Shapes
+/// Segments with [`WindowSettings::margins`] round `onset`, one [`Aligned`] each.
+/// # Units
+/// As the segments; positions in samples.
+/// # Accuracy
+/// Interpolation 5e-5 of the jump at the onset, 1e-6 elsewhere (see [`fractional_shift`](super::fractional_shift)); the onset
+/// is late by the samples that the signal stays within the average's noise, one to three, alike in all events.
+/// # Errors
+/// None; segments shorter than that are padded with their end values.
 pub fn cut_windows(
     segments: &[Vec<f64>],
     onset: usize,
@@ -112,7 +120,8 @@ pub fn cut_windows(
     Windows { events, onset_correction: correction }
 }
 
-/// Indices of events whose quality is out of line: beyond the median by `significance` robust deviations and by a factor of `factor`.
+/// Indices of events whose quality is out of line: beyond the median by `significance` robust deviations and by a factor of
+/// `factor`.
 pub fn quality_outliers(qualities: &[f64], significance: f64, factor: f64) -> Vec<usize> {
     let (center, scale) = median_and_scale(&mut qualities.to_vec());
     let limit = (center + significance * scale).max(factor * center);
@@ -151,7 +160,8 @@ fn levels(window: &[f64], pre: usize) -> Option<Levels> {
     Some(Levels { before: before.at(pre as f64), after, noise_std: before.noise_std })
 }
 
-/// The least-squares line through `values` with Hann weights, at `position` (of `values`): a ringing of many periods averages out.
+/// The least-squares line through `values` with Hann weights, at `position` (of `values`): a ringing of many periods averages
+/// out.
 fn extrapolated_past_ringing(values: &[f64], position: f64) -> Option<f64> {
     let n = values.len() as f64;
     if values.len() < 8 {

@@ -14,20 +14,29 @@ use super::memory::{memory_channel, memory_record};
 
 /// Counts what is wrong with stored samples: missing ones, sentinels, saturation; and what is noise.
 ///
-/// Model: a stored sample is not finite, the declared fill code, a sentinel, or valid; valid ones that pile up at an end of their range are saturated.
-/// Method: one streaming pass over every channel of every record.
-/// Shapes: one row per record and channel.
-/// Units: least, largest and noise in the channel's unit.
-/// Accuracy: counts are exact; noise to some per cent, its bandwidth to an order of magnitude.
-/// Errors: a record that cannot be read.
-/// Source: von Neumann, Ann. Math. Stat. 12 (1941) 367, for the bandwidth.
+/// # Model
+/// A stored sample is not finite, the declared fill code, a sentinel, or valid; valid ones that pile up at an end of their
+/// range are saturated.
+/// # Method
+/// One streaming pass over every channel of every record.
+/// # Shapes
+/// One row per record and channel.
+/// # Units
+/// Least, largest and noise in the channel's unit.
+/// # Accuracy
+/// Counts are exact; noise to some per cent, its bandwidth to an order of magnitude.
+/// # Errors
+/// A record that cannot be read.
+/// # Source
+/// Von Neumann, Ann. Math. Stat. 12 (1941) 367, for the bandwidth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Census {
-    /// Stored codes that stand for no value, besides the fill code that a file declares. Default: -32768 and 32767, the ends of 16 bits.
+    /// Stored codes that stand for no value, besides the fill code that a file declares. Default: -32768 and 32767, the ends of
+    /// 16 bits.
     pub sentinels: Vec<f64>,
-    /// Warn where the deflection's noise reaches less than this share of the sample rate, 0 to 0.5: the recorder has filtered it. Default: 0.02; a
-    /// lever below 50 samples per period would still be seen.
+    /// Warn where the deflection's noise reaches less than this share of the sample rate, 0 to 0.5: the recorder has filtered
+    /// it. Default: 0.02; a lever below 50 samples per period would still be seen.
     pub min_bandwidth_share: f64,
 }
 

@@ -13,15 +13,22 @@ use super::file_patterns::matching_files;
 
 /// Opens native HDF5 records by pattern.
 ///
-/// Model: file attributes `sample_rate_hz`, `started_at`; one dataset per channel; value = stored * scale_factor + add_offset.
-/// Method: files in natural order; nothing but attributes is read here, samples are streamed by the stages that need them. Sample rate and unit
-/// must agree over all files; other lengths are reported.
-/// Shapes: one record per file, with the roles `deflection` and, where the file has it, `piezo`.
-/// Units: the channels' own.
-/// Accuracy: codes stay codes: nothing is rounded.
-/// Errors: a pattern without a match; files that are no HDF5, cut short or damaged; a missing channel or attribute; rates or units that differ; a rate too low for
-/// a ringdown.
-/// Source: the CF conventions for scale_factor and add_offset.
+/// # Model
+/// File attributes `sample_rate_hz`, `started_at`; one dataset per channel; value = stored * scale_factor + add_offset.
+/// # Method
+/// Files in natural order; nothing but attributes is read here, samples are streamed by the stages that need them. Sample rate
+/// and unit must agree over all files; other lengths are reported.
+/// # Shapes
+/// One record per file, with the roles `deflection` and, where the file has it, `piezo`.
+/// # Units
+/// The channels' own.
+/// # Accuracy
+/// Codes stay codes: nothing is rounded.
+/// # Errors
+/// A pattern without a match; files that are no HDF5, cut short or damaged; a missing channel or attribute; rates or units that
+/// differ; a rate too low for a ringdown.
+/// # Source
+/// The CF conventions for scale_factor and add_offset.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Records {
@@ -31,8 +38,8 @@ pub struct Records {
     pub channel: String,
     /// Dataset of the piezo monitor, used where a file has it; empty: not looked for. Default: `/piezo`.
     pub piezo_channel: String,
-    /// Least sample rate, in Hz, 0 or more. Default: 200000: twenty samples in a period of a 10 kHz lever, the softest in use; slower archives are force
-    /// curves, low-pass filtered, without a ringdown.
+    /// Least sample rate, in Hz, 0 or more. Default: 200000: twenty samples in a period of a 10 kHz lever, the softest in use;
+    /// slower archives are force curves, low-pass filtered, without a ringdown.
     pub min_sample_rate_hz: f64,
     /// Leave out files that cannot be opened, with a warning, instead of stopping. Default: false.
     pub skip_unreadable: bool,

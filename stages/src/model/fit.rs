@@ -130,8 +130,7 @@ fn nuisance_matrix(model: &InnovationsModel, samples: usize, nuisances: Nuisance
 
 /// FIT % of a perfect model, given the standard error of y: `100 (1 - sqrt(sum se^2) / |y - mean(y)|)`.
 ///
-/// `standard_error` must be that of the noise alone: scatter of the events' amplitudes, which the input carries as well, is first taken out
-/// ([`scale_free_standard_error`]). Errors: lengths, values that are not finite, a constant y.
+/// `standard_error` must be that of the noise alone: scatter of the events' amplitudes, which the input carries as well, is no part of it. Errors: lengths, values that are not finite, a constant y.
 pub fn noise_ceiling_percent(y: &[f64], standard_error: &[f64]) -> Result<f64, ModelError> {
     if y.len() != standard_error.len() {
         return Err(ModelError::Length { what: "standard error", found: standard_error.len(), wanted: y.len() });
@@ -139,52 +138,4 @@ pub fn noise_ceiling_percent(y: &[f64], standard_error: &[f64]) -> Result<f64, M
     finite("standard error", standard_error)?;
     let noise = standard_error.iter().map(|se| se * se).sum::<f64>();
     Ok(100.0 * (1.0 - (noise / variation(y)?).sqrt()))
-}
-
-/// A mean's standard error without the events' common scatter in amplitude.
-///
-/// # Model
-/// `se(t)^2 = v + s^2 y(t)^2`: noise that is the same all along, and a relative scatter s of the amplitude (per root of the number of events).
-/// # Method
-/// Weighted least squares for v and s^2, weights `1 / fitted^2` (a variance estimate's scatter is proportional to itself), iterated; then
-/// `se^2 - s^2 y^2` sample by sample, at least zero.
-/// # Shapes
-/// N samples; result `(se, s)`.
-/// # Units
-/// Those of y.
-/// # Accuracy
-/// Sample by sample that of se; summed over a window a fraction of a per cent.
-/// # Errors
-/// Lengths, values that are not finite.
-/// # Source
-/// R. Carroll and D. Ruppert, Transformation and Weighting in Regression (1988), chapter 3.
-pub fn scale_free_standard_error(y: &[f64], standard_error: &[f64]) -> Result<(Vec<f64>, f64), ModelError> {
-    if y.len() != standard_error.len() {
-        return Err(ModelError::Length { what: "standard error", found: standard_error.len(), wanted: y.len() });
-    }
-    finite("output", y)?;
-    finite("standard error", standard_error)?;
-    let points: Vec<(f64, f64)> = y.iter().zip(standard_error).map(|(y, se)| (y * y, se * se)).collect();
-    let mean = points.iter().map(|point| point.1).sum::<f64>() / points.len().max(1) as f64;
-    let (mut level, mut slope) = (mean, 0.0);
-    for _ in 0..20 {
-        let floor = 1e-3 * mean;
-        let [mut w, mut wx, mut wy, mut wxx, mut wxy] = [0.0; 5];
-        for &(x, v) in &points {
-            let weight = (level + slope * x).max(floor).powi(-2);
-            w += weight;
-            wx += weight * x;
-            wy += weight * v;
-            wxx += weight * x * x;
-            wxy += weight * x * v;
-        }
-        let determinant = w * wxx - wx * wx;
-        if !(determinant > 1e-12 * w * wxx) {
-            break;
-        }
-        slope = ((w * wxy - wx * wy) / determinant).max(0.0);
-        level = ((wy - slope * wx) / w).max(floor);
-    }
-    let free = points.iter().map(|(x, v)| (v - slope * x).max(0.0).sqrt()).collect();
-    Ok((free, slope.sqrt()))
 }

@@ -2,9 +2,9 @@
 
 use faer::Mat;
 
-use super::chi_square::chi_square_tail;
 use super::error::{ModelError, finite};
 use super::orthogonal::{Qr, Svd};
+use crate::calibration::chi_square_tail;
 
 /// A test statistic with its tail probability.
 #[derive(Debug, Clone, Copy, PartialEq)]

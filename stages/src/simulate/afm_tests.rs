@@ -52,7 +52,7 @@ fn truth_counts_what_was_asked_for_and_the_record_shows_it() {
     for (record, truth) in records.iter().zip(truth["records"].as_array().unwrap()) {
         let off = truth["events"].as_array().unwrap().iter().find(|e| e["kind"] == "snap-off").unwrap();
         let sample = off["sample"].as_f64().unwrap() as usize;
-        assert!(sample >= 10_000 && sample <= 210_000);
+        assert!((10_000..=210_000).contains(&sample));
         let values = record.channel("deflection").unwrap().read(sample - 20, 100).unwrap();
         // pulled down by 0.6 to 1.1 V before, swinging up after half a period (54 samples)
         assert!(values[10] < -0.6 && values[74] > 0.3, "{} {}", values[10], values[74]);

@@ -45,9 +45,10 @@ impl Stage for Periodogram {
         let rate = pair.number("sample_rate_hz")?;
         let samples = pair.axis("time")?.values.len();
         let power = pair.number("noise_gain").unwrap_or(1.0) * samples as f64;
-        let density =
-            |name: &str| Ok(power_spectrum(pair.real(name)?, power, rate).map_err(StageError::from_error)?.density);
-        let (response, force): (Vec<f64>, Vec<f64>) = (density("response")?, density("force")?);
+        let density = |name: &str| -> Result<Vec<f64>, StageError> {
+            Ok(power_spectrum(pair.real(name)?, power, rate).map_err(StageError::from_error)?.density)
+        };
+        let (response, force) = (density("response")?, density("force")?);
         // white noise of this variance, windowed: sum w^2 divides out
         let noise = 2.0 * pair.real("standard_error")?.iter().map(|s| s * s).sum::<f64>() / (rate * power);
         let over = &["frequency_hz"];

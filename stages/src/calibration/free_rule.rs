@@ -1,0 +1,43 @@
+//! How stages are told what a free stretch is.
+
+use afmid_pipeline::StageError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::free_stretches::FreeRule;
+use super::reading::within;
+
+/// What counts as a free stretch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct FreeSettings {
+    /// Samples per block of the level and noise statistics, 16 to 65536. Default: 512 (0.1 ms at 5 MS/s: some periods of mode 1).
+    pub block_samples: usize,
+    /// Left out after a snap-off once the blocks' noise is back to normal, in s, 0 to 1. Default: 5e-3: eighteen decay times of the paper's
+    /// mode 1, the ringing is far below the thermal motion.
+    pub settle_s: f64,
+    /// Left out before a snap-in, in s, 0 to 1. Default: 5e-4.
+    pub guard_s: f64,
+}
+
+impl Default for FreeSettings {
+    fn default() -> Self {
+        Self { block_samples: 512, settle_s: 5e-3, guard_s: 5e-4 }
+    }
+}
+
+impl FreeSettings {
+    pub(super) fn check(&self) -> Result<(), StageError> {
+        within("free.block_samples", self.block_samples as f64, 16.0, 65_536.0)?;
+        within("free.settle_s", self.settle_s, 0.0, 1.0)?;
+        within("free.guard_s", self.guard_s, 0.0, 1.0)
+    }
+
+    pub(super) fn rule(&self, sample_rate_hz: f64, shortest_samples: usize) -> FreeRule {
+        FreeRule {
+            settle_samples: (self.settle_s * sample_rate_hz).round() as usize,
+            guard_samples: (self.guard_s * sample_rate_hz).round() as usize,
+            shortest_samples,
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! The stage `calibration.stiffness`.
+
+use afmid_pipeline::{
+    Array, Axis, Caching, Context, Document, Example, Port, Ports, Recording, Spec, Stage, StageError,
+};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::free_rule::FreeSettings;
+use super::peak_settings::PeakSettings;
+use super::reading::{common_rate, push_free, read_blocks, read_free, within};
+use super::sensitivity::SensitivitySummary;
+use super::sensitivity_model::Estimate;
+use super::spring_constant::{SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, spring_constant};
+use super::thermal_peak::{ThermalPeak, thermal_peak};
+use super::welch::Welch;
+
+/// Spring constant from the thermal motion of mode 1 in the free stretches.
+///
+/// # Model
+/// Equipartition: `<q_1^2> = c_tip_1 k_B T / k`. The detector sees `S (c_slope_1 / c_tip_1) q_1`, so that
+/// `k = S^2 chi k_B T |D(f1)|^2 / <v_1^2>`, `chi = c_slope_1^2 / c_tip_1`. With a soft contact `S = S_a (1 + k / k_c)`, and both are
+/// solved together.
+/// # Method
+/// Free stretches by level and noise; averaged Hann periodograms; harmonic oscillator, white and 1/f noise by Whittle's likelihood.
+/// # Shapes
+/// `spectrum`: density and fitted model over frequency.
+/// # Units
+/// N/m; V^2/Hz.
+/// # Accuracy
+/// Relative variance of the peak `1 / sqrt(pi f1 T / Q)` for T seconds of free flight: 0.9 % for the paper's archive; twice the
+/// sensitivity's, the temperature's and the mode shape's uncertainty added in squares.
+/// # Errors
+/// No free stretch of a segment's length, no peak, no sensitivity, a contact too soft for any lever.
+/// # Source
+/// H.-J. Butt and M. Jaschke, Nanotechnology 6 (1995) 1; P. Whittle, Ark. Mat. 2 (1953) 423.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Stiffness")]
+pub struct ThermalStiffness {
+    /// Optical lever sensitivity in V/m, above 0, where `sensitivity` is not wired. Default: absent.
+    pub sensitivity_v_per_m: Option<f64>,
+    /// Its standard error in V/m, not negative. Default: 0.
+    pub sensitivity_std_v_per_m: f64,
+    /// Contact stiffness in N/m under the contact slope, above 0, where the sensitivity is not corrected yet; absent: as `sensitivity`
+    /// says, or rigid. Default: absent.
+    pub contact_stiffness_n_per_m: Option<f64>,
+    /// Temperature in K, above 0. Default: 295.
+    pub temperature_k: f64,
+    /// Its standard uncertainty in K, not negative. Default: 2.
+    pub temperature_std_k: f64,
+    /// `c_slope_1^2 / c_tip_1`, above 0. Default: 0.8175, a uniform beam seen by its end slope. From an identified static share of mode
+    /// 1 of the detector signal: its square / 0.971.
+    pub mode_shape_factor: f64,
+    /// Its standard uncertainty, not negative. Default: 0.01.
+    pub mode_shape_factor_std: f64,
+    /// Real detector poles in Hz, above 0: they attenuate the peak (by 0.2 % for the paper's). Default: none.
+    pub detector_poles_hz: Vec<f64>,
+    /// Where the peak is sought.
+    pub peak: PeakSettings,
+    /// What counts as a free stretch.
+    pub free: FreeSettings,
+}
+
+impl Default for ThermalStiffness {
+    fn default() -> Self {
+        Self {
+            sensitivity_v_per_m: None,
+            sensitivity_std_v_per_m: 0.0,
+            contact_stiffness_n_per_m: None,
+            temperature_k: 295.0,
+            temperature_std_k: 2.0,
+            mode_shape_factor: UNIFORM_BEAM_FACTOR,
+            mode_shape_factor_std: 0.01,
+            detector_poles_hz: Vec::new(),
+            peak: PeakSettings::default(),
+            free: FreeSettings::default(),
+        }
+    }
+}
+
+const RECORDS: Port<Recording> = Port::new("records", "records", "the records; channel `deflection`");
+const SENSITIVITY: Port<Document> =
+    Port::optional("sensitivity", "sensitivity", "the summary of `calibration.sensitivity`");
+const SPECTRUM: Port<Array> =
+    Port::new("spectrum", "thermal-spectrum", "averaged density of the free stretches and its fit");
+const SUMMARY: Port<Document> =
+    Port::new("summary", "stiffness", "the spring constant, its error and where it comes from");
+
+/// What `summary` holds.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct StiffnessSummary {
+    /// The spring constant, N/m.
+    pub stiffness_n_per_m: Estimate,
+    /// What an uncorrected sensitivity would give, N/m.
+    pub apparent_n_per_m: f64,
+    /// The sensitivity that goes with it, V/m.
+    pub sensitivity_v_per_m: Estimate,
+    /// The contact stiffness that was corrected for together with k, N/m; null: none, or corrected before.
+    pub contact_stiffness_n_per_m: Option<f64>,
+    /// Mode 1, undamped, Hz.
+    pub frequency_hz: Estimate,
+    /// Its quality factor.
+    pub quality_factor: Estimate,
+    /// Variance of the signal in mode 1, V^2.
+    pub variance_v2: Estimate,
+    /// White noise, V^2/Hz.
+    pub white_v2_per_hz: f64,
+    /// `|D(f1)|^2`.
+    pub attenuation: f64,
+    /// Relative standard errors by origin.
+    pub relative_errors: RelativeErrors,
+    /// Mean square of (data/model - 1) over its expectation: 1 where the model holds.
+    pub dispersion: f64,
+    /// Lines left out of the fit, Hz.
+    pub lines_hz: Vec<f64>,
+    /// Number of half-overlapping segments.
+    pub segments: usize,
+    /// Free flight that went into it, s.
+    pub free_s: f64,
+}
+
+/// Relative standard errors of the spring constant by origin.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct RelativeErrors {
+    /// Statistics of the thermal peak.
+    pub peak: f64,
+    /// Sensitivity (twice its own).
+    pub sensitivity: f64,
+    /// Temperature.
+    pub temperature: f64,
+    /// Mode shape.
+    pub mode_shape: f64,
+}
+
+impl Stage for ThermalStiffness {
+    const SPEC: Spec = Spec {
+        name: "calibration.stiffness",
+        version: 1,
+        summary: "spring constant from the thermal peak of mode 1 in the free stretches",
+        inputs: &[RECORDS.spec(), SENSITIVITY.spec()],
+        outputs: &[SPECTRUM.spec(), SUMMARY.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "H.-J. Butt and M. Jaschke, Nanotechnology 6 (1995) 1; P. Whittle, Ark. Mat. 2 (1953) 423",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        within("sensitivity_v_per_m", self.sensitivity_v_per_m.unwrap_or(1.0), 1e-12, 1e15)?;
+        within("sensitivity_std_v_per_m", self.sensitivity_std_v_per_m, 0.0, 1e15)?;
+        within("contact_stiffness_n_per_m", self.contact_stiffness_n_per_m.unwrap_or(1.0), 1e-6, 1e9)?;
+        within("temperature_k", self.temperature_k, 1e-3, 1e5)?;
+        within("temperature_std_k", self.temperature_std_k, 0.0, self.temperature_k)?;
+        within("mode_shape_factor", self.mode_shape_factor, 1e-6, 1e3)?;
+        within("mode_shape_factor_std", self.mode_shape_factor_std, 0.0, self.mode_shape_factor)?;
+        for &pole in &self.detector_poles_hz {
+            within("detector_poles_hz", pole, 1.0, 1e15)?;
+        }
+        self.peak.check()?;
+        self.free.check()
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let records = &inputs.get(&RECORDS)?.records;
+        let gauge = self.gauge(inputs.find(&SENSITIVITY)?)?;
+        let rate = common_rate(records)?;
+        let rule = self.free.rule(rate, self.peak.segment_samples);
+        let empty = Welch::new(self.peak.segment_samples, rate).map_err(StageError::from_error)?;
+        cx.expect(records.len());
+        let parts = records
+            .par_iter()
+            .map(|record| {
+                let free = read_free(record, &read_blocks(record, self.free.block_samples)?, rule)?;
+                let mut welch = empty.fresh();
+                push_free(record, &free.stretches, &mut welch)?;
+                cx.tick();
+                Ok((welch, free.stretches.iter().map(ExactSizeIterator::len).sum::<usize>()))
+            })
+            .collect::<Result<Vec<(Welch, usize)>, StageError>>()?;
+        let mut welch = empty;
+        parts.iter().for_each(|(part, _)| welch.merge(part));
+        let free_samples: usize = parts.iter().map(|(_, samples)| samples).sum();
+        let average = welch.average().map_err(StageError::from_error)?;
+        let peak = thermal_peak(&average, self.peak.search()).map_err(StageError::from_error)?;
+        let variance = Estimate { value: peak.variance_v2, std: peak.variance_std_v2 };
+        let k = spring_constant(peak.frequency_hz, variance, &gauge).map_err(StageError::from_error)?;
+        warn(&peak, &k, cx);
+        let frequencies: Vec<f64> = (0..average.density_v2_per_hz.len()).map(|i| i as f64 * average.bin_hz).collect();
+        let model: Vec<f64> =
+            frequencies.iter().map(|&f| if f > 0.0 { peak.density_v2_per_hz(f) } else { f64::NAN }).collect();
+        let axis = Axis::new("frequency", "Hz", "frequency", frequencies);
+        let spectrum = Array::over(vec![axis])
+            .with("density", "V^2/Hz", "one-sided power spectral density", &["frequency"], average.density_v2_per_hz)
+            .with("model", "V^2/Hz", "thermal peak of mode 1, white and 1/f noise", &["frequency"], model)
+            .attribute("segments", average.segments);
+        let summary = StiffnessSummary {
+            stiffness_n_per_m: k.stiffness_n_per_m,
+            apparent_n_per_m: k.apparent_n_per_m,
+            sensitivity_v_per_m: k.sensitivity_v_per_m,
+            contact_stiffness_n_per_m: gauge.contact_stiffness_n_per_m,
+            frequency_hz: Estimate { value: peak.frequency_hz, std: peak.frequency_std_hz },
+            quality_factor: Estimate { value: peak.quality_factor, std: peak.quality_factor_std },
+            variance_v2: variance,
+            white_v2_per_hz: peak.white_v2_per_hz,
+            attenuation: k.attenuation,
+            relative_errors: RelativeErrors {
+                peak: k.relative_errors[0],
+                sensitivity: k.relative_errors[1],
+                temperature: k.relative_errors[2],
+                mode_shape: k.relative_errors[3],
+            },
+            dispersion: peak.dispersion,
+            lines_hz: peak.lines_hz,
+            segments: average.segments,
+            free_s: free_samples as f64 / rate,
+        };
+        Ok(Ports::new().with(&SPECTRUM, spectrum).with(&SUMMARY, Document::new(&summary)?))
+    }
+
+    fn examples() -> Vec<Example> {
+        vec![Example {
+            title: "3.8 N/m from the free stretches of two simulated records",
+            params: "sensitivity_v_per_m = 1e7\nmode_shape_factor = 0.830\ndetector_poles_hz = [1.3e6, 1.9e6, 2.4e6]",
+            inputs: super::example::records,
+            expect,
+        }]
+    }
+}
+
+fn expect(outputs: &Ports) -> Result<String, String> {
+    let summary: StiffnessSummary =
+        outputs.get(&SUMMARY).and_then(Document::read).map_err(|error| error.to_string())?;
+    let found = summary.stiffness_n_per_m;
+    // 0.1 s of free flight: about 6 %; four standard errors
+    if (found.value - 3.8).abs() < 4.0 * found.std && found.std < 0.4 {
+        Ok(format!("{:.2} +- {:.2} N/m; truth 3.8", found.value, found.std))
+    } else {
+        Err(format!("{:.3} +- {:.3} N/m, wanted 3.8", found.value, found.std))
+    }
+}
+
+impl ThermalStiffness {
+    fn gauge(&self, wired: Option<&Document>) -> Result<ThermalGauge, StageError> {
+        let (sensitivity, contact) = match (wired, self.sensitivity_v_per_m) {
+            (Some(document), _) => {
+                let summary: SensitivitySummary = document.read()?;
+                if summary.corrected {
+                    (summary.sensitivity_v_per_m, None)
+                } else {
+                    (summary.apparent_v_per_m, self.contact_stiffness_n_per_m.or(summary.contact_stiffness_n_per_m))
+                }
+            }
+            (None, Some(value)) => {
+                (Estimate { value, std: self.sensitivity_std_v_per_m }, self.contact_stiffness_n_per_m)
+            }
+            (None, None) => {
+                return Err(StageError::new(
+                    "no sensitivity: neither `sensitivity` is wired nor `sensitivity_v_per_m` given",
+                )
+                .help("wire the summary of `calibration.sensitivity`, or give the number"));
+            }
+        };
+        Ok(ThermalGauge {
+            sensitivity_v_per_m: sensitivity,
+            contact_stiffness_n_per_m: contact,
+            temperature_k: Estimate { value: self.temperature_k, std: self.temperature_std_k },
+            mode_shape_factor: Estimate { value: self.mode_shape_factor, std: self.mode_shape_factor_std },
+            detector_pole_hz: self.detector_poles_hz.clone(),
+        })
+    }
+}
+
+fn warn(peak: &ThermalPeak, k: &SpringConstant, cx: &Context) {
+    if peak.dispersion > 1.5 {
+        cx.warn(format!(
+            "the thermal peak scatters {:.2} times as much about its model as chance allows: lines, a second peak or ringing in the free stretches",
+            peak.dispersion
+        ));
+    }
+    let relative = k.stiffness_n_per_m.std / k.stiffness_n_per_m.value;
+    if relative > 0.1 {
+        cx.warn(format!(
+            "the spring constant is known to {:.0} % only: more or longer free stretches help",
+            100.0 * relative
+        ));
+    }
+}

@@ -1,0 +1,117 @@
+//! Examples of the stages: known truth, as inputs.
+
+use afmid_pipeline::{Array, Axis, Context, Document, Example, Port, Ports, Stage, StageError, StateSpace, Table};
+
+use super::modes_stage;
+use super::pem_stage::{self, DataSet, Pem};
+use super::zeros_stage;
+use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, release};
+
+pub(super) fn pem() -> Vec<Example> {
+    vec![Example {
+        title: "One resonance, released",
+        params: "order = 2",
+        inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
+        expect: |outputs| {
+            let model = outputs.get(&pem_stage::MODEL).map_err(|error| error.to_string())?;
+            let (model, _) = modes_stage::innovations(model).map_err(|error| error.to_string())?;
+            let Some(z) = model.sections.first().and_then(|section| section.poles().first().copied()) else {
+                return Err("no pole".to_owned());
+            };
+            let s = z.ln() / model.sample_time_s;
+            let (f, q) = (s.norm() / std::f64::consts::TAU, s.norm() / (-2.0 * s.re));
+            // noise-free: rounding alone
+            if (f / FREQUENCY_HZ - 1.0).abs() < 1e-9 && (q / QUALITY_FACTOR - 1.0).abs() < 1e-7 {
+                Ok(format!("The pole lies at {f:.1} Hz with Q = {q:.3}."))
+            } else {
+                Err(format!("{f} Hz, Q = {q}"))
+            }
+        },
+    }]
+}
+
+pub(super) fn modes() -> Vec<Example> {
+    vec![Example {
+        title: "The mode of one resonance, beside a sweep",
+        params: "reference_frequency_hz = [119.9e3]",
+        inputs: || Ok(Ports::new().with(&pem_stage::MODEL, model()?)),
+        expect: |outputs| {
+            let modes = outputs.get(&modes_stage::MODES).map_err(|error| error.to_string())?;
+            let f = modes.real("frequency_hz").map_err(|error| error.to_string())?;
+            let summary: &Document = outputs.get(&modes_stage::SUMMARY).map_err(|error| error.to_string())?;
+            let difference = summary.0["reference"][0]["frequency_difference"].as_f64().unwrap_or(f64::NAN);
+            // the example's resonance is exact; the sweep is off by 0.1 kHz in 119.9
+            if f.len() == 1 && (f[0] / FREQUENCY_HZ - 1.0).abs() < 1e-9 && (difference - 0.1 / 119.9).abs() < 1e-8 {
+                Ok(format!("One mode at {:.1} Hz, {:.2e} above the sweep.", f[0], difference))
+            } else {
+                Err(format!("{f:?} {difference}"))
+            }
+        },
+    }]
+}
+
+pub(super) fn zeros() -> Vec<Example> {
+    vec![Example {
+        title: "A zero that stays while its pole moves",
+        params: "",
+        inputs: || {
+            let free = roots(&[(50e3, "pole"), (137e3, "zero"), (270e3, "pole")], 50.0);
+            let coupled = roots(&[(137.3e3, "zero"), (157e3, "pole"), (334e3, "pole")], 100.0);
+            Ok(Ports::new().with(&zeros_stage::FREE, free).with(&zeros_stage::COUPLED, coupled))
+        },
+        expect: |outputs| {
+            let column = |port: &Port<Table>, name: &str| -> Result<Vec<f64>, StageError> {
+                Ok(outputs.get(port)?.real(name)?.to_vec())
+            };
+            let errors = column(&zeros_stage::ZEROS, "combined_errors").map_err(|error| error.to_string())?;
+            let shifts = column(&zeros_stage::SHIFTS, "shift_hz").map_err(|error| error.to_string())?;
+            // 300 Hz over sqrt(50^2 + 100^2) Hz
+            if errors.len() == 1 && (errors[0] - 2.683).abs() < 1e-3 && (shifts[0] - 107e3).abs() < 1e-6 {
+                Ok(format!("The zero differs by {:.2} combined errors, the first pole moves by 107 kHz.", errors[0]))
+            } else {
+                Err(format!("{errors:?} {shifts:?}"))
+            }
+        },
+    }]
+}
+
+/// The release of one resonance, noise-free, as a pair with both halves.
+fn pair() -> Array {
+    let samples = 2048;
+    let time = (0..samples).map(|k| (k as f64 - T0 as f64) / SAMPLE_RATE_HZ).collect();
+    let force: Vec<f64> = (0..samples).map(|k| if k < T0 { LOAD_V } else { 0.0 }).collect();
+    let response = release(samples, T0, LOAD_V);
+    let mut pair = Array::over(vec![Axis::new("time", "s", "time since t0", time)])
+        .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
+        .attribute("t0_sample", T0)
+        .attribute("kind", "snap-off");
+    for set in [DataSet::All, DataSet::Identification, DataSet::Verification] {
+        let name = |what: &str| format!("{what}{}", set.suffix());
+        pair = pair
+            .with(&name("response"), "V", "response", &["time"], response.clone())
+            .with(&name("force"), "V", "force", &["time"], force.clone())
+            .with(&name("standard_error"), "V", "standard error of the response", &["time"], vec![1e-4; samples]);
+    }
+    pair
+}
+
+fn model() -> Result<StateSpace, StageError> {
+    let stage = Pem { order: 2, ..Pem::default() };
+    let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
+    let outputs = stage.run(&Ports::new().with(&pem_stage::PAIR, pair()), &cx)?;
+    Ok(outputs.get(&pem_stage::MODEL)?.clone())
+}
+
+/// A table as `model.modes` makes it, with one standard error for all.
+fn roots(rows: &[(f64, &str)], std_hz: f64) -> Table {
+    let text =
+        |value: &dyn Fn(&str) -> &'static str| rows.iter().map(|row| value(row.1).to_owned()).collect::<Vec<String>>();
+    let number = |value: f64| vec![value; rows.len()];
+    Table::new()
+        .with("kind", "", "pole or zero", text(&|kind| if kind == "pole" { "pole" } else { "zero" }))
+        .with("class", "", "class", text(&|kind| if kind == "pole" { "mechanical" } else { "pair" }))
+        .with("frequency_hz", "Hz", "frequency", rows.iter().map(|row| row.0).collect::<Vec<f64>>())
+        .with("frequency_std_hz", "Hz", "standard error", number(std_hz))
+        .with("quality_factor", "1", "quality factor", number(100.0))
+        .with("quality_factor_std", "1", "standard error", number(1.0))
+}

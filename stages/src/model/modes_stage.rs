@@ -1,0 +1,328 @@
+//! The stage `model.modes`.
+
+use afmid_pipeline::{
+    Array, Attribute, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace,
+    Table,
+};
+use faer::{Mat, c64};
+use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::modes::{ModeCriteria, Pole, PoleKind, ResponsePoint, Root, poles, response, zeros};
+use super::pem_stage::{DataSet, MODEL};
+use super::{InnovationsModel, Nuisances, noise_ceiling_percent, simulate_held_out};
+
+/// Extracts modes, poles and zeros from a model, each with its standard error, and judges the model on held-out events.
+///
+/// Model: s = ln(z) / Ts, f = |s| / 2 pi, Q = |s| / (-2 Re s), pole by pole; a mode is an established, weakly damped pair; the rest are detector
+/// poles, doubtful pairs, and real negative ones, which have no continuous counterpart.
+/// Method: zeros are the invariant zeros of (A, B, C, D). Standard errors by the delta method from the model's covariance. Held-out fit: the model of
+/// the identification half simulated on the verification half's force, initial state, offset and drift fitted again.
+/// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency.
+/// Units: Hz; static shares are parts of the static gain.
+/// Accuracy: first order in the errors. A static share is the mode's own partial fraction: within the detector's roll-off it is turned and damped by it.
+/// Zeros map as poles do; the hold makes them differ from the continuous system's by 1e-4 at a tenth of the sample rate.
+/// Errors: a model that is not one of `model.pem`, or without covariance; a pair of another sample rate.
+/// Source: Stark et al. 2005, Table I and Fig. 5; L. Ljung, System Identification, 1999, section 9.4.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Modes {
+    /// Least quality factor of a mode, above 0.5. Default: 5; detector poles are real or strongly damped.
+    pub min_quality_factor: f64,
+    /// Highest frequency of a mode in Hz, above 0. Default: none.
+    pub max_frequency_hz: Option<f64>,
+    /// Least amplitude of a mode's ringing over its standard error, 0 or more. Default: 6; the best of thousands of noise frequencies reaches 5.
+    pub min_significance: f64,
+    /// Largest relative standard error of a mode's quality factor, above 0. Default: 0.5; a line that does not decay is no mode.
+    pub max_quality_factor_error: f64,
+    /// Points of the frequency response, 2 to 100000, logarithmic from `response_from_hz` to half the sample rate. Default: 2000.
+    pub response_points: usize,
+    /// Lowest frequency of the response in Hz, above 0. Default: 1000.
+    pub response_from_hz: f64,
+    /// Reference frequencies in Hz (a sweep), to compare with. Default: none.
+    pub reference_frequency_hz: Vec<f64>,
+    /// Reference quality factors, as many as frequencies, or none. Default: none.
+    pub reference_quality_factor: Vec<f64>,
+}
+
+impl Default for Modes {
+    fn default() -> Self {
+        let criteria = ModeCriteria::default();
+        Self {
+            min_quality_factor: criteria.min_quality_factor,
+            max_frequency_hz: None,
+            min_significance: criteria.min_significance,
+            max_quality_factor_error: criteria.max_quality_factor_error,
+            response_points: 2000,
+            response_from_hz: 1000.0,
+            reference_frequency_hz: Vec::new(),
+            reference_quality_factor: Vec::new(),
+        }
+    }
+}
+
+const HALF: Port<StateSpace> =
+    Port::optional("half", "model", "the model of the identification half, for the held-out fit");
+const PAIR: Port<Array> = Port::optional("pair", "pair", "force and response with both halves, for the held-out fit");
+pub(super) const MODES: Port<Table> = Port::new("modes", "modes", "mechanical modes, ascending");
+pub(super) const ROOTS: Port<Table> =
+    Port::new("roots", "roots", "all poles and zeros, with classes and standard errors");
+const RESPONSE: Port<Array> = Port::new("response", "model-response", "frequency response with its standard errors");
+pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "modes and fits");
+
+impl Stage for Modes {
+    const SPEC: Spec = Spec {
+        name: "model.modes",
+        version: 1,
+        summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
+        inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
+        outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "Stark et al., Rev. Sci. Instrum. 2005, Table I and Fig. 5",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        let above = |name: &str, value: f64, least: f64| {
+            if value > least && value.is_finite() {
+                Ok(())
+            } else {
+                Err(wanted(name, value, &format!("above {least}")))
+            }
+        };
+        above("min_quality_factor", self.min_quality_factor, 0.5)?;
+        above("max_frequency_hz", self.max_frequency_hz.unwrap_or(1.0), 0.0)?;
+        above("min_significance", self.min_significance, -f64::MIN_POSITIVE)?;
+        above("max_quality_factor_error", self.max_quality_factor_error, 0.0)?;
+        above("response_from_hz", self.response_from_hz, 0.0)?;
+        if !(2..=100_000).contains(&self.response_points) {
+            return Err(wanted("response_points", self.response_points as f64, "2 to 100000"));
+        }
+        let (f, q) = (self.reference_frequency_hz.len(), self.reference_quality_factor.len());
+        if q > 0 && q != f {
+            return Err(wanted("reference_quality_factor's length", q as f64, &format!("none or {f}, as frequencies")));
+        }
+        if let Some(value) =
+            self.reference_frequency_hz.iter().chain(&self.reference_quality_factor).find(|v| !(**v > 0.0))
+        {
+            return Err(wanted("a reference value", *value, "above 0"));
+        }
+        Ok(())
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let artifact = inputs.get(&MODEL)?;
+        let (model, covariance) = innovations(artifact)?;
+        let found = poles(&model, &covariance, &self.criteria()).map_err(StageError::from_error)?;
+        let zeros = zeros(&model, &covariance).map_err(StageError::from_error)?;
+        let modes: Vec<&Pole> = found.iter().filter(|pole| pole.kind == PoleKind::Mechanical).collect();
+        if modes.is_empty() {
+            cx.warn("no pole passes as a mode: lower min_significance or min_quality_factor, or raise the order");
+        }
+        let half = inputs.find(&HALF)?;
+        let fits = match (half, inputs.find(&PAIR)?) {
+            (Some(half), Some(pair)) => held_out(half, pair)?,
+            _ => Fits::default(),
+        };
+        let points = response(&model, &covariance, &self.frequencies(1.0 / model.sample_time_s))
+            .map_err(StageError::from_error)?;
+        let summary = Document::new(&json!({
+            "modes": modes.iter().map(|mode| mode_document(mode)).collect::<Vec<Value>>(),
+            "fit_percent": {
+                "identification": fits.identification,
+                "held_out": fits.held_out,
+                "noise_ceiling": fits.noise_ceiling,
+            },
+            "reference": self.compared(&modes),
+        }))?;
+        Ok(Ports::new()
+            .with(&MODES, mode_table(&modes))
+            .with(&ROOTS, root_table(&found, &zeros))
+            .with(&RESPONSE, response_array(&points, artifact))
+            .with(&SUMMARY, summary))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::example::modes()
+    }
+}
+
+impl Modes {
+    fn criteria(&self) -> ModeCriteria {
+        ModeCriteria {
+            min_quality_factor: self.min_quality_factor,
+            max_frequency_hz: self.max_frequency_hz.unwrap_or(f64::INFINITY),
+            min_significance: self.min_significance,
+            max_quality_factor_error: self.max_quality_factor_error,
+        }
+    }
+
+    fn frequencies(&self, rate: f64) -> Vec<f64> {
+        let (low, high) = (self.response_from_hz.min(0.25 * rate).ln(), (0.5 * rate).ln());
+        let last = (self.response_points - 1) as f64;
+        (0..self.response_points).map(|i| (low + (high - low) * i as f64 / last).exp()).collect()
+    }
+
+    /// Each reference value beside the nearest mode.
+    fn compared(&self, modes: &[&Pole]) -> Vec<Value> {
+        let row = |(i, &reference): (usize, &f64)| {
+            let distance = |mode: &&&Pole| (mode.root.frequency_hz / reference).ln().abs();
+            let nearest = modes.iter().min_by(|x, y| distance(x).total_cmp(&distance(y))).map(|mode| mode.root);
+            let q = self.reference_quality_factor.get(i);
+            json!({
+                "reference_frequency_hz": reference,
+                "reference_quality_factor": q,
+                "frequency_hz": nearest.map(|root| root.frequency_hz),
+                "frequency_difference": nearest.map(|root| root.frequency_hz / reference - 1.0),
+                "quality_factor": nearest.map(|root| root.quality_factor),
+                "quality_factor_difference": nearest.zip(q).map(|(root, q)| root.quality_factor / q - 1.0),
+            })
+        };
+        self.reference_frequency_hz.iter().enumerate().map(row).collect()
+    }
+}
+
+fn wanted(name: &str, value: f64, range: &str) -> StageError {
+    StageError::new(format!("`{name}` is {value}, wanted {range}"))
+}
+
+/// Model and covariance of an artifact that `model.pem` made.
+pub(super) fn innovations(artifact: &StateSpace) -> Result<(InnovationsModel, Mat<f64>), StageError> {
+    let n = artifact.order();
+    let a = Mat::from_fn(n, n, |i, j| artifact.a.at(i, j));
+    let feedthrough = artifact.d.values.first().copied().unwrap_or(0.0);
+    let model = InnovationsModel::from_matrices(
+        &a,
+        &artifact.b.values,
+        &artifact.k.values,
+        feedthrough,
+        artifact.sample_time_s,
+    )
+    .map_err(StageError::from_error)?;
+    let count = 2 * n + 1;
+    if (artifact.covariance.rows, artifact.covariance.columns) != (count, count) {
+        return Err(StageError::new(format!(
+            "the model's covariance is {} x {}, wanted {count} x {count}: all a, all b, d",
+            artifact.covariance.rows, artifact.covariance.columns
+        )));
+    }
+    Ok((model, Mat::from_fn(count, count, |i, j| artifact.covariance.at(i, j))))
+}
+
+/// FIT % of the half-split model; unknown where a part is missing.
+#[derive(Default)]
+struct Fits {
+    identification: Option<f64>,
+    held_out: Option<f64>,
+    noise_ceiling: Option<f64>,
+}
+
+fn held_out(half: &StateSpace, pair: &Array) -> Result<Fits, StageError> {
+    let (model, _) = innovations(half)?;
+    let rate = pair.number("sample_rate_hz")?;
+    if (rate * model.sample_time_s - 1.0).abs() > 1e-9 {
+        return Err(StageError::new(format!(
+            "the pair's sample rate is {rate} Hz, the model's {} Hz",
+            1.0 / model.sample_time_s
+        )));
+    }
+    let first = half.attributes.get("first_sample").and_then(Attribute::as_f64).unwrap_or(0.0) as usize;
+    let nuisances = Nuisances { offset: true, slope: true };
+    let series = |name: &str, set: DataSet| -> Result<Vec<f64>, StageError> {
+        let values = pair.real(&format!("{name}{}", set.suffix()))?;
+        values
+            .get(first..)
+            .map(<[f64]>::to_vec)
+            .ok_or_else(|| StageError::new("the pair is shorter than the model's window"))
+    };
+    let simulated = |set: DataSet| -> Result<f64, StageError> {
+        let simulation = simulate_held_out(&model, &series("force", set)?, &series("response", set)?, nuisances);
+        Ok(simulation.map_err(StageError::from_error)?.fit_percent)
+    };
+    let (response, error) =
+        (series("response", DataSet::Verification)?, series("standard_error", DataSet::Verification)?);
+    Ok(Fits {
+        identification: Some(simulated(DataSet::Identification)?),
+        held_out: Some(simulated(DataSet::Verification)?),
+        noise_ceiling: Some(noise_ceiling_percent(&response, &error).map_err(StageError::from_error)?),
+    })
+}
+
+fn mode_document(mode: &Pole) -> Value {
+    json!({
+        "frequency_hz": mode.root.frequency_hz,
+        "frequency_std_hz": mode.root.frequency_std_hz,
+        "quality_factor": mode.root.quality_factor,
+        "quality_factor_std": mode.root.quality_factor_std,
+        "static_share": mode.static_share,
+        "static_share_std": mode.static_share_std,
+    })
+}
+
+fn mode_table(modes: &[&Pole]) -> Table {
+    let column = |value: fn(&Pole) -> f64| modes.iter().map(|mode| value(mode)).collect::<Vec<f64>>();
+    Table::new()
+        .with("frequency_hz", "Hz", "resonance frequency", column(|m| m.root.frequency_hz))
+        .with("frequency_std_hz", "Hz", "its standard error", column(|m| m.root.frequency_std_hz))
+        .with("quality_factor", "1", "quality factor", column(|m| m.root.quality_factor))
+        .with("quality_factor_std", "1", "its standard error", column(|m| m.root.quality_factor_std))
+        .with("static_share", "1", "part of the static gain", column(|m| m.static_share))
+        .with("static_share_std", "1", "its standard error", column(|m| m.static_share_std))
+        .with("significance", "1", "ringing amplitude over its standard error", column(|m| m.significance))
+}
+
+fn root_table(poles: &[Pole], zeros: &[Root]) -> Table {
+    let roots: Vec<Root> = poles.iter().map(|pole| pole.root).chain(zeros.iter().copied()).collect();
+    let column = |value: fn(&Root) -> f64| roots.iter().map(value).collect::<Vec<f64>>();
+    let zero_kind = |root: &Root| if root.is_complex() { "pair" } else { "real" };
+    let kinds = poles.iter().map(|_| "pole").chain(zeros.iter().map(|_| "zero"));
+    let classes = poles.iter().map(|pole| pole.kind.name()).chain(zeros.iter().map(zero_kind));
+    Table::new()
+        .with("kind", "", "pole or zero", kinds.map(str::to_owned).collect::<Vec<String>>())
+        .with(
+            "class",
+            "",
+            "what a pole belongs to; whether a zero is one of a pair",
+            classes.map(str::to_owned).collect::<Vec<String>>(),
+        )
+        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", column(|r| r.frequency_hz))
+        .with("frequency_std_hz", "Hz", "its standard error", column(|r| r.frequency_std_hz))
+        .with("quality_factor", "1", "magnitude of s over minus twice its real part", column(|r| r.quality_factor))
+        .with("quality_factor_std", "1", "its standard error", column(|r| r.quality_factor_std))
+        .with("z_re", "1", "real part in the z plane", column(|r| r.z.re))
+        .with("z_im", "1", "imaginary part in the z plane, upper one of a pair", column(|r| r.z.im))
+        .with("s_re", "rad/s", "real part in the s plane", column(|r| r.s.re))
+        .with("s_im", "rad/s", "imaginary part in the s plane", column(|r| r.s.im))
+}
+
+fn response_array(points: &[ResponsePoint], model: &StateSpace) -> Array {
+    let over = &["frequency_hz"];
+    let complex = |value: c64| Complex64::new(value.re, value.im);
+    let axis = Axis::new("frequency_hz", "Hz", "frequency", points.iter().map(|p| p.frequency_hz).collect());
+    Array::over(vec![axis])
+        .with(
+            "transfer",
+            "1",
+            "transfer function of the model",
+            over,
+            points.iter().map(|p| complex(p.value)).collect::<Vec<_>>(),
+        )
+        .with(
+            "magnitude_std",
+            "1",
+            "standard error of its magnitude",
+            over,
+            points.iter().map(ResponsePoint::magnitude_std).collect::<Vec<_>>(),
+        )
+        .with(
+            "phase_std",
+            "rad",
+            "standard error of its phase",
+            over,
+            points.iter().map(ResponsePoint::phase_std_rad).collect::<Vec<_>>(),
+        )
+        .attribute("sample_rate_hz", 1.0 / model.sample_time_s)
+        .attribute("order", model.order())
+}
