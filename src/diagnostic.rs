@@ -27,6 +27,7 @@ fn render_with(file: &str, text: &str, problems: &[Problem], theme: GraphicalThe
             // a source that cannot be shown: the message alone
             let _ = writeln!(out, "error: {problem}");
         }
+        out.push('\n');
     }
     let count = if problems.len() == 1 { "1 problem".to_owned() } else { format!("{} problems", problems.len()) };
     // writing to a String cannot fail

@@ -24,11 +24,20 @@ pub(super) fn parse<'a>(text: &'a str, problems: &mut Vec<Problem>) -> Document<
             problems.push(duplicate(text, &root, span));
         } else {
             usable = false;
-            let message = error.message().replace(", expected ", ", wanted ");
-            problems.push(Problem::new(message, span, "here").help("a config is TOML: https://toml.io"));
+            problems.push(syntax(text, error.message(), span));
         }
     }
     Document { root, usable }
+}
+
+fn syntax(text: &str, message: &str, span: Range<usize>) -> Problem {
+    let word = text.get(span.clone()).unwrap_or_default();
+    if word.starts_with(char::is_alphabetic) {
+        let message = format!("`{word}` is not a TOML value");
+        return Problem::new(message, span, "not TOML").help(format!("text needs quotes: {word:?}"));
+    }
+    let message = message.replace(", expected ", ", wanted ");
+    Problem::new(message, span, "here").help("a config is TOML: https://toml.io")
 }
 
 /// A key that is given twice; within `inputs`, a port that is wired twice.

@@ -173,11 +173,21 @@ fn plain(message: &str) -> String {
         "a sequence" => "an array".to_owned(),
         "a boolean" => "true or false".to_owned(),
         "a string" | "string only" => "text".to_owned(),
-        "u8" | "u16" | "u32" | "u64" | "usize" => format!("a whole number that is not negative ({wanted})"),
-        "i8" | "i16" | "i32" | "i64" | "isize" => format!("a whole number ({wanted})"),
+        "u8" => whole(0, u8::MAX),
+        "u16" => whole(0, u16::MAX),
+        "u32" => whole(0, u32::MAX),
+        "u64" | "usize" => "a whole number, 0 or more".to_owned(),
+        "i8" => whole(i8::MIN, i8::MAX),
+        "i16" => whole(i16::MIN, i16::MAX),
+        "i32" => whole(i32::MIN, i32::MAX),
+        "i64" | "isize" => "a whole number".to_owned(),
         _ if wanted.starts_with("struct ") || wanted.starts_with("a map") => "a table".to_owned(),
         _ if wanted.starts_with("a nonzero ") => "a whole number above 0".to_owned(),
         _ => wanted.to_owned(),
     };
     format!("found {found}, wanted {wanted}")
+}
+
+fn whole(low: impl std::fmt::Display, high: impl std::fmt::Display) -> String {
+    format!("a whole number from {low} to {high}")
 }

@@ -4,7 +4,7 @@ use toml::Spanned;
 use toml::de::DeValue;
 
 use super::problem::Problem;
-use super::suggest::did_you_mean;
+use super::suggest::{did_you_mean, misspelt};
 use super::value::found;
 
 /// What the `[pipeline]` table holds.
@@ -41,7 +41,7 @@ pub(super) fn read(value: &Spanned<DeValue<'_>>, problems: &mut Vec<Problem>) ->
             }
         }
     }
-    if !entries.contains_key("name") {
+    if !entries.contains_key("name") && !misspelt("name", &KEYS, entries) {
         let problem = Problem::new("[pipeline] has no `name`", value.span(), "lacks `name`");
         problems.push(problem.help("add a line such as `name = \"free-lever\"`"));
     }

@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 use super::overrides::Override;
 use super::place::Place;
 use super::problem::{Origin, Problem};
-use super::suggest::did_you_mean;
+use super::suggest::{did_you_mean, misspelt};
 use super::value::{found, table};
 
 /// A stage as a config declares it: not yet looked up, its parameters not yet read.
@@ -97,7 +97,7 @@ pub(super) fn read(index: usize, stage: &Spanned<DeValue<'_>>, problems: &mut Ve
     let (inputs, inputs_span, inputs_read) = inputs(entries, &title, &header, problems);
     let before = problems.len();
     let (params, params_place) = params(entries, &title, &header, problems);
-    let params_read = problems.len() == before;
+    let params_read = problems.len() == before && !(params.is_empty() && misspelt("params", &KEYS, entries));
     let overrides = Vec::new();
     Some(StageDecl {
         id,
@@ -130,6 +130,9 @@ fn text(
     problems: &mut Vec<Problem>,
 ) -> (String, Range<usize>) {
     let Some(value) = entries.get(key) else {
+        if misspelt(key, &KEYS, entries) {
+            return (String::new(), header.clone());
+        }
         let example = if key == "id" { "id = \"events\"" } else { "uses = \"events.correlation\"" };
         let problem = Problem::new(format!("{title} has no `{key}`"), header.clone(), format!("lacks `{key}`"));
         problems.push(problem.help(format!("add a line such as `{example}`")));
@@ -151,7 +154,9 @@ fn inputs(
     header: &Range<usize>,
     problems: &mut Vec<Problem>,
 ) -> (Vec<Input>, Range<usize>, bool) {
-    let Some(value) = entries.get("inputs") else { return (Vec::new(), header.clone(), true) };
+    let Some(value) = entries.get("inputs") else {
+        return (Vec::new(), header.clone(), !misspelt("inputs", &KEYS, entries));
+    };
     let Some(wires) = value.get_ref().as_table() else {
         let message = format!("`inputs` of {title}: found {}, wanted a table", found(value.get_ref()));
         let help = "write `inputs = { port = \"stage id\" }`";

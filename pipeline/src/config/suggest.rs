@@ -41,6 +41,12 @@ pub(crate) fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
+/// Whether a key that is missing is there under a misspelt name: then that is said already.
+pub(crate) fn misspelt(key: &str, known: &[&str], entries: &toml::de::DeTable<'_>) -> bool {
+    let unknown = entries.iter().map(|(name, _)| name.get_ref().as_ref()).filter(|name| !known.contains(name));
+    unknown.into_iter().any(|name| nearest(name, known.iter().copied()) == Some(key))
+}
+
 fn normal(word: &str) -> String {
     word.to_lowercase().replace('-', "_")
 }

@@ -55,7 +55,7 @@ impl Board<'_> {
         let mut wires = Vec::new();
         for port in ports {
             match decl.inputs.iter().find(|input| input.port == port.name) {
-                Some(input) => match self.resolve(input, port) {
+                Some(input) => match self.resolve(decl, input, port) {
                     Ok(wire) => wires.extend(wire),
                     Err(problem) => problems.push(problem),
                 },
@@ -67,7 +67,7 @@ impl Board<'_> {
     }
 
     /// The output that an input names; nothing if that was said already (its stage is unknown, the wire is none).
-    fn resolve(&self, input: &Input, port: &PortSpec) -> Result<Option<Wire>, Problem> {
+    fn resolve(&self, reader: &StageDecl, input: &Input, port: &PortSpec) -> Result<Option<Wire>, Problem> {
         if input.target.is_empty() {
             return Ok(None);
         }
@@ -95,7 +95,7 @@ impl Board<'_> {
         if !fits(chosen, port) {
             let message =
                 format!("`{id}.{}` is {}, input `{}` wants {}", chosen.name, kind(chosen), port.name, kind(port));
-            return Err(wrong(message, "does not fit").maybe_help(self.fitting_help(port)));
+            return Err(wrong(message, "does not fit").maybe_help(self.fitting_help(reader, port)));
         }
         Ok(Some(Wire { port: port.name, node, output: chosen.name, span: input.target_span.clone() }))
     }
@@ -103,7 +103,7 @@ impl Board<'_> {
     fn missing(&self, decl: &StageDecl, entry: &Entry, port: &PortSpec) -> Problem {
         let message = format!("input `{}` of {} (`{}`) is not wired", port.name, decl.title(), entry.spec.name);
         let label = format!("lacks `{}`", port.name);
-        let help = match self.fitting(port).as_slice() {
+        let help = match self.fitting(decl, port).as_slice() {
             [] => format!("it wants {} ({}); no stage of this config makes one", kind(port), port.doc),
             [one] => format!("write `inputs = {{ {} = \"{one}\" }}`", port.name),
             many => format!("it wants {}: {}", kind(port), list(many.iter().map(String::as_str))),
@@ -111,14 +111,15 @@ impl Board<'_> {
         Problem::new(message, decl.inputs_span.clone(), label).help(help)
     }
 
-    fn fitting_help(&self, port: &PortSpec) -> Option<String> {
-        let fitting = self.fitting(port);
+    fn fitting_help(&self, reader: &StageDecl, port: &PortSpec) -> Option<String> {
+        let fitting = self.fitting(reader, port);
         (!fitting.is_empty()).then(|| format!("these fit: {}", list(fitting.iter().map(String::as_str))))
     }
 
-    /// All outputs of the config that fit a port, as `id.port`.
-    fn fitting(&self, port: &PortSpec) -> Vec<String> {
-        let stages = self.decls.iter().zip(self.entries).filter(|(decl, _)| !decl.id.is_empty());
+    /// All outputs of other stages that fit a port, as `id.port`.
+    fn fitting(&self, reader: &StageDecl, port: &PortSpec) -> Vec<String> {
+        let other = |decl: &StageDecl| !decl.id.is_empty() && decl.id != reader.id;
+        let stages = self.decls.iter().zip(self.entries).filter(|(decl, _)| other(decl));
         stages
             .filter_map(|(decl, entry)| Some((decl, entry.as_ref()?)))
             .flat_map(|(decl, entry)| {

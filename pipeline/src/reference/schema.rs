@@ -3,6 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::stage::{Entry, PortSpec, Registry};
+use crate::store::RESERVED_STAGE_IDS;
 
 /// JSON Schema (draft 7, which all editors know) of a config with these stages.
 ///
@@ -113,10 +114,10 @@ fn stage(entry: &Entry, mut params: Value) -> Value {
 
 fn id() -> Value {
     json!({
-        "description": "Its id, unique; results are stored and shown under it. `pipeline` is reserved.",
+        "description": "Its id, unique; results are stored and shown under it.",
         "type": "string",
         "pattern": "^[a-z0-9_-]+$",
-        "not": { "const": crate::config::RESERVED_ID }
+        "not": { "enum": RESERVED_STAGE_IDS }
     })
 }
 

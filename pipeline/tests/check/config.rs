@@ -80,7 +80,7 @@ fn ids_are_checked() {
         wrong(&format!("{HEAD}{}", ids.concat()), &[]),
         [
             "\"a\" | stage id `a` is used twice | results are stored under it: rename one",
-            "\"pipeline\" | stage id `pipeline` is reserved for the [pipeline] table | choose another id",
+            "\"pipeline\" | stage id `pipeline` is reserved: result files hold something else under it | choose another id",
             "\"A b\" | stage id \"A b\": found 'A', wanted only a-z, 0-9, `_` and `-` | results are stored under it: write `a-b`, for instance",
         ]
     );
@@ -149,10 +149,16 @@ fn numbers_that_no_record_can_hold_are_refused() {
 
 #[test]
 fn syntax_errors_come_alone_and_all_at_once() {
-    let text = "[pipeline]\nname = x\n[[stage]]\nid = \n";
-    let wrong = wrong(text, &[]);
-    assert_eq!(wrong.len(), 2, "{wrong:?}");
-    assert!(wrong.iter().all(|line| line.contains("string values must be quoted, wanted")), "{wrong:?}");
+    let text = "[pipeline]\nname = x\nseed = \n[[stage]\nid = 3\n";
+    let here = "a config is TOML: https://toml.io";
+    assert_eq!(
+        wrong(text, &[]),
+        [
+            "x | `x` is not a TOML value | text needs quotes: \"x\"".to_owned(),
+            format!(" | string values must be quoted, wanted literal string | {here}"),
+            format!(" | unclosed array table, wanted `]` | {here}"),
+        ]
+    );
 }
 
 #[test]
