@@ -46,6 +46,8 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Write a run's page with its figures: one HTML file that needs no network.
+    Report(ReportArgs),
     /// List the stages, or document one.
     Stages {
         /// The stage to document.
@@ -93,6 +95,19 @@ pub struct RunArgs {
     /// Where stage results are kept [default: $AFMID_CACHE, or `afmid` in the user's cache folder].
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
+}
+
+/// What to report, and where to.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// The result file.
+    pub result: PathBuf,
+    /// The page [default: the result file's name with `.html`, in the working directory].
+    #[arg(short, long, value_name = "REPORT.html")]
+    pub output: Option<PathBuf>,
+    /// Also write every figure as an SVG file into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
 }
 
 /// What to explain.

@@ -5,6 +5,7 @@ mod commands;
 mod diagnostic;
 mod failure;
 mod progress;
+mod report;
 mod show;
 
 use std::process::ExitCode;

@@ -5,6 +5,7 @@ mod docs;
 mod explain;
 mod graph;
 mod load;
+mod report;
 mod run;
 mod schema;
 mod show;
@@ -21,6 +22,7 @@ pub fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Run(args) => run::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::Show { result, id, json } => show::run(&result, id.as_deref(), json),
+        Command::Report(args) => report::run(&args),
         Command::Check { configs } => check::run(&configs),
         Command::Graph { config, format } => graph::run(&config, format),
         Command::Stages { name } => stages::run(name.as_deref()),

@@ -1,0 +1,52 @@
+//! `afmid report`: a run as one page.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::store::read_result;
+
+use crate::cli::ReportArgs;
+use crate::failure::Failure;
+use crate::report::{figures, report};
+
+/// Writes the page, and the figures if asked for, and says where.
+pub fn run(args: &ReportArgs) -> Result<(), Failure> {
+    if !args.result.is_file() {
+        return Err(Failure::usage(format!("there is no file {}", args.result.display()), None));
+    }
+    let run = read_result(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    let output = args.output.clone().unwrap_or_else(|| default_output(&args.result));
+    if output == args.result {
+        return Err(Failure::usage("the page would replace the result file", Some("give another name with -o".to_owned())));
+    }
+    let page = report(&run).map_err(|error| Failure::failed(error, None))?;
+    write(&output, &page)?;
+    println!("{}", output.display());
+    if let Some(folder) = &args.figures {
+        fs::create_dir_all(folder)
+            .map_err(|error| Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None))?;
+        for (name, text) in figures(&run) {
+            let path = folder.join(name);
+            write(&path, &text)?;
+            println!("{}", path.display());
+        }
+    }
+    Ok(())
+}
+
+fn default_output(result: &Path) -> PathBuf {
+    PathBuf::from(result.file_stem().unwrap_or_default()).with_extension("html")
+}
+
+/// Writes under a temporary name beside it and renames: a page is whole or not there.
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    let mut temporary = path.as_os_str().to_owned();
+    temporary.push(format!(".{}.tmp", std::process::id()));
+    let temporary = PathBuf::from(temporary);
+    let written = fs::write(&temporary, text).and_then(|()| fs::rename(&temporary, path));
+    written.map_err(|error| {
+        // a half-written file is of no use to anybody; if it cannot be removed either, the first error says why
+        let _ = fs::remove_file(&temporary);
+        Failure::failed(format!("{} cannot be written: {error}", path.display()), None)
+    })
+}

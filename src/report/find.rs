@@ -1,0 +1,126 @@
+//! Finding artifacts by what they are: shapes, variables and the stages that they came from.
+
+use afmid_pipeline::{Array, Attribute, Axis, RunResult, Shaped, StageRecord, Values};
+use serde_json::Value;
+
+/// An artifact with the stage and port that it came from.
+#[derive(Debug)]
+pub(crate) struct Found<'a, T> {
+    pub stage: &'a StageRecord,
+    pub port: &'a str,
+    pub value: &'a T,
+}
+
+impl<T> Clone for Found<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Found<'_, T> {}
+
+/// All artifacts of shape `T`, in the order of the run.
+pub(crate) fn all<T: Shaped>(run: &RunResult) -> impl Iterator<Item = Found<'_, T>> {
+    run.stages.iter().flat_map(|stage| {
+        stage
+            .result
+            .outputs
+            .iter()
+            .filter_map(move |(port, artifact)| T::peek(artifact).map(|value| Found { stage, port, value }))
+    })
+}
+
+/// The kind of event that a stage's data came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum EventKind {
+    /// The lever is free afterwards; also where nothing says otherwise.
+    SnapOff,
+    /// The lever is coupled to the surface afterwards.
+    SnapIn,
+}
+
+/// The kind of event at the head of a stage's inputs: the nearest stage upstream whose parameter `kind` names one.
+pub(crate) fn event_kind(run: &RunResult, stage: &StageRecord) -> EventKind {
+    let mut seen: Vec<&str> = Vec::new();
+    let mut next = vec![stage];
+    while !next.is_empty() {
+        if let Some(kind) = next.iter().find_map(|stage| named_kind(stage)) {
+            return kind;
+        }
+        let mut upstream = Vec::new();
+        for stage in next {
+            for (_, source, _) in &stage.wires {
+                if !seen.contains(&source.as_str()) {
+                    seen.push(source);
+                    upstream.extend(run.stage(source));
+                }
+            }
+        }
+        next = upstream;
+    }
+    EventKind::SnapOff
+}
+
+fn named_kind(stage: &StageRecord) -> Option<EventKind> {
+    kind_from(stage.params.get("kind").and_then(Value::as_str)?)
+}
+
+fn kind_from(name: &str) -> Option<EventKind> {
+    match name {
+        "snap-off" => Some(EventKind::SnapOff),
+        "snap-in" | "snap-to-contact" => Some(EventKind::SnapIn),
+        _ => None,
+    }
+}
+
+impl Found<'_, Array> {
+    /// The kind of event that the array says it came from, or that its stage's inputs did.
+    pub fn event_kind(&self, run: &RunResult) -> EventKind {
+        let said = self.value.attributes.get("kind").and_then(Attribute::as_str).and_then(kind_from);
+        said.unwrap_or_else(|| event_kind(run, self.stage))
+    }
+}
+
+/// Whether `stage` reads, directly or not, what `source` made.
+pub(crate) fn depends_on(run: &RunResult, stage: &StageRecord, source: &str) -> bool {
+    let mut seen: Vec<&str> = Vec::new();
+    let mut next = vec![stage];
+    while let Some(stage) = next.pop() {
+        for (_, upstream, _) in &stage.wires {
+            if upstream == source {
+                return true;
+            }
+            if !seen.contains(&upstream.as_str()) {
+                seen.push(upstream);
+                next.extend(run.stage(upstream));
+            }
+        }
+    }
+    false
+}
+
+/// The axis of a frequency response or spectrum.
+pub(crate) fn frequency_axis(array: &Array) -> Option<&Axis> {
+    array.axes.iter().find(|axis| axis.unit == "Hz")
+}
+
+/// The axis of a signal in time.
+pub(crate) fn time_axis(array: &Array) -> Option<&Axis> {
+    array.axes.iter().find(|axis| axis.unit == "s")
+}
+
+/// The values of a real variable over exactly this axis.
+pub(crate) fn real_over<'a>(array: &'a Array, name: &str, axis: &Axis) -> Option<&'a [f64]> {
+    let variable = array.variables.iter().find(|variable| variable.name == name)?;
+    match &variable.values {
+        Values::Real(values) if variable.dims == [axis.name.as_str()] && values.len() == axis.values.len() => {
+            Some(values)
+        }
+        _ => None,
+    }
+}
+
+/// The unit of a variable; `1` if there is no such variable.
+pub(crate) fn unit_of<'a>(array: &'a Array, name: &str) -> &'a str {
+    array.variables.iter().find(|variable| variable.name == name).map_or("1", |variable| &variable.unit)
+}

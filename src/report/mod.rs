@@ -1,0 +1,23 @@
+//! The report: one self-contained HTML page about a run, with the paper's figures where the run has what they show.
+//!
+//! ```text
+//! RunResult -> paper/ (figures found by what artifacts mean) + generic/ (every stage) -> page -> template.html
+//! ```
+//!
+//! The page loads nothing, follows the reader's colour scheme and prints. The same run gives the same bytes.
+
+mod figure;
+mod find;
+mod generic;
+mod number;
+mod page;
+mod palette;
+mod paper;
+mod view;
+
+#[cfg(test)]
+mod fixture;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use page::{ReportError, figures, report};

@@ -1,0 +1,226 @@
+//! Assembles the page.
+
+use afmid_pipeline::{Document, Recording, RunResult};
+use minijinja::Environment;
+use minijinja::value::Serde;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::figure::Figure;
+use super::find::all;
+use super::generic::stage_view;
+use super::number::{bytes, duration, with_error};
+use super::palette;
+use super::paper;
+use super::view::{Fact, Head, Picture, Section, StageView, TableView, Tile};
+
+/// Bytes that the figures of the stages may take together, so that the page stays under 5 MB.
+const STAGE_FIGURES: usize = 2_000_000;
+
+/// Why a page could not be made.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum ReportError {
+    /// The template does not fit the data: a fault of this program.
+    #[error("the report's template does not fit: {0}")]
+    Template(#[from] minijinja::Error),
+}
+
+/// What the template reads.
+#[derive(Serialize)]
+struct Page<'a> {
+    name: &'a str,
+    program: &'a str,
+    facts: Vec<Fact>,
+    tiles: Vec<Tile>,
+    warnings: Vec<(String, Vec<String>)>,
+    sections: Vec<Section>,
+    skipped: Vec<Section>,
+    rejected: TableView,
+    stages: Vec<StageView>,
+    provenance: TableView,
+    config: &'a str,
+    overrides: &'a [String],
+    variables: String,
+    figure_css: &'static str,
+    page_css: &'static str,
+    script: &'static str,
+}
+
+/// One self-contained HTML page about a run.
+pub(crate) fn report(run: &RunResult) -> Result<String, ReportError> {
+    let sections: Vec<Section> = paper::sections(run)
+        .into_iter()
+        .map(|drawn| Section {
+            id: drawn.id.to_owned(),
+            title: drawn.title.to_owned(),
+            missing: if drawn.is_empty() { drawn.missing.to_owned() } else { String::new() },
+            pictures: drawn.figures.iter().map(picture).collect(),
+            tables: drawn.tables,
+        })
+        .collect();
+    let (shown, skipped): (Vec<Section>, Vec<Section>) =
+        sections.into_iter().partition(|section| section.missing.is_empty());
+    let warnings: Vec<(String, Vec<String>)> = run
+        .stages
+        .iter()
+        .filter(|stage| !stage.result.warnings.is_empty())
+        .map(|stage| (stage.id.clone(), stage.result.warnings.clone()))
+        .collect();
+    let mut environment = Environment::new();
+    environment.add_template("report.html", include_str!("template.html"))?;
+    let page = Page {
+        name: &run.name,
+        program: &run.program,
+        facts: facts(run),
+        tiles: tiles(run),
+        warnings,
+        sections: shown,
+        skipped,
+        rejected: rejected(run),
+        stages: stages(run),
+        provenance: provenance(run),
+        config: &run.config,
+        overrides: &run.overrides,
+        variables: palette::variables(),
+        figure_css: include_str!("figure.css"),
+        page_css: include_str!("page.css"),
+        script: include_str!("figure.js"),
+    };
+    Ok(environment.get_template("report.html")?.render(Serde(page))?)
+}
+
+/// Every figure of a run as (file name, SVG file).
+pub(crate) fn figures(run: &RunResult) -> Vec<(String, String)> {
+    let style = palette::in_light(include_str!("figure.css"));
+    let of_paper = paper::sections(run).into_iter().flat_map(|drawn| drawn.figures);
+    let of_stages = run.stages.iter().flat_map(|stage| stage_view(run, stage).1.into_iter().flatten());
+    of_paper.chain(of_stages).map(|figure| (format!("{}.svg", figure.id), figure.standalone(&style))).collect()
+}
+
+fn picture(figure: &Figure) -> Picture {
+    Picture { id: figure.id.clone(), title: figure.title.clone(), caption: figure.caption.clone(), svg: figure.svg() }
+}
+
+fn facts(run: &RunResult) -> Vec<Fact> {
+    let info = &run.info;
+    let cached = info.stages.iter().filter(|(_, _, cached)| *cached).count();
+    vec![
+        Fact::new("Run", info.started_at.clone()),
+        Fact::new(
+            "Took",
+            format!("{}, {} of {} stages from the cache", duration(info.seconds), cached, run.stages.len()),
+        ),
+        Fact::new("On", format!("{} ({} threads)", info.host, info.threads)),
+        Fact::new("By", run.program.clone()),
+        Fact::new("Seed", run.seed.to_string()),
+    ]
+}
+
+/// The numbers that matter: records, events, fits.
+fn tiles(run: &RunResult) -> Vec<Tile> {
+    let mut tiles = Vec::new();
+    let tile = |label: &str, value: String, note: String| Tile { label: label.to_owned(), value, note };
+    for found in all::<Recording>(run) {
+        let size: u64 = found.value.records.iter().map(|record| record.size).sum();
+        tiles.push(tile("records", found.value.records.len().to_string(), bytes(size)));
+    }
+    for found in all::<Document>(run) {
+        let document = &found.value.0;
+        if let Some(count) = document.pointer("/events/found").and_then(Value::as_u64) {
+            let kind = document
+                .pointer("/events/kind")
+                .and_then(Value::as_str)
+                .map_or("events".to_owned(), |kind| format!("{kind}s"));
+            let rejected = document.pointer("/events/rejected").and_then(Value::as_array).map_or(0, Vec::len);
+            let note = if rejected == 0 { "none rejected".to_owned() } else { format!("{rejected} rejected") };
+            tiles.push(tile(&kind, count.to_string(), note));
+        }
+        if let Some(force) = document.get("force").filter(|force| force.get("value").is_some()) {
+            let at = |name: &str| force.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+            let unit = force.get("unit").and_then(Value::as_str).unwrap_or_default();
+            tiles.push(tile(
+                "force at the event",
+                super::number::quantity(at("value"), at("std"), unit),
+                found.stage.id.clone(),
+            ));
+        }
+        if let Some(fit) = document.get("fit_percent") {
+            let at = |name: &str| fit.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+            let held_out = at("held_out");
+            if held_out.is_finite() {
+                let note = format!("noise allows {}", percent(at("noise_ceiling")));
+                tiles.push(tile("fit on held-out events", percent(held_out), note));
+            }
+        }
+    }
+    tiles
+}
+
+fn percent(value: f64) -> String {
+    format!("{} %", with_error(value, 0.005).split('(').next().unwrap_or_default())
+}
+
+/// What was rejected, and why.
+fn rejected(run: &RunResult) -> TableView {
+    let mut table = TableView::new("Rejected", vec![Head::text("stage"), Head::text("record"), Head::text("reason")]);
+    let mut total = 0;
+    for found in all::<Document>(run) {
+        let Some(list) = found.value.0.pointer("/events/rejected").and_then(Value::as_array) else { continue };
+        total += list.len();
+        for item in list.iter().take(200) {
+            let text = |name: &str| item.get(name).and_then(Value::as_str).unwrap_or_default().to_owned();
+            table.rows.push(vec![found.stage.id.clone(), text("record"), text("reason")]);
+        }
+    }
+    table.truncated(200, total)
+}
+
+/// All stages, with figures as long as there is room for them.
+fn stages(run: &RunResult) -> Vec<StageView> {
+    let mut room = STAGE_FIGURES;
+    run.stages
+        .iter()
+        .map(|stage| {
+            let (mut view, figures) = stage_view(run, stage);
+            for (artifact, figure) in view.artifacts.iter_mut().zip(figures) {
+                let Some(picture) = figure.as_ref().map(picture) else { continue };
+                match room.checked_sub(picture.svg.len()) {
+                    Some(left) => {
+                        room = left;
+                        artifact.picture = Some(picture);
+                    }
+                    None => {
+                        artifact.facts.push(Fact::new("plot", "left out to keep the page small; `--figures` writes it"))
+                    }
+                }
+            }
+            view
+        })
+        .collect()
+}
+
+fn provenance(run: &RunResult) -> TableView {
+    let heads = vec![
+        Head::text("stage"),
+        Head::text("uses"),
+        Head::number("version", ""),
+        Head::number("time", ""),
+        Head::text("from the cache"),
+        Head::number("files", ""),
+        Head::text("key"),
+    ];
+    let mut table = TableView::new("", heads);
+    for stage in &run.stages {
+        let timing = run.info.stages.iter().find(|(id, _, _)| *id == stage.id);
+        table.rows.push(vec![
+            stage.id.clone(),
+            stage.uses.clone(),
+            stage.version.to_string(),
+            timing.map(|(_, seconds, _)| duration(*seconds)).unwrap_or_default(),
+            timing.map(|(_, _, cached)| if *cached { "yes" } else { "no" }.to_owned()).unwrap_or_default(),
+            stage.sources.len().to_string(),
+            stage.key.chars().take(16).collect(),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,115 @@
+//! Bode plots: magnitude and phase over log frequency.
+
+use num_complex::Complex64;
+
+use super::response::{degrees_near, unwrapped_degrees};
+use crate::report::figure::{Axis, Band, Figure, Mark, Panel, Row, Stroke};
+
+/// Standard errors that a band spans on either side: 95 % of a normal distribution.
+const BAND: f64 = 1.96;
+
+/// Curves of a Bode plot and the frequencies marked in it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Bode {
+    /// The first lies lowest. Phases follow the turn of the last curve that is a reference.
+    pub curves: Vec<BodeCurve>,
+    /// Frequencies in Hz with their words.
+    pub rules: Vec<(f64, String)>,
+}
+
+/// A curve of a Bode plot, ascending in frequency.
+#[derive(Debug, Clone)]
+pub(crate) struct BodeCurve {
+    pub series: String,
+    pub frequency_hz: Vec<f64>,
+    pub transfer: Vec<Complex64>,
+    /// Standard error of the magnitude; empty: unknown.
+    pub magnitude_std: Vec<f64>,
+    /// Standard error of the phase in radians; empty: unknown.
+    pub phase_std_rad: Vec<f64>,
+    pub stroke: Stroke,
+    /// Smooth enough to unwrap its phase by itself.
+    pub reference: bool,
+}
+
+impl BodeCurve {
+    /// A smooth curve; bins at zero frequency have no place on the axis and are left out.
+    pub fn new(series: &str, frequency_hz: &[f64], transfer: &[Complex64], stroke: Stroke) -> Self {
+        let (frequency_hz, transfer) =
+            frequency_hz.iter().zip(transfer).filter(|(f, _)| **f > 0.0).map(|(f, h)| (*f, *h)).unzip();
+        Self { series: series.to_owned(), frequency_hz, transfer, magnitude_std: Vec::new(), phase_std_rad: Vec::new(), stroke, reference: true }
+    }
+
+    /// With standard errors of magnitude and phase at each of the frequencies that [`BodeCurve::new`] was given.
+    pub fn with_errors(mut self, frequency_hz: &[f64], magnitude_std: &[f64], phase_std_rad: &[f64]) -> Self {
+        let shown = |values: &[f64]| frequency_hz.iter().zip(values).filter(|(f, _)| **f > 0.0).map(|(_, v)| *v).collect();
+        (self.magnitude_std, self.phase_std_rad) = (shown(magnitude_std), shown(phase_std_rad));
+        self
+    }
+
+    /// With a variance of the complex value, E|h - mean|^2, at each of the frequencies that [`BodeCurve::new`] was given: half of it lies
+    /// along h, half across.
+    pub fn with_variance(self, frequency_hz: &[f64], transfer: &[Complex64], variance: &[f64]) -> Self {
+        let error: Vec<f64> = variance.iter().map(|v| (0.5 * v).sqrt()).collect();
+        let turn: Vec<f64> = error.iter().zip(transfer).map(|(e, h)| e / h.norm()).collect();
+        self.with_errors(frequency_hz, &error, &turn)
+    }
+
+    /// Without errors.
+    pub fn plain(mut self) -> Self {
+        self.magnitude_std.clear();
+        self.phase_std_rad.clear();
+        self
+    }
+
+    /// With noise that would make its own phase wander.
+    pub fn noisy(mut self) -> Self {
+        self.reference = false;
+        self
+    }
+}
+
+/// Magnitude above phase; bands where a curve has errors.
+pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> Figure {
+    let reference = bode.curves.iter().rev().find(|curve| curve.reference).map(|curve| {
+        let phases = unwrapped_degrees(&curve.transfer);
+        (curve.frequency_hz.clone(), phases)
+    });
+    let mut magnitude = Panel::new("", Axis::frequency().bare(), Axis::new("Magnitude", "1").log());
+    let mut phase = Panel::new("", Axis::frequency(), Axis::phase());
+    for curve in &bode.curves {
+        let size: Vec<f64> = curve.transfer.iter().map(|h| h.norm()).collect();
+        let angle = match &reference {
+            Some((f, phases)) => degrees_near(&curve.frequency_hz, &curve.transfer, (f, phases)),
+            None => unwrapped_degrees(&curve.transfer),
+        };
+        let times = |std: &[f64], factor: f64| -> Vec<f64> { std.iter().map(|std| factor * std).collect() };
+        if curve.magnitude_std.len() == size.len() && curve.phase_std_rad.len() == size.len() {
+            magnitude = magnitude.with(band(curve, &size, &times(&curve.magnitude_std, BAND)));
+            // an error of half a turn says that nothing is known of the phase
+            let turn = times(&curve.phase_std_rad, BAND).iter().map(|e| e.min(std::f64::consts::PI).to_degrees()).collect::<Vec<_>>();
+            phase = phase.with(band(curve, &angle, &turn));
+        }
+        magnitude = magnitude.with(Mark::line(&curve.series, &curve.frequency_hz, &size, curve.stroke));
+        phase = phase.with(Mark::line(&curve.series, &curve.frequency_hz, &angle, curve.stroke));
+    }
+    for (at, label) in &bode.rules {
+        magnitude = magnitude.with(Mark::at_x(*at, label));
+        phase = phase.with(Mark::at_x(*at, ""));
+    }
+    // resonances are narrow: twice the resolution of other figures
+    Figure { column_px: 0.5, ..Figure::new(id, title, caption) }
+        .row(Row::one(340.0, magnitude))
+        .row(Row::one(200.0, phase))
+}
+
+fn band(curve: &BodeCurve, middle: &[f64], error: &[f64]) -> Mark {
+    Mark::Band(Band {
+        series: curve.series.clone(),
+        x: curve.frequency_hz.clone(),
+        low: middle.iter().zip(error).map(|(m, e)| m - e).collect(),
+        high: middle.iter().zip(error).map(|(m, e)| m + e).collect(),
+        colour: curve.stroke.colour,
+        fits: false,
+    })
+}

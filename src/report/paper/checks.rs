@@ -1,0 +1,195 @@
+//! What the paper checks beside its figures: alignment, drift, periodograms, residuals, calibration.
+
+use afmid_pipeline::{Array, Document, RunResult, Table, Values};
+
+use super::force_curve::is_ensemble;
+use super::sections::Drawn;
+use crate::report::figure::{Axis, Band, Colour, Figure, Line, Mark, Marker, Panel, Points, Row, Stroke};
+use crate::report::find::{EventKind, Found, all, frequency_axis, real_over, time_axis, unit_of};
+use crate::report::generic::{ROWS, document_view, table_view};
+use crate::report::view::{Fact, Head, TableView};
+
+/// Aligned events on top of each other, and the list of what was seen.
+pub(crate) fn alignment(run: &RunResult) -> Drawn {
+    let ensembles = all::<Array>(run).filter(is_ensemble);
+    let figures = ensembles.filter_map(|found| aligned(run, &found)).collect();
+    let lists = all::<Table>(run)
+        .filter(|found| found.value.column("rejected").is_ok() && found.value.column("correlation").is_ok());
+    let tables =
+        lists.map(|found| table_view(&format!("Events seen by stage {}", found.stage.id), found.value, ROWS)).collect();
+    Drawn { id: "alignment", title: "Alignment of the events", figures, tables, missing: "no stage extracts events" }
+}
+
+/// Events that are drawn one by one; more would hide each other.
+const MOST_EVENTS: usize = 12;
+
+fn aligned(run: &RunResult, found: &Found<'_, Array>) -> Option<Figure> {
+    let time = time_axis(found.value)?;
+    let Values::Real(signal) = &found.value.variable("signal").ok()?.values else { return None };
+    let count = time.values.len();
+    let onset = time.values.iter().position(|t| *t >= 0.0)?;
+    // an eighth of the window: where a wrong alignment would show
+    let (first, last) = (onset.saturating_sub(count / 64), (onset + count / 16).min(count));
+    let x = time.values.get(first..last)?;
+    let rows: Vec<&[f64]> = signal.chunks_exact(count.max(1)).filter_map(|row| row.get(first..last)).collect();
+    let (kind, event) = match found.event_kind(run) {
+        EventKind::SnapOff => ("snap-off", "Snap-off"),
+        EventKind::SnapIn => ("snap-in", "Snap to contact"),
+    };
+    let series = |rows: usize| format!("{rows} of the events");
+    let step = rows.len().div_ceil(MOST_EVENTS).max(1);
+    let drawn: Vec<&&[f64]> = rows.iter().step_by(step).collect();
+    let mut panel = Panel::new(
+        &format!("{event}: {} aligned events", rows.len()),
+        Axis::new("Time after the onset", "s"),
+        Axis::new("Deflection", unit_of(found.value, "signal")),
+    );
+    let (low, high) = envelope(&rows, x.len());
+    panel = panel.with(Mark::Band(Band {
+        series: "range of all events".to_owned(),
+        x: x.to_vec(),
+        low,
+        high,
+        colour: Colour::Sky,
+        fits: true,
+    }));
+    for row in &drawn {
+        let line = Line {
+            series: series(drawn.len()),
+            x: x.to_vec(),
+            y: row.to_vec(),
+            stroke: Stroke::solid(Colour::Blue, 0.6),
+        };
+        panel = panel.with(Mark::Line(line));
+    }
+    let figure =
+        Figure::new(&format!("alignment-{kind}-{}", found.stage.id), "Aligned events", "").row(Row::one(220.0, panel));
+    Some(figure)
+}
+
+fn envelope(rows: &[&[f64]], count: usize) -> (Vec<f64>, Vec<f64>) {
+    let fold = |pick: fn(f64, f64) -> f64| -> Vec<f64> {
+        (0..count)
+            .map(|k| rows.iter().filter_map(|row| row.get(k).copied()).filter(|y| y.is_finite()).fold(f64::NAN, pick))
+            .collect()
+    };
+    // f64::min and f64::max skip NaN
+    (fold(f64::min), fold(f64::max))
+}
+
+/// Correlations of ordered and random sub-ensembles.
+pub(crate) fn drift(run: &RunResult) -> Drawn {
+    let mut section = Drawn {
+        id: "drift",
+        title: "Drift over the archive",
+        missing: "no stage compares sub-ensembles",
+        ..Drawn::default()
+    };
+    for found in all::<Table>(run) {
+        let (Ok(order), Ok(group), Ok(correlation)) =
+            (found.value.text("order"), found.value.integer("group"), found.value.real("correlation"))
+        else {
+            continue;
+        };
+        let mut panel = Panel::new("", Axis::new("Sub-ensemble", "1"), Axis::new("1 − correlation", "1").log());
+        for (word, series, colour, marker) in [
+            ("ordered", "in order of the archive", Colour::Vermillion, Marker::Dot),
+            ("random", "at random", Colour::Blue, Marker::Ring),
+        ] {
+            let rows = || order.iter().zip(group).zip(correlation).filter(|((order, _), _)| *order == word);
+            panel = panel.with(Mark::Points(Points {
+                series: series.to_owned(),
+                x: rows().map(|((_, group), _)| *group as f64 + 1.0).collect(),
+                y: rows().map(|(_, correlation)| 1.0 - correlation).collect(),
+                y_error: Vec::new(),
+                titles: rows().map(|(_, correlation)| format!("correlation {correlation:.9}")).collect(),
+                marker,
+                colour,
+            }));
+        }
+        let p_value = summary_number(run, &found.stage.id, "p_value");
+        let title = p_value.map_or_else(String::new, |p| format!("{}: p = {p:.3} for no drift", found.stage.id));
+        let caption = "Each sub-ensemble's mean against the mean of all other events. Drift pulls the ordered ones away from the random ones.";
+        let id = format!("drift-{}", found.stage.id);
+        section.figures.push(Figure::new(&id, "Sub-ensembles", caption).row(Row::one(160.0, Panel { title, ..panel })));
+    }
+    section
+}
+
+fn summary_number(run: &RunResult, stage: &str, name: &str) -> Option<f64> {
+    all::<Document>(run).find(|found| found.stage.id == stage)?.value.0.get(name)?.as_f64()
+}
+
+/// Periodograms of input and output.
+pub(crate) fn spectra(run: &RunResult) -> Drawn {
+    let mut section = Drawn {
+        id: "periodograms",
+        title: "Power spectra",
+        missing: "no stage computes periodograms",
+        ..Drawn::default()
+    };
+    for found in all::<Array>(run) {
+        let Some(axis) = frequency_axis(found.value) else { continue };
+        let densities: Vec<(&str, &[f64])> = found
+            .value
+            .variables
+            .iter()
+            .filter(|variable| variable.unit.ends_with("/Hz"))
+            .filter_map(|variable| Some((variable.name.as_str(), real_over(found.value, &variable.name, axis)?)))
+            .collect();
+        let Some((first, _)) = densities.first() else { continue };
+        let y = Axis::new("Power spectral density", unit_of(found.value, first)).log();
+        let mut panel = Panel::new(&format!("Stage {}", found.stage.id), Axis::frequency(), y);
+        for (index, (name, values)) in densities.iter().enumerate().take(8) {
+            panel = panel.with(Mark::line(name, &axis.values, values, Stroke::solid(Colour::cycle(index), 1.1)));
+        }
+        let id = format!("spectrum-{}-{}", found.stage.id, found.port);
+        section.figures.push(Figure::new(&id, "Power spectra", "").row(Row::one(260.0, panel)));
+    }
+    section
+}
+
+/// What the model leaves.
+pub(crate) fn residuals(run: &RunResult) -> Drawn {
+    let mut section =
+        Drawn { id: "residuals", title: "Residuals", missing: "no stage gives residuals", ..Drawn::default() };
+    for found in all::<Array>(run) {
+        let Some(time) = time_axis(found.value) else { continue };
+        let left: Vec<(&str, &[f64])> = found
+            .value
+            .variables
+            .iter()
+            .filter(|variable| variable.name.contains("residual"))
+            .filter_map(|variable| Some((variable.name.as_str(), real_over(found.value, &variable.name, time)?)))
+            .collect();
+        let Some((first, _)) = left.first() else { continue };
+        let y = Axis::new("Residual", unit_of(found.value, first));
+        let mut panel = Panel::new(&format!("Stage {}", found.stage.id), Axis::new("Time", "s"), y);
+        for (index, (name, values)) in left.iter().enumerate().take(4) {
+            panel = panel.with(Mark::line(name, &time.values, values, Stroke::solid(Colour::cycle(index), 0.9)));
+        }
+        let id = format!("residual-{}-{}", found.stage.id, found.port);
+        section.figures.push(Figure::new(&id, "Residuals", "").row(Row::one(200.0, panel)));
+    }
+    section
+}
+
+/// Numbers of the calibration stages.
+pub(crate) fn calibration(run: &RunResult) -> Drawn {
+    let tables = all::<Document>(run)
+        .filter(|found| found.stage.uses.starts_with("calibration."))
+        .flat_map(|found| {
+            let (facts, mut tables) = document_view(&found.value.0);
+            tables.iter_mut().for_each(|table| table.caption = format!("{}: {}", found.stage.id, table.caption));
+            tables.insert(0, fact_table(&found.stage.id, facts));
+            tables
+        })
+        .collect();
+    Drawn { id: "calibration", title: "Calibration", tables, missing: "no calibration stage", ..Drawn::default() }
+}
+
+fn fact_table(caption: &str, facts: Vec<Fact>) -> TableView {
+    let mut table = TableView::new(caption, vec![Head::text("quantity"), Head::number("value", "")]);
+    table.rows = facts.into_iter().map(|fact| vec![fact.name, fact.value]).collect();
+    table
+}
