@@ -37,12 +37,21 @@ impl BodeCurve {
     pub fn new(series: &str, frequency_hz: &[f64], transfer: &[Complex64], stroke: Stroke) -> Self {
         let (frequency_hz, transfer) =
             frequency_hz.iter().zip(transfer).filter(|(f, _)| **f > 0.0).map(|(f, h)| (*f, *h)).unzip();
-        Self { series: series.to_owned(), frequency_hz, transfer, magnitude_std: Vec::new(), phase_std_rad: Vec::new(), stroke, reference: true }
+        Self {
+            series: series.to_owned(),
+            frequency_hz,
+            transfer,
+            magnitude_std: Vec::new(),
+            phase_std_rad: Vec::new(),
+            stroke,
+            reference: true,
+        }
     }
 
     /// With standard errors of magnitude and phase at each of the frequencies that [`BodeCurve::new`] was given.
     pub fn with_errors(mut self, frequency_hz: &[f64], magnitude_std: &[f64], phase_std_rad: &[f64]) -> Self {
-        let shown = |values: &[f64]| frequency_hz.iter().zip(values).filter(|(f, _)| **f > 0.0).map(|(_, v)| *v).collect();
+        let shown =
+            |values: &[f64]| frequency_hz.iter().zip(values).filter(|(f, _)| **f > 0.0).map(|(_, v)| *v).collect();
         (self.magnitude_std, self.phase_std_rad) = (shown(magnitude_std), shown(phase_std_rad));
         self
     }
@@ -87,7 +96,10 @@ pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> 
         if curve.magnitude_std.len() == size.len() && curve.phase_std_rad.len() == size.len() {
             magnitude = magnitude.with(band(curve, &size, &times(&curve.magnitude_std, BAND)));
             // an error of half a turn says that nothing is known of the phase
-            let turn = times(&curve.phase_std_rad, BAND).iter().map(|e| e.min(std::f64::consts::PI).to_degrees()).collect::<Vec<_>>();
+            let turn = times(&curve.phase_std_rad, BAND)
+                .iter()
+                .map(|e| e.min(std::f64::consts::PI).to_degrees())
+                .collect::<Vec<_>>();
             phase = phase.with(band(curve, &angle, &turn));
         }
         magnitude = magnitude.with(Mark::line(&curve.series, &curve.frequency_hz, &size, curve.stroke));
