@@ -42,6 +42,7 @@ mod tests;
 pub use compare::{Difference, compare};
 pub use error::StoreError;
 pub use format::FORMAT_VERSION;
+pub use names::RESERVED_STAGE_IDS;
 pub use ports::PortSummary;
 pub use result_file::write_result;
 pub use result_reader::{ResultFile, StageSummary, read_result};

@@ -1,7 +1,7 @@
 //! Names of groups: stage ids and ports, as far as NeXus allows.
 
-/// What a result file keeps under its entry beside the stages.
-pub(super) const TAKEN_BY_ENTRY: [&str; 4] = ["pipeline", "run", "title", "definition"];
+/// What a result file keeps under its entry beside the stages: configs refuse these ids, so that a stage's group has its name.
+pub const RESERVED_STAGE_IDS: [&str; 4] = ["pipeline", "run", "title", "definition"];
 
 /// What a stage's group holds beside its ports.
 pub(super) const TAKEN_BY_STAGE: [&str; 5] = ["provenance", "program", "version", "sequence_index", "date"];
@@ -25,12 +25,12 @@ pub(super) fn group_names<'a>(ids: impl Iterator<Item = &'a str>, taken: &[&str]
 
 #[cfg(test)]
 mod tests {
-    use super::{TAKEN_BY_ENTRY, group_names};
+    use super::{RESERVED_STAGE_IDS, group_names};
 
     #[test]
     fn valid_names_stay_and_no_two_are_equal() {
         let ids = ["records", "free-lever", "free_lever", "a.b", ".", "", "zähler", "records_", "run", "run_"];
-        let names = group_names(ids.into_iter(), &TAKEN_BY_ENTRY);
+        let names = group_names(ids.into_iter(), &RESERVED_STAGE_IDS);
         assert_eq!(
             names,
             ["records", "free_lever", "free_lever_", "a_b", "_", "__", "z_hler", "records_", "run_", "run__"]

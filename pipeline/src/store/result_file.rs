@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::error::{Result, StoreError};
 use super::format::write_format;
-use super::names::{TAKEN_BY_ENTRY, TAKEN_BY_STAGE, group_names};
+use super::names::{RESERVED_STAGE_IDS, TAKEN_BY_STAGE, group_names};
 use super::ports::write_ports;
 use super::run_info::write_run_info;
 use super::seal::seal;
@@ -45,7 +45,7 @@ fn write_contents(file: &File, run: &RunResult) -> Result<()> {
     let entry = write::nexus_group(file, ENTRY, "NXentry")?;
     write::text(&entry, "title", &run.name)?;
     write_pipeline(&entry, run)?;
-    let groups = group_names(run.stages.iter().map(|stage| stage.id.as_str()), &TAKEN_BY_ENTRY);
+    let groups = group_names(run.stages.iter().map(|stage| stage.id.as_str()), &RESERVED_STAGE_IDS);
     let mut default = None;
     for (index, (stage, group)) in run.stages.iter().zip(&groups).enumerate() {
         let process = write_stage_record(&entry, group, stage, &run.program)?;
@@ -69,7 +69,7 @@ fn write_pipeline(entry: &Group, run: &RunResult) -> Result<()> {
     write::texts(&group, "overrides", &run.overrides)?;
     let ids: Vec<&str> = run.stages.iter().map(|stage| stage.id.as_str()).collect();
     write::texts(&group, STAGES, &ids)?;
-    write::texts(&group, GROUPS, &group_names(ids.into_iter(), &TAKEN_BY_ENTRY))?;
+    write::texts(&group, GROUPS, &group_names(ids.into_iter(), &RESERVED_STAGE_IDS))?;
     let config = write::nexus_group(&group, "config", "NXnote")?;
     write::text(&config, "type", "application/toml")?;
     write::text(&config, "data", &run.config)?;
