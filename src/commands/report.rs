@@ -17,14 +17,18 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     let run = read_result(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.result));
     if output == args.result {
-        return Err(Failure::usage("the page would replace the result file", Some("give another name with -o".to_owned())));
+        return Err(Failure::usage(
+            "the page would replace the result file",
+            Some("give another name with -o".to_owned()),
+        ));
     }
     let page = report(&run).map_err(|error| Failure::failed(error, None))?;
     write(&output, &page)?;
     println!("{}", output.display());
     if let Some(folder) = &args.figures {
-        fs::create_dir_all(folder)
-            .map_err(|error| Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None))?;
+        fs::create_dir_all(folder).map_err(|error| {
+            Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
+        })?;
         for (name, text) in figures(&run) {
             let path = folder.join(name);
             write(&path, &text)?;

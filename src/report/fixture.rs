@@ -249,8 +249,10 @@ fn modes() -> StageRecord {
         .collect();
     let both: Vec<(f64, f64, f64, f64)> = rows.iter().chain(&zeros).copied().collect();
     let column = |pick: fn(&(f64, f64, f64, f64)) -> f64| both.iter().map(pick).collect::<Vec<f64>>();
-    let kinds = rows.iter().map(|_| "pole").chain(zeros.iter().map(|_| "zero")).map(str::to_owned).collect::<Vec<String>>();
-    let classes = both.iter().map(|row| if row.3 > 5.0 { "mechanical" } else { "detector" }.to_owned()).collect::<Vec<String>>();
+    let kinds =
+        rows.iter().map(|_| "pole").chain(zeros.iter().map(|_| "zero")).map(str::to_owned).collect::<Vec<String>>();
+    let classes =
+        both.iter().map(|row| if row.3 > 5.0 { "mechanical" } else { "detector" }.to_owned()).collect::<Vec<String>>();
     let roots = Table::new()
         .with("kind", "", "pole or zero", kinds)
         .with("class", "", "what a pole belongs to", classes)

@@ -20,4 +20,4 @@ mod fixture;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use page::{ReportError, figures, report};
+pub(crate) use page::{figures, report};

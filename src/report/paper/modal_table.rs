@@ -25,7 +25,9 @@ fn modal_table(found: &Found<'_, Document>, coupled: bool) -> Option<TableView> 
     let references = found.value.0.get("reference").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
     // a mode's reference is the row that names the mode's own frequency
     let reference = |mode: &Value, name: &str| {
-        let own = references.iter().find(|row| row.get("frequency_hz").is_some() && row.get("frequency_hz") == mode.get("frequency_hz"));
+        let own = references
+            .iter()
+            .find(|row| row.get("frequency_hz").is_some() && row.get("frequency_hz") == mode.get("frequency_hz"));
         own.and_then(|row| row.get(name)).and_then(Value::as_f64).unwrap_or(f64::NAN)
     };
     let at = |mode: &Value, name: &str| match mode.get(name).and_then(Value::as_f64) {

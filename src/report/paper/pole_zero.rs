@@ -29,7 +29,8 @@ pub(crate) fn figures(run: &RunResult) -> Vec<Figure> {
 }
 
 fn figure(run: &RunResult, kind: EventKind, id: &str, title: &str) -> Option<Figure> {
-    let tables = || all::<Table>(run).filter(|found| event_kind(run, found.stage) == kind && found.value.real("z_re").is_ok());
+    let tables =
+        || all::<Table>(run).filter(|found| event_kind(run, found.stage) == kind && found.value.real("z_re").is_ok());
     // the stage that the modal table is read from first: others may list fits of a half
     let found = tables().find(|found| found.stage.id == "modes").or_else(|| tables().last())?;
     let (poles, zeros) = (roots(found.value, "pole")?, roots(found.value, "zero")?);
@@ -47,7 +48,8 @@ fn figure(run: &RunResult, kind: EventKind, id: &str, title: &str) -> Option<Fig
 
 /// Reads the rows of one kind from a table of roots: `kind`, `z_re`, `z_im`, frequencies and quality factors with their errors.
 fn roots(table: &Table, kind: &str) -> Option<Roots> {
-    let rows: Vec<usize> = table.text("kind").ok()?.iter().enumerate().filter(|(_, have)| *have == kind).map(|(row, _)| row).collect();
+    let rows: Vec<usize> =
+        table.text("kind").ok()?.iter().enumerate().filter(|(_, have)| *have == kind).map(|(row, _)| row).collect();
     let column = |name: &str| -> Option<Vec<f64>> {
         let values = table.real(name).ok()?;
         Some(rows.iter().map(|row| values.get(*row).copied().unwrap_or(f64::NAN)).collect())
@@ -58,7 +60,9 @@ fn roots(table: &Table, kind: &str) -> Option<Roots> {
     let (q, q_std) = (or_unknown("quality_factor"), or_unknown("quality_factor_std"));
     let class = table.text("class").ok();
     let (mut titles, mut radius_std) = (Vec::new(), Vec::new());
-    for (((((row, re), im), q), q_std), (f, f_std)) in rows.iter().zip(&re).zip(&im).zip(&q).zip(&q_std).zip(f.iter().zip(&f_std)) {
+    for (((((row, re), im), q), q_std), (f, f_std)) in
+        rows.iter().zip(&re).zip(&im).zip(&q).zip(&q_std).zip(f.iter().zip(&f_std))
+    {
         let class = class.and_then(|class| class.get(*row)).map_or("", String::as_str);
         titles.push(format!("{class} {kind}: f = {}, Q = {}", quantity(*f, *f_std, "Hz"), with_error(*q, *q_std)));
         // |z| = exp(Re s Ts), and Re s = -|s| / 2Q: the logarithm of |z| has the relative error of Q (that of f is small beside it)
