@@ -44,15 +44,6 @@ fn every_example_gives_the_same_bits_twice_and_on_any_number_of_threads() {
 }
 
 #[test]
-fn no_port_has_a_name_that_result_files_reserve() {
-    every_stage(|entry| {
-        let reserved = afmid_pipeline::store::RESERVED_PORTS;
-        let outputs = entry.spec.outputs.iter().filter(|port| reserved.contains(&port.name));
-        outputs.map(|port| format!("the port name `{}` is reserved", port.name)).collect()
-    });
-}
-
-#[test]
 fn every_input_can_be_fed_by_some_stage() {
     let registry = registry();
     let outputs = || registry.entries().iter().flat_map(|entry| entry.spec.outputs);

@@ -3,17 +3,18 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::Registry;
 use afmid_pipeline::reference::files;
 
 use super::schema;
 use crate::failure::Failure;
 
 /// Writes `FOLDER/stages/*.md` and `FOLDER/pipeline.schema.json`, or says what would change. Pages of stages that are gone are removed.
-pub fn run(folder: &Path, check: bool) -> Result<(), Failure> {
+pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failure> {
     let stages = folder.join("stages");
-    let pages = files(&super::registry()?).map_err(|error| Failure::failed(error, None))?;
+    let pages = files(registry).map_err(|error| Failure::failed(error, None))?;
     let mut wanted: Vec<(PathBuf, String)> = pages.into_iter().map(|(name, text)| (stages.join(name), text)).collect();
-    wanted.push((folder.join("pipeline.schema.json"), schema::text()?));
+    wanted.push((folder.join("pipeline.schema.json"), schema::text(registry)?));
     let stale = stale(&stages, &wanted);
     let changed: Vec<&(PathBuf, String)> =
         wanted.iter().filter(|(path, text)| fs::read_to_string(path).ok().as_ref() != Some(text)).collect();

@@ -1,5 +1,6 @@
 //! `afmid explain`: which stages would run, and why.
 
+use afmid_pipeline::Registry;
 use afmid_pipeline::runner::{Decision, explain};
 
 use super::load::load;
@@ -9,8 +10,8 @@ use crate::failure::Failure;
 use crate::show::grid;
 
 /// Says on stdout what a run would do with each stage.
-pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
-    let plan = load(&args.config.config, &args.config.set, &super::registry()?)?;
+pub fn run(args: &ExplainArgs, registry: &Registry) -> Result<(), Failure> {
+    let plan = load(&args.config.config, &args.config.set, registry)?;
     let cache = open_cache(args.cache.as_deref())?;
     let rows = explain(&plan, plan.config.base(), &cache);
     let mut table = vec![["stage", "would", "because", "key"].map(str::to_owned).to_vec()];

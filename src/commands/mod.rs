@@ -16,22 +16,17 @@ use afmid_pipeline::Registry;
 use crate::cli::Command;
 use crate::failure::Failure;
 
-/// Runs a command.
-pub fn dispatch(command: Command) -> Result<(), Failure> {
+/// Runs a command with the stages of a program.
+pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
     match command {
-        Command::Run(args) => run::run(&args),
-        Command::Explain(args) => explain::run(&args),
+        Command::Run(args) => run::run(&args, registry),
+        Command::Explain(args) => explain::run(&args, registry),
         Command::Show { result, id, json } => show::run(&result, id.as_deref(), json),
         Command::Report(args) => report::run(&args),
-        Command::Check { configs } => check::run(&configs),
-        Command::Graph { config, format } => graph::run(&config, format),
-        Command::Stages { name } => stages::run(name.as_deref()),
-        Command::Schema => schema::run(),
-        Command::Docs { folder, check } => docs::run(&folder, check),
+        Command::Check { configs } => check::run(&configs, registry),
+        Command::Graph { config, format } => graph::run(&config, format, registry),
+        Command::Stages { name } => stages::run(name.as_deref(), registry),
+        Command::Schema => schema::run(registry),
+        Command::Docs { folder, check } => docs::run(&folder, check, registry),
     }
-}
-
-/// All stages of this program.
-fn registry() -> Result<Registry, Failure> {
-    afmid_stages::registry().map_err(|error| Failure::failed(error, None))
 }

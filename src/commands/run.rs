@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::Registry;
 use afmid_pipeline::cache::{Cache, write_result};
 use afmid_pipeline::runner::{Options, RunError, run as run_plan};
 use afmid_pipeline::{Plan, RunResult};
@@ -12,9 +13,8 @@ use crate::failure::{Failure, Message};
 use crate::progress::observer;
 
 /// Runs a config and writes its result file.
-pub fn run(args: &RunArgs) -> Result<(), Failure> {
-    let registry = super::registry()?;
-    let plan = load(&args.config.config, &args.config.set, &registry)?;
+pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
+    let plan = load(&args.config.config, &args.config.set, registry)?;
     let output = args.output.clone().unwrap_or_else(|| default_output(plan.name()));
     make_folder(&output)?;
     let cache = open_cache(args.cache.as_deref())?;

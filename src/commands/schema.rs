@@ -1,17 +1,18 @@
 //! `afmid schema`: JSON Schema of a config.
 
+use afmid_pipeline::Registry;
 use afmid_pipeline::reference::config_schema;
 
 use crate::failure::Failure;
 
 /// Prints the schema.
-pub fn run() -> Result<(), Failure> {
-    print!("{}", text()?);
+pub fn run(registry: &Registry) -> Result<(), Failure> {
+    print!("{}", text(registry)?);
     Ok(())
 }
 
 /// The schema as it lies in docs/.
-pub fn text() -> Result<String, Failure> {
-    let schema = config_schema(&super::registry()?);
+pub fn text(registry: &Registry) -> Result<String, Failure> {
+    let schema = config_schema(registry);
     serde_json::to_string_pretty(&schema).map(|text| text + "\n").map_err(|error| Failure::failed(error, None))
 }

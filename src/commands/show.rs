@@ -50,10 +50,10 @@ fn artifact(file: &ResultFile, id: &str, port: &str) -> Result<Artifact, Failure
 fn stage_json(file: &ResultFile, stage: &StageSummary) -> Result<Value, Failure> {
     let id = &stage.record.id;
     let mut ports = Map::new();
-    for (port, _) in &stage.ports {
-        match artifact(file, id, port)? {
-            Artifact::Document(document) if port == SUMMARY => return Ok(document.0.clone()),
-            artifact => ports.insert(port.clone(), artifact_json(&artifact)),
+    for port in &stage.ports {
+        match artifact(file, id, &port.name)? {
+            Artifact::Document(document) if port.name == SUMMARY => return Ok(document.0.clone()),
+            artifact => ports.insert(port.name.clone(), artifact_json(&artifact)),
         };
     }
     Ok(Value::Object(ports))
@@ -61,9 +61,9 @@ fn stage_json(file: &ResultFile, stage: &StageSummary) -> Result<Value, Failure>
 
 fn stage_text(file: &ResultFile, stage: &StageSummary) -> Result<String, Failure> {
     let mut text = stage_head(&stage.record);
-    for (port, shape) in &stage.ports {
-        let artifact = artifact(file, &stage.record.id, port)?;
-        text.push_str(&format!("\n{port} ({})\n{}", shape.name(), artifact_text(&artifact)));
+    for port in &stage.ports {
+        let artifact = artifact(file, &stage.record.id, &port.name)?;
+        text.push_str(&format!("\n{} ({})\n{}", port.name, port.shape.name(), artifact_text(&artifact)));
     }
     Ok(text)
 }

@@ -1,13 +1,13 @@
 //! `afmid stages`: the registry's own documentation.
 
+use afmid_pipeline::Registry;
 use afmid_pipeline::config::nearest;
 use afmid_pipeline::reference::{Examples, page};
 
 use crate::failure::Failure;
 
 /// Lists all stages, or prints the page of one.
-pub fn run(name: Option<&str>) -> Result<(), Failure> {
-    let registry = super::registry()?;
+pub fn run(name: Option<&str>, registry: &Registry) -> Result<(), Failure> {
     let Some(name) = name else {
         let width = registry.entries().iter().map(|entry| entry.spec.name.len()).max().unwrap_or(0);
         for entry in registry.entries() {

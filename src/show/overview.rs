@@ -1,7 +1,7 @@
 //! What a result file holds.
 
-use afmid_pipeline::store::{ResultFile, StageSummary};
-use afmid_pipeline::{Shape, StageRecord};
+use afmid_pipeline::StageRecord;
+use afmid_pipeline::store::{PortSummary, ResultFile, StageSummary};
 use serde_json::{Value, json};
 
 use super::grid::grid;
@@ -18,7 +18,8 @@ pub fn overview_text(file: &ResultFile) -> String {
     text.push_str("\n\n");
     let mut rows = vec![["stage", "uses", "artifacts"].map(str::to_owned).to_vec()];
     for stage in file.stages() {
-        let ports: Vec<String> = stage.ports.iter().map(|(port, shape)| format!("{port} ({})", shape.name())).collect();
+        let ports: Vec<String> =
+            stage.ports.iter().map(|port| format!("{} ({})", port.name, port.shape.name())).collect();
         rows.push(vec![stage.record.id.clone(), stage.record.uses.clone(), ports.join(", ")]);
     }
     text.push_str(&grid(&rows));
@@ -37,7 +38,7 @@ fn warnings(stage: &StageSummary) -> Vec<String> {
 /// The same for scripts.
 pub fn overview_json(file: &ResultFile) -> Value {
     let run = file.run();
-    let artifact = |(port, shape): &(String, Shape)| json!({ "port": port, "shape": shape.name() });
+    let artifact = |port: &PortSummary| json!({ "port": port.name, "shape": port.shape.name() });
     let stage = |stage: &StageSummary| {
         let record = &stage.record;
         json!({

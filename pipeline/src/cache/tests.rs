@@ -101,9 +101,9 @@ fn a_failed_write_leaves_the_old_file_and_no_temporary_one() {
     write_result(&path, &run_result()).unwrap();
     let old = std::fs::read(&path).unwrap();
     let mut run = run_result();
-    run.stages[1].id = "run".to_owned();
+    run.config.push('\0');
     let error = write_result(&path, &run).unwrap_err();
-    assert!(error.problem.contains("`run` is reserved"), "{error}");
+    assert!(error.problem.contains("NUL"), "{error}");
     assert_eq!(error.file, path);
     assert!(std::fs::read(&path).unwrap() == old);
     assert_eq!(std::fs::read_dir(&folder.0).unwrap().count(), 1);

@@ -15,6 +15,7 @@ mod stage;
 mod suggest;
 mod value;
 
+pub(crate) use name::RESERVED_ID;
 pub use overrides::Override;
 pub(crate) use parameters::instantiate;
 pub use place::Place;

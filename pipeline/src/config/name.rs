@@ -2,7 +2,6 @@
 
 use super::problem::Problem;
 use super::stage::StageDecl;
-use crate::store::RESERVED_STAGE_IDS;
 
 /// The id that means the `[pipeline]` table in `--set`.
 pub(crate) const RESERVED_ID: &str = "pipeline";
@@ -15,8 +14,8 @@ pub(super) fn check(stages: &[StageDecl], problems: &mut Vec<Problem>) {
             let help = format!("results are stored under it: write `{}`, for instance", mended(id));
             let message = format!("stage id {id:?}: found {wrong:?}, wanted only a-z, 0-9, `_` and `-`");
             problems.push(Problem::new(message, span, "not an id").help(help));
-        } else if RESERVED_STAGE_IDS.contains(&id.as_str()) {
-            let message = format!("stage id `{id}` is reserved: result files hold something else under it");
+        } else if id == RESERVED_ID {
+            let message = format!("stage id `{id}` is reserved: `--set` means the `[pipeline]` table by it");
             problems.push(Problem::new(message, span, "reserved").help("choose another id"));
         } else if stages[..index].iter().any(|other| other.id == *id) {
             let message = format!("stage id `{id}` is used twice");

@@ -1,8 +1,6 @@
 //! Storage chunks of HDF5 datasets: undo the filters and turn bytes into samples, outside HDF5's global lock.
 
-use std::io::Read;
-
-use flate2::read::ZlibDecoder;
+use flate2::{Decompress, FlushDecompress, Status};
 
 use super::Raw;
 
@@ -91,11 +89,14 @@ pub(super) fn undo_filters(
 }
 
 fn inflate(bytes: &[u8], wanted: usize) -> Result<Vec<u8>, String> {
+    // never grows beyond what is wanted: a longer stream is an error, not a memory hog
     let mut inflated = Vec::with_capacity(wanted);
-    // one byte more than wanted: a longer stream is an error, not a memory hog
-    let mut stream = ZlibDecoder::new(bytes).take(wanted as u64 + 1);
-    stream.read_to_end(&mut inflated).map_err(|error| format!("a chunk does not inflate: {error}"))?;
-    if inflated.len() == wanted { Ok(inflated) } else { Err("a chunk inflates to another size".to_owned()) }
+    let status = Decompress::new(true).decompress_vec(bytes, &mut inflated, FlushDecompress::Finish);
+    match status {
+        Ok(Status::StreamEnd) if inflated.len() == wanted => Ok(inflated),
+        Ok(_) => Err(format!("a chunk does not inflate to the {wanted} bytes that it should hold")),
+        Err(error) => Err(format!("a chunk does not inflate: {error}")),
+    }
 }
 
 /// HDF5's shuffle stores all first bytes, then all second bytes...; a rest shorter than a sample stays at the end.

@@ -9,6 +9,8 @@ mod source;
 mod write;
 
 #[cfg(test)]
+mod foreign_tests;
+#[cfg(test)]
 mod tests;
 
 use std::path::PathBuf;

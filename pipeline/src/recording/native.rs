@@ -152,14 +152,18 @@ fn describe(dataset: &Dataset, path: &Path, location: &str) -> Result<Hdf5Source
     };
     let dtype = dataset.dtype().map_err(hdf5)?;
     let kind = dtype.to_descriptor().ok().and_then(|descriptor| sample_type(&descriptor)).ok_or_else(|| {
-        let found =
-            dtype.to_descriptor().map_or_else(|_| format!("{} bytes", dtype.size()), |kind| format!("{kind:?}"));
-        fail(format!("found samples of type {found}, wanted integers of up to 32 bits or 32- or 64-bit floats"))
+        let odd = |_| format!("an unusual number of {} bytes", dtype.size());
+        let found = dtype.to_descriptor().map_or_else(odd, |descriptor| descriptor.to_string());
+        fail(format!("the samples are {found}, wanted int8 to int32, uint8 to uint32, float32 or float64"))
             .help("store the converter's codes as int16 with scale_factor and add_offset")
     })?;
     check_size(dataset, kind.bytes()).map_err(|error| fail(error.problem))?;
     let big_endian = matches!(dtype.byte_order(), ByteOrder::BigEndian);
     let file_size = size_of_file(path)?;
+    if let Some(filter) = dataset.filters().iter().find(|filter| !filter.decode_enabled()) {
+        return Err(fail(format!("stored with the HDF5 filter {}, which is not built in", filter_name(filter)))
+            .help("store it with gzip, or not compressed: h5repack -f GZIP=4 OLD.h5 NEW.h5"));
+    }
     let place = locate(dataset, kind, samples, file_size).map_err(fail)?;
     Ok(Hdf5Source {
         path: path.to_owned(),
@@ -171,6 +175,20 @@ fn describe(dataset: &Dataset, path: &Path, location: &str) -> Result<Hdf5Source
         place,
         number: source_number(),
     })
+}
+
+fn filter_name(filter: &Filter) -> String {
+    let name = match filter.id() {
+        32000 => "LZF",
+        32001 => "Blosc",
+        32004 => "LZ4",
+        32008 => "bitshuffle",
+        32013 => "ZFP",
+        32015 => "Zstandard",
+        32026 => "Blosc2",
+        other => return format!("number {other}"),
+    };
+    name.to_owned()
 }
 
 fn sample_type(descriptor: &TypeDescriptor) -> Option<SampleType> {

@@ -142,7 +142,7 @@ fn errors_say_what_was_found_and_what_is_wanted() {
         rate(file)?;
         file.new_dataset::<u64>().shape([3]).create("deflection").map(|_| ())
     });
-    says(&path, &[deflection()], &["Unsigned", "32 bits"]);
+    says(&path, &[deflection()], &["uint64", "wanted int8 to int32"]);
     foreign(&|file| {
         rate(file)?;
         file.new_dataset_builder().with_data(&[1_i16, 2]).create("deflection").map(|_| ())

@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
+use crate::config::RESERVED_ID;
 use crate::stage::{Entry, PortSpec, Registry};
-use crate::store::RESERVED_STAGE_IDS;
 
 /// JSON Schema (draft 7, which all editors know) of a config with these stages.
 ///
@@ -117,7 +117,7 @@ fn id() -> Value {
         "description": "Its id, unique; results are stored and shown under it.",
         "type": "string",
         "pattern": "^[a-z0-9_-]+$",
-        "not": { "enum": RESERVED_STAGE_IDS }
+        "not": { "const": RESERVED_ID }
     })
 }
 

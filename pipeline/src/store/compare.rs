@@ -100,7 +100,7 @@ fn compare_values(a: &Container, b: &Container, place: &str, found: &mut Vec<Dif
     let (kind, other) = (read::descriptor(a)?, read::descriptor(b)?);
     let (shape, other_shape) = (a.get_shape()?, b.get_shape()?);
     if kind != other {
-        push(found, place, format!("type {kind:?} in the first file, {other:?} in the second"));
+        push(found, place, format!("type {kind} in the first file, {other} in the second"));
     } else if shape != other_shape {
         push(found, place, format!("shape {shape:?} in the first file, {other_shape:?} in the second"));
     } else if let Some(what) = differing(a, b, &kind).map_err(|error| error.at(place))? {
@@ -126,7 +126,7 @@ fn differing(a: &Container, b: &Container, kind: &TypeDescriptor) -> Result<Opti
             let (left, right) = (read::read_texts(a)?, read::read_texts(b)?);
             Ok(summary(&left, &right, |x, y| x == y))
         }
-        other => Err(StoreError::new(format!("values of type {other:?} cannot be compared"))),
+        other => Err(StoreError::new(format!("values of type {other} cannot be compared"))),
     }
 }
 

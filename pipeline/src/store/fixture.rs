@@ -135,7 +135,7 @@ fn empty() -> [(&'static str, Artifact); 5] {
         ("no-columns", Artifact::Table(Arc::new(Table::new()))),
         ("no-samples", Artifact::Array(Arc::new(none))),
         ("no-model", Artifact::StateSpace(Arc::new(StateSpace::default()))),
-        ("no-records", Artifact::Recording(Arc::new(Recording::default()))),
+        ("version", Artifact::Recording(Arc::new(Recording::default()))),
     ]
 }
 
@@ -173,7 +173,8 @@ pub(crate) fn run_result() -> RunResult {
         program: "0.1.0".to_owned(),
         stages: vec![
             stage("records", Vec::new()),
-            stage("free-lever.events_2", Vec::new()),
+            stage("free-lever_2", Vec::new()),
+            stage("run", Vec::new()),
             stage("events", vec![("records".to_owned(), "records".to_owned(), "records".to_owned())]),
         ],
         info: RunInfo {

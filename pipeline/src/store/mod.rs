@@ -7,7 +7,7 @@
 //! /entry                 NXentry, default = the stage to plot
 //! /entry/pipeline        name, config verbatim, overrides, seed, program
 //! /entry/run             when and where: the only group that comparisons leave out
-//! /entry/ID              NXprocess, one per stage, in the order of sequence_index (what NeXus forbids in a name becomes `_`)
+//! /entry/ID              NXprocess, one per stage, in the order of sequence_index (what NeXus forbids in names becomes `_`)
 //! /entry/ID/provenance   stage, version, parameters, wires, seed, key, sources, warnings
 //! /entry/ID/PORT         an artifact: NXdata (array, table), NXcollection (model, recording), NXnote (document)
 //! ```
@@ -43,6 +43,6 @@ pub use compare::{Difference, compare};
 pub use error::StoreError;
 pub use format::FORMAT_VERSION;
 pub use ports::PortSummary;
-pub use result_file::{RESERVED_PORTS, RESERVED_STAGE_IDS, write_result};
+pub use result_file::write_result;
 pub use result_reader::{ResultFile, StageSummary, read_result};
 pub use stage_file::{read_stage, write_stage};

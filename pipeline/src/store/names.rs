@@ -1,15 +1,21 @@
 //! Names of groups: stage ids and ports, as far as NeXus allows.
 
+/// What a result file keeps under its entry beside the stages.
+pub(super) const TAKEN_BY_ENTRY: [&str; 4] = ["pipeline", "run", "title", "definition"];
+
+/// What a stage's group holds beside its ports.
+pub(super) const TAKEN_BY_STAGE: [&str; 5] = ["provenance", "program", "version", "sequence_index", "date"];
+
 /// A group name per id: `nxcheck` passes letters, digits and `_`; every other character becomes `_`, and `_` is added until no two
-/// names are equal.
-pub(super) fn group_names<'a>(ids: impl Iterator<Item = &'a str>) -> Vec<String> {
+/// names are equal and none is taken.
+pub(super) fn group_names<'a>(ids: impl Iterator<Item = &'a str>, taken: &[&str]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for id in ids {
         let mut name: String = id.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         if name.is_empty() {
             name.push('_');
         }
-        while names.contains(&name) {
+        while names.contains(&name) || taken.contains(&name.as_str()) {
             name.push('_');
         }
         names.push(name);
@@ -19,12 +25,15 @@ pub(super) fn group_names<'a>(ids: impl Iterator<Item = &'a str>) -> Vec<String>
 
 #[cfg(test)]
 mod tests {
-    use super::group_names;
+    use super::{TAKEN_BY_ENTRY, group_names};
 
     #[test]
     fn valid_names_stay_and_no_two_are_equal() {
-        let ids = ["records", "free-lever", "free_lever", "a.b", ".", "", "zähler", "records_"];
-        let names = group_names(ids.into_iter());
-        assert_eq!(names, ["records", "free_lever", "free_lever_", "a_b", "_", "__", "z_hler", "records_"]);
+        let ids = ["records", "free-lever", "free_lever", "a.b", ".", "", "zähler", "records_", "run", "run_"];
+        let names = group_names(ids.into_iter(), &TAKEN_BY_ENTRY);
+        assert_eq!(
+            names,
+            ["records", "free_lever", "free_lever_", "a_b", "_", "__", "z_hler", "records_", "run_", "run__"]
+        );
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::array::{read_array, write_array};
 use super::document::{read_document, write_document};
 use super::error::{Result, StoreError};
-use super::names::group_names;
+use super::names::{TAKEN_BY_STAGE, group_names};
 use super::recording::{read_recording, write_recording};
 use super::state_space::{read_state_space, write_state_space};
 use super::table::{read_table, write_table};
@@ -31,7 +31,7 @@ pub(super) struct StoredPort {
 /// Writes every artifact into a group of its own under `parent`. Errors: an artifact that is not valid.
 pub(super) fn write_ports(parent: &Group, ports: &Ports) -> Result<()> {
     let mut stored = Vec::new();
-    let places = group_names(ports.iter().map(|(name, _)| name));
+    let places = group_names(ports.iter().map(|(name, _)| name), &TAKEN_BY_STAGE);
     for ((name, artifact), place) in ports.iter().zip(places) {
         let group = match artifact {
             Artifact::Array(array) => write_array(parent, &place, array),

@@ -51,7 +51,7 @@ pub(super) fn numbers<T: H5Type>(parent: &Group, name: &str) -> Result<Vec<T>> {
     let place = path_of(parent, name);
     let (wanted, found) = (T::type_descriptor(), descriptor(&dataset).map_err(|error| error.at(&place))?);
     if found != wanted {
-        return Err(StoreError::new(format!("found values of type {found:?}, wanted {wanted:?}")).at(place));
+        return Err(StoreError::new(format!("found values of type {found}, wanted {wanted}")).at(place));
     }
     check_size(&dataset, size_of::<T>()).map_err(|error| error.at(&place))?;
     dataset.read_raw().map_err(|error| StoreError::from(error).at(place))
@@ -84,7 +84,7 @@ pub(super) fn attribute<T: H5Type + Copy>(owner: &Location, name: &str) -> Resul
     let attribute = owner.attr(name).map_err(|_| StoreError::new("the attribute is missing or damaged").at(place()))?;
     let found = descriptor(&attribute).map_err(|error| error.at(place()))?;
     if found != T::type_descriptor() || attribute.size() != 1 {
-        return Err(StoreError::new(format!("found {found:?}, wanted one {:?}", T::type_descriptor())).at(place()));
+        return Err(StoreError::new(format!("found {found}, wanted one {}", T::type_descriptor())).at(place()));
     }
     one(attribute.read_raw().map_err(|error| StoreError::from(error).at(place()))?)
 }
@@ -110,7 +110,7 @@ pub(crate) fn read_texts(container: &Container) -> Result<Vec<String>> {
         TypeDescriptor::FixedUnicode(size) if size <= 8192 => {
             read_bytes::<FixedUnicode<8192>>(container, FixedUnicode::as_bytes)
         }
-        other => Err(StoreError::new(format!("found values of type {other:?}, wanted text"))),
+        other => Err(StoreError::new(format!("found values of type {other}, wanted text"))),
     }
 }
 

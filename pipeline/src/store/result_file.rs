@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::error::{Result, StoreError};
 use super::format::write_format;
-use super::names::group_names;
+use super::names::{TAKEN_BY_ENTRY, TAKEN_BY_STAGE, group_names};
 use super::ports::write_ports;
 use super::run_info::write_run_info;
 use super::seal::seal;
@@ -25,15 +25,9 @@ pub(super) const STAGES: &str = "stages";
 /// The groups of the stages, under the entry.
 pub(super) const GROUPS: &str = "stage_groups";
 
-/// Stage ids that a result file has another use for.
-pub const RESERVED_STAGE_IDS: [&str; 4] = [PIPELINE, RUN, "title", "definition"];
-
-/// Port names that a result file has another use for.
-pub const RESERVED_PORTS: [&str; 6] = [PROVENANCE, "program", "version", "sequence_index", "date", "note"];
-
 /// Writes a run's result to a new file, seals and syncs it; [`crate::cache::write_result`] replaces an old one safely.
 ///
-/// Errors: the file exists or cannot be written; an artifact is not valid; a stage's id or port is reserved.
+/// Errors: the file exists or cannot be written; an artifact is not valid.
 pub fn write_result(path: &Path, run: &RunResult) -> std::result::Result<(), StoreError> {
     write_file(path, run).map_err(|error| error.file(path))?;
     seal(path)
@@ -51,7 +45,7 @@ fn write_contents(file: &File, run: &RunResult) -> Result<()> {
     let entry = write::nexus_group(file, ENTRY, "NXentry")?;
     write::text(&entry, "title", &run.name)?;
     write_pipeline(&entry, run)?;
-    let groups = group_names(run.stages.iter().map(|stage| stage.id.as_str()));
+    let groups = group_names(run.stages.iter().map(|stage| stage.id.as_str()), &TAKEN_BY_ENTRY);
     let mut default = None;
     for (index, (stage, group)) in run.stages.iter().zip(&groups).enumerate() {
         let process = write_stage_record(&entry, group, stage, &run.program)?;
@@ -75,7 +69,7 @@ fn write_pipeline(entry: &Group, run: &RunResult) -> Result<()> {
     write::texts(&group, "overrides", &run.overrides)?;
     let ids: Vec<&str> = run.stages.iter().map(|stage| stage.id.as_str()).collect();
     write::texts(&group, STAGES, &ids)?;
-    write::texts(&group, GROUPS, &group_names(ids.into_iter()))?;
+    write::texts(&group, GROUPS, &group_names(ids.into_iter(), &TAKEN_BY_ENTRY))?;
     let config = write::nexus_group(&group, "config", "NXnote")?;
     write::text(&config, "type", "application/toml")?;
     write::text(&config, "data", &run.config)?;
@@ -83,12 +77,6 @@ fn write_pipeline(entry: &Group, run: &RunResult) -> Result<()> {
 }
 
 fn write_stage_record(entry: &Group, group: &str, stage: &StageRecord, program: &str) -> Result<Group> {
-    if RESERVED_STAGE_IDS.contains(&stage.id.as_str()) {
-        return Err(StoreError::new(format!("the stage id `{}` is reserved: choose another", stage.id)));
-    }
-    if let Some((port, _)) = stage.result.outputs.iter().find(|(port, _)| RESERVED_PORTS.contains(port)) {
-        return Err(StoreError::new(format!("stage `{}`: the port name `{port}` is reserved", stage.id)));
-    }
     let process = write::nexus_group(entry, group, "NXprocess")?;
     write::text(&process, "program", "afmid")?;
     write::text(&process, "version", program)?;
@@ -147,6 +135,6 @@ fn default_port(ports: &Ports) -> Option<String> {
         }),
         _ => false,
     };
-    let groups = group_names(ports.iter().map(|(name, _)| name));
+    let groups = group_names(ports.iter().map(|(name, _)| name), &TAKEN_BY_STAGE);
     ports.iter().zip(groups).find(|((_, artifact), _)| plots(artifact)).map(|(_, group)| group)
 }

@@ -120,12 +120,12 @@ fn stages_and_artifacts_are_read_one_by_one() {
     write_result(&path, &run_result()).unwrap();
     let file = ResultFile::open(&path).unwrap();
     let ids: Vec<&str> = file.stages().iter().map(|stage| stage.record.id.as_str()).collect();
-    assert_eq!(ids, ["records", "free-lever.events_2", "events"]);
+    assert_eq!(ids, ["records", "free-lever_2", "run", "events"]);
     assert_eq!(file.run().config, run_result().config);
     let artifact = file.artifact("events", "summary").unwrap();
-    same(&artifact, run_result().stages[2].result.outputs.artifact("summary").unwrap());
+    same(&artifact, run_result().stages[3].result.outputs.artifact("summary").unwrap());
     let error = file.artifact("event", "summary").unwrap_err().to_string();
-    assert!(error.contains("no stage `event`; there is: records, free-lever.events_2, events"), "{error}");
+    assert!(error.contains("no stage `event`; there is: records, free-lever_2, run, events"), "{error}");
     let error = file.artifact("events", "sumary").unwrap_err().to_string();
     assert!(error.contains("no output `sumary`; it has: ensemble, "), "{error}");
 }
@@ -170,13 +170,13 @@ fn comparison_finds_each_difference_and_leaves_the_run_out() {
     std::fs::remove_file(&second).unwrap();
 
     run.seed = 2;
-    let Some(Artifact::Array(array)) = run.stages[2].result.outputs.artifact("ensemble") else { panic!() };
+    let Some(Artifact::Array(array)) = run.stages[3].result.outputs.artifact("ensemble") else { panic!() };
     let mut array = Array::clone(array);
     if let crate::artifact::Values::Real(values) = &mut array.variables[1].values {
         values[2] = 0.0; // was -0.0
     }
     array.attributes.remove("empty");
-    run.stages[2].result.outputs.insert("ensemble", Artifact::Array(Arc::new(array)));
+    run.stages[3].result.outputs.insert("ensemble", Artifact::Array(Arc::new(array)));
     run.stages[0].result.warnings.pop();
     write_result(&second, &run).unwrap();
     let found = compare(&first, &second).unwrap();

@@ -96,13 +96,17 @@ pub fn spring_constant(
             (contact * x, (1.0 + x) / (1.0 - x))
         }
     };
+    let stiffness_std = stiffness * relative * growth;
     let sensitivity_factor = gauge.contact_stiffness_n_per_m.map_or(1.0, |contact| 1.0 + stiffness / contact);
+    // the correction is as uncertain as k
+    let correction_std =
+        gauge.contact_stiffness_n_per_m.map_or(0.0, |contact| sensitivity.value * stiffness_std / contact);
     Ok(SpringConstant {
-        stiffness_n_per_m: Estimate { value: stiffness, std: stiffness * relative * growth },
+        stiffness_n_per_m: Estimate { value: stiffness, std: stiffness_std },
         apparent_n_per_m: apparent,
         sensitivity_v_per_m: Estimate {
             value: sensitivity.value * sensitivity_factor,
-            std: sensitivity.std * sensitivity_factor,
+            std: (sensitivity.std * sensitivity_factor).hypot(correction_std),
         },
         attenuation,
         relative_errors,

@@ -53,7 +53,6 @@ fn lever_a_has_its_published_sensitivity_and_spring_constant() {
     let outputs = slope.run(&records, &cx).unwrap();
     let document = outputs.get(&SUMMARY).unwrap().clone();
     let found: SensitivitySummary = document.read().unwrap();
-    println!("{found:?}");
     assert!(found.records_without_contact.is_empty());
     // 60 N/m under 3.8 N/m reads 5.96 % low
     assert!((found.apparent_v_per_m.value / 1e7 - 60.0 / 63.8).abs() < 2e-3, "{found:?}");
@@ -66,12 +65,11 @@ fn lever_a_has_its_published_sensitivity_and_spring_constant() {
     };
     let outputs = thermal.run(&records.clone().with(&SENSITIVITY, document), &cx).unwrap();
     let found: StiffnessSummary = outputs.get(&SUMMARY).unwrap().read().unwrap();
-    println!("{found:?}");
     let (k, s) = (found.stiffness_n_per_m, found.sensitivity_v_per_m);
     // its temperature is not stated (293 to 300 K): one per cent beside two standard errors
     assert!((k.value - 3.8).abs() < 2.0 * k.std + 0.04, "{k:?}");
-    // the correction follows from k: 0.06 of k's error
-    assert!((s.value / 1e7 - 1.0).abs() < 5e-3, "{s:?}");
+    // the correction follows from k, of whose relative error it takes 0.06 / 1.06
+    assert!((s.value - 1e7).abs() < 3.0 * s.std && s.std < 3e4, "{s:?}");
     if found.free_s > 1.0 {
         assert!(k.std / k.value < 0.05, "{k:?}");
     }
@@ -87,7 +85,6 @@ fn lever_a_does_not_change_over_its_archive() {
     let cx = Context::new(Path::new("."), 1, &NoProgress);
     let outputs = Thermal::default().run(&records, &cx).unwrap();
     let summary = &outputs.get(&SUMMARY).unwrap().0;
-    println!("{summary:#}");
     assert_eq!(summary["changed"], serde_json::json!([]), "{summary:#}");
     assert_eq!(summary["without_peak"], serde_json::json!([]));
 }

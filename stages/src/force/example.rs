@@ -23,12 +23,12 @@ pub(super) fn examples() -> Vec<Example> {
         },
         Example {
             title: "In newtons, with stiffness and sensitivity",
-            params: "guard_s = 4e-6\nstiffness_n_per_m = 3.8\nsensitivity_m_per_v = 1e-7",
+            params: "guard_s = 4e-6\nstiffness_n_per_m = 3.8\nsensitivity_v_per_m = 1e7",
             inputs: || Ok(Ports::new().with(&AVERAGE, average())),
             expect: |outputs| {
                 let force = number(outputs, &["force", "value"])?;
                 let first = newtons(outputs).map_err(|error| error.to_string())?;
-                // -0.8 V * 1e-7 m/V * 3.8 N/m; the line is exact to 1e-4 V
+                // -0.8 V / 1e7 V/m * 3.8 N/m; the line is exact to 1e-4 V
                 if (force + 304e-9).abs() < 0.1e-9 && (first + 304e-9).abs() < 0.1e-9 {
                     Ok(format!("The force at the rupture is {:.1} nN.", 1e9 * force))
                 } else {

@@ -39,8 +39,8 @@ pub struct Extrapolation {
     pub t0_s: Option<f64>,
     /// Spring constant in N/m, above 0, for a force in newtons; it comes before the calibration's. Default: none.
     pub stiffness_n_per_m: Option<f64>,
-    /// Optical lever sensitivity in metres of deflection per volt, above 0; it comes before the calibration's. Default: none.
-    pub sensitivity_m_per_v: Option<f64>,
+    /// Optical lever sensitivity in volts per metre of deflection, above 0; it comes before the calibration's. Default: none.
+    pub sensitivity_v_per_m: Option<f64>,
 }
 
 /// Shape of the line without force.
@@ -63,14 +63,14 @@ impl Default for Extrapolation {
             zero_line: ZeroLineKind::Linear,
             t0_s: None,
             stiffness_n_per_m: None,
-            sensitivity_m_per_v: None,
+            sensitivity_v_per_m: None,
         }
     }
 }
 
 pub(super) const AVERAGE: Port<Array> = Port::new("average", "average", "averaged events, whole and halves");
 const CALIBRATION: Port<Document> =
-    Port::optional("calibration", "calibration", "stiffness_n_per_m and sensitivity_m_per_v, for newtons");
+    Port::optional("calibration", "stiffness", "the summary of `calibration.stiffness`, for newtons");
 pub(super) const PAIR: Port<Array> =
     Port::new("pair", "pair", "force and response over time since t0, whole and halves");
 pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "load at the event, t0 and its ambiguity");
@@ -94,7 +94,7 @@ impl Stage for Extrapolation {
         within("sure_share", self.sure_share, 0.001, 0.9)?;
         within("t0_s", self.t0_s.unwrap_or(0.0), -1.0, 1.0)?;
         within("stiffness_n_per_m", self.stiffness_n_per_m.unwrap_or(1.0), f64::MIN_POSITIVE, f64::MAX)?;
-        within("sensitivity_m_per_v", self.sensitivity_m_per_v.unwrap_or(1.0), f64::MIN_POSITIVE, f64::MAX)
+        within("sensitivity_v_per_m", self.sensitivity_v_per_m.unwrap_or(1.0), f64::MIN_POSITIVE, f64::MAX)
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -134,7 +134,7 @@ impl Stage for Extrapolation {
                 "" => lines,
                 _ => extrapolate(mean, error, settings, Some(lines.onset)).map_err(StageError::from_error)?,
             };
-            result = add_pair(result, suffix, mean, error, &own, event, scale);
+            result = add_pair(result, suffix, mean, error, &own, event, scale.map(|scale| scale.per_volt));
             halves.push((suffix, own));
             if let Some(count) = average.attributes.get(&format!("count{suffix}")) {
                 result.attributes.insert(format!("count{suffix}"), count.clone());
@@ -181,25 +181,37 @@ impl Extrapolation {
         Some(Onset { latest: sample as usize, earliest: sample })
     }
 
-    /// Stiffness times sensitivity, from the parameters or the calibration.
-    fn newtons_per_volt(&self, calibration: Option<&Document>) -> Result<Option<f64>, StageError> {
-        let stiffness = self.stiffness_n_per_m.or_else(|| calibrated(calibration, "stiffness_n_per_m"));
-        let sensitivity = self.sensitivity_m_per_v.or_else(|| calibrated(calibration, "sensitivity_m_per_v"));
+    /// Stiffness over sensitivity, from the parameters or the calibration.
+    fn newtons_per_volt(&self, calibration: Option<&Document>) -> Result<Option<Newtons>, StageError> {
+        let given = |value: Option<f64>| value.map(|value| (value, 0.0));
+        let stiffness = given(self.stiffness_n_per_m).or_else(|| calibrated(calibration, "stiffness_n_per_m"));
+        let sensitivity = given(self.sensitivity_v_per_m).or_else(|| calibrated(calibration, "sensitivity_v_per_m"));
         match (stiffness, sensitivity) {
-            (Some(stiffness), Some(sensitivity)) => Ok(Some(stiffness * sensitivity)),
+            (Some((k, k_std)), Some((s, s_std))) => {
+                // both errors added, although a sensitivity that is too high raises k twice and lowers 1 / s once
+                Ok(Some(Newtons { per_volt: k / s, relative_std: (k_std / k).hypot(s_std / s) }))
+            }
             (None, None) => Ok(None),
             _ => Err(StageError::new(
-                "a force in newtons wants both `stiffness_n_per_m` and `sensitivity_m_per_v`, found one",
+                "a force in newtons wants both `stiffness_n_per_m` and `sensitivity_v_per_m`, found one",
             )
             .help("give the other as a parameter, or wire a calibration that has both")),
         }
     }
 }
 
-/// A number of the calibration, plain or as `{ "value": ... }`.
-fn calibrated(calibration: Option<&Document>, name: &str) -> Option<f64> {
+/// From volts of static deflection to newtons.
+#[derive(Debug, Clone, Copy)]
+struct Newtons {
+    per_volt: f64,
+    relative_std: f64,
+}
+
+/// A number of the calibration with its standard error, plain or as `{ "value": ..., "std": ... }`.
+fn calibrated(calibration: Option<&Document>, name: &str) -> Option<(f64, f64)> {
     let found = calibration?.0.get(name)?;
-    found.as_f64().or_else(|| found.get("value")?.as_f64())
+    let part = |key: &str| found.get(key).and_then(Value::as_f64);
+    found.as_f64().map(|value| (value, 0.0)).or_else(|| Some((part("value")?, part("std").unwrap_or(0.0))))
 }
 
 fn event_kind(average: &Array) -> Result<Event, StageError> {
@@ -244,7 +256,7 @@ fn summary(
     event: Event,
     onset: usize,
     rate: f64,
-    scale: Option<f64>,
+    scale: Option<Newtons>,
 ) -> Result<Document, StageError> {
     let Some((_, whole)) = halves.first() else { return Err(StageError::new("there is no average")) };
     let with_std = |value: f64, std: f64, unit: &str| json!({ "value": value, "std": std, "unit": unit });
@@ -257,7 +269,10 @@ fn summary(
         "load": with_std(whole.load, whole.load_std, "V"),
         "load_identification": half("_identification"),
         "load_verification": half("_verification"),
-        "force": scale.map(|scale| with_std(scale * whole.load, scale.abs() * whole.load_std, "N")),
+        "force": scale.map(|scale| {
+            let force = scale.per_volt * whole.load;
+            with_std(force, (scale.per_volt * whole.load_std).hypot(force * scale.relative_std), "N")
+        }),
         "load_rate_v_per_s": whole.load_slope * rate,
         "t0_s": (whole.onset.latest as f64 - onset as f64) / rate,
         "t0_sample": whole.onset.latest,
