@@ -11,11 +11,12 @@ use super::find::all;
 use super::generic::stage_view;
 use super::number::{bytes, duration, with_error};
 use super::palette;
-use super::paper;
+use super::paper::{self, Drawn};
 use super::view::{Fact, Head, Picture, Section, StageView, TableView, Tile};
 
-/// Bytes that the figures of the stages may take together, so that the page stays under 5 MB.
-const STAGE_FIGURES: usize = 2_000_000;
+/// Bytes that the figures of the sections, and of the stages, may take together, so that the page stays under 5 MB.
+const SECTION_FIGURES: usize = 2_500_000;
+const STAGE_FIGURES: usize = 1_200_000;
 
 /// Why a page could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -48,16 +49,8 @@ struct Page<'a> {
 
 /// One self-contained HTML page about a run.
 pub(crate) fn report(run: &RunResult) -> Result<String, ReportError> {
-    let sections: Vec<Section> = paper::sections(run)
-        .into_iter()
-        .map(|drawn| Section {
-            id: drawn.id.to_owned(),
-            title: drawn.title.to_owned(),
-            missing: if drawn.is_empty() { drawn.missing.to_owned() } else { String::new() },
-            pictures: drawn.figures.iter().map(picture).collect(),
-            tables: drawn.tables,
-        })
-        .collect();
+    let mut room = SECTION_FIGURES;
+    let sections: Vec<Section> = paper::sections(run).into_iter().map(|drawn| section(drawn, &mut room)).collect();
     let (shown, skipped): (Vec<Section>, Vec<Section>) =
         sections.into_iter().partition(|section| section.missing.is_empty());
     let warnings: Vec<(String, Vec<String>)> = run
@@ -95,6 +88,30 @@ pub(crate) fn figures(run: &RunResult) -> Vec<(String, String)> {
     let of_paper = paper::sections(run).into_iter().flat_map(|drawn| drawn.figures);
     let of_stages = run.stages.iter().flat_map(|stage| stage_view(run, stage).1.into_iter().flatten());
     of_paper.chain(of_stages).map(|figure| (format!("{}.svg", figure.id), figure.standalone(&style))).collect()
+}
+
+/// Draws the figures of a section, as long as there is room for them.
+fn section(drawn: Drawn, room: &mut usize) -> Section {
+    let missing = if drawn.is_empty() { drawn.missing.to_owned() } else { String::new() };
+    let mut pictures = Vec::new();
+    for picture in drawn.figures.iter().map(picture) {
+        if let Some(left) = room.checked_sub(picture.svg.len()) {
+            *room = left;
+            pictures.push(picture);
+        }
+    }
+    let left_out = match drawn.figures.len() - pictures.len() {
+        0 => String::new(),
+        count => format!("{count} figures left out to keep the page small; `afmid report --figures DIR` writes them."),
+    };
+    Section {
+        id: drawn.id.to_owned(),
+        title: drawn.title.to_owned(),
+        pictures,
+        tables: drawn.tables,
+        missing,
+        left_out,
+    }
 }
 
 fn picture(figure: &Figure) -> Picture {

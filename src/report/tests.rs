@@ -48,7 +48,7 @@ fn assert_page(page: &str) {
 fn the_paper_s_run_shows_every_figure() {
     let page = report(&paper()).expect("a page");
     assert_page(&page);
-    for id in ["figure-2", "figure-3", "figure-4", "figure-5", "drift-drift", "residual-model-residual"] {
+    for id in ["figure-2", "figure-3", "figure-4", "figure-5", "drift", "residual-model-residual"] {
         assert!(page.contains(&format!("id=\"{id}\"")), "{id}");
     }
     assert!(!page.contains("Not in this run"), "a section is missing");

@@ -91,6 +91,8 @@ pub(crate) struct Section {
     pub tables: Vec<TableView>,
     /// Why it is empty.
     pub missing: String,
+    /// What was left out to keep the page small; empty: nothing.
+    pub left_out: String,
 }
 
 /// An artifact of a stage.

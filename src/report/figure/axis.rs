@@ -12,6 +12,8 @@ pub(crate) enum TickStyle {
     Prefixed,
     /// Multiples of 45 or 90 degrees.
     Degrees,
+    /// Whole numbers.
+    Whole,
 }
 
 /// What an axis shows.
@@ -48,6 +50,12 @@ impl Axis {
         Self { style: TickStyle::Degrees, ..Self::new("Phase", "°") }
     }
 
+    /// Ticks at whole numbers.
+    pub fn whole(mut self) -> Self {
+        self.style = TickStyle::Whole;
+        self
+    }
+
     /// Logarithmic.
     pub fn log(mut self) -> Self {
         self.log = true;
@@ -82,9 +90,10 @@ impl Axis {
             }
             (true, _) => ticks::logarithmic(low, high, wanted, ticks::power_label),
             (false, TickStyle::Degrees) => ticks::degrees(low, high, wanted),
+            (false, TickStyle::Whole) => ticks::linear(low, high, wanted.min(high - low), 1.0),
             (false, _) => ticks::linear(low, high, wanted, factor),
         };
-        Some(Resolved { log: self.log, low, high, unit, ticks })
+        Some(Resolved { log: self.log, low, high, factor, unit, ticks })
     }
 
     fn display_unit(&self, low: f64, high: f64) -> (f64, String) {
@@ -129,6 +138,8 @@ pub(crate) struct Resolved {
     pub log: bool,
     pub low: f64,
     pub high: f64,
+    /// What values are divided by before they are written, as `unit` says.
+    pub factor: f64,
     pub unit: String,
     pub ticks: Vec<Tick>,
 }

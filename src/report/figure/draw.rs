@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::axis::{Axis, Resolved};
+use super::axis::{Axis, Resolved, TickStyle};
 use super::decimate::decimate;
 use super::layout::Panel;
 use super::mark::{Band, Ellipse, Line, Mark, Marker, Points, Rule, Stroke};
@@ -71,7 +71,7 @@ pub(super) fn panel(
     let f = map.frame;
     let _ = write!(
         out,
-        "<clipPath id=\"{0}\"><rect x=\"{1}\" y=\"{2}\" width=\"{3}\" height=\"{4}\"/></clipPath><g class=\"marks\" clip-path=\"url(#{0})\">",
+        "<clipPath id=\"{0}\"><rect x=\"{1}\" y=\"{2}\" width=\"{3}\" height=\"{4}\"/></clipPath><g class=\"marks\" clip-path=\"url(#{0})\"><g class=\"zoom\">",
         escape(id),
         px(f.left),
         px(f.top),
@@ -88,16 +88,25 @@ pub(super) fn panel(
             Mark::Rule(_) => {}
         }
     }
-    out.push_str("</g>");
+    out.push_str("</g></g>");
+    out.push_str("<g class=\"rules\">");
     rules(out, panel, &map);
-    out.push_str("</g>");
+    out.push_str("</g></g>");
 }
 
 fn open(out: &mut String, panel: &Panel, map: &Map) {
     let f = map.frame;
     let axis = |axis: &Axis, resolved: &Resolved| {
+        let style = match axis.style {
+            TickStyle::Plain => "plain",
+            TickStyle::Prefixed => "prefixed",
+            TickStyle::Degrees => "degrees",
+            TickStyle::Whole => "whole",
+        };
+        let unit = if axis.style == TickStyle::Prefixed { &axis.unit } else { &resolved.unit };
         serde_json::json!({
-            "label": axis.label, "unit": axis.unit, "log": resolved.log, "low": resolved.low, "high": resolved.high,
+            "label": axis.label, "unit": unit, "factor": resolved.factor, "style": style, "bare": axis.hide_labels,
+            "log": resolved.log, "low": resolved.low, "high": resolved.high,
         })
     };
     let data = serde_json::json!({

@@ -78,7 +78,7 @@ impl Figure {
             title: title.to_owned(),
             caption: caption.to_owned(),
             rows: Vec::new(),
-            column_px: 1.0,
+            column_px: 0.5,
         }
     }
 
@@ -191,12 +191,14 @@ fn draw_legend(keys: &[Key<'_>]) -> (String, f64) {
         if x + width > WIDTH && x > MARGIN_LEFT {
             (x, y) = (MARGIN_LEFT, y + LEGEND_ROW);
         }
-        let _ = write!(out, "<g class=\"key\" data-series=\"{index}\" transform=\"translate({} {})\">", px(x), px(y));
+        let _ = write!(out, "<g class=\"key\" data-key=\"{index}\" transform=\"translate({} {})\">", px(x), px(y));
         let _ = write!(out, "<rect class=\"hit\" x=\"-4\" y=\"-12\" width=\"{}\" height=\"24\"/>", px(width - 8.0));
         if let Some(class) = key.band {
             let _ = write!(out, "<rect class=\"band {class}\" x=\"0\" y=\"-6\" width=\"22\" height=\"12\"/>");
         }
         if let Some(stroke) = key.line {
+            // a hair of a line shows no colour on so short a piece
+            let stroke = Stroke { width: stroke.width.max(1.6), ..stroke };
             let _ = write!(out, "<path {} d=\"M0,0 22,0\"/>", draw::stroke(stroke));
         }
         if let Some((marker, class)) = key.marker {

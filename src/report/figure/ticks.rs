@@ -104,14 +104,21 @@ pub(super) fn logarithmic(low: f64, high: f64, wanted: f64, label: impl Fn(f64) 
     ticks
 }
 
-/// `1`, `0.1` and `10` as they are, other values as powers of ten.
+/// `0.1`, `2` and `50` as they are, what is smaller or larger as `1.5·10⁻⁶`.
 pub(super) fn power_label(value: f64) -> String {
-    let exponent = value.log10().floor() as i32;
-    let digit = (value / 10f64.powi(exponent)).round();
+    let text = format!("{value:.3e}");
+    let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    let digits = if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits };
     if (-1..=1).contains(&exponent) {
-        return plain(value, usize::from(exponent < 0));
+        let decimals = digits.len().saturating_sub(2) as i32 - exponent;
+        return plain(value, usize::try_from(decimals).unwrap_or(0));
     }
-    if digit == 1.0 { format!("10{}", superscript(exponent)) } else { format!("{digit}·10{}", superscript(exponent)) }
+    if digits == "1" {
+        format!("10{}", superscript(exponent))
+    } else {
+        format!("{digits}·10{}", superscript(exponent))
+    }
 }
 
 /// A value with an SI prefix: `46.3 kHz`.
@@ -171,6 +178,14 @@ mod tests {
         let ticks = logarithmic(3e-4, 30.0, 6.0, power_label);
         assert_eq!(labels(&ticks), ["10⁻³", "10⁻²", "0.1", "1", "10"]);
         assert!(ticks.len() > 30);
+        assert_eq!(
+            ["1", "0.5", "0.15", "20", "12.5", "10⁻³", "2.5·10⁶"],
+            [1.0, 0.5, 0.15, 20.0, 12.5, 1e-3, 2.5e6].map(power_label)
+        );
+        assert_eq!(
+            labels(&logarithmic(2.1e-6, 2.9e-6, 4.0, power_label)),
+            ["2.2·10⁻⁶", "2.4·10⁻⁶", "2.6·10⁻⁶", "2.8·10⁻⁶"]
+        );
         assert_eq!(labels(&logarithmic(1e-30, 1.0, 6.0, power_label)).len(), 7);
         assert!(logarithmic(0.0, 1.0, 5.0, power_label).is_empty());
     }

@@ -85,7 +85,7 @@ fn default_plot(id: &str, array: &Array) -> Option<Figure> {
         panel = panel.with(Mark::Band(band)).with(line("their mean", &axis.values, mean, Colour::Blue));
     }
     let figure = Figure::new(id, &name_of(signal), "").row(Row::one(200.0, panel));
-    Some(figure)
+    Some(Figure { column_px: 1.0, ..figure })
 }
 
 fn line(series: &str, x: &[f64], y: Vec<f64>, colour: Colour) -> Mark {

@@ -9,7 +9,7 @@ mod table;
 
 pub(crate) use document::document_view;
 pub(crate) use stage::stage_view;
-pub(crate) use table::{ROWS, table_view};
+use table::ROWS;
 
 use std::collections::BTreeMap;
 

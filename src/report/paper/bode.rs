@@ -71,7 +71,7 @@ impl BodeCurve {
         self
     }
 
-    /// With noise that would make its own phase wander.
+    /// Noisy: its scatter shows its error, which is not drawn, and its phase follows a smoother curve's.
     pub fn noisy(mut self) -> Self {
         self.reference = false;
         self
@@ -81,7 +81,7 @@ impl BodeCurve {
 /// Magnitude above phase; bands where a curve has errors.
 pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> Figure {
     let reference = bode.curves.iter().rev().find(|curve| curve.reference).map(|curve| {
-        let phases = unwrapped_degrees(&curve.transfer);
+        let phases = unwrapped_degrees(&curve.transfer, &curve.phase_std_rad);
         (curve.frequency_hz.clone(), phases)
     });
     let mut magnitude = Panel::new("", Axis::frequency().bare(), Axis::new("Magnitude", "1").log());
@@ -90,10 +90,10 @@ pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> 
         let size: Vec<f64> = curve.transfer.iter().map(|h| h.norm()).collect();
         let angle = match &reference {
             Some((f, phases)) => degrees_near(&curve.frequency_hz, &curve.transfer, (f, phases)),
-            None => unwrapped_degrees(&curve.transfer),
+            None => unwrapped_degrees(&curve.transfer, &curve.phase_std_rad),
         };
         let times = |std: &[f64], factor: f64| -> Vec<f64> { std.iter().map(|std| factor * std).collect() };
-        if curve.magnitude_std.len() == size.len() && curve.phase_std_rad.len() == size.len() {
+        if curve.reference && curve.magnitude_std.len() == size.len() && curve.phase_std_rad.len() == size.len() {
             magnitude = magnitude.with(band(curve, &size, &times(&curve.magnitude_std, BAND)));
             // an error of half a turn says that nothing is known of the phase
             let turn = times(&curve.phase_std_rad, BAND)
@@ -109,10 +109,7 @@ pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> 
         magnitude = magnitude.with(Mark::at_x(*at, label));
         phase = phase.with(Mark::at_x(*at, ""));
     }
-    // resonances are narrow: twice the resolution of other figures
-    Figure { column_px: 0.5, ..Figure::new(id, title, caption) }
-        .row(Row::one(340.0, magnitude))
-        .row(Row::one(200.0, phase))
+    Figure::new(id, title, caption).row(Row::one(340.0, magnitude)).row(Row::one(200.0, phase))
 }
 
 fn band(curve: &BodeCurve, middle: &[f64], error: &[f64]) -> Mark {

@@ -1,23 +1,25 @@
 //! What the paper checks beside its figures: alignment, drift, periodograms, residuals, calibration.
 
-use afmid_pipeline::{Array, Document, RunResult, Table, Values};
+use afmid_pipeline::{Array, Axis as Coordinates, Document, RunResult, Table, Values};
 
 use super::force_curve::is_ensemble;
 use super::sections::Drawn;
 use crate::report::figure::{Axis, Band, Colour, Figure, Line, Mark, Marker, Panel, Points, Row, Stroke};
-use crate::report::find::{EventKind, Found, all, frequency_axis, real_over, time_axis, unit_of};
-use crate::report::generic::{ROWS, document_view, table_view};
+use crate::report::find::{EventKind, Found, all, event_kind, frequency_axis, real_over, time_axis, unit_of};
+use crate::report::generic::document_view;
 use crate::report::view::{Fact, Head, TableView};
 
 /// Aligned events on top of each other, and the list of what was seen.
 pub(crate) fn alignment(run: &RunResult) -> Drawn {
     let ensembles = all::<Array>(run).filter(is_ensemble);
     let figures = ensembles.filter_map(|found| aligned(run, &found)).collect();
-    let lists = all::<Table>(run)
-        .filter(|found| found.value.column("rejected").is_ok() && found.value.column("correlation").is_ok());
-    let tables =
-        lists.map(|found| table_view(&format!("Events seen by stage {}", found.stage.id), found.value, ROWS)).collect();
-    Drawn { id: "alignment", title: "Alignment of the events", figures, tables, missing: "no stage extracts events" }
+    Drawn {
+        id: "alignment",
+        title: "Alignment of the events",
+        figures,
+        missing: "no stage extracts events",
+        ..Drawn::default()
+    }
 }
 
 /// Events that are drawn one by one; more would hide each other.
@@ -79,41 +81,51 @@ fn envelope(rows: &[&[f64]], count: usize) -> (Vec<f64>, Vec<f64>) {
 
 /// Correlations of ordered and random sub-ensembles.
 pub(crate) fn drift(run: &RunResult) -> Drawn {
-    let mut section = Drawn {
-        id: "drift",
+    let caption = "Each sub-ensemble's mean against the mean of all other events. Drift pulls the ordered ones away from the random ones.";
+    let panels: Vec<(f64, Panel)> =
+        all::<Table>(run).filter_map(|found| Some((1.0, sub_ensembles(run, &found)?))).take(6).collect();
+    let rows = panels.chunks(2).map(|pair| Row { height: 170.0, panels: pair.to_vec() }).collect();
+    let figure = Figure { rows, ..Figure::new("drift", "Sub-ensembles", caption) };
+    let figures = if figure.rows.is_empty() { Vec::new() } else { vec![figure] };
+    Drawn {
+        id: "sub-ensembles",
         title: "Drift over the archive",
+        figures,
         missing: "no stage compares sub-ensembles",
         ..Drawn::default()
-    };
-    for found in all::<Table>(run) {
-        let (Ok(order), Ok(group), Ok(correlation)) =
-            (found.value.text("order"), found.value.integer("group"), found.value.real("correlation"))
-        else {
-            continue;
-        };
-        let mut panel = Panel::new("", Axis::new("Sub-ensemble", "1"), Axis::new("1 − correlation", "1").log());
-        for (word, series, colour, marker) in [
-            ("ordered", "in order of the archive", Colour::Vermillion, Marker::Dot),
-            ("random", "at random", Colour::Blue, Marker::Ring),
-        ] {
-            let rows = || order.iter().zip(group).zip(correlation).filter(|((order, _), _)| *order == word);
-            panel = panel.with(Mark::Points(Points {
-                series: series.to_owned(),
-                x: rows().map(|((_, group), _)| *group as f64 + 1.0).collect(),
-                y: rows().map(|(_, correlation)| 1.0 - correlation).collect(),
-                y_error: Vec::new(),
-                titles: rows().map(|(_, correlation)| format!("correlation {correlation:.9}")).collect(),
-                marker,
-                colour,
-            }));
-        }
-        let p_value = summary_number(run, &found.stage.id, "p_value");
-        let title = p_value.map_or_else(String::new, |p| format!("{}: p = {p:.3} for no drift", found.stage.id));
-        let caption = "Each sub-ensemble's mean against the mean of all other events. Drift pulls the ordered ones away from the random ones.";
-        let id = format!("drift-{}", found.stage.id);
-        section.figures.push(Figure::new(&id, "Sub-ensembles", caption).row(Row::one(160.0, Panel { title, ..panel })));
     }
-    section
+}
+
+fn sub_ensembles(run: &RunResult, found: &Found<'_, Table>) -> Option<Panel> {
+    let order = found.value.text("order").ok()?;
+    let (group, correlation) = (found.value.integer("group").ok()?, found.value.real("correlation").ok()?);
+    let groups = group.iter().copied().max()? as f64 + 1.0;
+    let event = match event_kind(run, found.stage) {
+        EventKind::SnapOff => "Snap-offs",
+        EventKind::SnapIn => "Snaps to contact",
+    };
+    let p_value = summary_number(run, &found.stage.id, "p_value")
+        .map_or_else(String::new, |p| format!(": p = {p:.2} for no drift"));
+    let x = Axis::new("Sub-ensemble", "1").limits(0.5, groups + 0.5).whole();
+    let worst = correlation.iter().map(|c| 1.0 - c).filter(|value| value.is_finite()).fold(0.0, f64::max);
+    let y = Axis::new("1 − correlation", "1").limits(0.0, 1.12 * worst);
+    let mut panel = Panel::new(&format!("{event}{p_value}"), x, y);
+    for (word, series, colour, marker, aside) in [
+        ("random", "at random", Colour::Blue, Marker::Ring, 0.06),
+        ("ordered", "in order of the archive", Colour::Vermillion, Marker::Dot, -0.06),
+    ] {
+        let rows = || order.iter().zip(group).zip(correlation).filter(|((order, _), _)| *order == word);
+        panel = panel.with(Mark::Points(Points {
+            series: series.to_owned(),
+            x: rows().map(|((_, group), _)| *group as f64 + 1.0 + aside).collect(),
+            y: rows().map(|(_, correlation)| 1.0 - correlation).collect(),
+            y_error: Vec::new(),
+            titles: rows().map(|(_, correlation)| format!("{series}: correlation {correlation:.9}")).collect(),
+            marker,
+            colour,
+        }));
+    }
+    Some(panel)
 }
 
 fn summary_number(run: &RunResult, stage: &str, name: &str) -> Option<f64> {
@@ -137,7 +149,10 @@ pub(crate) fn spectra(run: &RunResult) -> Drawn {
             .filter(|variable| variable.unit.ends_with("/Hz"))
             .filter_map(|variable| Some((variable.name.as_str(), real_over(found.value, &variable.name, axis)?)))
             .collect();
-        let Some((first, _)) = densities.first() else { continue };
+        let Some((first, _)) = densities.first() else {
+            section.figures.extend(several_spectra(&found, axis));
+            continue;
+        };
         let y = Axis::new("Power spectral density", unit_of(found.value, first)).log();
         let mut panel = Panel::new(&format!("Stage {}", found.stage.id), Axis::frequency(), y);
         for (index, (name, values)) in densities.iter().enumerate().take(8) {
@@ -147,6 +162,40 @@ pub(crate) fn spectra(run: &RunResult) -> Drawn {
         section.figures.push(Figure::new(&id, "Power spectra", "").row(Row::one(260.0, panel)));
     }
     section
+}
+
+/// Spectra of many records: their range and mean.
+fn several_spectra(found: &Found<'_, Array>, axis: &Coordinates) -> Option<Figure> {
+    let variable = found
+        .value
+        .variables
+        .iter()
+        .find(|variable| variable.unit.ends_with("/Hz") && variable.dims.last() == Some(&axis.name))?;
+    let Values::Real(values) = &variable.values else { return None };
+    let rows: Vec<&[f64]> = values.chunks_exact(axis.values.len().max(1)).collect();
+    let (low, high) = envelope(&rows, axis.values.len());
+    let mean = (0..axis.values.len())
+        .map(|k| rows.iter().filter_map(|row| row.get(k)).sum::<f64>() / rows.len() as f64)
+        .collect();
+    let y = Axis::new("Power spectral density", &variable.unit).log();
+    let band = Band {
+        series: "range of the records".to_owned(),
+        x: axis.values.clone(),
+        low,
+        high,
+        colour: Colour::Sky,
+        fits: true,
+    };
+    let line = Line {
+        series: "mean of the records".to_owned(),
+        x: axis.values.clone(),
+        y: mean,
+        stroke: Stroke::solid(Colour::Blue, 1.1),
+    };
+    let title = format!("Stage {}: {} records", found.stage.id, rows.len());
+    let panel = Panel::new(&title, Axis::frequency(), y).with(Mark::Band(band)).with(Mark::Line(line));
+    let id = format!("spectrum-{}-{}", found.stage.id, found.port);
+    Some(Figure::new(&id, "Power spectra", "").row(Row::one(260.0, panel)))
 }
 
 /// What the model leaves.

@@ -104,10 +104,7 @@ fn array_curve(found: &Found<'_, Array>, kind: EventKind, prefix: &str) -> Optio
     };
     let (name, stroke) = style(role, kind, prefix);
     let curve = BodeCurve::new(&name, &axis.values, transfer, stroke);
-    if role == Role::Raw {
-        // drawn without a band: its scatter shows its error
-        return Some((role, curve.noisy()));
-    }
+    let curve = if role == Role::Raw { curve.noisy() } else { curve };
     let over = |name: &str| real_over(found.value, name, axis);
     let curve = match (over("variance"), over("magnitude_std"), over("phase_std")) {
         (_, Some(magnitude), Some(phase)) => curve.with_errors(&axis.values, magnitude, phase),

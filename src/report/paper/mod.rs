@@ -2,6 +2,7 @@
 
 mod bode;
 mod checks;
+mod coupling;
 mod force_curve;
 mod frequency_response;
 mod modal_table;
@@ -11,4 +12,4 @@ mod sections;
 
 pub(crate) use bode::{Bode, BodeCurve, bode_figure};
 pub(crate) use response::model_curve;
-pub(crate) use sections::sections;
+pub(crate) use sections::{Drawn, sections};

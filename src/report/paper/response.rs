@@ -104,18 +104,27 @@ fn transfer(model: &StateSpace, z: Complex64) -> Option<Complex64> {
     h.is_finite().then_some(h)
 }
 
+/// Standard error in radians above which a phase says nothing about its turn: a third of the half turn that unwrapping must tell apart.
+const VAGUE_RAD: f64 = 1.0;
+
 /// Phase in degrees without jumps, starting within half a turn of zero; NaN where the response is unknown or zero.
-pub(super) fn unwrapped_degrees(transfer: &[Complex64]) -> Vec<f64> {
+///
+/// Method: each value is put on the turn nearest to the last one that is well known. `std_rad` are the phases' standard errors (empty: all
+/// are well known): noise, as in the depth of an antiresonance, is put on a turn and never decides on one.
+pub(super) fn unwrapped_degrees(transfer: &[Complex64], std_rad: &[f64]) -> Vec<f64> {
     let mut last: Option<f64> = None;
     transfer
         .iter()
-        .map(|h| {
+        .enumerate()
+        .map(|(k, h)| {
             let phase = degrees(*h);
             if phase.is_nan() {
                 return phase;
             }
             let phase = last.map_or(phase, |last| near(phase, last));
-            last = Some(phase);
+            if last.is_none() || std_rad.get(k).is_none_or(|std| *std <= VAGUE_RAD) {
+                last = Some(phase);
+            }
             phase
         })
         .collect()
@@ -205,14 +214,28 @@ mod tests {
         let f: Vec<f64> = (0..200).map(f64::from).collect();
         let h: Vec<Complex64> = f.iter().map(|f| Complex64::from_polar(1.0, -0.1 * f)).collect();
         let truth: Vec<f64> = f.iter().map(|f| (-0.1 * f).to_degrees()).collect();
-        let alone = unwrapped_degrees(&h);
+        let alone = unwrapped_degrees(&h, &[]);
         let guided = degrees_near(&f, &h, (&f, &truth));
         for k in 0..200 {
             assert!((alone[k] - truth[k]).abs() < 1e-9 && (guided[k] - truth[k]).abs() < 1e-9);
         }
         assert!(
-            unwrapped_degrees(&[Complex64::new(f64::NAN, 0.0), Complex64::new(0.0, 0.0)]).iter().all(|p| p.is_nan())
+            unwrapped_degrees(&[Complex64::new(f64::NAN, 0.0), Complex64::new(0.0, 0.0)], &[])
+                .iter()
+                .all(|p| p.is_nan())
         );
         assert!(degrees_near(&f, &h, (&[], &[])).iter().all(|p| p.is_nan()));
+    }
+
+    #[test]
+    fn noise_decides_on_no_turn() {
+        // a stretch of vague phases that turn round and round
+        let h: Vec<Complex64> = (0..100)
+            .map(|k| Complex64::from_polar(1.0, if (40..60).contains(&k) { 2.0 * f64::from(k) } else { -0.5 }))
+            .collect();
+        let std: Vec<f64> = (0..100).map(|k| if (40..60).contains(&k) { 2.0 } else { 0.01 }).collect();
+        let phases = unwrapped_degrees(&h, &std);
+        assert!((phases[99] - (-0.5f64).to_degrees()).abs() < 1e-9, "{}", phases[99]);
+        assert!(phases.iter().all(|phase| phase.abs() < 220.0));
     }
 }

@@ -2,7 +2,7 @@
 
 use afmid_pipeline::RunResult;
 
-use super::{checks, force_curve, frequency_response, modal_table, pole_zero};
+use super::{checks, coupling, force_curve, frequency_response, modal_table, pole_zero};
 use crate::report::figure::Figure;
 use crate::report::view::TableView;
 
@@ -52,6 +52,7 @@ pub(crate) fn sections(run: &RunResult) -> Vec<Drawn> {
             id: "fig-4",
             title: "Fig. 4 · The surface-coupled lever",
             figures: frequency_response::coupled(run).into_iter().collect(),
+            tables: coupling::tables(run),
             missing: "no frequency response of a snap to contact",
             ..Drawn::default()
         },
