@@ -5,7 +5,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::name::RESERVED_ID;
+use super::RESERVED_ID;
 use super::place::Place;
 use super::problem::{Origin, Problem};
 use super::read::Config;

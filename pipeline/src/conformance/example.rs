@@ -12,9 +12,17 @@ const SEED: u64 = 1;
 
 /// Runs an example in a folder of its own, which is removed again: its outputs. Errors: why it does not run.
 pub fn run_example(entry: &Entry, example: &Example) -> Result<Ports, String> {
-    let stage = instance(entry, example)?;
-    let inputs = (example.inputs)().map_err(|error| format!("inputs: {error}"))?;
-    run(stage.as_ref(), &inputs)
+    run(instance(entry, example)?.as_ref(), &inputs(entry, example)?)
+}
+
+/// An example's inputs: those that the stage declares, as in a run.
+fn inputs(entry: &Entry, example: &Example) -> Result<Ports, String> {
+    let given = (example.inputs)().map_err(|error| format!("inputs: {error}"))?;
+    let mut inputs = Ports::new();
+    for (name, artifact) in given.iter().filter(|(name, _)| entry.spec.inputs.iter().any(|port| port.name == *name)) {
+        inputs.insert(name, artifact.clone());
+    }
+    Ok(inputs)
 }
 
 /// Checks that there is an example, that each runs with the declared ports and makes the declared ports, and that the truth comes out.
@@ -78,7 +86,7 @@ fn run(stage: &dyn DynStage, inputs: &Ports) -> Result<Ports, String> {
 }
 
 fn holds(entry: &Entry, example: &Example) -> Result<(), String> {
-    let inputs = (example.inputs)().map_err(|error| format!("inputs: {error}"))?;
+    let inputs = inputs(entry, example)?;
     as_declared("input", entry.spec.inputs, &inputs)?;
     let stage = instance(entry, example)?;
     resolved_parameters_are_parameters(entry, stage.as_ref())?;

@@ -80,7 +80,7 @@ fn ids_are_checked() {
         wrong(&format!("{HEAD}{}", ids.concat()), &[]),
         [
             "\"a\" | stage id `a` is used twice | results are stored under it: rename one",
-            "\"pipeline\" | stage id `pipeline` is reserved: result files hold something else under it | choose another id",
+            "\"pipeline\" | stage id `pipeline` is reserved: `--set` means the `[pipeline]` table by it | choose another id",
             "\"A b\" | stage id \"A b\": found 'A', wanted only a-z, 0-9, `_` and `-` | results are stored under it: write `a-b`, for instance",
         ]
     );
