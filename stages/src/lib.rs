@@ -13,14 +13,8 @@ use afmid_pipeline::stage::DoubleName;
 use afmid_pipeline::{Entry, Registry};
 
 /// The stages of every domain that has any: one line each.
-const DOMAINS: &[&[Entry]] = &[
-    ensemble::STAGES,
-    events::STAGES,
-    force::STAGES,
-    io::STAGES,
-    simulate::STAGES,
-    spectrum::STAGES,
-];
+const DOMAINS: &[&[Entry]] =
+    &[ensemble::STAGES, events::STAGES, force::STAGES, io::STAGES, simulate::STAGES, spectrum::STAGES];
 
 /// All built-in stages. Errors: two of one name.
 pub fn registry() -> Result<Registry, DoubleName> {
