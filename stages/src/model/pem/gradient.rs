@@ -5,7 +5,7 @@
 
 use faer::Mat;
 
-use super::parametrisation::{Coefficients, section_order, sections, slopes};
+use super::parametrisation::{Coefficients, coordinates, roots, section_order, sections, slopes};
 use super::predictor::{Problem, all_pole, delayed};
 
 /// How the errors are whitened.
@@ -41,6 +41,18 @@ impl Point {
 
     fn free(&self) -> &[f64] {
         if let Noise::Free(c) = &self.noise { c } else { &[] }
+    }
+
+    /// Coordinates of the predictor's poles, of a model of order `order`.
+    pub fn predictor_coordinates(&self, order: usize) -> Vec<f64> {
+        match &self.noise {
+            Noise::White => self.poles.clone(),
+            Noise::Frozen(_, c) => {
+                let all = c.iter().enumerate().flat_map(|(i, &c)| roots(c, section_order(order, i)));
+                coordinates(&all.collect::<Vec<_>>())
+            }
+            Noise::Free(c) => c.clone(),
+        }
     }
 
     /// Coefficients of the poles.

@@ -3,10 +3,10 @@
 //! Steps are scaled column by column; a coordinate at its limit that pulls outwards is held. The gradient is measured as the share of the
 //! residual that lies in the tangent space: `share * sqrt(N)` is the distance to the minimum in standard errors.
 
-use faer::Mat;
+use faer::{Mat, c64};
 
-use super::gradient::{Point, coefficient_jacobian, residual, to_coordinates};
-use super::parametrisation::LIMIT;
+use super::gradient::{Noise, Point, coefficient_jacobian, residual, to_coordinates};
+use super::parametrisation::{LIMIT, coordinates, roots, section_order};
 use super::predictor::Problem;
 use super::projection::Projection;
 use crate::model::error::ModelError;
@@ -141,8 +141,33 @@ fn stalled(state: &State, output: f64) -> Ending {
     if state.projection.cost <= NEARLY_EXACT * output { Ending::Exact } else { Ending::Stalled }
 }
 
-/// Iterates to the minimum or to a limit. Errors: the starting point cannot be evaluated.
+/// Real poles of different sections that merge cannot become a complex pair: so often are they paired anew.
+const PAIRINGS: usize = 3;
+
+/// Iterates to the minimum or to a limit; where it stalls, real poles are paired anew. Errors: the starting point cannot be evaluated.
 pub(crate) fn minimise(problem: &Problem, start: State, limits: Limits) -> Result<State, ModelError> {
+    let mut state = descend(problem, start, limits)?;
+    for _ in 0..PAIRINGS {
+        if state.ending != Ending::Stalled || matches!(state.point.noise, Noise::Free(_)) {
+            break;
+        }
+        let a = state.point.a();
+        let all: Vec<c64> =
+            a.iter().enumerate().flat_map(|(i, &a)| roots(a, section_order(problem.order, i))).collect();
+        let point = Point { poles: coordinates(&all), noise: state.point.noise.clone() };
+        let next = State { iterations: state.iterations, ..State::new(problem, point)? };
+        let cost = state.projection.cost;
+        let next = descend(problem, next, limits)?;
+        if next.projection.cost < cost || next.ending == Ending::Minimum {
+            state = next;
+        } else {
+            break;
+        }
+    }
+    Ok(state)
+}
+
+fn descend(problem: &Problem, start: State, limits: Limits) -> Result<State, ModelError> {
     let (mut lambda, down, up, floor) = DAMPING;
     let mut state = start;
     let output: f64 = problem.experiments.iter().flat_map(|(_, y)| y.iter()).map(|y| y * y).sum();

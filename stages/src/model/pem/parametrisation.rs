@@ -59,10 +59,11 @@ pub(crate) fn coordinates(roots: &[c64]) -> Vec<f64> {
     }
     real.sort_by(f64::total_cmp);
     while real.len() > 1 {
-        // neighbours: a pair that merges into a complex one does so within its section
-        if let (Some(x), Some(y)) = (real.pop(), real.pop()) {
-            push_pair(&mut p, -(x + y), x * y);
-        }
+        // the closest two: a pair that merges into a complex one can do so within its section
+        let gap = |i: &usize| real[i + 1] - real[*i];
+        let closest = (0..real.len() - 1).min_by(|i, j| gap(i).total_cmp(&gap(j))).unwrap_or(0);
+        let (x, y) = (real.remove(closest + 1), real.remove(closest));
+        push_pair(&mut p, -(x + y), x * y);
     }
     p.extend(real.pop().map(|x| limited_atanh(-x)));
     p

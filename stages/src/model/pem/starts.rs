@@ -36,28 +36,41 @@ pub(crate) fn candidates(subspace: &Subspace, order: usize) -> Result<Vec<Vec<c6
     Ok(starts)
 }
 
-/// Best output-error state after a few iterations from the most promising starts.
-pub(crate) fn best(problem: &Problem, starts: &[Vec<c64>], limits: Limits) -> Result<State, ModelError> {
+/// Output-error states at the most promising starts, the best first. Errors: none can be evaluated.
+pub(crate) fn ranked(problem: &Problem, starts: &[Vec<c64>]) -> Result<Vec<State>, ModelError> {
+    let points = starts.iter().map(|poles| Point { poles: coordinates(poles), noise: Noise::White });
     let mut states = Vec::new();
     let mut failure = ModelError::Degenerate("no start could be evaluated");
-    for poles in starts {
-        match State::new(problem, Point { poles: coordinates(poles), noise: Noise::White }) {
+    for point in points {
+        match State::new(problem, point) {
             Ok(state) => states.push(state),
             Err(error) => failure = error,
         }
     }
     states.sort_by(|x, y| x.projection.cost.total_cmp(&y.projection.cost));
     states.truncate(REFINED);
+    if states.is_empty() { Err(failure) } else { Ok(states) }
+}
+
+/// Refines each state by a few iterations and takes the best: least cost over its variance, plus `2 ln N` for every complex pair.
+///
+/// A resonance may lie at any of N frequencies: it must gain more than the best of so many by chance. Errors: no state can be refined.
+pub(crate) fn refined(problem: &Problem, states: Vec<State>, limits: Limits) -> Result<State, ModelError> {
     let trial = Limits { iterations: limits.iterations.min(TRIAL_ITERATIONS), ..limits };
-    let mut best: Option<State> = None;
+    let mut failure = ModelError::Degenerate("no start could be refined");
+    let mut refined = Vec::new();
     for state in states {
         match minimise(problem, state, trial) {
-            Ok(state) if best.as_ref().is_none_or(|best| state.projection.cost < best.projection.cost) => {
-                best = Some(state)
-            }
-            Ok(_) => {}
+            Ok(state) => refined.push(state),
             Err(error) => failure = error,
         }
     }
-    best.ok_or(failure)
+    let rows = problem.rows() as f64;
+    let least = refined.iter().map(|state| state.projection.cost).fold(f64::MAX, f64::min);
+    let score = |state: &State| {
+        let pairs = state.point.a().iter().filter(|a| a[0] * a[0] < 4.0 * a[1]).count() as f64;
+        let gain = if least > 0.0 { rows * (state.projection.cost / least - 1.0) } else { state.projection.cost };
+        gain + 2.0 * rows.ln() * pairs
+    };
+    refined.into_iter().min_by(|x, y| score(x).total_cmp(&score(y))).ok_or(failure)
 }
