@@ -28,8 +28,8 @@ lint: deps
 # HDF5 is built from source and wants CMake >= 3.26; PyPI's is newer than many systems'.
 .tools/bin/cmake:
 	python3 -m venv .tools
-	.tools/bin/pip install --quiet --disable-pip-version-check cmake==$(CMAKE_VERSION)
+	.tools/bin/python -m pip install --quiet --disable-pip-version-check cmake==$(CMAKE_VERSION)
 
 .tools/readers: tests/requirements.txt | .tools/bin/cmake
-	.tools/bin/pip install --quiet --disable-pip-version-check -r tests/requirements.txt
+	.tools/bin/python -m pip install --quiet --disable-pip-version-check -r tests/requirements.txt
 	touch .tools/readers

@@ -189,7 +189,7 @@ fn force() -> StageRecord {
     let time: Vec<f64> = (0..8192).map(|k| (f64::from(k) - 1024.0) / RATE).collect();
     let mut noise = Noise::new(11);
     let response: Vec<f64> =
-        time.iter().map(|t| 0.9 * ringing(*t, 1.0) - 40.0 * t.min(0.0) * -1.0 + 2e-4 * noise.next()).collect();
+        time.iter().map(|t| 0.9 * ringing(*t, 1.0) + 40.0 * t.min(0.0) + 2e-4 * noise.next()).collect();
     let force: Vec<f64> = time.iter().map(|t| if *t < 0.0 { -0.9 + 40.0 * t } else { 0.0 }).collect();
     let n = time.len();
     let pair = Array::over(vec![Axis::new("time", "s", "time since t0", time)])

@@ -35,7 +35,7 @@ pub(super) fn decimate(points: impl Iterator<Item = Option<(f64, f64)>>, column_
     if !run.is_empty() {
         runs.push(run);
     }
-    thin(runs.iter().map(|run| straighten(run)).collect())
+    thin(runs.iter().map(straighten).collect())
 }
 
 /// How far a curve may lie from what is drawn, in pixels: half of the last decimal of a coordinate would be invisible, too.

@@ -153,8 +153,11 @@ fn empty(out: &mut String, panel: &Panel, f: Frame) {
     );
 }
 
+/// From the least to the greatest value, if there is any.
+type Extent = Option<(f64, f64)>;
+
 /// Limits of what can be drawn: pairs of finite values, positive on logarithmic axes.
-fn extents(panel: &Panel) -> (Option<(f64, f64)>, Option<(f64, f64)>) {
+fn extents(panel: &Panel) -> (Extent, Extent) {
     let fits = |axis: &Axis, value: f64| value.is_finite() && (!axis.log || value > 0.0);
     let inside = |axis: &Axis, value: f64| axis.limits.is_none_or(|(low, high)| value >= low && value <= high);
     let grow = |range: &mut Option<(f64, f64)>, value: f64| {

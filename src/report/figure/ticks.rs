@@ -145,7 +145,7 @@ pub(super) fn prefix_of(value: f64) -> (f64, &'static str) {
         (1e-18, "a"),
     ];
     let size = value.abs() * (1.0 + 1e-9);
-    if !(size > 1e-19) {
+    if size.is_nan() || size <= 1e-19 {
         return (1.0, "");
     }
     PREFIXES.into_iter().find(|(factor, _)| size >= *factor).unwrap_or((1e-18, "a"))

@@ -32,7 +32,8 @@ use super::file_patterns::matching_files;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Records {
-    /// Files, as patterns relative to the config file (`archive/*.h5`); a folder means its `*.h5`. Required.
+    /// Files, as patterns relative to the config file (`archive/*.h5`); a folder means its `*.h5`. Patterns that begin with `../../shared/data/`
+    /// begin at the variable `AFMID_DATA` where that is set. Required.
     pub files: Vec<String>,
     /// Dataset of the deflection signal. Default: `/deflection`.
     pub channel: String,
@@ -59,6 +60,24 @@ impl Default for Records {
 
 const RECORDS: Port<Recording> = Port::new("records", "records", "the records, in natural order of their paths");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many records, how long, at what rate");
+
+/// Patterns into the shared data folder, with its root moved: `../../shared/data/afm/x/*.h5` becomes `ROOT/afm/x/*.h5`.
+fn moved(patterns: &[String], root: Option<&Path>) -> Vec<String> {
+    const SHARED: &str = "../../shared/data/";
+    let moved = |pattern: &String| match (root, pattern.strip_prefix(SHARED)) {
+        (Some(root), Some(rest)) => root.join(rest).display().to_string(),
+        _ => pattern.clone(),
+    };
+    patterns.iter().map(moved).collect()
+}
+
+#[cfg(test)]
+#[test]
+fn the_root_of_shared_data_moves_and_other_patterns_stay() {
+    let patterns = ["../../shared/data/afm/x/*.h5".to_owned(), "archive/*.h5".to_owned()];
+    assert_eq!(moved(&patterns, Some(Path::new("/data"))), ["/data/afm/x/*.h5", "archive/*.h5"]);
+    assert_eq!(moved(&patterns, None), patterns);
+}
 
 impl Stage for Records {
     const SPEC: Spec = Spec {
@@ -89,7 +108,8 @@ impl Stage for Records {
     }
 
     fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
-        matching_files(&self.files, base)
+        let root = std::env::var_os("AFMID_DATA");
+        matching_files(&moved(&self.files, root.as_deref().map(Path::new)), base)
     }
 
     fn location_params() -> &'static [&'static str] {

@@ -85,7 +85,7 @@ pub fn pole_shifts(free: &[Frequency], coupled: &[Frequency]) -> Vec<PoleShift> 
         .enumerate()
         .map(|(i, &mode)| {
             let next = free.get(i + 1).map_or(f64::INFINITY, |next| next.value_hz);
-            let partner = coupled.iter().filter(|c| c.value_hz >= mode.value_hz && c.value_hz < next).last();
+            let partner = coupled.iter().rfind(|c| c.value_hz >= mode.value_hz && c.value_hz < next);
             PoleShift { free: mode, coupled: partner.copied() }
         })
         .collect()

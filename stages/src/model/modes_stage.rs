@@ -105,7 +105,7 @@ impl Stage for Modes {
             return Err(wanted("reference_quality_factor's length", q as f64, &format!("none or {f}, as frequencies")));
         }
         if let Some(value) =
-            self.reference_frequency_hz.iter().chain(&self.reference_quality_factor).find(|v| !(**v > 0.0))
+            self.reference_frequency_hz.iter().chain(&self.reference_quality_factor).find(|v| v.is_nan() || **v <= 0.0)
         {
             return Err(wanted("a reference value", *value, "above 0"));
         }

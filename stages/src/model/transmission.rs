@@ -60,7 +60,7 @@ fn polished(model: &InnovationsModel, start: c64) -> c64 {
     for _ in 0..8 {
         let next = zero - model.transfer(zero) / model.transfer_slope(zero);
         let trial = model.transfer(next).norm();
-        if !(trial < level) || (start.im > 0.0) != (next.im > 0.0) {
+        if trial.is_nan() || trial >= level || (start.im > 0.0) != (next.im > 0.0) {
             break;
         }
         (zero, level) = (next, trial);

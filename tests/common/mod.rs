@@ -1,0 +1,113 @@
+//! What the tests of whole runs share: the program, an archive to run it on, and the truth to compare with.
+
+#![allow(dead_code, reason = "each test binary uses a part of it")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// The folder of the package.
+pub const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// An archive of force curves with its truth.
+pub struct Archive {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Frequencies, quality factors and numbers of events.
+    pub truth: Truth,
+    /// Whether it is simulated in place of a recording that is not here.
+    pub stand_in: bool,
+}
+
+/// What the archive holds.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    pub frequency_hz: Vec<f64>,
+    pub quality_factor: Vec<f64>,
+    pub snap_offs: u64,
+    pub snap_ins: u64,
+}
+
+/// The program with arguments, in a folder.
+pub fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
+    command.current_dir(folder).args(arguments);
+    command
+}
+
+/// Runs the program and insists on exit code 0. Returns what it printed.
+pub fn afmid(folder: &Path, arguments: &[&str]) -> String {
+    let Output { status, stdout, stderr } = command(folder, arguments).output().expect("afmid starts");
+    assert!(status.success(), "afmid {arguments:?}: {status}\n{}", String::from_utf8_lossy(&stderr));
+    String::from_utf8_lossy(&stdout).into_owned()
+}
+
+/// The absolute path of a shipped config.
+pub fn config(name: &str) -> String {
+    Path::new(ROOT).join("configs").join(name).display().to_string()
+}
+
+/// `afmid show RESULT ID --json`.
+pub fn shown(folder: &Path, result: &str, id: &str) -> Value {
+    serde_json::from_str(&afmid(folder, &["show", result, id, "--json"])).expect("JSON on stdout")
+}
+
+/// `records.files` set to the HDF5 files of a folder.
+pub fn files(folder: &Path) -> String {
+    format!("records.files=['{}/*.h5']", folder.display())
+}
+
+/// The recorded archive `lever-a`, or a stand-in that afmid's own simulator makes below `scratch`, counted in the output.
+pub fn lever_a(scratch: &Path) -> Archive {
+    let data = std::env::var_os("AFMID_DATA").map_or_else(|| Path::new(ROOT).join("../shared/data"), PathBuf::from);
+    let folder = data.join("afm/lever-a");
+    let truth = std::fs::read_to_string(data.join("afm/lever-a.truth.json"));
+    if let (true, Ok(truth)) = (folder.is_dir(), truth) {
+        let json: Value = serde_json::from_str(&truth).expect("the truth is JSON");
+        let events = json["events"].as_array().expect("events per record");
+        let count = |kind: f64| {
+            events.iter().flat_map(|record| record.as_array()).flatten().filter(|event| event[1] == kind).count()
+        };
+        let truth = Truth {
+            frequency_hz: numbers(&json["truth"]["f"]),
+            quality_factor: numbers(&json["truth"]["Q"]),
+            snap_offs: count(2.0) as u64,
+            snap_ins: count(1.0) as u64,
+        };
+        return Archive { folder, truth, stand_in: false };
+    }
+    println!("stand-in: 1 archive simulated in place of lever-a");
+    Archive { stand_in: true, ..simulated(scratch, "stand-in", 24, 77) }
+}
+
+/// An archive of `records` files of 0.9 MS, one snap-off and one snap-in in each.
+pub fn simulated(scratch: &Path, name: &str, records: u64, seed: u64) -> Archive {
+    let folder = scratch.join(name);
+    let set = |parameter: &str, value: &str| ["--set".to_owned(), format!("archive.{parameter}={value}")];
+    let mut arguments = vec!["run".to_owned(), config("simulate-demo.toml"), "-o".to_owned(), format!("{name}.h5")];
+    arguments.extend(set("out", &format!("'{}'", folder.display())));
+    for parameter in ["records", "snap_offs", "snap_ins"] {
+        arguments.extend(set(parameter, &records.to_string()));
+    }
+    arguments.extend(["--set".to_owned(), format!("pipeline.seed={seed}")]);
+    arguments.extend(["--cache".to_owned(), "cache".to_owned()]);
+    afmid(scratch, &arguments.iter().map(String::as_str).collect::<Vec<&str>>());
+    let truth = Truth {
+        frequency_hz: vec![46.3e3, 247.4e3, 580.8e3, 1051.2e3],
+        quality_factor: vec![40.8, 193.2, 358.0, 503.8],
+        snap_offs: records,
+        snap_ins: records,
+    };
+    Archive { folder, truth, stand_in: false }
+}
+
+/// A list of numbers.
+pub fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
+}
+
+/// A number of a document; panics with its path if it is missing or null.
+pub fn number(value: &Value, pointer: &str) -> f64 {
+    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("no number at {pointer} in {value}"))
+}

@@ -1,0 +1,24 @@
+//! Results open in the readers that people use: h5py, xarray, nxcheck.
+
+mod common;
+
+use std::path::Path;
+use std::process::Command;
+
+use common::{ROOT, afmid, config, files, simulated};
+
+#[test]
+fn h5py_xarray_and_nxcheck_read_a_result() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let archive = simulated(here, "archive", 6, 3);
+    afmid(here, &["run", &config("paper.toml"), "--set", &files(&archive.folder), "-o", "p.h5", "--cache", "cache"]);
+    let python = Path::new(ROOT).join(".tools/bin/python");
+    assert!(python.exists(), "{} is missing: run `make test-deps`", python.display());
+    let script = Path::new(ROOT).join("tests/store_readers.py");
+    let output = Command::new(python).arg(script).arg(here.join("p.h5")).output().expect("python starts");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}\n{}", String::from_utf8_lossy(&output.stderr));
+    assert!(text.contains("coordinates"), "{text}");
+    println!("{text}");
+}
