@@ -48,8 +48,7 @@ fn standard_errors_agree_with_differences() {
     let find = |model: &InnovationsModel| poles(model, &covariance, &criteria).unwrap();
     let found = find(&model());
     assert_eq!(found.len(), 4);
-    for i in 0..4 {
-        let pole = &found[i];
+    for (i, pole) in found.iter().enumerate() {
         let expected = [
             (pole.root.frequency_std_hz, deviation(&covariance, |m| find(m)[i].root.frequency_hz)),
             (pole.static_share_std, deviation(&covariance, |m| find(m)[i].static_share)),
@@ -62,9 +61,9 @@ fn standard_errors_agree_with_differences() {
     let slow = deviation(&covariance, |m| find(m)[pair].root.quality_factor);
     assert!((found[pair].root.quality_factor_std / slow - 1.0).abs() < 1e-5);
     let all = zeros(&model(), &covariance).unwrap();
-    for i in 0..all.len() {
+    for (i, zero) in all.iter().enumerate() {
         let slow = deviation(&covariance, |m| zeros(m, &covariance).unwrap()[i].frequency_hz);
-        assert!((all[i].frequency_std_hz / slow - 1.0).abs() < 1e-4, "{i}: {} {slow}", all[i].frequency_std_hz);
+        assert!((zero.frequency_std_hz / slow - 1.0).abs() < 1e-4, "{i}: {} {slow}", zero.frequency_std_hz);
     }
     let point = response(&model(), &covariance, &[100e3]).unwrap()[0];
     let at = |m: &InnovationsModel| m.transfer(c64::cis(std::f64::consts::TAU * 100e3 * 2e-7));
