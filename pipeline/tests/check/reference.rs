@@ -48,7 +48,7 @@ fn parameters_are_read_from_the_schema() {
 fn a_page_tells_everything_in_order() {
     let text = page(&sine(), Examples::Run).expect("the example runs");
     let parts = [
-        "# test.sine\n\nA sine.\n",
+        "# test.sine\n\nA sine.\n\nVersion 1; it runs every time.\n",
         "## Inputs\n\nNone.\n",
         "| `signal` | array | `signal` | samples of a sine |",
         "| `samples` | whole number | `16` | 1 to 1000000 |",
