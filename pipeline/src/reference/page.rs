@@ -28,7 +28,7 @@ pub fn page(entry: &Entry, examples: Examples) -> Result<String, String> {
     ports(&mut text, "Outputs", spec.outputs);
     parameter_table(&mut text, entry);
     for (heading, body) in &doc.sections {
-        let _ = write!(text, "\n## {heading}\n\n{body}\n");
+        let _ = write!(text, "\n## {heading}\n\n{}\n", begun(body));
     }
     if doc.get("Source").is_none() {
         let _ = write!(text, "\n## Source\n\n{}\n", spec.source);
@@ -109,6 +109,16 @@ fn example_toml(entry: &Entry, example: &Example) -> String {
 /// Text that fits into a cell of a table.
 fn cell(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
+}
+
+/// With a capital letter if it begins with a word; a symbol stays as it is.
+fn begun(text: &str) -> String {
+    let word = text.split([' ', ',', '.', ':', ';', '\n']).next().unwrap_or_default();
+    let is_word = word == "a" || (word.len() > 1 && word.chars().all(|c| c.is_ascii_lowercase() || c == '-'));
+    match text.get(..1) {
+        Some(first) if is_word => format!("{}{}", first.to_uppercase(), &text[1..]),
+        _ => text.to_owned(),
+    }
 }
 
 /// With a capital letter, without a full stop.
