@@ -53,7 +53,7 @@ fn a_page_tells_everything_in_order() {
         "| `signal` | array | `signal` | samples of a sine |",
         "| `samples` | whole number | `16` | 1 to 1000000 |",
         "## Method\n\nSamples of `amplitude_v",
-        "## Source\n\nany textbook.\n",
+        "## Source\n\nAny textbook.\n",
         "## Example: Half the amplitude\n\n```toml\n[[stage]]\nid = \"sine\"\nuses = \"test.sine\"\n[stage.params]\namplitude_v = 0.5\n```",
         "The peak is 0.500 V.",
     ];
