@@ -42,7 +42,7 @@ const place = (axis, value) => axis.log ? Math.log(value / axis.low) / Math.log(
 const value = (axis, at) => axis.log ? axis.low * (axis.high / axis.low) ** at : axis.low + at * (axis.high - axis.low);
 
 function ticks(axis, length) {
-  const wanted = Math.max(2, length / (axis.style === 'prefixed' ? 95 : 62));
+  const wanted = Math.max(2, length / ({ prefixed: 95, degrees: 40 }[axis.style] || 62));
   const decades = axis.log ? Math.log10(axis.high / axis.low) : 0;
   if (axis.log && decades >= 0.7) {
     const every = Math.max(1, Math.ceil(decades / wanted)), found = [];
@@ -71,6 +71,19 @@ function ticks(axis, length) {
   return found;
 }
 const label = (axis, at) => axis.style === 'prefixed' ? prefixed(at, axis.unit, 6) : power(at, 6);
+
+// the point of a curve at x: between two drawn ones, or the nearest end of a stretch
+function between(runs, x) {
+  let best = null;
+  for (const run of runs) {
+    for (let k = 0; k < run.length; k++) {
+      const [x0, y0] = run[k], [x1, y1] = run[k + 1] || run[k];
+      if (x0 <= x && x <= x1 && x1 > x0) return [x, y0 + (y1 - y0) * (x - x0) / (x1 - x0)];
+      if (best === null || Math.abs(x0 - x) < Math.abs(best[0] - x)) best = run[k];
+    }
+  }
+  return best;
+}
 
 class Panel {
   constructor(figure, group) {
@@ -107,7 +120,7 @@ class Panel {
     if (!this.curves) {
       this.curves = [...this.zoom.querySelectorAll('path.line')].map(path => ({
         path, series: path.dataset.series,
-        points: path.getAttribute('d').split(/[M ]/).filter(Boolean).map(pair => pair.split(',').map(parseFloat)),
+        runs: path.getAttribute('d').split('M').filter(Boolean).map(run => run.split(' ').map(pair => pair.split(',').map(parseFloat))),
       }));
       this.marks = [...this.zoom.querySelectorAll('.mark,.dot')].map(mark => {
         const box = mark.getBBox();
@@ -130,11 +143,10 @@ class Panel {
       this.show(event, null, [[getComputedStyle(near.m.mark).stroke === 'none' ? getComputedStyle(near.m.mark).fill : getComputedStyle(near.m.mark).stroke, near.m.text]]);
       return;
     }
-    for (const { path, series, points } of this.curves) {
-      if (path.closest('.hidden') || path.classList.contains('hidden') || !points.length) continue;
-      let best = null;
-      for (const point of points) if (best === null || Math.abs(point[0] - drawn) < Math.abs(best[0] - drawn)) best = point;
-      if (Math.abs(best[0] - drawn) * sx > 8) continue;
+    for (const { path, series, runs } of this.curves) {
+      if (path.closest('.hidden')) continue;
+      const best = between(runs, drawn);
+      if (best === null || Math.abs(best[0] - drawn) * sx > 8) continue;
       const y = value(this.home.y, 1 - (best[1] - this.top) / this.height);
       rows.push([getComputedStyle(path).stroke, `${this.figure.names[series] || ''} ${written(this.y, y)}`]);
     }

@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::figure::Figure;
 use super::find::all;
 use super::generic::stage_view;
-use super::number::{bytes, duration, with_error};
+use super::number::{bytes, duration, quantity, with_error};
 use super::palette;
 use super::paper::{self, Drawn};
 use super::view::{Fact, Head, Picture, Section, StageView, TableView, Tile};
@@ -109,6 +109,7 @@ fn section(drawn: Drawn, room: &mut usize) -> Section {
         title: drawn.title.to_owned(),
         pictures,
         tables: drawn.tables,
+        groups: drawn.groups,
         missing,
         left_out,
     }
@@ -155,10 +156,11 @@ fn tiles(run: &RunResult) -> Vec<Tile> {
         if let Some(force) = document.get("force").filter(|force| force.get("value").is_some()) {
             let at = |name: &str| force.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
             let unit = force.get("unit").and_then(Value::as_str).unwrap_or_default();
+            let event = document.get("kind").and_then(Value::as_str).unwrap_or("event");
             tiles.push(tile(
-                "force at the event",
-                super::number::quantity(at("value"), at("std"), unit),
-                found.stage.id.clone(),
+                &format!("force at the {event}"),
+                quantity(at("value"), at("std"), unit),
+                format!("stage {}", found.stage.id),
             ));
         }
         if let Some(fit) = document.get("fit_percent") {

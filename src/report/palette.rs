@@ -18,7 +18,7 @@ const COLOURS: [(&str, &str, &str); 18] = [
     ("vermillion", "#d55e00", "#f58b4c"),
     ("green", "#00845f", "#2fc79b"),
     ("purple", "#b2568d", "#e29cc4"),
-    ("sky", "#2a8fc4", "#9fd6f5"),
+    ("sky", "#2a8fc4", "#38bdf8"),
     ("orange", "#b97800", "#eebf4d"),
     ("shade", "#0000000a", "#ffffff0a"),
 ];

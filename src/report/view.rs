@@ -89,6 +89,8 @@ pub(crate) struct Section {
     pub title: String,
     pub pictures: Vec<Picture>,
     pub tables: Vec<TableView>,
+    /// Numbers under a name.
+    pub groups: Vec<(String, Vec<Fact>)>,
     /// Why it is empty.
     pub missing: String,
     /// What was left out to keep the page small; empty: nothing.

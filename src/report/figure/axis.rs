@@ -83,7 +83,12 @@ impl Axis {
         let (low, high) = fixed.or(extent.filter(good))?;
         let (low, high) = widen(low, high, self.log, if fixed.is_some() { 0.0 } else { padding });
         let (factor, unit) = self.display_unit(low, high);
-        let wanted = (length_px / if self.style == TickStyle::Prefixed { 95.0 } else { 62.0 }).max(2.0);
+        let spacing_px = match self.style {
+            TickStyle::Prefixed => 95.0,
+            TickStyle::Degrees => 40.0,
+            TickStyle::Plain | TickStyle::Whole => 62.0,
+        };
+        let wanted = (length_px / spacing_px).max(2.0);
         let ticks = match (self.log, self.style) {
             (true, TickStyle::Prefixed) => {
                 ticks::logarithmic(low, high, wanted, |value| ticks::prefixed(value, &self.unit))

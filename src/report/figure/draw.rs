@@ -180,7 +180,7 @@ fn equal_scales(map: &Map) -> Frame {
     let (span_x, span_y) = (map.x.high - map.x.low, map.y.high - map.y.low);
     let scale = (f.width / span_x).min(f.height / span_y);
     let (width, height) = (scale * span_x, scale * span_y);
-    Frame { left: f.left, top: f.top + 0.5 * (f.height - height), width, height }
+    Frame { left: f.left, top: f.top, width, height }
 }
 
 fn grid(out: &mut String, panel: &Panel, map: &Map) {
@@ -363,7 +363,7 @@ fn ellipse(out: &mut String, ellipse: &Ellipse, map: &Map, tag: &str) {
 /// Rules, with their words on alternating heights where they would touch.
 fn rules(out: &mut String, panel: &Panel, map: &Map) {
     let f = map.frame;
-    let mut ends = [f64::NEG_INFINITY; 3];
+    let mut words: Vec<(usize, f64, f64)> = Vec::new();
     let mut verticals: Vec<&Rule> = Vec::new();
     for mark in &panel.marks {
         let Mark::Rule(rule) = mark else { continue };
@@ -385,12 +385,12 @@ fn rules(out: &mut String, panel: &Panel, map: &Map) {
     for rule in verticals {
         let Some(x) = map.px_x(rule.at).filter(|x| map.holds_x(*x)) else { continue };
         let _ = write!(out, "<path class=\"rule\" d=\"M{0},{1} {0},{2}\"/>", px(x), px(f.top + f.height), px(f.top));
-        let width = 6.0 * rule.label.chars().count() as f64 + 8.0;
-        let level = ends.iter().position(|end| x + 4.0 > *end).unwrap_or(0);
-        if let Some(end) = ends.get_mut(level) {
-            *end = x + 4.0 + width;
-        }
+        let width = 6.3 * rule.label.chars().count() as f64 + 8.0;
         let flip = x + width > f.left + f.width;
+        let (from, to) = if flip { (x - width, x) } else { (x, x + width) };
+        let free = |level: &usize| words.iter().all(|(at, left, right)| at != level || to < *left || from > *right);
+        let level = (0..4).find(free).unwrap_or(0);
+        words.push((level, from, to));
         let (class, at) = if flip { ("rule-label end", x - 4.0) } else { ("rule-label", x + 4.0) };
         let _ = write!(
             out,

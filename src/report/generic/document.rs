@@ -15,7 +15,7 @@ pub(crate) fn document_view(document: &Value) -> (Vec<Fact>, Vec<TableView>) {
 
 fn walk(path: &str, value: &Value, facts: &mut Vec<Fact>, tables: &mut Vec<TableView>) {
     match value {
-        Value::Object(map) if is_quantity(map) => facts.push(Fact::new(path, quantity_text(map))),
+        Value::Object(map) if is_quantity(map) => facts.push(Fact::new(path, quantity_text(path, map))),
         Value::Object(map) => {
             for (key, value) in map {
                 let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
@@ -23,7 +23,7 @@ fn walk(path: &str, value: &Value, facts: &mut Vec<Fact>, tables: &mut Vec<Table
             }
         }
         Value::Array(list) if list.iter().any(Value::is_object) => tables.push(objects(path, list)),
-        other => facts.push(Fact::new(if path.is_empty() { "value" } else { path }, scalar(other))),
+        other => facts.push(Fact::new(if path.is_empty() { "value" } else { path }, named_scalar(path, other))),
     }
 }
 
@@ -32,9 +32,9 @@ fn is_quantity(map: &Map<String, Value>) -> bool {
     map.contains_key("value") && map.len() > 1 && map.keys().all(|key| matches!(key.as_str(), "value" | "std" | "unit"))
 }
 
-fn quantity_text(map: &Map<String, Value>) -> String {
+fn quantity_text(name: &str, map: &Map<String, Value>) -> String {
     let at = |name: &str| map.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
-    let unit = map.get("unit").and_then(Value::as_str).unwrap_or_default();
+    let unit = map.get("unit").and_then(Value::as_str).unwrap_or(unit_in(name));
     match map.get("value") {
         Some(Value::Number(_)) => quantity(at("value"), at("std"), unit),
         Some(other) => scalar(other),
@@ -62,6 +62,38 @@ fn objects(caption: &str, list: &[Value]) -> TableView {
     view.truncated(ROWS, rows.len())
 }
 
+/// A number with the unit that its name carries, other values as they are.
+fn named_scalar(name: &str, value: &Value) -> String {
+    match (value, unit_in(name)) {
+        (Value::Number(value), unit) if !unit.is_empty() => {
+            quantity(value.as_f64().unwrap_or(f64::NAN), f64::NAN, unit)
+        }
+        (value, _) => scalar(value),
+    }
+}
+
+/// The unit that a name ends with: `stiffness_n_per_m` is in N/m.
+fn unit_in(name: &str) -> &'static str {
+    // the longest endings first: `_n_per_m` also ends with `_m`
+    const ENDINGS: [(&str, &str); 14] = [
+        ("_v2_per_hz", "V^2/Hz"),
+        ("_n_per_m", "N/m"),
+        ("_v_per_m", "V/m"),
+        ("_m_per_v", "m/V"),
+        ("_v_per_s", "V/s"),
+        ("_v_per_v", "V/V"),
+        ("_percent", "%"),
+        ("_v2", "V^2"),
+        ("_hz", "Hz"),
+        ("_s", "s"),
+        ("_v", "V"),
+        ("_n", "N"),
+        ("_m", "m"),
+        ("_k", "K"),
+    ];
+    ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("", |(_, unit)| unit)
+}
+
 /// A value on one line.
 fn scalar(value: &Value) -> String {
     match value {
@@ -78,7 +110,7 @@ fn scalar(value: &Value) -> String {
             let more = if list.len() > shown.len() { format!(", … ({} in all)", list.len()) } else { String::new() };
             format!("{}{more}", shown.join(", "))
         }
-        Value::Object(map) if is_quantity(map) => quantity_text(map),
+        Value::Object(map) if is_quantity(map) => quantity_text("", map),
         Value::Object(map) => {
             let parts: Vec<String> = map.iter().map(|(key, value)| format!("{key}: {}", scalar(value))).collect();
             parts.join(", ")
@@ -94,13 +126,14 @@ mod tests {
     fn lists_of_objects_become_tables_and_the_rest_facts() {
         let document = serde_json::json!({
             "events": {"found": 24, "rejected": [{"record": "a.h5", "reason": "no rupture"}, {"record": "b.h5", "extra": null}]},
-            "fit": 99.8123456, "k": {"value": 3.81, "std": 0.12, "unit": "N/m"}, "ids": [1, 2], "none": [], "unknown": null,
+            "fit": 99.8123456, "k": {"value": 3.81, "std": 0.12, "unit": "N/m"}, "ids": [1, 2], "none": [], "unknown": null, "free_s": 1.5e-3,
         });
         let (facts, tables) = document_view(&document);
         assert!(facts.contains(&Fact::new("events.found", "24")));
         assert!(facts.contains(&Fact::new("fit", "99.8123")));
         assert!(facts.contains(&Fact::new("ids", "1, 2")));
         assert!(facts.contains(&Fact::new("k", "3.81(12) N/m")));
+        assert!(facts.contains(&Fact::new("free_s", "1.5 ms")));
         assert!(facts.contains(&Fact::new("none", "none")));
         assert!(facts.contains(&Fact::new("unknown", "–")));
         assert_eq!(tables.len(), 1);

@@ -11,7 +11,7 @@ const BAND: f64 = 1.96;
 /// Curves of a Bode plot and the frequencies marked in it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bode {
-    /// The first lies lowest. Phases follow the turn of the last curve that is a reference.
+    /// The first lies lowest. Phases follow the turn of the smoothest curve, the last of several.
     pub curves: Vec<BodeCurve>,
     /// Frequencies in Hz with their words.
     pub rules: Vec<(f64, String)>,
@@ -28,12 +28,22 @@ pub(crate) struct BodeCurve {
     /// Standard error of the phase in radians; empty: unknown.
     pub phase_std_rad: Vec<f64>,
     pub stroke: Stroke,
-    /// Smooth enough to unwrap its phase by itself.
-    pub reference: bool,
+    pub smoothness: Smoothness,
+}
+
+/// How far a curve may be trusted to unwrap phases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Smoothness {
+    /// Its scatter shows its error, which is not drawn.
+    Noisy,
+    /// Smoothed data.
+    Smoothed,
+    /// A model's.
+    Exact,
 }
 
 impl BodeCurve {
-    /// A smooth curve; bins at zero frequency have no place on the axis and are left out.
+    /// A model's curve; bins at zero frequency have no place on the axis and are left out.
     pub fn new(series: &str, frequency_hz: &[f64], transfer: &[Complex64], stroke: Stroke) -> Self {
         let (frequency_hz, transfer) =
             frequency_hz.iter().zip(transfer).filter(|(f, _)| **f > 0.0).map(|(f, h)| (*f, *h)).unzip();
@@ -44,7 +54,7 @@ impl BodeCurve {
             magnitude_std: Vec::new(),
             phase_std_rad: Vec::new(),
             stroke,
-            reference: true,
+            smoothness: Smoothness::Exact,
         }
     }
 
@@ -71,21 +81,26 @@ impl BodeCurve {
         self
     }
 
-    /// Noisy: its scatter shows its error, which is not drawn, and its phase follows a smoother curve's.
-    pub fn noisy(mut self) -> Self {
-        self.reference = false;
+    /// From data.
+    pub fn measured(mut self, smoothness: Smoothness) -> Self {
+        self.smoothness = smoothness;
         self
     }
 }
 
 /// Magnitude above phase; bands where a curve has errors.
 pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> Figure {
-    let reference = bode.curves.iter().rev().find(|curve| curve.reference).map(|curve| {
-        let phases = unwrapped_degrees(&curve.transfer, &curve.phase_std_rad);
-        (curve.frequency_hz.clone(), phases)
-    });
-    let mut magnitude = Panel::new("", Axis::frequency().bare(), Axis::new("Magnitude", "1").log());
-    let mut phase = Panel::new("", Axis::frequency(), Axis::phase());
+    let reference: Option<(Vec<f64>, Vec<f64>)> =
+        bode.curves.iter().max_by_key(|curve| curve.smoothness).map(|curve| {
+            let phases = unwrapped_degrees(&curve.transfer, &curve.phase_std_rad);
+            curve.frequency_hz.iter().zip(phases).filter(|(_, phase)| phase.is_finite()).unzip()
+        });
+    let axis = match shown_range(&bode.curves) {
+        Some((low, high)) => Axis::frequency().limits(low, high),
+        None => Axis::frequency(),
+    };
+    let mut magnitude = Panel::new("", axis.clone().bare(), Axis::new("Magnitude", "1").log());
+    let mut phase = Panel::new("", axis, Axis::phase());
     for curve in &bode.curves {
         let size: Vec<f64> = curve.transfer.iter().map(|h| h.norm()).collect();
         let angle = match &reference {
@@ -93,7 +108,10 @@ pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> 
             None => unwrapped_degrees(&curve.transfer, &curve.phase_std_rad),
         };
         let times = |std: &[f64], factor: f64| -> Vec<f64> { std.iter().map(|std| factor * std).collect() };
-        if curve.reference && curve.magnitude_std.len() == size.len() && curve.phase_std_rad.len() == size.len() {
+        if curve.smoothness > Smoothness::Noisy
+            && curve.magnitude_std.len() == size.len()
+            && curve.phase_std_rad.len() == size.len()
+        {
             magnitude = magnitude.with(band(curve, &size, &times(&curve.magnitude_std, BAND)));
             // an error of half a turn says that nothing is known of the phase
             let turn = times(&curve.phase_std_rad, BAND)
@@ -110,6 +128,22 @@ pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> 
         phase = phase.with(Mark::at_x(*at, ""));
     }
     Figure::new(id, title, caption).row(Row::one(340.0, magnitude)).row(Row::one(200.0, phase))
+}
+
+/// The range in which there are data, and a fifth beyond it; a model alone is shown whole.
+fn shown_range(curves: &[BodeCurve]) -> Option<(f64, f64)> {
+    let known = |curve: &BodeCurve| -> Option<(f64, f64)> {
+        let mut known = curve.frequency_hz.iter().zip(&curve.transfer).filter(|(_, h)| h.is_finite()).map(|(f, _)| *f);
+        let first = known.next()?;
+        Some((first, known.next_back().unwrap_or(first)))
+    };
+    let range = |curves: &mut dyn Iterator<Item = &BodeCurve>| {
+        curves.filter_map(known).reduce(|(low, high), (first, last)| (low.min(first), high.max(last)))
+    };
+    let measured = range(&mut curves.iter().filter(|curve| curve.smoothness < Smoothness::Exact));
+    let all = range(&mut curves.iter())?;
+    let (low, high) = measured.map_or(all, |(low, high)| (low, (1.2 * high).min(all.1)));
+    (low < high).then_some((low, high))
 }
 
 fn band(curve: &BodeCurve, middle: &[f64], error: &[f64]) -> Mark {

@@ -7,7 +7,6 @@ use super::sections::Drawn;
 use crate::report::figure::{Axis, Band, Colour, Figure, Line, Mark, Marker, Panel, Points, Row, Stroke};
 use crate::report::find::{EventKind, Found, all, event_kind, frequency_axis, real_over, time_axis, unit_of};
 use crate::report::generic::document_view;
-use crate::report::view::{Fact, Head, TableView};
 
 /// Aligned events on top of each other, and the list of what was seen.
 pub(crate) fn alignment(run: &RunResult) -> Drawn {
@@ -198,47 +197,40 @@ fn several_spectra(found: &Found<'_, Array>, axis: &Coordinates) -> Option<Figur
     Some(Figure::new(&id, "Power spectra", "").row(Row::one(260.0, panel)))
 }
 
-/// What the model leaves.
+/// What the models leave, one panel each.
 pub(crate) fn residuals(run: &RunResult) -> Drawn {
-    let mut section =
-        Drawn { id: "residuals", title: "Residuals", missing: "no stage gives residuals", ..Drawn::default() };
-    for found in all::<Array>(run) {
-        let Some(time) = time_axis(found.value) else { continue };
-        let left: Vec<(&str, &[f64])> = found
-            .value
-            .variables
-            .iter()
-            .filter(|variable| variable.name.contains("residual"))
-            .filter_map(|variable| Some((variable.name.as_str(), real_over(found.value, &variable.name, time)?)))
-            .collect();
-        let Some((first, _)) = left.first() else { continue };
-        let y = Axis::new("Residual", unit_of(found.value, first));
-        let mut panel = Panel::new(&format!("Stage {}", found.stage.id), Axis::new("Time", "s"), y);
-        for (index, (name, values)) in left.iter().enumerate().take(4) {
-            panel = panel.with(Mark::line(name, &time.values, values, Stroke::solid(Colour::cycle(index), 0.9)));
-        }
-        let id = format!("residual-{}-{}", found.stage.id, found.port);
-        section.figures.push(Figure::new(&id, "Residuals", "").row(Row::one(200.0, panel)));
-    }
-    section
+    let rows: Vec<Row> =
+        all::<Array>(run).filter_map(|found| Some(Row::one(130.0, residual(&found)?))).take(8).collect();
+    let caption = "One-step prediction errors over the window of the fit. What is white was noise; what is left of a shape is not in the model.";
+    let figure = Figure { rows, ..Figure::new("residuals", "Residuals", caption) };
+    let figures = if figure.rows.is_empty() { Vec::new() } else { vec![figure] };
+    Drawn { id: "what-is-left", title: "Residuals", figures, missing: "no stage gives residuals", ..Drawn::default() }
+}
+
+fn residual(found: &Found<'_, Array>) -> Option<Panel> {
+    let time = time_axis(found.value)?;
+    let values = real_over(found.value, "residual", time)?;
+    let fitted = found
+        .stage
+        .params
+        .get("set")
+        .and_then(serde_json::Value::as_str)
+        .map_or_else(String::new, |set| format!(", fitted to: {set}"));
+    let label = if time.long_name.is_empty() { "time" } else { &time.long_name };
+    let y = Axis::new("Residual", unit_of(found.value, "residual"));
+    let panel = Panel::new(&format!("Stage {}{fitted}", found.stage.id), Axis::new(label, "s"), y);
+    Some(panel.with(Mark::line("residual", &time.values, values, Stroke::solid(Colour::Blue, 0.8))))
 }
 
 /// Numbers of the calibration stages.
 pub(crate) fn calibration(run: &RunResult) -> Drawn {
-    let tables = all::<Document>(run)
-        .filter(|found| found.stage.uses.starts_with("calibration."))
-        .flat_map(|found| {
-            let (facts, mut tables) = document_view(&found.value.0);
-            tables.iter_mut().for_each(|table| table.caption = format!("{}: {}", found.stage.id, table.caption));
-            tables.insert(0, fact_table(&found.stage.id, facts));
-            tables
-        })
-        .collect();
-    Drawn { id: "calibration", title: "Calibration", tables, missing: "no calibration stage", ..Drawn::default() }
-}
-
-fn fact_table(caption: &str, facts: Vec<Fact>) -> TableView {
-    let mut table = TableView::new(caption, vec![Head::text("quantity"), Head::number("value", "")]);
-    table.rows = facts.into_iter().map(|fact| vec![fact.name, fact.value]).collect();
-    table
+    let mut section =
+        Drawn { id: "calibration", title: "Calibration", missing: "no calibration stage", ..Drawn::default() };
+    for found in all::<Document>(run).filter(|found| found.stage.uses.starts_with("calibration.")) {
+        let (facts, mut tables) = document_view(&found.value.0);
+        tables.iter_mut().for_each(|table| table.caption = format!("{}: {}", found.stage.id, table.caption));
+        section.groups.push((found.stage.id.clone(), facts));
+        section.tables.extend(tables);
+    }
+    section
 }

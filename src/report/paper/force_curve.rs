@@ -2,7 +2,7 @@
 
 use afmid_pipeline::{Array, RunResult};
 
-use crate::report::figure::{Axis, Band, Colour, Figure, Mark, Panel, Row, Stroke};
+use crate::report::figure::{Axis, Colour, Figure, Mark, Panel, Row, Stroke};
 use crate::report::find::{EventKind, Found, all, real_over, time_axis, unit_of};
 
 /// Fig. 2 with the panels that the run has data for.
@@ -43,19 +43,12 @@ fn overview(run: &RunResult) -> Option<Panel> {
         let time = time_axis(found.value)?;
         let low = real_over(found.value, "minimum", time)?;
         let high = real_over(found.value, "maximum", time)?;
-        let band = Band {
-            series: "record, least to largest value".to_owned(),
-            x: time.values.clone(),
-            low: low.to_vec(),
-            high: high.to_vec(),
-            colour: Colour::Blue,
-            fits: true,
-        };
-        let middle: Vec<f64> = low.iter().zip(high).map(|(low, high)| 0.5 * (low + high)).collect();
-        let line =
-            Mark::line("record, least to largest value", &time.values, &middle, Stroke::solid(Colour::Blue, 0.8));
-        let y = Axis::new("Deflection", unit_of(found.value, "minimum"));
-        Some(Panel::new("", Axis::new("Time", "s"), y).with(Mark::Band(band)).with(line))
+        // up and down within each stretch, as the signal itself would look
+        let x: Vec<f64> = time.values.iter().flat_map(|t| [*t, *t]).collect();
+        let y: Vec<f64> = low.iter().zip(high).flat_map(|(low, high)| [*low, *high]).collect();
+        let line = Mark::line("one record", &x, &y, Stroke::solid(Colour::Blue, 1.1));
+        let axis = Axis::new("Deflection", unit_of(found.value, "minimum"));
+        Some(Panel::new("", Axis::new("Time", "s"), axis).with(line))
     })
 }
 

@@ -4,7 +4,7 @@ use afmid_pipeline::{Array, Document, RunResult, StageRecord, StateSpace};
 use num_complex::Complex64;
 use serde_json::Value;
 
-use super::bode::{Bode, BodeCurve, bode_figure};
+use super::bode::{Bode, BodeCurve, Smoothness, bode_figure};
 use super::response::model_curve;
 use crate::report::figure::{Colour, Figure, Stroke};
 use crate::report::find::{EventKind, Found, all, depends_on, event_kind, frequency_axis, real_over};
@@ -104,7 +104,11 @@ fn array_curve(found: &Found<'_, Array>, kind: EventKind, prefix: &str) -> Optio
     };
     let (name, stroke) = style(role, kind, prefix);
     let curve = BodeCurve::new(&name, &axis.values, transfer, stroke);
-    let curve = if role == Role::Raw { curve.noisy() } else { curve };
+    let curve = match role {
+        Role::Raw => curve.measured(Smoothness::Noisy),
+        Role::Smoothed => curve.measured(Smoothness::Smoothed),
+        Role::Parametric => curve,
+    };
     let over = |name: &str| real_over(found.value, name, axis);
     let curve = match (over("variance"), over("magnitude_std"), over("phase_std")) {
         (_, Some(magnitude), Some(phase)) => curve.with_errors(&axis.values, magnitude, phase),

@@ -42,7 +42,8 @@ fn figure(run: &RunResult, kind: EventKind, id: &str, title: &str) -> Option<Fig
     let mut panels = vec![(1.0, whole(&poles, &zeros))];
     panels.extend(strip(&poles, &zeros, sample_time_s).map(|panel| (1.15, panel)));
     let caption = "Weakly damped poles and zeros, close to the unit circle, belong to the lever; the others to detector and electronics. \
-                   The strip shows the distance from the circle enlarged; bars: one standard error.";
+                   The strip enlarges the distance from the circle, as far as the lever's poles \
+                   lie; bars: one standard error.";
     Some(Figure::new(id, title, caption).row(Row { height: 400.0, panels }))
 }
 
@@ -152,11 +153,11 @@ fn strip(poles: &Roots, zeros: &Roots, sample_time_s: Option<f64>) -> Option<Pan
         Some(t) => (Axis::new("arg z, as a frequency", "Hz"), 1.0 / (std::f64::consts::TAU * t)),
         None => (Axis::new("arg z", "rad"), 1.0),
     };
-    let radii = || poles.iter().chain(&zeros).map(|(radius, _, _, _)| *radius);
-    let (low, high) = (radii().fold(1.0, f64::min), radii().fold(1.0, f64::max));
-    let room = 0.12 * (high - low).max(1e-4);
+    // what lies as close to the circle as the poles do; a zero that is hardly known may lie far off, and would hide the rest
+    let farthest = poles.iter().map(|root| (1.0 - root.0).abs()).fold(0.0, f64::max);
+    let farthest = if farthest > 0.0 { farthest } else { 0.02 };
     let right = poles.iter().chain(&zeros).map(|(_, angle, _, _)| angle * scale).fold(0.0, f64::max) * 1.08;
-    let y = Axis::new("1 − |z|", "1").limits(1.0 - high - room, 1.0 - low + room);
+    let y = Axis::new("1 − |z|", "1").limits(-0.5 * farthest, 1.25 * farthest);
     let mut panel =
         Panel::new("along the unit circle, enlarged", unit.limits(0.0, right), y).with(Mark::at_y(0.0, "unit circle"));
     for (series, roots) in [("zero", zeros), ("pole", poles)] {

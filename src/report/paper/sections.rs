@@ -4,7 +4,7 @@ use afmid_pipeline::RunResult;
 
 use super::{checks, coupling, force_curve, frequency_response, modal_table, pole_zero};
 use crate::report::figure::Figure;
-use crate::report::view::TableView;
+use crate::report::view::{Fact, TableView};
 
 /// A section before its figures are drawn.
 #[derive(Debug, Clone, Default)]
@@ -13,6 +13,8 @@ pub(crate) struct Drawn {
     pub title: &'static str,
     pub figures: Vec<Figure>,
     pub tables: Vec<TableView>,
+    /// Numbers under a name.
+    pub groups: Vec<(String, Vec<Fact>)>,
     /// What the run lacks, if the section is empty.
     pub missing: &'static str,
 }
@@ -20,7 +22,7 @@ pub(crate) struct Drawn {
 impl Drawn {
     /// Whether there is anything to show.
     pub fn is_empty(&self) -> bool {
-        self.figures.is_empty() && self.tables.is_empty()
+        self.figures.is_empty() && self.tables.is_empty() && self.groups.is_empty()
     }
 }
 

@@ -8,8 +8,10 @@ mod consistency;
 mod file_patterns;
 mod memory;
 mod natural_order;
+mod overview;
 mod records;
 mod records_example;
+mod stretch_extremes;
 
 pub use census::Census;
 pub use code_census::{CensusSettings, ChannelCensus, Found};
@@ -17,7 +19,9 @@ pub use consistency::{Consistency, check_consistency};
 pub use file_patterns::matching_files;
 pub use memory::{MemorySource, memory_channel, memory_record};
 pub use natural_order::natural_order;
+pub use overview::Overview;
 pub use records::Records;
+pub use stretch_extremes::StretchExtremes;
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] = &[Entry::of::<Records>(), Entry::of::<Census>()];
+pub const STAGES: &[Entry] = &[Entry::of::<Records>(), Entry::of::<Census>(), Entry::of::<Overview>()];
