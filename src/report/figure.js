@@ -23,9 +23,9 @@ function prefixed(value, unit, digits) {
   const [factor, prefix] = PREFIXES.find(([f]) => size >= f) || [1, ''];
   return `${minus(trim((value / factor).toPrecision(digits)))} ${prefix}${unit}`;
 }
-function power(value, digits) {
+function power(value, digits, low = -3, high = 4) {
   const exponent = Math.floor(Math.log10(Math.abs(value)) + 1e-9);
-  if (value === 0 || exponent >= -2 && exponent <= 4) return minus(trim(value.toPrecision(digits)));
+  if (value === 0 || exponent >= low && exponent <= high) return minus(trim(value.toPrecision(digits)));
   const mantissa = trim((value / 10 ** exponent).toPrecision(digits));
   return minus(mantissa === '1' ? '' : mantissa + '·') + '10' + superscript(exponent);
 }
@@ -70,7 +70,7 @@ function ticks(axis, length) {
   }
   return found;
 }
-const label = (axis, at) => axis.style === 'prefixed' ? prefixed(at, axis.unit, 6) : power(at, 6);
+const label = (axis, at) => axis.style === 'prefixed' ? prefixed(at, axis.unit, 6) : power(at, 6, -1, 1);
 
 // the point of a curve at x: between two drawn ones, or the nearest end of a stretch
 function between(runs, x) {

@@ -8,7 +8,7 @@ pub fn grid(rows: &[Vec<String>]) -> String {
         .map(|column| rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0))
         .collect();
     let right: Vec<bool> =
-        (0..columns).map(|column| rows.iter().skip(1).all(|row| numeric(&cell(row, column)))).collect();
+        (0..columns).map(|column| column_is_numeric(rows.iter().skip(1).map(|row| cell(row, column)))).collect();
     let mut text = String::new();
     for row in rows {
         let cells = widths.iter().zip(&right).enumerate().map(|(column, (&width, &right))| {
@@ -20,6 +20,10 @@ pub fn grid(rows: &[Vec<String>]) -> String {
         text.push('\n');
     }
     text
+}
+
+fn column_is_numeric(mut cells: impl Iterator<Item = String> + Clone) -> bool {
+    cells.clone().any(|cell| !cell.is_empty()) && cells.all(|cell| numeric(&cell))
 }
 
 fn numeric(cell: &str) -> bool {

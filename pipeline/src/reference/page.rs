@@ -21,14 +21,14 @@ pub fn page(entry: &Entry, examples: Examples) -> Result<String, String> {
     let spec = entry.spec;
     let (schema, _) = super::params_schema(entry);
     let doc = Sections::of(schema["description"].as_str().unwrap_or_default());
-    let mut text = format!("# {}\n\n{}.\n\n{}\n", spec.name, sentence(spec.summary), doc.intro);
+    let mut text = format!("# {}\n\n{}\n", spec.name, doc.intro);
     // writing to a String cannot fail
     let _ = writeln!(text, "\nVersion {}; {}.", spec.version, facts(entry));
     ports(&mut text, "Inputs", spec.inputs);
     ports(&mut text, "Outputs", spec.outputs);
     parameter_table(&mut text, entry);
     for (heading, body) in &doc.sections {
-        let _ = write!(text, "\n## {heading}\n\n{body}\n");
+        let _ = write!(text, "\n## {heading}\n\n{}\n", begun(body));
     }
     if doc.get("Source").is_none() {
         let _ = write!(text, "\n## Source\n\n{}\n", spec.source);
@@ -38,7 +38,7 @@ pub fn page(entry: &Entry, examples: Examples) -> Result<String, String> {
         if examples == Examples::Run {
             let outcome = run_example(entry, &example).and_then(|outputs| (example.expect)(&outputs));
             let sentence = outcome.map_err(|why| format!("{}: example {:?}: {why}", spec.name, example.title))?;
-            let _ = write!(text, "\n{sentence}\n");
+            let _ = write!(text, "\n{}.\n", capitalised(&sentence));
         }
     }
     Ok(text)
@@ -74,11 +74,14 @@ fn parameter_table(text: &mut String, entry: &Entry) {
         text.push_str("None.\n");
         return;
     }
-    text.push_str("| parameter | type | default | range | meaning |\n|---|---|---|---|---|\n");
+    // most ranges are told in words: a column of its own only where the schema states one
+    let ranges = rows.iter().any(|row| !row.range.is_empty());
+    let (title, rule) = if ranges { ("range | ", "---|") } else { ("", "") };
+    let _ = writeln!(text, "| parameter | type | default | {title}meaning |\n|---|---|---|{rule}---|");
     for row in rows {
         let default = row.default.map_or("required".to_owned(), |value| format!("`{}`", cell(&value)));
-        let _ =
-            writeln!(text, "| `{}` | {} | {default} | {} | {} |", row.name, cell(&row.kind), row.range, cell(&row.doc));
+        let range = if ranges { format!("{} | ", row.range) } else { String::new() };
+        let _ = writeln!(text, "| `{}` | {} | {default} | {range}{} |", row.name, cell(&row.kind), cell(&row.doc));
     }
 }
 
@@ -108,7 +111,18 @@ fn cell(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
 }
 
-fn sentence(text: &str) -> String {
-    let mut letters = text.trim_end_matches('.').chars();
+/// With a capital letter if it begins with a word; a symbol stays as it is.
+fn begun(text: &str) -> String {
+    let word = text.split([' ', ',', '.', ':', ';', '\n']).next().unwrap_or_default();
+    let is_word = word == "a" || (word.len() > 1 && word.chars().all(|c| c.is_ascii_lowercase() || c == '-'));
+    match text.get(..1) {
+        Some(first) if is_word => format!("{}{}", first.to_uppercase(), &text[1..]),
+        _ => text.to_owned(),
+    }
+}
+
+/// With a capital letter, without a full stop.
+fn capitalised(text: &str) -> String {
+    let mut letters = text.trim().trim_end_matches('.').chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }

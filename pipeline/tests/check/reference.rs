@@ -48,12 +48,12 @@ fn parameters_are_read_from_the_schema() {
 fn a_page_tells_everything_in_order() {
     let text = page(&sine(), Examples::Run).expect("the example runs");
     let parts = [
-        "# test.sine\n\nA sine.\n",
+        "# test.sine\n\nA sine.\n\nVersion 1; it runs every time.\n",
         "## Inputs\n\nNone.\n",
         "| `signal` | array | `signal` | samples of a sine |",
         "| `samples` | whole number | `16` | 1 to 1000000 |",
-        "## Method\n\nsamples of `amplitude_v",
-        "## Source\n\nany textbook.\n",
+        "## Method\n\nSamples of `amplitude_v",
+        "## Source\n\nAny textbook.\n",
         "## Example: Half the amplitude\n\n```toml\n[[stage]]\nid = \"sine\"\nuses = \"test.sine\"\n[stage.params]\namplitude_v = 0.5\n```",
         "The peak is 0.500 V.",
     ];

@@ -10,7 +10,8 @@ use super::svg::{escape, px};
 /// Width of every figure in its own units; the page scales it.
 pub(super) const WIDTH: f64 = 1000.0;
 const MARGIN_LEFT: f64 = 74.0;
-const MARGIN_RIGHT: f64 = 16.0;
+// half of a label such as `140 kHz` at the right end
+const MARGIN_RIGHT: f64 = 26.0;
 const MARGIN_TOP: f64 = 30.0;
 const MARGIN_BOTTOM: f64 = 48.0;
 const MARGIN_BOTTOM_BARE: f64 = 10.0;

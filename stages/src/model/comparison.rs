@@ -90,3 +90,31 @@ pub fn pole_shifts(free: &[Frequency], coupled: &[Frequency]) -> Vec<PoleShift> 
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(values: &[f64]) -> Vec<Frequency> {
+        values.iter().map(|&value_hz| Frequency { value_hz, std_hz: 3.0 }).collect()
+    }
+
+    #[test]
+    fn each_zero_finds_its_nearest_once() {
+        let pairs = compare_zeros(&at(&[100.0, 200.0, 900.0]), &at(&[205.0, 104.0, 199.0]));
+        assert_eq!(pairs[0].coupled.unwrap().value_hz, 104.0);
+        assert_eq!(pairs[1].coupled.unwrap().value_hz, 199.0);
+        // 4 over 3 sqrt 2
+        assert!((pairs[0].combined_errors() - 4.0 / 18.0_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(pairs[2].coupled.unwrap().value_hz, 205.0);
+        assert!(compare_zeros(&at(&[100.0]), &[])[0].combined_errors().is_nan());
+    }
+
+    #[test]
+    fn poles_rise_at_most_to_the_next_free_one() {
+        let shifts = pole_shifts(&at(&[49.0, 270.0, 608.0]), &at(&[49.2, 157.0, 334.0]));
+        assert_eq!(shifts[0].shift_hz().0, 108.0);
+        assert_eq!(shifts[1].coupled.unwrap().value_hz, 334.0);
+        assert!(shifts[2].coupled.is_none() && shifts[2].shift_hz().0.is_nan());
+    }
+}

@@ -139,3 +139,45 @@ pub fn noise_ceiling_percent(y: &[f64], standard_error: &[f64]) -> Result<f64, M
     let noise = standard_error.iter().map(|se| se * se).sum::<f64>();
     Ok(100.0 * (1.0 - (noise / variation(y)?).sqrt()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::white_noise;
+    use crate::model::innovations::Section;
+
+    fn model() -> InnovationsModel {
+        let section = Section { order: 2, a: [-1.8, 0.9], b: [0.1, 0.05], k: [0.0; 2] };
+        InnovationsModel { sections: vec![section], feedthrough: 0.2, sample_time_s: 1.0 }
+    }
+
+    #[test]
+    fn fit_is_what_the_formula_says() {
+        let y = [1.0, 2.0, 3.0, 4.0];
+        assert_eq!(fit_percent(&y, &y).unwrap(), 100.0);
+        // the mean explains nothing
+        assert_eq!(fit_percent(&y, &[2.5; 4]).unwrap(), 0.0);
+        // |y - mean|^2 = 5, se^2 sums to 0.05
+        assert!((noise_ceiling_percent(&y, &[0.05_f64.sqrt() / 2.0; 4]).unwrap() - 90.0).abs() < 1e-12);
+        assert!(fit_percent(&[1.0; 4], &y).is_err() && fit_percent(&y, &y[1..]).is_err());
+        assert!(noise_ceiling_percent(&y, &[f64::NAN; 4]).is_err());
+    }
+
+    #[test]
+    fn nuisances_of_held_out_data_are_found_and_reach_the_ceiling() {
+        let u: Vec<f64> = (0..1000).map(|k| if k < 200 { 1.0 } else { 0.0 }).collect();
+        let clean = model().simulate(&u, &[3.0, -1.0]).unwrap();
+        let noise = white_noise(1000, 0.02, 4);
+        let y: Vec<f64> = (0..1000).map(|k| clean[k] + 0.5 + 0.3 * (k as f64 - 499.5) / 499.5 + noise[k]).collect();
+        let both = Nuisances { offset: true, slope: true };
+        let found = simulate_held_out(&model(), &u, &y, both).unwrap();
+        // 1000 samples of 0.02: 0.0006 and 0.0011 for offset and drift, 0.05 for a state that decays in 20 samples; four of them
+        assert!((found.offset - 0.5).abs() < 0.0026 && (found.drift - 0.3).abs() < 0.0045);
+        assert!((found.initial_state[0] - 3.0).abs() < 0.2);
+        let ceiling = noise_ceiling_percent(&y, &[0.02; 1000]).unwrap();
+        // four fitted nuisances of 1000 samples, and the noise's own scatter of 2 % of what is missing; four of that
+        assert!((found.fit_percent - ceiling).abs() < 0.1 * (100.0 - ceiling), "{} {ceiling}", found.fit_percent);
+        let none = simulate_held_out(&model(), &u, &y, Nuisances { offset: false, slope: false }).unwrap();
+        assert!(none.fit_percent < found.fit_percent && none.offset == 0.0);
+    }
+}

@@ -246,3 +246,65 @@ impl Ring {
         if norm == 0.0 { Err(SHARED_POLE) } else { Ok([-x[0] / norm, (x[1] - self.a[0] * x[0]) / norm]) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model() -> InnovationsModel {
+        let section = |a: [f64; 2], b: [f64; 2]| Section { order: 2, a, b, k: [0.1, -0.05] };
+        let last = Section { order: 1, a: [-0.3, 0.0], b: [0.05, 0.0], k: [0.02, 0.0] };
+        InnovationsModel {
+            sections: vec![section([-1.9, 0.95], [0.01, 0.02]), last],
+            feedthrough: 0.1,
+            sample_time_s: 1.0,
+        }
+    }
+
+    #[test]
+    fn matrices_and_back_is_the_identity() {
+        let (a, b, _, k) = model().matrices();
+        assert_eq!(InnovationsModel::from_matrices(&a, &b, &k, 0.1, 1.0).unwrap(), model());
+        let mut other = a.clone();
+        other[(0, 2)] = 0.5;
+        assert!(InnovationsModel::from_matrices(&other, &b, &k, 0.1, 1.0).is_err());
+        assert!(InnovationsModel::from_matrices(&a, &b[..2], &k, 0.1, 1.0).is_err());
+    }
+
+    #[test]
+    fn a_sine_comes_out_as_the_transfer_function_says() {
+        let w = 0.3_f64;
+        let u: Vec<f64> = (0..4000).map(|t| (w * t as f64).cos()).collect();
+        let y = model().simulate(&u, &[0.0; 3]).unwrap();
+        let g = model().transfer(c64::cis(w));
+        for (t, y) in y.iter().enumerate().skip(3900) {
+            let expected = (g * c64::cis(w * t as f64)).re;
+            // transients decay by 0.975 per sample: gone after 4000
+            assert!((y - expected).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn prediction_of_a_simulation_is_the_simulation() {
+        let u: Vec<f64> = (0..100).map(|t| f64::from(t % 7)).collect();
+        let y = model().simulate(&u, &[0.3, 0.1, -0.2]).unwrap();
+        assert_eq!(model().predict(&u, &y, &[0.3, 0.1, -0.2]).unwrap(), y);
+        assert!(model().simulate(&u, &[0.0; 2]).is_err() && model().predict(&u, &y[1..], &[0.0; 3]).is_err());
+    }
+
+    #[test]
+    fn gains_are_the_partial_fractions_of_the_noise_model() {
+        let (a, c) = ([[-1.9, 0.95], [-0.7, 0.1], [-0.3, 0.0]], [[-1.5, 0.7], [0.2, 0.05], [0.4, 0.0]]);
+        let k = kalman_gains(5, &a, &c).unwrap();
+        let polynomial = |s: [f64; 2], z: c64, first: bool| if first { z + s[0] } else { (z + s[0]) * z + s[1] };
+        for z in [c64::new(1.3, 0.4), c64::new(-0.8, 0.9), c64::new(0.0, 2.0)] {
+            let whole =
+                |s: &[[f64; 2]; 3]| polynomial(s[0], z, false) * polynomial(s[1], z, false) * polynomial(s[2], z, true);
+            let parts = (z * k[0][0] + k[0][1]) / polynomial(a[0], z, false)
+                + (z * k[1][0] + k[1][1]) / polynomial(a[1], z, false)
+                + k[2][0] / polynomial(a[2], z, true);
+            assert!((whole(&c) / whole(&a) - 1.0 - parts).norm() < 1e-13); // rounding
+        }
+        assert!(kalman_gains(5, &[a[0], [-0.7, 0.12], [-0.3, 0.0]], &c).is_err()); // 0.3 and 0.4: shared
+    }
+}

@@ -117,3 +117,47 @@ pub fn input_dependence(u: &[f64], e: &[f64], lags: usize) -> Result<TestResult,
             / variance;
     Ok(TestResult::new(statistic, rank))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::white_noise;
+
+    #[test]
+    fn p_values_of_white_noise_are_uniform() {
+        let u: Vec<f64> = (0..2000).map(|k| if k < 500 { -1.0 } else { 0.0 }).collect();
+        let (mut white, mut input) = (Vec::new(), Vec::new());
+        for seed in 0..100 {
+            let e = white_noise(2000, 1e-3, seed);
+            white.push(whiteness(&e, 25, 0).unwrap().p_value);
+            input.push(input_dependence(&u, &e, 10).unwrap().p_value);
+        }
+        for p in [white, input] {
+            let mean = p.iter().sum::<f64>() / 100.0;
+            // uniform: standard error of the mean 0.029, four of them
+            assert!((mean - 0.5).abs() < 0.12, "{mean}");
+        }
+    }
+
+    #[test]
+    fn colour_and_a_forgotten_response_are_seen() {
+        let noise = white_noise(2001, 1e-3, 1);
+        let coloured: Vec<f64> = noise.windows(2).map(|w| w[1] + 0.2 * w[0]).collect();
+        // correlation 0.19 at lag 1: 8.6 standard errors
+        assert!(whiteness(&coloured, 25, 0).unwrap().p_value < 1e-6);
+        let u: Vec<f64> = (0..2000).map(|k| if k < 500 { -1.0 } else { 0.0 }).collect();
+        let left: Vec<f64> = noise.iter().zip(&u).map(|(e, u)| e + 3e-4 * u).collect();
+        // a step of 0.3 standard deviations over 500 of 2000 samples: 5.8 standard errors
+        assert!(input_dependence(&u, &left, 10).unwrap().p_value < 1e-2);
+    }
+
+    #[test]
+    fn unusable_residuals_are_refused() {
+        assert!(whiteness(&[0.0; 50], 20, 0).is_err());
+        assert!(whiteness(&white_noise(50, 1.0, 1), 20, 20).is_err());
+        assert!(whiteness(&white_noise(10, 1.0, 1), 20, 0).is_err());
+        assert!(input_dependence(&[0.0; 10], &white_noise(50, 1.0, 1), 5).is_err());
+        // an input that never moves has nothing to depend on
+        assert_eq!(input_dependence(&[1.0; 50], &white_noise(50, 1.0, 1), 5).unwrap().freedom, 0);
+    }
+}

@@ -52,3 +52,43 @@ pub(crate) fn kalman_gain(a: &Mat<f64>, c: &[f64], q: &Mat<f64>, r: f64) -> Resu
 fn symmetric(m: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(m.nrows(), m.ncols(), |i, j| 0.5 * (m[(i, j)] + m[(j, i)]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::orthogonal::eigenvalues;
+
+    #[test]
+    fn a_random_walk_in_noise_has_the_textbook_gain() {
+        // p = p + q - p^2 / (p + r) with a = 1, q = r = 1: p = (1 + sqrt 5) / 2, k = p / (p + 1)
+        let (a, q) = (Mat::from_fn(1, 1, |_, _| 1.0 - 1e-12), Mat::from_fn(1, 1, |_, _| 1.0));
+        let (k, innovation) = kalman_gain(&a, &[1.0], &q, 1.0).unwrap();
+        let p = 0.5 * (1.0 + 5.0_f64.sqrt());
+        // a differs from one by 1e-12
+        assert!((k[0] - p / (p + 1.0)).abs() < 1e-11 && (innovation - p - 1.0).abs() < 1e-11);
+    }
+
+    #[test]
+    fn the_gain_solves_the_equation_and_stabilises() {
+        // a resonance of Q = 500 at a hundredth of the sample rate, driven weakly
+        let (r, w) = (0.99994_f64, 0.0628_f64);
+        let a = Mat::from_fn(2, 2, |i, j| [[2.0 * r * w.cos(), 1.0], [-r * r, 0.0]][i][j]);
+        let q = Mat::from_fn(2, 2, |i, j| if (i, j) == (1, 1) { 1e-6 } else { 0.0 });
+        let (k, _) = kalman_gain(&a, &[1.0, 0.0], &q, 1.0).unwrap();
+        let closed = Mat::from_fn(2, 2, |i, j| a[(i, j)] - if j == 0 { k[i] } else { 0.0 });
+        let radius = eigenvalues(&closed).unwrap()[0].norm();
+        assert!(radius < r && radius > 0.9, "{radius}");
+        // slow twin: the Riccati recursion itself
+        let mut p = q.clone();
+        let mut gain = [0.0; 2];
+        for _ in 0..200_000 {
+            let innovation = 1.0 + p[(0, 0)];
+            let ap = product(a.as_ref(), p.as_ref());
+            gain = [ap[(0, 0)] / innovation, ap[(1, 0)] / innovation];
+            let apa = product(ap.as_ref(), a.transpose());
+            p = Mat::from_fn(2, 2, |i, j| apa[(i, j)] + q[(i, j)] - gain[i] * gain[j] * innovation);
+        }
+        // the recursion's own rounding over 1e5 steps
+        assert!((gain[0] - k[0]).abs() < 1e-9 && (gain[1] - k[1]).abs() < 1e-9, "{gain:?} {k:?}");
+    }
+}

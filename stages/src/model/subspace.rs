@@ -128,3 +128,55 @@ fn gram(u: &[f64], block_rows: usize, level: f64) -> Mat<f64> {
     }
     gram
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{Lever, white_noise};
+
+    fn loaded(samples: usize) -> Vec<f64> {
+        (0..samples).map(|k| if k <= 600 { -0.8 - 1e-5 * k as f64 } else { 0.0 }).collect()
+    }
+
+    #[test]
+    fn a_noise_free_release_gives_its_poles() {
+        let lever = Lever::paper();
+        let y: Vec<f64> = lever.release(4096, 600.3, -0.8).iter().map(|y| y + 0.01).collect();
+        let subspace = Subspace::new(&loaded(4096), &y, 60).unwrap();
+        let found = subspace.poles(11).unwrap();
+        for pole in &lever.poles()[..8] {
+            let z = (pole / lever.sample_rate_hz).exp();
+            let nearest = found.iter().map(|w| (w - z).norm()).fold(f64::MAX, f64::min);
+            // the load's ramp is not in this closed form: 1e-5 of the load per sample
+            assert!(nearest < 1e-4, "{z}: {nearest}");
+        }
+        let s = subspace.singular_values();
+        assert!(s.len() == 60 && s.windows(2).all(|pair| pair[0] >= pair[1]));
+        // eleven states: the weakest stand three decades above rounding, measured against the load
+        assert!(s[11] < 1e-8 * s[0] && s[10] > 1e-7 * s[0], "{:?}", &s[..12]);
+    }
+
+    #[test]
+    fn the_running_sums_equal_the_products() {
+        let u = white_noise(300, 1.0, 9);
+        let fast = gram(&u, 20, 2.0);
+        let windows = 281;
+        let column = |j: usize, t: usize| if j == 0 { 1.0 } else { u[t + j - 1] / 2.0 };
+        for i in 0..=20 {
+            for j in 0..=20 {
+                let slow: f64 = (0..windows).map(|t| column(i, t) * column(j, t)).sum();
+                assert!((fast[(i, j)] - slow).abs() < 1e-11); // 300 roundings of order one
+            }
+        }
+    }
+
+    #[test]
+    fn unusable_data_is_refused() {
+        let y = white_noise(400, 1.0, 1);
+        assert!(Subspace::new(&y, &y[1..], 60).is_err() && Subspace::new(&y, &y, 1).is_err());
+        assert!(Subspace::new(&y[..100], &y[..100], 60).is_err());
+        let subspace = Subspace::new(&vec![0.0; 400], &y, 60).unwrap();
+        assert!(subspace.poles(0).is_err() && subspace.poles(60).is_err());
+        assert_eq!(subspace.poles(59).unwrap().len(), 59);
+    }
+}

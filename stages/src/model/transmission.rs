@@ -67,3 +67,38 @@ fn polished(model: &InnovationsModel, start: c64) -> c64 {
     }
     zero
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::innovations::Section;
+
+    fn model(feedthrough: f64) -> InnovationsModel {
+        let section = |a: [f64; 2], b: [f64; 2]| Section { order: 2, a, b, k: [0.0; 2] };
+        let last = Section { order: 1, a: [-0.3, 0.0], b: [0.05, 0.0], k: [0.0; 2] };
+        let sections = vec![section([-1.9, 0.95], [0.01, 0.02]), section([-1.2, 0.9], [-0.03, 0.01]), last];
+        InnovationsModel { sections, feedthrough, sample_time_s: 1.0 }
+    }
+
+    #[test]
+    fn the_transfer_function_vanishes_at_its_zeros() {
+        for (feedthrough, count) in [(0.1, 5), (0.0, 4)] {
+            let model = model(feedthrough);
+            let zeros = transmission_zeros(&model).unwrap();
+            assert_eq!(zeros.len(), count, "{zeros:?}");
+            for zero in &zeros {
+                // rounding, against terms of order one tenth
+                assert!(model.transfer(*zero).norm() < 1e-13, "{zero}");
+                assert!(zero.im == 0.0 || zeros.iter().any(|other| *other == zero.conj()));
+            }
+        }
+    }
+
+    #[test]
+    fn a_single_section_has_the_zero_of_its_numerator() {
+        let section = Section { order: 2, a: [-1.0, 0.5], b: [2.0, -1.0], k: [0.0; 2] };
+        let zeros =
+            transmission_zeros(&InnovationsModel { sections: vec![section], feedthrough: 0.0, sample_time_s: 1.0 });
+        assert!((zeros.unwrap()[0].re - 0.5).abs() < 1e-14);
+    }
+}

@@ -3,6 +3,8 @@
 mod map;
 mod poles;
 mod response;
+#[cfg(test)]
+mod tests;
 
 pub use map::Root;
 pub use poles::{ModeCriteria, Pole, PoleKind, poles, zeros};

@@ -124,8 +124,9 @@ pub struct Identified {
 /// # Units
 /// Those of u and y.
 /// # Accuracy
-/// Maximum likelihood for Gaussian e: the Cramer-Rao bound is reached where the noise is white plus thermal (same poles). Noise-free
-/// data are recovered to rounding. The covariance allows for a coloured residual.
+/// Restricted maximum likelihood for Gaussian noise, white plus thermal (same poles). Over 60 seeds of the paper's lever in such noise the rms
+/// errors of f and Q are 0.85 to 1.13 of the Cramer-Rao bound, and their squares 0.86 to 1.3 of the squared standard errors. Noise-free data
+/// are recovered to rounding. The covariance allows for a coloured residual.
 /// # Errors
 /// Lengths, samples that are not finite, too few samples, parameters out of range, a constant output, no finite fit. No convergence is
 /// no error: see the verdict.
