@@ -56,6 +56,7 @@ pub(crate) fn sections(run: &RunResult) -> Vec<Drawn> {
             figures: frequency_response::coupled(run).into_iter().collect(),
             tables: coupling::tables(run),
             missing: "no frequency response of a snap to contact",
+            ..Drawn::default()
         },
         Drawn {
             id: "fig-5",
