@@ -12,7 +12,7 @@ const KILLS: u32 = 50;
 fn a_killed_run_loses_nothing_that_was_finished() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
-    let archive = simulated(here, "archive", 6, 9);
+    let archive = simulated(here, "archive", 8, 9);
     let (config, set) = (config("free-lever.toml"), files(&archive.folder));
     let clock = Instant::now();
     afmid(here, &["run", &config, "--set", &set, "-o", "whole.h5", "--cache", "whole"]);

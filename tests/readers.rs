@@ -11,7 +11,7 @@ use common::{ROOT, afmid, config, files, simulated};
 fn h5py_xarray_and_nxcheck_read_a_result() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
-    let archive = simulated(here, "archive", 6, 3);
+    let archive = simulated(here, "archive", 8, 3);
     afmid(here, &["run", &config("paper.toml"), "--set", &files(&archive.folder), "-o", "p.h5", "--cache", "cache"]);
     let python = Path::new(ROOT).join(".tools/bin/python");
     assert!(python.exists(), "{} is missing: run `make test-deps`", python.display());

@@ -8,7 +8,7 @@ use common::{afmid, config, files, simulated};
 fn a_result_is_the_same_bit_for_bit_on_one_thread_and_on_four() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
-    let archive = simulated(here, "archive", 6, 5);
+    let archive = simulated(here, "archive", 8, 5);
     let set = files(&archive.folder);
     for (threads, result) in [("1", "one.h5"), ("4", "four.h5")] {
         let cache = format!("cache-{threads}");

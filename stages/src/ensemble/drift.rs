@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::average::{onset_sample, signal_rows};
-use super::{DriftSettings, ShapeDrift, SubEnsemble, shape_drift};
+use super::{DriftSettings, EnsembleError, ShapeDrift, SubEnsemble, shape_drift};
 
 /// Asks whether the shape of the events changes slowly over the archive.
 ///
@@ -16,7 +16,7 @@ use super::{DriftSettings, ShapeDrift, SubEnsemble, shape_drift};
 /// Shapes: one row per sub-ensemble in `groups`.
 /// Units: correlation coefficients and probabilities.
 /// Accuracy: the p-value is at least 1 / (1 + permutations); its standard error is sqrt(p (1 - p) / permutations).
-/// Errors: fewer than eight events, or than two per group.
+/// Errors: values that are not finite. Fewer than eight events, or than two per group: a warning, and the p-value is unknown.
 /// Source: Stark et al. 2005, section Data processing; Phipson and Smyth, Stat. Appl. Genet. Mol. Biol. 9 (2010) 39.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -44,7 +44,7 @@ const SUMMARY: Port<Document> =
 impl Stage for Drift {
     const SPEC: Spec = Spec {
         name: "ensemble.drift",
-        version: 1,
+        version: 2,
         summary: "compares ordered with random sub-ensembles: does the shape change over the archive?",
         inputs: &[ENSEMBLE.spec()],
         outputs: &[GROUPS.spec(), SUMMARY.spec()],
@@ -70,7 +70,17 @@ impl Stage for Drift {
         let ensemble = inputs.get(&ENSEMBLE)?;
         let (rows, _) = signal_rows(ensemble)?;
         let settings = DriftSettings { groups: self.groups, permutations: self.permutations, seed: cx.seed() };
-        let found = shape_drift(rows, onset_sample(ensemble)?, settings).map_err(StageError::from_error)?;
+        let found = match shape_drift(rows, onset_sample(ensemble)?, settings) {
+            Ok(found) => found,
+            // a small archive is no reason to lose the rest of the pipeline: nothing is known of drift, and that is said
+            Err(error @ EnsembleError::TooFewEvents { .. }) => {
+                cx.warn(format!("{error}: whether the events drift is unknown"));
+                let unknown = ShapeDrift { groups: Vec::new(), p_value: f64::NAN, z_score: f64::NAN };
+                let summary = summary(&unknown, rows.count(), 0)?;
+                return Ok(Ports::new().with(&GROUPS, table(&[])).with(&SUMMARY, summary));
+            }
+            Err(error) => return Err(StageError::from_error(error)),
+        };
         if found.p_value < self.alarm_p_value {
             cx.warn(format!(
                 "the shape of the events drifts over the archive: p = {:.4}, {:.1} standard deviations from random order",
@@ -115,7 +125,8 @@ fn table(groups: &[SubEnsemble]) -> Table {
 fn summary(found: &ShapeDrift, events: usize, permutations: usize) -> Result<Document, StageError> {
     let range = |ordered: bool| {
         let of = found.groups.iter().filter(|g| g.ordered == ordered).map(|g| g.correlation);
-        let (low, high) = of.fold((1.0, -1.0), |(low, high): (f64, f64), c| (low.min(c), high.max(c)));
+        // NaN, which is null in JSON, where there is no group
+        let (low, high) = of.fold((f64::NAN, f64::NAN), |(low, high): (f64, f64), c| (low.min(c), high.max(c)));
         json!({ "lowest": low, "highest": high })
     };
     Document::new(&json!({
