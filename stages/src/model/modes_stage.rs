@@ -4,7 +4,7 @@ use afmid_pipeline::{
     Array, Attribute, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace,
     Table,
 };
-use faer::{Mat, c64};
+use faer::Mat;
 use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 use super::modes::{ModeCriteria, Pole, PoleKind, ResponsePoint, Root, poles, response, zeros};
 use super::pem_stage::{DataSet, MODEL};
 use super::{InnovationsModel, Nuisances, noise_ceiling_percent, simulate_held_out};
+use crate::spectrum::IntersampleKind;
 
 /// Extracts modes, poles and zeros from a model, each with its standard error, and judges the model on held-out events.
 ///
@@ -41,6 +42,9 @@ pub struct Modes {
     pub response_points: usize,
     /// Lowest frequency of the response in Hz, above 0. Default: 1000.
     pub response_from_hz: f64,
+    /// What the force does between samples, for `response`: `held` (half a sample's lag and droop are taken out, as in `spectrum.etfe`) or
+    /// `sampled`. Default: held, which is exact for a step at a sample.
+    pub intersample: IntersampleKind,
     /// Reference frequencies in Hz (a sweep), to compare with. Default: none.
     pub reference_frequency_hz: Vec<f64>,
     /// Reference quality factors, as many as frequencies, or none. Default: none.
@@ -57,6 +61,7 @@ impl Default for Modes {
             max_quality_factor_error: criteria.max_quality_factor_error,
             response_points: 2000,
             response_from_hz: 1000.0,
+            intersample: IntersampleKind::Held,
             reference_frequency_hz: Vec::new(),
             reference_quality_factor: Vec::new(),
         }
@@ -75,7 +80,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "mode
 impl Stage for Modes {
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 1,
+        version: 2,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -140,7 +145,7 @@ impl Stage for Modes {
         Ok(Ports::new()
             .with(&MODES, mode_table(&modes))
             .with(&ROOTS, root_table(&found, &zeros))
-            .with(&RESPONSE, response_array(&points, artifact))
+            .with(&RESPONSE, response_array(&points, artifact, self.intersample))
             .with(&SUMMARY, summary))
     }
 
@@ -297,9 +302,20 @@ fn root_table(poles: &[Pole], zeros: &[Root]) -> Table {
         .with("s_im", "rad/s", "imaginary part in the s plane", column(|r| r.s.im))
 }
 
-fn response_array(points: &[ResponsePoint], model: &StateSpace) -> Array {
+/// From the response to a held input to that of the continuous system: `i w T / (1 - exp(-i w T))`.
+fn hold_correction(frequency_hz: f64, sample_time_s: f64, intersample: IntersampleKind) -> Complex64 {
+    let angle = std::f64::consts::TAU * frequency_hz * sample_time_s;
+    match intersample {
+        IntersampleKind::Held if angle > 0.0 => {
+            Complex64::new(0.0, angle) / (Complex64::new(1.0, 0.0) - Complex64::cis(-angle))
+        }
+        _ => Complex64::new(1.0, 0.0),
+    }
+}
+
+fn response_array(points: &[ResponsePoint], model: &StateSpace, intersample: IntersampleKind) -> Array {
     let over = &["frequency_hz"];
-    let complex = |value: c64| Complex64::new(value.re, value.im);
+    let factor = |point: &ResponsePoint| hold_correction(point.frequency_hz, model.sample_time_s, intersample);
     let axis = Axis::new("frequency_hz", "Hz", "frequency", points.iter().map(|p| p.frequency_hz).collect());
     Array::over(vec![axis])
         .with(
@@ -307,14 +323,14 @@ fn response_array(points: &[ResponsePoint], model: &StateSpace) -> Array {
             "1",
             "transfer function of the model",
             over,
-            points.iter().map(|p| complex(p.value)).collect::<Vec<_>>(),
+            points.iter().map(|p| Complex64::new(p.value.re, p.value.im) * factor(p)).collect::<Vec<_>>(),
         )
         .with(
             "magnitude_std",
             "1",
             "standard error of its magnitude",
             over,
-            points.iter().map(ResponsePoint::magnitude_std).collect::<Vec<_>>(),
+            points.iter().map(|p| p.magnitude_std() * factor(p).norm()).collect::<Vec<_>>(),
         )
         .with(
             "phase_std",
@@ -325,4 +341,15 @@ fn response_array(points: &[ResponsePoint], model: &StateSpace) -> Array {
         )
         .attribute("sample_rate_hz", 1.0 / model.sample_time_s)
         .attribute("order", model.order())
+}
+
+#[cfg(test)]
+#[test]
+fn the_hold_correction_advances_by_half_a_sample_and_undoes_the_droop() {
+    let (rate, f) = (5e6, 1.05e6);
+    let found = hold_correction(f, 1.0 / rate, IntersampleKind::Held);
+    let x = std::f64::consts::PI * f / rate;
+    // exact: exp(i x) x / sin(x); rounding of a few operations
+    assert!((found - Complex64::from_polar(x / x.sin(), x)).norm() < 1e-14);
+    assert_eq!(hold_correction(f, 1.0 / rate, IntersampleKind::Sampled), Complex64::new(1.0, 0.0));
 }
