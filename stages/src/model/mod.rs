@@ -12,6 +12,8 @@ pub mod pem;
 mod pem_stage;
 mod residual;
 mod riccati;
+pub mod ringdown;
+mod ringdown_stage;
 mod subspace;
 mod transmission;
 mod zeros_stage;
@@ -23,6 +25,7 @@ pub use innovations::{InnovationsModel, Section};
 pub use modes_stage::Modes;
 pub use pem_stage::{DataSet, NoiseKind, Pem};
 pub use residual::{TestResult, input_dependence, whiteness};
+pub use ringdown_stage::{ErrorSource, JointNoise, RingdownFit};
 pub use subspace::Subspace;
 pub use transmission::transmission_zeros;
 pub use zeros_stage::Zeros;
@@ -30,7 +33,8 @@ pub use zeros_stage::Zeros;
 use afmid_pipeline::Entry;
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] = &[Entry::of::<Pem>(), Entry::of::<Modes>(), Entry::of::<Zeros>()];
+pub const STAGES: &[Entry] =
+    &[Entry::of::<Pem>(), Entry::of::<Modes>(), Entry::of::<Zeros>(), Entry::of::<RingdownFit>()];
 
 #[cfg(test)]
 #[test]

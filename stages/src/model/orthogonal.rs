@@ -153,3 +153,23 @@ pub(crate) fn product(lhs: MatRef<'_, f64>, rhs: MatRef<'_, f64>) -> Mat<f64> {
     matmul(out.as_mut(), Accum::Replace, lhs, rhs, 1.0, Par::Seq);
     out
 }
+
+/// Lower Cholesky factor of a symmetric positive semidefinite matrix: a direction with less than `1e-14` of its own variance left is rounding
+/// and gets `1e-7` of its scale.
+pub(crate) fn cholesky(matrix: &Mat<f64>) -> Mat<f64> {
+    let n = matrix.nrows();
+    let mut lower = Mat::<f64>::zeros(n, n);
+    for j in 0..n {
+        let left = matrix[(j, j)] - (0..j).map(|k| lower[(j, k)].powi(2)).sum::<f64>();
+        if left <= 1e-14 * matrix[(j, j)] {
+            lower[(j, j)] = 1e-7 * matrix[(j, j)].max(f64::MIN_POSITIVE).sqrt();
+            continue;
+        }
+        lower[(j, j)] = left.sqrt();
+        for i in j + 1..n {
+            let rest = matrix[(i, j)] - (0..j).map(|k| lower[(i, k)] * lower[(j, k)]).sum::<f64>();
+            lower[(i, j)] = rest / lower[(j, j)];
+        }
+    }
+    lower
+}

@@ -1,0 +1,108 @@
+//! What the joint fit yields.
+
+use faer::{Mat, c64};
+
+use super::modal_form::{EventParameters, Exponential};
+use super::noise::RingdownNoise;
+
+/// A value with its standard error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// Its standard error.
+    pub std: f64,
+}
+
+/// One mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModeEstimate {
+    /// `abs(s) / 2 pi`, Hz.
+    pub frequency_hz: Estimate,
+    /// `abs(s) / (-2 Re s)`.
+    pub quality_factor: Estimate,
+}
+
+/// How the search ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RingdownVerdict {
+    /// Whether the last step moved no mode by a thousandth of its standard error.
+    pub converged: bool,
+    /// Largest move of a mode's parameter in the last step, in its standard errors.
+    pub distance: f64,
+    /// Accepted steps.
+    pub steps: usize,
+}
+
+/// A joint fit of several ringdowns.
+#[derive(Debug, Clone)]
+pub struct Ringdown {
+    /// The shared shape: modes ascending in frequency, then real poles.
+    pub exponentials: Vec<Exponential>,
+    /// Amplitude, onset, offset and slope of each event.
+    pub events: Vec<EventParameters>,
+    /// Their standard errors, in the same order; zero for a slope that was not estimated.
+    pub event_std: Vec<EventParameters>,
+    /// Covariance of [`Self::parameters`], from the noise model; zero for the two that fix the gauge.
+    pub covariance: Mat<f64>,
+    /// Covariance of the same from the scatter of the events' scores: right under a wrong noise model too; none with fewer than 8 events.
+    pub sandwich: Option<Mat<f64>>,
+    /// The noise that the events were weighted with.
+    pub noise: RingdownNoise,
+    /// Whitened residual energy over degrees of freedom: 1 if the noise model holds.
+    pub reduced_chi_square: f64,
+    /// Degrees of freedom of that.
+    pub freedom: usize,
+    /// Frequencies of [`Self::residual_periodogram`], Hz.
+    pub frequency_hz: Vec<f64>,
+    /// Mean Hann periodogram of the residuals, one-sided, V^2/Hz.
+    pub residual_periodogram: Vec<f64>,
+    /// What the noise model expects of it, what the fit absorbs taken off, V^2/Hz.
+    pub expected_periodogram: Vec<f64>,
+    /// How the search ended.
+    pub verdict: RingdownVerdict,
+}
+
+impl Ringdown {
+    /// Shared parameters: per mode Re and Im of pole (rad/s) and residue (V), per real pole both.
+    pub fn parameters(&self) -> Vec<f64> {
+        super::modal_form::shared(&self.exponentials)
+    }
+
+    /// The modes with standard errors from the noise model.
+    pub fn modes(&self) -> Vec<ModeEstimate> {
+        self.modes_with(&self.covariance)
+    }
+
+    /// The modes with standard errors from another covariance of the same parameters.
+    pub fn modes_with(&self, covariance: &Mat<f64>) -> Vec<ModeEstimate> {
+        let mut first = 0;
+        let mut modes = Vec::new();
+        for e in &self.exponentials {
+            if e.oscillates() {
+                modes.push(mode(e.pole, covariance, first));
+            }
+            first += e.parameters();
+        }
+        modes
+    }
+}
+
+/// Frequency and quality factor of a pole by the delta method.
+fn mode(pole: c64, covariance: &Mat<f64>, first: usize) -> ModeEstimate {
+    let w = pole.norm();
+    let (re, im) = (pole.re, pole.im);
+    let spread = |by_re: f64, by_im: f64| {
+        let c = |i: usize, j: usize| covariance[(first + i, first + j)];
+        (by_re * by_re * c(0, 0) + 2.0 * by_re * by_im * c(0, 1) + by_im * by_im * c(1, 1)).max(0.0).sqrt()
+    };
+    let q = w / (-2.0 * re);
+    ModeEstimate {
+        frequency_hz: Estimate {
+            value: w / std::f64::consts::TAU,
+            std: spread(re / w, im / w) / std::f64::consts::TAU,
+        },
+        // dQ/dRe = -Re/(2 w Re) + w/(2 Re^2), dQ/dIm = -Im/(2 w Re)
+        quality_factor: Estimate { value: q, std: spread(-0.5 / w + 0.5 * w / (re * re), -0.5 * im / (w * re)) },
+    }
+}
