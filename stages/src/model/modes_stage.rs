@@ -80,7 +80,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "mode
 impl Stage for Modes {
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 2,
+        version: 3,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -107,7 +107,12 @@ impl Stage for Modes {
         }
         let (f, q) = (self.reference_frequency_hz.len(), self.reference_quality_factor.len());
         if q > 0 && q != f {
-            return Err(wanted("reference_quality_factor's length", q as f64, &format!("none or {f}, as frequencies")));
+            let wanted = match f {
+                0 => "none, since `reference_frequency_hz` has none".to_owned(),
+                _ => format!("{f}, one for each of `reference_frequency_hz`, or none"),
+            };
+            let values = if q == 1 { "1 value".to_owned() } else { format!("{q} values") };
+            return Err(StageError::new(format!("`reference_quality_factor` has {values}, wanted {wanted}")));
         }
         if let Some(value) =
             self.reference_frequency_hz.iter().chain(&self.reference_quality_factor).find(|v| v.is_nan() || **v <= 0.0)
@@ -173,20 +178,33 @@ impl Modes {
     /// Each reference value beside the nearest mode.
     fn compared(&self, modes: &[&Pole]) -> Vec<Value> {
         let row = |(i, &reference): (usize, &f64)| {
-            let distance = |mode: &&&Pole| (mode.root.frequency_hz / reference).ln().abs();
-            let nearest = modes.iter().min_by(|x, y| distance(x).total_cmp(&distance(y))).map(|mode| mode.root);
+            let distance = |mode: &Pole| (mode.root.frequency_hz / reference).ln().abs();
+            let numbered = modes.iter().enumerate().min_by(|(_, x), (_, y)| distance(x).total_cmp(&distance(y)));
+            let nearest = numbered.map(|(_, mode)| mode.root);
             let q = self.reference_quality_factor.get(i);
             json!({
+                "mode": numbered.map(|(index, _)| index + 1),
                 "reference_frequency_hz": reference,
                 "reference_quality_factor": q,
                 "frequency_hz": nearest.map(|root| root.frequency_hz),
+                "frequency_std_hz": nearest.map(|root| root.frequency_std_hz),
                 "frequency_difference": nearest.map(|root| root.frequency_hz / reference - 1.0),
+                "frequency_difference_in_errors":
+                    nearest.and_then(|root| in_errors(root.frequency_hz - reference, root.frequency_std_hz)),
                 "quality_factor": nearest.map(|root| root.quality_factor),
+                "quality_factor_std": nearest.map(|root| root.quality_factor_std),
                 "quality_factor_difference": nearest.zip(q).map(|(root, q)| root.quality_factor / q - 1.0),
+                "quality_factor_difference_in_errors":
+                    nearest.zip(q).and_then(|(root, q)| in_errors(root.quality_factor - q, root.quality_factor_std)),
             })
         };
         self.reference_frequency_hz.iter().enumerate().map(row).collect()
     }
+}
+
+/// A difference in standard errors; unknown where there is no error.
+fn in_errors(difference: f64, std: f64) -> Option<f64> {
+    Some(difference / std).filter(|ratio| ratio.is_finite())
 }
 
 fn wanted(name: &str, value: f64, range: &str) -> StageError {
