@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::modes::{ModeCriteria, Pole, PoleKind, ResponsePoint, Root, poles, response, zeros};
+use super::modes::{ModeCriteria, Pole, PoleKind, ResponsePoint, Root, poles, response, share_error_from_onset, zeros};
 use super::pem_stage::{DataSet, MODEL};
 use super::{InnovationsModel, Nuisances, noise_ceiling_percent, simulate_held_out};
 use crate::spectrum::IntersampleKind;
@@ -20,7 +20,9 @@ use crate::spectrum::IntersampleKind;
 /// Model: s = ln(z) / Ts, f = |s| / 2 pi, Q = |s| / (-2 Re s), pole by pole; a mode is an established, weakly damped pair; the rest are detector
 /// poles, doubtful pairs, and real negative ones, which have no continuous counterpart.
 /// Method: zeros are the invariant zeros of (A, B, C, D). Standard errors by the delta method from the model's covariance. Held-out fit: the model of
-/// the identification half simulated on the verification half's force, initial state, offset and drift fitted again.
+/// the identification half simulated on the verification half's force, initial state, offset and drift fitted again. The error of a static share counts the ambiguity of t0: an event
+/// that was d earlier turns and raises the mode's amplitude by exp(-s d); the root mean square over the pair's `t0_ambiguity_s`, at least one
+/// sample, is added in squares.
 /// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency.
 /// Units: Hz; static shares are parts of the static gain.
 /// Accuracy: first order in the errors. A static share is the mode's own partial fraction: within the detector's roll-off it is turned and damped by it.
@@ -125,7 +127,12 @@ impl Stage for Modes {
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let artifact = inputs.get(&MODEL)?;
         let (model, covariance) = innovations(artifact)?;
-        let found = poles(&model, &covariance, &self.criteria()).map_err(StageError::from_error)?;
+        let mut found = poles(&model, &covariance, &self.criteria()).map_err(StageError::from_error)?;
+        let ambiguity_s = onset_ambiguity(artifact);
+        for pole in found.iter_mut().filter(|pole| pole.root.is_complex()) {
+            let from_onset = share_error_from_onset(pole.amplitude, pole.root.s, ambiguity_s.unwrap_or(0.0));
+            pole.static_share_std = pole.static_share_std.hypot(from_onset);
+        }
         let zeros = zeros(&model, &covariance).map_err(StageError::from_error)?;
         let modes: Vec<&Pole> = found.iter().filter(|pole| pole.kind == PoleKind::Mechanical).collect();
         if modes.is_empty() {
@@ -145,6 +152,7 @@ impl Stage for Modes {
                 "held_out": fits.held_out,
                 "noise_ceiling": fits.noise_ceiling,
             },
+            "t0_ambiguity_s": ambiguity_s,
             "reference": self.compared(&modes),
         }))?;
         Ok(Ports::new()
@@ -200,6 +208,13 @@ impl Modes {
         };
         self.reference_frequency_hz.iter().enumerate().map(row).collect()
     }
+}
+
+/// Width of the interval in which t0 may lie, as `force.extrapolation` states it; at least a sample, since t0 lies on the grid and the event
+/// does not. None for a pair that says nothing of it.
+fn onset_ambiguity(model: &StateSpace) -> Option<f64> {
+    let stated = model.attributes.get("t0_ambiguity_s").and_then(Attribute::as_f64)?;
+    Some(stated.max(model.sample_time_s))
 }
 
 /// A difference in standard errors; unknown where there is no error.

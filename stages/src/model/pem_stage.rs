@@ -110,7 +110,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Pem {
     const SPEC: Spec = Spec {
         name: "model.pem",
-        version: 1,
+        version: 2,
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],
@@ -158,7 +158,11 @@ impl Stage for Pem {
         }
         let time = pair.axis("time")?.values[first..].to_vec();
         let summary = self.summary(&fit, input, output, first)?;
-        let model = state_space(&fit, suffix, first)?;
+        let mut model = state_space(&fit, suffix, first)?;
+        // what the model cannot know: `model.modes` counts it in the shares
+        if let Some(ambiguity) = pair.attributes.get("t0_ambiguity_s") {
+            model.attributes.insert("t0_ambiguity_s".to_owned(), ambiguity.clone());
+        }
         let residual = fit.residuals.into_iter().next().unwrap_or_default();
         let prediction = output.iter().zip(&residual).map(|(y, e)| y - e).collect::<Vec<f64>>();
         let residuals = Array::over(vec![Axis::new("time", "s", "time since t0", time)])
