@@ -7,6 +7,7 @@ use afmid_pipeline::store::read_result;
 
 use crate::cli::ReportArgs;
 use crate::failure::Failure;
+use crate::output::print;
 use crate::report::{figures, report};
 
 /// Writes the page, and the figures if asked for, and says where.
@@ -24,7 +25,7 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     }
     let page = report(&run).map_err(|error| Failure::failed(error, None))?;
     write(&output, &page)?;
-    println!("{}", output.display());
+    let mut written = format!("{}\n", output.display());
     if let Some(folder) = &args.figures {
         fs::create_dir_all(folder).map_err(|error| {
             Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
@@ -32,10 +33,10 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
         for (name, text) in figures(&run) {
             let path = folder.join(name);
             write(&path, &text)?;
-            println!("{}", path.display());
+            written.push_str(&format!("{}\n", path.display()));
         }
     }
-    Ok(())
+    print(&written)
 }
 
 fn default_output(result: &Path) -> PathBuf {

@@ -10,6 +10,7 @@ use afmid_pipeline::{Plan, RunResult};
 use super::load::load;
 use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
+use crate::output::{print, say};
 use crate::progress::observer;
 
 /// Runs a config and writes its result file.
@@ -20,12 +21,11 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
     let cache = open_cache(args.cache.as_deref())?;
     let result = compute(&plan, args, &cache);
     for note in cache.take_notes() {
-        eprintln!("note: {note}");
+        say(&format!("note: {note}\n"));
     }
     let result = result?;
     write_result(&output, &result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
-    println!("{}: {}", output.display(), told(&result));
-    Ok(())
+    print(&format!("{}: {}\n", output.display(), told(&result)))
 }
 
 /// The cache that was asked for, or the user's.

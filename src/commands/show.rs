@@ -8,6 +8,7 @@ use afmid_pipeline::store::{ResultFile, StageSummary};
 use serde_json::{Map, Value};
 
 use crate::failure::Failure;
+use crate::output::print;
 use crate::show::{artifact_json, artifact_text, overview_json, overview_text, stage_head};
 
 /// The port whose document stands for a stage.
@@ -27,8 +28,7 @@ pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
             if json { pretty(&stage_json(&file, stage)?)? } else { stage_text(&file, stage)? }
         }
     };
-    print!("{text}");
-    Ok(())
+    print(&text)
 }
 
 fn find<'a>(file: &'a ResultFile, id: &str) -> Result<&'a StageSummary, Failure> {
