@@ -9,7 +9,7 @@ deps: .tools/bin/cmake
 # The readers that the tests open results with.
 test-deps: deps .tools/readers
 
-# Simulates an archive, runs the paper's pipeline on it, prints the modal table beside the truth, writes result and report.
+# Simulates an archive, runs the paper's pipeline on it, writes result and report, prints the modes; the last table has them beside the truth.
 demo: deps
 	cargo build --release --locked
 	./target/release/afmid run configs/simulate-demo.toml -o results/simulate-demo.h5

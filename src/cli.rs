@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-/// Identifies dynamic systems from archived transients; at home in atomic force microscopy.
+/// Identifies dynamic systems from archived transients, such as snap-off events in force curves of an atomic force microscope.
 #[derive(Debug, Parser)]
 #[command(name = "afmid", version, about, propagate_version = true)]
 pub struct Cli {
@@ -87,7 +87,7 @@ pub struct RunArgs {
     #[arg(short, long, value_name = "OUT.h5")]
     pub output: Option<PathBuf>,
     /// Threads [default: one per processor]; results don't depend on it.
-    #[arg(short, long, value_name = "N")]
+    #[arg(short, long, value_name = "N", value_parser = threads)]
     pub jobs: Option<NonZeroU16>,
     /// Reuse nothing.
     #[arg(long)]
@@ -95,6 +95,11 @@ pub struct RunArgs {
     /// Where stage results are kept [default: $AFMID_CACHE, or `afmid` in the user's cache folder].
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
+}
+
+/// A number of threads.
+fn threads(text: &str) -> Result<NonZeroU16, String> {
+    text.parse().map_err(|_| format!("wanted a whole number from 1 to {}", u16::MAX))
 }
 
 /// What to report, and where to.

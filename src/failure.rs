@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::process::ExitCode;
 
+use crate::output::say;
+
 /// How a command ends when it does not succeed.
 #[derive(Debug)]
 pub enum Failure {
@@ -10,6 +12,8 @@ pub enum Failure {
     Usage(Message),
     /// Something failed: exit code 1.
     Failed(Message),
+    /// Whoever read stdout has seen enough (`afmid schema | head`): the quiet end, exit code 0.
+    Closed,
 }
 
 /// What goes to stderr.
@@ -37,15 +41,14 @@ impl Failure {
         let (message, code) = match self {
             Self::Usage(message) => (message, 2),
             Self::Failed(message) => (message, 1),
+            Self::Closed => return ExitCode::SUCCESS,
         };
         match message {
             Message::Line(line, help) => {
-                eprintln!("error: {line}");
-                if let Some(help) = help {
-                    eprintln!("  help: {help}");
-                }
+                let help = help.map(|help| format!("  help: {help}\n")).unwrap_or_default();
+                say(&format!("error: {line}\n{help}"));
             }
-            Message::Rendered(text) => eprint!("{text}"),
+            Message::Rendered(text) => say(&text),
         }
         ExitCode::from(code)
     }

@@ -5,9 +5,6 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     match afmid::registry() {
         Ok(registry) => afmid::main(&registry),
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
+        Err(error) => afmid::fail(&error),
     }
 }

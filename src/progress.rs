@@ -3,6 +3,7 @@
 use std::io::IsTerminal;
 use std::time::Duration;
 
+use crate::output::say;
 use afmid_pipeline::runner::Observer;
 use afmid_pipeline::stage::{NoProgress, Progress};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -20,8 +21,7 @@ impl Observer for Lines {
     }
 
     fn end(&self, id: &str, cached: bool, took: Duration, warnings: &[String]) {
-        // one call, so that lines of several threads don't mix
-        eprint!("{}", lines(id, cached, took, warnings));
+        say(&lines(id, cached, took, warnings));
     }
 }
 
@@ -40,7 +40,7 @@ impl Observer for Bars {
     }
 
     fn end(&self, id: &str, cached: bool, took: Duration, warnings: &[String]) {
-        self.bars.suspend(|| eprint!("{}", lines(id, cached, took, warnings)));
+        self.bars.suspend(|| say(&lines(id, cached, took, warnings)));
     }
 }
 

@@ -199,3 +199,232 @@ fn a_set_argument_changes_the_run_and_its_mistakes_are_shown_in_it() {
     assert_eq!(code(&wrong), 2);
     assert!(stderr(&wrong).contains("did you mean `files`?") && stderr(&wrong).contains("--set"), "{}", stderr(&wrong));
 }
+
+/// Everything in a folder, by name, with its bytes.
+fn contents(folder: &Path) -> Vec<(std::path::PathBuf, Vec<u8>)> {
+    let entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path());
+    let mut found: Vec<_> = entries.filter(|path| path.is_file()).collect();
+    found.sort();
+    found.into_iter().map(|path| (path.clone(), std::fs::read(&path).expect("a file"))).collect()
+}
+
+#[test]
+fn an_output_never_replaces_an_input_or_anything_that_afmid_did_not_write() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    archive(folder);
+    let link = |to: &str, name: &str| std::os::unix::fs::symlink(to, folder.join(name)).expect("a link");
+    link("record_2.h5", "also.h5");
+    link("/dev/null", "device.h5");
+    link("nowhere", "dangling.h5");
+    std::fs::hard_link(folder.join("record_3.h5"), folder.join("hard.h5")).expect("a link");
+    std::fs::write(folder.join("thesis.txt"), "three years").expect("a file");
+    std::fs::write(folder.join("photo.h5"), [0xff; 100]).expect("a file");
+    std::fs::create_dir(folder.join("there")).expect("a folder");
+    let before = contents(folder);
+    for (output, said) in [
+        ("record_1.h5", "the output would replace a record"),
+        ("./record_1.h5", "the output would replace a record"),
+        ("also.h5", "the output would replace a record"),
+        ("hard.h5", "the output would replace a record"),
+        ("count.toml", "the output would replace the config"),
+        ("thesis.txt", "is a text file: only a result of afmid's is replaced"),
+        ("photo.h5", "is a file of an unknown kind"),
+        ("there", "is a folder"),
+        ("..", "is a folder"),
+        ("/dev/null", "is a device"),
+        ("device.h5", "is a device"),
+        ("dangling.h5", "is a link to nothing"),
+        ("/proc/x.h5", "/proc/x.h5 cannot be written"),
+        ("no/such/x.h5", "the folder no/such does not exist"),
+        ("thesis.txt/x.h5", "thesis.txt"),
+        (&format!("{}.h5", "x".repeat(250)), "its name is too long"),
+    ] {
+        let run = afmid(folder, &["run", "count.toml", "--cache", "cache", "-o", output]);
+        let told = stderr(&run);
+        assert_eq!(code(&run), 2, "{output}: {told}");
+        assert!(told.contains(said), "{output}: {told}");
+        assert!(!told.contains(".tmp") && !told.contains("HDF5:") && !told.contains("records: "), "{output}: {told}");
+        assert!(told.contains("help: "), "{output}: {told}");
+        assert_eq!(stdout(&run), "");
+    }
+    assert_eq!(contents(folder), before, "nothing was written, nothing replaced");
+    assert!(!folder.join("cache").exists() && !folder.join("no").exists(), "nothing ran");
+    // what may be replaced: a result, whole or cut short, and an empty file
+    for bytes in [None, Some(300)] {
+        let run = afmid(folder, &["run", "count.toml", "--cache", "cache", "-o", "there/a.h5"]);
+        assert_eq!(code(&run), 0, "{}", stderr(&run));
+        let whole = std::fs::read(folder.join("there/a.h5")).expect("a result");
+        std::fs::write(folder.join("there/a.h5"), &whole[..whole.len() - bytes.unwrap_or(0)]).expect("a file");
+    }
+    std::fs::write(folder.join("there/empty.h5"), "").expect("a file");
+    for output in ["there/a.h5", "there/empty.h5", "new/a.h5"] {
+        let run = afmid(folder, &["run", "count.toml", "--cache", "cache", "-o", output]);
+        assert_eq!(code(&run), 0, "{output}: {}", stderr(&run));
+    }
+}
+
+#[test]
+fn a_result_beside_the_records_is_no_record_and_may_be_replaced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    archive(folder);
+    let run = || {
+        let output = afmid(
+            folder,
+            &["run", "count.toml", "--cache", "cache", "-o", "result.h5", "--set", "records.files=['*.h5']"],
+        );
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        stderr(&output)
+    };
+    assert!(!run().contains("warning"));
+    let again = run();
+    assert!(
+        again.contains("1 file of those that match is a result of afmid's") && again.contains("census: reused"),
+        "{again}"
+    );
+    let shown = stdout(&afmid(folder, &["show", "result.h5", "records"]));
+    assert!(shown.contains("record_3.h5") && !shown.contains("result.h5 "), "{shown}");
+}
+
+#[test]
+fn a_file_that_is_no_result_is_called_what_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    archive(folder);
+    std::fs::write(folder.join("cut.h5"), b"\x89HDF\r\n\x1a\nand no more").expect("a file");
+    assert_eq!(code(&afmid(folder, &["run", "count.toml", "--cache", "cache", "-o", "a.h5"])), 0);
+    for command in ["show", "report"] {
+        for (file, said, help) in [
+            ("record_1.h5", "is a native record", "io.records"),
+            ("count.toml", "is a TOML file", "afmid run count.toml"),
+            ("cut.h5", "is an HDF5 file of another program", "afmid run CONFIG"),
+            (".", "is a folder", ""),
+        ] {
+            let output = afmid(folder, &[command, file]);
+            let told = stderr(&output);
+            assert_eq!(code(&output), 2, "{command} {file}: {told}");
+            assert!(
+                told.contains(said) && told.contains("wanted a result file") && told.contains(help),
+                "{file}: {told}"
+            );
+            assert!(!told.contains("seal"), "{told}");
+        }
+        let whole = std::fs::read(folder.join("a.h5")).expect("the result");
+        std::fs::write(folder.join("b.h5"), &whole[..whole.len() - 1]).expect("a file");
+        let broken = afmid(folder, &[command, "b.h5"]);
+        assert_eq!(code(&broken), 1);
+        assert!(stderr(&broken).contains("its last line is no seal"), "{}", stderr(&broken));
+    }
+}
+
+#[test]
+fn a_closed_pipe_ends_quietly_and_a_full_device_with_an_error() {
+    use std::process::Stdio;
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    archive(folder);
+    assert_eq!(code(&afmid(folder, &["run", "count.toml", "--cache", "cache", "-o", "a.h5"])), 0);
+    let start = |arguments: &[&str], stdout: Stdio| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
+        command.current_dir(folder).args(arguments).stdout(stdout).stderr(Stdio::piped()).spawn().expect("afmid starts")
+    };
+    for arguments in [
+        &["schema"][..],
+        &["show", "a.h5"],
+        &["show", "a.h5", "--json"],
+        &["stages"],
+        &["stages", "io.records"],
+        &["graph", "count.toml"],
+        &["explain", "count.toml", "--cache", "cache"],
+        &["check", "count.toml", "count.toml"],
+        &["run", "count.toml", "--cache", "cache", "-o", "b.h5"],
+        &["report", "a.h5"],
+        &["--help"],
+        &["run", "--help"],
+        &["--version"],
+    ] {
+        let mut child = start(arguments, Stdio::piped());
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
+        assert!(!stderr(&output).contains("panicked") && !stderr(&output).contains("error"), "{}", stderr(&output));
+
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("/dev/full");
+        let output = start(arguments, full.into()).wait_with_output().expect("it ends");
+        assert_eq!(code(&output), 1, "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("error: stdout cannot be written: No space left"), "{}", stderr(&output));
+    }
+    // stderr may be full too: the exit code is left
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("/dev/full");
+    let status = Command::new(env!("CARGO_BIN_EXE_afmid"))
+        .args(["show", "nowhere.h5"])
+        .stderr(full)
+        .status()
+        .expect("afmid starts");
+    assert_eq!(status.code(), Some(2));
+}
+
+#[test]
+fn mistakes_are_told_with_the_range_that_holds() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    archive(folder);
+    let told = |arguments: &[&str]| {
+        let output = afmid(folder, arguments);
+        assert_eq!(code(&output), 2);
+        stderr(&output)
+    };
+    let jobs = told(&["run", "count.toml", "-j", "0"]);
+    assert!(jobs.contains("wanted a whole number from 1 to 65535") && !jobs.contains("non-zero"), "{jobs}");
+    let config = std::fs::read_to_string(folder.join("count.toml")).expect("the config");
+    let events = "[[stage]]\nid = \"events\"\nuses = \"events.correlation\"\ninputs = { records = \"records\" }\n\
+        params = { kind = \"snap-off\", window_samples = -3 }\n";
+    std::fs::write(folder.join("range.toml"), format!("{config}{events}")).expect("a config");
+    let range = told(&["check", "range.toml"]);
+    assert!(range.contains("found the integer `-3`, wanted 256 to 4194304"), "{range}");
+    let modes = "[pipeline]\nname = \"x\"\n[[stage]]\nid = \"m\"\nuses = \"model.modes\"\ninputs = { model = \"m\" }\n\
+        params = { reference_quality_factor = [1.0] }\n";
+    std::fs::write(folder.join("modes.toml"), modes).expect("a config");
+    let modes = told(&["check", "modes.toml"]).replace(['\n', '│'], " ");
+    assert!(modes.contains("has 1 value, wanted none"), "{modes}");
+    std::fs::write(folder.join("open.toml"), config.replace("[pipeline]", "[pipeline")).expect("a config");
+    let open = told(&["check", "open.toml"]);
+    assert!(open.contains("unclosed table") && !open.contains("given twice"), "{open}");
+}
+
+/// No text of the program sends people to a command that does not exist.
+#[test]
+fn every_command_that_help_texts_name_exists() {
+    let help = stdout(&root(&["--help"]));
+    let commands: Vec<&str> =
+        help.lines().filter_map(|line| line.strip_prefix("  ")?.split_whitespace().next()).collect();
+    let mut sources =
+        vec![Path::new(ROOT).join("src"), Path::new(ROOT).join("stages/src"), Path::new(ROOT).join("pipeline/src")];
+    let mut seen = 0;
+    while let Some(path) = sources.pop() {
+        if path.is_dir() {
+            sources.extend(std::fs::read_dir(path).expect("a folder").map(|entry| entry.expect("an entry").path()));
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap_or_default();
+        for (at, _) in text.match_indices("`afmid ") {
+            let name: String = text[at + 7..].chars().take_while(|c| c.is_ascii_lowercase()).collect();
+            seen += 1;
+            let known = name.is_empty() || name == "docs" || commands.contains(&name.as_str());
+            assert!(known, "{}: `afmid {name}`", path.display());
+        }
+    }
+    assert!(seen > 10, "{seen}");
+}
+
+/// The config in the README is one.
+#[test]
+fn the_config_in_the_readme_is_right() {
+    let readme = std::fs::read_to_string(Path::new(ROOT).join("README.md")).expect("the README");
+    let config = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a config");
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("mine.toml"), config).expect("a config");
+    let output = afmid(folder.path(), &["check", "mine.toml"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+}

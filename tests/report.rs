@@ -69,15 +69,27 @@ fn what_cannot_be_reported_is_said_with_the_exit_code() {
     let folder = folder.path();
     result(&folder.join("waves.h5"));
     std::fs::write(folder.join("text.h5"), "no HDF5").expect("a file");
+    std::os::unix::fs::symlink("waves.h5", folder.join("other-name.h5")).expect("a link");
+    std::os::unix::fs::symlink("/dev/null", folder.join("device.html")).expect("a link");
+    let bytes = std::fs::read(folder.join("waves.h5")).expect("the result");
+    std::fs::write(folder.join("cut.h5"), &bytes[..bytes.len() - 10]).expect("a file");
     for (arguments, code, message) in [
         (&["nowhere.h5"][..], 2, "there is no file nowhere.h5"),
         (&["waves.h5", "-o", "waves.h5"], 2, "would replace the result file"),
-        (&["text.h5"], 1, "text.h5"),
-        (&["waves.h5", "-o", "no/such/folder.html"], 1, "cannot be written"),
+        (&["text.h5"], 2, "text.h5 is a text file, wanted a result file"),
+        (&["waves.h5", "-o", "no/such/folder.html"], 2, "the folder no/such does not exist"),
+        (&["waves.h5", "-o", "other-name.h5"], 2, "would replace the result file"),
+        (&["waves.h5", "-o", "text.h5"], 2, "only an HTML page is replaced"),
+        (&["waves.h5", "-o", "/dev/null"], 2, "is a device"),
+        (&["waves.h5", "-o", "device.html"], 2, "is a device"),
+        (&["waves.h5", "-o", "."], 2, "is a folder"),
+        (&["cut.h5"], 1, "no seal"),
     ] {
         let output = report(folder, arguments);
         let told = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(code), "{arguments:?}: {told}");
         assert!(told.contains(message), "{arguments:?}: {told}");
     }
+    assert_eq!(std::fs::read(folder.join("waves.h5")).expect("the result"), bytes, "nothing was replaced");
+    assert_eq!(std::fs::read(folder.join("text.h5")).expect("a file"), b"no HDF5");
 }

@@ -5,18 +5,23 @@ use std::path::PathBuf;
 
 use super::load::load;
 use crate::failure::{Failure, Message};
+use crate::output::print;
 
 /// Checks every config before it gives up.
 pub fn run(configs: &[PathBuf], registry: &Registry) -> Result<(), Failure> {
-    let mut wrong = 0;
+    let (mut wrong, mut printed) = (0, Ok(()));
     for config in configs {
         match load(config, &[], registry) {
-            Ok(plan) => println!("{}: right, {} stages", config.display(), plan.nodes.len()),
+            // the verdict counts, whether anybody reads on or not
+            Ok(plan) if printed.is_ok() => {
+                printed = print(&format!("{}: right, {} stages\n", config.display(), plan.nodes.len()));
+            }
+            Ok(_) => {}
             Err(failure) => {
                 wrong += 1;
                 failure.report();
             }
         }
     }
-    if wrong == 0 { Ok(()) } else { Err(Failure::Usage(Message::Rendered(String::new()))) }
+    if wrong == 0 { printed } else { Err(Failure::Usage(Message::Rendered(String::new()))) }
 }

@@ -8,6 +8,7 @@ use afmid_pipeline::reference::files;
 
 use super::schema;
 use crate::failure::Failure;
+use crate::output::print;
 
 /// Writes `FOLDER/stages/*.md` and `FOLDER/pipeline.schema.json`, or says what would change. Pages of stages that are gone are removed.
 pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failure> {
@@ -29,15 +30,16 @@ pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failur
     }
     let fail = |path: &Path, error| Failure::failed(format!("{} cannot be written: {error}", path.display()), None);
     fs::create_dir_all(&stages).map_err(|error| fail(&stages, error))?;
+    let mut done = String::new();
     for (path, text) in changed {
         fs::write(path, text).map_err(|error| fail(path, error))?;
-        println!("wrote {}", path.display());
+        done.push_str(&format!("wrote {}\n", path.display()));
     }
     for path in stale {
         fs::remove_file(&path).map_err(|error| fail(&path, error))?;
-        println!("removed {}", path.display());
+        done.push_str(&format!("removed {}\n", path.display()));
     }
-    Ok(())
+    print(&done)
 }
 
 /// Pages that no stage has any more.

@@ -7,6 +7,7 @@ use super::load::load;
 use super::run::open_cache;
 use crate::cli::ExplainArgs;
 use crate::failure::Failure;
+use crate::output::print;
 use crate::show::grid;
 
 /// Says on stdout what a run would do with each stage.
@@ -25,6 +26,5 @@ pub fn run(args: &ExplainArgs, registry: &Registry) -> Result<(), Failure> {
         let key = key.map_or_else(|| "-".to_owned(), |key| key.chars().take(16).collect());
         table.push(vec![id, would.to_owned(), because, key]);
     }
-    print!("{}", grid(&table));
-    Ok(())
+    print(&grid(&table))
 }

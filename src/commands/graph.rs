@@ -6,6 +6,7 @@ use afmid_pipeline::graph::Format;
 use super::load::load;
 use crate::cli::{ConfigArgs, GraphFormat};
 use crate::failure::Failure;
+use crate::output::print;
 
 /// Draws the graph on stdout.
 pub fn run(config: &ConfigArgs, format: GraphFormat, registry: &Registry) -> Result<(), Failure> {
@@ -15,6 +16,5 @@ pub fn run(config: &ConfigArgs, format: GraphFormat, registry: &Registry) -> Res
         GraphFormat::Mermaid => Format::Mermaid,
         GraphFormat::Dot => Format::Dot,
     };
-    print!("{}", plan.render(format));
-    Ok(())
+    print(&plan.render(format))
 }

@@ -5,11 +5,13 @@ mod docs;
 mod explain;
 mod graph;
 mod load;
+mod open;
 mod report;
 mod run;
 mod schema;
 mod show;
 mod stages;
+mod target;
 
 use afmid_pipeline::Registry;
 

@@ -5,26 +5,22 @@ use std::path::{Path, PathBuf};
 
 use afmid_pipeline::store::read_result;
 
+use super::open::require_result;
+use super::target::{Target, prepare};
 use crate::cli::ReportArgs;
 use crate::failure::Failure;
+use crate::output::print;
 use crate::report::{figures, report};
 
 /// Writes the page, and the figures if asked for, and says where.
 pub fn run(args: &ReportArgs) -> Result<(), Failure> {
-    if !args.result.is_file() {
-        return Err(Failure::usage(format!("there is no file {}", args.result.display()), None));
-    }
-    let run = read_result(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    require_result(&args.result)?;
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.result));
-    if output == args.result {
-        return Err(Failure::usage(
-            "the page would replace the result file",
-            Some("give another name with -o".to_owned()),
-        ));
-    }
+    prepare(&output, Target::Page, &[("the result file", args.result.clone())])?;
+    let run = read_result(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let page = report(&run).map_err(|error| Failure::failed(error, None))?;
     write(&output, &page)?;
-    println!("{}", output.display());
+    let mut written = format!("{}\n", output.display());
     if let Some(folder) = &args.figures {
         fs::create_dir_all(folder).map_err(|error| {
             Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
@@ -32,10 +28,10 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
         for (name, text) in figures(&run) {
             let path = folder.join(name);
             write(&path, &text)?;
-            println!("{}", path.display());
+            written.push_str(&format!("{}\n", path.display()));
         }
     }
-    Ok(())
+    print(&written)
 }
 
 fn default_output(result: &Path) -> PathBuf {

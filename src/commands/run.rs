@@ -8,24 +8,25 @@ use afmid_pipeline::runner::{Options, RunError, run as run_plan};
 use afmid_pipeline::{Plan, RunResult};
 
 use super::load::load;
+use super::target::{Input, Target, prepare};
 use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
+use crate::output::{print, say};
 use crate::progress::observer;
 
 /// Runs a config and writes its result file.
 pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
     let plan = load(&args.config.config, &args.config.set, registry)?;
     let output = args.output.clone().unwrap_or_else(|| default_output(plan.name()));
-    make_folder(&output)?;
+    prepare(&output, Target::Result, &inputs(&plan, &args.config.config))?;
     let cache = open_cache(args.cache.as_deref())?;
     let result = compute(&plan, args, &cache);
     for note in cache.take_notes() {
-        eprintln!("note: {note}");
+        say(&format!("note: {note}\n"));
     }
     let result = result?;
     write_result(&output, &result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
-    println!("{}: {}", output.display(), told(&result));
-    Ok(())
+    print(&format!("{}: {}\n", output.display(), told(&result)))
 }
 
 /// The cache that was asked for, or the user's.
@@ -79,13 +80,15 @@ fn default_output(name: &str) -> PathBuf {
     PathBuf::from(format!("{}.h5", name.trim_start_matches('.')))
 }
 
-fn make_folder(output: &Path) -> Result<(), Failure> {
-    if output.is_dir() {
-        return Err(Failure::usage(format!("{} is a folder, wanted a file", output.display()), None));
+/// What a run reads: its config and the files of its stages.
+fn inputs(plan: &Plan, config: &Path) -> Vec<Input> {
+    let mut inputs = vec![("the config", config.to_owned())];
+    for node in &plan.nodes {
+        // files that cannot be listed are for the run to complain about
+        let sources = node.stage.sources(plan.config.base()).unwrap_or_default();
+        inputs.extend(sources.into_iter().map(|source| ("a record", source)));
     }
-    let Some(folder) = output.parent().filter(|folder| !folder.as_os_str().is_empty()) else { return Ok(()) };
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Failure::usage(format!("the folder {} cannot be made: {error}", folder.display()), None))
+    inputs
 }
 
 /// `$AFMID_CACHE`, or `afmid` in the user's cache folder.

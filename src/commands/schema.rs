@@ -4,11 +4,11 @@ use afmid_pipeline::Registry;
 use afmid_pipeline::reference::config_schema;
 
 use crate::failure::Failure;
+use crate::output::print;
 
 /// Prints the schema.
 pub fn run(registry: &Registry) -> Result<(), Failure> {
-    print!("{}", text(registry)?);
-    Ok(())
+    print(&text(registry)?)
 }
 
 /// The schema as it lies in docs/.

@@ -7,7 +7,9 @@ use afmid_pipeline::config::nearest;
 use afmid_pipeline::store::{ResultFile, StageSummary};
 use serde_json::{Map, Value};
 
+use super::open::require_result;
 use crate::failure::Failure;
+use crate::output::print;
 use crate::show::{artifact_json, artifact_text, overview_json, overview_text, stage_head};
 
 /// The port whose document stands for a stage.
@@ -15,9 +17,7 @@ const SUMMARY: &str = "summary";
 
 /// Shows a result file, or one of its stages, as text or as JSON.
 pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
-    if !path.is_file() {
-        return Err(Failure::usage(format!("there is no file {}", path.display()), None));
-    }
+    require_result(path)?;
     let file = ResultFile::open(path).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let text = match (id, json) {
         (None, false) => overview_text(&file),
@@ -27,8 +27,7 @@ pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
             if json { pretty(&stage_json(&file, stage)?)? } else { stage_text(&file, stage)? }
         }
     };
-    print!("{text}");
-    Ok(())
+    print(&text)
 }
 
 fn find<'a>(file: &'a ResultFile, id: &str) -> Result<&'a StageSummary, Failure> {

@@ -2,8 +2,11 @@
 
 use serde_json::{Map, Value};
 
-use super::grid::grid;
+use super::grid::narrow_grid;
 use super::number::{number, std_name, with_std};
+
+/// Characters in a table's line that most windows show.
+const WIDEST: usize = 110;
 
 /// A document as indented lines; lists of flat objects become tables.
 pub fn document_text(value: &Value) -> String {
@@ -37,7 +40,7 @@ fn write_value(name: &str, value: &Value, depth: usize, text: &mut String) {
         }
         Value::Array(values) if !values.is_empty() && values.iter().all(flat) => {
             text.push_str(&format!("{}\n", head.trim_end()));
-            for line in grid(&table(values)).lines() {
+            for line in narrow_grid(&table(values), WIDEST).lines() {
                 text.push_str(&format!("{}{line}\n", indent(depth + 1)));
             }
         }

@@ -2,13 +2,45 @@
 
 /// Rows of cells as aligned columns, two blanks apart; columns of numbers are aligned to the right. The first row is the header.
 pub fn grid(rows: &[Vec<String>]) -> String {
+    aligned(rows, 1)
+}
+
+/// As [`grid`]; where that is wider than `most` characters, the names in the header are folded at their underscores.
+pub fn narrow_grid(rows: &[Vec<String>], most: usize) -> String {
+    let plain = grid(rows);
+    let (Some((header, body)), true) = (rows.split_first(), plain.lines().any(|line| line.chars().count() > most))
+    else {
+        return plain;
+    };
+    let width = |column: usize| body.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
+    let folded: Vec<Vec<String>> =
+        header.iter().enumerate().map(|(column, name)| fold(name, width(column).unwrap_or(0))).collect();
+    let height = folded.iter().map(Vec::len).max().unwrap_or(1);
+    let line = |k: usize| folded.iter().map(|lines| lines.get(k).cloned().unwrap_or_default()).collect();
+    let rows: Vec<Vec<String>> = (0..height).map(line).chain(body.iter().cloned()).collect();
+    aligned(&rows, height)
+}
+
+/// A name in lines of at most `most` characters where its words allow it, each but the last ending in its underscore.
+fn fold(name: &str, most: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in name.split_inclusive('_') {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + word.chars().count() <= most => line.push_str(word),
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+fn aligned(rows: &[Vec<String>], head: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let cell = |row: &[String], column: usize| row.get(column).cloned().unwrap_or_default();
     let widths: Vec<usize> = (0..columns)
         .map(|column| rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0))
         .collect();
     let right: Vec<bool> =
-        (0..columns).map(|column| column_is_numeric(rows.iter().skip(1).map(|row| cell(row, column)))).collect();
+        (0..columns).map(|column| column_is_numeric(rows.iter().skip(head).map(|row| cell(row, column)))).collect();
     let mut text = String::new();
     for row in rows {
         let cells = widths.iter().zip(&right).enumerate().map(|(column, (&width, &right))| {
@@ -32,7 +64,14 @@ fn numeric(cell: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::grid;
+    use super::{grid, narrow_grid};
+
+    #[test]
+    fn long_names_are_folded_where_a_table_is_too_wide() {
+        let rows = [["n", "reference_frequency_hz"], ["1", "46300.0(1)"]].map(|row| row.map(str::to_owned).to_vec());
+        assert_eq!(narrow_grid(&rows, 100), grid(&rows));
+        assert_eq!(narrow_grid(&rows, 20), "n  reference_\n   frequency_\n           hz\n1  46300.0(1)\n");
+    }
 
     #[test]
     fn words_go_left_and_numbers_right() {

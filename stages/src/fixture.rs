@@ -61,7 +61,7 @@ impl Lever {
     }
 
     /// `R_p / p` for each pole, by a small circle round it (poles are simple and far apart).
-    fn step_residues(&self) -> Vec<(c64, c64)> {
+    pub fn step_residues(&self) -> Vec<(c64, c64)> {
         self.poles()
             .into_iter()
             .map(|p| {

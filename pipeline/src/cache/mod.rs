@@ -12,4 +12,4 @@ mod tests;
 
 pub use folder::Cache;
 pub use key::{KeyParts, key};
-pub use replace::{replace_file, sweep, write_result};
+pub use replace::{probe, replace_file, sweep, write_result};

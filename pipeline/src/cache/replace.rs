@@ -31,9 +31,20 @@ pub fn replace_file(path: &Path, write: impl FnOnce(&Path) -> Result<(), StoreEr
     if let Err(error) = written {
         // nothing more can be done about a file that cannot be removed: the next sweep takes it
         let _ = fs::remove_file(&temporary);
-        return Err(if error.file == temporary { StoreError { file: path.to_owned(), ..error } } else { error });
+        // the temporary name is gone and tells nobody anything
+        let problem = error.problem.replace(&*temporary.to_string_lossy(), &path.to_string_lossy());
+        let file = if error.file == temporary { path.to_owned() } else { error.file };
+        return Err(StoreError { file, problem, ..error });
     }
     File::open(folder).and_then(|folder| folder.sync_all()).map_err(|error| io("its folder cannot be synced", &error))
+}
+
+/// Finds out whether [`replace_file`] could write `path`, by making a temporary file beside it and removing it. Errors: why not, in the
+/// system's words.
+pub fn probe(path: &Path) -> std::io::Result<()> {
+    let temporary = folder_of(path).join(temporary_name(path));
+    File::create_new(&temporary)?;
+    fs::remove_file(&temporary)
 }
 
 /// Writes a run's result file, whole or not at all, and sweeps what killed runs left beside it. Errors: as [`replace_file`].

@@ -13,14 +13,23 @@ pub(super) struct Document<'a> {
     pub usable: bool,
 }
 
+/// The parser's word for a key that is given twice.
+const DUPLICATE: &str = "duplicate key";
+
 /// Parses the text, with all syntax errors at once.
 pub(super) fn parse<'a>(text: &'a str, problems: &mut Vec<Problem>) -> Document<'a> {
     let (root, errors) = DeTable::parse_recoverable(text);
     let root = root.into_inner();
     let mut usable = true;
+    // behind broken syntax the parser sees tables where there are none: keys that seem to be given twice mostly are not
+    let broken = errors.iter().filter(|error| error.message() != DUPLICATE);
+    let broken = broken.map(|error| error.span().unwrap_or_default().start).min().unwrap_or(text.len());
     for error in errors {
         let span = error.span().unwrap_or_default();
-        if error.message() == "duplicate key" {
+        if error.message() == DUPLICATE {
+            if span.start > broken {
+                continue;
+            }
             problems.push(duplicate(text, &root, span));
         } else {
             usable = false;

@@ -85,11 +85,37 @@ fn describe(decl: &StageDecl, entry: &Entry, path: &[String], kind: &Kind, error
         }
         Kind::Other => {
             let subject = if path.is_empty() { title } else { format!("parameter `{dotted}` of {title}") };
-            Problem::new(format!("{subject}: {}", plain(&error.message)), 0..0, "wrong value")
+            let message = ranged(decl, entry, path, &error.message).unwrap_or_else(|| plain(&error.message));
+            Problem::new(format!("{subject}: {message}"), 0..0, "wrong value")
                 .at(decl.locate(path, false))
                 .help(format!("`afmid stages {name}` lists the parameters"))
         }
     }
+}
+
+/// The message about a negative number where a count is wanted, with the range that the stage's own check states: it is asked about 0, which
+/// the type allows and the range mostly does not.
+fn ranged(decl: &StageDecl, entry: &Entry, path: &[String], message: &str) -> Option<String> {
+    let [name] = path else { return None };
+    let negative = message.strip_prefix("invalid value: integer `-").is_some();
+    if !negative || !(message.ends_with(" usize") || message.ends_with(" u64")) {
+        return None;
+    }
+    let params = toml::Table::from_iter([(name.clone(), toml::Value::Integer(0))]);
+    let with_all = || {
+        let mut all = decl.params.clone();
+        all.extend(params.clone());
+        all
+    };
+    // other parameters may be wrong too: then their defaults
+    let stage = (entry.parse)(with_all()).or_else(|_| (entry.parse)(params.clone())).ok()?;
+    let said = stage.check().err()?.problem;
+    let range = [" is 0, wanted ", ": found 0, wanted "]
+        .into_iter()
+        .find_map(|verb| said.strip_prefix(&format!("`{name}`{verb}")))?;
+    let plain = plain(message);
+    let (found, _) = plain.split_once(", wanted ")?;
+    Some(format!("{found}, wanted {range}"))
 }
 
 /// All parameters without default that are not given; at least the one that was found missing, if it is none that is wrong.

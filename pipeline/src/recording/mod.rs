@@ -17,6 +17,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use hash::hash_file;
+pub(crate) use native::is_native;
 pub use native::{Wanted, open_native};
 pub(crate) use source::DeferredSource;
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};

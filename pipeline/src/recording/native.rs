@@ -67,6 +67,13 @@ pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError>
     })
 }
 
+/// Whether a file is HDF5 that states a sample rate: a native record, whatever its channels.
+pub(crate) fn is_native(path: &Path) -> bool {
+    // damage that keeps the library busy for ever is looked for first
+    let safe = inspect_file(path).is_ok_and(|inspected| !inspected.endless);
+    safe && open_file(path).is_ok_and(|file| has_attribute(&file, "sample_rate_hz"))
+}
+
 fn size_of_file(path: &Path) -> Result<u64, StageError> {
     std::fs::metadata(path)
         .map(|metadata| metadata.len())

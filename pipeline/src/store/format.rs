@@ -8,7 +8,8 @@ use super::{read, write};
 /// Version of the layout of stage and result files; part of every cache key.
 pub const FORMAT_VERSION: u32 = 1;
 
-const FORMAT: &str = "afmid_format";
+/// The attribute of the root group that names the kind of file.
+pub(super) const FORMAT: &str = "afmid_format";
 const VERSION: &str = "afmid_format_version";
 
 pub(super) fn write_format(root: &Group, format: &str) -> Result<()> {

@@ -19,6 +19,7 @@ mod compare;
 mod dimension_scale;
 mod document;
 mod error;
+mod file_kind;
 mod format;
 mod layout;
 mod names;
@@ -41,6 +42,7 @@ mod tests;
 
 pub use compare::{Difference, compare};
 pub use error::StoreError;
+pub use file_kind::{FileKind, file_kind, is_own};
 pub use format::FORMAT_VERSION;
 pub use names::RESERVED_STAGE_IDS;
 pub use ports::PortSummary;

@@ -8,6 +8,7 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::error::{Result, StoreError};
+use super::file_kind::{FileKind, file_kind};
 
 const MAGIC: &str = "\nafmid seal, BLAKE3 of all bytes before this line: ";
 const HASH_LENGTH: u64 = 64;
@@ -33,19 +34,33 @@ pub(super) fn check_seal(path: &Path) -> Result<()> {
     let broken = |problem: &str| {
         Err(StoreError::new(problem).file(path).help("make it again: run the pipeline that it comes from"))
     };
-    let Some(body) = size.checked_sub(LENGTH) else {
-        return broken("not a file of afmid's: too short");
+    let Some((body, last)) = last_line(&mut file, size).map_err(io)? else {
+        return match file_kind(path).map_err(io)? {
+            FileKind::Own => broken("cut short, or changed by another program: its last line is no seal"),
+            other => Err(StoreError::new(format!("not a file of afmid's: it is {other}")).file(path)),
+        };
     };
-    let mut last = String::new();
-    file.seek(SeekFrom::Start(body)).map_err(io)?;
-    if Read::by_ref(&mut file).take(LENGTH).read_to_string(&mut last).is_err() || !last.starts_with(MAGIC) {
-        return broken("not a file of afmid's, cut short, or changed by another program: its last line is no seal");
-    }
     let hash = hash_start(&mut file, body).map_err(io)?;
     if last != format!("{MAGIC}{hash}\n") {
         return broken("damaged or altered: its bytes do not have the hash that its last line states");
     }
     Ok(())
+}
+
+/// Whether a file ends in a seal, whether it fits or not. Errors: it cannot be read.
+pub(super) fn has_seal(path: &Path) -> std::io::Result<bool> {
+    let mut file = File::open(path)?;
+    let size = file.metadata()?.len();
+    Ok(last_line(&mut file, size)?.is_some())
+}
+
+/// Where the seal begins, and the seal; none if the file ends in anything else.
+fn last_line(file: &mut File, size: u64) -> std::io::Result<Option<(u64, String)>> {
+    let Some(body) = size.checked_sub(LENGTH) else { return Ok(None) };
+    let mut last = Vec::new();
+    file.seek(SeekFrom::Start(body))?;
+    Read::by_ref(file).take(LENGTH).read_to_end(&mut last)?;
+    Ok(String::from_utf8(last).ok().filter(|last| last.starts_with(MAGIC)).map(|last| (body, last)))
 }
 
 /// BLAKE3 of the first `size` bytes.

@@ -25,7 +25,7 @@ pub use moments::{Moments, moments};
 pub use rows::Rows;
 pub use scatter::{Scatter, scatter};
 pub use shape_drift::{DriftSettings, ShapeDrift, SubEnsemble, shape_drift};
-pub use split::{Split, split_halves};
+pub use split::{LEAST_EVENTS, Split, split_halves};
 
 /// The stages of this domain.
 pub const STAGES: &[Entry] = &[Entry::of::<Average>(), Entry::of::<Drift>()];

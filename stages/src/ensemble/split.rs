@@ -15,6 +15,9 @@ pub struct Split {
     pub verification: Vec<usize>,
 }
 
+/// Fewest events that can be split: each half needs two for a variance.
+pub const LEAST_EVENTS: usize = 4;
+
 /// Splits `count` events at random into halves.
 ///
 /// # Method
@@ -26,8 +29,8 @@ pub struct Split {
 /// # Source
 /// Stark et al. 2005, "randomly split into an identification data set and a verification data set".
 pub fn split_halves(count: usize, seed: u64) -> Result<Split, EnsembleError> {
-    if count < 4 {
-        return Err(EnsembleError::TooFewEvents { got: count, wanted: 4, purpose: "a split into halves" });
+    if count < LEAST_EVENTS {
+        return Err(EnsembleError::TooFewEvents { got: count, wanted: LEAST_EVENTS, purpose: "a split into halves" });
     }
     let mut order: Vec<usize> = (0..count).collect();
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));

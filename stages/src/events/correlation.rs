@@ -306,7 +306,7 @@ fn nothing_found(listed: &Listed, records: &[Record]) -> StageError {
     let more = listed.refused.len().saturating_sub(reasons.len());
     let more = if more > 0 { format!("; and {more} more") } else { String::new() };
     StageError::new(format!("no usable event in {} records: {}{more}", records.len(), reasons.join("; ")))
-        .help("look at a record with `afmid inspect`; check the channel, its sign, and `kind`")
+        .help("check the channel, its sign, and `kind`: `afmid stages io.records` says what a record holds, a run of `io.records` and `io.overview` alone draws one (`afmid report`)")
 }
 
 #[cfg(test)]

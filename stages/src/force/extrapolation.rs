@@ -18,7 +18,8 @@ use super::{Event, ExtrapolationSettings, Lines, Onset, OnsetSettings, ZeroLine,
 /// Shapes: `force`, `response`, `standard_error` over time since t0; the same with `_identification` and `_verification`.
 /// Units: volts of static deflection, so that the transfer function is one at rest; `force_newton` where stiffness and sensitivity are given.
 /// Accuracy: the load's standard error counts the noise of the mean and its correlation over a window, not slower drift. t0 has an ambiguity of
-/// some samples, reported: an earlier t0 is the same as a delay.
+/// some samples, reported: an earlier t0 is the same as a delay. It reaches from the earliest that the data allow to the t0 that is used, also to
+/// one that is given by `t0_s`.
 /// Errors: no departure near the onset, lines shorter than 32 samples, a load that does not stand out from the noise.
 /// Source: Stark et al. 2005, section Data processing and Fig. 2(d).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -78,7 +79,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "load
 impl Stage for Extrapolation {
     const SPEC: Spec = Spec {
         name: "force.extrapolation",
-        version: 1,
+        version: 2,
         summary: "derives force input and response from the lines before and after the averaged event",
         inputs: &[AVERAGE.spec(), CALIBRATION.spec()],
         outputs: &[PAIR.spec(), SUMMARY.spec()],
@@ -108,7 +109,11 @@ impl Stage for Extrapolation {
         let causal = extrapolate(mean, error, settings, None);
         let lines = match self.given_onset(onset, rate) {
             None => causal.map_err(StageError::from_error)?,
-            Some(given) => {
+            Some(mut given) => {
+                // the data know the event no better because somebody chose a t0: the interval still begins where they say
+                if let Ok(causal) = &causal {
+                    given.earliest = given.earliest.min(causal.onset.earliest);
+                }
                 if let Ok(causal) =
                     causal.as_ref().map(|lines| lines.onset).map(|c| given.latest.saturating_sub(c.latest))
                     && causal > 0

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::{Wanted, open_native};
+use afmid_pipeline::store::is_own;
 use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -17,7 +18,8 @@ use super::file_patterns::matching_files;
 /// File attributes `sample_rate_hz`, `started_at`; one dataset per channel; value = stored * scale_factor + add_offset.
 /// # Method
 /// Files in natural order; nothing but attributes is read here, samples are streamed by the stages that need them. Sample rate
-/// and unit must agree over all files; other lengths are reported.
+/// and unit must agree over all files; other lengths are reported. Results of afmid's own that a pattern matches are left out and counted in
+/// a warning.
 /// # Shapes
 /// One record per file, with the roles `deflection` and, where the file has it, `piezo`.
 /// # Units
@@ -108,8 +110,7 @@ impl Stage for Records {
     }
 
     fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
-        let root = std::env::var_os("AFMID_DATA");
-        matching_files(&moved(&self.files, root.as_deref().map(Path::new)), base)
+        self.matches(base).map(|(records, _)| records)
     }
 
     fn location_params() -> &'static [&'static str] {
@@ -117,7 +118,15 @@ impl Stage for Records {
     }
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let paths = self.sources(cx.base())?;
+        let (paths, own) = self.matches(cx.base())?;
+        if let [first, ..] = &own[..] {
+            let (count, are) = if own.len() == 1 {
+                ("1 file", "is a result")
+            } else {
+                (&*format!("{} files", own.len()), "are results")
+            };
+            cx.warn(format!("{count} of those that match {are} of afmid's, no record: left out ({})", first.display()));
+        }
         cx.expect(paths.len());
         let opened: Vec<Result<Record, StageError>> = paths
             .par_iter()
@@ -143,6 +152,25 @@ impl Stage for Records {
 }
 
 impl Records {
+    /// The files that match: those to be opened, and afmid's own stage and result files, which lie beside the records where a run was told
+    /// to write there. Errors: as [`matching_files`]; nothing but results.
+    fn matches(&self, base: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), StageError> {
+        let root = std::env::var_os("AFMID_DATA");
+        let files = matching_files(&moved(&self.files, root.as_deref().map(Path::new)), base)?;
+        // a file that cannot be read is for `open` to complain about
+        let (own, records): (Vec<PathBuf>, Vec<PathBuf>) =
+            files.into_iter().partition(|file| is_own(file).unwrap_or(false));
+        match (&records[..], own.first()) {
+            ([], Some(first)) => Err(StageError::new(format!(
+                "all files that match `files` are results of afmid's ({} of them), wanted records",
+                own.len()
+            ))
+            .at(first)
+            .help("let `files` name the folder of the recordings; `afmid show` shows a result")),
+            _ => Ok((records, own)),
+        }
+    }
+
     fn open(&self, path: &Path) -> Result<Record, StageError> {
         let mut wanted = vec![Wanted { role: "deflection", location: &self.channel, required: true }];
         if !self.piezo_channel.is_empty() {

@@ -159,3 +159,30 @@ fn parameters_are_checked_alone() {
         assert!(stage.check().unwrap_err().to_string().contains(named));
     }
 }
+
+#[test]
+fn results_of_afmids_own_are_left_out_with_a_counted_warning() {
+    use afmid_pipeline::{RunInfo, RunResult, store::write_result};
+    let folder = Folder::new("own");
+    folder.write("r1.h5", 5e6, 1000);
+    let run = RunResult {
+        name: "own".to_owned(),
+        seed: 0,
+        config: String::new(),
+        overrides: Vec::new(),
+        program: "afmid".to_owned(),
+        stages: Vec::new(),
+        info: RunInfo::default(),
+    };
+    for name in ["a-result.h5", "result.h5"] {
+        write_result(&folder.0.join(name), &run).unwrap();
+    }
+    let (ports, warnings) = folder.run(&all()).unwrap();
+    let Some(Artifact::Recording(recording)) = ports.artifact("records") else { panic!("no recording") };
+    assert_eq!((recording.records.len(), warnings.len()), (1, 1));
+    assert!(warnings[0].starts_with("2 files of those that match are results of afmid's"), "{warnings:?}");
+    // what is left out is no source either: the key does not depend on it
+    assert_eq!(all().sources(&folder.0).unwrap(), [folder.0.join("r1.h5")]);
+    let alone = Records { files: vec!["result.h5".to_owned()], ..all() };
+    assert!(folder.run(&alone).unwrap_err().to_string().contains("all files that match"));
+}

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::modes::{ModeCriteria, Pole, PoleKind, ResponsePoint, Root, poles, response, zeros};
+use super::modes::{ModeCriteria, Pole, PoleKind, ResponsePoint, Root, poles, response, share_error_from_onset, zeros};
 use super::pem_stage::{DataSet, MODEL};
 use super::{InnovationsModel, Nuisances, noise_ceiling_percent, simulate_held_out};
 use crate::spectrum::IntersampleKind;
@@ -20,7 +20,9 @@ use crate::spectrum::IntersampleKind;
 /// Model: s = ln(z) / Ts, f = |s| / 2 pi, Q = |s| / (-2 Re s), pole by pole; a mode is an established, weakly damped pair; the rest are detector
 /// poles, doubtful pairs, and real negative ones, which have no continuous counterpart.
 /// Method: zeros are the invariant zeros of (A, B, C, D). Standard errors by the delta method from the model's covariance. Held-out fit: the model of
-/// the identification half simulated on the verification half's force, initial state, offset and drift fitted again.
+/// the identification half simulated on the verification half's force, initial state, offset and drift fitted again. The error of a static share counts the ambiguity of t0: an event
+/// that was d earlier turns and raises the mode's amplitude by exp(-s d); the root mean square over the pair's `t0_ambiguity_s`, at least one
+/// sample, is added in squares.
 /// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency.
 /// Units: Hz; static shares are parts of the static gain.
 /// Accuracy: first order in the errors. A static share is the mode's own partial fraction: within the detector's roll-off it is turned and damped by it.
@@ -80,7 +82,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "mode
 impl Stage for Modes {
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 2,
+        version: 3,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -107,7 +109,12 @@ impl Stage for Modes {
         }
         let (f, q) = (self.reference_frequency_hz.len(), self.reference_quality_factor.len());
         if q > 0 && q != f {
-            return Err(wanted("reference_quality_factor's length", q as f64, &format!("none or {f}, as frequencies")));
+            let wanted = match f {
+                0 => "none, since `reference_frequency_hz` has none".to_owned(),
+                _ => format!("{f}, one for each of `reference_frequency_hz`, or none"),
+            };
+            let values = if q == 1 { "1 value".to_owned() } else { format!("{q} values") };
+            return Err(StageError::new(format!("`reference_quality_factor` has {values}, wanted {wanted}")));
         }
         if let Some(value) =
             self.reference_frequency_hz.iter().chain(&self.reference_quality_factor).find(|v| v.is_nan() || **v <= 0.0)
@@ -120,7 +127,12 @@ impl Stage for Modes {
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let artifact = inputs.get(&MODEL)?;
         let (model, covariance) = innovations(artifact)?;
-        let found = poles(&model, &covariance, &self.criteria()).map_err(StageError::from_error)?;
+        let mut found = poles(&model, &covariance, &self.criteria()).map_err(StageError::from_error)?;
+        let ambiguity_s = onset_ambiguity(artifact);
+        for pole in found.iter_mut().filter(|pole| pole.root.is_complex()) {
+            let from_onset = share_error_from_onset(pole.amplitude, pole.root.s, ambiguity_s.unwrap_or(0.0));
+            pole.static_share_std = pole.static_share_std.hypot(from_onset);
+        }
         let zeros = zeros(&model, &covariance).map_err(StageError::from_error)?;
         let modes: Vec<&Pole> = found.iter().filter(|pole| pole.kind == PoleKind::Mechanical).collect();
         if modes.is_empty() {
@@ -140,6 +152,7 @@ impl Stage for Modes {
                 "held_out": fits.held_out,
                 "noise_ceiling": fits.noise_ceiling,
             },
+            "t0_ambiguity_s": ambiguity_s,
             "reference": self.compared(&modes),
         }))?;
         Ok(Ports::new()
@@ -173,20 +186,40 @@ impl Modes {
     /// Each reference value beside the nearest mode.
     fn compared(&self, modes: &[&Pole]) -> Vec<Value> {
         let row = |(i, &reference): (usize, &f64)| {
-            let distance = |mode: &&&Pole| (mode.root.frequency_hz / reference).ln().abs();
-            let nearest = modes.iter().min_by(|x, y| distance(x).total_cmp(&distance(y))).map(|mode| mode.root);
+            let distance = |mode: &Pole| (mode.root.frequency_hz / reference).ln().abs();
+            let numbered = modes.iter().enumerate().min_by(|(_, x), (_, y)| distance(x).total_cmp(&distance(y)));
+            let nearest = numbered.map(|(_, mode)| mode.root);
             let q = self.reference_quality_factor.get(i);
             json!({
+                "mode": numbered.map(|(index, _)| index + 1),
                 "reference_frequency_hz": reference,
                 "reference_quality_factor": q,
                 "frequency_hz": nearest.map(|root| root.frequency_hz),
+                "frequency_std_hz": nearest.map(|root| root.frequency_std_hz),
                 "frequency_difference": nearest.map(|root| root.frequency_hz / reference - 1.0),
+                "frequency_difference_in_errors":
+                    nearest.and_then(|root| in_errors(root.frequency_hz - reference, root.frequency_std_hz)),
                 "quality_factor": nearest.map(|root| root.quality_factor),
+                "quality_factor_std": nearest.map(|root| root.quality_factor_std),
                 "quality_factor_difference": nearest.zip(q).map(|(root, q)| root.quality_factor / q - 1.0),
+                "quality_factor_difference_in_errors":
+                    nearest.zip(q).and_then(|(root, q)| in_errors(root.quality_factor - q, root.quality_factor_std)),
             })
         };
         self.reference_frequency_hz.iter().enumerate().map(row).collect()
     }
+}
+
+/// Width of the interval in which t0 may lie, as `force.extrapolation` states it; at least a sample, since t0 lies on the grid and the event
+/// does not. None for a pair that says nothing of it.
+fn onset_ambiguity(model: &StateSpace) -> Option<f64> {
+    let stated = model.attributes.get("t0_ambiguity_s").and_then(Attribute::as_f64)?;
+    Some(stated.max(model.sample_time_s))
+}
+
+/// A difference in standard errors; unknown where there is no error.
+fn in_errors(difference: f64, std: f64) -> Option<f64> {
+    Some(difference / std).filter(|ratio| ratio.is_finite())
 }
 
 fn wanted(name: &str, value: f64, range: &str) -> StageError {

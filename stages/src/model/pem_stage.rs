@@ -1,11 +1,14 @@
 //! The stage `model.pem`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Matrix, Port, Ports, Spec, Stage, StageError, StateSpace,
+    Array, Attribute, Axis, Caching, Context, Document, Example, Matrix, Port, Ports, Spec, Stage, StageError,
+    StateSpace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
+
+use crate::ensemble::LEAST_EVENTS;
 
 use super::pem::{Ending, Experiment, Identified, NoiseModel, PemOptions, identify};
 use super::{TestResult, fit_percent, input_dependence, whiteness};
@@ -107,7 +110,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Pem {
     const SPEC: Spec = Spec {
         name: "model.pem",
-        version: 1,
+        version: 2,
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],
@@ -131,6 +134,7 @@ impl Stage for Pem {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let pair = inputs.get(&PAIR)?;
+        self.require_set(pair)?;
         let rate = pair.number("sample_rate_hz")?;
         let first = self.first_sample(pair, rate)?;
         let suffix = self.set.suffix();
@@ -154,7 +158,11 @@ impl Stage for Pem {
         }
         let time = pair.axis("time")?.values[first..].to_vec();
         let summary = self.summary(&fit, input, output, first)?;
-        let model = state_space(&fit, suffix, first)?;
+        let mut model = state_space(&fit, suffix, first)?;
+        // what the model cannot know: `model.modes` counts it in the shares
+        if let Some(ambiguity) = pair.attributes.get("t0_ambiguity_s") {
+            model.attributes.insert("t0_ambiguity_s".to_owned(), ambiguity.clone());
+        }
         let residual = fit.residuals.into_iter().next().unwrap_or_default();
         let prediction = output.iter().zip(&residual).map(|(y, e)| y - e).collect::<Vec<f64>>();
         let residuals = Array::over(vec![Axis::new("time", "s", "time since t0", time)])
@@ -184,6 +192,22 @@ impl Pem {
             },
             ..PemOptions::default()
         }
+    }
+
+    /// Errors: a half is asked for, and the pair has none.
+    fn require_set(&self, pair: &Array) -> Result<(), StageError> {
+        let suffix = self.set.suffix();
+        if suffix.is_empty() || pair.variable(&format!("force{suffix}")).is_ok() {
+            return Ok(());
+        }
+        let half = suffix.trim_start_matches('_');
+        let events = match pair.attributes.get("count").and_then(Attribute::as_f64) {
+            Some(count) => format!(", made from {count} events"),
+            None => String::new(),
+        };
+        Err(StageError::new(format!("`set` is \"{half}\", but the pair has no halves{events}")).help(format!(
+            "set `split = true` in the stage `ensemble.average`; it splits {LEAST_EVENTS} events or more. With fewer, fit all of them: `set = \"all\"`"
+        )))
     }
 
     fn first_sample(&self, pair: &Array, rate: f64) -> Result<usize, StageError> {
@@ -272,4 +296,20 @@ fn state_space(fit: &Identified, suffix: &str, first: usize) -> Result<StateSpac
     artifact.attributes.insert("offset_v".to_owned(), fit.offsets.first().copied().unwrap_or(0.0).into());
     artifact.attributes.insert("drift_v_per_s".to_owned(), fit.slopes.first().copied().unwrap_or(0.0).into());
     Ok(artifact)
+}
+
+#[cfg(test)]
+#[test]
+fn a_half_that_the_pair_does_not_have_is_refused_with_what_to_do() {
+    let pair = Array::over(vec![Axis::new("time", "s", "time", vec![0.0; 64])])
+        .with("response", "V", "response", &["time"], vec![0.0; 64])
+        .with("force", "V", "force", &["time"], vec![0.0; 64])
+        .attribute("sample_rate_hz", 5e6)
+        .attribute("count", 3.0);
+    let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
+    let stage = Pem { set: DataSet::Identification, ..Pem::default() };
+    let error = stage.run(&Ports::new().with(&PAIR, pair), &cx).unwrap_err();
+    assert_eq!(error.problem, "`set` is \"identification\", but the pair has no halves, made from 3 events");
+    let help = error.help.unwrap_or_default();
+    assert!(help.contains("split = true") && help.contains("ensemble.average") && help.contains("4 events"), "{help}");
 }

@@ -41,8 +41,10 @@ pub struct Pole {
     pub kind: PoleKind,
     /// Its section's part of the static gain `G(1)`; a section of two real poles counts as a whole, at each.
     pub static_share: f64,
-    /// Standard error of the static share.
+    /// Standard error of the static share, for a t0 that is known; see [`share_error_from_onset`](super::share_error_from_onset).
     pub static_share_std: f64,
+    /// Amplitude of its ringing after a released unit load, over the static gain: `A` in `2 Re(A exp(s t))`.
+    pub amplitude: c64,
     /// Amplitude of its ringing after a released unit load, over its standard error (root of chi-square over two; `>= 0`).
     pub significance: f64,
 }
@@ -122,6 +124,7 @@ pub fn poles(
                 kind: classify(&root, significance, criteria),
                 static_share: share,
                 static_share_std: share_std,
+                amplitude: amplitude / gain,
                 significance,
             });
         }

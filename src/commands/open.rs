@@ -1,0 +1,31 @@
+//! From a result file's name to the file.
+
+use std::path::Path;
+
+use afmid_pipeline::store::{FileKind, file_kind};
+
+use crate::failure::Failure;
+
+/// Sees to it that a path names a file of afmid's, whole or not. Errors, all usage: there is none; what it is instead, and what to do.
+pub fn require_result(path: &Path) -> Result<(), Failure> {
+    let shown = path.display();
+    if path.is_dir() {
+        return Err(Failure::usage(format!("{shown} is a folder, wanted a result file"), None));
+    }
+    if !path.is_file() {
+        return Err(Failure::usage(format!("there is no file {shown}"), None));
+    }
+    let kind = file_kind(path).map_err(|error| Failure::usage(format!("{shown} cannot be read: {error}"), None))?;
+    let help = match kind {
+        FileKind::Own => return Ok(()),
+        FileKind::Record => {
+            "name it in `files` of a config's stage `io.records`; `afmid run CONFIG -o OUT.h5` makes a result"
+                .to_owned()
+        }
+        FileKind::Toml => format!(
+            "if it is a config, `afmid run {shown} -o OUT.h5` makes a result, and `afmid check {shown}` checks it"
+        ),
+        _ => "`afmid run CONFIG -o OUT.h5` makes one".to_owned(),
+    };
+    Err(Failure::usage(format!("{shown} is {kind}, wanted a result file of `afmid run`"), Some(help)))
+}

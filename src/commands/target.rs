@@ -1,0 +1,147 @@
+//! Where a command may write: never over its own inputs, and over nothing that afmid did not write.
+
+use std::fs::{self, Metadata};
+use std::io::ErrorKind;
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::cache::probe;
+use afmid_pipeline::store::{FileKind, file_kind};
+
+use crate::failure::Failure;
+
+/// What is to be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// A result file.
+    Result,
+    /// A report's page.
+    Page,
+}
+
+impl Target {
+    /// An empty file holds nothing that could be lost: a script may have made it to reserve the name.
+    fn may_replace(self, kind: FileKind) -> bool {
+        kind == FileKind::Empty
+            || match self {
+                Self::Result => kind == FileKind::Own,
+                Self::Page => kind == FileKind::Html,
+            }
+    }
+
+    const fn wanted(self) -> &'static str {
+        match self {
+            Self::Result => "a result of afmid's",
+            Self::Page => "an HTML page",
+        }
+    }
+}
+
+/// An input of the command, and what it is to it.
+pub type Input = (&'static str, PathBuf);
+
+/// Sees to it, before anything runs, that `path` can be written and that nothing is lost by it. Makes its folder if only that is missing.
+///
+/// Errors, all usage: it is an input; it exists and is no regular file, or a file of another kind; its folder cannot be made or written.
+pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Failure> {
+    let shown = path.display();
+    match fs::metadata(path) {
+        Ok(metadata) => existing(path, &metadata, target, inputs)?,
+        Err(_) if path.is_symlink() => {
+            return Err(usage(
+                format!("{shown} is a link to nothing, wanted a file"),
+                "remove it, or give another name with -o",
+            ));
+        }
+        Err(error) if error.kind() != ErrorKind::NotFound && path.parent().is_some_and(Path::is_dir) => {
+            return Err(usage(format!("{shown} cannot be written: {error}"), ANOTHER));
+        }
+        Err(_) => {}
+    }
+    if path.file_name().is_none() {
+        return Err(usage(format!("{shown} is a folder, wanted a file"), ANOTHER));
+    }
+    make_folder(path)?;
+    probe(path).map_err(|error| match error.kind() {
+        ErrorKind::InvalidFilename => {
+            usage(format!("{shown} cannot be written: its name is too long ({error})"), ANOTHER)
+        }
+        _ => {
+            let folder = folder(path).unwrap_or(Path::new("."));
+            usage(
+                format!("{shown} cannot be written: no file can be made in its folder {} ({error})", folder.display()),
+                ANOTHER,
+            )
+        }
+    })
+}
+
+const ANOTHER: &str = "give another place with -o";
+
+fn usage(message: String, help: &str) -> Failure {
+    Failure::usage(message, Some(help.to_owned()))
+}
+
+fn existing(path: &Path, metadata: &Metadata, target: Target, inputs: &[Input]) -> Result<(), Failure> {
+    let shown = path.display();
+    if !metadata.is_file() {
+        return Err(usage(format!("{shown} is {}, wanted a file", odd(metadata)), ANOTHER));
+    }
+    let same = |other: &Path| {
+        fs::metadata(other).is_ok_and(|other| (other.dev(), other.ino()) == (metadata.dev(), metadata.ino()))
+    };
+    if let Some((what, input)) = inputs.iter().find(|(_, input)| same(input)) {
+        let called = if input == path { String::new() } else { format!(", also called {shown},") };
+        return Err(usage(
+            format!("the output would replace {what}: {}{called} is an input of this command", input.display()),
+            "give another name with -o",
+        ));
+    }
+    let kind = file_kind(path).map_err(|error| usage(format!("{shown} cannot be looked at: {error}"), ANOTHER))?;
+    if target.may_replace(kind) {
+        return Ok(());
+    }
+    Err(usage(
+        format!("{shown} exists and is {kind}: only {} is replaced", target.wanted()),
+        "give another name with -o, or remove the file first if it is no longer needed",
+    ))
+}
+
+fn odd(metadata: &Metadata) -> &'static str {
+    let kind = metadata.file_type();
+    if kind.is_dir() {
+        "a folder"
+    } else if kind.is_char_device() || kind.is_block_device() {
+        "a device"
+    } else if kind.is_fifo() {
+        "a pipe"
+    } else if kind.is_socket() {
+        "a socket"
+    } else {
+        "no regular file"
+    }
+}
+
+fn folder(path: &Path) -> Option<&Path> {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty())
+}
+
+/// One level only: more missing folders are most likely a misspelt path.
+fn make_folder(path: &Path) -> Result<(), Failure> {
+    let Some(folder) = folder(path) else { return Ok(()) };
+    match fs::create_dir(folder) {
+        Ok(()) => Ok(()),
+        Err(_) if folder.is_dir() => Ok(()),
+        Err(error) => {
+            let shown = folder.display();
+            Err(match error.kind() {
+                ErrorKind::NotFound => usage(
+                    format!("the folder {shown} does not exist, nor does the one above it"),
+                    "make it first, or give another place with -o",
+                ),
+                ErrorKind::AlreadyExists => usage(format!("{shown} is a file, wanted a folder"), ANOTHER),
+                _ => usage(format!("the folder {shown} cannot be made: {error}"), ANOTHER),
+            })
+        }
+    }
+}
