@@ -12,12 +12,16 @@ mod extrapolate;
 mod extrapolation;
 mod line;
 mod onset;
+mod reconstruct;
 
 pub use error::ForceError;
 pub use extrapolate::{Event, ExtrapolationSettings, Lines, Pair, ZeroLine, extrapolate, pair};
 pub use extrapolation::{Extrapolation, ZeroLineKind};
 pub use line::{Line, Weighting, fit_line};
 pub use onset::{Onset, OnsetSettings, find_onset};
+pub use reconstruct::{
+    ForcePrior, IdentifiedModel, Reconstruction, ReconstructionSettings, Rise, reconstruct, rise,
+};
 
 /// The stages of this domain.
 pub const STAGES: &[Entry] = &[Entry::of::<Extrapolation>()];
