@@ -13,6 +13,10 @@ mod extrapolation;
 mod line;
 mod onset;
 mod reconstruct;
+mod reconstruction;
+mod reconstruction_example;
+#[cfg(test)]
+mod reconstruction_tests;
 
 pub use error::ForceError;
 pub use extrapolate::{Event, ExtrapolationSettings, Lines, Pair, ZeroLine, extrapolate, pair};
@@ -22,9 +26,10 @@ pub use onset::{Onset, OnsetSettings, find_onset};
 pub use reconstruct::{
     ForcePrior, IdentifiedModel, Reconstruction, ReconstructionSettings, Rise, reconstruct, rise,
 };
+pub use reconstruction::{NoiseSource, PriorKind, Reconstruction as ForceReconstruction};
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] = &[Entry::of::<Extrapolation>()];
+pub const STAGES: &[Entry] = &[Entry::of::<Extrapolation>(), Entry::of::<ForceReconstruction>()];
 
 #[cfg(test)]
 #[test]

@@ -130,8 +130,8 @@ impl Stage for Welch {
                 let summary = &outputs.get(&SUMMARY).map_err(|error| error.to_string())?.0;
                 let number = |name: &str| summary[name].as_f64().unwrap_or(f64::NAN);
                 let (segments, averages) = (number("segments"), number("averages"));
-                // 4 stretches of some 35 segments: worth 1 / (1 + 2/36) each, less the ends
-                if segments > 100.0 && (0.94..0.96).contains(&(averages / segments)) && number("record_scatter") < 1.5 {
+                // 4 stretches of some 12 segments: worth 1 / (1 + 2/36) each, less the ends
+                if segments > 40.0 && (0.94..0.96).contains(&(averages / segments)) && number("record_scatter") < 1.5 {
                     Ok(format!("{segments} segments are worth {averages:.1} independent ones."))
                 } else {
                     Err(format!("{summary}"))

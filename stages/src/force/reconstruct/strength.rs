@@ -26,7 +26,7 @@ const FIRST_STEP: f64 = 1.5;
 const WEAKEST: f64 = 1e-4;
 const STRONGEST: f64 = 1e8;
 
-/// Maximises the likelihood over walk and jump, one after the other, three times; a parabola through the best three ends each search.
+/// Maximises the likelihood over walk and jump, one after the other, twice; a parabola through the best three ends each search.
 pub(super) fn strongest(system: &Augmented, y: &[f64], start: Strengths, noise_variance: Option<f64>) -> Found {
     let mut evaluations = 0;
     let mut strengths = start;
@@ -36,8 +36,8 @@ pub(super) fn strongest(system: &Augmented, y: &[f64], start: Strengths, noise_v
     };
     let weakest = if system.size == system.order + 1 { WEAKEST } else { 1e-4 * WEAKEST };
     let has_jump = !strengths.transition.is_empty();
-    for round in 0..if has_jump { 3 } else { 1 } {
-        let step = FIRST_STEP / [1.0, 2.0, 6.0][round];
+    for round in 0..if has_jump { 2 } else { 1 } {
+        let step = FIRST_STEP / [1.0, 4.0][round];
         strengths.walk = search(strengths.walk, step, weakest, |walk| value(&Strengths { walk, ..strengths.clone() }));
         if has_jump {
             strengths.jump = search(strengths.jump, step, WEAKEST, |jump| value(&Strengths { jump, ..strengths.clone() }));

@@ -81,6 +81,12 @@ impl<'a> Likelihood<'a> {
         (0..used.len()).map(|k| if used[k] { of(ratio(k)) } else { of(threshold) }).sum()
     }
 
+    /// Deviance of a model that holds, and 15 % more: `2 K (ln K - psi(K))` per bin.
+    pub fn expected_deviance(&self) -> f64 {
+        let k = self.data.averages.max(1.0);
+        1.15 * (1.0 + 1.0 / (6.0 * k)) * self.data.density.len() as f64
+    }
+
     pub fn slopes(&self, parameters: &Parameters, used: &[bool]) -> Slopes {
         let [variance, f0, quality, white, flicker] = std::array::from_fn(|i| parameters.value(i));
         let seen = SeenOscillator::new(f0, quality, self.bin_hz, self.through);

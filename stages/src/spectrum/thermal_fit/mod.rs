@@ -177,8 +177,15 @@ fn fit_through(
     let best = |flicker: bool| -> Result<Settled, SpectrumError> {
         let (mut settled, mut failure) = (Vec::new(), SpectrumError::NoPeak { lowest_hz, highest_hz });
         for start in &starts {
+            let inside = |s: &Settled| s.parameters.frequency_hz() > lowest_hz && s.parameters.frequency_hz() < highest_hz;
             match settle(&likelihood, &rule, start.parameters(flicker)) {
-                Ok(s) if s.parameters.frequency_hz() > lowest_hz && s.parameters.frequency_hz() < highest_hz => settled.push(s),
+                Ok(s) if inside(&s) => {
+                    let plain = !s.parameters.is_line(likelihood.bin_hz) && s.deviance < likelihood.expected_deviance();
+                    settled.push(s);
+                    if plain {
+                        break; // as good as chance allows: no other start can be better by much
+                    }
+                }
                 Ok(_) => {}
                 Err(error) => failure = error,
             }
