@@ -18,7 +18,8 @@ fn stored_spectrum() -> Option<String> {
 fn a_stored_thermal_spectrum_gives_resonance_and_quality_factor() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
-    let (mut arguments, stand_in) = (vec!["run".to_owned(), config("thermal-spectrum.toml")], stored_spectrum().is_none());
+    let (mut arguments, stand_in) =
+        (vec!["run".to_owned(), config("thermal-spectrum.toml")], stored_spectrum().is_none());
     if stand_in {
         println!("stand-in: 1 spectrum in closed form in place of brownian-red");
         write_stand_in(&here.join("spectrum.h5"));
@@ -30,7 +31,10 @@ fn a_stored_thermal_spectrum_gives_resonance_and_quality_factor() {
     let fit = shown(here, "thermal.h5", "thermal");
     let (f, q) = (number(&fit, "/frequency/value"), number(&fit, "/quality_factor/value"));
     let (f_std, q_std) = (number(&fit, "/frequency/std"), number(&fit, "/quality_factor/std"));
-    println!("f0 {f:.3} +- {f_std:.3} Hz, Q {q:.0} +- {q_std:.0}, window {}, dispersion {}", fit["window"], fit["dispersion"]);
+    println!(
+        "f0 {f:.3} +- {f_std:.3} Hz, Q {q:.0} +- {q_std:.0}, window {}, dispersion {}",
+        fit["window"], fit["dispersion"]
+    );
     // published with the data: 70561.29 +- 0.04 Hz, Q 29210 +- 3.3 %; two combined errors
     assert!((f - 70_561.29).abs() < 2.0 * f_std.hypot(0.04), "{f} +- {f_std}");
     assert!((q - 29_210.0).abs() < 2.0 * q_std.hypot(0.033 * 29_210.0), "{q} +- {q_std}");

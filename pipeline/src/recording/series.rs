@@ -47,7 +47,9 @@ pub fn read_number_attribute(path: &Path, location: &str, name: &str) -> Result<
         has_attribute(&file, name).then(|| number_attribute(&file, location, name)).transpose()
     } else {
         match find(&file, path, &Wanted { role: "series", location, required: true })? {
-            Some(dataset) => has_attribute(&dataset, name).then(|| number_attribute(&dataset, location, name)).transpose(),
+            Some(dataset) => {
+                has_attribute(&dataset, name).then(|| number_attribute(&dataset, location, name)).transpose()
+            }
             None => Ok(None),
         }
     };

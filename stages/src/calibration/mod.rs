@@ -35,6 +35,7 @@ pub use chi_square::{chi_square_tail, gamma_tail, normal_two_sided};
 pub use contact_slope::{ContactSlope, SlopeStretch, contact_slope, contact_stretches};
 pub use delay::Delay;
 pub use error::CalibrationError;
+pub(crate) use example::free_records;
 pub use free_rule::FreeSettings;
 pub use free_stretches::{FreeRule, FreeStretches, free_stretches};
 pub use half_sample_mode::{half_sample_mode, median};
@@ -46,7 +47,6 @@ pub use spring_constant::{SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, rin
 pub use stability::{Stability, stability};
 pub use stiffness::{RelativeErrors, StiffnessSummary, ThermalStiffness};
 pub use thermal::Thermal;
-pub(crate) use example::free_records;
 pub(crate) use thermal_peak::inverse;
 pub use thermal_peak::{PeakSearch, ThermalPeak, thermal_peak};
 pub use welch::{AveragedPeriodogram, Welch};

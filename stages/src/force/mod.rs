@@ -24,7 +24,7 @@ pub use extrapolation::{Extrapolation, ZeroLineKind};
 pub use line::{Line, Weighting, fit_line};
 pub use onset::{Onset, OnsetSettings, find_onset};
 pub use reconstruct::{
-    ForcePrior, IdentifiedModel, Reconstruction, ReconstructionSettings, Rise, reconstruct, rise,
+    ForcePrior, IdentifiedModel, Reconstruction, ReconstructionSettings, Rise, band_inflation, reconstruct, rise,
 };
 pub use reconstruction::{NoiseSource, PriorKind, Reconstruction as ForceReconstruction};
 

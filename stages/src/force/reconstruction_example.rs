@@ -20,7 +20,11 @@ pub(super) fn examples() -> Vec<Example> {
             let late = T0 + 100..4096;
             let within = late.clone().filter(|&k| force[k].abs() < 2.0 * band[k]).count() as f64 / late.len() as f64;
             if within > 0.85 && (force[T0 / 2] / LOAD_V - 1.0).abs() < 0.4 && rise < 1.5e-6 {
-                Ok(format!("{:.0} % of the force after the release lies within two standard errors of zero; it rises in {:.2} us.", 100.0 * within, 1e6 * rise))
+                Ok(format!(
+                    "{:.0} % of the force after the release lies within two standard errors of zero; it rises in {:.2} us.",
+                    100.0 * within,
+                    1e6 * rise
+                ))
             } else {
                 Err(format!("{within} within the band, {} before, rise {rise}", force[T0 / 2]))
             }

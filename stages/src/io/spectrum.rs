@@ -64,8 +64,11 @@ impl Default for Spectrum {
 }
 
 /// What `spectrum.thermal` takes.
-pub(crate) const DENSITY: Port<Array> =
-    Port::new("density", "power-density", "one-sided power spectral density over frequency, with its number of averages");
+pub(crate) const DENSITY: Port<Array> = Port::new(
+    "density",
+    "power-density",
+    "one-sided power spectral density over frequency, with its number of averages",
+);
 
 impl Stage for Spectrum {
     const SPEC: Spec = Spec {
@@ -142,7 +145,9 @@ impl Spectrum {
         for location in [self.density.as_str(), "/"] {
             match read_number_attribute(path, location, NAME)? {
                 Some(n) if n.is_finite() && n >= 1.0 => return Ok(n),
-                Some(n) => return Err(StageError::new(format!("{location}: `{NAME}` is {n}, wanted 1 or more")).at(path)),
+                Some(n) => {
+                    return Err(StageError::new(format!("{location}: `{NAME}` is {n}, wanted 1 or more")).at(path));
+                }
                 None => {}
             }
         }

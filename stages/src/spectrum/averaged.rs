@@ -65,8 +65,7 @@ pub fn average_spectra(records: &[RecordSpectrum]) -> Result<AveragedSpectrum, S
     }
     let total = segments as f64;
     let share = |r: &RecordSpectrum| r.segments as f64 / total;
-    let density: Vec<f64> =
-        (0..bins).map(|k| records.iter().map(|r| share(r) * r.density[k]).sum::<f64>()).collect();
+    let density: Vec<f64> = (0..bins).map(|k| records.iter().map(|r| share(r) * r.density[k]).sum::<f64>()).collect();
     let averages = total * total / (total + 2.0 * pairs as f64 * HALF_OVERLAP);
     let several = records.iter().filter(|r| r.segments > 0).count() > 1;
     let record_error = (0..bins)
@@ -114,7 +113,12 @@ mod tests {
         // 1800 values, correlated by 1 % at three bins: mean 0.4 %, variances sqrt(2 / 1800) = 3.3 %; four of them
         assert!((sum / count / 2.0 - 1.0).abs() < 0.018, "{}", sum / count);
         // told is of the estimate: E density^2 is 1 + 1 / averages above the square of the mean
-        assert!((square / told - 1.0).abs() < 0.17 && (square / seen - 1.0).abs() < 0.17, "{} {}", square / told, square / seen);
+        assert!(
+            (square / told - 1.0).abs() < 0.17 && (square / seen - 1.0).abs() < 0.17,
+            "{} {}",
+            square / told,
+            square / seen
+        );
     }
 
     #[test]

@@ -45,7 +45,9 @@ pub enum SpectrumError {
     #[error("the input is zero throughout: no transfer function can be derived from it")]
     NoInput,
     /// Nothing stands out where a resonance is sought.
-    #[error("no resonance stands out between {lowest_hz} and {highest_hz} Hz: widen the range, or average longer segments")]
+    #[error(
+        "no resonance stands out between {lowest_hz} and {highest_hz} Hz: widen the range, or average longer segments"
+    )]
     NoPeak {
         /// Lower end of the search.
         lowest_hz: f64,

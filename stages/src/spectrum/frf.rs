@@ -45,9 +45,11 @@ impl Default for Frf {
     }
 }
 
-pub(super) const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "aligned events: signal over event and time");
+pub(super) const ENSEMBLE: Port<Array> =
+    Port::new("ensemble", "ensemble", "aligned events: signal over event and time");
 pub(super) const PAIR: Port<Array> = Port::new("pair", "pair", "force and response of the mean, for the force's shape");
-pub(super) const FRF: Port<Array> = Port::new("frf", "transfer", "transfer function, its variance, coherence and levels");
+pub(super) const FRF: Port<Array> =
+    Port::new("frf", "transfer", "transfer function, its variance, coherence and levels");
 pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "lags, coherence, where distortion shows");
 
 impl Stage for Frf {
@@ -87,8 +89,7 @@ impl Stage for Frf {
         let rate = ensemble.number("sample_rate_hz")?;
         let all = rows.all();
         let mean = moments(rows, &all).map_err(StageError::from_error)?.mean;
-        let amplitude =
-            scatter(rows, &all, &mean, onset_sample(ensemble)?).map_err(StageError::from_error)?.amplitude;
+        let amplitude = scatter(rows, &all, &mean, onset_sample(ensemble)?).map_err(StageError::from_error)?.amplitude;
         let step = difference(force);
         let forces: Vec<Vec<f64>> = amplitude.iter().map(|a| step.iter().map(|u| a * u).collect()).collect();
         let responses: Vec<Vec<f64>> = all.iter().map(|&i| difference(rows.row(i))).collect();
@@ -99,7 +100,8 @@ impl Stage for Frf {
         let distorted: Vec<usize> = (1..band).filter(|&k| found.distortion_p[k] < self.significance).collect();
         let expected = self.significance * band as f64;
         if distorted.len() as f64 > expected + 5.0 * expected.sqrt() + 2.0 {
-            let worst = distorted.iter().copied().min_by(|&a, &b| found.distortion_p[a].total_cmp(&found.distortion_p[b]));
+            let worst =
+                distorted.iter().copied().min_by(|&a, &b| found.distortion_p[a].total_cmp(&found.distortion_p[b]));
             cx.warn(format!(
                 "the response changes with the force's size in {} bins ({expected:.1} by chance), most surely at {:.0} Hz: the system is not linear",
                 distorted.len(),
@@ -151,7 +153,11 @@ fn frf_array(
     let bins = frequency.len();
     let held = |k: usize| {
         let turn = std::f64::consts::TAU * frequency[k] / rate;
-        if k == 0 { Complex64::new(1.0, 0.0) } else { Complex64::new(0.0, turn) / (1.0 - Complex64::from_polar(1.0, -turn)) }
+        if k == 0 {
+            Complex64::new(1.0, 0.0)
+        } else {
+            Complex64::new(0.0, turn) / (1.0 - Complex64::from_polar(1.0, -turn))
+        }
     };
     let cut = |values: &[f64]| (0..bins).map(|k| if k < band { values[k] } else { f64::NAN }).collect::<Vec<f64>>();
     let unknown = Complex64::new(f64::NAN, f64::NAN);
@@ -169,7 +175,13 @@ fn frf_array(
         .with("noise", "V^2", "part of the scatter that is noise", over, cut(&found.noise))
         .with("timing", "V^2", "part of the scatter that is a shift in time", over, cut(&found.timing))
         .with("distortion", "V^2", "part of the scatter that goes with the force's size", over, cut(&found.distortion))
-        .with("distortion_p_value", "1", "chance of such a distortion in a linear system", over, cut(&found.distortion_p))
+        .with(
+            "distortion_p_value",
+            "1",
+            "chance of such a distortion in a linear system",
+            over,
+            cut(&found.distortion_p),
+        )
         .with("lag", "s", "how much later than the mean", &["event"], lag)
         .attribute("sample_rate_hz", rate)
         .attribute("static_gain", 1.0)

@@ -129,8 +129,22 @@ fn average(points: &Points, full: Orders, known_variance: bool, pull: f64) -> Lo
     let (a, b) = (akaike(points, &plain), akaike(points, &fraction));
     let share = 1.0 / (1.0 + (0.5 * (a - b)).clamp(-700.0, 700.0).exp());
     // a share that rounding alone leaves is none: the other model's value may be anything
-    let share = if share < 1e-12 { 0.0 } else if share > 1.0 - 1e-12 { 1.0 } else { share };
-    let mix = |x: f64, y: f64| if share == 0.0 { y } else if share == 1.0 { x } else { share * x + (1.0 - share) * y };
+    let share = if share < 1e-12 {
+        0.0
+    } else if share > 1.0 - 1e-12 {
+        1.0
+    } else {
+        share
+    };
+    let mix = |x: f64, y: f64| {
+        if share == 0.0 {
+            y
+        } else if share == 1.0 {
+            x
+        } else {
+            share * x + (1.0 - share) * y
+        }
+    };
     let value = Complex64::new(mix(plain.value.re, fraction.value.re), mix(plain.value.im, fraction.value.im));
     let misfit = mix(misfit(points, &plain), misfit(points, &fraction)) / (1.0 - pull * share);
     let scale = if known_variance { 1.0 } else { misfit };
@@ -162,7 +176,8 @@ fn overfit(usable: &Usable<'_>, full: Orders, count: usize, turns: f64) -> f64 {
             let mut rng = ChaCha8Rng::seed_from_u64(draw);
             let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
             let value = shape.offset.iter().map(|_| Complex64::new(normal(), normal()) * 0.5f64.sqrt()).collect();
-            let points = Points { value, offset: shape.offset.clone(), weight: shape.weight.clone(), turn: shape.turn.clone() };
+            let points =
+                Points { value, offset: shape.offset.clone(), weight: shape.weight.clone(), turn: shape.turn.clone() };
             let (plain, fraction) =
                 (fit_fraction(&points, Orders { denominator: 0, ..full }), fit_fraction(&points, full));
             let (a, b) = (akaike(&points, &plain), akaike(&points, &fraction));

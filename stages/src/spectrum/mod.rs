@@ -51,8 +51,15 @@ pub use welch::Welch;
 pub use window::{Window, WindowKind};
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] =
-    &[Entry::of::<Window>(), Entry::of::<Periodogram>(), Entry::of::<Etfe>(), Entry::of::<Frf>(), Entry::of::<Smoothing>(), Entry::of::<Thermal>(), Entry::of::<Welch>()];
+pub const STAGES: &[Entry] = &[
+    Entry::of::<Window>(),
+    Entry::of::<Periodogram>(),
+    Entry::of::<Etfe>(),
+    Entry::of::<Frf>(),
+    Entry::of::<Smoothing>(),
+    Entry::of::<Thermal>(),
+    Entry::of::<Welch>(),
+];
 
 #[cfg(test)]
 mod chain_tests;

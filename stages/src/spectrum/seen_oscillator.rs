@@ -121,9 +121,7 @@ impl SeenOscillator {
                 let sine = Complex64::new(0.0, -0.5 / TAU);
                 (
                     mid.f * (2.0 / 3.0) + (up.f + down.f) / 6.0 + sine * (down.h - up.h),
-                    mid.f_slope * (2.0 / 3.0)
-                        + (up.f_slope + down.f_slope) / 6.0
-                        + sine * (down.h_slope - up.h_slope),
+                    mid.f_slope * (2.0 / 3.0) + (up.f_slope + down.f_slope) / 6.0 + sine * (down.h_slope - up.h_slope),
                 )
             }
         }
@@ -226,7 +224,8 @@ mod tests {
     fn the_limit_of_long_segments_is_the_density() {
         let (f0, quality) = (100.0_f64, 50.0_f64);
         for f in [1.0_f64, 90.0, 100.0, 101.0, 150.0] {
-            let direct = std::f64::consts::FRAC_2_PI * f0.powi(3) / quality
+            let direct = std::f64::consts::FRAC_2_PI * f0.powi(3)
+                / quality
                 / ((f0 * f0 - f * f).powi(2) + (f * f0 / quality).powi(2));
             let nothing = SeenOscillator::new(f0, quality, 1.0, SeenThrough::Nothing).at(f).value;
             assert!((nothing / direct - 1.0).abs() < 1e-12, "{f}");

@@ -173,8 +173,9 @@ impl Thermal {
                 Some("hann") => Some(SeenThrough::Hann),
                 Some("rectangular") => Some(SeenThrough::Rectangular),
                 Some(other) => {
-                    return Err(StageError::new(format!("the spectra were made with the window `{other}`"))
-                        .help("set `window = \"none\"` where the resonance is many bins wide, or make them with `hann`"));
+                    return Err(StageError::new(format!("the spectra were made with the window `{other}`")).help(
+                        "set `window = \"none\"` where the resonance is many bins wide, or make them with `hann`",
+                    ));
                 }
             },
         })

@@ -18,7 +18,8 @@ pub(super) fn examples() -> Vec<Example> {
             let number = |pointer: &str| summary.pointer(pointer).and_then(|value| value.as_f64()).unwrap_or(f64::NAN);
             let (f, q) = (number("/frequency/value"), number("/quality_factor/value"));
             // the ripple averages out over its period of 7 bins: a hundredth of what chance would do
-            let off = ((f - FREQUENCY_HZ) / number("/frequency/std"), (q - QUALITY_FACTOR) / number("/quality_factor/std"));
+            let off =
+                ((f - FREQUENCY_HZ) / number("/frequency/std"), (q - QUALITY_FACTOR) / number("/quality_factor/std"));
             if off.0.abs() < 0.5 && off.1.abs() < 0.5 && number("/lines") == 1.0 {
                 Ok(format!("f0 = {f:.2} +- {:.2} Hz, one line set aside.", number("/frequency/std")))
             } else {
@@ -42,4 +43,3 @@ fn density() -> Array {
         .with("density", "V^2/Hz", "density", &["frequency_hz"], density)
         .attribute("averages", 32.0)
 }
-

@@ -65,7 +65,10 @@ impl Stage for Welch {
     fn check(&self) -> Result<(), StageError> {
         within("segment_samples", self.segment_samples as f64, 16.0, 4_194_304.0)?;
         if self.segment_samples % 2 == 1 {
-            return Err(StageError::new(format!("`segment_samples` is {}, wanted an even number", self.segment_samples)));
+            return Err(StageError::new(format!(
+                "`segment_samples` is {}, wanted an even number",
+                self.segment_samples
+            )));
         }
         self.free.check()
     }
@@ -94,7 +97,9 @@ impl Stage for Welch {
         let inner = 4..average.density.len().saturating_sub(4);
         let excess = inner.clone().map(ratio).sum::<f64>() / inner.len().max(1) as f64;
         if excess > 2.0 {
-            cx.warn(format!("the records' spectra scatter {excess:.1} times as much as chance: the noise is not stationary"));
+            cx.warn(format!(
+                "the records' spectra scatter {excess:.1} times as much as chance: the noise is not stationary"
+            ));
         }
         let summary = Document::new(&json!({
             "records": found.len(),
@@ -111,7 +116,13 @@ impl Stage for Welch {
         let density = Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", frequency)])
             .with("density", "V^2/Hz", "one-sided power spectral density", over, average.density)
             .with("standard_error", "V^2/Hz", "its standard error if stationary", over, average.standard_error)
-            .with("record_error", "V^2/Hz", "its standard error from the scatter of records", over, average.record_error)
+            .with(
+                "record_error",
+                "V^2/Hz",
+                "its standard error from the scatter of records",
+                over,
+                average.record_error,
+            )
             .attribute("averages", average.averages)
             .attribute("segments", average.segments)
             .attribute("window", "hann")

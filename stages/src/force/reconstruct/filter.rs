@@ -6,8 +6,8 @@ use super::triangle::Rows;
 /// Standard deviations of what moves the force, and of the start; all in units of the measurement noise.
 #[derive(Debug, Clone)]
 pub(super) struct Strengths {
-    /// Step of the walk per sample (its last state).
-    pub walk: f64,
+    /// Step of the walk per sample (its last state): up to the transition, and after it.
+    pub walk: [f64; 2],
     /// Additional step of the force itself within the transition.
     pub jump: f64,
     /// Samples after which the force may jump.
@@ -94,7 +94,7 @@ fn settled(before: &(f64, Vec<f64>), variance: f64, gain: &[f64]) -> bool {
 pub(super) fn add_noise(wide: &mut Rows, system: &Augmented, strengths: &Strengths, t: usize) {
     let m = system.size;
     (0..wide.values.len() / wide.width).for_each(|i| wide.row_mut(i)[m..].fill(0.0));
-    wide.row_mut(m - 1)[m] = strengths.walk;
+    wide.row_mut(m - 1)[m] = strengths.walk[usize::from(t >= strengths.transition.start)];
     if strengths.transition.contains(&t) {
         wide.row_mut(system.order)[m + 1] = strengths.jump;
     }

@@ -62,8 +62,8 @@ pub struct Reconstruction {
     pub std: Vec<f64>,
     /// One-step innovations over their standard deviation: white and of size one if model and prior hold.
     pub innovations: Vec<f64>,
-    /// Standard deviation of the walk's step per sample (of its change of slope if integrated).
-    pub walk_std: f64,
+    /// Standard deviation of the walk's step per sample (of its change of slope if integrated), up to the transition and after it.
+    pub walk_std: [f64; 2],
     /// Standard deviation of a jump per sample of the transition; 0 without one.
     pub jump_std: f64,
     /// Variance of e.
@@ -72,18 +72,18 @@ pub struct Reconstruction {
     pub log_likelihood: f64,
     /// Passes of the filter that the search took.
     pub evaluations: usize,
-    /// The walk is too weak to be told from none.
+    /// A walk is too weak to be told from none.
     pub walk_at_limit: bool,
 }
 
 /// Reconstructs the input of an identified model from its output.
 ///
 /// # Model
-/// The model, with its input as one more state: a random walk (or an integrated one), and jumps of their own size in the samples of the
-/// transition. The innovation form is solved for e, `x+ = (A - K C) x + (B - K D) u + K y`, so that what drives the states is known and only the force is uncertain.
+/// The model, with its input as one more state: a random walk (or an integrated one), of one strength up to the event and another after it (a tip in contact
+/// feels more than a free one), and jumps of their own size in the samples of the transition. The innovation form is solved for e, `x+ = (A - K C) x + (B - K D) u + K y`, so that what drives the states is known and only the force is uncertain.
 ///
 /// # Method
-/// Square-root Kalman filter and square-root Rauch-Tung-Striebel smoother. Sizes of walk and jumps, and of the noise unless given, by maximum likelihood
+/// Square-root Kalman filter and square-root Rauch-Tung-Striebel smoother. Sizes of walks and jumps, and of the noise unless given, by maximum likelihood
 /// (the noise eliminated in closed form, the others searched in logarithms).
 ///
 /// # Shapes
@@ -94,7 +94,7 @@ pub struct Reconstruction {
 ///
 /// # Accuracy
 /// The band is that of measurement noise and prior: where these hold, 68 and 95 % of the values lie within one and two of them (tested over seeds). It leaves
-/// out: errors of the model, of its t0 (a shift in time), of the line without force, and of the strengths themselves; the force's shape within a sample.
+/// out: readout noise slower than the model's ([`band_inflation`] counts it), errors of the model, of its t0 (a shift in time), of the line without force, and of the strengths themselves; the force's shape within a sample.
 /// Cost: some `n^3` operations per sample and pass.
 ///
 /// # Errors
@@ -121,13 +121,23 @@ pub fn reconstruct(
         force,
         std: scaled(std),
         innovations: filtered.innovations.iter().map(|v| v / noise_std).collect(),
-        walk_std: found.strengths.walk * noise_std,
+        walk_std: found.strengths.walk.map(|walk| walk * noise_std),
         jump_std: if settings.transition.is_empty() { 0.0 } else { found.strengths.jump * noise_std },
         noise_variance: found.noise_variance,
         log_likelihood,
         evaluations: found.evaluations,
         walk_at_limit: found.walk_at_limit,
     })
+}
+
+/// By how much a band is too narrow where no force acts: rms of force over band in the free stretch, never below one.
+///
+/// Readout noise that is slower than the model's (1/f, mains) looks like a force and is followed as one; where the force is known to be zero, what
+/// is found there is error. `None` for a stretch outside or without samples.
+pub fn band_inflation(force: &[f64], band: &[f64], free: std::ops::Range<usize>) -> Option<f64> {
+    let (force, band) = (force.get(free.clone())?, band.get(free)?);
+    let mean = force.iter().zip(band).map(|(f, b)| (f / b).powi(2)).sum::<f64>() / force.len() as f64;
+    mean.is_finite().then(|| mean.sqrt().max(1.0))
 }
 
 /// Start of the search: noise from the differences of the second half, a walk of a hundredth of it, jumps as large as the response.
@@ -146,7 +156,7 @@ fn guess(y: &[f64], settings: &ReconstructionSettings, size: usize) -> Strengths
     let lasting = settings.transition.len().max(1) as f64;
     let integrated = settings.prior == ForcePrior::IntegratedWalk;
     Strengths {
-        walk: if integrated { 1e-4 } else { 1e-2 },
+        walk: [if integrated { 1e-4 } else { 1e-2 }; 2],
         jump: (largest / noise / lasting.sqrt()).max(1e-2),
         transition: settings.transition.clone(),
         // loose against anything that the response can hold: a state of these models is some ten times the response at most
@@ -176,7 +186,9 @@ fn check(model: &IdentifiedModel<'_>, y: &[f64], settings: &ReconstructionSettin
         return Err(ForceError::Reconstruction("the response is constant"));
     }
     if settings.transition.end > y.len() || settings.noise_variance.is_some_and(|v| !(v.is_finite() && v > 0.0)) {
-        return Err(ForceError::Reconstruction("wanted a transition within the window and a noise variance above zero"));
+        return Err(ForceError::Reconstruction(
+            "wanted a transition within the window and a noise variance above zero",
+        ));
     }
     Ok(())
 }

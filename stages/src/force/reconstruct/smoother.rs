@@ -12,7 +12,12 @@ use super::triangle::Rows;
 ///
 /// # Source
 /// H. Rauch, F. Tung, C. Striebel, AIAA J. 3 (1965) 1445; P. Park, T. Kailath, IEEE Trans. Autom. Control 40 (1995) 727.
-pub(super) fn smooth(system: &Augmented, y: &[f64], strengths: &Strengths, filtered: &Filtered) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn smooth(
+    system: &Augmented,
+    y: &[f64],
+    strengths: &Strengths,
+    filtered: &Filtered,
+) -> (Vec<f64>, Vec<f64>) {
     let (m, n) = (system.size, y.len());
     let (mut mean, mut std) = (vec![0.0; n], vec![0.0; n]);
     let (Some(last), Some(factor)) = (filtered.mean.last(), filtered.factor.last()) else { return (mean, std) };

@@ -16,7 +16,7 @@ pub(super) struct Found {
     pub strengths: Strengths,
     pub noise_variance: f64,
     pub evaluations: usize,
-    /// Whether the walk has become so weak that the data cannot tell it from none.
+    /// Whether a walk has become so weak that the data cannot tell it from none.
     pub walk_at_limit: bool,
 }
 
@@ -26,7 +26,7 @@ const FIRST_STEP: f64 = 1.5;
 const WEAKEST: f64 = 1e-4;
 const STRONGEST: f64 = 1e8;
 
-/// Maximises the likelihood over walk and jump, one after the other, twice; a parabola through the best three ends each search.
+/// Maximises the likelihood over both walks and the jump, one after the other, twice; a parabola through the best three ends each search.
 pub(super) fn strongest(system: &Augmented, y: &[f64], start: Strengths, noise_variance: Option<f64>) -> Found {
     let mut evaluations = 0;
     let mut strengths = start;
@@ -36,15 +36,30 @@ pub(super) fn strongest(system: &Augmented, y: &[f64], start: Strengths, noise_v
     };
     let weakest = if system.size == system.order + 1 { WEAKEST } else { 1e-4 * WEAKEST };
     let has_jump = !strengths.transition.is_empty();
-    for round in 0..if has_jump { 2 } else { 1 } {
-        let step = FIRST_STEP / [1.0, 4.0][round];
-        strengths.walk = search(strengths.walk, step, weakest, |walk| value(&Strengths { walk, ..strengths.clone() }));
+    // without an event there is one walk
+    let sides = if has_jump { 2 } else { 1 };
+    for step in [FIRST_STEP, FIRST_STEP / 4.0].into_iter().take(if has_jump { 2 } else { 1 }) {
+        for side in 0..sides {
+            let found = search(strengths.walk[side], step, weakest, |walk| {
+                let mut tried = strengths.clone();
+                tried.walk[side] = walk;
+                if sides == 1 {
+                    tried.walk = [walk; 2];
+                }
+                value(&tried)
+            });
+            strengths.walk[side] = found;
+            if sides == 1 {
+                strengths.walk = [found; 2];
+            }
+        }
         if has_jump {
-            strengths.jump = search(strengths.jump, step, WEAKEST, |jump| value(&Strengths { jump, ..strengths.clone() }));
+            strengths.jump =
+                search(strengths.jump, step, WEAKEST, |jump| value(&Strengths { jump, ..strengths.clone() }));
         }
     }
     let variance = log_likelihood(&filter(system, y, &strengths, false), noise_variance).1;
-    let walk_at_limit = strengths.walk <= 2.0 * weakest;
+    let walk_at_limit = strengths.walk.iter().any(|walk| *walk <= 2.0 * weakest);
     Found { strengths, noise_variance: variance, evaluations: evaluations + 1, walk_at_limit }
 }
 

@@ -50,6 +50,37 @@ fn a_local_rational_lowers_no_peak() {
 }
 
 #[test]
+fn resonances_two_bins_wide_are_kept_wherever_they_lie_between_the_bins() {
+    let bin = 5e6 / N as f64;
+    let v = vec![0.0; truth().0.len()];
+    for quarter in 0..4 {
+        let mut lever = Lever::paper();
+        for (f, q) in lever.frequency_hz.iter_mut().zip(&mut lever.quality_factor) {
+            *f = ((*f / bin).round() + 0.25 * f64::from(quarter)) * bin;
+            *q = *f / (2.0 * bin);
+        }
+        let f = truth().0;
+        let at = |f: &f64| {
+            let g = lever.transfer(faer::c64::new(0.0, TAU * f));
+            Complex64::new(g.re, g.im)
+        };
+        let g: Vec<Complex64> = f.iter().map(at).collect();
+        let bins = Bins { frequency_hz: &f, transfer: &g, variance: &v };
+        for half_width in [4, 10, 16] {
+            let got = local_rational(bins, settings(half_width), &[]).unwrap();
+            for resonance in &lever.frequency_hz {
+                let k = (resonance / bin).floor() as usize;
+                for k in [k, k + 1] {
+                    // wanted: a thousandth; measured: 1e-6
+                    let change = got.transfer[k].norm() / g[k].norm() - 1.0;
+                    assert!(change.abs() < 1e-5, "{resonance} half width {half_width}: {change:e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_fixed_parabola_lowers_the_peaks_by_tens_of_per_cent() {
     let (f, g) = truth();
     let v = vec![0.0; g.len()];

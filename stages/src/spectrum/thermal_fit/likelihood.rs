@@ -81,12 +81,6 @@ impl<'a> Likelihood<'a> {
         (0..used.len()).map(|k| if used[k] { of(ratio(k)) } else { of(threshold) }).sum()
     }
 
-    /// Deviance of a model that holds, and 15 % more: `2 K (ln K - psi(K))` per bin.
-    pub fn expected_deviance(&self) -> f64 {
-        let k = self.data.averages.max(1.0);
-        1.15 * (1.0 + 1.0 / (6.0 * k)) * self.data.density.len() as f64
-    }
-
     pub fn slopes(&self, parameters: &Parameters, used: &[bool]) -> Slopes {
         let [variance, f0, quality, white, flicker] = std::array::from_fn(|i| parameters.value(i));
         let seen = SeenOscillator::new(f0, quality, self.bin_hz, self.through);
@@ -95,7 +89,8 @@ impl<'a> Likelihood<'a> {
             let f = self.data.frequency_hz[k].max(f64::MIN_POSITIVE);
             let peak = seen.at(f);
             let model = variance * peak.value + white + flicker / f;
-            let row = [variance * peak.value, variance * peak.by_frequency, variance * peak.by_quality, white, flicker / f];
+            let row =
+                [variance * peak.value, variance * peak.by_frequency, variance * peak.by_quality, white, flicker / f];
             slopes.bin.push(k);
             slopes.row.push(row.map(|r| r / model));
             slopes.misfit.push(self.data.density[k] / model - 1.0);

@@ -175,16 +175,19 @@ fn fit_through(
     let starts = candidates(data, settings)?;
     let ThermalFitSettings { lowest_hz, highest_hz, .. } = settings;
     let best = |flicker: bool| -> Result<Settled, SpectrumError> {
+        let mut explained: Vec<f64> = Vec::new();
         let (mut settled, mut failure) = (Vec::new(), SpectrumError::NoPeak { lowest_hz, highest_hz });
         for start in &starts {
-            let inside = |s: &Settled| s.parameters.frequency_hz() > lowest_hz && s.parameters.frequency_hz() < highest_hz;
+            let inside =
+                |s: &Settled| s.parameters.frequency_hz() > lowest_hz && s.parameters.frequency_hz() < highest_hz;
+            // what an earlier fit explains within a factor of two is no other resonance
+            if explained.get(start.bin).is_some_and(|model| start.level < 2.0 * model) {
+                continue;
+            }
             match settle(&likelihood, &rule, start.parameters(flicker)) {
                 Ok(s) if inside(&s) => {
-                    let plain = !s.parameters.is_line(likelihood.bin_hz) && s.deviance < likelihood.expected_deviance();
+                    explained = likelihood.density(&s.parameters);
                     settled.push(s);
-                    if plain {
-                        break; // as good as chance allows: no other start can be better by much
-                    }
                 }
                 Ok(_) => {}
                 Err(error) => failure = error,
@@ -201,12 +204,14 @@ fn fit_through(
         Some(flicker) => (best(flicker)?, f64::NAN),
         None => {
             let plain = best(false)?;
-            let full = settle(&likelihood, &rule, plain.parameters.with_flicker(data.frequency_hz[0])).or_else(|_| best(true));
+            let full =
+                settle(&likelihood, &rule, plain.parameters.with_flicker(data.frequency_hz[0])).or_else(|_| best(true));
             match full {
                 // both with the lines of the fuller model, so that they are of the same bins
                 Ok(full) => {
                     let alone = likelihood.maximise(plain.parameters, &full.used)?;
-                    let gain = 2.0 * (likelihood.value(&full.parameters, &full.used) - likelihood.value(&alone, &full.used));
+                    let gain =
+                        2.0 * (likelihood.value(&full.parameters, &full.used) - likelihood.value(&alone, &full.used));
                     if gain > FLICKER_GAIN { (full, gain) } else { (plain, gain) }
                 }
                 Err(_) => (plain, f64::NAN),
@@ -239,7 +244,8 @@ fn settle(likelihood: &Likelihood<'_>, rule: &LineRule, start: Parameters) -> Re
         }
         used = next;
         if used.iter().filter(|u| **u).count() < used.len() / 2 {
-            let reason = "more than half of the bins would be lines: the number of averages is too high, or the model is wrong";
+            let reason =
+                "more than half of the bins would be lines: the number of averages is too high, or the model is wrong";
             return Err(SpectrumError::NoFit { near_hz: start.frequency_hz(), reason });
         }
     }

@@ -8,6 +8,9 @@ use crate::spectrum::SpectrumError;
 
 /// A place that stands out, as a start of the fit.
 pub(super) struct Candidate {
+    /// Its bin, and the running median there.
+    pub bin: usize,
+    pub level: f64,
     frequency_hz: f64,
     width_hz: f64,
     height: f64,
@@ -20,10 +23,7 @@ impl Candidate {
         let area = 0.5 * PI * self.height * self.width_hz;
         let quality = (self.frequency_hz / self.width_hz).max(0.6);
         let values = [area, self.frequency_hz, quality, self.white, 0.1 * self.white * self.first_hz];
-        Parameters {
-            ln: values.map(|v| v.max(f64::MIN_POSITIVE).ln()),
-            active: [true, true, true, true, flicker],
-        }
+        Parameters { ln: values.map(|v| v.max(f64::MIN_POSITIVE).ln()), active: [true, true, true, true, flicker] }
     }
 }
 
@@ -59,6 +59,8 @@ pub(super) fn candidates(
         let height = (smooth[k] - white).max(0.1 * smooth[k]);
         let (from, to) = crossings(&smooth, k, 0.5 * smooth[k] + 0.5 * white);
         Candidate {
+            bin: k,
+            level: smooth[k],
             frequency_hz: 0.5 * (f[from] + f[to]),
             width_hz: bin_hz * (to - from).max(1) as f64,
             height,
