@@ -36,9 +36,9 @@ pub(super) fn smooth(
         let predicted = system.advance(&filtered.mean[t], y[t]);
         let ahead: Vec<f64> = z.iter().zip(&predicted).map(|(z, p)| z - p).collect();
         z.clone_from(&filtered.mean[t]);
-        for i in 0..m {
+        for (i, z) in z.iter_mut().enumerate() {
             let gain = gain_row(&stacked, i, m);
-            z[i] += gain.iter().zip(&ahead).map(|(j, d)| j * d).sum::<f64>();
+            *z += gain.iter().zip(&ahead).map(|(j, d)| j * d).sum::<f64>();
             let row = joined.row_mut(i);
             row[..m].fill(0.0);
             for (k, j) in gain.iter().enumerate() {

@@ -38,7 +38,8 @@ pub struct ThermalFitSettings {
     pub highest_hz: f64,
     /// Probability that a spectrum without lines loses a bin to the search for lines; 0 for no search.
     pub line_false_alarm: f64,
-    /// 1/f noise: `Some` with or without it, `None` where the likelihood gains more than chance does once in a hundred times.
+    /// 1/f noise: `Some` with or without it, `None` where the likelihood gains more than chance does once in a hundred times (never over less than a tenth of
+    /// an octave, where it cannot be told from white noise).
     pub flicker: Option<bool>,
 }
 
@@ -200,21 +201,23 @@ fn fit_through(
             .min_by(|a, b| score(a).0.cmp(&score(b).0).then(score(a).1.total_cmp(&score(b).1)))
             .ok_or(failure)
     };
-    let (settled, gain) = match settings.flicker {
+    // over less than a tenth of an octave 1/f noise and white noise are one
+    let first = data.frequency_hz[0].max(likelihood.bin_hz);
+    let narrow = data.frequency_hz[data.frequency_hz.len() - 1] < 1.07 * first;
+    let (settled, gain) = match settings.flicker.or(narrow.then_some(false)) {
         Some(flicker) => (best(flicker)?, f64::NAN),
         None => {
             let plain = best(false)?;
-            let full =
-                settle(&likelihood, &rule, plain.parameters.with_flicker(data.frequency_hz[0])).or_else(|_| best(true));
-            match full {
-                // both with the lines of the fuller model, so that they are of the same bins
-                Ok(full) => {
-                    let alone = likelihood.maximise(plain.parameters, &full.used)?;
+            let full = settle(&likelihood, &rule, plain.parameters.with_flicker(data.frequency_hz[0]));
+            // both with the lines of the fuller model, so that they are of the same bins
+            let alone = full.as_ref().ok().and_then(|f| likelihood.maximise(plain.parameters, &f.used).ok());
+            match (full, alone) {
+                (Ok(full), Some(alone)) => {
                     let gain =
                         2.0 * (likelihood.value(&full.parameters, &full.used) - likelihood.value(&alone, &full.used));
                     if gain > FLICKER_GAIN { (full, gain) } else { (plain, gain) }
                 }
-                Err(_) => (plain, f64::NAN),
+                _ => (plain, f64::NAN),
             }
         }
     };
