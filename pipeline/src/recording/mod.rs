@@ -5,6 +5,7 @@ mod global_heap;
 mod hash;
 mod native;
 mod recent;
+mod series;
 mod source;
 mod write;
 
@@ -19,6 +20,7 @@ use std::sync::Arc;
 pub use hash::hash_file;
 pub(crate) use native::is_native;
 pub use native::{Wanted, open_native};
+pub use series::{read_number_attribute, read_series};
 pub(crate) use source::DeferredSource;
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
 

@@ -80,7 +80,7 @@ fn size_of_file(path: &Path) -> Result<u64, StageError> {
         .map_err(|error| StageError::new(format!("the file cannot be read: {error}")).at(path))
 }
 
-fn find(file: &File, path: &Path, wanted: &Wanted) -> Result<Option<Dataset>, StageError> {
+pub(super) fn find(file: &File, path: &Path, wanted: &Wanted) -> Result<Option<Dataset>, StageError> {
     match file.dataset(wanted.location) {
         Ok(dataset) => Ok(Some(dataset)),
         Err(_) if !wanted.required && !file.link_exists(wanted.location) => Ok(None),
@@ -278,7 +278,7 @@ fn chunk_places(dataset: &Dataset, length: usize, samples: usize) -> Option<Vec<
     places.into_iter().collect()
 }
 
-fn has_attribute(owner: &Location, name: &str) -> bool {
+pub(super) fn has_attribute(owner: &Location, name: &str) -> bool {
     owner.attr(name).is_ok()
 }
 
@@ -289,7 +289,7 @@ fn text_attribute(owner: &Location, name: &str) -> Option<String> {
 }
 
 /// A number of any type in an attribute with one value.
-fn number_attribute(owner: &Location, place: &str, name: &str) -> Result<f64, StageError> {
+pub(super) fn number_attribute(owner: &Location, place: &str, name: &str) -> Result<f64, StageError> {
     let fail = |problem: String| StageError::new(format!("{place}: the attribute `{name}` {problem}"));
     let attribute = owner.attr(name).map_err(|_| fail("is missing".to_owned()))?;
     let kind = attribute.dtype().and_then(|dtype| dtype.to_descriptor());

@@ -12,7 +12,7 @@ pub(super) fn records() -> Result<Ports, StageError> {
 }
 
 /// Four short records of the lever far from the sample.
-pub(super) fn free_records() -> Result<Ports, StageError> {
+pub(crate) fn free_records() -> Result<Ports, StageError> {
     simulated(&Afm { ramp_hz: 0.1, samples: 150_000, phases: Some(vec![0.0; 4]), ..Afm::default() }, 4, None)
 }
 

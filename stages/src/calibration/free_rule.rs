@@ -27,13 +27,13 @@ impl Default for FreeSettings {
 }
 
 impl FreeSettings {
-    pub(super) fn check(&self) -> Result<(), StageError> {
+    pub(crate) fn check(&self) -> Result<(), StageError> {
         within("free.block_samples", self.block_samples as f64, 16.0, 65_536.0)?;
         within("free.settle_s", self.settle_s, 0.0, 1.0)?;
         within("free.guard_s", self.guard_s, 0.0, 1.0)
     }
 
-    pub(super) fn rule(&self, sample_rate_hz: f64, shortest_samples: usize) -> FreeRule {
+    pub(crate) fn rule(&self, sample_rate_hz: f64, shortest_samples: usize) -> FreeRule {
         FreeRule {
             settle_samples: (self.settle_s * sample_rate_hz).round() as usize,
             guard_samples: (self.guard_s * sample_rate_hz).round() as usize,

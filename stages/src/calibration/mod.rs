@@ -15,7 +15,7 @@ mod free_stretches;
 mod half_sample_mode;
 mod onset_delay;
 mod peak_settings;
-mod reading;
+pub(crate) mod reading;
 mod sensitivity;
 mod sensitivity_model;
 mod spring_constant;
@@ -31,10 +31,11 @@ mod stage_tests;
 mod tests;
 
 pub use blocks::Blocks;
-pub use chi_square::{chi_square_tail, normal_two_sided};
+pub use chi_square::{chi_square_tail, gamma_tail, normal_two_sided};
 pub use contact_slope::{ContactSlope, SlopeStretch, contact_slope, contact_stretches};
 pub use delay::Delay;
 pub use error::CalibrationError;
+pub(crate) use example::free_records;
 pub use free_rule::FreeSettings;
 pub use free_stretches::{FreeRule, FreeStretches, free_stretches};
 pub use half_sample_mode::{half_sample_mode, median};
@@ -46,6 +47,7 @@ pub use spring_constant::{SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, rin
 pub use stability::{Stability, stability};
 pub use stiffness::{RelativeErrors, StiffnessSummary, ThermalStiffness};
 pub use thermal::Thermal;
+pub(crate) use thermal_peak::inverse;
 pub use thermal_peak::{PeakSearch, ThermalPeak, thermal_peak};
 pub use welch::{AveragedPeriodogram, Welch};
 

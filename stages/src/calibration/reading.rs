@@ -15,7 +15,7 @@ const BLOCKS_AT_ONCE: usize = 256;
 const SEGMENTS_AT_ONCE: usize = 64;
 
 /// The block statistics of a record, with its piezo channel where it has one.
-pub(super) fn read_blocks(record: &Record, block_samples: usize) -> Result<Blocks, StageError> {
+pub(crate) fn read_blocks(record: &Record, block_samples: usize) -> Result<Blocks, StageError> {
     let deflection = record.channel("deflection")?;
     let piezo = record.channels.iter().find(|channel| channel.role == "piezo");
     if let Some(piezo) = piezo.filter(|piezo| piezo.samples != deflection.samples) {
@@ -36,12 +36,12 @@ pub(super) fn read_blocks(record: &Record, block_samples: usize) -> Result<Block
 }
 
 /// The free stretches of a record.
-pub(super) fn read_free(record: &Record, blocks: &Blocks, rule: FreeRule) -> Result<FreeStretches, StageError> {
+pub(crate) fn read_free(record: &Record, blocks: &Blocks, rule: FreeRule) -> Result<FreeStretches, StageError> {
     free_stretches(blocks, rule).map_err(|error| StageError::from_error(error).at(&record.path))
 }
 
 /// Feeds the free stretches of a record to a collector of segments.
-pub(super) fn push_free(record: &Record, stretches: &[Range<usize>], welch: &mut Welch) -> Result<(), StageError> {
+pub(crate) fn push_free(record: &Record, stretches: &[Range<usize>], welch: &mut Welch) -> Result<(), StageError> {
     let deflection = record.channel("deflection")?;
     let segment = welch.segment_samples();
     for stretch in stretches {
@@ -58,7 +58,7 @@ pub(super) fn push_free(record: &Record, stretches: &[Range<usize>], welch: &mut
 }
 
 /// The rate of all records. Errors: none, or two rates.
-pub(super) fn common_rate(records: &[Record]) -> Result<f64, StageError> {
+pub(crate) fn common_rate(records: &[Record]) -> Result<f64, StageError> {
     let Some(first) = records.first() else { return Err(StageError::new("there is no record")) };
     match records.iter().find(|record| record.sample_rate_hz != first.sample_rate_hz) {
         Some(other) => Err(StageError::new(format!(
@@ -70,7 +70,7 @@ pub(super) fn common_rate(records: &[Record]) -> Result<f64, StageError> {
 }
 
 /// `Err` unless `least <= value <= most`.
-pub(super) fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), StageError> {
+pub(crate) fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), StageError> {
     if (least..=most).contains(&value) {
         return Ok(());
     }

@@ -295,7 +295,7 @@ fn product(matrix: &[[f64; 5]; 5], vector: &[f64; 5]) -> [f64; 5] {
 }
 
 /// Inverse of a symmetric positive definite matrix after scaling to unit diagonal (Gauss-Jordan); `None` if it is not.
-pub(super) fn inverse(matrix: [[f64; 5]; 5]) -> Option<[[f64; 5]; 5]> {
+pub(crate) fn inverse(matrix: [[f64; 5]; 5]) -> Option<[[f64; 5]; 5]> {
     let scale: [f64; 5] = std::array::from_fn(|i| matrix[i][i].sqrt());
     if scale.iter().any(|s| !s.is_finite() || *s <= 0.0) {
         return None;

@@ -34,6 +34,19 @@ pub enum ForceError {
         /// Where it was looked for.
         near: usize,
     },
+    /// Matrices that do not fit together.
+    #[error("{name} of the model has {found} values, wanted {wanted}, more than none")]
+    Model {
+        /// Which matrix.
+        name: &'static str,
+        /// Its values.
+        found: usize,
+        /// What the order asks for.
+        wanted: usize,
+    },
+    /// What no reconstruction can use.
+    #[error("{0}")]
+    Reconstruction(&'static str),
     /// Load and noise are the same size.
     #[error("a load of {load:.3e} is within {sigmas:.1} standard errors of zero")]
     NoLoad {

@@ -12,15 +12,24 @@ mod extrapolate;
 mod extrapolation;
 mod line;
 mod onset;
+mod reconstruct;
+mod reconstruction;
+mod reconstruction_example;
+#[cfg(test)]
+mod reconstruction_tests;
 
 pub use error::ForceError;
 pub use extrapolate::{Event, ExtrapolationSettings, Lines, Pair, ZeroLine, extrapolate, pair};
 pub use extrapolation::{Extrapolation, ZeroLineKind};
 pub use line::{Line, Weighting, fit_line};
 pub use onset::{Onset, OnsetSettings, find_onset};
+pub use reconstruct::{
+    ForcePrior, IdentifiedModel, Reconstruction, ReconstructionSettings, Rise, band_inflation, reconstruct, rise,
+};
+pub use reconstruction::{NoiseSource, PriorKind, Reconstruction as ForceReconstruction};
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] = &[Entry::of::<Extrapolation>()];
+pub const STAGES: &[Entry] = &[Entry::of::<Extrapolation>(), Entry::of::<ForceReconstruction>()];
 
 #[cfg(test)]
 #[test]

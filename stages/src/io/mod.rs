@@ -11,6 +11,8 @@ mod natural_order;
 mod overview;
 mod records;
 mod records_example;
+mod spectrum;
+mod spectrum_example;
 mod stretch_extremes;
 
 pub use census::Census;
@@ -21,7 +23,10 @@ pub use memory::{MemorySource, memory_channel, memory_record};
 pub use natural_order::natural_order;
 pub use overview::Overview;
 pub use records::Records;
+pub(crate) use spectrum::DENSITY;
+pub use spectrum::Spectrum;
 pub use stretch_extremes::StretchExtremes;
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] = &[Entry::of::<Records>(), Entry::of::<Census>(), Entry::of::<Overview>()];
+pub const STAGES: &[Entry] =
+    &[Entry::of::<Records>(), Entry::of::<Census>(), Entry::of::<Overview>(), Entry::of::<Spectrum>()];

@@ -64,7 +64,7 @@ const RECORDS: Port<Recording> = Port::new("records", "records", "the records, i
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many records, how long, at what rate");
 
 /// Patterns into the shared data folder, with its root moved: `../../shared/data/afm/x/*.h5` becomes `ROOT/afm/x/*.h5`.
-fn moved(patterns: &[String], root: Option<&Path>) -> Vec<String> {
+pub(super) fn moved(patterns: &[String], root: Option<&Path>) -> Vec<String> {
     const SHARED: &str = "../../shared/data/";
     let moved = |pattern: &String| match (root, pattern.strip_prefix(SHARED)) {
         (Some(root), Some(rest)) => root.join(rest).display().to_string(),

@@ -60,6 +60,8 @@ pub struct Sampling {
 pub struct Motion {
     /// Detector output at each instant, as static deflection, m.
     pub signal_m: Vec<f64>,
+    /// Force of the sample on the tip at each instant, N: zero while free, negative while it holds the tip.
+    pub force_n: Vec<f64>,
     /// Every change of regime, in time.
     pub events: Vec<ContactEvent>,
 }
@@ -106,12 +108,13 @@ pub fn simulate_motion(
     rng: &mut ChaCha8Rng,
 ) -> Motion {
     let mut run = Run::start(system, lever, contact, drive, sampling, rng);
-    let mut signal_m = Vec::with_capacity(sampling.samples);
+    let (mut signal_m, mut force_n) = (Vec::with_capacity(sampling.samples), Vec::with_capacity(sampling.samples));
     for k in 0..sampling.samples {
+        force_n.push(run.force_n());
         signal_m.push(dot(&system.signal_weights, &run.state));
         run.advance_to(sampling.start_s + (k + 1) as f64 * sampling.interval_s, rng);
     }
-    Motion { signal_m, events: run.events }
+    Motion { signal_m, force_n, events: run.events }
 }
 
 struct Run<'a> {
@@ -217,6 +220,15 @@ impl<'a> Run<'a> {
             }
             self.arm();
         }
+    }
+
+    /// Force of the sample on the tip now.
+    fn force_n(&self) -> f64 {
+        if self.held_n.is_none() {
+            return 0.0;
+        }
+        let height = self.drive.height_m(self.half, self.time_s);
+        -self.system.tension_n(&self.state, height, self.drive.ramp.velocity_m_per_s(self.half))
     }
 
     /// How far `state` at `t_s` lies beyond the threshold of the present regime; positive: it has been crossed.

@@ -75,6 +75,8 @@ pub struct SimulatedRecord {
     pub deflection: Vec<i16>,
     /// Codes of the piezo monitor.
     pub piezo: Vec<i16>,
+    /// Force of the sample on the tip at each sample's instant (the detector's delay taken off), N.
+    pub force_n: Vec<f64>,
     /// Every event.
     pub events: Vec<RecordedEvent>,
     /// Deflection codes at a limit.
@@ -171,6 +173,7 @@ impl Microscope {
         SimulatedRecord {
             saturated: self.adc.saturated(&deflection),
             deflection,
+            force_n: motion.force_n,
             piezo: self.piezo_codes(&ramp, place),
             events: self.recorded(&motion.events, place),
         }

@@ -44,6 +44,24 @@ pub enum SpectrumError {
     /// An input that is zero throughout.
     #[error("the input is zero throughout: no transfer function can be derived from it")]
     NoInput,
+    /// Nothing stands out where a resonance is sought.
+    #[error(
+        "no resonance stands out between {lowest_hz} and {highest_hz} Hz: widen the range, or average longer segments"
+    )]
+    NoPeak {
+        /// Lower end of the search.
+        lowest_hz: f64,
+        /// Upper end of the search.
+        highest_hz: f64,
+    },
+    /// A fit that did not settle.
+    #[error("the fit of the resonance near {near_hz:.2} Hz did not settle: {reason}")]
+    NoFit {
+        /// Where it started.
+        near_hz: f64,
+        /// Why.
+        reason: &'static str,
+    },
     /// Too few defined bins for a local model.
     #[error("{got} bins are defined, a local model needs {wanted}")]
     TooFewBins {

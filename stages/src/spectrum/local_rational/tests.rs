@@ -50,6 +50,37 @@ fn a_local_rational_lowers_no_peak() {
 }
 
 #[test]
+fn resonances_two_bins_wide_are_kept_wherever_they_lie_between_the_bins() {
+    let bin = 5e6 / N as f64;
+    let v = vec![0.0; truth().0.len()];
+    for quarter in 0..4 {
+        let mut lever = Lever::paper();
+        for (f, q) in lever.frequency_hz.iter_mut().zip(&mut lever.quality_factor) {
+            *f = ((*f / bin).round() + 0.25 * f64::from(quarter)) * bin;
+            *q = *f / (2.0 * bin);
+        }
+        let f = truth().0;
+        let at = |f: &f64| {
+            let g = lever.transfer(faer::c64::new(0.0, TAU * f));
+            Complex64::new(g.re, g.im)
+        };
+        let g: Vec<Complex64> = f.iter().map(at).collect();
+        let bins = Bins { frequency_hz: &f, transfer: &g, variance: &v };
+        for half_width in [4, 10, 16] {
+            let got = local_rational(bins, settings(half_width), &[]).unwrap();
+            for resonance in &lever.frequency_hz {
+                let k = (resonance / bin).floor() as usize;
+                for k in [k, k + 1] {
+                    // wanted: a thousandth; measured: 1e-6
+                    let change = got.transfer[k].norm() / g[k].norm() - 1.0;
+                    assert!(change.abs() < 1e-5, "{resonance} half width {half_width}: {change:e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_fixed_parabola_lowers_the_peaks_by_tens_of_per_cent() {
     let (f, g) = truth();
     let v = vec![0.0; g.len()];
@@ -93,7 +124,7 @@ fn an_adaptive_parabola_keeps_the_peaks_and_smooths_between_them() {
 fn the_variance_is_that_of_repeated_measurements() {
     let (f, g) = truth();
     let variance = 2e-8;
-    let trials = 8;
+    let trials = 40;
     for known in [true, false] {
         let v = vec![if known { variance } else { 0.0 }; g.len()];
         let (mut seen, mut told, mut peaks, mut misfit) = (0.0, 0.0, 0.0, 0.0);
@@ -109,12 +140,14 @@ fn the_variance_is_that_of_repeated_measurements() {
                 peaks += (got.transfer[k] - g[k]).norm_sqr() / got.variance[k] / (4.0 * trials as f64);
             }
         }
-        // the choice between two models costs a tenth that the linearised variance does not count
-        assert!((0.95..1.25).contains(&(seen / told)), "{known} {}", seen / told);
-        // 32 exponential values: 4 sigma = 0.7, and the residual's own scatter when the variance is unknown
-        assert!((0.3..1.8).contains(&peaks), "{known} {peaks}");
+        println!("known {known}: seen / told {:.4}, at peaks {peaks:.3}, misfit {:.4e}", seen / told, misfit);
+        // 40 x 1967 bins, neighbours share their data over some 20: 4000 values, 1.6 %, three of them
+        assert!((0.95..1.05).contains(&(seen / told)), "{known} {}", seen / told);
+        // 160 exponential values: 4 sigma = 0.32, and the residual's own scatter when the variance is unknown
+        assert!((0.65..1.4).contains(&peaks), "{known} {peaks}");
         let expected = if known { 1.0 } else { variance };
-        assert!((misfit / expected - 1.0).abs() < 0.1, "{known} {misfit}");
+        // without the overfit 0.955; with it 4 % too large, since curvature too keeps the polynomial's share below one
+        assert!((misfit / expected - 1.0).abs() < 0.06, "{known} {misfit}");
     }
 }
 

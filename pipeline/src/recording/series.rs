@@ -1,0 +1,57 @@
+//! Plain series of numbers in HDF5 files of any layout: what other programs have stored.
+
+use std::path::Path;
+
+use super::Raw;
+use super::hash::inspect_file;
+use super::native::{Wanted, find, has_attribute, number_attribute, open_source};
+use super::source::Hdf5Source;
+use crate::error::StageError;
+use crate::store::read::open_file;
+
+/// Longest series that is read at once: a density or a sweep, not a recording.
+const LONGEST: usize = 1 << 26;
+
+/// Reads a one-dimensional dataset: stored * scale_factor + add_offset, where it has these attributes.
+///
+/// Errors: no file, not HDF5, damaged; no such dataset, not one-dimensional, not numbers, longer than 2^26 values.
+pub fn read_series(path: &Path, location: &str) -> Result<Vec<f64>, StageError> {
+    use super::Source;
+    if inspect_file(path)?.endless {
+        return Err(StageError::new("damaged: a heap collection of the HDF5 file never ends").at(path));
+    }
+    let optional = |name: &str, otherwise: f64| -> Result<f64, StageError> {
+        Ok(read_number_attribute(path, location, name)?.unwrap_or(otherwise))
+    };
+    let (scale, offset) = (optional("scale_factor", 1.0)?, optional("add_offset", 0.0)?);
+    let source: Hdf5Source = open_source(path, location)?;
+    if source.samples > LONGEST {
+        let problem = format!("{location} has {} values, wanted at most {LONGEST}", source.samples);
+        return Err(StageError::new(problem).at(path));
+    }
+    let values: Vec<f64> = match source.read(0, source.samples)? {
+        Raw::Int16(codes) => codes.into_iter().map(f64::from).collect(),
+        Raw::Int32(codes) => codes.into_iter().map(f64::from).collect(),
+        Raw::Float32(values) => values.into_iter().map(f64::from).collect(),
+        Raw::Float64(values) => values,
+    };
+    Ok(values.into_iter().map(|value| value * scale + offset).collect())
+}
+
+/// A single number in an attribute of a dataset, or of the file (`/`); none where there is no such attribute.
+///
+/// Errors: no file, no such dataset, an attribute that is not one number.
+pub fn read_number_attribute(path: &Path, location: &str, name: &str) -> Result<Option<f64>, StageError> {
+    let file = open_file(path)?;
+    let found = if location == "/" {
+        has_attribute(&file, name).then(|| number_attribute(&file, location, name)).transpose()
+    } else {
+        match find(&file, path, &Wanted { role: "series", location, required: true })? {
+            Some(dataset) => {
+                has_attribute(&dataset, name).then(|| number_attribute(&dataset, location, name)).transpose()
+            }
+            None => Ok(None),
+        }
+    };
+    found.map_err(|error| error.at(path))
+}

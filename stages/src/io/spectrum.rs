@@ -1,0 +1,224 @@
+//! The stage `io.spectrum`.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::recording::{read_number_attribute, read_series};
+use afmid_pipeline::{Array, Axis, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::file_patterns::matching_files;
+use super::records::moved;
+
+/// Opens a power spectral density that another program has averaged and stored.
+///
+/// # Model
+/// Two one-dimensional HDF5 datasets of one length: frequencies, equally spaced and ascending, and the one-sided density at them. Each value is the mean of
+/// `averages` independent periodograms.
+/// # Method
+/// Both are read and checked; frequencies outside the range are left out. Nothing is rescaled but by `scale`.
+/// # Shapes
+/// One value per frequency.
+/// # Units
+/// Hz; the density in `unit`, squared, per hertz, as stored times `scale`.
+/// # Accuracy
+/// `standard_error` is the density over the square root of the number of averages.
+/// # Errors
+/// No such file or dataset; lengths that differ; frequencies that do not ascend in equal steps; a density that is not positive; no number of averages.
+/// # Source
+/// P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70, for the scatter of an average.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Spectrum {
+    /// The file, relative to the config file. A path that begins with `../../shared/data/` begins at the variable `AFMID_DATA` where that is set. Required.
+    pub file: String,
+    /// Dataset of the frequencies, in Hz. Default: `/x`.
+    pub frequency: String,
+    /// Dataset of the one-sided density. Default: `/y`.
+    pub density: String,
+    /// Unit of the signal whose density it is. Default: V.
+    pub unit: String,
+    /// Factor from the stored density to `unit`^2/Hz, above 0. Default: 1; 0.5 for a density that has been doubled once too often.
+    pub scale: f64,
+    /// Independent spectra that were averaged, 1 to 1e9. Default: the attribute `n_avg` of the density's dataset or of the file.
+    pub averages: Option<f64>,
+    /// Frequencies below are left out, in Hz, 0 or more. Default: 0.
+    pub lowest_hz: f64,
+    /// Frequencies above are left out, in Hz. Default: none.
+    pub highest_hz: Option<f64>,
+}
+
+impl Default for Spectrum {
+    fn default() -> Self {
+        Self {
+            file: String::new(),
+            frequency: "/x".to_owned(),
+            density: "/y".to_owned(),
+            unit: "V".to_owned(),
+            scale: 1.0,
+            averages: None,
+            lowest_hz: 0.0,
+            highest_hz: None,
+        }
+    }
+}
+
+/// What `spectrum.thermal` takes.
+pub(crate) const DENSITY: Port<Array> = Port::new(
+    "density",
+    "power-density",
+    "one-sided power spectral density over frequency, with its number of averages",
+);
+
+impl Stage for Spectrum {
+    const SPEC: Spec = Spec {
+        name: "io.spectrum",
+        version: 1,
+        summary: "opens a stored power spectral density",
+        inputs: &[],
+        outputs: &[DENSITY.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        for (name, value) in [("file", &self.file), ("frequency", &self.frequency), ("density", &self.density)] {
+            if value.is_empty() {
+                return Err(StageError::new(format!("`{name}` is empty")));
+            }
+        }
+        if !(self.scale.is_finite() && self.scale > 0.0) {
+            return Err(StageError::new(format!("`scale` is {}, wanted above 0", self.scale)));
+        }
+        if let Some(averages) = self.averages.filter(|n| !(1.0..=1e9).contains(n)) {
+            return Err(StageError::new(format!("`averages` is {averages}, wanted 1 to 1e9")));
+        }
+        let highest = self.highest_hz.unwrap_or(f64::INFINITY);
+        if !(self.lowest_hz >= 0.0 && self.lowest_hz.is_finite() && highest > self.lowest_hz) {
+            return Err(StageError::new(format!(
+                "frequencies from {} to {highest} Hz, wanted `lowest_hz` from 0 and below `highest_hz`",
+                self.lowest_hz
+            )));
+        }
+        Ok(())
+    }
+
+    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+        let root = std::env::var_os("AFMID_DATA");
+        matching_files(&moved(std::slice::from_ref(&self.file), root.as_deref().map(Path::new)), base)
+    }
+
+    fn location_params() -> &'static [&'static str] {
+        &["file"]
+    }
+
+    fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let paths = self.sources(cx.base())?;
+        let [path] = &paths[..] else {
+            return Err(StageError::new(format!("`file` matches {} files, wanted one", paths.len())));
+        };
+        let (f, p) = (read_series(path, &self.frequency)?, read_series(path, &self.density)?);
+        let averages = match self.averages {
+            Some(averages) => averages,
+            None => self.stored_averages(path)?,
+        };
+        check_spectrum(&f, &p).map_err(|error| error.at(path))?;
+        let highest = self.highest_hz.unwrap_or(f64::INFINITY);
+        let inside = |f: f64| f >= self.lowest_hz && f <= highest;
+        let (f, p): (Vec<f64>, Vec<f64>) =
+            f.into_iter().zip(p).filter(|(f, _)| inside(*f)).map(|(f, p)| (f, p * self.scale)).unzip();
+        if f.is_empty() {
+            return Err(StageError::new("no frequency between `lowest_hz` and `highest_hz`").at(path));
+        }
+        Ok(Ports::new().with(&DENSITY, density_array(f, p, averages, &self.unit)))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::spectrum_example::examples()
+    }
+}
+
+impl Spectrum {
+    fn stored_averages(&self, path: &Path) -> Result<f64, StageError> {
+        const NAME: &str = "n_avg";
+        for location in [self.density.as_str(), "/"] {
+            match read_number_attribute(path, location, NAME)? {
+                Some(n) if n.is_finite() && n >= 1.0 => return Ok(n),
+                Some(n) => {
+                    return Err(StageError::new(format!("{location}: `{NAME}` is {n}, wanted 1 or more")).at(path));
+                }
+                None => {}
+            }
+        }
+        Err(StageError::new(format!("neither `{}` nor the file has the attribute `{NAME}`", self.density))
+            .at(path)
+            .help("set `averages` to the number of independent spectra in the mean"))
+    }
+}
+
+/// A density as `spectrum.thermal` takes it.
+fn density_array(frequency_hz: Vec<f64>, density: Vec<f64>, averages: f64, unit: &str) -> Array {
+    let square = format!("{unit}^2/Hz");
+    let error: Vec<f64> = density.iter().map(|p| p / averages.sqrt()).collect();
+    let over = &["frequency_hz"];
+    Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", frequency_hz)])
+        .with("density", &square, "one-sided power spectral density", over, density)
+        .with("standard_error", &square, "its standard error", over, error)
+        .attribute("averages", averages)
+        .attribute("signal_unit", unit)
+}
+
+fn check_spectrum(f: &[f64], p: &[f64]) -> Result<(), StageError> {
+    if f.len() != p.len() || f.len() < 2 {
+        return Err(StageError::new(format!(
+            "{} frequencies and {} densities, wanted as many, two or more",
+            f.len(),
+            p.len()
+        )));
+    }
+    let step = (f[f.len() - 1] - f[0]) / (f.len() - 1) as f64;
+    // NaN fails both comparisons
+    let even = |pair: &[f64]| (pair[1] - pair[0] - step).abs() <= 1e-3 * step;
+    if let Some(at) = f.windows(2).position(|pair| !even(pair)) {
+        return Err(StageError::new(format!(
+            "the frequencies {} and {} Hz, number {at} and the next, are not one step of {step} Hz apart",
+            f[at],
+            f[at + 1]
+        )));
+    }
+    match p.iter().position(|p| !(p.is_finite() && *p > 0.0)) {
+        Some(at) => Err(StageError::new(format!("the density at {} Hz is {}, wanted above zero", f[at], p[at]))
+            .help("a first bin that is zero: set `lowest_hz`")),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spectra_that_no_fit_could_use_are_refused() {
+        assert!(check_spectrum(&[1.0, 2.0, 3.0], &[1.0, 1.0, 1.0]).is_ok());
+        for (f, p, said) in [
+            (vec![1.0, 2.0], vec![1.0], "1 densities"),
+            (vec![1.0, 2.0, 4.0], vec![1.0; 3], "not one step"),
+            (vec![1.0, f64::NAN, 3.0], vec![1.0; 3], "not one step"),
+            (vec![0.0, 1.0, 2.0], vec![0.0, 1.0, 1.0], "at 0 Hz is 0"),
+        ] {
+            let error = check_spectrum(&f, &p).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
+    }
+
+    #[test]
+    fn parameters_are_checked_alone() {
+        let good = Spectrum { file: "a.h5".to_owned(), ..Spectrum::default() };
+        assert!(good.check().is_ok());
+        assert!(Spectrum::default().check().is_err());
+        assert!(Spectrum { scale: 0.0, ..good.clone() }.check().is_err());
+        assert!(Spectrum { averages: Some(0.5), ..good.clone() }.check().is_err());
+        assert!(Spectrum { highest_hz: Some(0.0), ..good }.check().is_err());
+    }
+}

@@ -1,0 +1,170 @@
+//! The stage `spectrum.welch`.
+
+use afmid_pipeline::{
+    Array, Axis, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError,
+};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::{RecordSpectrum, average_spectra};
+use crate::calibration::FreeSettings;
+use crate::calibration::Welch as Collector;
+use crate::calibration::reading::{common_rate, push_free, read_blocks, read_free, within};
+use crate::io::DENSITY;
+
+/// Power spectral density of all free stretches, with its uncertainty.
+///
+/// # Model
+/// Stationary noise while the lever is free: each segment's periodogram is exponentially distributed about the density.
+/// # Method
+/// Segments under a Hann window, each overlapping the next by half, their means removed; averaged over all free stretches of all records.
+/// # Shapes
+/// One value per bin, from zero to half the sample rate.
+/// # Units
+/// V^2/Hz, one-sided; its sum times the bin width is the mean square.
+/// # Accuracy
+/// `standard_error` from the number of independent segments (overlap counted), `record_error` from the scatter between records, which also holds drift: where the
+/// second is larger, the noise is not stationary. A bin sees an equivalent noise bandwidth of 1.5 bins; neighbours correlate by 4/9 and 1/36.
+/// # Errors
+/// No free stretch as long as a segment; records of two rates.
+/// # Source
+/// P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70; F. J. Harris, Proc. IEEE 66 (1978) 51.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Welch {
+    /// Samples per segment, even, 16 to 4194304. Default: 16384: bins of 305 Hz at 5 MS/s, a quarter of the paper's first peak.
+    pub segment_samples: usize,
+    /// What counts as a free stretch.
+    pub free: FreeSettings,
+}
+
+impl Default for Welch {
+    fn default() -> Self {
+        Self { segment_samples: 16_384, free: FreeSettings::default() }
+    }
+}
+
+const RECORDS: Port<Recording> = Port::new("records", "records", "the records; channel `deflection`");
+pub(super) const SUMMARY: Port<Document> =
+    Port::new("summary", "summary", "segments, degrees of freedom, bandwidth, whether records agree");
+
+impl Stage for Welch {
+    const SPEC: Spec = Spec {
+        name: "spectrum.welch",
+        version: 1,
+        summary: "averages periodograms of free stretches into a density with its uncertainty",
+        inputs: &[RECORDS.spec()],
+        outputs: &[DENSITY.spec(), SUMMARY.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        within("segment_samples", self.segment_samples as f64, 16.0, 4_194_304.0)?;
+        if self.segment_samples % 2 == 1 {
+            return Err(StageError::new(format!(
+                "`segment_samples` is {}, wanted an even number",
+                self.segment_samples
+            )));
+        }
+        self.free.check()
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let records = &inputs.get(&RECORDS)?.records;
+        let rate = common_rate(records)?;
+        let empty = Collector::new(self.segment_samples, rate).map_err(StageError::from_error)?;
+        cx.expect(records.len());
+        let spectra: Vec<Option<RecordSpectrum>> = records
+            .par_iter()
+            .map(|record| {
+                let spectrum = self.spectrum(record, rate, &empty);
+                cx.tick();
+                spectrum
+            })
+            .collect::<Result<_, StageError>>()?;
+        let found: Vec<RecordSpectrum> = spectra.into_iter().flatten().collect();
+        let average = average_spectra(&found).map_err(|_| {
+            StageError::new(format!("no free stretch of {} samples in {} records", self.segment_samples, records.len()))
+                .help("lower `segment_samples`, or `free.settle_s`")
+        })?;
+        let bin_hz = rate / self.segment_samples as f64;
+        // mean square of the records' scatter over what chance allows, bins of the removed mean left out
+        let ratio = |k: usize| (average.record_error[k] / average.standard_error[k]).powi(2);
+        let inner = 4..average.density.len().saturating_sub(4);
+        let excess = inner.clone().map(ratio).sum::<f64>() / inner.len().max(1) as f64;
+        if excess > 2.0 {
+            cx.warn(format!(
+                "the records' spectra scatter {excess:.1} times as much as chance: the noise is not stationary"
+            ));
+        }
+        let summary = Document::new(&json!({
+            "records": found.len(),
+            "segments": average.segments,
+            "averages": average.averages,
+            "degrees_of_freedom": 2.0 * average.averages,
+            "bin_hz": bin_hz,
+            "equivalent_noise_bandwidth_hz": 1.5 * bin_hz,
+            "record_scatter": excess.is_finite().then_some(excess),
+            "mean_square_v2": average.density.iter().sum::<f64>() * bin_hz,
+        }))?;
+        let frequency = (0..average.density.len()).map(|k| k as f64 * bin_hz).collect();
+        let over = &["frequency_hz"];
+        let density = Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", frequency)])
+            .with("density", "V^2/Hz", "one-sided power spectral density", over, average.density)
+            .with("standard_error", "V^2/Hz", "its standard error if stationary", over, average.standard_error)
+            .with(
+                "record_error",
+                "V^2/Hz",
+                "its standard error from the scatter of records",
+                over,
+                average.record_error,
+            )
+            .attribute("averages", average.averages)
+            .attribute("segments", average.segments)
+            .attribute("window", "hann")
+            .attribute("signal_unit", "V")
+            .attribute("equivalent_noise_bandwidth_hz", 1.5 * bin_hz)
+            .attribute("sample_rate_hz", rate);
+        Ok(Ports::new().with(&DENSITY, density).with(&SUMMARY, summary))
+    }
+
+    fn examples() -> Vec<Example> {
+        vec![Example {
+            title: "four records of one lever, free",
+            params: "segment_samples = 8192",
+            inputs: crate::calibration::free_records,
+            expect: |outputs| {
+                let summary = &outputs.get(&SUMMARY).map_err(|error| error.to_string())?.0;
+                let number = |name: &str| summary[name].as_f64().unwrap_or(f64::NAN);
+                let (segments, averages) = (number("segments"), number("averages"));
+                // 4 stretches of some 12 segments: worth 1 / (1 + 2/36) each, less the ends
+                if segments > 40.0 && (0.94..0.96).contains(&(averages / segments)) && number("record_scatter") < 1.5 {
+                    Ok(format!("{segments} segments are worth {averages:.1} independent ones."))
+                } else {
+                    Err(format!("{summary}"))
+                }
+            },
+        }]
+    }
+}
+
+impl Welch {
+    /// A record's average; none without a free stretch that is long enough.
+    fn spectrum(&self, record: &Record, rate: f64, empty: &Collector) -> Result<Option<RecordSpectrum>, StageError> {
+        let rule = self.free.rule(rate, self.segment_samples);
+        let free = read_free(record, &read_blocks(record, self.free.block_samples)?, rule)?;
+        let mut collector = empty.fresh();
+        push_free(record, &free.stretches, &mut collector)?;
+        let stretches = free.stretches.iter().filter(|stretch| stretch.len() >= self.segment_samples).count();
+        let Ok(average) = collector.average() else { return Ok(None) };
+        Ok(Some(RecordSpectrum {
+            density: average.density_v2_per_hz,
+            segments: average.segments,
+            pairs: average.segments.saturating_sub(stretches),
+        }))
+    }
+}
