@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::consistency::{Consistency, check_consistency};
 use super::file_patterns::matching_files;
+use super::shared_data::moved;
 
 /// Opens native HDF5 records by pattern.
 ///
@@ -61,24 +62,6 @@ impl Default for Records {
 const RECORDS: Port<Recording> = Port::new("records", "records", "the records, in natural order of their paths");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many records, how long, at what rate");
 
-/// Patterns into the shared data folder, with its root moved: `../../shared/data/afm/x/*.h5` becomes `ROOT/afm/x/*.h5`.
-fn moved(patterns: &[String], root: Option<&Path>) -> Vec<String> {
-    const SHARED: &str = "../../shared/data/";
-    let moved = |pattern: &String| match (root, pattern.strip_prefix(SHARED)) {
-        (Some(root), Some(rest)) => root.join(rest).display().to_string(),
-        _ => pattern.clone(),
-    };
-    patterns.iter().map(moved).collect()
-}
-
-#[cfg(test)]
-#[test]
-fn the_root_of_shared_data_moves_and_other_patterns_stay() {
-    let patterns = ["../../shared/data/afm/x/*.h5".to_owned(), "archive/*.h5".to_owned()];
-    assert_eq!(moved(&patterns, Some(Path::new("/data"))), ["/data/afm/x/*.h5", "archive/*.h5"]);
-    assert_eq!(moved(&patterns, None), patterns);
-}
-
 impl Stage for Records {
     const SPEC: Spec = Spec {
         name: "io.records",
@@ -109,7 +92,9 @@ impl Stage for Records {
 
     fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
         let root = std::env::var_os("AFMID_DATA");
-        matching_files(&moved(&self.files, root.as_deref().map(Path::new)), base)
+        let root = root.as_deref().map(Path::new);
+        let files: Vec<String> = self.files.iter().map(|pattern| moved(pattern, root)).collect();
+        matching_files(&files, base)
     }
 
     fn location_params() -> &'static [&'static str] {
