@@ -170,7 +170,8 @@ pub(crate) fn minimise(problem: &Problem, start: State, limits: Limits) -> Resul
 fn descend(problem: &Problem, start: State, limits: Limits) -> Result<State, ModelError> {
     let (mut lambda, down, up, floor) = DAMPING;
     let mut state = start;
-    let output: f64 = problem.experiments.iter().flat_map(|(_, y)| y.iter()).filter(|y| !y.is_nan()).map(|y| y * y).sum();
+    let output: f64 =
+        problem.experiments.iter().flat_map(|(_, y)| y.iter()).filter(|y| !y.is_nan()).map(|y| y * y).sum();
     state.ending = Ending::IterationLimit;
     for _ in 0..limits.iterations {
         if state.projection.cost <= EXACT * output {
