@@ -199,7 +199,7 @@ fn bic(fit: &Identified, noise: NoiseModel) -> f64 {
     let present: Vec<f64> = fit.residuals.iter().flatten().copied().filter(|e| e.is_finite()).collect();
     let (n, order) = (present.len() as f64, fit.model.order());
     let noise = match noise {
-        NoiseModel::White => 0,
+        NoiseModel::White | NoiseModel::Coloured => 0,
         NoiseModel::Thermal => order.div_ceil(2),
         NoiseModel::Free => order,
     };

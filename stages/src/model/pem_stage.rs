@@ -41,7 +41,8 @@ pub struct Pem {
     /// Most iterations in each stretch of the search, 1 to 10000. Default: 60; ten to thirty are usual.
     pub max_iterations: usize,
     /// Parametrisation of the Kalman gain: `thermal` (white output noise and a white force on every section, one intensity each), `free` (all its
-    /// elements) or `white` (none: output error). Default: thermal; a free gain also fits the dips that the fit itself leaves at resonances.
+    /// elements), `white` (none: output error) or `coloured` (none; the errors are whitened by an autoregressive filter of their own, for noise that does not
+    /// pass through the model's poles). Default: thermal; a free gain also fits the dips that the fit itself leaves at resonances.
     pub noise: NoiseKind,
     /// Which errors are made small: `prediction` (one sample ahead) or `simulation` (output error, started from the best of the subspace estimates and the
     /// prediction model; K is zero). Default: prediction, the most efficient where the noise model holds.
@@ -89,6 +90,8 @@ pub enum NoiseKind {
     Thermal,
     /// Every element free.
     Free,
+    /// Zero; the noise has an autoregressive filter of its own.
+    Coloured,
     /// Zero.
     White,
 }
@@ -212,6 +215,7 @@ impl Pem {
                 NoiseKind::Thermal => NoiseModel::Thermal,
                 NoiseKind::Free => NoiseModel::Free,
                 NoiseKind::White => NoiseModel::White,
+                NoiseKind::Coloured => NoiseModel::Coloured,
             },
             focus: match self.focus {
                 FocusKind::Prediction => Focus::Prediction,

@@ -3,6 +3,7 @@
 use faer::{Mat, c64};
 use realfft::RealFftPlanner;
 
+use super::autoregression::whitened;
 use super::covariance::{ResidualColour, covariance};
 use super::gradient::{Noise, Point};
 use super::noise::{gain, intensities};
@@ -75,6 +76,8 @@ pub enum NoiseModel {
     Thermal,
     /// K free: n parameters.
     Free,
+    /// K = 0, the noise whitened by an autoregressive filter of its own (Box and Jenkins): for noise that does not pass through the model's poles.
+    Coloured,
 }
 
 /// Which errors are made small.
@@ -170,6 +173,10 @@ pub fn identify(
     let prediction = |starts: Vec<State>| match options.noise {
         NoiseModel::White => minimise(&problem, refined(&problem, starts, limits)?, limits),
         NoiseModel::Free if many => lowest(&problem, predictors(&problem, &poles, &starts), options.starts, limits),
+        NoiseModel::Coloured => {
+            let points = starts.into_iter().map(|state| state.point).collect();
+            whitened(&problem, lowest(&problem, points, options.starts, limits)?, limits)
+        }
         noise => thermal_or_free(&problem, starts, limits, noise),
     };
     let state = match options.focus {
@@ -398,11 +405,12 @@ fn conclude(
     let a = state.point.a();
     let c = match &state.point.noise {
         Noise::White => a.clone(),
+        Noise::Frozen(..) if options.noise == NoiseModel::Coloured => a.clone(),
         Noise::Frozen(_, c) => c.clone(),
         Noise::Free(c) => sections(c),
     };
-    let gains = match &state.point.noise {
-        Noise::White => vec![[0.0; 2]; a.len()],
+    let gains = match (&state.point.noise, options.noise) {
+        (Noise::White, _) | (_, NoiseModel::Coloured) => vec![[0.0; 2]; a.len()],
         _ => kalman_gains(n, &a, &c)?,
     };
     let inputs: Vec<InputGains> = (0..problem.inputs)

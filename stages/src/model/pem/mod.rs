@@ -1,5 +1,6 @@
 //! Prediction error method: the innovations form of Eq. 8, fitted by minimum one-step prediction error.
 
+mod autoregression;
 mod covariance;
 mod gradient;
 mod identify;
