@@ -10,8 +10,8 @@ Errors: moving-block bootstrap of the test half. Nothing is selected on it; peer
 """
 
 import argparse
+import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -75,23 +75,22 @@ def bootstrap(errors, y, seed=1):
     return {name: fit_percent((e[rows] ** 2).sum(axis=1), variation) for name, e in errors.items()}
 
 
-def afmid(program, work, config, output, order, inputs):
+def afmid(program, work, config, output, order):
     """Runs the shipped config at another order and output; the model, and the fit that afmid itself states."""
     result = work / f"{config}-{output}-{order}.h5"
     settings = [f"model.order={order}", f"subspace.order={order}", f"data.output={output + 1}"]
     arguments = [program, "run", ROOT / f"configs/daisy-{config}.toml", "-o", result, "--cache", work / "cache"]
     arguments += [part for setting in settings for part in ("--set", setting)]
     subprocess.run([str(argument) for argument in arguments], check=True, stderr=subprocess.DEVNULL)
-    models = {}
     with h5py.File(result) as file:
-        for stage in ("model", "subspace"):
-            found = {}
-            file.visititems(lambda name, item: found.update({name: item}) if f"/{stage}/" in f"/{name}/" else None)
-            matrix = lambda letter: next(np.array(item) for name, item in found.items() if re.search(rf"(^|/){letter}$", name))
-            models[stage] = (matrix("a"), matrix("b").reshape(-1, inputs), matrix("c").ravel(), matrix("d").ravel())
-    shown = subprocess.run([str(program), "show", str(result), "modes", "--json"], check=True, capture_output=True, text=True)
-    import json
-
+        part = lambda stage, letter: np.array(file[f"entry/{stage}/model/{letter}"])
+        models = {
+            stage: (part(stage, "A"), part(stage, "B"), part(stage, "C").ravel(), part(stage, "D").ravel())
+            for stage in ("model", "subspace")
+        }
+    shown = subprocess.run(
+        [str(program), "show", str(result), "modes", "--json"], check=True, capture_output=True, text=True
+    )
     return models, json.loads(shown.stdout)["fit_percent"]["held_out"]
 
 
@@ -165,7 +164,7 @@ def main():
         for config, file, inputs, output, channels in ROWS:
             for order in ORDERS[config]:
                 (u, y), test = halves(file, inputs, output)
-                ours, stated = afmid(options.program, work, config, output, order, len(inputs))
+                ours, stated = afmid(options.program, work, config, output, order)
                 name = f"{config}-{output}-{order}"
                 models = {f"afmid {stage}": model for stage, model in ours.items()}
                 models |= {method: model for (job, method), model in from_octave.items() if job == name}
