@@ -49,6 +49,9 @@ pub struct Pem {
     pub focus: FocusKind,
     /// Starts that are refined, 1 to 100. Default: 3; more than three also take subspace estimates with instruments, which records of rich input need (8).
     pub starts: usize,
+    /// Prior against responses that the data do not ask for, 0 to 1: as if white noise of this share of each input's energy had been put in and nothing had come
+    /// out. Default: 0, none. Records that excite a narrow band need one to say anything beyond it: the share of noise in the output, over the samples.
+    pub prior: f64,
     /// Estimate a constant offset of the response. Default: true.
     pub offset: bool,
     /// Estimate a linear drift of the response. Default: true; averaged records wander.
@@ -117,6 +120,7 @@ impl Default for Pem {
             noise: NoiseKind::Thermal,
             focus: FocusKind::Prediction,
             starts: 3,
+            prior: 0.0,
             offset: true,
             drift: true,
             before_s: None,
@@ -150,6 +154,9 @@ impl Stage for Pem {
         within("starts", self.starts, 1, 100)?;
         within("max_iterations", self.max_iterations, 1, 10_000)?;
         within("test_lags", self.test_lags, 1, 1000)?;
+        if !(0.0..=1.0).contains(&self.prior) {
+            return Err(StageError::new(format!("`prior` is {}, wanted 0 to 1", self.prior)));
+        }
         match self.before_s {
             Some(before) if !(before > 0.0 && before.is_finite()) => {
                 Err(StageError::new(format!("`before_s` is {before}, wanted above 0")))
@@ -222,6 +229,7 @@ impl Pem {
                 FocusKind::Simulation => Focus::Simulation,
             },
             starts: self.starts,
+            prior: self.prior,
             ..PemOptions::default()
         }
     }

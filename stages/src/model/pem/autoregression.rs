@@ -33,8 +33,9 @@ pub(crate) fn whitened(problem: &Problem, mut state: State, limits: Limits) -> R
 
 /// Sections of the polynomial that whitens `e` (rows of all experiments). Errors: no convergence of its roots.
 fn autoregression(problem: &Problem, e: &[f64]) -> Result<Vec<[f64; 2]>, ModelError> {
-    let most = LARGEST.min(e.len() / SAMPLES_EACH).max(1);
-    let polynomial = levinson(&autocovariance(problem, e, most), e.len());
+    let samples = problem.measured().iter().map(|(_, y)| y.len()).sum();
+    let most = LARGEST.min(samples / SAMPLES_EACH).max(1);
+    let polynomial = levinson(&autocovariance(problem, e, most), samples);
     let order = polynomial.len();
     if order == 0 {
         return Ok(Vec::new());
@@ -49,7 +50,7 @@ fn autoregression(problem: &Problem, e: &[f64]) -> Result<Vec<[f64; 2]>, ModelEr
 fn autocovariance(problem: &Problem, e: &[f64], most: usize) -> Vec<f64> {
     let mut sums = vec![0.0; most + 1];
     let mut rest = e;
-    for (_, y) in &problem.experiments {
+    for (_, y) in problem.measured() {
         let (own, more) = rest.split_at(y.len());
         rest = more;
         for (lag, sum) in sums.iter_mut().enumerate() {
@@ -105,6 +106,7 @@ mod tests {
                 offset: false,
                 slope: false,
                 missing: Vec::new(),
+                priors: 0,
             };
             let found = levinson(&autocovariance(&problem, &y, 12), 4000);
             // standard error sqrt((1 - 0.8^2) / 4000) = 0.0095: four of them; BIC errs upwards in one of hundreds

@@ -44,6 +44,9 @@ pub struct PemOptions {
     pub focus: Focus,
     /// Starts that are refined, at least 1; default 3. Measured records of rich input need more: 8.
     pub starts: usize,
+    /// Prior against responses that the data do not ask for, 0 or more: as if white noise of this share of each input's energy had been put in and nothing had
+    /// come out. Default 0: none. It biases every estimate; the covariance does not count that.
+    pub prior: f64,
     /// Share of the residual in the tangent space that counts as zero gradient; default 1e-4: a hundredth of a standard error at 8192 samples.
     pub gradient_tolerance: f64,
     /// How the covariance treats the residual; default its own spectrum.
@@ -61,6 +64,7 @@ impl Default for PemOptions {
             noise: NoiseModel::Thermal,
             focus: Focus::Prediction,
             starts: 3,
+            prior: 0.0,
             gradient_tolerance: 1e-4,
             colour: ResidualColour::Spectrum,
         }
@@ -158,7 +162,10 @@ pub fn identify(
     sample_time_s: f64,
     options: &PemOptions,
 ) -> Result<Identified, ModelError> {
-    let problem = checked(experiments, sample_time_s, options)?;
+    let mut problem = checked(experiments, sample_time_s, options)?;
+    let prior = prior_records(experiments, problem.inputs, options)?;
+    problem.experiments.extend(prior.iter().map(|(input, output)| (input.as_slice(), output.as_slice())));
+    problem.priors = prior.len();
     let longest =
         experiments.iter().max_by_key(|experiment| experiment.output.len()).ok_or(ModelError::NoExperiment)?;
     let (input, output) = complete(longest, options)?;
@@ -184,6 +191,34 @@ pub fn identify(
         Focus::Simulation => simulation(&problem, starts, prediction, options.starts, limits)?,
     };
     conclude(&problem, &state, sample_time_s, options, subspace.singular_values().to_vec())
+}
+
+/// Input and output of each input's prior: an impulse of the share's energy, and silence. Errors: a share that is negative or not finite.
+fn prior_records(
+    experiments: &[Experiment<'_>],
+    inputs: usize,
+    options: &PemOptions,
+) -> Result<Vec<(Vec<f64>, Vec<f64>)>, ModelError> {
+    if !(options.prior >= 0.0 && options.prior.is_finite()) {
+        return Err(ModelError::Parameter { name: "prior", found: options.prior, wanted: "0 or more" });
+    }
+    if options.prior == 0.0 {
+        return Ok(Vec::new());
+    }
+    let samples = experiments.iter().map(|experiment| experiment.output.len()).max().unwrap_or(0);
+    let energy = |input: usize| -> f64 {
+        let own = |e: &Experiment<'_>| {
+            let n = e.output.len();
+            e.input[input * n..(input + 1) * n].iter().map(|u| u * u).sum::<f64>()
+        };
+        experiments.iter().map(own).sum()
+    };
+    let record = |input: usize| {
+        let mut impulse = vec![0.0; inputs * samples];
+        impulse[input * samples] = (options.prior * energy(input)).sqrt();
+        (impulse, vec![0.0; samples])
+    };
+    Ok((0..inputs).map(record).collect())
 }
 
 /// The model of these poles (order many) whose simulation is closest: b, D, x0, offset and slope by least squares, no iteration; K = 0.
@@ -330,7 +365,7 @@ fn thermal_noise(problem: &Problem, state: &State) -> Result<Noise, ModelError> 
     let mut planner = RealFftPlanner::<f64>::new();
     let mut top = 0;
     let mut spectra = Vec::new();
-    for (_, y) in &problem.experiments {
+    for (_, y) in problem.measured() {
         spectra.push((tangent.spectra(&e, top, y.len(), &mut planner), y.len()));
         top += y.len();
     }
@@ -390,6 +425,7 @@ fn checked<'a>(
         offset: options.offset,
         slope: options.slope,
         missing,
+        priors: 0,
     })
 }
 
@@ -429,13 +465,15 @@ fn conclude(
     let mut e = state.residual();
     problem.missing.iter().for_each(|&row| e[row] = 0.0);
     let covariance = parameter_covariance(problem, state, &e, options.colour)?;
-    let present = e.len() - problem.missing.len();
+    let lengths: Vec<usize> = problem.measured().iter().map(|(_, y)| y.len()).collect();
+    let (count, measured) = (lengths.len(), lengths.iter().sum::<usize>());
+    e.truncate(measured);
+    let cost = e.iter().map(|e| e * e).sum::<f64>();
+    let present = measured - problem.missing.len();
     problem.missing.iter().for_each(|&row| e[row] = f64::NAN);
     let own = |index: usize, entry: usize| theta[problem.nuisance_column(index) + entry];
-    let count = problem.experiments.len();
-    let lengths: Vec<usize> = problem.experiments.iter().map(|(_, y)| y.len()).collect();
     let half = |index: usize| 0.5 * (lengths[index] as f64 - 1.0) * sample_time_s;
-    let freedom = present.saturating_sub(state.point.len() + problem.columns()).max(1);
+    let freedom = present.saturating_sub(state.point.len() + problem.nuisance_column(count)).max(1);
     let mut rest = e.as_slice();
     let residuals = lengths
         .iter()
@@ -454,7 +492,7 @@ fn conclude(
         slopes: (0..count)
             .map(|i| if problem.slope { own(i, n + usize::from(problem.offset)) / half(i) } else { 0.0 })
             .collect(),
-        innovation_variance: state.projection.cost / freedom as f64,
+        innovation_variance: cost / freedom as f64,
         residuals,
         covariance,
         predictor_poles: c.iter().enumerate().flat_map(|(i, &c)| roots(c, section_order(n, i))).collect(),

@@ -18,6 +18,8 @@ pub(crate) struct Problem<'a> {
     pub slope: bool,
     /// Rows (over all experiments, ascending) whose output is missing; they take no part. Output error only.
     pub missing: Vec<usize>,
+    /// How many of the last experiments are a prior's: they begin at rest and have no offset or slope.
+    pub priors: usize,
 }
 
 /// Signals that pass the whitening filter side by side.
@@ -29,6 +31,11 @@ const RAMP: usize = 3;
 const OUTPUT: usize = 4;
 
 impl Problem<'_> {
+    /// The experiments without the prior's.
+    pub fn measured(&self) -> &[(&[f64], &[f64])] {
+        &self.experiments[..self.experiments.len() - self.priors]
+    }
+
     /// Samples of all experiments.
     pub fn rows(&self) -> usize {
         self.experiments.iter().map(|(_, y)| y.len()).sum()
@@ -81,29 +88,29 @@ impl Problem<'_> {
     }
 
     fn fill(&self, matrix: &mut Mat<f64>, top: usize, index: usize, signals: &[[f64; LANES]], a: &[Coefficients]) {
-        let own = self.nuisance_column(index);
-        let last = self.columns();
         let input: Vec<f64> = signals.iter().map(|s| s[INPUT]).collect();
         self.fill_input(matrix, top, 0, &input, a);
+        if index + self.priors < self.experiments.len() {
+            self.fill_own(matrix, top, index, signals, a);
+        }
+        copy_lane(matrix, top, self.columns(), signals, OUTPUT);
+    }
+
+    /// The columns of an experiment's own parameters: initial state, offset, slope.
+    fn fill_own(&self, matrix: &mut Mat<f64>, top: usize, index: usize, signals: &[[f64; LANES]], a: &[Coefficients]) {
+        let own = self.nuisance_column(index);
         for (i, &section) in a.iter().enumerate() {
             let free = all_pole(section, signals.iter().map(|s| s[IMPULSE]));
             for j in 0..section_order(self.order, i) {
                 delayed(matrix, top, own + 2 * i + j, &free, j);
             }
         }
-        let mut copy = |column: usize, lane: usize| {
-            let target = matrix.col_mut(column).try_as_col_major_mut();
-            if let Some(target) = target {
-                target.as_slice_mut()[top..top + signals.len()].iter_mut().zip(signals).for_each(|(t, s)| *t = s[lane]);
-            }
-        };
         if self.offset {
-            copy(own + self.order, ONE);
+            copy_lane(matrix, top, own + self.order, signals, ONE);
         }
         if self.slope {
-            copy(own + self.order + usize::from(self.offset), RAMP);
+            copy_lane(matrix, top, own + self.order + usize::from(self.offset), signals, RAMP);
         }
-        copy(last, OUTPUT);
     }
 
     /// The columns of one input, whitened: its response through every section, and itself.
@@ -116,6 +123,14 @@ impl Problem<'_> {
             }
         }
         delayed(matrix, top, first + self.order, input, 0);
+    }
+}
+
+/// Writes one of the whitened signals into a column from row `top` on.
+fn copy_lane(matrix: &mut Mat<f64>, top: usize, column: usize, signals: &[[f64; LANES]], lane: usize) {
+    let target = matrix.col_mut(column).try_as_col_major_mut();
+    if let Some(target) = target {
+        target.as_slice_mut()[top..top + signals.len()].iter_mut().zip(signals).for_each(|(t, s)| *t = s[lane]);
     }
 }
 

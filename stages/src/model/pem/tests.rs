@@ -168,6 +168,7 @@ fn sensitivities_agree_with_differences() {
         offset: true,
         slope: true,
         missing: Vec::new(),
+        priors: 0,
     };
     let z = |re, im| faer::c64::new(re, im);
     let a = coordinates(&[z(0.99, 0.06), z(0.99, -0.06), z(0.9, 0.3), z(0.9, -0.3), z(0.4, 0.0)]);
