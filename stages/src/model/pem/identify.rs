@@ -193,12 +193,15 @@ pub fn identify(
     conclude(&problem, &state, sample_time_s, options, subspace.singular_values().to_vec())
 }
 
+/// Inputs, one after the other, and output.
+type Record = (Vec<f64>, Vec<f64>);
+
 /// Input and output of each input's prior: an impulse of the share's energy, and silence. Errors: a share that is negative or not finite.
 fn prior_records(
     experiments: &[Experiment<'_>],
     inputs: usize,
     options: &PemOptions,
-) -> Result<Vec<(Vec<f64>, Vec<f64>)>, ModelError> {
+) -> Result<Vec<Record>, ModelError> {
     if !(options.prior >= 0.0 && options.prior.is_finite()) {
         return Err(ModelError::Parameter { name: "prior", found: options.prior, wanted: "0 or more" });
     }
