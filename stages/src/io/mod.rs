@@ -4,6 +4,7 @@ use afmid_pipeline::Entry;
 
 mod census;
 mod code_census;
+pub mod columns;
 mod consistency;
 mod file_patterns;
 mod memory;
@@ -11,12 +12,14 @@ mod natural_order;
 mod overview;
 mod records;
 mod records_example;
+mod shared_data;
 mod spectrum;
 mod spectrum_example;
 mod stretch_extremes;
 
 pub use census::Census;
 pub use code_census::{CensusSettings, ChannelCensus, Found};
+pub use columns::Columns;
 pub use consistency::{Consistency, check_consistency};
 pub use file_patterns::matching_files;
 pub use memory::{MemorySource, memory_channel, memory_record};
@@ -28,5 +31,10 @@ pub use spectrum::Spectrum;
 pub use stretch_extremes::StretchExtremes;
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] =
-    &[Entry::of::<Records>(), Entry::of::<Census>(), Entry::of::<Overview>(), Entry::of::<Spectrum>()];
+pub const STAGES: &[Entry] = &[
+    Entry::of::<Records>(),
+    Entry::of::<Columns>(),
+    Entry::of::<Spectrum>(),
+    Entry::of::<Census>(),
+    Entry::of::<Overview>(),
+];

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::consistency::{Consistency, check_consistency};
 use super::file_patterns::matching_files;
+use super::shared_data::moved;
 
 /// Opens native HDF5 records by pattern.
 ///
@@ -62,24 +63,6 @@ impl Default for Records {
 
 const RECORDS: Port<Recording> = Port::new("records", "records", "the records, in natural order of their paths");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many records, how long, at what rate");
-
-/// Patterns into the shared data folder, with its root moved: `../../shared/data/afm/x/*.h5` becomes `ROOT/afm/x/*.h5`.
-pub(super) fn moved(patterns: &[String], root: Option<&Path>) -> Vec<String> {
-    const SHARED: &str = "../../shared/data/";
-    let moved = |pattern: &String| match (root, pattern.strip_prefix(SHARED)) {
-        (Some(root), Some(rest)) => root.join(rest).display().to_string(),
-        _ => pattern.clone(),
-    };
-    patterns.iter().map(moved).collect()
-}
-
-#[cfg(test)]
-#[test]
-fn the_root_of_shared_data_moves_and_other_patterns_stay() {
-    let patterns = ["../../shared/data/afm/x/*.h5".to_owned(), "archive/*.h5".to_owned()];
-    assert_eq!(moved(&patterns, Some(Path::new("/data"))), ["/data/afm/x/*.h5", "archive/*.h5"]);
-    assert_eq!(moved(&patterns, None), patterns);
-}
 
 impl Stage for Records {
     const SPEC: Spec = Spec {
@@ -156,7 +139,9 @@ impl Records {
     /// to write there. Errors: as [`matching_files`]; nothing but results.
     fn matches(&self, base: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), StageError> {
         let root = std::env::var_os("AFMID_DATA");
-        let files = matching_files(&moved(&self.files, root.as_deref().map(Path::new)), base)?;
+        let root = root.as_deref().map(Path::new);
+        let files: Vec<String> = self.files.iter().map(|pattern| moved(pattern, root)).collect();
+        let files = matching_files(&files, base)?;
         // a file that cannot be read is for `open` to complain about
         let (own, records): (Vec<PathBuf>, Vec<PathBuf>) =
             files.into_iter().partition(|file| is_own(file).unwrap_or(false));

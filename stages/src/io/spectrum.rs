@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::file_patterns::matching_files;
-use super::records::moved;
+use super::shared_data::moved;
 
 /// Opens a power spectral density that another program has averaged and stored.
 ///
@@ -106,7 +106,7 @@ impl Stage for Spectrum {
 
     fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
         let root = std::env::var_os("AFMID_DATA");
-        matching_files(&moved(std::slice::from_ref(&self.file), root.as_deref().map(Path::new)), base)
+        matching_files(&[moved(&self.file, root.as_deref().map(Path::new))], base)
     }
 
     fn location_params() -> &'static [&'static str] {

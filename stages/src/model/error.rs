@@ -32,6 +32,14 @@ pub enum ModelError {
         /// First offending sample.
         index: usize,
     },
+    /// Outputs are missing and the noise model needs every one.
+    #[error("{count} output samples are missing, the first at {index}: a noise filter runs over every sample")]
+    Missing {
+        /// How many.
+        count: usize,
+        /// The first.
+        index: usize,
+    },
     /// A parameter outside its range.
     #[error("{name} is {found}, wanted {wanted}")]
     Parameter {

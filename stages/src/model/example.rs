@@ -3,6 +3,7 @@
 use afmid_pipeline::{Array, Axis, Context, Document, Example, Port, Ports, Stage, StageError, StateSpace, Table};
 
 use super::modes_stage;
+use super::order::Order;
 use super::pem_stage::{self, DataSet, Pem};
 use super::zeros_stage;
 use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, release};
@@ -12,22 +13,45 @@ pub(super) fn pem() -> Vec<Example> {
         title: "One resonance, released",
         params: "order = 2",
         inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
-        expect: |outputs| {
-            let model = outputs.get(&pem_stage::MODEL).map_err(|error| error.to_string())?;
-            let (model, _) = modes_stage::innovations(model).map_err(|error| error.to_string())?;
-            let Some(z) = model.sections.first().and_then(|section| section.poles().first().copied()) else {
-                return Err("no pole".to_owned());
-            };
-            let s = z.ln() / model.sample_time_s;
-            let (f, q) = (s.norm() / std::f64::consts::TAU, s.norm() / (-2.0 * s.re));
-            // noise-free: rounding alone
-            if (f / FREQUENCY_HZ - 1.0).abs() < 1e-9 && (q / QUALITY_FACTOR - 1.0).abs() < 1e-7 {
-                Ok(format!("The pole lies at {f:.1} Hz with Q = {q:.3}."))
-            } else {
-                Err(format!("{f} Hz, Q = {q}"))
-            }
-        },
+        // noise-free: rounding alone
+        expect: |outputs| the_resonance(outputs, 1e-9, 1e-7),
     }]
+}
+
+pub(super) fn subspace() -> Vec<Example> {
+    vec![Example {
+        title: "One resonance, released, without iteration",
+        params: "order = 2",
+        inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
+        // noise-free: rounding, over a Hankel matrix of 60 rows
+        expect: |outputs| the_resonance(outputs, 1e-8, 1e-6),
+    }]
+}
+
+pub(super) fn era() -> Vec<Example> {
+    vec![Example {
+        title: "The free decay of one resonance",
+        params: "order = 3\nblock_rows = 100",
+        inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
+        // the third pole takes what the decay's last tenth leaves of its rest
+        expect: |outputs| the_resonance(outputs, 1e-8, 1e-6),
+    }]
+}
+
+/// Whether the model's first pair is the example's resonance.
+fn the_resonance(outputs: &Ports, frequency_tolerance: f64, quality_tolerance: f64) -> Result<String, String> {
+    let model = outputs.get(&pem_stage::MODEL).map_err(|error| error.to_string())?;
+    let (model, _) = modes_stage::innovations(model).map_err(|error| error.to_string())?;
+    let Some(z) = model.sections.first().and_then(|section| section.poles().first().copied()) else {
+        return Err("no pole".to_owned());
+    };
+    let s = z.ln() / model.sample_time_s;
+    let (f, q) = (s.norm() / std::f64::consts::TAU, s.norm() / (-2.0 * s.re));
+    if (f / FREQUENCY_HZ - 1.0).abs() < frequency_tolerance && (q / QUALITY_FACTOR - 1.0).abs() < quality_tolerance {
+        Ok(format!("The pole lies at {f:.1} Hz with Q = {q:.3}."))
+    } else {
+        Err(format!("{f} Hz, Q = {q}"))
+    }
 }
 
 pub(super) fn modes() -> Vec<Example> {
@@ -96,7 +120,7 @@ fn pair() -> Array {
 }
 
 fn model() -> Result<StateSpace, StageError> {
-    let stage = Pem { order: 2, ..Pem::default() };
+    let stage = Pem { order: Order::Fixed(2), ..Pem::default() };
     let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
     let outputs = stage.run(&Ports::new().with(&pem_stage::PAIR, pair()), &cx)?;
     Ok(outputs.get(&pem_stage::MODEL)?.clone())

@@ -3,7 +3,7 @@
 use faer::Mat;
 
 use super::error::{ModelError, finite};
-use super::innovations::InnovationsModel;
+use super::innovations::{InnovationsModel, InputGains};
 use super::orthogonal::{Qr, Svd};
 use super::pem::{Coefficients, all_pole};
 
@@ -52,11 +52,11 @@ pub struct Simulation {
 /// Simulates `u` through a frozen model and fits initial state, offset and drift to `y`.
 ///
 /// # Model
-/// `y = G u + C A^t x0 + offset + drift t`, with `t` from -1 to 1 over the window.
+/// `y = G u + C A^t x0 + offset + drift t`, with `t` from -1 to 1 over the window; `further` are the gains of inputs beyond the first.
 /// # Method
-/// Linear least squares by QR and singular values.
+/// Linear least squares by QR and singular values, over the samples of y that are not missing.
 /// # Shapes
-/// u, y: N samples.
+/// u: as many times N samples as there are inputs, one after the other; y: N samples, NaN where missing.
 /// # Units
 /// Those of y.
 /// # Accuracy
@@ -67,22 +67,23 @@ pub struct Simulation {
 /// L. Ljung, System Identification (1999), section 16.5.
 pub fn simulate_held_out(
     model: &InnovationsModel,
+    further: &[InputGains],
     u: &[f64],
     y: &[f64],
     nuisances: Nuisances,
 ) -> Result<Simulation, ModelError> {
-    if u.len() != y.len() {
-        return Err(ModelError::Length { what: "input", found: u.len(), wanted: y.len() });
-    }
-    finite("input", u)?;
-    variation(y)?;
     let n = model.order();
-    let forced = model.simulate(u, &vec![0.0; n])?;
+    let present: Vec<usize> = (0..y.len()).filter(|&k| !y[k].is_nan()).collect();
+    let measured: Vec<f64> = present.iter().map(|&k| y[k]).collect();
+    variation(&measured)?;
+    let forced = forced_response(model, further, u, y.len())?;
     let matrix = nuisance_matrix(model, y.len(), nuisances);
     let p = matrix.ncols();
     let mut stacked = Mat::zeros(y.len(), p + 1);
-    stacked.as_mut().get_mut(.., ..p).copy_from(&matrix);
-    stacked.col_mut(p).iter_mut().zip(y.iter().zip(&forced)).for_each(|(t, (y, g))| *t = y - g);
+    for &k in &present {
+        (0..p).for_each(|j| stacked[(k, j)] = matrix[(k, j)]);
+        stacked[(k, p)] = y[k] - forced[k];
+    }
     let r = Qr::new(stacked).r();
     let size = r.nrows().min(p);
     let svd = Svd::new(&r.as_ref().get(..size, ..p).to_owned())?;
@@ -94,7 +95,8 @@ pub fn simulate_held_out(
     for (j, value) in theta.iter().enumerate() {
         response.iter_mut().zip(matrix.col(j).iter()).for_each(|(g, x)| *g += value * x);
     }
-    let fit_percent = fit_percent(y, &response)?;
+    let simulated: Vec<f64> = present.iter().map(|&k| response[k]).collect();
+    let fit_percent = fit_percent(&measured, &simulated)?;
     Ok(Simulation {
         response,
         initial_state: theta[..n].to_vec(),
@@ -102,6 +104,27 @@ pub fn simulate_held_out(
         drift: if nuisances.slope { theta[n + usize::from(nuisances.offset)] } else { 0.0 },
         fit_percent,
     })
+}
+
+/// Response to all inputs from rest. Errors: not as many inputs as gains, or values that are not finite.
+fn forced_response(
+    model: &InnovationsModel,
+    further: &[InputGains],
+    u: &[f64],
+    samples: usize,
+) -> Result<Vec<f64>, ModelError> {
+    let wanted = (1 + further.len()) * samples;
+    if u.len() != wanted {
+        return Err(ModelError::Length { what: "input", found: u.len(), wanted });
+    }
+    finite("input", u)?;
+    let rest = vec![0.0; model.order()];
+    let mut forced = model.simulate(&u[..samples], &rest)?;
+    for (gains, u) in further.iter().zip(u[samples..].chunks_exact(samples)) {
+        let more = model.from_input(gains)?.simulate(u, &rest)?;
+        forced.iter_mut().zip(more).for_each(|(sum, y)| *sum += y);
+    }
+    Ok(forced)
 }
 
 /// Free responses from each state, one, ramp: N x (n + nuisances).
@@ -170,14 +193,14 @@ mod tests {
         let noise = white_noise(1000, 0.02, 4);
         let y: Vec<f64> = (0..1000).map(|k| clean[k] + 0.5 + 0.3 * (k as f64 - 499.5) / 499.5 + noise[k]).collect();
         let both = Nuisances { offset: true, slope: true };
-        let found = simulate_held_out(&model(), &u, &y, both).unwrap();
+        let found = simulate_held_out(&model(), &[], &u, &y, both).unwrap();
         // 1000 samples of 0.02: 0.0006 and 0.0011 for offset and drift, 0.05 for a state that decays in 20 samples; four of them
         assert!((found.offset - 0.5).abs() < 0.0026 && (found.drift - 0.3).abs() < 0.0045);
         assert!((found.initial_state[0] - 3.0).abs() < 0.2);
         let ceiling = noise_ceiling_percent(&y, &[0.02; 1000]).unwrap();
         // four fitted nuisances of 1000 samples, and the noise's own scatter of 2 % of what is missing; four of that
         assert!((found.fit_percent - ceiling).abs() < 0.1 * (100.0 - ceiling), "{} {ceiling}", found.fit_percent);
-        let none = simulate_held_out(&model(), &u, &y, Nuisances { offset: false, slope: false }).unwrap();
+        let none = simulate_held_out(&model(), &[], &u, &y, Nuisances { offset: false, slope: false }).unwrap();
         assert!(none.fit_percent < found.fit_percent && none.offset == 0.0);
     }
 }

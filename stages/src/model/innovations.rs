@@ -64,7 +64,25 @@ pub struct InnovationsModel {
     pub sample_time_s: f64,
 }
 
+/// How a further input enters the same sections.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InputGains {
+    /// Gains of each section, as [`Section::b`].
+    pub b: Vec<[f64; 2]>,
+    /// D.
+    pub feedthrough: f64,
+}
+
 impl InnovationsModel {
+    /// The model from another input to the same output. Errors: gains for another number of sections.
+    pub fn from_input(&self, gains: &InputGains) -> Result<Self, ModelError> {
+        if gains.b.len() != self.sections.len() {
+            return Err(ModelError::Length { what: "input gains", found: gains.b.len(), wanted: self.sections.len() });
+        }
+        let sections = self.sections.iter().zip(&gains.b).map(|(section, &b)| Section { b, ..*section }).collect();
+        Ok(Self { sections, feedthrough: gains.feedthrough, sample_time_s: self.sample_time_s })
+    }
+
     /// Number of states.
     pub fn order(&self) -> usize {
         self.sections.iter().map(|section| section.order).sum()

@@ -1,40 +1,60 @@
 //! Parametric estimates: prediction error method, modes, zeros.
 
 mod comparison;
+mod era;
+mod era_stage;
 mod error;
 mod example;
 mod fit;
 mod innovations;
+mod instrumental;
 pub mod modes;
 mod modes_stage;
+mod order;
 mod orthogonal;
 pub mod pem;
 mod pem_stage;
+mod realised;
 mod residual;
 mod riccati;
 pub mod ringdown;
 mod ringdown_stage;
+mod series;
+#[cfg(test)]
+mod start_tests;
 mod subspace;
+mod subspace_stage;
 mod transmission;
 mod zeros_stage;
 
 pub use comparison::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
+pub use era::Era;
+pub use era_stage::EraEstimate;
 pub use error::ModelError;
 pub use fit::{Nuisances, Simulation, fit_percent, noise_ceiling_percent, simulate_held_out};
-pub use innovations::{InnovationsModel, Section};
+pub use innovations::{InnovationsModel, InputGains, Section};
+pub use instrumental::{InstrumentalSubspace, Weight};
 pub use modes_stage::Modes;
-pub use pem_stage::{DataSet, NoiseKind, Pem};
+pub use order::{Order, OrderCandidate, OrderChoice, choose_order};
+pub use pem_stage::{DataSet, FocusKind, NoiseKind, Pem};
 pub use residual::{TestResult, input_dependence, whiteness};
 pub use ringdown_stage::{ErrorSource, JointNoise, RingdownFit};
 pub use subspace::Subspace;
+pub use subspace_stage::{SubspaceEstimate, WeightKind};
 pub use transmission::transmission_zeros;
 pub use zeros_stage::Zeros;
 
 use afmid_pipeline::Entry;
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] =
-    &[Entry::of::<Pem>(), Entry::of::<Modes>(), Entry::of::<Zeros>(), Entry::of::<RingdownFit>()];
+pub const STAGES: &[Entry] = &[
+    Entry::of::<Pem>(),
+    Entry::of::<SubspaceEstimate>(),
+    Entry::of::<EraEstimate>(),
+    Entry::of::<Modes>(),
+    Entry::of::<Zeros>(),
+    Entry::of::<RingdownFit>(),
+];
 
 #[cfg(test)]
 #[test]

@@ -12,7 +12,8 @@ use serde_json::{Value, json};
 
 use super::modes::{ModeCriteria, Pole, PoleKind, ResponsePoint, Root, poles, response, share_error_from_onset, zeros};
 use super::pem_stage::{DataSet, MODEL};
-use super::{InnovationsModel, Nuisances, noise_ceiling_percent, simulate_held_out};
+use super::series::PairSeries;
+use super::{InnovationsModel, InputGains, Nuisances, noise_ceiling_percent, simulate_held_out};
 use crate::spectrum::IntersampleKind;
 
 /// Extracts modes, poles and zeros from a model, each with its standard error, and judges the model on held-out events.
@@ -23,7 +24,8 @@ use crate::spectrum::IntersampleKind;
 /// the identification half simulated on the verification half's force, initial state, offset and drift fitted again. The error of a static share counts the ambiguity of t0: an event
 /// that was d earlier turns and raises the mode's amplitude by exp(-s d); the root mean square over the pair's `t0_ambiguity_s`, at least one
 /// sample, is added in squares.
-/// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency.
+/// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency. Of a model with several inputs zeros,
+/// shares and response are those of the first.
 /// Units: Hz; static shares are parts of the static gain.
 /// Accuracy: first order in the errors. A static share is the mode's own partial fraction: within the detector's roll-off it is turned and damped by it.
 /// Zeros map as poles do; the hold makes them differ from the continuous system's by 2e-3 in frequency (closed-form test).
@@ -82,7 +84,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "mode
 impl Stage for Modes {
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 3,
+        version: 4,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -226,26 +228,42 @@ fn wanted(name: &str, value: f64, range: &str) -> StageError {
     StageError::new(format!("`{name}` is {value}, wanted {range}"))
 }
 
-/// Model and covariance of an artifact that `model.pem` made.
+/// Column `input` of B.
+fn input_column(artifact: &StateSpace, input: usize) -> Vec<f64> {
+    artifact.b.values.iter().skip(input).step_by(artifact.b.columns.max(1)).copied().collect()
+}
+
+/// Gains of the inputs beyond the first.
+pub(super) fn further_inputs(artifact: &StateSpace) -> Vec<InputGains> {
+    let gains = |input: usize| {
+        let b = input_column(artifact, input);
+        let pairs = b.chunks(2).map(|b| [b[0], b.get(1).copied().unwrap_or(0.0)]).collect();
+        InputGains { b: pairs, feedthrough: artifact.d.values.get(input).copied().unwrap_or(0.0) }
+    };
+    (1..artifact.b.columns).map(gains).collect()
+}
+
+/// Model, from the first input, and covariance of an artifact that a stage of this domain made.
 pub(super) fn innovations(artifact: &StateSpace) -> Result<(InnovationsModel, Mat<f64>), StageError> {
     let n = artifact.order();
     let a = Mat::from_fn(n, n, |i, j| artifact.a.at(i, j));
     let feedthrough = artifact.d.values.first().copied().unwrap_or(0.0);
     let model = InnovationsModel::from_matrices(
         &a,
-        &artifact.b.values,
+        &input_column(artifact, 0),
         &artifact.k.values,
         feedthrough,
         artifact.sample_time_s,
     )
     .map_err(StageError::from_error)?;
-    let count = 2 * n + 1;
+    let count = n + artifact.b.columns * (n + 1);
     if (artifact.covariance.rows, artifact.covariance.columns) != (count, count) {
         return Err(StageError::new(format!(
-            "the model's covariance is {} x {}, wanted {count} x {count}: all a, all b, d",
+            "the model's covariance is {} x {}, wanted {count} x {count}: all a, then all b and d of each input",
             artifact.covariance.rows, artifact.covariance.columns
         )));
     }
+    let count = 2 * n + 1;
     Ok((model, Mat::from_fn(count, count, |i, j| artifact.covariance.at(i, j))))
 }
 
@@ -267,24 +285,29 @@ fn held_out(half: &StateSpace, pair: &Array) -> Result<Fits, StageError> {
         )));
     }
     let first = half.attributes.get("first_sample").and_then(Attribute::as_f64).unwrap_or(0.0) as usize;
-    let nuisances = Nuisances { offset: true, slope: true };
-    let series = |name: &str, set: DataSet| -> Result<Vec<f64>, StageError> {
-        let values = pair.real(&format!("{name}{}", set.suffix()))?;
-        values
-            .get(first..)
-            .map(<[f64]>::to_vec)
-            .ok_or_else(|| StageError::new("the pair is shorter than the model's window"))
-    };
+    let further = further_inputs(half);
+    // what the model was fitted with is fitted again; models of before this was stored had both
+    let fitted = |name: &str| half.attributes.get(name) != Some(&Attribute::Flag(false));
+    let nuisances = Nuisances { offset: fitted("offset_fitted"), slope: fitted("drift_fitted") };
     let simulated = |set: DataSet| -> Result<f64, StageError> {
-        let simulation = simulate_held_out(&model, &series("force", set)?, &series("response", set)?, nuisances);
+        let series = PairSeries::new(pair, set, first)?;
+        let simulation = simulate_held_out(&model, &further, &series.input, &series.output, nuisances);
         Ok(simulation.map_err(StageError::from_error)?.fit_percent)
     };
-    let (response, error) =
-        (series("response", DataSet::Verification)?, series("standard_error", DataSet::Verification)?);
+    let held_out = DataSet::Verification;
+    let ceiling = match pair.real(&format!("standard_error{}", held_out.suffix())) {
+        Ok(error) => {
+            let series = PairSeries::new(pair, held_out, first)?;
+            let error = error.get(first..).unwrap_or(&[]);
+            Some(noise_ceiling_percent(&series.output, error).map_err(StageError::from_error)?)
+        }
+        // a measured record without repetition does not say how noisy it is
+        Err(_) => None,
+    };
     Ok(Fits {
         identification: Some(simulated(DataSet::Identification)?),
-        held_out: Some(simulated(DataSet::Verification)?),
-        noise_ceiling: Some(noise_ceiling_percent(&response, &error).map_err(StageError::from_error)?),
+        held_out: Some(simulated(held_out)?),
+        noise_ceiling: ceiling,
     })
 }
 

@@ -14,7 +14,7 @@ use super::orthogonal::{Qr, Svd, eigenvalues, least_squares, product};
 /// singular vectors of what remains span the observability matrix, and A follows from its shift invariance. A released ramp does not
 /// excite persistently: only the directions that `U_f` really spans are removed, and the free decay, which remains, carries A.
 /// # Shapes
-/// u, y: N samples; singular values: `block_rows`.
+/// u, y: N samples; several inputs one after the other, a multiple of N; singular values: `block_rows`.
 /// # Units
 /// Poles in the z plane.
 /// # Accuracy
@@ -35,7 +35,7 @@ const INPUT_TOLERANCE: f64 = 1e-12;
 impl Subspace {
     /// Builds the projected Hankel matrix with `block_rows` rows (at least 2) and decomposes it.
     pub fn new(u: &[f64], y: &[f64], block_rows: usize) -> Result<Self, ModelError> {
-        if u.len() != y.len() {
+        if !u.len().is_multiple_of(y.len().max(1)) || u.len() < y.len() {
             return Err(ModelError::Length { what: "input", found: u.len(), wanted: y.len() });
         }
         if block_rows < 2 {
@@ -47,7 +47,7 @@ impl Subspace {
         finite("input", u)?;
         finite("output", y)?;
         let windows = y.len() - block_rows + 1;
-        let basis = input_basis(u, block_rows)?;
+        let basis = input_basis(u, y.len(), block_rows)?;
         let removed = basis.ncols();
         let mut stacked = Mat::zeros(windows, removed + block_rows);
         stacked.as_mut().get_mut(.., ..removed).copy_from(&basis);
@@ -84,8 +84,11 @@ impl Subspace {
 }
 
 /// Columns that span the rows of `[1; U_f]`, from the eigenvectors of their Gram matrix: windows x rank.
-fn input_basis(u: &[f64], block_rows: usize) -> Result<Mat<f64>, ModelError> {
-    let windows = u.len() - block_rows + 1;
+pub(crate) fn input_basis(u: &[f64], samples: usize, block_rows: usize) -> Result<Mat<f64>, ModelError> {
+    let windows = samples - block_rows + 1;
+    if u.len() > samples {
+        return several_inputs_basis(u, samples, block_rows);
+    }
     let peak = u.iter().fold(0.0_f64, |peak, u| peak.max(u.abs()));
     let level = if peak > 0.0 { peak } else { 1.0 };
     let column = |j: usize, t: usize| if j == 0 { 1.0 } else { u[t + j - 1] / level };
@@ -99,6 +102,24 @@ fn input_basis(u: &[f64], block_rows: usize) -> Result<Mat<f64>, ModelError> {
         basis.col_mut(k).iter_mut().for_each(|value| *value /= norm);
     }
     Ok(basis)
+}
+
+/// The same of several inputs, each scaled to a peak of one, by QR and singular values.
+fn several_inputs_basis(u: &[f64], samples: usize, block_rows: usize) -> Result<Mat<f64>, ModelError> {
+    let windows = samples - block_rows + 1;
+    let mut stacked = Mat::zeros(windows, 1 + u.len() / samples * block_rows);
+    stacked.col_mut(0).iter_mut().for_each(|one| *one = 1.0);
+    for (i, u) in u.chunks_exact(samples).enumerate() {
+        let peak = u.iter().fold(0.0_f64, |peak, u| peak.max(u.abs()));
+        let level = if peak > 0.0 { peak } else { 1.0 };
+        for j in 0..block_rows {
+            let column = stacked.col_mut(1 + i * block_rows + j);
+            column.iter_mut().zip(&u[j..]).for_each(|(h, u)| *h = u / level);
+        }
+    }
+    let svd = Svd::new(&stacked)?;
+    // energies are squares of singular values
+    Ok(svd.u.get(.., ..svd.rank(INPUT_TOLERANCE.sqrt())).to_owned())
 }
 
 /// `[1; U_f] [1; U_f]^T`, each diagonal by a running sum: N operations per diagonal instead of N per entry.

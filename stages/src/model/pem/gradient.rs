@@ -109,7 +109,8 @@ pub(crate) fn coefficient_jacobian(
             let order = section_order(n, i);
             let mut x = if c.is_some() { e[rows.clone()].to_vec() } else { vec![0.0; y.len()] };
             for j in 0..order {
-                for column in [2 * i + j, own + 2 * i + j] {
+                let inputs = (0..problem.inputs).map(|input| problem.input_column(input) + 2 * i + j);
+                for column in inputs.chain([own + 2 * i + j]) {
                     let filtered = regressors.col(column).iter().skip(top);
                     x.iter_mut().zip(filtered).for_each(|(x, r)| *x += theta[column] * r);
                 }
@@ -127,6 +128,7 @@ pub(crate) fn coefficient_jacobian(
         }
         top = rows.end;
     }
+    problem.mask(&mut jacobian);
     jacobian
 }
 

@@ -1,5 +1,6 @@
 //! Prediction error method: the innovations form of Eq. 8, fitted by minimum one-step prediction error.
 
+mod autoregression;
 mod covariance;
 mod gradient;
 mod identify;
@@ -14,7 +15,7 @@ mod tangent;
 mod tests;
 
 pub use covariance::ResidualColour;
-pub use identify::{Experiment, Identified, NoiseModel, PemOptions, Verdict, identify};
+pub use identify::{Experiment, Focus, Identified, NoiseModel, PemOptions, Verdict, identify, with_poles};
 pub use optimiser::Ending;
 pub(crate) use parametrisation::{Coefficients, roots, section_order};
 pub(crate) use predictor::all_pole;

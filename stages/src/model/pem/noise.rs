@@ -76,6 +76,9 @@ pub(crate) fn intensities(
     Intensities { white, forces: values.split_off(1) }
 }
 
+/// Attempts at the Riccati equation, each with a hundred times more white noise.
+const MORE_WHITE: i32 = 8;
+
 /// Kalman gain and predictor poles of these intensities. Errors: no solution of the Riccati equation.
 pub(crate) fn gain(order: usize, a: &[Coefficients], noise: &Intensities) -> Result<(Vec<f64>, Vec<c64>), ModelError> {
     let (mut system, mut c, mut q) = (Mat::zeros(order, order), vec![0.0; order], Mat::zeros(order, order));
@@ -88,7 +91,9 @@ pub(crate) fn gain(order: usize, a: &[Coefficients], noise: &Intensities) -> Res
         c[first] = 1.0;
         q[(first + size - 1, first + size - 1)] = noise.forces[i] / noise.white;
     }
-    let (gain, _) = kalman_gain(&system, &c, &q, 1.0)?;
+    // hardly any white noise: the gain no longer depends on how little, but the doubling fails
+    let attempt = |i: i32| kalman_gain(&system, &c, &q, 100.0_f64.powi(i));
+    let (gain, _) = (1..MORE_WHITE).fold(attempt(0), |found, i| found.or_else(|_| attempt(i)))?;
     let closed = Mat::from_fn(order, order, |i, j| system[(i, j)] - gain[i] * c[j]);
     Ok((gain, eigenvalues(&closed)?))
 }

@@ -47,7 +47,7 @@ impl State {
     /// Evaluates a point. Errors: no finite prediction errors there.
     pub fn new(problem: &Problem, point: Point) -> Result<Self, ModelError> {
         let regressors = problem.regressors(&point.a(), &point.whitening());
-        let projection = Projection::new(&regressors)?;
+        let projection = Projection::new(problem, &regressors)?;
         Ok(Self { point, regressors, projection, gradient: f64::NAN, iterations: 0, ending: Ending::IterationLimit })
     }
 
@@ -170,7 +170,8 @@ pub(crate) fn minimise(problem: &Problem, start: State, limits: Limits) -> Resul
 fn descend(problem: &Problem, start: State, limits: Limits) -> Result<State, ModelError> {
     let (mut lambda, down, up, floor) = DAMPING;
     let mut state = start;
-    let output: f64 = problem.experiments.iter().flat_map(|(_, y)| y.iter()).map(|y| y * y).sum();
+    let output: f64 =
+        problem.experiments.iter().flat_map(|(_, y)| y.iter()).filter(|y| !y.is_nan()).map(|y| y * y).sum();
     state.ending = Ending::IterationLimit;
     for _ in 0..limits.iterations {
         if state.projection.cost <= EXACT * output {

@@ -5,6 +5,7 @@
 
 use faer::{Mat, MatMut};
 
+use super::predictor::Problem;
 use crate::model::error::ModelError;
 use crate::model::orthogonal::{Qr, Svd, product};
 
@@ -26,8 +27,9 @@ pub(crate) struct Projection {
 
 impl Projection {
     /// Solves for all linear parameters; the last column of `regressors` is the filtered output. Errors: no finite solution.
-    pub fn new(regressors: &Mat<f64>) -> Result<Self, ModelError> {
+    pub fn new(problem: &Problem, regressors: &Mat<f64>) -> Result<Self, ModelError> {
         let mut matrix = regressors.clone();
+        problem.mask(&mut matrix);
         let p = matrix.ncols() - 1;
         let mut scale = vec![1.0; p];
         for (j, scale) in scale.iter_mut().enumerate() {

@@ -161,7 +161,15 @@ fn results_are_stable_and_predict_as_the_dense_recursion_does() {
 #[test]
 fn sensitivities_agree_with_differences() {
     let (u, y) = (&force()[T0 - 200..T0 + 800], &averaged(3)[T0 - 200..T0 + 800]);
-    let problem = Problem { experiments: vec![(u, y), (&u[100..], &y[100..])], order: 5, offset: true, slope: true };
+    let problem = Problem {
+        experiments: vec![(u, y), (&u[100..], &y[100..])],
+        inputs: 1,
+        order: 5,
+        offset: true,
+        slope: true,
+        missing: Vec::new(),
+        priors: 0,
+    };
     let z = |re, im| faer::c64::new(re, im);
     let a = coordinates(&[z(0.99, 0.06), z(0.99, -0.06), z(0.9, 0.3), z(0.9, -0.3), z(0.4, 0.0)]);
     let c = coordinates(&[z(0.9, 0.1), z(0.9, -0.1), z(0.7, 0.0), z(0.2, 0.0), z(-0.3, 0.0)]);
@@ -236,6 +244,8 @@ fn unusable_data_is_refused() {
     assert_eq!(run(&u, &vec![0.25; N], &default).unwrap_err(), ModelError::ConstantOutput);
     let mut spoilt = y.clone();
     spoilt[17] = f64::NAN;
+    assert_eq!(run(&u, &spoilt, &default).unwrap_err(), ModelError::Missing { count: 1, index: 17 });
+    spoilt[17] = f64::INFINITY;
     assert_eq!(run(&u, &spoilt, &default).unwrap_err(), ModelError::NotFinite { what: "output", index: 17 });
     assert!(matches!(run(&u, &y, &PemOptions { order: 0, ..default.clone() }), Err(ModelError::Parameter { .. })));
     assert!(matches!(
