@@ -3,7 +3,7 @@
 //! `cargo run --release -p afmid-stages --example accuracy -- real 0.06 200`: the microscope's noise, adhesion scatter 6 %, seeds 1 to 200.
 //! `cargo run --release -p afmid-stages --example accuracy -- white 200`: white noise alone, the mean of 84 events.
 //! `... -- speed`: time of a fit of 8192 samples, and of 84 events of them; `... -- export SEED EVENTS`: such a mean, a sample per line.
-//! `... -- fit SEED EVENTS`: f and Q of that mean, with the bound, as JSON.
+//! `... -- variants 0.06 100`: what simpler ways lose at 24 events. `... -- fit SEED EVENTS`: f and Q of a white mean, with the bound, as JSON.
 
 mod bound;
 mod table;
@@ -27,6 +27,7 @@ fn main() {
     let done = match words.as_slice() {
         ["real", scatter, seeds] => scatter.parse().ok().zip(seeds.parse().ok()).map(|(s, n)| real(s, n)),
         ["white", seeds] => seeds.parse().ok().map(white),
+        ["variants", scatter, seeds] => scatter.parse().ok().zip(seeds.parse().ok()).map(|(s, n)| variants(s, n)),
         ["speed"] => Some(speed()),
         ["export", seed, events] => seed.parse().ok().zip(events.parse().ok()).map(|(s, n)| export(s, n)),
         ["fit", seed, events] => seed.parse().ok().zip(events.parse().ok()).map(|(s, n)| fit(s, n)),
@@ -34,7 +35,7 @@ fn main() {
     };
     if done.is_none() {
         eprintln!(
-            "usage: accuracy real ADHESION_SCATTER SEEDS | white SEEDS | speed | export SEED EVENTS | fit SEED EVENTS"
+            "usage: accuracy real ADHESION_SCATTER SEEDS | white SEEDS | variants SCATTER SEEDS | speed | export SEED EVENTS | fit SEED EVENTS"
         );
         std::process::exit(2);
     }
@@ -49,30 +50,78 @@ fn real(scatter: f64, seeds: u64) {
             .collect();
         println!("bound of one event of mean load, {start:?} lever's motion at the release: {}", numbers.join(", "));
     }
-    let results: Vec<Vec<Vec<Outcome>>> = (1..=seeds)
+    let results: Vec<Vec<(Vec<Outcome>, f64)>> = (1..=seeds)
         .into_par_iter()
         .map(|seed| {
-            let mut data: Vec<Vec<f64>> = (1..EVENTS[0]).map(|e| real_event(seed, e, scatter, SAMPLES)).collect();
             // the first event brings the rest of its record: one event alone cannot tell thermal motion from its own ringing
-            let long = real_event(seed, 0, scatter, (2 + FREE_WINDOWS) * SAMPLES);
-            data.insert(0, long[..SAMPLES].to_vec());
+            let (long, load) = real_event(seed, 0, scatter, (2 + FREE_WINDOWS) * SAMPLES);
+            let (mut data, mut loads) = (vec![long[..SAMPLES].to_vec()], vec![load]);
+            for e in 1..EVENTS[0] {
+                let (event, load) = real_event(seed, e, scatter, SAMPLES);
+                data.push(event);
+                loads.push(load);
+            }
             let free = [&long[2 * SAMPLES..]];
-            EVENTS.iter().map(|&count| estimate(&data[..count], if count == 1 { &free[..] } else { &[] })).collect()
+            EVENTS
+                .iter()
+                .map(|&count| {
+                    let squares = loads[..count].iter().map(|load| load * load).sum();
+                    (estimate(&data[..count], if count == 1 { &free[..] } else { &[] }), squares)
+                })
+                .collect()
         })
         .collect();
     let unit = bound(Noise::Real(Start::Free), SAMPLES, 1.0, true);
     for (i, count) in EVENTS.iter().enumerate() {
-        // information grows with the square of the load
-        let weight = *count as f64 * if *count > 1 { 1.0 + scatter * scatter } else { 1.0 };
-        let bound: Vec<f64> = unit.iter().map(|b| b / weight.sqrt()).collect();
-        let outcomes: Vec<Vec<Outcome>> = results.iter().map(|r| r[i].clone()).collect();
+        let outcomes: Vec<Vec<Outcome>> = results.iter().map(|r| r[i].0.clone()).collect();
+        let factor = rms_factor(results.iter().map(|r| r[i].1));
+        let bound: Vec<f64> = unit.iter().map(|b| b * factor).collect();
         table::print(&format!("{count} events, adhesion scatter {:.0} %", 100.0 * scatter), &outcomes, &bound);
     }
+}
+
+/// Root mean square over the seeds of `1 / sqrt(sum of squared loads)`: information grows with the square of the load.
+fn rms_factor(squares: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let seeds = squares.len() as f64;
+    (squares.map(|sum| 1.0 / sum).sum::<f64>() / seeds).sqrt()
 }
 
 fn estimate(data: &[Vec<f64>], free: &[&[f64]]) -> Vec<Outcome> {
     let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
     fit_ringdowns(&lent, free, 1.0 / RATE_HZ, &RingdownOptions::default())
+        .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit))
+}
+
+/// What simpler ways lose at 24 events: white weights; the events averaged first; both.
+fn variants(scatter: f64, seeds: u64) {
+    const COUNT: usize = 24;
+    let results: Vec<([Vec<Outcome>; 4], f64)> = (1..=seeds)
+        .into_par_iter()
+        .map(|seed| {
+            let (data, loads): (Vec<Vec<f64>>, Vec<f64>) =
+                (0..COUNT).map(|e| real_event(seed, e, scatter, SAMPLES)).unzip();
+            let mean: Vec<f64> = (0..SAMPLES).map(|k| data.iter().map(|e| e[k]).sum::<f64>() / COUNT as f64).collect();
+            let fits = [
+                estimate_with(&data, &RingdownOptions::default()),
+                estimate_with(&data, &white_options()),
+                estimate_with(std::slice::from_ref(&mean), &RingdownOptions::default()),
+                estimate_with(std::slice::from_ref(&mean), &white_options()),
+            ];
+            (fits, loads.iter().map(|load| load * load).sum())
+        })
+        .collect();
+    let factor = rms_factor(results.iter().map(|r| r.1));
+    let bound: Vec<f64> = bound(Noise::Real(Start::Free), SAMPLES, 1.0, true).iter().map(|b| b * factor).collect();
+    let names = ["joint", "joint, white weights", "the mean, noise estimated", "the mean, white weights"];
+    for (i, name) in names.iter().enumerate() {
+        let outcomes: Vec<Vec<Outcome>> = results.iter().map(|r| r.0[i].clone()).collect();
+        table::print(&format!("{COUNT} events, {name}"), &outcomes, &bound);
+    }
+}
+
+fn estimate_with(data: &[Vec<f64>], options: &RingdownOptions) -> Vec<Outcome> {
+    let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
+    fit_ringdowns(&lent, &[], 1.0 / RATE_HZ, options)
         .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit))
 }
 
@@ -126,7 +175,7 @@ fn speed() {
     time("one record of 8192 samples, order 11, white noise", 50, &|| {
         let _ = std::hint::black_box(fit_ringdowns(&[&y], &[], 1.0 / RATE_HZ, &white_options()));
     });
-    let data: Vec<Vec<f64>> = (0..84).map(|e| real_event(1, e, 0.06, SAMPLES)).collect();
+    let data: Vec<Vec<f64>> = (0..84).map(|e| real_event(1, e, 0.06, SAMPLES).0).collect();
     let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
     for count in EVENTS {
         time(&format!("{count} events jointly, noise estimated along"), 9, &|| {

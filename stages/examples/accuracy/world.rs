@@ -52,8 +52,8 @@ pub fn system(temperature_k: f64) -> (AfmSystem, Contact) {
 
 /// One release through the whole microscope: thermal forces, contact, readout noise, converter.
 ///
-/// Returns the samples from the first one after the release on.
-pub fn real_event(seed: u64, event: usize, scatter: f64, samples: usize) -> Vec<f64> {
+/// Returns the samples from the first one after the release on, and its load over the mean pull-off force.
+pub fn real_event(seed: u64, event: usize, scatter: f64, samples: usize) -> (Vec<f64>, f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(event as u64);
     let (system, contact) = system(295.0);
@@ -65,7 +65,10 @@ pub fn real_event(seed: u64, event: usize, scatter: f64, samples: usize) -> Vec<
         }
     };
     let pull_off = [ADHESION_N * (1.0 + scatter * deviate)];
-    let ramp = TriangleRamp { frequency_hz: 5.58, range_m: 200e-9, phase: 0.0 };
+    // wide scatter wants a longer way, at the same speed, for strong contacts to let go, and a nearer catch for weak ones not to come back
+    let (range_m, snap_in_gap_m) = if scatter > 0.1 { (500e-9, 1e-9) } else { (200e-9, contact.snap_in_gap_m) };
+    let contact = Contact { snap_in_gap_m, ..contact };
+    let ramp = TriangleRamp { frequency_hz: 5.58 * 200e-9 / range_m, range_m, phase: 0.0 };
     let drive = Drive { ramp, surface_m: -22e-9, pull_off_n: &pull_off };
     // the base's height above the surface at which the contact lets go, and when it is passed on the way up
     let series = 1.0 / (1.0 / lever.stiffness_n_per_m + 1.0 / contact.stiffness_n_per_m);
@@ -81,7 +84,7 @@ pub fn real_event(seed: u64, event: usize, scatter: f64, samples: usize) -> Vec<
     let noise = ReadoutNoise { white_v: WHITE_V, pink_v: PINK_V, drift_v: 0.0 };
     noise.add_random(&mut volts, RATE_HZ, &mut rng);
     let (adc, offset) = (Adc { bits: 12, lsb_v: LSB_V }, LSB_V * rng.random::<f64>());
-    volts.iter().map(|v| f64::from(adc.code(v + offset)) * LSB_V).collect()
+    (volts.iter().map(|v| f64::from(adc.code(v + offset)) * LSB_V).collect(), release.load_n.abs() / ADHESION_N)
 }
 
 /// Poles (rad/s, upper ones of pairs) and residues (V) of a unit release of the mean load, exact.

@@ -102,7 +102,7 @@ const MAX_ONSET_SAMPLES: usize = 16;
 impl Stage for Correlation {
     const SPEC: Spec = Spec {
         name: "events.correlation",
-        version: 1,
+        version: 2,
         summary: "finds snap-off or snap-to-contact events and aligns them by iterative correlation averaging",
         inputs: &[RECORDS.spec()],
         outputs: &[ENSEMBLE.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -144,7 +144,7 @@ impl Stage for Correlation {
         Ok(Ports::new()
             .with(&ENSEMBLE, ensemble_array(&listed, rate, self.pre_samples(), self.kind, unit))
             .with(&EVENTS, events_table(&listed, records, rate, unit))
-            .with(&SUMMARY, summary(&listed, records, self.kind)?))
+            .with(&SUMMARY, summary(&listed, records, rate, self.kind)?))
     }
 
     fn examples() -> Vec<Example> {

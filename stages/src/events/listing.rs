@@ -155,11 +155,19 @@ struct Events {
     kind: &'static str,
     records: usize,
     found: usize,
+    kept: Vec<KeptPlace>,
     rejected: Vec<Rejected>,
     iterations: usize,
     worst_correlation: Option<f64>,
     amplitude_mean: Option<f64>,
     amplitude_std: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct KeptPlace {
+    record: String,
+    index: f64,
+    time_s: f64,
 }
 
 #[derive(Serialize)]
@@ -170,7 +178,7 @@ struct Rejected {
 }
 
 /// How many events were found, and what was rejected.
-pub(super) fn summary(listed: &Listed, records: &[Record], kind: EventKind) -> Result<Document, StageError> {
+pub(super) fn summary(listed: &Listed, records: &[Record], rate: f64, kind: EventKind) -> Result<Document, StageError> {
     let amplitudes: Vec<f64> = listed.kept.iter().map(|kept| kept.event.amplitude).collect();
     let n = amplitudes.len() as f64;
     let mean = amplitudes.iter().sum::<f64>() / n;
@@ -181,6 +189,11 @@ pub(super) fn summary(listed: &Listed, records: &[Record], kind: EventKind) -> R
             kind: kind_name(kind),
             records: records.len(),
             found: listed.kept.len(),
+            kept: listed
+                .kept
+                .iter()
+                .map(|kept| KeptPlace { record: name(kept.record), index: kept.position, time_s: kept.position / rate })
+                .collect(),
             rejected: listed
                 .refused
                 .iter()

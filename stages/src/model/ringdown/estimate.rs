@@ -47,6 +47,8 @@ pub struct Ringdown {
     pub covariance: Mat<f64>,
     /// Covariance of the same from the scatter of the events' scores: right under a wrong noise model too; none with fewer than 8 events.
     pub sandwich: Option<Mat<f64>>,
+    /// Shared parameters of every draw of the bootstrap over events; empty if none was asked for.
+    pub bootstrap: Vec<Vec<f64>>,
     /// The noise that the events were weighted with.
     pub noise: RingdownNoise,
     /// Whitened residual energy over degrees of freedom: 1 if the noise model holds.
@@ -74,18 +76,43 @@ impl Ringdown {
         self.modes_with(&self.covariance)
     }
 
+    /// Interval of each mode's frequency (Hz) and quality factor that holds `share` of the bootstrap's draws; none without draws.
+    pub fn bootstrap_intervals(&self, share: f64) -> Option<Vec<[(f64, f64); 2]>> {
+        let draws: Vec<Vec<ModeEstimate>> = self
+            .bootstrap
+            .iter()
+            .map(|values| modes_of(&super::modal_form::from_shared(&self.exponentials, values), &self.covariance))
+            .collect();
+        let count = draws.first()?.len();
+        let interval = |value: &dyn Fn(&ModeEstimate) -> f64, mode: usize| {
+            let mut all: Vec<f64> = draws.iter().map(|draw| value(&draw[mode])).collect();
+            all.sort_by(f64::total_cmp);
+            let at = |p: f64| all[((p * (all.len() - 1) as f64).round() as usize).min(all.len() - 1)];
+            (at(0.5 - 0.5 * share), at(0.5 + 0.5 * share))
+        };
+        Some(
+            (0..count)
+                .map(|m| [interval(&|e| e.frequency_hz.value, m), interval(&|e| e.quality_factor.value, m)])
+                .collect(),
+        )
+    }
+
     /// The modes with standard errors from another covariance of the same parameters.
     pub fn modes_with(&self, covariance: &Mat<f64>) -> Vec<ModeEstimate> {
-        let mut first = 0;
-        let mut modes = Vec::new();
-        for e in &self.exponentials {
-            if e.oscillates() {
-                modes.push(mode(e.pole, covariance, first));
-            }
-            first += e.parameters();
-        }
-        modes
+        modes_of(&self.exponentials, covariance)
     }
+}
+
+fn modes_of(exponentials: &[Exponential], covariance: &Mat<f64>) -> Vec<ModeEstimate> {
+    let mut first = 0;
+    let mut modes = Vec::new();
+    for e in exponentials {
+        if e.oscillates() {
+            modes.push(mode(e.pole, covariance, first));
+        }
+        first += e.parameters();
+    }
+    modes
 }
 
 /// Frequency and quality factor of a pole by the delta method.

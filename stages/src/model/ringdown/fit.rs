@@ -1,6 +1,9 @@
 //! The joint fit, from records to estimates.
 
 use faer::{Mat, c64};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use super::compressed::{Compressed, compress, whiten};
 use super::estimate::{Ringdown, RingdownVerdict};
@@ -29,6 +32,10 @@ pub struct RingdownOptions {
     pub slope: bool,
     /// Relative standard deviation of what is known beforehand of a real pole; default 0.5. They hardly show in what follows the first samples.
     pub real_pole_std: f64,
+    /// Draws of the bootstrap over events, default 0: none.
+    pub bootstrap_draws: usize,
+    /// Seed of those draws.
+    pub bootstrap_seed: u64,
     /// Start from these exponentials instead of the Hankel matrix; default none. Their number replaces `modes` and `real_poles`.
     pub start: Option<Vec<Exponential>>,
 }
@@ -42,6 +49,8 @@ impl Default for RingdownOptions {
             noise: NoiseSource::Estimated,
             slope: true,
             real_pole_std: 0.5,
+            bootstrap_draws: 0,
+            bootstrap_seed: 1,
             start: None,
         }
     }
@@ -62,6 +71,8 @@ pub enum NoiseSource {
 const ROUNDS: usize = 12;
 /// Standard errors that count as arrived.
 const ARRIVED: f64 = 1e-3;
+/// The same for a draw of the bootstrap, whose scatter is of one standard error.
+const BOOTSTRAP_ARRIVED: f64 = 1e-2;
 /// Rounds of noise estimation: the third changes variances by less than their own errors.
 const NOISE_ROUNDS: usize = 3;
 /// Events below which their scatter says too little.
@@ -117,7 +128,8 @@ pub fn fit_ringdowns(
             }
         }
     }
-    fitted.result(events, interval_s, point, noise, &freedom)
+    let draws = bootstrap(&fitted, &point, &freedom, options);
+    fitted.result(events, interval_s, point, noise, &freedom).map(|result| Ringdown { bootstrap: draws, ..result })
 }
 
 fn check(events: &[&[f64]], free: &[&[f64]], interval_s: f64, options: &RingdownOptions) -> Result<usize, ModelError> {
@@ -334,6 +346,7 @@ impl Fitted {
         let residual_periodogram = mean_periodogram(&residuals(events, &point, interval_s), &taper);
         let density = |values: Vec<f64>| values.into_iter().map(|v| 2.0 * interval_s * v).collect::<Vec<f64>>();
         Ok(Ringdown {
+            bootstrap: Vec::new(),
             event_std: self.event_std(freedom),
             frequency_hz: (0..=samples / 2).map(|k| k as f64 / (samples as f64 * interval_s)).collect(),
             residual_periodogram: density(residual_periodogram),
@@ -430,6 +443,30 @@ fn parts_of(exponentials: &[Exponential], white: f64, interval_s: f64, samples: 
         .map(|e| ThermalMode { pole: c64::new(e.pole.re, e.pole.im), variance: 0.0 })
         .collect();
     RingdownNoise { white, thermal, wander }
+}
+
+/// Shared parameters of fits to events drawn with replacement, noise model and weights held.
+///
+/// Method: compressed events are drawn, not records, so that a draw costs a few steps of the search. Source: B. Efron, Ann. Stat. 7 (1979) 1.
+fn bootstrap(fitted: &Fitted, point: &Point, freedom: &Freedom, options: &RingdownOptions) -> Vec<Vec<f64>> {
+    let count = point.events.len();
+    let draw = |number: usize| {
+        let mut rng = ChaCha8Rng::seed_from_u64(options.bootstrap_seed);
+        rng.set_stream(number as u64);
+        let chosen: Vec<usize> = (0..count).map(|_| rng.random_range(0..count)).collect();
+        let data = Compressed {
+            r: fitted.data.r.clone(),
+            projections: chosen.iter().map(|&i| fitted.data.projections[i].clone()).collect(),
+            rest: chosen.iter().map(|&i| fitted.data.rest[i]).collect(),
+        };
+        let mut drawn = Point {
+            exponentials: point.exponentials.clone(),
+            events: chosen.iter().map(|&i| point.events[i]).collect(),
+        };
+        search(&data, &fitted.reference, &mut drawn, freedom, BOOTSTRAP_ARRIVED);
+        shared(&drawn.exponentials)
+    };
+    (0..options.bootstrap_draws).into_par_iter().map(draw).collect()
 }
 
 /// Events less their fits.

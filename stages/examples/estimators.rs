@@ -1,0 +1,66 @@
+//! Each estimator in a few lines, without any config: `cargo run -p afmid-stages --example estimators`.
+
+use afmid_stages::model::pem::{Experiment, PemOptions, identify};
+use afmid_stages::model::ringdown::{NoiseSource, RingdownOptions, fit_ringdowns};
+use afmid_stages::model::{Era, ModelError, Subspace};
+
+/// A resonance at 50 kHz with Q = 40, sampled at 1 MS/s.
+const INTERVAL_S: f64 = 1e-6;
+
+fn main() -> Result<(), ModelError> {
+    prediction_error_method()?;
+    subspace()?;
+    free_decay()?;
+    ringdowns()
+}
+
+/// Input and output: a step that ends, with a little noise.
+fn data() -> (Vec<f64>, Vec<f64>) {
+    let u: Vec<f64> = (0..4096).map(|k| if k < 200 { 1.0 } else { 0.0 }).collect();
+    let (w, a) = (std::f64::consts::TAU * 50e3 * INTERVAL_S, std::f64::consts::PI * 50e3 / 40.0 * INTERVAL_S);
+    let (a1, a2) = (-2.0 * (-a).exp() * w.cos(), (-2.0 * a).exp());
+    let mut y = vec![0.0; u.len()];
+    for k in 2..u.len() {
+        y[k] = -a1 * y[k - 1] - a2 * y[k - 2] + 0.1 * u[k - 1];
+    }
+    let noisy = y.iter().enumerate().map(|(k, y)| y + 1e-4 * ((k * k) as f64).sin()).collect();
+    (u, noisy)
+}
+
+fn prediction_error_method() -> Result<(), ModelError> {
+    let (u, y) = data();
+    let options = PemOptions { order: 2, ..PemOptions::default() };
+    let fit = identify(&[Experiment { input: &u, output: &y }], INTERVAL_S, &options)?;
+    let z = fit.model.sections[0].poles()[0];
+    println!(
+        "pem: {:.1} Hz, converged: {}",
+        z.ln().norm() / (std::f64::consts::TAU * INTERVAL_S),
+        fit.verdict.converged
+    );
+    Ok(())
+}
+
+fn subspace() -> Result<(), ModelError> {
+    let (u, y) = data();
+    let z = Subspace::new(&u, &y, 60)?.poles(2)?[0];
+    println!("subspace: {:.1} Hz", z.ln().norm() / (std::f64::consts::TAU * INTERVAL_S));
+    Ok(())
+}
+
+fn free_decay() -> Result<(), ModelError> {
+    let (_, y) = data();
+    let z = Era::new(&y[200..], 60)?.poles(2)?[0];
+    println!("era: {:.1} Hz", z.ln().norm() / (std::f64::consts::TAU * INTERVAL_S));
+    Ok(())
+}
+
+fn ringdowns() -> Result<(), ModelError> {
+    let (_, y) = data();
+    let options = RingdownOptions { modes: 1, real_poles: 0, noise: NoiseSource::White, ..RingdownOptions::default() };
+    let mode = fit_ringdowns(&[&y[200..]], &[], INTERVAL_S, &options)?.modes()[0];
+    println!(
+        "ringdown: {:.2} +- {:.2} Hz, Q {:.3}",
+        mode.frequency_hz.value, mode.frequency_hz.std, mode.quality_factor.value
+    );
+    Ok(())
+}
