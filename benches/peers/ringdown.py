@@ -303,7 +303,7 @@ def with_octave(data, rows, before, algorithm):
 # ---- the comparison --------------------------------------------------------------------------------------------------------------------
 
 
-# name, fit, its arguments, most seeds. Subspace methods take s block rows; `rest`: 2 s zeros before the pulse that starts the decay
+# name, fit, its arguments, most seeds. Subspace methods take s block rows; `rest`: twice as many zeros before the pulse that starts the decay
 PEERS = [
     ("scipy `least_squares`, variable projection, a residual per sample", with_scipy, (Samples,), 1000),
     ("scipy `least_squares`, variable projection, compressed", with_scipy, (Projection,), 1000),
