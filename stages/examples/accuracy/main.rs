@@ -28,7 +28,10 @@ fn main() {
         ["real", scatter, seeds] => scatter.parse().ok().zip(seeds.parse().ok()).map(|(s, n)| real(s, n)),
         ["white", seeds] => seeds.parse().ok().map(white),
         ["variants", scatter, seeds] => scatter.parse().ok().zip(seeds.parse().ok()).map(|(s, n)| variants(s, n)),
-        ["speed"] => Some(speed()),
+        ["speed"] => {
+            speed();
+            Some(())
+        }
         ["export", seed, events] => seed.parse().ok().zip(events.parse().ok()).map(|(s, n)| export(s, n)),
         ["fit", seed, events] => seed.parse().ok().zip(events.parse().ok()).map(|(s, n)| fit(s, n)),
         _ => None,

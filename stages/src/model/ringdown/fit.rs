@@ -397,10 +397,10 @@ impl Fitted {
             let mut direction = vec![0.0; width];
             for (i, &parameter) in freedom.shared.iter().enumerate().skip(j) {
                 let factor = shared_root[(i, j)];
-                for c in 0..width {
+                for (c, (direction, shared)) in direction.iter_mut().zip(&w.shared[parameter]).enumerate() {
                     let own: f64 =
                         freedom.own.iter().enumerate().map(|(k, &o)| w.own[o][c] * block.coupling[(k, i)]).sum();
-                    direction[c] += factor * (w.shared[parameter][c] - own);
+                    *direction += factor * (shared - own);
                 }
             }
             directions.push(direction);

@@ -60,20 +60,16 @@ pub(super) fn columns(reference: &[Exponential], interval_s: f64, samples: usize
         let step = (exponential.pole * interval_s).exp();
         let parts = exponential.columns();
         let mut own = vec![vec![0.0; samples]; parts];
-        let mut z = c64::new(1.0, 0.0);
-        for k in 0..samples {
-            let t = decay * k as f64;
-            for (m, power) in [1.0, t, t * t].into_iter().enumerate() {
-                if parts == 6 {
-                    own[2 * m][k] = power * z.re;
-                    own[2 * m + 1][k] = power * z.im;
-                } else {
-                    own[m][k] = power * z.re;
-                }
-            }
-            z *= step;
-            if z.norm_sqr() < 1e-280 {
-                break; // below every rounding, and denormal numbers are slow
+        let values: Vec<c64> = std::iter::successors(Some(c64::new(1.0, 0.0)), |z| Some(z * step))
+            .take(samples)
+            .take_while(|z| z.norm_sqr() > 1e-280) // below every rounding, and denormal numbers are slow
+            .collect();
+        for (j, column) in own.iter_mut().enumerate() {
+            let (power, imaginary) = if parts == 6 { (j / 2, j % 2 == 1) } else { (j, false) };
+            for (k, (value, z)) in column.iter_mut().zip(&values).enumerate() {
+                let t = decay * k as f64;
+                let factor = [1.0, t, t * t][power];
+                *value = factor * if imaginary { z.im } else { z.re };
             }
         }
         all.append(&mut own);

@@ -145,12 +145,8 @@ fn weighted(observed: &[f64], parts: &[Vec<f64>], level: &[f64]) -> (Vec<Vec<f64
             }
         }
     }
-    for i in 0..count {
-        for j in 0..i {
-            normal[j][i] = normal[i][j];
-        }
-    }
-    (normal, right)
+    let full = (0..count).map(|i| (0..count).map(|j| normal[i.max(j)][i.min(j)]).collect()).collect();
+    (full, right)
 }
 
 /// `min x'Nx/2 - r'x`, `x >= 0`, by coordinate descent.
