@@ -1,6 +1,7 @@
 //! Parametric estimates: prediction error method, modes, zeros.
 
 mod comparison;
+pub mod contact;
 mod era;
 mod era_stage;
 mod error;
