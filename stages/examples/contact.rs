@@ -2,15 +2,14 @@
 //!
 //! `cargo run -p afmid-stages --example contact -- 50`: seeds 1 to 50, 24 snap-ins and 24 snap-offs each.
 
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the world serves the example `accuracy` too")]
 #[path = "accuracy/world.rs"]
 mod world;
 
+use afmid_stages::model::ModelError;
 use afmid_stages::model::contact::{ContactEstimate, CoupledPoles, FreeLever, LOADED_BEAM_SHARES, contact_stiffness};
 use afmid_stages::model::ringdown::{Estimate, Ringdown, RingdownOptions, fit_ringdowns};
-use afmid_stages::simulate::{
-    Adc, Drive, EventKind, ReadoutNoise, Sampling, TriangleRamp, simulate_motion,
-};
+use afmid_stages::simulate::{Adc, Drive, EventKind, ReadoutNoise, Sampling, TriangleRamp, simulate_motion};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -18,48 +17,80 @@ use world::{LSB_V, PINK_V, RATE_HZ, SAMPLES, SENSITIVITY_V_PER_M, WHITE_V, lever
 
 /// Events of either kind per seed.
 const EVENTS: usize = 24;
+/// Scatter of the pull-off force.
+const SCATTER: f64 = 0.06;
 /// Random streams of the snap-ins begin here, beyond those of the snap-offs.
 const SNAP_IN_STREAM: u64 = 1 << 32;
+/// Samples that the coupled lever's start is made from: it rings for 500.
+const START_SAMPLES: usize = 1024;
 
 fn main() {
-    let Some(seeds) = std::env::args().nth(1).and_then(|word| word.parse::<u64>().ok()) else {
+    let Some(seeds) = std::env::args().nth(1).and_then(|word| word.parse::<u64>().ok()).filter(|seeds| *seeds > 0)
+    else {
         eprintln!("usage: contact SEEDS");
         std::process::exit(2);
     };
-    let (_, contact) = system(295.0);
-    let truth = [contact.stiffness_n_per_m, contact.damping_n_s_per_m];
-    let results: Vec<(ContactEstimate, Ringdown)> = (1..=seeds).into_par_iter().map(estimate).collect();
-    for (seed, (c, fit)) in results.iter().enumerate() {
-        println!("seed {} chi2 {:.3} conv {} steps {}: k {:.4} +- {:.4} eta {:.4e} +- {:.1e} p {:.3}", seed + 1, fit.reduced_chi_square, fit.verdict.converged, fit.verdict.steps, c.stiffness_n_per_m.value, c.stiffness_n_per_m.std, c.damping_n_s_per_m.value, c.damping_n_s_per_m.std, c.p_value);
-        if seed < 2 {
-            for m in fit.modes() { println!("   {:?}", m); }
-            for p in &c.poles { println!("   {:.3?}", p); }
-            println!("{:?}", c.budget);
-            for e in &fit.exponentials { println!("     {:.4e} {:.4e}", e.pole, e.residue); }
+    let results: Vec<Result<ContactEstimate, ModelError>> = (1..=seeds).into_par_iter().map(estimate).collect();
+    for (seed, result) in (1..).zip(&results) {
+        match result {
+            Ok(contact) => println!(
+                "seed {seed:3}: {:.4} +- {:.4} N/m, {:.4e} +- {:.1e} N s/m, p = {:.3}",
+                contact.stiffness_n_per_m.value,
+                contact.stiffness_n_per_m.std,
+                contact.damping_n_s_per_m.value,
+                contact.damping_n_s_per_m.std,
+                contact.p_value
+            ),
+            Err(error) => println!("seed {seed:3}: {error}"),
         }
     }
-    let z = |pick: fn(&ContactEstimate) -> Estimate, truth: f64| -> Vec<f64> { results.iter().map(|(c, _)| (pick(c).value - truth) / pick(c).std).collect() };
-    for (name, z) in [("k", z(|c| c.stiffness_n_per_m, truth[0])), ("eta", z(|c| c.damping_n_s_per_m, truth[1]))] {
-        let n = z.len() as f64;
-        println!("{name}: within 2: {} rms z {:.3} mean z {:.3}", z.iter().filter(|z| z.abs() <= 2.0).count(), (z.iter().map(|z| z * z).sum::<f64>() / n).sqrt(), z.iter().sum::<f64>() / n);
+    let found: Vec<&ContactEstimate> = results.iter().flatten().collect();
+    let (_, truth) = system(295.0);
+    print("stiffness", &found, seeds, truth.stiffness_n_per_m, |contact| contact.stiffness_n_per_m);
+    print("damping", &found, seeds, truth.damping_n_s_per_m, |contact| contact.damping_n_s_per_m);
+    let n = found.len() as f64;
+    for j in 0..LOADED_BEAM_SHARES.len() {
+        let mean = |of: fn(&ContactEstimate, usize) -> f64| found.iter().map(|c| of(c, j)).sum::<f64>() / n;
+        println!(
+            "pole at {:.0} kHz: weight {:.3} in the stiffness, {:.3} in the damping; alone +- {:.3} N/m",
+            mean(|c, j| c.poles[j].pole.norm() / std::f64::consts::TAU / 1e3),
+            mean(|c, j| c.poles[j].stiffness_weight),
+            mean(|c, j| c.poles[j].damping_weight),
+            mean(|c, j| c.poles[j].stiffness_n_per_m.std)
+        );
     }
+    let small = found.iter().filter(|contact| contact.p_value < 0.05).count();
+    println!("p-value below 0.05: {small} of {}", found.len());
 }
 
-fn estimate(seed: u64) -> (ContactEstimate, Ringdown) {
-    let snap_offs: Vec<Vec<f64>> = (0..EVENTS).map(|e| real_event(seed, e, 0.06, SAMPLES)).collect();
-    let snap_ins: Vec<Vec<f64>> = (0..EVENTS).map(|e| snap_in(seed, e, SAMPLES)).collect();
-    let free = fit(&snap_offs);
-    let coupled = fit(&snap_ins);
+fn print(name: &str, found: &[&ContactEstimate], seeds: u64, truth: f64, pick: fn(&ContactEstimate) -> Estimate) {
+    let z: Vec<f64> = found.iter().map(|contact| (pick(contact).value - truth) / pick(contact).std).collect();
+    let n = z.len() as f64;
+    let rms = |values: &mut dyn Iterator<Item = f64>| (values.map(|v| v * v).sum::<f64>() / n).sqrt();
+    println!(
+        "{name}: {} of {seeds} within 2 standard errors, rms z {:.3}, mean z {:+.3}, rms error {:.3} %, stated {:.3} %",
+        z.iter().filter(|z| z.abs() <= 2.0).count(),
+        rms(&mut z.iter().copied()),
+        z.iter().sum::<f64>() / n,
+        100.0 * rms(&mut found.iter().map(|contact| pick(contact).value / truth - 1.0)),
+        100.0 * rms(&mut found.iter().map(|contact| pick(contact).std / truth)),
+    );
+}
+
+/// Everything from the records of one seed: nothing but the lever's stiffness and tip shares is given.
+fn estimate(seed: u64) -> Result<ContactEstimate, ModelError> {
+    let snap_offs: Vec<Vec<f64>> = (0..EVENTS).map(|event| real_event(seed, event, SCATTER, SAMPLES)).collect();
+    let snap_ins: Vec<Vec<f64>> = (0..EVENTS).map(|event| snap_in(seed, event, SAMPLES)).collect();
+    let free = fit(&snap_offs, None)?;
+    let coupled = fit(&snap_ins, Some(START_SAMPLES))?;
     let stiffness = Estimate { value: lever().stiffness_n_per_m, std: 0.0 };
-    let lever = FreeLever::new(stiffness, free.modes(), LOADED_BEAM_SHARES.to_vec(), 0.0);
-    let contact = lever.and_then(|lever| contact_stiffness(&lever, &CoupledPoles::of(&coupled, &coupled.covariance)));
-    (contact.unwrap_or_else(|error| panic!("no contact: {error}")), coupled)
+    let lever = FreeLever::new(stiffness, free.modes(), LOADED_BEAM_SHARES.to_vec(), 0.0)?;
+    contact_stiffness(&lever, &CoupledPoles::of(&coupled, &coupled.covariance))
 }
 
-fn fit(events: &[Vec<f64>]) -> Ringdown {
+fn fit(events: &[Vec<f64>], start_samples: Option<usize>) -> Result<Ringdown, ModelError> {
     let lent: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
-    fit_ringdowns(&lent, &[], 1.0 / RATE_HZ, &RingdownOptions::default())
-        .unwrap_or_else(|error| panic!("the fit failed: {error}"))
+    fit_ringdowns(&lent, &[], 1.0 / RATE_HZ, &RingdownOptions { start_samples, ..RingdownOptions::default() })
 }
 
 /// One catch through the whole microscope, as [`real_event`] makes a release; the samples from the first one after it on.

@@ -291,9 +291,8 @@ impl Linear {
     fn budget(&self, measured: &CoupledPoles, gain: &Mat<f64>) -> ErrorBudget {
         let poles = gain * &measured.covariance * gain.transpose();
         let own = gain * &self.lever;
-        let part = |columns: &mut dyn Iterator<Item = usize>| {
-            columns.map(|p| own[(0, p)] * own[(0, p)]).sum::<f64>().sqrt()
-        };
+        let part =
+            |columns: &mut dyn Iterator<Item = usize>| columns.map(|p| own[(0, p)] * own[(0, p)]).sum::<f64>().sqrt();
         let count = own.ncols();
         ErrorBudget {
             poles: poles[(0, 0)].max(0.0).sqrt(),

@@ -75,6 +75,11 @@ impl FreeLever {
         Ok(Self { stiffness_n_per_m: stiffness, modes, tip_share, tip_share_error })
     }
 
+    /// Static stiffness at the tip, N/m.
+    pub fn stiffness(&self) -> Estimate {
+        self.stiffness_n_per_m
+    }
+
     /// Standard errors of the parameters: stiffness, then per mode angular frequency (rad/s), quality factor and share.
     pub(super) fn parameter_std(&self) -> Vec<f64> {
         let modes = self.modes.iter().zip(&self.tip_share).flat_map(|(mode, share)| {
