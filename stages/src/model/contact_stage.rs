@@ -38,7 +38,7 @@ pub struct ContactFit {
     /// What each free mode has of the tip's static compliance, ascending, above 0, their sum at most 1; the rest counts as static. Default:
     /// 0.9713, 0.0247, 0.0032, 0.0008, a beam loaded at its end as in `simulate.afm`: an assumption.
     pub tip_shares: Vec<f64>,
-    /// Relative standard error of each share, 0 to 1. Default: 0, the shares are taken as they are.
+    /// Relative standard error of each share but the first, which makes up for the others, 0 to 1. Default: 0, the shares are taken as they are.
     pub tip_share_error: f64,
     /// Coupled poles above this frequency in Hz are left out; above 0. Default: absent, all count.
     pub max_frequency_hz: Option<f64>,

@@ -30,7 +30,8 @@ pub(super) struct Compliance {
 }
 
 impl FreeLever {
-    /// A lever of `stiffness` (N/m) with `modes` and as many `tip_share`s, each known to the relative standard error `tip_share_error`.
+    /// A lever of `stiffness` (N/m) with `modes` and as many `tip_share`s, each but the first known to the relative standard
+    /// error `tip_share_error`; the first makes up for the others' errors, as the sum is known.
     ///
     /// # Errors
     /// No mode, unequal numbers, values that are not above zero, shares that sum to more than one.
@@ -94,6 +95,7 @@ impl FreeLever {
         let mut value = c64::new(1.0 - self.tip_share.iter().sum::<f64>(), 0.0);
         let mut by_s = c64::new(0.0, 0.0);
         let mut by_parameter = vec![c64::new(0.0, 0.0)];
+        let mut lowest = None;
         for (mode, &share) in self.modes.iter().zip(&self.tip_share) {
             let (w, q) = (TAU * mode.frequency_hz.value, mode.quality_factor.value);
             let d = s * s + s * (w / q) + w * w;
@@ -103,8 +105,9 @@ impl FreeLever {
             // d(w^2/d)/dw = (2 w - w^2/d (s/Q + 2 w)) / d
             by_parameter.push((c64::new(2.0 * w, 0.0) - part * (s / q + 2.0 * w)) / d * (share / k));
             by_parameter.push(part / d * s * (w / (q * q)) * (share / k));
-            // the static part gives what the mode takes
-            by_parameter.push((part - 1.0) / k);
+            // the first mode gives what the others take: their sum is known better than any of them
+            let first = *lowest.get_or_insert(part);
+            by_parameter.push((part - first) / k);
         }
         value /= k;
         by_parameter[0] = -value / k;

@@ -59,8 +59,9 @@ fn lever(errors: [f64; 4], deviate: &mut dyn FnMut() -> f64) -> FreeLever {
             quality_factor: around(QUALITY_FACTOR[i], errors[2]),
         })
         .collect();
-    // 0.999 of them: a share that errs upwards leaves no negative rest
-    let shares = LOADED_BEAM_SHARES.map(|share| around(0.999 * share, errors[3]).value).to_vec();
+    let mut shares = LOADED_BEAM_SHARES.map(|share| around(share, errors[3]).value).to_vec();
+    // the sum is known: the first makes up for the others
+    shares[0] = 1.0 - shares[1..].iter().sum::<f64>();
     FreeLever::new(stiffness, modes, shares, errors[3]).unwrap()
 }
 
