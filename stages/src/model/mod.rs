@@ -1,6 +1,8 @@
 //! Parametric estimates: prediction error method, modes, zeros.
 
 mod comparison;
+pub mod contact;
+mod contact_stage;
 mod era;
 mod era_stage;
 mod error;
@@ -28,6 +30,7 @@ mod transmission;
 mod zeros_stage;
 
 pub use comparison::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
+pub use contact_stage::ContactFit;
 pub use era::Era;
 pub use era_stage::EraEstimate;
 pub use error::ModelError;
@@ -54,6 +57,7 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<Modes>(),
     Entry::of::<Zeros>(),
     Entry::of::<RingdownFit>(),
+    Entry::of::<ContactFit>(),
 ];
 
 #[cfg(test)]

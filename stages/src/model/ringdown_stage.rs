@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::contact::CoupledPoles;
 use super::ringdown::{ModeEstimate, NoiseSource, Ringdown, RingdownOptions, fit_ringdowns};
 
 /// Fits the modes of all events at once: one set of poles, each event with its own amplitude, sub-sample onset, offset and slope.
@@ -13,7 +14,8 @@ use super::ringdown::{ModeEstimate, NoiseSource, Ringdown, RingdownOptions, fit_
 /// noise. Residues are free, so no input is needed and none is assumed.
 /// Method: maximum likelihood; records whitened by the noise's own Kalman filter, compressed, fitted by Levenberg-Marquardt with the
 /// events' own parameters eliminated; noise variances by a restricted Whittle likelihood of the residuals, in turns with the fit.
-/// Shapes: `modes` by mode ascending in frequency, `events` by event, `spectrum` over frequency.
+/// Shapes: `modes` by mode ascending in frequency, `events` by event, `spectrum` over frequency, `poles` and their covariance over real and imaginary
+/// part of each mode in turn.
 /// Units: Hz; volts; onsets in seconds after the ensemble's first sample used.
 /// Accuracy: rms errors within a few per cent of the Cramer-Rao bound and intervals that hold, for one event and for many (docs/accuracy.md). Standard
 /// errors count thermal, 1/f and white noise; `error_source = "events"` takes them from the events' scatter, right under a wrong noise model too.
@@ -38,6 +40,9 @@ pub struct RingdownFit {
     pub bootstrap_draws: usize,
     /// Rows of the Hankel matrix of the start, more than its order and at most 400. Default: 100, a period of the slowest mode.
     pub block_rows: usize,
+    /// Samples after the onset that the start is made from, 0 (all) or 8 per mode, real pole and two more to 10 million. Default: 0; some decay times
+    /// where the ringing fills a small part of the window, as on contact.
+    pub start_samples: usize,
 }
 
 /// Noise beside the ringing.
@@ -71,6 +76,7 @@ impl Default for RingdownFit {
             drift: true,
             bootstrap_draws: 0,
             block_rows: 100,
+            start_samples: 0,
         }
     }
 }
@@ -80,6 +86,8 @@ pub(super) const MODES: Port<Table> = Port::new("modes", "ringdown-modes", "mech
 const EVENTS: Port<Table> = Port::new("events", "ringdown-events", "what each event has for itself");
 const SPECTRUM: Port<Array> =
     Port::new("spectrum", "residual-spectrum", "what the fit leaves, and what the noise model expects");
+pub(super) const POLES: Port<Array> =
+    Port::new("poles", "ringdown-poles", "poles of the modes with their full covariance");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "modes, noise, convergence");
 
 /// Standard errors from the events' scatter that differ from the noise model's by this factor are worth a warning: with 24 events theirs scatters
@@ -91,10 +99,10 @@ const EXCESS: f64 = 1.1;
 impl Stage for RingdownFit {
     const SPEC: Spec = Spec {
         name: "model.ringdown",
-        version: 1,
+        version: 2,
         summary: "fits the modes of all events jointly, at the limit of their noise",
         inputs: &[ENSEMBLE.spec()],
-        outputs: &[MODES.spec(), EVENTS.spec(), SPECTRUM.spec(), SUMMARY.spec()],
+        outputs: &[MODES.spec(), EVENTS.spec(), SPECTRUM.spec(), POLES.spec(), SUMMARY.spec()],
         caching: Caching::Stored,
         seeded: true,
         source: "S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7",
@@ -112,6 +120,11 @@ impl Stage for RingdownFit {
             if !(least..=most).contains(&value) {
                 return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
             }
+        }
+        let least = 8 * (self.modes + self.real_poles + 2);
+        if self.start_samples != 0 && !(least..=10_000_000).contains(&self.start_samples) {
+            let found = self.start_samples;
+            return Err(StageError::new(format!("`start_samples` is {found}, wanted 0 or {least} to 10000000")));
         }
         Ok(())
     }
@@ -135,6 +148,7 @@ impl Stage for RingdownFit {
             .with(&MODES, mode_table(&fit, &modes))
             .with(&EVENTS, event_table(&fit))
             .with(&SPECTRUM, spectrum(&fit))
+            .with(&POLES, poles(&fit, self.error_source))
             .with(&SUMMARY, self.summary(&fit, &modes)?))
     }
 
@@ -169,6 +183,7 @@ impl RingdownFit {
             slope: self.drift,
             bootstrap_draws: self.bootstrap_draws,
             bootstrap_seed: seed,
+            start_samples: (self.start_samples > 0).then_some(self.start_samples),
             noise: match self.noise {
                 JointNoise::Estimated => NoiseSource::Estimated,
                 JointNoise::White => NoiseSource::White,
@@ -280,6 +295,23 @@ fn mode_table(fit: &Ringdown, modes: &[ModeEstimate]) -> Table {
         .with("frequency_high_hz", "Hz", "upper end of it", end(|i| i[0].1))
         .with("quality_factor_low", "1", "lower end of the bootstrap's 95 % interval", end(|i| i[1].0))
         .with("quality_factor_high", "1", "upper end of it", end(|i| i[1].1))
+}
+
+fn poles(fit: &Ringdown, source: ErrorSource) -> Array {
+    let covariance = match (source, &fit.sandwich) {
+        (ErrorSource::Events, Some(sandwich)) => sandwich,
+        _ => &fit.covariance,
+    };
+    let poles = CoupledPoles::of(fit, covariance);
+    let count = 2 * poles.poles.len();
+    let axis = |name: &str| {
+        Axis::new(name, "1", "real and imaginary part of each pole in turn", (0..count).map(|i| i as f64).collect())
+    };
+    let matrix: Vec<f64> = (0..count * count).map(|i| poles.covariance[(i / count, i % count)]).collect();
+    let values: Vec<f64> = poles.poles.iter().flat_map(|pole| [pole.re, pole.im]).collect();
+    Array::over(vec![axis("parameter"), axis("other")])
+        .with("pole", "rad/s", "poles of the modes, the upper ones of pairs", &["parameter"], values)
+        .with("covariance", "rad^2/s^2", "their covariance", &["parameter", "other"], matrix)
 }
 
 fn event_table(fit: &Ringdown) -> Table {

@@ -38,6 +38,9 @@ pub struct RingdownOptions {
     pub bootstrap_seed: u64,
     /// Start from these exponentials instead of the Hankel matrix; default none. Their number replaces `modes` and `real_poles`.
     pub start: Option<Vec<Exponential>>,
+    /// Make the start from this many first samples of the events' mean, each event's level and drift from the second half of its window;
+    /// default none: from the whole mean, no drift at the start. For ringing that fills a small part of the window, like a coupled lever's.
+    pub start_samples: Option<usize>,
 }
 
 impl Default for RingdownOptions {
@@ -52,6 +55,7 @@ impl Default for RingdownOptions {
             bootstrap_draws: 0,
             bootstrap_seed: 1,
             start: None,
+            start_samples: None,
         }
     }
 }
@@ -151,6 +155,10 @@ fn check(events: &[&[f64]], free: &[&[f64]], interval_s: f64, options: &Ringdown
     if !(interval_s > 0.0 && interval_s.is_finite()) {
         return Err(ModelError::Parameter { name: "interval_s", found: interval_s, wanted: "above 0" });
     }
+    if options.start_samples.is_some_and(|count| count < wanted) {
+        let found = options.start_samples.unwrap_or(0);
+        return Err(ModelError::TooShort { found, wanted });
+    }
     if options.modes == 0 && options.start.is_none() {
         return Err(ModelError::Parameter { name: "modes", found: 0.0, wanted: "at least 1" });
     }
@@ -176,13 +184,20 @@ fn first_guess(events: &[&[f64]], interval_s: f64, options: &RingdownOptions) ->
     if mean.iter().all(|v| *v == mean[0]) {
         return Err(ModelError::ConstantOutput);
     }
+    let early: Vec<f64> = match options.start_samples {
+        Some(count) => {
+            let line = line_of_second_half(&mean);
+            mean.iter().zip(&line.values(samples)).map(|(y, l)| y - l).take(count).collect()
+        }
+        None => mean,
+    };
     let exponentials = match &options.start {
         Some(given) => {
             let mut given = given.clone();
-            amplitudes(&mut given, &mean, interval_s);
+            amplitudes(&mut given, &early, interval_s);
             given
         }
-        None => start(&mean, interval_s, options.modes, options.real_poles, options.block_rows)?,
+        None => start(&early, interval_s, options.modes, options.real_poles, options.block_rows)?,
     };
     let tail = samples - samples / 4;
     let shape = {
@@ -192,16 +207,47 @@ fn first_guess(events: &[&[f64]], interval_s: f64, options: &RingdownOptions) ->
     let own = events
         .iter()
         .map(|event| {
-            let offset = event[tail..].iter().sum::<f64>() / (samples - tail) as f64;
+            let line = if options.start_samples.is_some() && options.slope {
+                line_of_second_half(event)
+            } else {
+                Line { offset: event[tail..].iter().sum::<f64>() / (samples - tail) as f64, slope: 0.0 }
+            };
             let (mut up, mut down) = (0.0, 0.0);
-            for (y, s) in event.iter().zip(&shape) {
-                up += (y - offset) * s;
+            for ((y, l), s) in event.iter().zip(line.values(samples)).zip(&shape) {
+                up += (y - l) * s;
                 down += s * s;
             }
-            EventParameters { amplitude: up / down.max(f64::MIN_POSITIVE), onset_s: 0.0, offset, slope: 0.0 }
+            let amplitude = up / down.max(f64::MIN_POSITIVE);
+            EventParameters { amplitude, onset_s: 0.0, offset: line.offset, slope: line.slope }
         })
         .collect();
     Ok(Point { exponentials, events: own })
+}
+
+/// Level in the middle of a window and its change over half of it, V.
+struct Line {
+    offset: f64,
+    slope: f64,
+}
+
+impl Line {
+    fn values(&self, samples: usize) -> Vec<f64> {
+        let centre = 0.5 * (samples.max(2) - 1) as f64;
+        (0..samples).map(|k| self.offset + self.slope * (k as f64 - centre) / centre).collect()
+    }
+}
+
+/// The least-squares line through the second half of a window.
+fn line_of_second_half(values: &[f64]) -> Line {
+    let (samples, first) = (values.len(), values.len() / 2);
+    let centre = 0.5 * (samples.max(2) - 1) as f64;
+    let count = (samples - first) as f64;
+    let x: Vec<f64> = (first..samples).map(|k| (k as f64 - centre) / centre).collect();
+    let (mean_x, mean_y) = (x.iter().sum::<f64>() / count, values[first..].iter().sum::<f64>() / count);
+    let up: f64 = x.iter().zip(&values[first..]).map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
+    let down: f64 = x.iter().map(|x| (x - mean_x).powi(2)).sum();
+    let slope = up / down.max(f64::MIN_POSITIVE);
+    Line { offset: mean_y - slope * mean_x, slope }
 }
 
 /// Everything but the residue of the strongest mode, which fixes scale and time of the shape.
