@@ -17,8 +17,8 @@ use super::orthogonal::Svd;
 /// # Units
 /// Poles in the z plane.
 /// # Accuracy
-/// Exact without noise. With white noise frequencies scatter by 1.0 to 1.5 times the Cramer-Rao bound when the rows are a third of N, and by
-/// more with fewer; damping is biased upwards by the noise's own energy.
+/// Exact without noise. With white noise above the Cramer-Rao bound, the less the more rows up to a third of N; damping is biased upwards by the noise's
+/// own energy. Start values.
 /// # Errors
 /// Values that are not finite, fewer than 2 `block_rows` samples, no convergence.
 /// # Source

@@ -17,7 +17,7 @@ use super::series::PairSeries;
 /// invariance; B, D, initial state, offset and drift by least squares of the simulation over the whole record. Unstable poles are reflected.
 /// Shapes: as `model.pem`.
 /// Units: those of the pair.
-/// Accuracy: exact without noise; with white noise frequencies scatter by up to 1.5 times the bound when the rows are a third of the decay. Damping is
+/// Accuracy: exact without noise; with white noise above the bound, the less the more rows up to a third of the decay. Damping is
 /// biased by the noise: a start value, or a check of `model.pem`.
 /// Errors: a decay shorter than twice the block rows, values that are missing or not finite, a response that is constant.
 /// Source: J. Juang and R. Pappa, J. Guidance 8 (1985) 620.

@@ -114,7 +114,7 @@ const BLOCKS: usize = 10;
 /// Each order is fitted to the first two thirds and simulated over the last: the smallest order whose squared error is within one standard error
 /// (over ten blocks) of the least. Where the last third has no input of its own (a release), the least Bayesian information criterion instead.
 /// # Accuracy
-/// The true order or one of the next two in most of 20 records at a noise of 5 % (test); no more than the data need, not the truth.
+/// The true order or one of the next two in most of 20 records with output noise of standard deviation 0.05 (test); no more than the data need, not the truth.
 /// # Errors
 /// No order can be fitted.
 /// # Source

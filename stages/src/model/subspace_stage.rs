@@ -19,7 +19,7 @@ use super::{InstrumentalSubspace, Subspace, Weight};
 /// drift by least squares of the simulation. Unstable poles are reflected.
 /// Shapes: as `model.pem`; `force` over `input` and time gives several inputs.
 /// Units: those of the pair.
-/// Accuracy: consistent; some tens of per cent above the errors of `model.pem`, in a hundredth of its time. The covariance takes the poles' errors as those
+/// Accuracy: consistent, but not efficient: above the errors of `model.pem`, without its iterations. The covariance takes the poles' errors as those
 /// of output error at this point.
 /// Errors: too few samples for the block rows, values that are missing or not finite, a response that is constant.
 /// Source: P. Van Overschee and B. De Moor, Subspace Identification for Linear Systems, 1996; M. Verhaegen and P. Dewilde, Int. J. Control 56 (1992) 1187.
