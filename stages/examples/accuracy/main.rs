@@ -9,7 +9,10 @@ mod bound;
 mod table;
 mod world;
 
-use afmid_stages::model::ringdown::{NoiseSource, Ringdown, RingdownOptions, fit_ringdowns};
+use afmid_stages::model::ModelError;
+use afmid_stages::model::ringdown::{
+    DecayOptions, ModeEstimate, NoiseSource, RingdownOptions, fit_decay, fit_ringdowns,
+};
 use bound::{Noise, Start, bound};
 use rayon::prelude::*;
 use std::time::Instant;
@@ -92,7 +95,7 @@ fn rms_factor(squares: impl ExactSizeIterator<Item = f64>) -> f64 {
 fn estimate(data: &[Vec<f64>], free: &[&[f64]]) -> Vec<Outcome> {
     let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
     fit_ringdowns(&lent, free, 1.0 / RATE_HZ, &RingdownOptions::default())
-        .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit))
+        .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit.modes()))
 }
 
 /// What simpler ways lose at 24 events: white weights; the events averaged first; both.
@@ -125,11 +128,10 @@ fn variants(scatter: f64, seeds: u64) {
 fn estimate_with(data: &[Vec<f64>], options: &RingdownOptions) -> Vec<Outcome> {
     let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
     fit_ringdowns(&lent, &[], 1.0 / RATE_HZ, options)
-        .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit))
+        .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit.modes()))
 }
 
-fn outcomes(fit: &Ringdown) -> Vec<Outcome> {
-    let modes = fit.modes();
+fn outcomes(modes: &[ModeEstimate]) -> Vec<Outcome> {
     let truth = FREQUENCY_HZ.iter().zip(QUALITY_FACTOR);
     let pairs = modes.iter().zip(truth).flat_map(|(m, (f, q))| [(m.frequency_hz, *f), (m.quality_factor, q)]);
     pairs.map(|(e, truth)| Outcome { error: e.value / truth - 1.0, std: e.std / truth }).collect()
@@ -150,15 +152,21 @@ fn export(seed: u64, events: usize) {
     println!("{}", lines.join("\n"));
 }
 
+/// Both fits of one record, each after one that warms up.
 fn fit(seed: u64, events: usize) {
     let y = white_mean(seed, events, white_std(), SAMPLES);
-    let start = Instant::now();
-    let fit = fit_ringdowns(&[&y], &[], 1.0 / RATE_HZ, &white_options())
-        .unwrap_or_else(|error| panic!("the fit failed: {error}"));
-    let seconds = start.elapsed().as_secs_f64();
-    let errors: Vec<f64> = outcomes(&fit).iter().map(|o| o.error).collect();
-    let bound = bound(Noise::White(white_std()), SAMPLES, events as f64, true);
-    println!("{}", serde_json::json!({ "relative_error": errors, "bound": bound, "seconds": seconds }));
+    let decay = || fit_decay(&y, 1.0 / RATE_HZ, &DecayOptions::default()).map(|fit| fit.modes());
+    let joint = || fit_ringdowns(&[&y], &[], 1.0 / RATE_HZ, &white_options()).map(|fit| fit.modes());
+    let timed = |run: &dyn Fn() -> Result<Vec<ModeEstimate>, ModelError>| {
+        let _ = std::hint::black_box(run());
+        let start = Instant::now();
+        let modes = run().unwrap_or_else(|error| panic!("the fit failed: {error}"));
+        let seconds = start.elapsed().as_secs_f64();
+        let errors: Vec<f64> = outcomes(&modes).iter().map(|o| o.error).collect();
+        serde_json::json!({ "relative_error": errors, "seconds": seconds })
+    };
+    let bound = bound(Noise::White(white_std()), SAMPLES, events as f64, false);
+    println!("{}", serde_json::json!({ "decay": timed(&decay), "joint": timed(&joint), "bound": bound }));
 }
 
 /// Smallest and median time of repeated fits.
@@ -175,7 +183,10 @@ fn speed() {
         println!("{name}: least {:.2} ms, median {:.2} ms", all[0], all[repeats / 2]);
     };
     let y = white_mean(1, 84, white_std(), SAMPLES);
-    time("one record of 8192 samples, order 11, white noise", 50, &|| {
+    time("one record of 8192 samples, order 11, white noise", 200, &|| {
+        let _ = std::hint::black_box(fit_decay(&y, 1.0 / RATE_HZ, &DecayOptions::default()));
+    });
+    time("the same by the joint fit, with drift", 50, &|| {
         let _ = std::hint::black_box(fit_ringdowns(&[&y], &[], 1.0 / RATE_HZ, &white_options()));
     });
     let data: Vec<Vec<f64>> = (0..84).map(|e| real_event(1, e, 0.06, SAMPLES).0).collect();
@@ -196,10 +207,20 @@ fn white(seeds: u64) {
             .map(|seed| {
                 let y = white_mean(seed, count, std, SAMPLES);
                 fit_ringdowns(&[&y], &[], 1.0 / RATE_HZ, &white_options())
-                    .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit))
+                    .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit.modes()))
             })
             .collect();
-        let bound = bound(Noise::White(std), SAMPLES, count as f64, true);
-        table::print(&format!("white noise, the mean of {count} events"), &results, &bound);
+        let with_drift = bound(Noise::White(std), SAMPLES, count as f64, true);
+        table::print(&format!("white noise, the mean of {count} events"), &results, &with_drift);
+        let results: Vec<Vec<Outcome>> = (1..=seeds)
+            .into_par_iter()
+            .map(|seed| {
+                let y = white_mean(seed, count, std, SAMPLES);
+                fit_decay(&y, 1.0 / RATE_HZ, &DecayOptions::default())
+                    .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit.modes()))
+            })
+            .collect();
+        let without = bound(Noise::White(std), SAMPLES, count as f64, false);
+        table::print("the same by `fit_decay`, no drift", &results, &without);
     }
 }

@@ -103,7 +103,7 @@ impl Ringdown {
     }
 }
 
-fn modes_of(exponentials: &[Exponential], covariance: &Mat<f64>) -> Vec<ModeEstimate> {
+pub(super) fn modes_of(exponentials: &[Exponential], covariance: &Mat<f64>) -> Vec<ModeEstimate> {
     let mut first = 0;
     let mut modes = Vec::new();
     for e in exponentials {
