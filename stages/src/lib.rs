@@ -1,6 +1,8 @@
 //! The built-in stages of afmid, by domain: each a thin shell around a pure kernel.
 
 pub mod calibration;
+pub mod causes;
+pub mod diagnosis;
 pub mod ensemble;
 pub mod events;
 pub mod force;

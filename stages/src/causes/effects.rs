@@ -1,0 +1,149 @@
+//! What causes change, as parts that add up in one simulation.
+
+use std::fmt;
+use std::sync::Arc;
+
+/// Motion of the lever at one instant, in volts of static deflection (deflection times sensitivity).
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<'a> {
+    /// Modal coordinates: each is the load's static deflection when the lever is held, V.
+    pub position: &'a [f64],
+    /// Their rates, V/s.
+    pub velocity: &'a [f64],
+    /// Undamped angular frequencies, rad/s.
+    pub omega: &'a [f64],
+    /// Displacement of the tip since its release, V.
+    pub gap: f64,
+}
+
+/// Where and when a sample was taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instant {
+    /// Number of the record in its archive, from 0.
+    pub record: usize,
+    /// Place in the archive, 0 at its first record, 1 at its last.
+    pub place: f64,
+    /// Time since the record's first sample, s.
+    pub time_s: f64,
+    /// Piezo position, m.
+    pub piezo_m: f64,
+}
+
+/// Share of the load that still acts `t` seconds after the release (t >= 0); the unhurt release leaves none.
+pub type RemainingLoad = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
+/// Adds to the acceleration of each mode, V/s^2.
+pub type ModalForce = Arc<dyn Fn(&Motion<'_>, &mut [f64]) + Send + Sync>;
+/// A static map, volts to volts: of the optics before the electronics, or of an input.
+pub type StaticMap = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
+/// Relative change of every mode's frequency at a place in the archive.
+pub type FrequencyChange = Arc<dyn Fn(&Instant) -> f64 + Send + Sync>;
+/// Volts added behind the electronics.
+pub type Added = Arc<dyn Fn(&Instant) -> f64 + Send + Sync>;
+
+/// A further oscillation that the load drives like the lever's own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExtraMode {
+    /// Undamped frequency, Hz.
+    pub frequency_hz: f64,
+    /// Quality factor.
+    pub quality_factor: f64,
+    /// Share of the static response.
+    pub share: f64,
+}
+
+/// A linear section of the electronics: `(high s + low w) / (s + w)`, w the pole.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearSection {
+    /// Pole, rad/s.
+    pub pole: f64,
+    /// Gain far below the pole.
+    pub low: f64,
+    /// Gain far above it.
+    pub high: f64,
+}
+
+/// How an input runs between its samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Intersample {
+    /// Held until the next sample.
+    #[default]
+    Held,
+    /// On a straight line.
+    Linear,
+    /// As the band-limited signal that the samples determine.
+    BandLimited,
+}
+
+/// Everything that causes add to a simulation; empty: nothing is wrong.
+///
+/// Parts of one kind add up (forces, loads, volts) or follow one another in order (maps, sections), so that causes compose.
+#[derive(Clone, Default)]
+pub struct Effects {
+    /// Loads that outlast the release.
+    pub remaining_load: Vec<RemainingLoad>,
+    /// Loads that were gone before the release: share of the load that has left `t` seconds before it (t > 0).
+    pub early_loss: Vec<RemainingLoad>,
+    /// Forces on the modes.
+    pub modal_force: Vec<ModalForce>,
+    /// Further modes.
+    pub extra_modes: Vec<ExtraMode>,
+    /// Maps of the deflection signal, before the electronics.
+    pub optics: Vec<StaticMap>,
+    /// Sections of the electronics beside the detector's own.
+    pub electronics: Vec<LinearSection>,
+    /// Signal per load (both in V of static deflection) that bypasses the lever.
+    pub feedthrough: f64,
+    /// Changes of the modes over the archive.
+    pub frequency: Vec<FrequencyChange>,
+    /// Signals added to the record.
+    pub added: Vec<Added>,
+    /// Lowest and highest volt that the converter delivers.
+    pub limits: Option<(f64, f64)>,
+    /// Standard deviation of the sampling instant from event to event, s.
+    pub jitter_s: f64,
+    /// Maps of a measured input.
+    pub input: Vec<StaticMap>,
+    /// How a measured input runs between samples; none: as the baseline has it.
+    pub intersample: Option<Intersample>,
+}
+
+impl Effects {
+    /// Whether the motion itself is no longer that of a linear lever under the load.
+    pub fn bend_the_motion(&self) -> bool {
+        !self.modal_force.is_empty()
+    }
+
+    /// Share of the load that acts `t` seconds after the release, before it for t < 0.
+    pub fn load(&self, t: f64) -> f64 {
+        if t < 0.0 {
+            1.0 - self.early_loss.iter().map(|gone| gone(-t)).sum::<f64>()
+        } else {
+            self.remaining_load.iter().map(|load| load(t)).sum()
+        }
+    }
+
+    /// The deflection signal as the optics show it.
+    pub fn seen(&self, volts: f64) -> f64 {
+        self.optics.iter().fold(volts, |v, map| map(v))
+    }
+}
+
+impl fmt::Debug for Effects {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Effects")
+            .field("remaining_load", &self.remaining_load.len())
+            .field("early_loss", &self.early_loss.len())
+            .field("modal_force", &self.modal_force.len())
+            .field("extra_modes", &self.extra_modes)
+            .field("optics", &self.optics.len())
+            .field("electronics", &self.electronics)
+            .field("feedthrough", &self.feedthrough)
+            .field("frequency", &self.frequency.len())
+            .field("added", &self.added.len())
+            .field("limits", &self.limits)
+            .field("jitter_s", &self.jitter_s)
+            .field("input", &self.input.len())
+            .field("intersample", &self.intersample)
+            .finish()
+    }
+}

@@ -1,0 +1,5 @@
+//! What the simulation gets wrong: the verdict of a diagnosis.
+
+mod verdict;
+
+pub use verdict::{DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};
