@@ -81,8 +81,6 @@ pub enum Intersample {
 pub struct Effects {
     /// Loads that outlast the release.
     pub remaining_load: Vec<RemainingLoad>,
-    /// Loads that were gone before the release: share of the load that has left `t` seconds before it (t > 0).
-    pub early_loss: Vec<RemainingLoad>,
     /// Forces on the modes.
     pub modal_force: Vec<ModalForce>,
     /// Further modes.
@@ -101,6 +99,12 @@ pub struct Effects {
     pub limits: Option<(f64, f64)>,
     /// Standard deviation of the sampling instant from event to event, s.
     pub jitter_s: f64,
+    /// Delay of the whole readout, s.
+    pub delay_s: f64,
+    /// Standard deviation of the light's intensity over its mean.
+    pub intensity: f64,
+    /// Samples that were never stored: when since the record's start (s), how many.
+    pub lost: Vec<(f64, usize)>,
     /// Maps of a measured input.
     pub input: Vec<StaticMap>,
     /// How a measured input runs between samples; none: as the baseline has it.
@@ -115,11 +119,7 @@ impl Effects {
 
     /// Share of the load that acts `t` seconds after the release, before it for t < 0.
     pub fn load(&self, t: f64) -> f64 {
-        if t < 0.0 {
-            1.0 - self.early_loss.iter().map(|gone| gone(-t)).sum::<f64>()
-        } else {
-            self.remaining_load.iter().map(|load| load(t)).sum()
-        }
+        if t < 0.0 { 1.0 } else { self.remaining_load.iter().map(|load| load(t)).sum() }
     }
 
     /// The deflection signal as the optics show it.
@@ -132,7 +132,6 @@ impl fmt::Debug for Effects {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Effects")
             .field("remaining_load", &self.remaining_load.len())
-            .field("early_loss", &self.early_loss.len())
             .field("modal_force", &self.modal_force.len())
             .field("extra_modes", &self.extra_modes)
             .field("optics", &self.optics.len())
@@ -142,6 +141,9 @@ impl fmt::Debug for Effects {
             .field("added", &self.added.len())
             .field("limits", &self.limits)
             .field("jitter_s", &self.jitter_s)
+            .field("delay_s", &self.delay_s)
+            .field("intensity", &self.intensity)
+            .field("lost", &self.lost)
             .field("input", &self.input.len())
             .field("intersample", &self.intersample)
             .finish()

@@ -6,12 +6,34 @@
 mod cause;
 mod effects;
 
+mod ac_coupling;
+mod adc_nonlinearity;
+mod alignment_jitter;
+mod clipping;
+mod clock_error;
+mod constant_delay;
 mod cubic_detector;
 mod duffing;
 mod extra_mode;
+mod extra_pole;
+mod feedthrough;
 mod finite_rupture;
+mod frequency_drift;
+mod intensity_noise;
+mod interference_fringe;
+mod mains_hum;
+mod mass_change;
+mod missing_samples;
+mod mode_coupling;
+mod near_surface_damping;
+mod photodiode_tail;
+mod piezo_crosstalk;
+mod piezo_ring;
 mod quadratic_detector;
+mod spurious_line;
 mod tether_tail;
+mod tip_sample_force;
+mod two_step_rupture;
 
 pub use cause::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, within_limits};
 pub use effects::{
@@ -21,12 +43,34 @@ pub use effects::{
 
 /// Every built-in cause.
 pub const CATALOGUE: &[&dyn Cause] = &[
-    &quadratic_detector::QuadraticDetector,
+    &ac_coupling::AcCoupling,
+    &adc_nonlinearity::AdcNonlinearity,
+    &alignment_jitter::AlignmentJitter,
+    &clipping::Clipping,
+    &clock_error::ClockError,
+    &constant_delay::ConstantDelay,
     &cubic_detector::CubicDetector,
     &duffing::Duffing,
     &extra_mode::ExtraModeCause,
+    &extra_pole::ExtraPole,
+    &feedthrough::Feedthrough,
     &finite_rupture::FiniteRupture,
+    &frequency_drift::FrequencyDrift,
+    &intensity_noise::IntensityNoise,
+    &interference_fringe::InterferenceFringe,
+    &mains_hum::MainsHum,
+    &mass_change::MassChange,
+    &missing_samples::MissingSamples,
+    &mode_coupling::ModeCoupling,
+    &near_surface_damping::NearSurfaceDamping,
+    &photodiode_tail::PhotodiodeTail,
+    &piezo_crosstalk::PiezoCrosstalk,
+    &piezo_ring::PiezoRing,
+    &quadratic_detector::QuadraticDetector,
+    &spurious_line::SpuriousLine,
     &tether_tail::TetherTail,
+    &tip_sample_force::TipSampleForce,
+    &two_step_rupture::TwoStepRupture,
 ];
 
 /// The cause of that id.

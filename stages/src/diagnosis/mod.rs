@@ -1,5 +1,6 @@
 //! What the simulation gets wrong: the verdict of a diagnosis.
 
+pub mod release;
 mod verdict;
 
 pub use verdict::{DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};

@@ -18,7 +18,7 @@ pub(super) struct Compressed {
 }
 
 /// Whitens signals in place, [`LANES`] at a time on all cores; the result does not depend on their number.
-pub(super) fn whiten(whitener: &Whitener, signals: &mut [Vec<f64>]) {
+pub(crate) fn whiten(whitener: &Whitener, signals: &mut [Vec<f64>]) {
     signals.par_chunks_mut(LANES).for_each(|chunk| {
         let mut lanes: Vec<&mut [f64]> = chunk.iter_mut().map(Vec::as_mut_slice).collect();
         whitener.apply(&mut lanes);

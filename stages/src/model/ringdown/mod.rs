@@ -29,6 +29,14 @@ mod tests;
 mod whitener;
 mod whittle;
 
+/// What the diagnosis shares with the fit: whitening, the basis, normal equations.
+pub(crate) mod internals {
+    pub(crate) use super::compressed::whiten;
+    pub(crate) use super::modal_form::{columns, signal, weights};
+    pub(crate) use super::normal::symmetric_inverse;
+    pub(crate) use super::whitener::{LANES, Whitener};
+}
+
 pub use decay::{Decay, DecayOptions, fit_decay};
 pub use estimate::{Estimate, ModeEstimate, Ringdown, RingdownVerdict};
 pub use fit::{NoiseSource, RingdownOptions, fit_ringdowns};

@@ -53,7 +53,7 @@ pub struct EventParameters {
 /// decay times; then 1 and a ramp from -1 to 1.
 ///
 /// Changes of a pole move the signal within this space up to the third order: events are projected on it once per reference.
-pub(super) fn columns(reference: &[Exponential], interval_s: f64, samples: usize) -> Vec<Vec<f64>> {
+pub(crate) fn columns(reference: &[Exponential], interval_s: f64, samples: usize) -> Vec<Vec<f64>> {
     let mut all = Vec::with_capacity(width(reference));
     for exponential in reference {
         let decay = -exponential.pole.re * interval_s;
@@ -86,7 +86,7 @@ pub(super) fn width(reference: &[Exponential]) -> usize {
 }
 
 /// Weights of the basis columns that make one event, and their derivatives.
-pub(super) struct Weights {
+pub(crate) struct Weights {
     /// Per column.
     pub value: Vec<f64>,
     /// Per shared parameter, in the order of [`shared`]: pole, then residue of each exponential.
@@ -129,7 +129,7 @@ pub(super) fn from_shared(like: &[Exponential], values: &[f64]) -> Vec<Exponenti
 ///
 /// # Method
 /// `a rho exp(s (t - t0)) = sum_m c_m t^m exp(s_ref t)`, `c_m = a rho exp(-s t0) d^m / m!`, `d = (s - s_ref)` in decay rates.
-pub(super) fn weights(reference: &[Exponential], exponentials: &[Exponential], event: &EventParameters) -> Weights {
+pub(crate) fn weights(reference: &[Exponential], exponentials: &[Exponential], event: &EventParameters) -> Weights {
     let total = width(reference);
     let mut out = Weights { value: vec![0.0; total], shared: Vec::new(), own: vec![vec![0.0; total]; 4] };
     let mut first = 0;
@@ -177,7 +177,7 @@ pub(super) fn weights(reference: &[Exponential], exponentials: &[Exponential], e
 }
 
 /// The signal of one event, `samples` values.
-pub(super) fn signal(
+pub(crate) fn signal(
     exponentials: &[Exponential],
     event: &EventParameters,
     interval_s: f64,

@@ -131,7 +131,7 @@ fn block(
 
 /// Inverse of a symmetric positive definite matrix by Cholesky, scaled to a unit diagonal first; a direction without information (a pivot below
 /// `1e-15`) is held: it gets a pivot of one.
-pub(super) fn symmetric_inverse(matrix: &Mat<f64>) -> Mat<f64> {
+pub(crate) fn symmetric_inverse(matrix: &Mat<f64>) -> Mat<f64> {
     let n = matrix.nrows();
     let scale: Vec<f64> =
         (0..n).map(|i| if matrix[(i, i)] > 0.0 { matrix[(i, i)].sqrt().recip() } else { 0.0 }).collect();

@@ -3,7 +3,7 @@
 use super::noise::RingdownNoise;
 
 /// Signals that pass the filter side by side.
-pub(super) const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// A filter that turns noise of a [`RingdownNoise`] into white noise of unit variance.
 ///
@@ -17,7 +17,7 @@ pub(super) const LANES: usize = 8;
 /// # Source
 /// B. D. O. Anderson and J. B. Moore, Optimal Filtering, 1979, chapter 9.
 #[derive(Debug, Clone)]
-pub(super) struct Whitener {
+pub(crate) struct Whitener {
     rotations: Vec<[f64; 4]>,
     decays: Vec<f64>,
     /// `A K` and `1 / sqrt(S)` of each sample; the last entry serves all later ones.

@@ -1,0 +1,48 @@
+//! A contact that lets go twice.
+
+use std::sync::Arc;
+
+use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+
+/// `u = -F p` for a while after the first rupture.
+pub struct TwoStepRupture;
+
+const ABOUT: About = About {
+    id: "two-step-rupture",
+    physics: "a second, smaller contact or neck holds on and ruptures a little later",
+    part: Part::Force,
+    domain: Domain::Release,
+    parameters: &[
+        Parameter {
+            name: "fraction",
+            unit: "1",
+            meaning: "share of the load that lets go later",
+            low: -0.3,
+            high: 0.3,
+        },
+        Parameter { name: "delay_s", unit: "s", meaning: "how much later", low: 2e-7, high: 1e-3 },
+    ],
+    class: &["two-step-rupture"],
+    resembles: "tether-tail: relaxes smoothly instead of at once",
+    next_measurement: "other spots of the sample: delays and shares change from event to event",
+    identifiable: Identifiable::Shape,
+    source: "H.-J. Butt, B. Cappella, M. Kappl, Surf. Sci. Rep. 59 (2005) 1",
+};
+
+impl Cause for TwoStepRupture {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn add(&self, values: &[f64], effects: &mut Effects) {
+        let (fraction, delay) = (values[0], values[1]);
+        effects.remaining_load.push(Arc::new(move |t| if t < delay { fraction } else { 0.0 }));
+    }
+
+    fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        // fifths of a decade from four samples to an eighth of the window
+        let (first, last) = (4.0 * scene.interval_s, scene.window_s / 8.0);
+        let count = (5.0 * (last / first).log10()).floor().max(0.0) as i32;
+        (0..=count).map(|i| vec![0.005, first * 10f64.powf(f64::from(i) / 5.0)]).collect()
+    }
+}

@@ -1,0 +1,208 @@
+//! Score tests: which candidate's effect the residuals point at.
+
+use faer::Mat;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::joint::{JointFit, Linearised, Problem, eliminate};
+use crate::calibration::normal_two_sided;
+use crate::causes::{Cause, Effects, Scene};
+use crate::model::orthogonal::{cholesky, product};
+use crate::model::ringdown::internals::symmetric_inverse;
+
+/// A candidate at one of its trial values.
+#[derive(Clone)]
+pub struct Sign {
+    /// The candidate.
+    pub cause: &'static dyn Cause,
+    /// Values with the strength that fits best.
+    pub values: Vec<f64>,
+    /// Score over its standard deviation.
+    pub z: f64,
+    /// Fall of the sum of squares that its strength promises.
+    pub gain: f64,
+}
+
+/// What a screen finds.
+pub struct Screen {
+    /// Best trial of each candidate, strongest first.
+    pub signs: Vec<Sign>,
+    /// Probability of the strongest, all trials considered.
+    pub p_value: f64,
+    /// Its probability, alone.
+    pub alone: f64,
+}
+
+/// Events from which their scatter may widen a score's standard deviation.
+const SCATTER_EVENTS: usize = 8;
+/// Draws of the scores' joint distribution without any cause.
+const DRAWS: usize = 20_000;
+/// Projected share of a trial below which nothing of it is left to be seen.
+const VISIBLE: f64 = 1e-4;
+
+/// Screens candidates at a finished fit.
+///
+/// # Model
+/// Scores are linear in the residuals: normal without any cause, their covariance known. Each is taken at a secant of its candidate, the
+/// lever's parameters, those of causes already found and each event's own projected out; where the events' scores scatter by more than the
+/// noise model says, their scatter counts.
+/// # Method
+/// The probability of the strongest of all comes from draws of that joint distribution, beyond them from its effective number of
+/// independent scores.
+/// # Source
+/// C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50.
+pub fn screen(
+    problem: &Problem<'_>,
+    fitted: &JointFit,
+    candidates: &[&'static dyn Cause],
+    scene: &Scene,
+    seed: u64,
+) -> Screen {
+    let state = &fitted.state;
+    let trials: Vec<(&'static dyn Cause, Vec<f64>)> =
+        candidates.iter().flat_map(|cause| cause.trials(scene).into_iter().map(|values| (*cause, values))).collect();
+    let turned = problem.turn(state, &fitted.starts);
+    let linearised = problem.linearised(&turned, state);
+    let mut sets: Vec<Effects> = vec![state.effects()];
+    sets.extend(trials.iter().map(|(cause, values)| {
+        let mut effects = state.effects();
+        cause.add(values, &mut effects);
+        effects
+    }));
+    let changes = problem.changed(&turned, state, &sets);
+    let events: Vec<Scores> = linearised
+        .par_iter()
+        .zip(changes)
+        .map(|(linearised, mut changes)| {
+            let base = changes.remove(0);
+            for (change, (_, values)) in changes.iter_mut().zip(&trials) {
+                change.iter_mut().zip(&base).for_each(|(c, b)| *c = (*c - b) / values[0]);
+            }
+            Scores::of(linearised, &changes)
+        })
+        .collect();
+    let (known, count) = (events.first().map_or(0, |e| e.known), trials.len());
+    let total = known + count;
+    let mut information = Mat::<f64>::zeros(total, total);
+    let mut raw = vec![0.0; count];
+    for event in &events {
+        information += &event.information;
+        raw.iter_mut().zip(&event.raw).for_each(|(r, e)| *r += e);
+    }
+    let mut prior = vec![0.0; total];
+    problem.add_prior(&state.lever, &mut information, &mut prior);
+    let projection = Projection::of(&information, known);
+    let scores: Vec<Vec<f64>> = events.iter().map(|event| projection.score(&event.gradient)).collect();
+    let mut signs: Vec<Sign> = Vec::new();
+    let mut used = Vec::new();
+    for (c, (cause, values)) in trials.iter().enumerate() {
+        let seen = projection.information[(c, c)];
+        if !(seen > VISIBLE * raw[c]) {
+            continue;
+        }
+        used.push(c);
+        let score: f64 = scores.iter().map(|s| s[c]).sum();
+        let scatter: f64 = scores.iter().map(|s| s[c] * s[c]).sum::<f64>() / seen;
+        let widened = if events.len() >= SCATTER_EVENTS { scatter.max(1.0) } else { 1.0 };
+        // one event's score alone must not widen it: a sign that all events share has a scatter of z^2 / events as well
+        let shared = score * score / seen / events.len() as f64;
+        let widened = (widened - shared).max(1.0);
+        let strength = score / seen;
+        let parameter = cause.about().parameters[0];
+        let inside = strength.clamp(parameter.low, parameter.high);
+        let gain = (2.0 * score * inside - seen * inside * inside) / widened;
+        let mut values = values.clone();
+        values[0] = inside;
+        signs.push(Sign { cause: *cause, values, z: (gain.max(0.0)).sqrt() * score.signum(), gain });
+    }
+    let strongest = signs.iter().map(|s| s.gain).fold(0.0, f64::max);
+    let p_value = joint_probability(&projection.information, &used, strongest, seed);
+    let mut best: Vec<Sign> = Vec::new();
+    for sign in signs {
+        match best.iter_mut().find(|b| b.cause.about().id == sign.cause.about().id) {
+            Some(known) if known.gain >= sign.gain => {}
+            Some(known) => *known = sign,
+            None => best.push(sign),
+        }
+    }
+    best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    Screen { signs: best, p_value, alone: normal_two_sided(strongest.max(0.0).sqrt()) }
+}
+
+/// One event's share of the normal equations of known parameters and trials.
+struct Scores {
+    known: usize,
+    information: Mat<f64>,
+    gradient: Vec<f64>,
+    /// Squared length of each trial before anything is projected out.
+    raw: Vec<f64>,
+}
+
+impl Scores {
+    fn of(linearised: &Linearised, trials: &[Vec<f64>]) -> Self {
+        let known = linearised.lever.ncols() + linearised.causes.len();
+        let columns = linearised.matrix(false, trials);
+        let eliminated = eliminate(&columns, &linearised.residual, known + trials.len());
+        let raw = trials.iter().map(|t| t.iter().map(|v| v * v).sum()).collect();
+        Self { known, information: eliminated.information, gradient: eliminated.gradient, raw }
+    }
+}
+
+/// Projection off the known parameters.
+struct Projection {
+    known: usize,
+    /// `G_CA G_AA^-1`: trials x known.
+    weights: Mat<f64>,
+    /// Of the trials: trials x trials.
+    information: Mat<f64>,
+}
+
+impl Projection {
+    fn of(information: &Mat<f64>, known: usize) -> Self {
+        let trials = information.nrows() - known;
+        let inner = symmetric_inverse(&Mat::from_fn(known, known, |i, j| information[(i, j)]));
+        let cross = Mat::from_fn(trials, known, |i, j| information[(known + i, j)]);
+        let weights = product(cross.as_ref(), inner.as_ref());
+        let taken = product(weights.as_ref(), cross.transpose());
+        let information = Mat::from_fn(trials, trials, |i, j| information[(known + i, known + j)] - taken[(i, j)]);
+        Self { known, weights, information }
+    }
+
+    fn score(&self, gradient: &[f64]) -> Vec<f64> {
+        (0..self.weights.nrows())
+            .map(|c| {
+                gradient[self.known + c] - (0..self.known).map(|a| self.weights[(c, a)] * gradient[a]).sum::<f64>()
+            })
+            .collect()
+    }
+}
+
+/// Probability that the largest squared score of `used` trials exceeds `strongest` without any cause.
+fn joint_probability(information: &Mat<f64>, used: &[usize], strongest: f64, seed: u64) -> f64 {
+    let n = used.len();
+    if n == 0 {
+        return 1.0;
+    }
+    let scale: Vec<f64> = used.iter().map(|&c| information[(c, c)].sqrt()).collect();
+    let factor = cholesky(&Mat::from_fn(n, n, |i, j| information[(used[i], used[j])] / (scale[i] * scale[j])));
+    let mut largest: Vec<f64> = (0..DRAWS)
+        .into_par_iter()
+        .map(|draw| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(draw as u64);
+            let deviates: Vec<f64> = (0..n).map(|_| StandardNormal.sample(&mut rng)).collect();
+            (0..n).map(|i| (0..=i).map(|j| factor[(i, j)] * deviates[j]).sum::<f64>().powi(2)).fold(0.0, f64::max)
+        })
+        .collect();
+    largest.sort_by(f64::total_cmp);
+    let beyond = largest.len() - largest.partition_point(|v| *v < strongest);
+    if beyond >= 50 {
+        return beyond as f64 / DRAWS as f64;
+    }
+    // as many independent scores as exceed the draws' hundredth as often
+    let far = largest[DRAWS - DRAWS / 100];
+    let number = (1.0f64 - 0.01).ln() / (1.0 - normal_two_sided(far.sqrt())).ln();
+    (number * normal_two_sided(strongest.max(far).sqrt())).min(1.0)
+}

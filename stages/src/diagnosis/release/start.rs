@@ -1,0 +1,124 @@
+//! Where the joint fit begins: noise and modes from free exponentials.
+
+use super::joint::{State, suggested};
+use super::lever::LeverMode;
+use super::window::{Cut, EventWindow};
+use crate::model::ModelError;
+use crate::model::ringdown::{EventParameters, Exponential, Ringdown, RingdownNoise, RingdownOptions, fit_ringdowns};
+
+/// What the start says.
+pub struct Start {
+    /// Lever, and the events' own parameters.
+    pub state: State,
+    /// First samples of the windows.
+    pub starts: Vec<usize>,
+    /// Noise, from residuals and free stretches.
+    pub noise: RingdownNoise,
+    /// Modes of the free exponentials.
+    pub seen: Vec<LeverMode>,
+    /// Lines that were no modes but combinations of them, Hz.
+    pub combinations_hz: Vec<f64>,
+}
+
+/// Samples after the release that the free exponentials leave out: edges of every kind.
+const SKIPPED: usize = 4;
+/// A line this close to a combination of stronger modes is one, relative.
+const NEAR: f64 = 0.006;
+/// Tries with more exponentials where combinations took the place of modes.
+const TRIES: usize = 3;
+
+/// Fits free exponentials to all events, combination lines (2 f1, 3 f1, f2 +- f1: signs of a nonlinearity, not modes) set aside.
+///
+/// # Errors
+/// Those of [`fit_ringdowns`]; an event whose window leaves its samples.
+pub fn start(
+    windows: &[EventWindow],
+    free: &[&[f64]],
+    cut: &Cut,
+    modes: usize,
+    nominal_poles: &[f64],
+) -> Result<Start, ModelError> {
+    let mut starts = Vec::with_capacity(windows.len());
+    for window in windows {
+        starts.push(window.start(window.onset, cut).ok_or(ModelError::Degenerate("an onset lies outside its window"))?);
+    }
+    let after: Vec<&[f64]> = windows
+        .iter()
+        .zip(&starts)
+        .map(|(window, start)| &window.values[start + cut.before + SKIPPED..start + cut.samples])
+        .collect();
+    let (mut fitted, mut lines) = (None, Vec::new());
+    for extra in 0..TRIES {
+        let options = RingdownOptions { modes: modes + extra, ..RingdownOptions::default() };
+        let found = match fit_ringdowns(&after, free, cut.interval_s, &options) {
+            Ok(found) => found,
+            Err(error) if fitted.is_none() => return Err(error),
+            Err(_) => break,
+        };
+        lines = combinations(&found.exponentials);
+        let enough = found.exponentials.iter().filter(|e| e.oscillates()).count() - lines.len() >= modes;
+        fitted = Some(found);
+        if enough {
+            break;
+        }
+    }
+    let fitted: Ringdown = fitted.ok_or(ModelError::Degenerate("no exponentials"))?;
+    let mut kept: Vec<Exponential> = fitted
+        .exponentials
+        .iter()
+        .enumerate()
+        .filter(|(i, e)| e.oscillates() && !lines.contains(i))
+        .map(|(_, e)| *e)
+        .collect();
+    // too many are left where fewer lines than tries were combinations
+    kept.sort_by(|a, b| energy(b).total_cmp(&energy(a)));
+    kept.truncate(modes);
+    kept.sort_by(|a, b| a.pole.im.total_cmp(&b.pole.im));
+    let lever = suggested(&kept, nominal_poles);
+    let events = windows
+        .iter()
+        .zip(&starts)
+        .map(|(window, start)| {
+            let level = |from: usize, to: usize| {
+                let part = &window.values[from.min(to)..to];
+                part.iter().sum::<f64>() / part.len().max(1) as f64
+            };
+            let first = start + cut.before;
+            let held = level(first.saturating_sub(200), first.saturating_sub(4));
+            let settled = level(start + cut.samples * 3 / 4, start + cut.samples);
+            let lead = (window.onset - first as f64).clamp(-1.0, 0.0);
+            EventParameters { amplitude: settled - held, onset_s: lead * cut.interval_s, offset: settled, slope: 0.0 }
+        })
+        .collect();
+    let combinations_hz = lines
+        .iter()
+        .filter_map(|&i| fitted.exponentials.get(i))
+        .map(|e| e.pole.norm() / std::f64::consts::TAU)
+        .collect();
+    let seen = lever.modes.clone();
+    Ok(Start {
+        state: State { lever, hypotheses: Vec::new(), events },
+        starts,
+        noise: fitted.noise,
+        seen,
+        combinations_hz,
+    })
+}
+
+fn energy(e: &Exponential) -> f64 {
+    e.residue.norm_sqr() / -e.pole.re
+}
+
+/// Which exponentials ring at a combination of stronger ones.
+fn combinations(exponentials: &[Exponential]) -> Vec<usize> {
+    let modes: Vec<(usize, &Exponential)> = exponentials.iter().enumerate().filter(|(_, e)| e.oscillates()).collect();
+    let Some((_, first)) = modes.first() else { return Vec::new() };
+    let near = |e: &Exponential, frequency: f64| (e.pole.im / frequency - 1.0).abs() < NEAR;
+    let is_one = |e: &Exponential| {
+        let strong = modes.iter().filter(|(_, m)| energy(m) > 4.0 * energy(e));
+        let beside = strong.flat_map(|(_, m)| [m.pole.im + first.pole.im, (m.pole.im - first.pole.im).abs()]);
+        energy(first) > 4.0 * energy(e)
+            && beside.chain([3.0 * first.pole.im]).any(|frequency| frequency > 0.0 && near(e, frequency))
+    };
+    modes.iter().filter(|(_, e)| is_one(e)).map(|(i, _)| *i).collect()
+}
