@@ -6,11 +6,26 @@
 mod cause;
 mod effects;
 
+mod baseline_drift;
+mod coulomb_friction;
 mod cubic_detector;
 mod duffing;
 mod extra_mode;
 mod finite_rupture;
+mod input_dead_zone;
+mod input_saturation;
+mod intersample;
+mod nonlinear_damping;
+mod offset;
+mod output_absolute;
+mod output_cubic;
+mod output_quadratic;
+mod output_saturation;
+mod quadratic_damping;
 mod quadratic_detector;
+mod quadratic_stiffness;
+mod quintic_stiffness;
+mod spurious_line;
 mod tether_tail;
 
 pub use cause::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, within_limits};
@@ -27,6 +42,21 @@ pub const CATALOGUE: &[&dyn Cause] = &[
     &extra_mode::ExtraModeCause,
     &finite_rupture::FiniteRupture,
     &tether_tail::TetherTail,
+    &baseline_drift::BaselineDrift,
+    &coulomb_friction::CoulombFriction,
+    &input_dead_zone::InputDeadZone,
+    &input_saturation::InputSaturation,
+    &intersample::IntersampleCause,
+    &nonlinear_damping::NonlinearDamping,
+    &offset::Offset,
+    &output_absolute::OutputAbsolute,
+    &output_cubic::OutputCubic,
+    &output_quadratic::OutputQuadratic,
+    &output_saturation::OutputSaturation,
+    &quadratic_damping::QuadraticDamping,
+    &quadratic_stiffness::QuadraticStiffness,
+    &quintic_stiffness::QuinticStiffness,
+    &spurious_line::SpuriousLine,
 ];
 
 /// The cause of that id.
