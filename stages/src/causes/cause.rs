@@ -35,7 +35,7 @@ pub enum Domain {
 pub struct Parameter {
     /// Its name, as in configs and results.
     pub name: &'static str,
-    /// Its unit.
+    /// Its unit. `V` stands for the output's unit where that is another, `input` for the unit of a general system's input.
     pub unit: &'static str,
     /// What it means.
     pub meaning: &'static str,
@@ -94,6 +94,8 @@ pub struct Scene {
     pub window_s: f64,
     /// Mean static deflection before the release, V, absolute value.
     pub level_v: f64,
+    /// Largest input of a general system, in the input's unit, absolute value; 0 where there is none.
+    pub input_level: f64,
     /// Standard deviation of the mean event's residual, V: what a strength is compared with.
     pub noise_v: f64,
     /// Frequencies at which residuals peak, Hz, strongest first.

@@ -9,9 +9,11 @@ mod effects;
 mod ac_coupling;
 mod adc_nonlinearity;
 mod alignment_jitter;
+mod baseline_drift;
 mod clipping;
 mod clock_error;
 mod constant_delay;
+mod coulomb_friction;
 mod cubic_detector;
 mod duffing;
 mod extra_mode;
@@ -19,17 +21,29 @@ mod extra_pole;
 mod feedthrough;
 mod finite_rupture;
 mod frequency_drift;
+mod input_dead_zone;
+mod input_saturation;
 mod intensity_noise;
 mod interference_fringe;
+mod intersample;
 mod mains_hum;
 mod mass_change;
 mod missing_samples;
 mod mode_coupling;
 mod near_surface_damping;
+mod nonlinear_damping;
+mod offset;
+mod output_absolute;
+mod output_cubic;
+mod output_quadratic;
+mod output_saturation;
 mod photodiode_tail;
 mod piezo_crosstalk;
 mod piezo_ring;
+mod quadratic_damping;
 mod quadratic_detector;
+mod quadratic_stiffness;
+mod quintic_stiffness;
 mod spurious_line;
 mod tether_tail;
 mod tip_sample_force;
@@ -46,9 +60,11 @@ pub const CATALOGUE: &[&dyn Cause] = &[
     &ac_coupling::AcCoupling,
     &adc_nonlinearity::AdcNonlinearity,
     &alignment_jitter::AlignmentJitter,
+    &baseline_drift::BaselineDrift,
     &clipping::Clipping,
     &clock_error::ClockError,
     &constant_delay::ConstantDelay,
+    &coulomb_friction::CoulombFriction,
     &cubic_detector::CubicDetector,
     &duffing::Duffing,
     &extra_mode::ExtraModeCause,
@@ -56,17 +72,29 @@ pub const CATALOGUE: &[&dyn Cause] = &[
     &feedthrough::Feedthrough,
     &finite_rupture::FiniteRupture,
     &frequency_drift::FrequencyDrift,
+    &input_dead_zone::InputDeadZone,
+    &input_saturation::InputSaturation,
     &intensity_noise::IntensityNoise,
     &interference_fringe::InterferenceFringe,
+    &intersample::IntersampleCause,
     &mains_hum::MainsHum,
     &mass_change::MassChange,
     &missing_samples::MissingSamples,
     &mode_coupling::ModeCoupling,
     &near_surface_damping::NearSurfaceDamping,
+    &nonlinear_damping::NonlinearDamping,
+    &offset::Offset,
+    &output_absolute::OutputAbsolute,
+    &output_cubic::OutputCubic,
+    &output_quadratic::OutputQuadratic,
+    &output_saturation::OutputSaturation,
     &photodiode_tail::PhotodiodeTail,
     &piezo_crosstalk::PiezoCrosstalk,
     &piezo_ring::PiezoRing,
+    &quadratic_damping::QuadraticDamping,
     &quadratic_detector::QuadraticDetector,
+    &quadratic_stiffness::QuadraticStiffness,
+    &quintic_stiffness::QuinticStiffness,
     &spurious_line::SpuriousLine,
     &tether_tail::TetherTail,
     &tip_sample_force::TipSampleForce,

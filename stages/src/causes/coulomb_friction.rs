@@ -1,0 +1,55 @@
+//! Dry friction.
+
+use std::sync::Arc;
+
+use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+
+/// `+ w^2 c sgn(q')` on the first mode.
+pub struct CoulombFriction;
+
+const ABOUT: About = About {
+    id: "coulomb-friction",
+    physics: "two surfaces rub: a force of constant size against the motion, so that the envelope falls on a straight line and stops",
+    part: Part::Lever,
+    domain: Domain::Both,
+    parameters: &[Parameter {
+        name: "c",
+        unit: "V",
+        meaning: "static deflection that the friction holds",
+        low: -10.0,
+        high: 10.0,
+    }],
+    class: &["coulomb-friction"],
+    resembles: "a higher loss: decays exponentially at small amplitudes, where friction stops the motion",
+    next_measurement: "let it ring until it stops: under friction it stops off zero, within the static deflection that it holds",
+    identifiable: Identifiable::Shape,
+    source: "T. K. Caughey, A. Vijayaraghavan, Int. J. Non-Linear Mech. 5 (1970) 533",
+};
+
+/// Speed at which friction is three quarters of its full size, in units of omega times the deflection that it holds.
+const CREEP: f64 = 0.2;
+
+impl Cause for CoulombFriction {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn add(&self, values: &[f64], effects: &mut Effects) {
+        let c = values[0];
+        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+            if let (Some(a), Some(v), Some(w)) =
+                (acceleration.first_mut(), motion.velocity.first(), motion.omega.first())
+            {
+                // rounded below a creep of this speed: a jump of the force would stall every integrator
+                let creep = CREEP * w * c.abs();
+                if c != 0.0 {
+                    *a -= w * w * c * (v / creep).tanh();
+                }
+            }
+        }));
+    }
+
+    fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        vec![vec![0.003 * scene.level_v]]
+    }
+}
