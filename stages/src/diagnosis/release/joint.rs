@@ -21,6 +21,21 @@ pub struct Hypothesis {
     pub values: Vec<f64>,
 }
 
+/// What a fit holds as it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hold {
+    /// Nothing: lever, causes and events are fitted.
+    Nothing,
+    /// Lever and causes: the events' own parameters are fitted, as on held-out events.
+    Shared,
+}
+
+impl Hold {
+    fn lever(self) -> bool {
+        self == Self::Shared
+    }
+}
+
 /// Everything that is fitted.
 #[derive(Clone)]
 pub struct State {
@@ -58,11 +73,17 @@ pub struct Problem<'a> {
     /// Standard deviation of their logarithms.
     pub pole_std: f64,
     /// What free exponentials say of the modes; weakly held, so that no weak mode runs off to absorb a misfit of another kind.
-    pub seen: Vec<LeverMode>,
+    pub seen: Vec<SeenMode>,
 }
 
-/// Standard deviations of ln w and ln Q round what free exponentials say.
-const SEEN_STD: [f64; 2] = [0.003, 0.2];
+/// A mode as free exponentials show it, and how weakly the fit is held to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenMode {
+    /// The mode.
+    pub mode: LeverMode,
+    /// Standard deviations of ln w and ln Q.
+    pub std: [f64; 2],
+}
 
 /// The data turned to the space of one linearisation.
 pub(super) struct Turned {
@@ -89,6 +110,18 @@ pub(super) struct Linearised {
 const STEP: f64 = 1e-3;
 
 impl<'a> Problem<'a> {
+    /// The same knowledge about other events.
+    pub fn with_windows<'b>(&self, windows: &'b [EventWindow]) -> Problem<'b> {
+        Problem {
+            windows,
+            cut: self.cut,
+            noise: self.noise.clone(),
+            nominal_poles: self.nominal_poles.clone(),
+            pole_std: self.pole_std,
+            seen: self.seen.clone(),
+        }
+    }
+
     /// Starts of the windows for the events' present onsets. Errors: an event that leaves its samples.
     pub(super) fn starts(&self, state: &mut State, starts: &mut [usize]) -> Result<(), ModelError> {
         for ((own, start), window) in state.events.iter_mut().zip(starts.iter_mut()).zip(self.windows) {
@@ -155,8 +188,11 @@ impl<'a> Problem<'a> {
     }
 
     /// Sets of effects: the hypotheses as they are, then each parameter moved by its step.
-    fn variants(&self, state: &State) -> (Vec<Effects>, Vec<f64>) {
+    fn variants(&self, state: &State, hold: Hold) -> (Vec<Effects>, Vec<f64>) {
         let (mut sets, mut steps) = (vec![state.effects()], Vec::new());
+        if hold == Hold::Shared {
+            return (sets, steps);
+        }
         for (h, hypothesis) in state.hypotheses.iter().enumerate() {
             for p in 0..hypothesis.values.len() {
                 let mut moved = state.clone();
@@ -169,9 +205,9 @@ impl<'a> Problem<'a> {
     }
 
     /// Residuals and derivatives of every event at `state`.
-    pub(super) fn linearised(&self, turned: &Turned, state: &State) -> Vec<Linearised> {
+    pub(super) fn linearised(&self, turned: &Turned, state: &State, hold: Hold) -> Vec<Linearised> {
         let shared = Shared::of(&state.lever);
-        let (sets, steps) = self.variants(state);
+        let (sets, steps) = self.variants(state, hold);
         let mut changes =
             if steps.is_empty() { vec![Vec::new(); state.events.len()] } else { self.changed(turned, state, &sets) };
         changes
@@ -341,7 +377,7 @@ const ARRIVED: f64 = 0.05;
 /// exponentials, causes by difference quotients of their simulated change. Parameters stay within their limits.
 /// # Errors
 /// Onsets that leave their windows, a search without a finite result.
-pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold_lever: bool) -> Result<JointFit, ModelError> {
+pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) -> Result<JointFit, ModelError> {
     let (mut state, mut starts) = (state, starts);
     let mut last_round = f64::INFINITY;
     for round in 0..ROUNDS {
@@ -353,14 +389,14 @@ pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold_lever: 
         let mut converged = false;
         let mut covariance = None;
         for _ in 0..STEPS {
-            let normal = Normal::assemble(problem, &turned, &state, hold_lever);
+            let normal = Normal::assemble(problem, &turned, &state, hold);
             let step = normal.solve(damping);
             covariance = Some(step.covariance);
             if step.promised < ARRIVED {
                 converged = true;
                 break;
             }
-            let trial = moved(&state, &step.shared, &step.own, hold_lever);
+            let trial = moved(&state, &step.shared, &step.own, hold);
             let next = problem.costs(&turned, &trial);
             let next_cost = next.iter().sum::<f64>() + problem.prior_cost(&trial);
             if next_cost <= cost && next_cost.is_finite() {
@@ -405,15 +441,16 @@ fn at_limit(state: &State) -> Vec<(usize, usize)> {
 /// Largest relative change of a cause's shape parameter in one step.
 const STRETCH: f64 = 2.0;
 
-fn moved(state: &State, shared: &[f64], own: &[[f64; 4]], hold_lever: bool) -> State {
+fn moved(state: &State, shared: &[f64], own: &[[f64; 4]], hold: Hold) -> State {
     let mut out = state.clone();
-    let lever = if hold_lever { 0 } else { state.lever.parameters().len() };
-    if !hold_lever {
+    let lever = if hold.lever() { 0 } else { state.lever.parameters().len() };
+    if !hold.lever() {
         let values: Vec<f64> = state.lever.parameters().iter().zip(shared).map(|(v, s)| v + s).collect();
         out.lever = state.lever.with(&values);
     }
     let mut next = lever;
-    for hypothesis in &mut out.hypotheses {
+    let held = hold == Hold::Shared;
+    for hypothesis in out.hypotheses.iter_mut().filter(|_| !held) {
         let about = hypothesis.cause.about();
         for (p, (value, parameter)) in hypothesis.values.iter_mut().zip(about.parameters).enumerate() {
             let mut goal = *value + shared[next];
@@ -474,8 +511,8 @@ pub(super) fn eliminate(columns: &Mat<f64>, residual: &[f64], shared: usize) -> 
 
 impl Linearised {
     /// All columns: lever (unless held), causes, `extra`, own.
-    pub fn matrix(&self, hold_lever: bool, extra: &[Vec<f64>]) -> Mat<f64> {
-        let lever = if hold_lever { 0 } else { self.lever.ncols() };
+    pub fn matrix(&self, hold: Hold, extra: &[Vec<f64>]) -> Mat<f64> {
+        let lever = if hold.lever() { 0 } else { self.lever.ncols() };
         let width = self.lever.nrows();
         let (causes, total) = (self.causes.len(), lever + self.causes.len() + extra.len() + 4);
         Mat::from_fn(self.residual.len(), total, |i, j| {
@@ -495,19 +532,20 @@ impl Linearised {
 }
 
 impl Normal {
-    fn assemble(problem: &Problem<'_>, turned: &Turned, state: &State, hold_lever: bool) -> Self {
-        let lever = if hold_lever { 0 } else { state.lever.parameters().len() };
-        let count = lever + state.causes();
+    fn assemble(problem: &Problem<'_>, turned: &Turned, state: &State, hold: Hold) -> Self {
+        let lever = if hold.lever() { 0 } else { state.lever.parameters().len() };
+        let count = if hold == Hold::Shared { 0 } else { lever + state.causes() };
+        let bent = !state.hypotheses.is_empty();
         let width = turned.r.ncols();
         let events: Vec<Eliminated> = problem
-            .linearised(turned, state)
+            .linearised(turned, state, hold)
             .into_par_iter()
             .map(|mut event| {
-                if event.causes.is_empty() {
+                if !bent {
                     // nothing but the residual is outside the basis
                     event.residual.truncate(width);
                 }
-                eliminate(&event.matrix(hold_lever, &[]), &event.residual, count)
+                eliminate(&event.matrix(hold, &[]), &event.residual, count)
             })
             .collect();
         let mut information = Mat::zeros(count, count);
@@ -516,7 +554,7 @@ impl Normal {
             information += &event.information;
             gradient.iter_mut().zip(&event.gradient).for_each(|(g, e)| *g += e);
         }
-        if !hold_lever {
+        if !hold.lever() {
             problem.add_prior(&state.lever, &mut information, &mut gradient);
         }
         Self { information, gradient, events }
@@ -554,8 +592,8 @@ impl Problem<'_> {
         let poles = poles.map(|(k, (pole, nominal))| (first + k, (pole / nominal).ln(), self.pole_std));
         let modes = lever.modes.iter().zip(&self.seen).enumerate().flat_map(|(m, (now, seen))| {
             [
-                (2 * m, (now.omega / seen.omega).ln(), SEEN_STD[0]),
-                (2 * m + 1, (now.quality_factor / seen.quality_factor).ln(), SEEN_STD[1]),
+                (2 * m, (now.omega / seen.mode.omega).ln(), seen.std[0]),
+                (2 * m + 1, (now.quality_factor / seen.mode.quality_factor).ln(), seen.std[1]),
             ]
         });
         poles.chain(modes).collect()

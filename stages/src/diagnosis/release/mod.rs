@@ -4,14 +4,16 @@ mod joint;
 mod lever;
 mod residuals;
 mod screen;
+mod search;
 mod start;
 mod stepper;
 mod window;
 
-pub use joint::{Hypothesis, JointFit, Problem, State, fit, suggested};
+pub use joint::{Hold, Hypothesis, JointFit, Problem, SeenMode, State, fit, suggested};
 pub use lever::{Lever, LeverMode};
 pub use residuals::{Tile, common, peaks, residuals, tiles, whitened};
 pub use screen::{Screen, Sign, screen};
+pub use search::{Named, Naming, NamingOptions, name_causes, scene};
 pub use start::{Start, start};
 pub use stepper::{Release, differences};
 pub use window::{Cut, EventWindow};

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::joint::{JointFit, Linearised, Problem, eliminate};
+use super::joint::{Hold, JointFit, Linearised, Problem, eliminate};
 use crate::calibration::normal_two_sided;
 use crate::causes::{Cause, Effects, Scene};
 use crate::model::orthogonal::{cholesky, product};
@@ -64,7 +64,7 @@ pub fn screen(
     let trials: Vec<(&'static dyn Cause, Vec<f64>)> =
         candidates.iter().flat_map(|cause| cause.trials(scene).into_iter().map(|values| (*cause, values))).collect();
     let turned = problem.turn(state, &fitted.starts);
-    let linearised = problem.linearised(&turned, state);
+    let linearised = problem.linearised(&turned, state, Hold::Nothing);
     let mut sets: Vec<Effects> = vec![state.effects()];
     sets.extend(trials.iter().map(|(cause, values)| {
         let mut effects = state.effects();
@@ -96,7 +96,7 @@ pub fn screen(
     let projection = Projection::of(&information, known);
     let scores: Vec<Vec<f64>> = events.iter().map(|event| projection.score(&event.gradient)).collect();
     let mut signs: Vec<Sign> = Vec::new();
-    let mut used = Vec::new();
+    let (mut used, mut strongest) = (Vec::new(), 0.0f64);
     for (c, (cause, values)) in trials.iter().enumerate() {
         let seen = projection.information[(c, c)];
         if !(seen > VISIBLE * raw[c]) {
@@ -112,12 +112,12 @@ pub fn screen(
         let strength = score / seen;
         let parameter = cause.about().parameters[0];
         let inside = strength.clamp(parameter.low, parameter.high);
-        let gain = (2.0 * score * inside - seen * inside * inside) / widened;
+        let gain = 2.0 * score * inside - seen * inside * inside;
+        strongest = strongest.max(gain / widened);
         let mut values = values.clone();
         values[0] = inside;
         signs.push(Sign { cause: *cause, values, z: (gain.max(0.0)).sqrt() * score.signum(), gain });
     }
-    let strongest = signs.iter().map(|s| s.gain).fold(0.0, f64::max);
     let p_value = joint_probability(&projection.information, &used, strongest, seed);
     let mut best: Vec<Sign> = Vec::new();
     for sign in signs {
@@ -143,7 +143,7 @@ struct Scores {
 impl Scores {
     fn of(linearised: &Linearised, trials: &[Vec<f64>]) -> Self {
         let known = linearised.lever.ncols() + linearised.causes.len();
-        let columns = linearised.matrix(false, trials);
+        let columns = linearised.matrix(Hold::Nothing, trials);
         let eliminated = eliminate(&columns, &linearised.residual, known + trials.len());
         let raw = trials.iter().map(|t| t.iter().map(|v| v * v).sum()).collect();
         Self { known, information: eliminated.information, gradient: eliminated.gradient, raw }

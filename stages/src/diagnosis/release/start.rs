@@ -1,10 +1,9 @@
 //! Where the joint fit begins: noise and modes from free exponentials.
 
-use super::joint::{State, suggested};
-use super::lever::LeverMode;
+use super::joint::{SeenMode, State, suggested};
 use super::window::{Cut, EventWindow};
 use crate::model::ModelError;
-use crate::model::ringdown::{EventParameters, Exponential, Ringdown, RingdownNoise, RingdownOptions, fit_ringdowns};
+use crate::model::ringdown::{EventParameters, Exponential, ModeEstimate, Ringdown, RingdownNoise, RingdownOptions, fit_ringdowns};
 
 /// What the start says.
 pub struct Start {
@@ -15,7 +14,7 @@ pub struct Start {
     /// Noise, from residuals and free stretches.
     pub noise: RingdownNoise,
     /// Modes of the free exponentials.
-    pub seen: Vec<LeverMode>,
+    pub seen: Vec<SeenMode>,
     /// Lines that were no modes but combinations of them, Hz.
     pub combinations_hz: Vec<f64>,
 }
@@ -24,6 +23,9 @@ pub struct Start {
 const SKIPPED: usize = 4;
 /// A line this close to a combination of stronger modes is one, relative.
 const NEAR: f64 = 0.006;
+/// How far the fit may go from free exponentials, in their standard errors, and at least (relative, of f and Q): a cause biases them.
+const HELD_ERRORS: f64 = 5.0;
+const HELD_LEAST: [f64; 2] = [1e-3, 0.05];
 /// Tries with more exponentials where combinations took the place of modes.
 const TRIES: usize = 3;
 
@@ -63,17 +65,20 @@ pub fn start(
         }
     }
     let fitted: Ringdown = fitted.ok_or(ModelError::Degenerate("no exponentials"))?;
-    let mut kept: Vec<Exponential> = fitted
+    // modes come first, in the same order
+    let mut kept: Vec<(Exponential, ModeEstimate)> = fitted
         .exponentials
         .iter()
+        .zip(fitted.modes())
         .enumerate()
-        .filter(|(i, e)| e.oscillates() && !lines.contains(i))
-        .map(|(_, e)| *e)
+        .filter(|(i, (e, _))| e.oscillates() && !lines.contains(i))
+        .map(|(_, (e, mode))| (*e, mode))
         .collect();
     // too many are left where fewer lines than tries were combinations
-    kept.sort_by(|a, b| energy(b).total_cmp(&energy(a)));
+    kept.sort_by(|a, b| energy(&b.0).total_cmp(&energy(&a.0)));
     kept.truncate(modes);
-    kept.sort_by(|a, b| a.pole.im.total_cmp(&b.pole.im));
+    kept.sort_by(|a, b| a.0.pole.im.total_cmp(&b.0.pole.im));
+    let (kept, estimates): (Vec<Exponential>, Vec<ModeEstimate>) = kept.into_iter().unzip();
     let lever = suggested(&kept, nominal_poles);
     let events = windows
         .iter()
@@ -95,7 +100,12 @@ pub fn start(
         .filter_map(|&i| fitted.exponentials.get(i))
         .map(|e| e.pole.norm() / std::f64::consts::TAU)
         .collect();
-    let seen = lever.modes.clone();
+    let held = |estimate: &ModeEstimate| {
+        let (f, q) = (&estimate.frequency_hz, &estimate.quality_factor);
+        [(f.std / f.value, HELD_LEAST[0]), (q.std / q.value, HELD_LEAST[1])].map(|(own, least)| (HELD_ERRORS * own).max(least))
+    };
+    let seen =
+        lever.modes.iter().zip(&estimates).map(|(mode, estimate)| SeenMode { mode: *mode, std: held(estimate) }).collect();
     Ok(Start {
         state: State { lever, hypotheses: Vec::new(), events },
         starts,

@@ -1,0 +1,342 @@
+//! From signs to names: refits, held-out events, and when to abstain.
+
+use super::joint::{Hold, Hypothesis, JointFit, Problem, State, fit};
+use super::residuals::{Tile, common, peaks, residuals, tiles, whitened};
+use super::screen::{Screen, Sign, screen};
+use super::window::EventWindow;
+use crate::causes::{Cause, Domain, Identifiable, Part, Scene};
+use crate::diagnosis::verdict::{Gain, RunnerUp, Verdict};
+use crate::model::ModelError;
+
+/// How names are given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamingOptions {
+    /// Probability of a name, or of `unexplained`, where nothing is wrong.
+    pub false_alarm_rate: f64,
+    /// Causes that are not considered.
+    pub without: Vec<String>,
+    /// Most causes named.
+    pub most: usize,
+    /// Candidates that are fitted in full at each step.
+    pub refits: usize,
+    /// Seed of the draws of the scores.
+    pub seed: u64,
+}
+
+impl Default for NamingOptions {
+    fn default() -> Self {
+        Self { false_alarm_rate: 0.01, without: Vec::new(), most: 4, refits: 5, seed: 1 }
+    }
+}
+
+/// A cause that has been named.
+pub struct Named {
+    /// The cause; its values are those of the last fit's hypothesis of the same place.
+    pub cause: &'static dyn Cause,
+    /// Probability of so strong a sign without any cause.
+    pub p_value: f64,
+    /// What it buys on held-out events.
+    pub gain: Gain,
+    /// The next best candidate of another class.
+    pub runner_up: Option<RunnerUp>,
+}
+
+/// What the search ends with.
+pub struct Naming {
+    /// Clean, named or unexplained.
+    pub verdict: Verdict,
+    /// Named causes in the order of their finding.
+    pub named: Vec<Named>,
+    /// The baseline, then one fit per cause.
+    pub fits: Vec<JointFit>,
+    /// The last screen.
+    pub screen: Screen,
+    /// Tiles of the common residual, strongest first: of the baseline and of the last fit.
+    pub tiles: [Vec<Tile>; 2],
+    /// Nearest candidates where there is no name.
+    pub nearest: Vec<RunnerUp>,
+    /// What was seen, in sentences.
+    pub evidence: Vec<String>,
+}
+
+/// Fall of the sum of squares that a parameter must bring, over the logarithm of the number of samples: as the Bayesian information criterion.
+const PENALTY: f64 = 1.0;
+/// Difference of penalised gains below which two classes tie, unless held-out events decide.
+const TIE: f64 = 6.0;
+/// Share of the baseline's excess energy that named causes may leave.
+const REMAINDER: f64 = 0.05;
+/// Safety of the omnibus test, whose tiles are counted but whose noise model is an estimate.
+const OMNIBUS: f64 = 0.1;
+
+/// Whether a candidate belongs into a screen of events' shapes.
+fn is_candidate(cause: &dyn Cause, without: &[String]) -> bool {
+    let about = cause.about();
+    let here = matches!(about.domain, Domain::Release | Domain::Both) && about.identifiable == Identifiable::Shape;
+    here && !matches!(about.part, Part::Record | Part::Input) && !without.iter().any(|id| id == about.id)
+}
+
+/// The scene that trial values are made for.
+pub fn scene(problem: &Problem<'_>, fitted: &JointFit, common: &[f64]) -> Scene {
+    let modes = &fitted.state.lever.modes;
+    let events = &fitted.state.events;
+    let count = events.len().max(1) as f64;
+    let interval_s = problem.cut.interval_s;
+    let own: Vec<f64> = modes.iter().map(|m| m.omega / std::f64::consts::TAU).collect();
+    Scene {
+        quality_factor: modes.iter().map(|m| m.quality_factor).collect(),
+        interval_s,
+        window_s: problem.cut.samples as f64 * interval_s,
+        level_v: events.iter().map(|e| e.amplitude.abs()).sum::<f64>() / count,
+        input_level: 0.0,
+        noise_v: (problem.noise.white / count).sqrt(),
+        // what lies within a mode's width is that mode's misfit
+        residual_peaks_hz: peaks(common, interval_s, 12)
+            .into_iter()
+            .filter(|f| modes.iter().zip(&own).all(|(m, g)| (f - g).abs() > g / m.quality_factor))
+            .take(4)
+            .collect(),
+        frequency_hz: own,
+    }
+}
+
+/// Names what a baseline leaves unexplained.
+///
+/// # Method
+/// Greedy: a score screen of all candidates; the strongest fitted in full, from the present fit; the one that gains most, its parameters
+/// paid for, is held against held-out events (two halves in turn, shared parameters frozen) and against the best of another class. It is
+/// named if it wins both and is not at a limit of its parameters. The search ends when no sign is stronger than the false-alarm rate allows.
+/// # Errors
+/// Those of [`fit`] on the baseline.
+pub fn name_causes(
+    problem: &Problem<'_>,
+    state: State,
+    starts: Vec<usize>,
+    catalogue: &[&'static dyn Cause],
+    options: &NamingOptions,
+) -> Result<Naming, ModelError> {
+    let mut candidates: Vec<&'static dyn Cause> =
+        catalogue.iter().copied().filter(|cause| is_candidate(*cause, &options.without)).collect();
+    let mut fits = vec![fit(problem, state, starts, Hold::Nothing)?];
+    let mut named: Vec<Named> = Vec::new();
+    let mut nearest = Vec::new();
+    let mut evidence = Vec::new();
+    let mut verdict = Verdict::Clean;
+    let first_tiles = tiles_of(problem, &fits[0]);
+    let mut last_screen;
+    loop {
+        let base = &fits[fits.len() - 1];
+        let common = common_of(problem, base);
+        last_screen = screen(problem, base, &candidates, &scene(problem, base, &common), options.seed);
+        if last_screen.p_value >= options.false_alarm_rate || named.len() == options.most {
+            break;
+        }
+        let trials = refits(problem, base, &last_screen.signs, options.refits);
+        let Some(best) = trials.first() else {
+            verdict = Verdict::Unexplained;
+            evidence.push("signs of a cause, but no candidate could be fitted".into());
+            break;
+        };
+        let rival = trials.iter().find(|t| !same_class(t.cause, best.cause));
+        let share = |t: &Trial| (best.gain > 0.0).then(|| (t.gain / best.gain).clamp(0.0, 1.0));
+        let runner_up = rival.map(|t| RunnerUp { id: t.cause.about().id.into(), share_of_gain: share(t) });
+        let halves = Halves::of(problem, base);
+        let held_out = halves.gain(base, best);
+        let refusal = if best.gain <= 0.0 {
+            Some("no candidate pays for its parameters".to_string())
+        } else if !best.fitted.at_limit.is_empty() {
+            Some(format!("the nearest candidate, {}, ends at a limit of its parameters", best.cause.about().id))
+        } else if held_out.log_likelihood <= 0.0 {
+            Some(format!("the nearest candidate, {}, gains nothing on held-out events", best.cause.about().id))
+        } else {
+            rival.and_then(|rival| {
+                let close = best.gain - rival.gain < TIE;
+                let held = || halves.gain(base, rival).log_likelihood;
+                (close && held() > held_out.log_likelihood - 0.5 * TIE).then(|| {
+                    format!("{} and {} explain it equally well", best.cause.about().id, rival.cause.about().id)
+                })
+            })
+        };
+        if let Some(reason) = refusal {
+            verdict = Verdict::Unexplained;
+            nearest = trials
+                .iter()
+                .take(3)
+                .map(|t| RunnerUp { id: t.cause.about().id.into(), share_of_gain: share(t) })
+                .collect();
+            evidence.push(reason);
+            break;
+        }
+        let cause = best.cause;
+        named.push(Named { cause, p_value: last_screen.p_value, gain: held_out.report(), runner_up });
+        candidates.retain(|candidate| !same_class(*candidate, cause));
+        verdict = Verdict::Named;
+        if let Some(best) = trials.into_iter().next() {
+            fits.push(best.fitted);
+        }
+    }
+    let last_tiles = tiles_of(problem, &fits[fits.len() - 1]);
+    if verdict != Verdict::Unexplained {
+        if let Some(reason) = remainder(&first_tiles, &last_tiles, options.false_alarm_rate) {
+            nearest = named
+                .iter()
+                .map(|n| n.cause.about().id)
+                .chain(last_screen.signs.iter().take(3).map(|s| s.cause.about().id))
+                .map(|id| RunnerUp { id: id.into(), share_of_gain: None })
+                .collect();
+            verdict = Verdict::Unexplained;
+            evidence.push(reason);
+        }
+    }
+    Ok(Naming { verdict, named, fits, screen: last_screen, tiles: [first_tiles, last_tiles], nearest, evidence })
+}
+
+fn same_class(a: &dyn Cause, b: &dyn Cause) -> bool {
+    a.about().class.contains(&b.about().id) || b.about().class.contains(&a.about().id)
+}
+
+fn common_of(problem: &Problem<'_>, fitted: &JointFit) -> Vec<f64> {
+    let residuals = residuals(problem, &fitted.state, &fitted.starts);
+    common(&fitted.state, &whitened(problem, &residuals))
+}
+
+fn tiles_of(problem: &Problem<'_>, fitted: &JointFit) -> Vec<Tile> {
+    let mut all = tiles(&common_of(problem, fitted), problem.cut.before, problem.cut.interval_s);
+    all.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    all
+}
+
+/// What remains in the common residual, if it is more than noise and more than a small share of what there was.
+fn remainder(before: &[Tile], after: &[Tile], false_alarm_rate: f64) -> Option<String> {
+    let limit = OMNIBUS * false_alarm_rate / after.len().max(1) as f64;
+    let strongest = after.first().filter(|t| t.p_value < limit)?;
+    let energy = |tiles: &[Tile]| tiles.iter().filter(|t| t.p_value < limit).map(|t| t.excess - 1.0).sum::<f64>();
+    let share = energy(after) / energy(before).max(f64::MIN_POSITIVE);
+    (share > REMAINDER).then(|| {
+        format!(
+            "a residual common to all events is left at {:.4} MHz, {:.0} to {:.0} us after the release: {:.1} times the noise's energy",
+            1e-6 * strongest.peak_hz,
+            1e6 * strongest.from_s.max(0.0),
+            1e6 * strongest.to_s,
+            strongest.excess
+        )
+    })
+}
+
+/// A candidate fitted in full.
+struct Trial {
+    cause: &'static dyn Cause,
+    fitted: JointFit,
+    /// Fall of the cost less what the parameters must pay.
+    gain: f64,
+}
+
+/// The strongest candidates fitted from the present fit, best first.
+fn refits(problem: &Problem<'_>, base: &JointFit, signs: &[Sign], count: usize) -> Vec<Trial> {
+    let samples = (base.state.events.len() * problem.cut.samples) as f64;
+    let mut chosen: Vec<&Sign> = Vec::new();
+    for sign in signs.iter().filter(|s| s.gain > 0.0) {
+        // members of one class are one signal
+        if chosen.iter().all(|c| !same_class(c.cause, sign.cause)) {
+            chosen.push(sign);
+        }
+    }
+    let mut trials: Vec<Trial> = chosen
+        .into_iter()
+        .take(count)
+        .filter_map(|sign| {
+            let mut state = base.state.clone();
+            state.hypotheses.push(Hypothesis { cause: sign.cause, values: sign.values.clone() });
+            let fitted = fit(problem, state, base.starts.clone(), Hold::Nothing).ok()?;
+            let paid = PENALTY * samples.ln() * sign.values.len() as f64;
+            Some(Trial { cause: sign.cause, gain: base.cost - fitted.cost - paid, fitted })
+        })
+        .collect();
+    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    trials
+}
+
+/// Two halves of the events, each fitted alone and judged on the other.
+struct Halves<'a> {
+    whole: &'a Problem<'a>,
+    windows: [Vec<EventWindow>; 2],
+    events: [Vec<usize>; 2],
+}
+
+struct HeldOut {
+    log_likelihood: f64,
+    rms: [f64; 2],
+    events: usize,
+}
+
+impl HeldOut {
+    fn report(&self) -> Gain {
+        Gain {
+            rms_before: Some(self.rms[0]),
+            rms_after: Some(self.rms[1]),
+            unit: "V".into(),
+            log_likelihood: Some(self.log_likelihood),
+            held_out: format!("{} events, each judged by a fit to the other half", self.events),
+        }
+    }
+}
+
+impl<'a> Halves<'a> {
+    fn of(whole: &'a Problem<'a>, base: &JointFit) -> Self {
+        let events = [0, 1].map(|half| (0..base.state.events.len()).filter(|i| i % 2 == half).collect::<Vec<usize>>());
+        let windows = events.clone().map(|chosen| chosen.iter().map(|&i| whole.windows[i].clone()).collect());
+        Self { whole, windows, events }
+    }
+
+    fn part(&self, half: usize) -> Problem<'_> {
+        self.whole.with_windows(&self.windows[half])
+    }
+
+    fn state(&self, fitted: &JointFit, half: usize) -> (State, Vec<usize>) {
+        let mut state = fitted.state.clone();
+        state.events = self.events[half].iter().map(|&i| fitted.state.events[i]).collect();
+        (state, self.events[half].iter().map(|&i| fitted.starts[i]).collect())
+    }
+
+    /// Fits `fitted`'s model to one half, then the other half's own parameters under it.
+    fn judged(&self, fitted: &JointFit, half: usize) -> Option<(f64, Vec<f64>)> {
+        let (state, starts) = self.state(fitted, half);
+        let trained = fit(&self.part(half), state, starts, Hold::Nothing).ok()?;
+        let other = 1 - half;
+        let (mut state, starts) = self.state(fitted, other);
+        state.lever = trained.state.lever;
+        state.hypotheses = trained.state.hypotheses;
+        let problem = self.part(other);
+        let judged = fit(&problem, state, starts, Hold::Shared).ok()?;
+        let residuals = residuals(&problem, &judged.state, &judged.starts);
+        Some((judged.costs.iter().sum(), common(&judged.state, &residuals)))
+    }
+
+    /// Gain of the log likelihood on held-out events, and the rms of their common residual where the models differ.
+    fn gain(&self, base: &JointFit, trial: &Trial) -> HeldOut {
+        let count = base.state.events.len();
+        let mut out = HeldOut { log_likelihood: 0.0, rms: [0.0; 2], events: count };
+        let mut weight = 0.0;
+        if self.events[1].is_empty() {
+            return HeldOut { log_likelihood: f64::NEG_INFINITY, ..out };
+        }
+        for half in 0..2 {
+            let (Some(before), Some(after)) = (self.judged(base, half), self.judged(&trial.fitted, half)) else {
+                return HeldOut { log_likelihood: f64::NEG_INFINITY, ..out };
+            };
+            out.log_likelihood += 0.5 * (before.0 - after.0);
+            // of a sum weighted to unit variance: back to volts of one event
+            let scale = (self.events[1 - half].len() as f64).sqrt();
+            let differs: Vec<f64> = before.1.iter().zip(&after.1).map(|(b, a)| (b - a).abs()).collect();
+            let limit = 0.1 * differs.iter().copied().fold(0.0, f64::max);
+            for ((b, a), d) in before.1.iter().zip(&after.1).zip(&differs) {
+                if *d >= limit {
+                    out.rms[0] += (b / scale).powi(2);
+                    out.rms[1] += (a / scale).powi(2);
+                    weight += 1.0;
+                }
+            }
+        }
+        out.rms = out.rms.map(|sum| (sum / f64::max(weight, 1.0)).sqrt());
+        out
+    }
+}
