@@ -5,8 +5,11 @@ use afmid_pipeline::{Array, Axis, Context, Document, Example, Port, Ports, Stage
 use super::modes_stage;
 use super::order::Order;
 use super::pem_stage::{self, DataSet, Pem};
+use super::stabilisation_stage;
+use super::vector_fitting_stage;
 use super::zeros_stage;
 use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, release};
+use crate::spectrum::{Etfe, Window, WindowKind};
 
 pub(super) fn pem() -> Vec<Example> {
     vec![Example {
@@ -35,6 +38,49 @@ pub(super) fn era() -> Vec<Example> {
         inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
         // the third pole takes what the decay's last tenth leaves of its rest
         expect: |outputs| the_resonance(outputs, 1e-8, 1e-6),
+    }]
+}
+
+pub(super) fn vector_fitting() -> Vec<Example> {
+    vec![Example {
+        title: "One resonance, from its response",
+        params: "order = 2",
+        inputs: || Ok(Ports::new().with(&vector_fitting_stage::TRANSFER, response()?)),
+        // the response is exact but for rounding; the first pole may come after other pairs, of which order 2 has none
+        expect: |outputs| the_resonance(outputs, 1e-9, 1e-7),
+    }]
+}
+
+/// Transfer function of the release, by the estimate over its differences.
+fn response() -> Result<Array, StageError> {
+    let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
+    let window = Window { kind: WindowKind::Rectangular, differenced: true, ..Window::default() };
+    let windowed = window.run(&named("pair", pair()), &cx)?;
+    let windowed = windowed.get(&Port::<Array>::new(Window::SPEC.outputs[0].name, "", ""))?.clone();
+    let etfe = Etfe { bandwidth_hz: 0.5 * SAMPLE_RATE_HZ, ..Etfe::default() }.run(&named("pair", windowed), &cx)?;
+    Ok(etfe.get(&Port::<Array>::new(Etfe::SPEC.outputs[0].name, "", ""))?.clone())
+}
+
+fn named(name: &'static str, array: Array) -> Ports {
+    Ports::new().with(&Port::<Array>::new(name, "", ""), array)
+}
+
+pub(super) fn stabilisation() -> Vec<Example> {
+    vec![Example {
+        title: "One resonance stays, whatever the order",
+        params: "to_order = 8\nblock_rows = 60\nmethod = \"release\"",
+        inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
+        expect: |outputs| {
+            let modes = outputs.get(&stabilisation_stage::MODES).map_err(|error| error.to_string())?;
+            let summary = outputs.get(&stabilisation_stage::SUMMARY).map_err(|error| error.to_string())?;
+            let f = modes.real("frequency_hz").map_err(|error| error.to_string())?;
+            // noise-free: rounding, as for `model.subspace`
+            if f.len() == 1 && (f[0] / FREQUENCY_HZ - 1.0).abs() < 1e-6 {
+                Ok(format!("One mode, at {:.1} Hz; the proposed order is {}.", f[0], summary.0["proposed_order"]))
+            } else {
+                Err(format!("{f:?} {}", summary.0))
+            }
+        },
     }]
 }
 

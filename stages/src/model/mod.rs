@@ -22,11 +22,15 @@ mod riccati;
 pub mod ringdown;
 mod ringdown_stage;
 mod series;
+pub mod stabilisation;
+mod stabilisation_stage;
 #[cfg(test)]
 mod start_tests;
 mod subspace;
 mod subspace_stage;
 mod transmission;
+pub mod vector_fitting;
+mod vector_fitting_stage;
 mod zeros_stage;
 
 pub use comparison::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
@@ -42,9 +46,11 @@ pub use order::{Order, OrderCandidate, OrderChoice, choose_order};
 pub use pem_stage::{DataSet, FocusKind, NoiseKind, Pem};
 pub use residual::{TestResult, input_dependence, whiteness};
 pub use ringdown_stage::{ErrorSource, JointNoise, RingdownFit};
+pub use stabilisation_stage::{PoleMethod, StabilisationDiagram};
 pub use subspace::Subspace;
 pub use subspace_stage::{SubspaceEstimate, WeightKind};
 pub use transmission::transmission_zeros;
+pub use vector_fitting_stage::{ResponseWeight, VectorFittingEstimate};
 pub use zeros_stage::Zeros;
 
 use afmid_pipeline::Entry;
@@ -54,6 +60,8 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<Pem>(),
     Entry::of::<SubspaceEstimate>(),
     Entry::of::<EraEstimate>(),
+    Entry::of::<VectorFittingEstimate>(),
+    Entry::of::<StabilisationDiagram>(),
     Entry::of::<Modes>(),
     Entry::of::<Zeros>(),
     Entry::of::<RingdownFit>(),
