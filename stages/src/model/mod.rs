@@ -31,6 +31,8 @@ mod subspace_stage;
 mod transmission;
 pub mod vector_fitting;
 mod vector_fitting_stage;
+#[cfg(test)]
+mod weight_tests;
 mod zeros_stage;
 
 pub use comparison::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
