@@ -2,6 +2,7 @@
 
 use afmid_pipeline::{Array, Axis, Context, Document, Example, Port, Ports, Stage, StageError, StateSpace, Table};
 
+use super::bootstrap_stage;
 use super::modes_stage;
 use super::order::Order;
 use super::pem_stage::{self, DataSet, Pem};
@@ -79,6 +80,45 @@ pub(super) fn stabilisation() -> Vec<Example> {
                 Ok(format!("One mode, at {:.1} Hz; the proposed order is {}.", f[0], summary.0["proposed_order"]))
             } else {
                 Err(format!("{f:?} {}", summary.0))
+            }
+        },
+    }]
+}
+
+pub(super) fn bootstrap() -> Vec<Example> {
+    vec![Example {
+        title: "The resonance of twelve noisy events",
+        params: "replicates = 40",
+        inputs: || {
+            let pair = pair();
+            let (clean, samples) = (release(2048, T0, LOAD_V), 2048);
+            // a deterministic disturbance that no two events share; 1 mV
+            let wiggle =
+                |event: usize, k: usize| 1e-3 * ((k * k + 7 * event * k) as f64 * (0.37 + 0.11 * event as f64)).sin();
+            let signal: Vec<f64> =
+                (0..12 * samples).map(|i| clean[i % samples] + wiggle(i / samples, i % samples)).collect();
+            let time = pair.axis("time")?.values.clone();
+            let ensemble = Array::over(vec![
+                Axis::new("event", "1", "event", (0..12).map(f64::from).collect()),
+                Axis::new("time", "s", "time since t0", time),
+            ])
+            .with("signal", "V", "signal", &["event", "time"], signal)
+            .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
+            .attribute("onset_sample", T0);
+            Ok(Ports::new()
+                .with(&bootstrap_stage::ENSEMBLE, ensemble)
+                .with(&pem_stage::PAIR, pair)
+                .with(&pem_stage::MODEL, model()?))
+        },
+        expect: |outputs| {
+            let roots = outputs.get(&bootstrap_stage::ROOTS).map_err(|error| error.to_string())?;
+            let column = |name: &str| roots.real(name).map(|x| x.first().copied()).ok().flatten().unwrap_or(f64::NAN);
+            let (f, low, high) = (column("frequency_hz"), column("frequency_low_hz"), column("frequency_high_hz"));
+            // 1 mV over sqrt(12) against 0.9 V over 20 periods: some hertz; four half intervals
+            if (f - FREQUENCY_HZ).abs() < 2.0 * (high - low) && high - low < 200.0 && low < high {
+                Ok(format!("The pole lies between {low:.1} and {high:.1} Hz."))
+            } else {
+                Err(format!("{f} {low} {high}"))
             }
         },
     }]

@@ -1,5 +1,7 @@
 //! Parametric estimates: prediction error method, modes, zeros.
 
+mod bootstrap;
+mod bootstrap_stage;
 mod comparison;
 pub mod contact;
 mod contact_stage;
@@ -35,6 +37,8 @@ mod vector_fitting_stage;
 mod weight_tests;
 mod zeros_stage;
 
+pub use bootstrap::{BootstrapSettings, Bootstrapped, bootstrap};
+pub use bootstrap_stage::BootstrapIntervals;
 pub use comparison::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
 pub use contact_stage::ContactFit;
 pub use era::Era;
@@ -65,6 +69,7 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<VectorFittingEstimate>(),
     Entry::of::<StabilisationDiagram>(),
     Entry::of::<Modes>(),
+    Entry::of::<BootstrapIntervals>(),
     Entry::of::<Zeros>(),
     Entry::of::<RingdownFit>(),
     Entry::of::<ContactFit>(),
