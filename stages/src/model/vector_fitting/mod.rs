@@ -36,7 +36,7 @@ pub struct VectorFitting {
     pub pairs: Option<usize>,
     /// Relocations of the poles at most, at least 1; default 30: ten are usual.
     pub iterations: usize,
-    /// Ends with Gauss-Newton on the weighted error itself; default true. Without, sigma weights the noise: rms errors of a noisy event's Q grow by up to a tenth (test).
+    /// Ends with Gauss-Newton on the weighted error itself; default true. Without, sigma weights the noise: rms errors of a noisy event's Q grow by up to a seventh (test).
     pub refine: bool,
     /// Reflects poles from outside the unit circle into it; default false: an unstable pole says that the order is too high, and may.
     pub stable: bool,
