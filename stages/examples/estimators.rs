@@ -2,7 +2,10 @@
 
 use afmid_stages::model::pem::{Experiment, PemOptions, identify};
 use afmid_stages::model::ringdown::{NoiseSource, RingdownOptions, fit_ringdowns};
+use afmid_stages::model::stabilisation::{StabilisationCriteria, stabilisation};
+use afmid_stages::model::vector_fitting::{MeasuredResponse, VectorFitting, vector_fitting};
 use afmid_stages::model::{Era, ModelError, Subspace};
+use num_complex::Complex64;
 
 /// A resonance at 50 kHz with Q = 40, sampled at 1 MS/s.
 const INTERVAL_S: f64 = 1e-6;
@@ -11,6 +14,8 @@ fn main() -> Result<(), ModelError> {
     prediction_error_method()?;
     subspace()?;
     free_decay()?;
+    stable_poles()?;
+    frequency_response()?;
     ringdowns()
 }
 
@@ -51,6 +56,26 @@ fn free_decay() -> Result<(), ModelError> {
     let (_, y) = data();
     let z = Era::new(&y[200..], 60)?.poles(2)?[0];
     println!("era: {:.1} Hz", z.ln().norm() / (std::f64::consts::TAU * INTERVAL_S));
+    Ok(())
+}
+
+fn stable_poles() -> Result<(), ModelError> {
+    let (_, y) = data();
+    let era = Era::new(&y[200..], 60)?;
+    let orders = (2..=12).map(|order| Ok((order, era.poles(order)?))).collect::<Result<Vec<_>, ModelError>>()?;
+    let found = stabilisation(&orders, INTERVAL_S, &StabilisationCriteria::default())?;
+    println!("stabilisation: {:?} at order {:?}", found.modes.first().map(|mode| mode.frequency_hz), found.order);
+    Ok(())
+}
+
+fn frequency_response() -> Result<(), ModelError> {
+    let f: Vec<f64> = (1..400).map(|k| 1e3 * f64::from(k)).collect();
+    // z / (z^2 - 1.8 z + 0.95), measured
+    let z = |f: &f64| Complex64::cis(std::f64::consts::TAU * f * INTERVAL_S);
+    let g: Vec<Complex64> = f.iter().map(z).map(|z| z / (z * z - 1.8 * z + 0.95)).collect();
+    let measured = MeasuredResponse { frequency_hz: &f, transfer: &g, variance: None };
+    let fit = vector_fitting(measured, INTERVAL_S, &VectorFitting { order: 2, ..VectorFitting::default() })?;
+    println!("vector fitting: {:?}", fit.model.sections[0].a);
     Ok(())
 }
 

@@ -9,6 +9,7 @@ mod modal_table;
 mod pole_zero;
 mod response;
 mod sections;
+mod stabilisation;
 
 pub(crate) use bode::{Bode, BodeCurve, bode_figure};
 pub(crate) use response::model_curve;

@@ -2,7 +2,7 @@
 
 use afmid_pipeline::RunResult;
 
-use super::{checks, coupling, force_curve, frequency_response, modal_table, pole_zero};
+use super::{checks, coupling, force_curve, frequency_response, modal_table, pole_zero, stabilisation};
 use crate::report::figure::Figure;
 use crate::report::view::{Fact, TableView};
 
@@ -28,7 +28,7 @@ impl Drawn {
 
 /// The sections of the paper's figures and checks; empty ones say what is missing.
 pub(crate) fn sections(run: &RunResult) -> Vec<Drawn> {
-    vec![
+    let mut sections = vec![
         Drawn {
             id: "modes",
             title: "Modes",
@@ -70,5 +70,11 @@ pub(crate) fn sections(run: &RunResult) -> Vec<Drawn> {
         checks::drift(run),
         checks::spectra(run),
         checks::calibration(run),
-    ]
+    ];
+    // the paper has none: a run without one lacks nothing
+    let figures = stabilisation::figures(run);
+    if !figures.is_empty() {
+        sections.push(Drawn { id: "stabilisation", title: "Stabilisation diagram", figures, ..Drawn::default() });
+    }
+    sections
 }

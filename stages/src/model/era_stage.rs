@@ -72,7 +72,7 @@ impl Stage for EraEstimate {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let series = PairSeries::new(inputs.get(&PAIR)?, self.set, 0)?;
-        let decay = self.decay(&series);
+        let decay = free_decay(&series, self.skip_s);
         let era = Era::new(&decay, self.block_rows).map_err(|error| {
             StageError::from_error(error)
                 .help("fewer `block_rows`, or a record that goes on longer after the force's last change")
@@ -97,16 +97,14 @@ impl Stage for EraEstimate {
     }
 }
 
-impl EraEstimate {
-    /// The response after the last change of any input, about its rest.
-    fn decay(&self, series: &PairSeries) -> Vec<f64> {
-        let samples = series.output.len();
-        let last_change = |u: &[f64]| (1..u.len()).rev().find(|&k| u[k] != u[k - 1]).unwrap_or(0);
-        let begin = series.input.chunks_exact(samples).map(last_change).max().unwrap_or(0);
-        let begin = begin.saturating_add((self.skip_s * series.rate).ceil() as usize).min(samples);
-        let decay = &series.output[begin..];
-        let tail = &decay[decay.len() - decay.len() / 10..];
-        let rest = if tail.is_empty() { 0.0 } else { tail.iter().sum::<f64>() / tail.len() as f64 };
-        decay.iter().map(|y| y - rest).collect()
-    }
+/// The response after the last change of any input, `skip_s` later, about its rest.
+pub(super) fn free_decay(series: &PairSeries, skip_s: f64) -> Vec<f64> {
+    let samples = series.output.len();
+    let last_change = |u: &[f64]| (1..u.len()).rev().find(|&k| u[k] != u[k - 1]).unwrap_or(0);
+    let begin = series.input.chunks_exact(samples).map(last_change).max().unwrap_or(0);
+    let begin = begin.saturating_add((skip_s * series.rate).ceil() as usize).min(samples);
+    let decay = &series.output[begin..];
+    let tail = &decay[decay.len() - decay.len() / 10..];
+    let rest = if tail.is_empty() { 0.0 } else { tail.iter().sum::<f64>() / tail.len() as f64 };
+    decay.iter().map(|y| y - rest).collect()
 }

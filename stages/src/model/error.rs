@@ -24,6 +24,14 @@ pub enum ModelError {
         /// Samples needed.
         wanted: usize,
     },
+    /// Too few points of a frequency response are defined.
+    #[error("{found} points of the response are defined, wanted at least {wanted} for this order")]
+    TooFewPoints {
+        /// Defined points.
+        found: usize,
+        /// Points needed.
+        wanted: usize,
+    },
     /// A NaN or an infinity in the data.
     #[error("sample {index} of the {what} is not finite")]
     NotFinite {

@@ -2,11 +2,15 @@
 
 use afmid_pipeline::{Array, Axis, Context, Document, Example, Port, Ports, Stage, StageError, StateSpace, Table};
 
+use super::bootstrap_stage;
 use super::modes_stage;
 use super::order::Order;
 use super::pem_stage::{self, DataSet, Pem};
+use super::stabilisation_stage;
+use super::vector_fitting_stage;
 use super::zeros_stage;
 use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, release};
+use crate::spectrum::{Etfe, Window, WindowKind};
 
 pub(super) fn pem() -> Vec<Example> {
     vec![Example {
@@ -35,6 +39,88 @@ pub(super) fn era() -> Vec<Example> {
         inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
         // the third pole takes what the decay's last tenth leaves of its rest
         expect: |outputs| the_resonance(outputs, 1e-8, 1e-6),
+    }]
+}
+
+pub(super) fn vector_fitting() -> Vec<Example> {
+    vec![Example {
+        title: "One resonance, from its response",
+        params: "order = 2",
+        inputs: || Ok(Ports::new().with(&vector_fitting_stage::TRANSFER, response()?)),
+        // the response is exact but for rounding; the first pole may come after other pairs, of which order 2 has none
+        expect: |outputs| the_resonance(outputs, 1e-9, 1e-7),
+    }]
+}
+
+/// Transfer function of the release, by the estimate over its differences.
+fn response() -> Result<Array, StageError> {
+    let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
+    let window = Window { kind: WindowKind::Rectangular, differenced: true, ..Window::default() };
+    let windowed = window.run(&named("pair", pair()), &cx)?;
+    let windowed = windowed.get(&Port::<Array>::new(Window::SPEC.outputs[0].name, "", ""))?.clone();
+    let etfe = Etfe { bandwidth_hz: 0.5 * SAMPLE_RATE_HZ, ..Etfe::default() }.run(&named("pair", windowed), &cx)?;
+    Ok(etfe.get(&Port::<Array>::new(Etfe::SPEC.outputs[0].name, "", ""))?.clone())
+}
+
+fn named(name: &'static str, array: Array) -> Ports {
+    Ports::new().with(&Port::<Array>::new(name, "", ""), array)
+}
+
+pub(super) fn stabilisation() -> Vec<Example> {
+    vec![Example {
+        title: "One resonance stays, whatever the order",
+        params: "to_order = 8\nblock_rows = 60\nmethod = \"release\"",
+        inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
+        expect: |outputs| {
+            let modes = outputs.get(&stabilisation_stage::MODES).map_err(|error| error.to_string())?;
+            let summary = outputs.get(&stabilisation_stage::SUMMARY).map_err(|error| error.to_string())?;
+            let f = modes.real("frequency_hz").map_err(|error| error.to_string())?;
+            // noise-free: rounding, as for `model.subspace`
+            if f.len() == 1 && (f[0] / FREQUENCY_HZ - 1.0).abs() < 1e-6 {
+                Ok(format!("One mode, at {:.1} Hz; the proposed order is {}.", f[0], summary.0["proposed_order"]))
+            } else {
+                Err(format!("{f:?} {}", summary.0))
+            }
+        },
+    }]
+}
+
+pub(super) fn bootstrap() -> Vec<Example> {
+    vec![Example {
+        title: "The resonance of twelve noisy events",
+        params: "replicates = 40",
+        inputs: || {
+            let pair = pair();
+            let (clean, samples) = (release(2048, T0, LOAD_V), 2048);
+            // a deterministic disturbance that no two events share; 1 mV
+            let wiggle =
+                |event: usize, k: usize| 1e-3 * ((k * k + 7 * event * k) as f64 * (0.37 + 0.11 * event as f64)).sin();
+            let signal: Vec<f64> =
+                (0..12 * samples).map(|i| clean[i % samples] + wiggle(i / samples, i % samples)).collect();
+            let time = pair.axis("time")?.values.clone();
+            let ensemble = Array::over(vec![
+                Axis::new("event", "1", "event", (0..12).map(f64::from).collect()),
+                Axis::new("time", "s", "time since t0", time),
+            ])
+            .with("signal", "V", "signal", &["event", "time"], signal)
+            .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
+            .attribute("onset_sample", T0);
+            Ok(Ports::new()
+                .with(&bootstrap_stage::ENSEMBLE, ensemble)
+                .with(&pem_stage::PAIR, pair)
+                .with(&pem_stage::MODEL, model()?))
+        },
+        expect: |outputs| {
+            let roots = outputs.get(&bootstrap_stage::ROOTS).map_err(|error| error.to_string())?;
+            let column = |name: &str| roots.real(name).map(|x| x.first().copied()).ok().flatten().unwrap_or(f64::NAN);
+            let (f, low, high) = (column("frequency_hz"), column("frequency_low_hz"), column("frequency_high_hz"));
+            // 1 mV over sqrt(12) against 0.9 V over 20 periods: some hertz; four half intervals
+            if (f - FREQUENCY_HZ).abs() < 2.0 * (high - low) && high - low < 200.0 && low < high {
+                Ok(format!("The pole lies between {low:.1} and {high:.1} Hz."))
+            } else {
+                Err(format!("{f} {low} {high}"))
+            }
+        },
     }]
 }
 

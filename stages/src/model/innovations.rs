@@ -35,6 +35,11 @@ impl Section {
         }
     }
 
+    /// Derivative of [`Section::denominator`] to z.
+    pub fn denominator_slope(&self, z: c64) -> c64 {
+        if self.order == 1 { c64::new(1.0, 0.0) } else { z * 2.0 + self.a[0] }
+    }
+
     /// Derivative of [`Section::transfer`] to z.
     pub fn transfer_slope(&self, z: c64) -> c64 {
         let d = self.denominator(z);
@@ -119,6 +124,24 @@ impl InnovationsModel {
             powers(s).into_iter().map(move |power| power / d)
         });
         to_a.chain(to_b).chain(std::iter::once(c64::new(1.0, 0.0))).collect()
+    }
+
+    /// Derivatives of [`InnovationsModel::transfer_slope`] to [`InnovationsModel::parameters`].
+    pub fn transfer_slope_sensitivities(&self, z: c64) -> Vec<c64> {
+        let (one, zero) = (c64::new(1.0, 0.0), c64::new(0.0, 0.0));
+        // each power of z with its own slope
+        let powers =
+            |section: &Section| if section.order == 1 { vec![(one, zero)] } else { vec![(z, one), (one, zero)] };
+        let to_a = self.sections.iter().flat_map(|s| {
+            let (d, slope) = (s.denominator(z), s.denominator_slope(z));
+            let (g, dg) = (s.transfer(z), s.transfer_slope(z));
+            powers(s).into_iter().map(move |(p, dp)| (g * p * slope / d - dg * p - g * dp) / d)
+        });
+        let to_b = self.sections.iter().flat_map(|s| {
+            let (d, slope) = (s.denominator(z), s.denominator_slope(z));
+            powers(s).into_iter().map(move |(p, dp)| (dp - p * slope / d) / d)
+        });
+        to_a.chain(to_b).chain(std::iter::once(zero)).collect()
     }
 
     /// `(A, B, C, K)` in full.

@@ -30,6 +30,8 @@ pub enum Weight {
 /// Poles in the z plane; each signal is scaled to its peak first.
 /// # Accuracy
 /// Consistent as N and the block rows grow, if the input excites 2 `block_rows` rows: start values, some per cent from the likelihood's maximum.
+/// The weights differ in the metric alone in which the order is cut off: with noise below the weakest state, or a white input, N4SID and MOESP agree to a per cent, and CVA gains 4 to 10 %
+/// where the noise is coloured; a coloured input sets N4SID behind MOESP (60 seeds, test). Singular values always differ.
 /// # Errors
 /// Lengths, values that are not finite, fewer than `(4 + 2 inputs) block_rows` samples, no convergence of a decomposition.
 /// # Source

@@ -1,5 +1,7 @@
 //! Parametric estimates: prediction error method, modes, zeros.
 
+mod bootstrap;
+mod bootstrap_stage;
 mod comparison;
 pub mod contact;
 mod contact_stage;
@@ -22,13 +24,21 @@ mod riccati;
 pub mod ringdown;
 mod ringdown_stage;
 mod series;
+pub mod stabilisation;
+mod stabilisation_stage;
 #[cfg(test)]
 mod start_tests;
 mod subspace;
 mod subspace_stage;
 mod transmission;
+pub mod vector_fitting;
+mod vector_fitting_stage;
+#[cfg(test)]
+mod weight_tests;
 mod zeros_stage;
 
+pub use bootstrap::{BootstrapSettings, Bootstrapped, bootstrap};
+pub use bootstrap_stage::BootstrapIntervals;
 pub use comparison::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
 pub use contact_stage::ContactFit;
 pub use era::Era;
@@ -42,9 +52,11 @@ pub use order::{Order, OrderCandidate, OrderChoice, choose_order};
 pub use pem_stage::{DataSet, FocusKind, NoiseKind, Pem};
 pub use residual::{TestResult, input_dependence, whiteness};
 pub use ringdown_stage::{ErrorSource, JointNoise, RingdownFit};
+pub use stabilisation_stage::{PoleMethod, StabilisationDiagram};
 pub use subspace::Subspace;
 pub use subspace_stage::{SubspaceEstimate, WeightKind};
 pub use transmission::transmission_zeros;
+pub use vector_fitting_stage::{ResponseWeight, VectorFittingEstimate};
 pub use zeros_stage::Zeros;
 
 use afmid_pipeline::Entry;
@@ -54,7 +66,10 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<Pem>(),
     Entry::of::<SubspaceEstimate>(),
     Entry::of::<EraEstimate>(),
+    Entry::of::<VectorFittingEstimate>(),
+    Entry::of::<StabilisationDiagram>(),
     Entry::of::<Modes>(),
+    Entry::of::<BootstrapIntervals>(),
     Entry::of::<Zeros>(),
     Entry::of::<RingdownFit>(),
     Entry::of::<ContactFit>(),

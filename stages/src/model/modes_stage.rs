@@ -10,7 +10,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::modes::{ModeCriteria, Pole, PoleKind, ResponsePoint, Root, poles, response, share_error_from_onset, zeros};
+use super::modes::{
+    Interval, LEVEL, ModeCriteria, Pole, PoleKind, ResponsePoint, Root, at_rest, poles, response,
+    share_error_from_onset, zeros,
+};
 use super::pem_stage::{DataSet, MODEL};
 use super::series::PairSeries;
 use super::{InnovationsModel, InputGains, Nuisances, noise_ceiling_percent, simulate_held_out};
@@ -23,11 +26,12 @@ use crate::spectrum::IntersampleKind;
 /// Method: zeros are the invariant zeros of (A, B, C, D). Standard errors by the delta method from the model's covariance. Held-out fit: the model of
 /// the identification half simulated on the verification half's force, initial state, offset and drift fitted again. The error of a static share counts the ambiguity of t0: an event
 /// that was d earlier turns and raises the mode's amplitude by exp(-s d); the root mean square over the pair's `t0_ambiguity_s`, at least one
-/// sample, is added in squares.
+/// sample, is added in squares. Intervals are those of 95 %: normal for frequencies, quality factors, gain and delay, log-normal for the response's magnitude; the phase's is 1.96 `phase_std` on
+/// either side.
 /// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency. Of a model with several inputs zeros,
-/// shares and response are those of the first.
+/// shares and response are those of the first. `at_rest` in the summary: static gain, and the group delay at zero frequency, without the hold's half sample if `intersample` is held.
 /// Units: Hz; static shares are parts of the static gain.
-/// Accuracy: first order in the errors. A static share is the mode's own partial fraction: within the detector's roll-off it is turned and damped by it.
+/// Accuracy: first order in the errors; over 300 seeds of a second-order system the intervals of zeros, gain, delay and response cover 90 to 99 % each (test). A static share is the mode's own partial fraction: within the detector's roll-off it is turned and damped by it.
 /// Zeros map as poles do; the hold makes them differ from the continuous system's by 2e-3 in frequency (closed-form test).
 /// Errors: a model that is not one of `model.pem`, or without covariance; a pair of another sample rate.
 /// Source: Stark et al. 2005, Table I and Fig. 5; L. Ljung, System Identification, 1999, section 9.4.
@@ -84,7 +88,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "mode
 impl Stage for Modes {
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 4,
+        version: 5,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -155,6 +159,7 @@ impl Stage for Modes {
                 "noise_ceiling": fits.noise_ceiling,
             },
             "t0_ambiguity_s": ambiguity_s,
+            "at_rest": self.at_rest(&model, &covariance)?,
             "reference": self.compared(&modes),
         }))?;
         Ok(Ports::new()
@@ -177,6 +182,21 @@ impl Modes {
             min_significance: self.min_significance,
             max_quality_factor_error: self.max_quality_factor_error,
         }
+    }
+
+    /// Gain and delay with their intervals.
+    fn at_rest(&self, model: &InnovationsModel, covariance: &Mat<f64>) -> Result<Value, StageError> {
+        let rest = at_rest(model, covariance).map_err(StageError::from_error)?;
+        let hold_s = if self.intersample == IntersampleKind::Held { 0.5 * model.sample_time_s } else { 0.0 };
+        let with_interval = |value: f64, std: f64| {
+            let Interval { low, high } = Interval::normal(value, std);
+            json!({ "value": value, "std": std, "low": low, "high": high })
+        };
+        Ok(json!({
+            "gain": with_interval(rest.gain, rest.gain_std),
+            "delay_s": with_interval(rest.delay_s - hold_s, rest.delay_std_s),
+            "level": LEVEL,
+        }))
     }
 
     fn frequencies(&self, rate: f64) -> Vec<f64> {
@@ -336,7 +356,9 @@ fn mode_table(modes: &[&Pole]) -> Table {
 
 fn root_table(poles: &[Pole], zeros: &[Root]) -> Table {
     let roots: Vec<Root> = poles.iter().map(|pole| pole.root).chain(zeros.iter().copied()).collect();
-    let column = |value: fn(&Root) -> f64| roots.iter().map(value).collect::<Vec<f64>>();
+    let column = |value: &dyn Fn(&Root) -> f64| roots.iter().map(value).collect::<Vec<f64>>();
+    let frequency = |r: &Root| Interval::normal(r.frequency_hz, r.frequency_std_hz);
+    let quality = |r: &Root| Interval::normal(r.quality_factor, r.quality_factor_std);
     let zero_kind = |root: &Root| if root.is_complex() { "pair" } else { "real" };
     let kinds = poles.iter().map(|_| "pole").chain(zeros.iter().map(|_| "zero"));
     let classes = poles.iter().map(|pole| pole.kind.name()).chain(zeros.iter().map(zero_kind));
@@ -348,14 +370,18 @@ fn root_table(poles: &[Pole], zeros: &[Root]) -> Table {
             "what a pole belongs to; whether a zero is one of a pair",
             classes.map(str::to_owned).collect::<Vec<String>>(),
         )
-        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", column(|r| r.frequency_hz))
-        .with("frequency_std_hz", "Hz", "its standard error", column(|r| r.frequency_std_hz))
-        .with("quality_factor", "1", "magnitude of s over minus twice its real part", column(|r| r.quality_factor))
-        .with("quality_factor_std", "1", "its standard error", column(|r| r.quality_factor_std))
-        .with("z_re", "1", "real part in the z plane", column(|r| r.z.re))
-        .with("z_im", "1", "imaginary part in the z plane, upper one of a pair", column(|r| r.z.im))
-        .with("s_re", "rad/s", "real part in the s plane", column(|r| r.s.re))
-        .with("s_im", "rad/s", "imaginary part in the s plane", column(|r| r.s.im))
+        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", column(&|r| r.frequency_hz))
+        .with("frequency_std_hz", "Hz", "its standard error", column(&|r| r.frequency_std_hz))
+        .with("quality_factor", "1", "magnitude of s over minus twice its real part", column(&|r| r.quality_factor))
+        .with("quality_factor_std", "1", "its standard error", column(&|r| r.quality_factor_std))
+        .with("frequency_low_hz", "Hz", "lower end of its 95 % interval", column(&|r| frequency(r).low))
+        .with("frequency_high_hz", "Hz", "upper end", column(&|r| frequency(r).high))
+        .with("quality_factor_low", "1", "lower end of its 95 % interval", column(&|r| quality(r).low))
+        .with("quality_factor_high", "1", "upper end", column(&|r| quality(r).high))
+        .with("z_re", "1", "real part in the z plane", column(&|r| r.z.re))
+        .with("z_im", "1", "imaginary part in the z plane, upper one of a pair", column(&|r| r.z.im))
+        .with("s_re", "rad/s", "real part in the s plane", column(&|r| r.s.re))
+        .with("s_im", "rad/s", "imaginary part in the s plane", column(&|r| r.s.im))
 }
 
 /// From the response to a held input to that of the continuous system: `i w T / (1 - exp(-i w T))`.
@@ -372,6 +398,10 @@ fn hold_correction(frequency_hz: f64, sample_time_s: f64, intersample: Intersamp
 fn response_array(points: &[ResponsePoint], model: &StateSpace, intersample: IntersampleKind) -> Array {
     let over = &["frequency_hz"];
     let factor = |point: &ResponsePoint| hold_correction(point.frequency_hz, model.sample_time_s, intersample);
+    let interval = |p: &ResponsePoint| {
+        let scale = factor(p).norm();
+        Interval::positive(p.value.norm() * scale, p.magnitude_std() * scale)
+    };
     let axis = Axis::new("frequency_hz", "Hz", "frequency", points.iter().map(|p| p.frequency_hz).collect());
     Array::over(vec![axis])
         .with(
@@ -388,6 +418,14 @@ fn response_array(points: &[ResponsePoint], model: &StateSpace, intersample: Int
             over,
             points.iter().map(|p| p.magnitude_std() * factor(p).norm()).collect::<Vec<_>>(),
         )
+        .with(
+            "magnitude_low",
+            "1",
+            "lower end of the magnitude's 95 % interval",
+            over,
+            points.iter().map(|p| interval(p).low).collect::<Vec<_>>(),
+        )
+        .with("magnitude_high", "1", "upper end", over, points.iter().map(|p| interval(p).high).collect::<Vec<_>>())
         .with(
             "phase_std",
             "rad",

@@ -239,6 +239,22 @@ pub fn with_poles(
     conclude(&problem, &state, sample_time_s, &options, Vec::new())
 }
 
+/// The model of output error from these poles on (order many): for the same model on other data, where [`identify`]'s search is not needed again.
+///
+/// Errors: as [`identify`].
+pub fn refit(
+    experiments: &[Experiment<'_>],
+    sample_time_s: f64,
+    poles: &[c64],
+    options: &PemOptions,
+) -> Result<Identified, ModelError> {
+    let options = PemOptions { order: poles.len(), noise: NoiseModel::White, ..options.clone() };
+    let problem = checked(experiments, sample_time_s, &options)?;
+    let limits = Limits { iterations: options.max_iterations, gradient: options.gradient_tolerance };
+    let start = State::new(&problem, Point { poles: coordinates(poles), noise: Noise::White })?;
+    conclude(&problem, &minimise(&problem, start, limits)?, sample_time_s, &options, Vec::new())
+}
+
 /// Prediction errors with a noise filter, from the output error's starts.
 fn thermal_or_free(
     problem: &Problem,

@@ -15,7 +15,7 @@ mod tangent;
 mod tests;
 
 pub use covariance::ResidualColour;
-pub use identify::{Experiment, Focus, Identified, NoiseModel, PemOptions, Verdict, identify, with_poles};
+pub use identify::{Experiment, Focus, Identified, NoiseModel, PemOptions, Verdict, identify, refit, with_poles};
 pub use optimiser::Ending;
-pub(crate) use parametrisation::{Coefficients, roots, section_order};
+pub(crate) use parametrisation::{Coefficients, roots, section_order, sections_of_roots};
 pub(crate) use predictor::all_pole;

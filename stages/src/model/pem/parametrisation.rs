@@ -48,30 +48,33 @@ pub(crate) fn slopes(coordinates: &[f64]) -> [f64; 3] {
 /// Complex roots must come with their conjugates (only those with positive imaginary part are read).
 pub(crate) fn coordinates(roots: &[c64]) -> Vec<f64> {
     let inside = |z: &c64| if z.norm() > 1.0 { z / z.norm_sqr() } else { *z };
-    let mut p = Vec::with_capacity(roots.len());
-    let mut real = Vec::new();
-    for z in roots.iter().map(inside) {
-        if z.im > 0.0 {
-            push_pair(&mut p, -2.0 * z.re, z.norm_sqr());
-        } else if z.im == 0.0 {
-            real.push(z.re);
-        }
-    }
+    let inside: Vec<c64> = roots.iter().map(inside).collect();
+    let a = sections_of_roots(&inside);
+    let order = inside.len();
+    let own = |(i, [a1, a2]): (usize, Coefficients)| match section_order(order, i) {
+        1 => vec![limited_atanh(a1)],
+        _ => vec![limited_atanh(a1 / (1.0 + a2)), limited_atanh(a2)],
+    };
+    a.into_iter().enumerate().flat_map(own).collect()
+}
+
+/// Sections of the polynomial with these roots, wherever they lie: complex pairs, then real ones by two, the closest together.
+///
+/// Complex roots must come with their conjugates (only those with positive imaginary part are read).
+pub(crate) fn sections_of_roots(roots: &[c64]) -> Vec<Coefficients> {
+    let upper = roots.iter().filter(|z| z.im > 0.0);
+    let mut a: Vec<Coefficients> = upper.map(|z| [-2.0 * z.re, z.norm_sqr()]).collect();
+    let mut real: Vec<f64> = roots.iter().filter(|z| z.im == 0.0).map(|z| z.re).collect();
     real.sort_by(f64::total_cmp);
     while real.len() > 1 {
         // the closest two: a pair that merges into a complex one can do so within its section
         let gap = |i: &usize| real[i + 1] - real[*i];
         let closest = (0..real.len() - 1).min_by(|i, j| gap(i).total_cmp(&gap(j))).unwrap_or(0);
         let (x, y) = (real.remove(closest + 1), real.remove(closest));
-        push_pair(&mut p, -(x + y), x * y);
+        a.push([-(x + y), x * y]);
     }
-    p.extend(real.pop().map(|x| limited_atanh(-x)));
-    p
-}
-
-fn push_pair(p: &mut Vec<f64>, a1: f64, a2: f64) {
-    p.push(limited_atanh(a1 / (1.0 + a2)));
-    p.push(limited_atanh(a2));
+    a.extend(real.pop().map(|x| [-x, 0.0]));
+    a
 }
 
 fn limited_atanh(k: f64) -> f64 {
