@@ -15,13 +15,21 @@
 //! # Ok::<(), afmid_stages::model::ModelError>(())
 //! ```
 
+mod absorbed;
+mod bootstrap;
 mod compressed;
 mod decay;
 mod estimate;
 mod fit;
+mod fitted;
+mod freedom;
+mod guess;
 mod modal_form;
 mod noise;
+mod noise_estimate;
 mod normal;
+mod options;
+mod result;
 mod search;
 mod start;
 #[cfg(test)]
@@ -39,7 +47,8 @@ pub(crate) mod internals {
 
 pub use decay::{Decay, DecayOptions, fit_decay};
 pub use estimate::{Estimate, ModeEstimate, Ringdown, RingdownVerdict};
-pub use fit::{NoiseSource, RingdownOptions, fit_ringdowns};
+pub use fit::fit_ringdowns;
 pub use modal_form::{EventParameters, Exponential};
 pub use noise::{RingdownNoise, ThermalMode, Wander};
 pub use normal::Prior;
+pub use options::{NoiseSource, RingdownOptions};

@@ -1,0 +1,94 @@
+//! The fit under one noise model.
+
+use faer::Mat;
+
+use super::compressed::{Compressed, compress, whiten};
+use super::estimate::RingdownVerdict;
+use super::modal_form::{EventParameters, Exponential, shared};
+use super::noise::RingdownNoise;
+use super::normal::{EventBlock, Freedom, blocks, symmetric_inverse};
+use super::search::{Point, assembled, search};
+use super::whitener::Whitener;
+use crate::model::error::ModelError;
+
+/// Outer rounds: each takes the basis to the present poles.
+const ROUNDS: usize = 12;
+/// Standard errors that count as arrived.
+const ARRIVED: f64 = 1e-3;
+
+/// A fit under one noise model.
+pub(super) struct Fitted {
+    pub data: Compressed,
+    pub reference: Vec<Exponential>,
+    pub blocks: Vec<EventBlock>,
+    pub covariance: Mat<f64>,
+    pub verdict: RingdownVerdict,
+    pub events: Vec<EventParameters>,
+}
+
+impl Fitted {
+    pub(super) fn of(
+        events: &[&[f64]],
+        interval_s: f64,
+        noise: &RingdownNoise,
+        point: &mut Point,
+        freedom: &Freedom,
+        samples: usize,
+    ) -> Result<Self, ModelError> {
+        let whitener = Whitener::new(noise, interval_s, samples);
+        let mut whitened: Vec<Vec<f64>> = events.iter().map(|event| event.to_vec()).collect();
+        whiten(&whitener, &mut whitened);
+        let mut verdict = RingdownVerdict { converged: false, distance: f64::INFINITY, steps: 0 };
+        for round in 0..ROUNDS {
+            let reference = point.exponentials.clone();
+            let data = compress(&whitener, &reference, &whitened, interval_s);
+            let before = shared(&point.exponentials);
+            let found = search(&data, &reference, point, freedom, ARRIVED);
+            verdict.steps += found.steps;
+            let parts = blocks(&data, &reference, &point.exponentials, &point.events, freedom, 0.0);
+            let values = shared(&point.exponentials);
+            let (information, _) = assembled(&parts, freedom, &values);
+            // how far this round went: the basis is exact to the third order of it
+            let moved: Vec<f64> = freedom.shared.iter().map(|&i| values[i] - before[i]).collect();
+            let distance = (0..moved.len())
+                .map(|i| (0..moved.len()).map(|j| moved[i] * information[(i, j)] * moved[j]).sum::<f64>())
+                .sum::<f64>()
+                .max(0.0)
+                .sqrt();
+            verdict.distance = found.distance;
+            verdict.converged = distance < 1.0 && found.distance < ARRIVED;
+            if verdict.converged || round + 1 == ROUNDS {
+                let covariance = symmetric_inverse(&information);
+                if (0..moved.len()).any(|i| !covariance[(i, i)].is_finite()) {
+                    return Err(ModelError::Degenerate("no finite covariance"));
+                }
+                let events = point.events.clone();
+                return Ok(Self { data, reference, blocks: parts, covariance, verdict, events });
+            }
+        }
+        Err(ModelError::Degenerate("no round was made"))
+    }
+
+    /// The same fit under `excess` times the white noise's variance.
+    pub(super) fn rescale(&mut self, excess: f64) {
+        let grow = |matrix: &Mat<f64>, factor: f64| {
+            Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| factor * matrix[(i, j)])
+        };
+        self.covariance = grow(&self.covariance, excess);
+        self.data.rest.iter_mut().for_each(|rest| *rest /= excess);
+        for block in &mut self.blocks {
+            block.cost /= excess;
+            block.own_inverse = grow(&block.own_inverse, excess);
+            block.information = grow(&block.information, 1.0 / excess);
+            block.score.iter_mut().for_each(|score| *score /= excess);
+        }
+    }
+
+    pub(super) fn used(&self, freedom: &Freedom) -> usize {
+        freedom.shared.len() + self.blocks.len() * freedom.own.len()
+    }
+
+    pub(super) fn chi_square(&self) -> f64 {
+        self.blocks.iter().map(|block| block.cost).sum::<f64>() + self.data.rest.iter().sum::<f64>()
+    }
+}
