@@ -3,6 +3,7 @@
 use super::fitted::Fitted;
 use super::modal_form::{Exponential, columns, weights};
 use super::normal::Freedom;
+use super::records::Records;
 use super::whittle::summed_periodograms;
 use crate::model::orthogonal::cholesky;
 
@@ -12,7 +13,7 @@ impl Fitted {
         &self,
         exponentials: &[Exponential],
         freedom: &Freedom,
-        interval_s: f64,
+        records: &Records<'_>,
         taper: &[f64],
     ) -> Vec<f64> {
         let count = self.events.len();
@@ -49,7 +50,7 @@ impl Fitted {
             }
             directions.push(direction);
         }
-        let basis = columns(&self.reference, interval_s, taper.len());
+        let basis = columns(&self.reference, records.interval_s, taper.len());
         let signals: Vec<Vec<f64>> = directions
             .iter()
             .map(|direction| {
@@ -57,6 +58,7 @@ impl Fitted {
                 for (column, factor) in basis.iter().zip(direction) {
                     signal.iter_mut().zip(column).for_each(|(s, c)| *s += factor * c);
                 }
+                records.gaps.apply(typical, &mut signal, taper);
                 signal
             })
             .collect();

@@ -4,7 +4,6 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::compressed::Compressed;
 use super::fitted::Fitted;
 use super::modal_form::shared;
 use super::normal::Freedom;
@@ -23,11 +22,7 @@ pub(super) fn bootstrap(fitted: &Fitted, point: &Point, freedom: &Freedom, optio
         let mut rng = ChaCha8Rng::seed_from_u64(options.bootstrap_seed);
         rng.set_stream(number as u64);
         let chosen: Vec<usize> = (0..count).map(|_| rng.random_range(0..count)).collect();
-        let data = Compressed {
-            r: fitted.data.r.clone(),
-            projections: chosen.iter().map(|&i| fitted.data.projections[i].clone()).collect(),
-            rest: chosen.iter().map(|&i| fitted.data.rest[i]).collect(),
-        };
+        let data = fitted.data.chosen(&chosen);
         let mut drawn = Point {
             exponentials: point.exponentials.clone(),
             events: chosen.iter().map(|&i| point.events[i]).collect(),

@@ -2,13 +2,13 @@
 
 use faer::Mat;
 
-use super::compressed::{Compressed, compress, whiten};
 use super::estimate::RingdownVerdict;
 use super::modal_form::{EventParameters, Exponential, shared};
 use super::noise::RingdownNoise;
 use super::normal::{EventBlock, Freedom, blocks, symmetric_inverse};
+use super::projected::{Projected, Whitened};
+use super::records::Records;
 use super::search::{Point, assembled, search};
-use super::whitener::Whitener;
 use crate::model::error::ModelError;
 
 /// Outer rounds: each takes the basis to the present poles.
@@ -18,7 +18,7 @@ const ARRIVED: f64 = 1e-3;
 
 /// A fit under one noise model.
 pub(super) struct Fitted {
-    pub data: Compressed,
+    pub data: Projected,
     pub reference: Vec<Exponential>,
     pub blocks: Vec<EventBlock>,
     pub covariance: Mat<f64>,
@@ -28,20 +28,16 @@ pub(super) struct Fitted {
 
 impl Fitted {
     pub(super) fn of(
-        events: &[&[f64]],
-        interval_s: f64,
+        records: &Records<'_>,
         noise: &RingdownNoise,
         point: &mut Point,
         freedom: &Freedom,
-        samples: usize,
     ) -> Result<Self, ModelError> {
-        let whitener = Whitener::new(noise, interval_s, samples);
-        let mut whitened: Vec<Vec<f64>> = events.iter().map(|event| event.to_vec()).collect();
-        whiten(&whitener, &mut whitened);
+        let whitened = Whitened::of(records, noise);
         let mut verdict = RingdownVerdict { converged: false, distance: f64::INFINITY, steps: 0 };
         for round in 0..ROUNDS {
             let reference = point.exponentials.clone();
-            let data = compress(&whitener, &reference, &whitened, interval_s);
+            let data = whitened.projected(&reference);
             let before = shared(&point.exponentials);
             let found = search(&data, &reference, point, freedom, ARRIVED);
             verdict.steps += found.steps;

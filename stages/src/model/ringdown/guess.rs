@@ -2,15 +2,19 @@
 
 use super::modal_form::{EventParameters, signal};
 use super::options::RingdownOptions;
+use super::records::Records;
 use super::search::Point;
 use super::start::{amplitudes, start};
 use crate::model::error::ModelError;
 
 /// Noise that is white at the highest frequencies: second differences of the quieter half.
-pub(super) fn white_variance(events: &[&[f64]]) -> f64 {
+pub(super) fn white_variance(records: &Records<'_>) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
-    for event in events {
-        for w in event[event.len() / 2..].windows(3) {
+    for (number, event) in records.events.iter().enumerate() {
+        for (k, w) in event.windows(3).enumerate().skip(event.len() / 2) {
+            if (k..k + 3).any(|k| records.gaps.missing(number, k)) {
+                continue;
+            }
             sum += (w[0] - 2.0 * w[1] + w[2]).powi(2);
             count += 1;
         }

@@ -23,12 +23,18 @@ mod estimate;
 mod fit;
 mod fitted;
 mod freedom;
+mod gap_start;
+#[cfg(test)]
+mod gap_tests;
+mod gaps;
 mod guess;
 mod modal_form;
 mod noise;
 mod noise_estimate;
 mod normal;
 mod options;
+mod projected;
+mod records;
 mod result;
 mod search;
 mod start;

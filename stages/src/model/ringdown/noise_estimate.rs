@@ -6,8 +6,9 @@ use super::fitted::Fitted;
 use super::modal_form::{Exponential, signal};
 use super::noise::{RingdownNoise, ThermalMode, Wander};
 use super::normal::Freedom;
+use super::records::Records;
 use super::search::Point;
-use super::whittle::{expected_parts, hann, mean_periodogram, variances};
+use super::whittle::{autocorrelation, expected_parts, hann, mean_periodogram, variances};
 
 /// Thermal motion of every mode and a ladder of wander from the window's own frequency upwards, a decade apart.
 fn parts_of(exponentials: &[Exponential], white: f64, interval_s: f64, samples: usize) -> RingdownNoise {
@@ -26,38 +27,40 @@ fn parts_of(exponentials: &[Exponential], white: f64, interval_s: f64, samples: 
     RingdownNoise { white, thermal, wander }
 }
 
-/// Events less their fits.
-pub(super) fn residuals(events: &[&[f64]], point: &Point, interval_s: f64) -> Vec<Vec<f64>> {
+/// Events less their fits; zero in gaps, the rest scaled for `taper` ([`Gaps::apply`](super::gaps::Gaps::apply)).
+pub(super) fn residuals(records: &Records<'_>, point: &Point, taper: &[f64]) -> Vec<Vec<f64>> {
+    let events = records.events.iter().zip(&point.events).enumerate();
     events
-        .iter()
-        .zip(&point.events)
-        .map(|(y, own)| {
-            let fitted = signal(&point.exponentials, own, interval_s, y.len());
-            y.iter().zip(fitted).map(|(y, s)| y - s).collect()
+        .map(|(number, (y, own))| {
+            let fitted = signal(&point.exponentials, own, records.interval_s, y.len());
+            let mut residual: Vec<f64> = y.iter().zip(fitted).map(|(y, s)| y - s).collect();
+            records.gaps.apply(number, &mut residual, taper);
+            residual
         })
         .collect()
 }
 
 /// The noise under which the residuals, what the fit absorbed added back, and the free stretches are likeliest.
+///
+/// Gaps are cut out of the taper, event by event, and the expected periodogram is that of the same tapers: it stays without bias.
 pub(super) fn estimated(
-    events: &[&[f64]],
-    free: &[&[f64]],
-    interval_s: f64,
+    records: &Records<'_>,
     point: &Point,
     last: &RingdownNoise,
     absorbed: Option<&Fitted>,
     freedom: &Freedom,
 ) -> RingdownNoise {
-    let samples = events[0].len();
+    let (samples, interval_s) = (records.samples(), records.interval_s);
     let parts = parts_of(&point.exponentials, last.white, interval_s, samples);
     let taper = hann(samples);
-    let residuals = residuals(events, point, interval_s);
+    let residuals = residuals(records, point, &taper);
     let mut observed = mean_periodogram(&residuals, &taper);
     if let Some(fitted) = absorbed {
-        let missing = fitted.absorbed(&point.exponentials, freedom, interval_s, &taper);
+        let missing = fitted.absorbed(&point.exponentials, freedom, records, &taper);
         observed.iter_mut().zip(missing).for_each(|(o, m)| *o += m);
     }
-    let stretches: Vec<Vec<f64>> = free
+    let stretches: Vec<Vec<f64>> = records
+        .free
         .iter()
         .flat_map(|stretch| stretch.chunks_exact(samples))
         .map(|chunk| {
@@ -65,13 +68,18 @@ pub(super) fn estimated(
             chunk.iter().map(|v| v - mean).collect()
         })
         .collect();
+    let mut lag_weights = records.gaps.lag_weights(&taper);
     if !stretches.is_empty() {
         // events and stretches count by their number
         let (own, other) = (residuals.len() as f64, stretches.len() as f64);
         let quiet = mean_periodogram(&stretches, &taper);
         observed.iter_mut().zip(quiet).for_each(|(o, q)| *o = (own * *o + other * q) / (own + other));
+        if records.gaps.any() {
+            let whole = autocorrelation(&taper);
+            lag_weights.iter_mut().zip(whole).for_each(|(l, w)| *l = (own * *l + other * w) / (own + other));
+        }
     }
-    let unit = expected_parts(&parts, interval_s, &taper);
+    let unit = expected_parts(&parts, interval_s, &lag_weights);
     let mean = observed.iter().skip(1).sum::<f64>() / (observed.len() - 1) as f64;
     let first: Vec<f64> = unit
         .iter()

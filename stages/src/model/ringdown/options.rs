@@ -1,5 +1,7 @@
 //! What is fitted, and how.
 
+use std::ops::Range;
+
 use super::modal_form::Exponential;
 use super::noise::RingdownNoise;
 
@@ -27,6 +29,8 @@ pub struct RingdownOptions {
     /// Make the start from this many first samples of the events' mean, each event's level and drift from the second half of its window;
     /// default none: from the whole mean, no drift at the start. For ringing that fills a small part of the window, like a coupled lever's.
     pub start_samples: Option<usize>,
+    /// Samples of each event that are missing, clipped say: one list of ranges per event; default empty: none. What stands there is never used.
+    pub missing: Vec<Vec<Range<usize>>>,
 }
 
 impl Default for RingdownOptions {
@@ -42,6 +46,7 @@ impl Default for RingdownOptions {
             bootstrap_seed: 1,
             start: None,
             start_samples: None,
+            missing: Vec::new(),
         }
     }
 }

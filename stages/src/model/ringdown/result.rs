@@ -8,6 +8,7 @@ use super::modal_form::{EventParameters, shared};
 use super::noise::RingdownNoise;
 use super::noise_estimate::residuals;
 use super::normal::Freedom;
+use super::records::Records;
 use super::search::Point;
 use super::whittle::{expected_parts, hann, mean_periodogram};
 use crate::model::error::ModelError;
@@ -18,14 +19,13 @@ const SANDWICH_EVENTS: usize = 8;
 impl Fitted {
     pub(super) fn result(
         self,
-        events: &[&[f64]],
-        interval_s: f64,
+        records: &Records<'_>,
         point: Point,
         noise: RingdownNoise,
         freedom: &Freedom,
     ) -> Result<Ringdown, ModelError> {
-        let samples = events.first().map_or(0, |event| event.len());
-        let degrees = (self.blocks.len() * samples).saturating_sub(self.used(freedom)).max(1);
+        let (samples, interval_s) = (records.samples(), records.interval_s);
+        let degrees = records.observed().saturating_sub(self.used(freedom)).max(1);
         let total = shared(&point.exponentials).len();
         let spread = |inner: &Mat<f64>| {
             let mut full = Mat::<f64>::zeros(total, total);
@@ -51,12 +51,14 @@ impl Fitted {
         });
         let taper = hann(samples);
         let mut expected = vec![0.0; samples / 2 + 1];
-        for (part, variance) in expected_parts(&noise, interval_s, &taper).iter().zip(noise.variances()) {
+        for (part, variance) in
+            expected_parts(&noise, interval_s, &records.gaps.lag_weights(&taper)).iter().zip(noise.variances())
+        {
             expected.iter_mut().zip(part).for_each(|(e, p)| *e += variance * p);
         }
-        let absorbed = self.absorbed(&point.exponentials, freedom, interval_s, &taper);
+        let absorbed = self.absorbed(&point.exponentials, freedom, records, &taper);
         expected.iter_mut().zip(absorbed).for_each(|(e, a)| *e = (*e - a).max(0.0));
-        let residual_periodogram = mean_periodogram(&residuals(events, &point, interval_s), &taper);
+        let residual_periodogram = mean_periodogram(&residuals(records, &point, &taper), &taper);
         let density = |values: Vec<f64>| values.into_iter().map(|v| 2.0 * interval_s * v).collect::<Vec<f64>>();
         Ok(Ringdown {
             bootstrap: Vec::new(),

@@ -2,9 +2,9 @@
 
 use faer::Mat;
 
-use super::compressed::Compressed;
 use super::modal_form::{EventParameters, Exponential, from_shared, shared};
 use super::normal::{EventBlock, Freedom, blocks, cost, symmetric_inverse};
+use super::projected::Projected;
 
 /// Where the search stands.
 #[derive(Clone)]
@@ -52,7 +52,7 @@ const VALLEY: f64 = 0.06;
 /// worse, are repeated shorter. Ends when no parameter of a mode moves by `tolerance` of its standard error and all of them together by less than
 /// a quarter of one: real poles that nearly coincide make a long flat valley, along which nothing else changes.
 pub(super) fn search(
-    data: &Compressed,
+    data: &Projected,
     reference: &[Exponential],
     point: &mut Point,
     freedom: &Freedom,
