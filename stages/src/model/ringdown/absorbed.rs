@@ -26,7 +26,8 @@ impl Fitted {
             .min_by(|a, b| (a.1.amplitude.abs() - amplitude).abs().total_cmp(&(b.1.amplitude.abs() - amplitude).abs()))
             .map_or(0, |(i, _)| i);
         let block = &self.blocks[typical];
-        let w = weights(&self.reference, exponentials, &self.events[typical]);
+        let mut w = weights(&self.reference, exponentials, &self.events[typical]);
+        freedom.turn(&mut w.shared, exponentials);
         let width = w.value.len();
         let mut directions: Vec<Vec<f64>> = Vec::new();
         let shared_root = cholesky(&self.covariance);

@@ -7,6 +7,7 @@ use super::freedom::freedom;
 use super::gap_start::gap_start;
 use super::gaps::Gaps;
 use super::guess::{first_guess, white_variance};
+use super::knowledge::Knowledge;
 use super::noise::RingdownNoise;
 use super::noise_estimate::estimated;
 use super::normal::Freedom;
@@ -28,7 +29,8 @@ const NOISE_ROUNDS: usize = 3;
 /// the shape can reach, and fitted there by Levenberg-Marquardt with the events' own parameters eliminated; noise variances by a
 /// Whittle likelihood of the residuals with what the fit absorbed added back (restricted likelihood), fit and noise in turns. Over missing samples
 /// the filter predicts without correcting; for the noise's variances gaps are cut out of the taper, and the expected periodograms are exact for
-/// the taper that is left: neither is biased, and no window is lost.
+/// the taper that is left: neither is biased, and no window is lost. Modes of which something is known are searched in frequency and quality
+/// factor, bounds by an active set.
 /// # Shapes
 /// `events`: E records of equal length, each from the first sample after its release on, [`RingdownOptions::missing`] their gaps; `free`: stretches of noise alone, any length.
 /// # Units
@@ -37,7 +39,7 @@ const NOISE_ROUNDS: usize = 3;
 /// The Cramer-Rao bound within a few per cent (docs/accuracy.md). About 3 ms per record of 8192 samples and noise round on one core,
 /// ten times that for one with gaps, whose filter and basis are its own.
 /// # Errors
-/// No event, unequal lengths, values that are not finite, too few samples, no oscillation.
+/// No event, unequal lengths, values that are not finite, too few samples, no oscillation, knowledge of what is not fitted.
 /// # Source
 /// S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7; G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413;
 /// D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320 (restricted likelihood).
@@ -57,7 +59,9 @@ pub fn fit_ringdowns(
     let freedom = freedom(&point.exponentials, options);
     let (fitted, noise) = with_noise(&records, &mut point, &freedom, options)?;
     let draws = bootstrap(&fitted, &point, &freedom, options);
-    fitted.result(&records, point, noise, &freedom).map(|result| Ringdown { bootstrap: draws, ..result })
+    fitted
+        .result(&records, point, noise, &freedom, &options.known)
+        .map(|result| Ringdown { bootstrap: draws, ..result })
 }
 
 /// Fit and noise in turns.
@@ -75,6 +79,10 @@ fn with_noise(
             let excess = fitted.chi_square() / records.observed().saturating_sub(used).max(1) as f64;
             noise.white *= excess;
             fitted.rescale(excess);
+            if options.known.iter().any(|known| matches!(known.knowledge, Knowledge::About(..))) {
+                // a prior weighs against the noise: once more under the right one
+                fitted = Fitted::of(records, &noise, point, freedom)?;
+            }
         }
         NoiseSource::Known(known) => {
             noise = known.clone();
@@ -130,5 +138,6 @@ fn check(events: &[&[f64]], free: &[&[f64]], interval_s: f64, options: &Ringdown
     if options.modes == 0 && options.start.is_none() {
         return Err(ModelError::Parameter { name: "modes", found: 0.0, wanted: "at least 1" });
     }
+    super::knowledge::check(&options.known)?;
     Ok(samples)
 }

@@ -3,7 +3,8 @@
 use faer::Mat;
 
 use super::estimate::RingdownVerdict;
-use super::modal_form::{EventParameters, Exponential, shared};
+use super::limits::hold;
+use super::modal_form::{EventParameters, Exponential};
 use super::noise::RingdownNoise;
 use super::normal::{EventBlock, Freedom, blocks, symmetric_inverse};
 use super::projected::{Projected, Whitened};
@@ -38,12 +39,12 @@ impl Fitted {
         for round in 0..ROUNDS {
             let reference = point.exponentials.clone();
             let data = whitened.projected(&reference);
-            let before = shared(&point.exponentials);
+            let before = freedom.values(&point.exponentials);
             let found = search(&data, &reference, point, freedom, ARRIVED);
             verdict.steps += found.steps;
             let parts = blocks(&data, &reference, &point.exponentials, &point.events, freedom, 0.0);
-            let values = shared(&point.exponentials);
-            let (information, _) = assembled(&parts, freedom, &values);
+            let values = freedom.values(&point.exponentials);
+            let (mut information, _) = assembled(&parts, freedom, &values);
             // how far this round went: the basis is exact to the third order of it
             let moved: Vec<f64> = freedom.shared.iter().map(|&i| values[i] - before[i]).collect();
             let distance = (0..moved.len())
@@ -54,6 +55,9 @@ impl Fitted {
             verdict.distance = found.distance;
             verdict.converged = distance < 1.0 && found.distance < ARRIVED;
             if verdict.converged || round + 1 == ROUNDS {
+                // what sits on a bound is not known to be there: the others' errors are those beside it
+                let edges = freedom.edges(&values);
+                (0..edges.len()).filter(|&k| edges[k] != 0).for_each(|k| hold(&mut information, k));
                 let covariance = symmetric_inverse(&information);
                 if (0..moved.len()).any(|i| !covariance[(i, i)].is_finite()) {
                     return Err(ModelError::Degenerate("no finite covariance"));

@@ -1,5 +1,6 @@
 //! First values of the search: exponentials of the mean, and each event's share of it.
 
+use super::knowledge::obey;
 use super::modal_form::{EventParameters, signal};
 use super::options::RingdownOptions;
 use super::records::Records;
@@ -44,6 +45,11 @@ pub(super) fn first_guess(events: &[&[f64]], interval_s: f64, options: &Ringdown
         }
         None => start(&early, interval_s, options.modes, options.real_poles, options.block_rows)?,
     };
+    let mut exponentials = exponentials;
+    if !options.known.is_empty() {
+        obey(&mut exponentials, &options.known)?;
+        amplitudes(&mut exponentials, &early, interval_s);
+    }
     let tail = samples - samples / 4;
     let shape = {
         let unit = EventParameters { amplitude: 1.0, onset_s: 0.0, offset: 0.0, slope: 0.0 };

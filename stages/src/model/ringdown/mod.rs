@@ -18,6 +18,7 @@
 mod absorbed;
 mod bootstrap;
 mod compressed;
+mod coordinates;
 mod decay;
 mod estimate;
 mod fit;
@@ -28,6 +29,10 @@ mod gap_start;
 mod gap_tests;
 mod gaps;
 mod guess;
+mod knowledge;
+#[cfg(test)]
+mod knowledge_tests;
+mod limits;
 mod modal_form;
 mod noise;
 mod noise_estimate;
@@ -54,6 +59,7 @@ pub(crate) mod internals {
 pub use decay::{Decay, DecayOptions, fit_decay};
 pub use estimate::{Estimate, ModeEstimate, Ringdown, RingdownVerdict};
 pub use fit::fit_ringdowns;
+pub use knowledge::{Knowledge, Known, Quantity};
 pub use modal_form::{EventParameters, Exponential};
 pub use noise::{RingdownNoise, ThermalMode, Wander};
 pub use normal::Prior;

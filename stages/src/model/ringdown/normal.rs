@@ -20,6 +20,10 @@ pub struct Prior {
 pub(super) struct Freedom {
     pub shared: Vec<usize>,
     pub priors: Vec<Option<Prior>>,
+    /// Least and largest value of each.
+    pub limits: Vec<Option<(f64, f64)>>,
+    /// Which exponentials are given by angular frequency and quality factor instead of the pole's parts.
+    pub resonance: Vec<bool>,
     pub own: Vec<usize>,
 }
 
@@ -93,7 +97,8 @@ fn block(
     freedom: &Freedom,
     damping: f64,
 ) -> EventBlock {
-    let w = weights(reference, exponentials, event);
+    let mut w = weights(reference, exponentials, event);
+    freedom.turn(&mut w.shared, exponentials);
     let residual = residual(data, index, &w.value);
     let (shared, own) = (freedom.shared.len(), freedom.own.len());
     let columns = Mat::from_fn(residual.len(), shared + own, |i, j| match j.checked_sub(shared) {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::knowledge::Known;
 use super::modal_form::Exponential;
 use super::noise::RingdownNoise;
 
@@ -31,6 +32,8 @@ pub struct RingdownOptions {
     pub start_samples: Option<usize>,
     /// Samples of each event that are missing, clipped say: one list of ranges per event; default empty: none. What stands there is never used.
     pub missing: Vec<Vec<Range<usize>>>,
+    /// What is known beforehand of frequencies, quality factors and real poles; default empty: nothing.
+    pub known: Vec<Known>,
 }
 
 impl Default for RingdownOptions {
@@ -47,6 +50,7 @@ impl Default for RingdownOptions {
             start: None,
             start_samples: None,
             missing: Vec::new(),
+            known: Vec::new(),
         }
     }
 }

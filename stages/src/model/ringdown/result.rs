@@ -4,6 +4,8 @@ use faer::Mat;
 
 use super::estimate::Ringdown;
 use super::fitted::Fitted;
+use super::freedom::parameter;
+use super::knowledge::{Knowledge, Known, Quantity};
 use super::modal_form::{EventParameters, shared};
 use super::noise::RingdownNoise;
 use super::noise_estimate::residuals;
@@ -23,6 +25,7 @@ impl Fitted {
         point: Point,
         noise: RingdownNoise,
         freedom: &Freedom,
+        known: &[Known],
     ) -> Result<Ringdown, ModelError> {
         let (samples, interval_s) = (records.samples(), records.interval_s);
         let degrees = records.observed().saturating_sub(self.used(freedom)).max(1);
@@ -34,7 +37,7 @@ impl Fitted {
                     full[(p, q)] = inner[(i, j)];
                 }
             }
-            full
+            freedom.of_parts(full, &point.exponentials)
         };
         let sandwich = (self.blocks.len() >= SANDWICH_EVENTS).then(|| {
             let n = freedom.shared.len();
@@ -60,7 +63,16 @@ impl Fitted {
         expected.iter_mut().zip(absorbed).for_each(|(e, a)| *e = (*e - a).max(0.0));
         let residual_periodogram = mean_periodogram(&residuals(records, &point, &taper), &taper);
         let density = |values: Vec<f64>| values.into_iter().map(|v| 2.0 * interval_s * v).collect::<Vec<f64>>();
+        let values = freedom.values(&point.exponentials);
+        let edges = freedom.edges(&values);
+        let on_edge = |quantity: &Quantity| {
+            let parameter = parameter(*quantity, &point.exponentials);
+            freedom.shared.iter().zip(&edges).any(|(p, edge)| Some(*p) == parameter && *edge != 0)
+        };
+        let fixed = known.iter().filter(|k| matches!(k.knowledge, Knowledge::Fixed(_))).map(|k| k.quantity).collect();
         Ok(Ringdown {
+            on_bound: known.iter().map(|k| k.quantity).filter(on_edge).collect(),
+            fixed,
             bootstrap: Vec::new(),
             event_std: self.event_std(freedom),
             frequency_hz: (0..=samples / 2).map(|k| k as f64 / (samples as f64 * interval_s)).collect(),
