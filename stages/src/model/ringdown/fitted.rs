@@ -88,6 +88,11 @@ impl Fitted {
         freedom.shared.len() + self.blocks.len() * freedom.own.len()
     }
 
+    /// Whitened energy that each event leaves.
+    pub(super) fn energies(&self) -> Vec<f64> {
+        self.blocks.iter().zip(&self.data.rest).map(|(block, rest)| block.cost + rest).collect()
+    }
+
     pub(super) fn chi_square(&self) -> f64 {
         self.blocks.iter().map(|block| block.cost).sum::<f64>() + self.data.rest.iter().sum::<f64>()
     }

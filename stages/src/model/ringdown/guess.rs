@@ -1,7 +1,7 @@
 //! First values of the search: exponentials of the mean, and each event's share of it.
 
 use super::knowledge::obey;
-use super::modal_form::{EventParameters, signal};
+use super::modal_form::{EventParameters, Exponential, signal};
 use super::options::RingdownOptions;
 use super::records::Records;
 use super::search::Point;
@@ -50,12 +50,24 @@ pub(super) fn first_guess(events: &[&[f64]], interval_s: f64, options: &Ringdown
         obey(&mut exponentials, &options.known)?;
         amplitudes(&mut exponentials, &early, interval_s);
     }
+    let events = shares(events, &exponentials, interval_s, options);
+    Ok(Point { exponentials, events })
+}
+
+/// Each event's amplitude of a shape, with its level.
+pub(super) fn shares(
+    events: &[&[f64]],
+    exponentials: &[Exponential],
+    interval_s: f64,
+    options: &RingdownOptions,
+) -> Vec<EventParameters> {
+    let samples = events.first().map_or(0, |event| event.len());
     let tail = samples - samples / 4;
     let shape = {
         let unit = EventParameters { amplitude: 1.0, onset_s: 0.0, offset: 0.0, slope: 0.0 };
-        signal(&exponentials, &unit, interval_s, samples)
+        signal(exponentials, &unit, interval_s, samples)
     };
-    let own = events
+    events
         .iter()
         .map(|event| {
             let line = if options.start_samples.is_some() && options.slope {
@@ -71,8 +83,7 @@ pub(super) fn first_guess(events: &[&[f64]], interval_s: f64, options: &Ringdown
             let amplitude = up / down.max(f64::MIN_POSITIVE);
             EventParameters { amplitude, onset_s: 0.0, offset: line.offset, slope: line.slope }
         })
-        .collect();
-    Ok(Point { exponentials, events: own })
+        .collect()
 }
 
 /// Level in the middle of a window and its change over half of it, V.

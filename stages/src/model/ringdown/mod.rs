@@ -17,6 +17,9 @@
 
 mod absorbed;
 mod bootstrap;
+mod choice;
+#[cfg(test)]
+mod choice_tests;
 mod compressed;
 mod coordinates;
 mod decay;
@@ -32,6 +35,7 @@ mod guess;
 mod knowledge;
 #[cfg(test)]
 mod knowledge_tests;
+mod ladder;
 mod limits;
 mod modal_form;
 mod noise;
@@ -56,6 +60,7 @@ pub(crate) mod internals {
     pub(crate) use super::whitener::{LANES, Whitener};
 }
 
+pub use choice::{CountedRingdown, HELD_OUT_EVENTS, ModeCount, fit_counted_ringdowns};
 pub use decay::{Decay, DecayOptions, fit_decay};
 pub use estimate::{Estimate, ModeEstimate, Ringdown, RingdownVerdict};
 pub use fit::fit_ringdowns;
