@@ -82,7 +82,7 @@ pub fn fit_counted_ringdowns(
         let worse_by = chosen.map_or(f64::NAN, |best| this.worse_than(&tries[best]));
         let better = match chosen {
             None => this.bic.is_finite(),
-            Some(best) => this.bic < tries[best].bic && !(worse_by >= -CLEARLY),
+            Some(best) => this.bic < tries[best].bic && (worse_by.is_nan() || worse_by < -CLEARLY),
         };
         if better {
             chosen = Some(i);

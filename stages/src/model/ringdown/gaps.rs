@@ -112,10 +112,8 @@ impl Gaps {
 fn bridged(values: &[f64], mask: &[bool]) -> Vec<f64> {
     let mut out = values.to_vec();
     let mut last = None;
-    for next in 0..=values.len() {
-        if next < values.len() && mask[next] {
-            continue;
-        }
+    let there = (0..values.len()).filter(|&k| !mask[k]).chain([values.len()]);
+    for next in there {
         let first = last.map_or(0, |k: usize| k + 1);
         let ends = (last.map(|k| values[k]), values.get(next).copied());
         for (k, value) in out.iter_mut().enumerate().take(next).skip(first) {
