@@ -51,7 +51,7 @@ pub use modes_stage::Modes;
 pub use order::{Order, OrderCandidate, OrderChoice, choose_order};
 pub use pem_stage::{DataSet, FocusKind, NoiseKind, Pem};
 pub use residual::{TestResult, input_dependence, whiteness};
-pub use ringdown_stage::{ErrorSource, JointNoise, RingdownFit};
+pub use ringdown_stage::{ErrorSource, JointNoise, KnownNumber, KnownQuantity, ModeNumber, RingdownFit};
 pub use stabilisation_stage::{PoleMethod, StabilisationDiagram};
 pub use subspace::Subspace;
 pub use subspace_stage::{SubspaceEstimate, WeightKind};

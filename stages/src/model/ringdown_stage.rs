@@ -1,31 +1,56 @@
 //! The stage `model.ringdown`.
 
-use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
+mod gaps;
+mod known;
+mod mode_number;
+mod stretches;
+mod summary;
+mod tables;
+#[cfg(test)]
+mod tests;
+
+use afmid_pipeline::{
+    Array, Caching, Context, Document, Example, Port, Ports, Recording, Spec, Stage, StageError, Table,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 
-use super::contact::CoupledPoles;
-use super::ringdown::{ModeEstimate, NoiseSource, Ringdown, RingdownOptions, fit_ringdowns};
+use self::gaps::{gaps, total};
+use self::known::named;
+pub use self::known::{KnownNumber, KnownQuantity};
+pub use self::mode_number::ModeNumber;
+use self::stretches::windows;
+use self::summary::summary;
+use self::tables::{event_table, mode_table, poles, spectrum};
+use super::ringdown::{
+    ModeCount, ModeEstimate, NoiseSource, Quantity, Ringdown, RingdownOptions, fit_counted_ringdowns, fit_ringdowns,
+};
+use crate::calibration::FreeSettings;
 
 /// Fits the modes of all events at once: one set of poles, each event with its own amplitude, sub-sample onset, offset and slope.
 ///
 /// Model: after its release every event is a(e) sum Re(rho_j exp(s_j (t - t_e))) + offset + slope, in thermal noise of every mode, 1/f and white
 /// noise. Residues are free, so no input is needed and none is assumed.
 /// Method: maximum likelihood; records whitened by the noise's own Kalman filter, compressed, fitted by Levenberg-Marquardt with the
-/// events' own parameters eliminated; noise variances by a restricted Whittle likelihood of the residuals, in turns with the fit.
+/// events' own parameters eliminated; noise variances by a restricted Whittle likelihood of the residuals, and of the free stretches of the records where
+/// they are wired to `free`, in turns with the fit. Missing samples are predicted by the noise's filter and weigh nothing; for the noise's variances they
+/// are cut out of the taper and of what is expected of it alike. Bounds by an active set.
 /// Shapes: `modes` by mode ascending in frequency, `events` by event, `spectrum` over frequency, `poles` and their covariance over real and imaginary
 /// part of each mode in turn.
 /// Units: Hz; volts; onsets in seconds after the ensemble's first sample used.
 /// Accuracy: rms errors within a few per cent of the Cramer-Rao bound and intervals that hold, for one event and for many (docs/accuracy.md). Standard
 /// errors count thermal, 1/f and white noise; `error_source = "events"` takes them from the events' scatter, right under a wrong noise model too.
-/// Errors: fewer samples than the shape needs, values that are not finite, fewer oscillations than `modes`. No convergence is a warning.
+/// Errors: fewer samples than the shape needs, values that are not finite, fewer oscillations than `modes`, knowledge of what is not fitted. No convergence is a warning, and so is a
+/// number on a bound, whose error is unknown.
 /// Source: S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7; D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RingdownFit {
-    /// Oscillating modes, 1 to 20. Default: 4, the paper's.
-    pub modes: usize,
+    /// Oscillating modes, 1 to 20, or `auto`: as many up to `max_modes` as lower the chi square of held-out events by two standard errors each, below 4
+    /// events as the least BIC wants. Default: 4, the paper's.
+    pub modes: ModeNumber,
+    /// Largest number that `auto` tries, 1 to 20. Default: 8; each takes a fit, and three from 4 events on.
+    pub max_modes: usize,
     /// Real poles of the detector, 0 to 8. Default: 3, the paper's; they matter in the first samples only.
     pub real_poles: usize,
     /// Samples after the onset that are left out, 0 to 100000. Default: 0; some where the onset is not sharp.
@@ -43,6 +68,16 @@ pub struct RingdownFit {
     /// Samples after the onset that the start is made from, 0 (all) or 8 per mode, real pole and two more to 10 million. Default: 0; some decay times
     /// where the ringing fills a small part of the window, as on contact.
     pub start_samples: usize,
+    /// Samples after the onset that are missing in every event, each `[first, end]`, the end not included, -1000000 to 1e9. Default: none. Samples that
+    /// are NaN are missing anyway.
+    pub missing: Vec<[i64; 2]>,
+    /// Range of the detector or converter `[least, most]` in V: samples at its ends or beyond are missing, as in events of `keep_saturated`. Default: none.
+    pub range_v: Option<[f64; 2]>,
+    /// What is known beforehand, such as `{ mode = 2, quantity = "quality_factor", fixed = 193.0 }`, `between = [190, 195]` or `about = [193.0, 0.5]`.
+    /// Default: nothing. A frequency or quality factor of a `mode`, the corner frequency of a `real_pole`.
+    pub known: Vec<KnownNumber>,
+    /// What counts as a free stretch of the records on port `free`.
+    pub free: FreeSettings,
 }
 
 /// Noise beside the ringing.
@@ -68,7 +103,8 @@ pub enum ErrorSource {
 impl Default for RingdownFit {
     fn default() -> Self {
         Self {
-            modes: 4,
+            modes: ModeNumber::Fixed(4),
+            max_modes: 8,
             real_poles: 3,
             skip_samples: 0,
             noise: JointNoise::Estimated,
@@ -77,11 +113,17 @@ impl Default for RingdownFit {
             bootstrap_draws: 0,
             block_rows: 100,
             start_samples: 0,
+            missing: Vec::new(),
+            range_v: None,
+            known: Vec::new(),
+            free: FreeSettings::default(),
         }
     }
 }
 
 pub(super) const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "aligned events over event and time");
+const FREE: Port<Recording> =
+    Port::optional("free", "records", "the records, whose free stretches tell the noise beside the events' own");
 pub(super) const MODES: Port<Table> = Port::new("modes", "ringdown-modes", "mechanical modes, ascending");
 const EVENTS: Port<Table> = Port::new("events", "ringdown-events", "what each event has for itself");
 const SPECTRUM: Port<Array> =
@@ -99,9 +141,9 @@ const EXCESS: f64 = 1.1;
 impl Stage for RingdownFit {
     const SPEC: Spec = Spec {
         name: "model.ringdown",
-        version: 2,
+        version: 3,
         summary: "fits the modes of all events jointly, at the limit of their noise",
-        inputs: &[ENSEMBLE.spec()],
+        inputs: &[ENSEMBLE.spec(), FREE.spec()],
         outputs: &[MODES.spec(), EVENTS.spec(), SPECTRUM.spec(), POLES.spec(), SUMMARY.spec()],
         caching: Caching::Stored,
         seeded: true,
@@ -109,9 +151,11 @@ impl Stage for RingdownFit {
     };
 
     fn check(&self) -> Result<(), StageError> {
-        let order = 2 * self.modes + self.real_poles.max(1);
+        let modes = self.modes.largest(self.max_modes);
+        let order = 2 * modes + self.real_poles.max(1);
         for (name, value, least, most) in [
-            ("modes", self.modes, 1, 20),
+            ("modes", self.modes.largest(1), 1, 20),
+            ("max_modes", self.max_modes, 1, 20),
             ("real_poles", self.real_poles, 0, 8),
             ("skip_samples", self.skip_samples, 0, 100_000),
             ("bootstrap_draws", self.bootstrap_draws, 0, 100_000),
@@ -121,12 +165,14 @@ impl Stage for RingdownFit {
                 return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
             }
         }
-        let least = 8 * (self.modes + self.real_poles + 2);
+        let least = 8 * (modes + self.real_poles + 2);
         if self.start_samples != 0 && !(least..=10_000_000).contains(&self.start_samples) {
             let found = self.start_samples;
             return Err(StageError::new(format!("`start_samples` is {found}, wanted 0 or {least} to 10000000")));
         }
-        Ok(())
+        self.check_missing()?;
+        self.check_known(modes)?;
+        self.free.check()
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -142,14 +188,23 @@ impl Stage for RingdownFit {
             .help("lower `skip_samples`, or cut longer windows"));
         }
         let events: Vec<&[f64]> = signal.chunks_exact(samples).map(|event| &event[first..]).collect();
-        let fit = fit_ringdowns(&events, &[], 1.0 / rate, &self.options(cx.seed())).map_err(StageError::from_error)?;
+        let gaps = self.gaps(&events);
+        let free = match inputs.find(&FREE)? {
+            Some(records) => windows(records, self.free, samples - first, rate)?,
+            None => Vec::new(),
+        };
+        let lent: Vec<&[f64]> = free.iter().map(Vec::as_slice).collect();
+        let missing = total(&gaps);
+        let options = RingdownOptions { missing: gaps, ..self.options(cx.seed())? };
+        let (fit, seen) = self.fitted(&events, &lent, 1.0 / rate, &options)?;
+        self.warn(&fit, &seen, cx);
         let modes = self.estimates(&fit, cx)?;
         Ok(Ports::new()
             .with(&MODES, mode_table(&fit, &modes))
             .with(&EVENTS, event_table(&fit))
             .with(&SPECTRUM, spectrum(&fit))
             .with(&POLES, poles(&fit, self.error_source))
-            .with(&SUMMARY, self.summary(&fit, &modes)?))
+            .with(&SUMMARY, summary(&fit, &modes, self.error_source, missing, free.len(), &seen)?))
     }
 
     fn examples() -> Vec<Example> {
@@ -175,9 +230,43 @@ impl Stage for RingdownFit {
 }
 
 impl RingdownFit {
-    fn options(&self, seed: u64) -> RingdownOptions {
-        RingdownOptions {
-            modes: self.modes,
+    fn check_missing(&self) -> Result<(), StageError> {
+        for [from, to] in &self.missing {
+            if !(-1_000_000 <= *from && from < to && *to <= 1_000_000_000) {
+                return Err(StageError::new(format!("`missing` has [{from}, {to}], wanted [first, end] ascending"))
+                    .help("samples after the onset, -1000000 to 1000000000"));
+            }
+        }
+        match self.range_v {
+            Some([least, most]) if !(least < most && least.is_finite() && most.is_finite()) => {
+                Err(StageError::new(format!("`range_v` is [{least}, {most}], wanted [least, most] in V")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_known(&self, modes: usize) -> Result<(), StageError> {
+        let mut seen: Vec<Quantity> = Vec::new();
+        for entry in &self.known {
+            if self.modes == ModeNumber::Auto && entry.mode.is_some() {
+                return Err(StageError::new(
+                    "`known` names a mode, and `modes` is \"auto\": which it is cannot be said",
+                )
+                .help("give the number of modes"));
+            }
+            let known = entry.known(modes, self.real_poles)?;
+            if seen.contains(&known.quantity) {
+                return Err(StageError::new(format!("`known` has two entries for {}", named(known.quantity))));
+            }
+            seen.push(known.quantity);
+        }
+        Ok(())
+    }
+
+    fn options(&self, seed: u64) -> Result<RingdownOptions, StageError> {
+        let modes = self.modes.largest(self.max_modes);
+        Ok(RingdownOptions {
+            modes,
             real_poles: self.real_poles,
             block_rows: self.block_rows,
             slope: self.drift,
@@ -188,12 +277,35 @@ impl RingdownFit {
                 JointNoise::Estimated => NoiseSource::Estimated,
                 JointNoise::White => NoiseSource::White,
             },
+            known: self.known.iter().map(|entry| entry.known(modes, self.real_poles)).collect::<Result<_, _>>()?,
             ..RingdownOptions::default()
-        }
+        })
     }
 
-    /// The modes with the standard errors that were asked for; warns where something does not fit.
-    fn estimates(&self, fit: &Ringdown, cx: &Context) -> Result<Vec<ModeEstimate>, StageError> {
+    /// Missing samples of each event; `missing` counts from the onset, the events from the first sample used.
+    fn gaps(&self, events: &[&[f64]]) -> Vec<Vec<std::ops::Range<usize>>> {
+        let skip = self.skip_samples as i64;
+        let ranges: Vec<[i64; 2]> = self.missing.iter().map(|[from, to]| [from - skip, to - skip]).collect();
+        gaps(events, &ranges, self.range_v)
+    }
+
+    fn fitted(
+        &self,
+        events: &[&[f64]],
+        free: &[&[f64]],
+        interval_s: f64,
+        options: &RingdownOptions,
+    ) -> Result<(Ringdown, Vec<ModeCount>), StageError> {
+        match self.modes {
+            ModeNumber::Fixed(_) => fit_ringdowns(events, free, interval_s, options).map(|fit| (fit, Vec::new())),
+            ModeNumber::Auto => fit_counted_ringdowns(events, free, interval_s, self.max_modes, options)
+                .map(|counted| (counted.fit, counted.seen)),
+        }
+        .map_err(StageError::from_error)
+    }
+
+    /// Warns where something does not fit.
+    fn warn(&self, fit: &Ringdown, seen: &[ModeCount], cx: &Context) {
         if !fit.verdict.converged {
             cx.warn(format!(
                 "no minimum after {} steps: the last was {:.2} standard errors",
@@ -206,6 +318,23 @@ impl RingdownFit {
                 fit.reduced_chi_square
             ));
         }
+        for quantity in &fit.on_bound {
+            cx.warn(format!(
+                "{} sits on a bound of `known`: the data want it beyond, and its error is unknown",
+                named(*quantity)
+            ));
+        }
+        let found = fit.modes().len();
+        if self.modes == ModeNumber::Auto && found == self.max_modes {
+            cx.warn(format!("`modes = \"auto\"` found {found}, all that `max_modes` allows: there may be more"));
+        }
+        for count in seen.iter().filter(|count| !count.chi_square.is_finite()) {
+            cx.warn(format!("`modes = \"auto\"`: no fit with {} modes", count.modes));
+        }
+    }
+
+    /// The modes with the standard errors that were asked for; warns where the two kinds differ.
+    fn estimates(&self, fit: &Ringdown, cx: &Context) -> Result<Vec<ModeEstimate>, StageError> {
         let model = fit.modes();
         let Some(sandwich) = &fit.sandwich else {
             return match self.error_source {
@@ -236,104 +365,4 @@ impl RingdownFit {
             ErrorSource::Events => scatter,
         })
     }
-
-    fn summary(&self, fit: &Ringdown, modes: &[ModeEstimate]) -> Result<Document, StageError> {
-        let modes: Vec<Value> = modes
-            .iter()
-            .map(|mode| {
-                json!({
-                    "frequency_hz": mode.frequency_hz.value,
-                    "frequency_std_hz": mode.frequency_hz.std,
-                    "quality_factor": mode.quality_factor.value,
-                    "quality_factor_std": mode.quality_factor.std,
-                })
-            })
-            .collect();
-        Document::new(&json!({
-            "modes": modes,
-            "events": fit.events.len(),
-            "error_source": self.error_source,
-            "converged": fit.verdict.converged,
-            "steps": fit.verdict.steps,
-            "reduced_chi_square": fit.reduced_chi_square,
-            "white_noise_std_v": fit.noise.white.sqrt(),
-            "coloured_noise_std_v": fit.noise.wander.iter().map(|part| part.variance).sum::<f64>().sqrt(),
-            "thermal_std_v": fit.noise.thermal.iter().map(|mode| mode.variance.sqrt()).collect::<Vec<f64>>(),
-        }))
-    }
-}
-
-fn mode_table(fit: &Ringdown, modes: &[ModeEstimate]) -> Table {
-    let column = |value: fn(&ModeEstimate) -> f64| modes.iter().map(value).collect::<Vec<f64>>();
-    let scatter = fit.sandwich.as_ref().map(|covariance| fit.modes_with(covariance));
-    let other = |value: fn(&ModeEstimate) -> f64| match &scatter {
-        Some(scatter) => scatter.iter().map(value).collect::<Vec<f64>>(),
-        None => vec![f64::NAN; modes.len()],
-    };
-    let oscillating = || fit.exponentials.iter().filter(|e| e.oscillates());
-    let thermal = (0..modes.len())
-        .map(|i| fit.noise.thermal.get(i).map_or(f64::NAN, |mode| mode.variance.max(0.0).sqrt()))
-        .collect::<Vec<f64>>();
-    let table = Table::new()
-        .with("frequency_hz", "Hz", "resonance frequency", column(|m| m.frequency_hz.value))
-        .with("frequency_std_hz", "Hz", "its standard error", column(|m| m.frequency_hz.std))
-        .with("quality_factor", "1", "quality factor", column(|m| m.quality_factor.value))
-        .with("quality_factor_std", "1", "its standard error", column(|m| m.quality_factor.std))
-        .with("frequency_scatter_hz", "Hz", "standard error from the events' scatter", other(|m| m.frequency_hz.std))
-        .with("quality_factor_scatter", "1", "standard error from the events' scatter", other(|m| m.quality_factor.std))
-        .with(
-            "amplitude",
-            "V",
-            "ringing of an event of amplitude 1 at its onset",
-            oscillating().map(|e| e.residue.norm()).collect::<Vec<f64>>(),
-        )
-        .with("thermal_std", "V", "rms of the mode's thermal motion", thermal);
-    let Some(intervals) = fit.bootstrap_intervals(0.95) else { return table };
-    let end = |value: fn(&[(f64, f64); 2]) -> f64| intervals.iter().map(value).collect::<Vec<f64>>();
-    table
-        .with("frequency_low_hz", "Hz", "lower end of the bootstrap's 95 % interval", end(|i| i[0].0))
-        .with("frequency_high_hz", "Hz", "upper end of it", end(|i| i[0].1))
-        .with("quality_factor_low", "1", "lower end of the bootstrap's 95 % interval", end(|i| i[1].0))
-        .with("quality_factor_high", "1", "upper end of it", end(|i| i[1].1))
-}
-
-fn poles(fit: &Ringdown, source: ErrorSource) -> Array {
-    let covariance = match (source, &fit.sandwich) {
-        (ErrorSource::Events, Some(sandwich)) => sandwich,
-        _ => &fit.covariance,
-    };
-    let poles = CoupledPoles::of(fit, covariance);
-    let count = 2 * poles.poles.len();
-    let axis = |name: &str| {
-        Axis::new(name, "1", "real and imaginary part of each pole in turn", (0..count).map(|i| i as f64).collect())
-    };
-    let matrix: Vec<f64> = (0..count * count).map(|i| poles.covariance[(i / count, i % count)]).collect();
-    let values: Vec<f64> = poles.poles.iter().flat_map(|pole| [pole.re, pole.im]).collect();
-    Array::over(vec![axis("parameter"), axis("other")])
-        .with("pole", "rad/s", "poles of the modes, the upper ones of pairs", &["parameter"], values)
-        .with("covariance", "rad^2/s^2", "their covariance", &["parameter", "other"], matrix)
-}
-
-fn event_table(fit: &Ringdown) -> Table {
-    let column =
-        |value: fn(&super::ringdown::EventParameters) -> f64| fit.events.iter().map(value).collect::<Vec<f64>>();
-    let error =
-        |value: fn(&super::ringdown::EventParameters) -> f64| fit.event_std.iter().map(value).collect::<Vec<f64>>();
-    Table::new()
-        .with("amplitude", "1", "factor of the shared shape", column(|e| e.amplitude))
-        .with("amplitude_std", "1", "its standard error", error(|e| e.amplitude))
-        .with("onset_s", "s", "onset after the first sample used", column(|e| e.onset_s))
-        .with("onset_std_s", "s", "its standard error", error(|e| e.onset_s))
-        .with("offset", "V", "level that it decays to", column(|e| e.offset))
-        .with("offset_std", "V", "its standard error", error(|e| e.offset))
-        .with("slope", "V", "change of that level over half the window", column(|e| e.slope))
-        .with("slope_std", "V", "its standard error", error(|e| e.slope))
-}
-
-fn spectrum(fit: &Ringdown) -> Array {
-    let over = &["frequency_hz"];
-    Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", fit.frequency_hz.clone())])
-        .with("residual", "V^2/Hz", "mean Hann periodogram of the residuals", over, fit.residual_periodogram.clone())
-        .with("expected", "V^2/Hz", "what the noise model expects of it", over, fit.expected_periodogram.clone())
-        .attribute("events", fit.events.len())
 }

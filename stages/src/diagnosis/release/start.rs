@@ -3,7 +3,9 @@
 use super::joint::{SeenMode, State, suggested};
 use super::window::{Cut, EventWindow};
 use crate::model::ModelError;
-use crate::model::ringdown::{EventParameters, Exponential, ModeEstimate, Ringdown, RingdownNoise, RingdownOptions, fit_ringdowns};
+use crate::model::ringdown::{
+    EventParameters, Exponential, ModeEstimate, Ringdown, RingdownNoise, RingdownOptions, fit_ringdowns,
+};
 
 /// What the start says.
 pub struct Start {
@@ -102,10 +104,15 @@ pub fn start(
         .collect();
     let held = |estimate: &ModeEstimate| {
         let (f, q) = (&estimate.frequency_hz, &estimate.quality_factor);
-        [(f.std / f.value, HELD_LEAST[0]), (q.std / q.value, HELD_LEAST[1])].map(|(own, least)| (HELD_ERRORS * own).max(least))
+        [(f.std / f.value, HELD_LEAST[0]), (q.std / q.value, HELD_LEAST[1])]
+            .map(|(own, least)| (HELD_ERRORS * own).max(least))
     };
-    let seen =
-        lever.modes.iter().zip(&estimates).map(|(mode, estimate)| SeenMode { mode: *mode, std: held(estimate) }).collect();
+    let seen = lever
+        .modes
+        .iter()
+        .zip(&estimates)
+        .map(|(mode, estimate)| SeenMode { mode: *mode, std: held(estimate) })
+        .collect();
     Ok(Start {
         state: State { lever, hypotheses: Vec::new(), events },
         starts,

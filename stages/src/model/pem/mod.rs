@@ -1,11 +1,14 @@
 //! Prediction error method: the innovations form of Eq. 8, fitted by minimum one-step prediction error.
 
 mod autoregression;
+mod conclusion;
 mod covariance;
+mod data;
 mod gradient;
 mod identify;
 mod noise;
 mod optimiser;
+mod options;
 mod parametrisation;
 mod predictor;
 mod projection;
@@ -13,9 +16,11 @@ mod starts;
 mod tangent;
 #[cfg(test)]
 mod tests;
+mod turns;
 
 pub use covariance::ResidualColour;
-pub use identify::{Experiment, Focus, Identified, NoiseModel, PemOptions, Verdict, identify, refit, with_poles};
+pub use identify::{identify, refit, with_poles};
 pub use optimiser::Ending;
+pub use options::{Experiment, Focus, Identified, NoiseModel, PemOptions, Verdict};
 pub(crate) use parametrisation::{Coefficients, roots, section_order, sections_of_roots};
 pub(crate) use predictor::all_pole;

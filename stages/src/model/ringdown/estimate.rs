@@ -2,6 +2,7 @@
 
 use faer::{Mat, c64};
 
+use super::knowledge::Quantity;
 use super::modal_form::{EventParameters, Exponential};
 use super::noise::RingdownNoise;
 
@@ -10,7 +11,7 @@ use super::noise::RingdownNoise;
 pub struct Estimate {
     /// The value.
     pub value: f64,
-    /// Its standard error.
+    /// Its standard error; zero for a number that was given, NaN (unknown) for one that sits on a bound.
     pub std: f64,
 }
 
@@ -63,6 +64,10 @@ pub struct Ringdown {
     pub expected_periodogram: Vec<f64>,
     /// How the search ended.
     pub verdict: RingdownVerdict,
+    /// Quantities that were given.
+    pub fixed: Vec<Quantity>,
+    /// Quantities that sit on a bound: the data want them beyond it.
+    pub on_bound: Vec<Quantity>,
 }
 
 impl Ringdown {
@@ -99,7 +104,17 @@ impl Ringdown {
 
     /// The modes with standard errors from another covariance of the same parameters.
     pub fn modes_with(&self, covariance: &Mat<f64>) -> Vec<ModeEstimate> {
-        modes_of(&self.exponentials, covariance)
+        let mut modes = modes_of(&self.exponentials, covariance);
+        for (list, std) in [(&self.fixed, 0.0), (&self.on_bound, f64::NAN)] {
+            for quantity in list {
+                match *quantity {
+                    Quantity::Frequency(i) => modes[i].frequency_hz.std = std,
+                    Quantity::QualityFactor(i) => modes[i].quality_factor.std = std,
+                    Quantity::RealPole(_) => {}
+                }
+            }
+        }
+        modes
     }
 }
 

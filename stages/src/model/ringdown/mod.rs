@@ -15,13 +15,36 @@
 //! # Ok::<(), afmid_stages::model::ModelError>(())
 //! ```
 
+mod absorbed;
+mod bootstrap;
+mod choice;
+#[cfg(test)]
+mod choice_tests;
 mod compressed;
+mod coordinates;
 mod decay;
 mod estimate;
 mod fit;
+mod fitted;
+mod freedom;
+mod gap_start;
+#[cfg(test)]
+mod gap_tests;
+mod gaps;
+mod guess;
+mod knowledge;
+#[cfg(test)]
+mod knowledge_tests;
+mod ladder;
+mod limits;
 mod modal_form;
 mod noise;
+mod noise_estimate;
 mod normal;
+mod options;
+mod projected;
+mod records;
+mod result;
 mod search;
 mod start;
 #[cfg(test)]
@@ -37,9 +60,12 @@ pub(crate) mod internals {
     pub(crate) use super::whitener::{LANES, Whitener};
 }
 
+pub use choice::{CountedRingdown, HELD_OUT_EVENTS, ModeCount, fit_counted_ringdowns};
 pub use decay::{Decay, DecayOptions, fit_decay};
 pub use estimate::{Estimate, ModeEstimate, Ringdown, RingdownVerdict};
-pub use fit::{NoiseSource, RingdownOptions, fit_ringdowns};
+pub use fit::fit_ringdowns;
+pub use knowledge::{Knowledge, Known, Quantity};
 pub use modal_form::{EventParameters, Exponential};
 pub use noise::{RingdownNoise, ThermalMode, Wander};
 pub use normal::Prior;
+pub use options::{NoiseSource, RingdownOptions};

@@ -3,8 +3,8 @@
 use faer::Mat;
 use rayon::prelude::*;
 
-use super::compressed::Compressed;
 use super::modal_form::{EventParameters, Exponential, weights};
+use super::projected::Projected;
 use crate::model::orthogonal::product;
 
 /// Knowledge from elsewhere about one shared parameter.
@@ -20,6 +20,10 @@ pub struct Prior {
 pub(super) struct Freedom {
     pub shared: Vec<usize>,
     pub priors: Vec<Option<Prior>>,
+    /// Least and largest value of each.
+    pub limits: Vec<Option<(f64, f64)>>,
+    /// Which exponentials are given by angular frequency and quality factor instead of the pole's parts.
+    pub resonance: Vec<bool>,
     pub own: Vec<usize>,
 }
 
@@ -42,14 +46,14 @@ pub(super) struct EventBlock {
 }
 
 /// Residual within the basis.
-pub(super) fn residual(data: &Compressed, index: usize, value: &[f64]) -> Vec<f64> {
-    let z = &data.projections[index];
-    (0..z.len()).map(|i| z[i] - (i..z.len()).map(|j| data.r[(i, j)] * value[j]).sum::<f64>()).collect()
+pub(super) fn residual(data: &Projected, index: usize, value: &[f64]) -> Vec<f64> {
+    let (r, z) = (data.triangle(index), &data.projections[index]);
+    (0..z.len()).map(|i| z[i] - (i..z.len()).map(|j| r[(i, j)] * value[j]).sum::<f64>()).collect()
 }
 
 /// Half the sum of squares that the fit minimises, priors included, is half of this.
 pub(super) fn cost(
-    data: &Compressed,
+    data: &Projected,
     reference: &[Exponential],
     exponentials: &[Exponential],
     events: &[EventParameters],
@@ -70,7 +74,7 @@ pub(super) fn cost(
 
 /// Blocks of all events at the present parameters; `damping` enlarges the diagonals of their own blocks.
 pub(super) fn blocks(
-    data: &Compressed,
+    data: &Projected,
     reference: &[Exponential],
     exponentials: &[Exponential],
     events: &[EventParameters],
@@ -85,7 +89,7 @@ pub(super) fn blocks(
 }
 
 fn block(
-    data: &Compressed,
+    data: &Projected,
     reference: &[Exponential],
     exponentials: &[Exponential],
     index: usize,
@@ -93,14 +97,15 @@ fn block(
     freedom: &Freedom,
     damping: f64,
 ) -> EventBlock {
-    let w = weights(reference, exponentials, event);
+    let mut w = weights(reference, exponentials, event);
+    freedom.turn(&mut w.shared, exponentials);
     let residual = residual(data, index, &w.value);
     let (shared, own) = (freedom.shared.len(), freedom.own.len());
     let columns = Mat::from_fn(residual.len(), shared + own, |i, j| match j.checked_sub(shared) {
         None => w.shared[freedom.shared[j]][i],
         Some(j) => w.own[freedom.own[j]][i],
     });
-    let jacobian = product(data.r.as_ref(), columns.as_ref());
+    let jacobian = product(data.triangle(index).as_ref(), columns.as_ref());
     let gram = product(jacobian.transpose(), jacobian.as_ref());
     let gradient: Vec<f64> =
         (0..shared + own).map(|j| jacobian.col(j).iter().zip(&residual).map(|(a, b)| a * b).sum()).collect();

@@ -2,9 +2,9 @@
 
 use faer::Mat;
 
-use super::compressed::Compressed;
-use super::modal_form::{EventParameters, Exponential, from_shared, shared};
+use super::modal_form::{EventParameters, Exponential};
 use super::normal::{EventBlock, Freedom, blocks, cost, symmetric_inverse};
+use super::projected::Projected;
 
 /// Where the search stands.
 #[derive(Clone)]
@@ -49,33 +49,41 @@ const VALLEY: f64 = 0.06;
 ///
 /// # Method
 /// Levenberg-Marquardt, the events' own parameters eliminated by Schur complements; steps that leave the stable half plane, or make the fit
-/// worse, are repeated shorter. Ends when no parameter of a mode moves by `tolerance` of its standard error and all of them together by less than
+/// worse, are repeated shorter; parameters on a bound are held while they want beyond it. Ends when no parameter of a mode moves by `tolerance` of its standard error and all of them together by less than
 /// a quarter of one: real poles that nearly coincide make a long flat valley, along which nothing else changes.
 pub(super) fn search(
-    data: &Compressed,
+    data: &Projected,
     reference: &[Exponential],
     point: &mut Point,
     freedom: &Freedom,
     tolerance: f64,
 ) -> Search {
     let mut damping = 1e-6;
-    let mut best =
-        cost(data, reference, &point.exponentials, &point.events, &shared(&point.exponentials), &freedom.priors);
+    let mut best = cost(
+        data,
+        reference,
+        &point.exponentials,
+        &point.events,
+        &freedom.values(&point.exponentials),
+        &freedom.priors,
+    );
     let of_mode: Vec<bool> =
         reference.iter().flat_map(|e| std::iter::repeat_n(e.oscillates(), e.parameters())).collect();
     let mut out = Search { distance: f64::INFINITY, steps: 0 };
     for _ in 0..TRIALS {
         let parts = blocks(data, reference, &point.exponentials, &point.events, freedom, damping);
-        let values = shared(&point.exponentials);
-        let (mut information, gradient) = assembled(&parts, freedom, &values);
+        let values = freedom.values(&point.exponentials);
+        let (mut information, mut gradient) = assembled(&parts, freedom, &values);
+        freedom.hold_pushed(&values, &mut information, &mut gradient);
         (0..gradient.len()).for_each(|i| information[(i, i)] *= 1.0 + damping);
         let inverse = symmetric_inverse(&information);
-        let step: Vec<f64> =
+        let mut step: Vec<f64> =
             (0..gradient.len()).map(|i| (0..gradient.len()).map(|j| inverse[(i, j)] * gradient[j]).sum()).collect();
+        freedom.cut(&values, &mut step);
         let trial = moved(point, &values, &step, &parts, freedom);
         let stable = trial.exponentials.iter().all(|e| e.pole.re < 0.0 && e.pole.is_finite());
         let next = if stable {
-            let values = shared(&trial.exponentials);
+            let values = freedom.values(&trial.exponentials);
             cost(data, reference, &trial.exponentials, &trial.events, &values, &freedom.priors)
         } else {
             f64::INFINITY
@@ -119,5 +127,5 @@ fn moved(point: &Point, values: &[f64], step: &[f64], parts: &[EventBlock], free
             EventParameters { amplitude: own[0], onset_s: own[1], offset: own[2], slope: own[3] }
         })
         .collect();
-    Point { exponentials: from_shared(&point.exponentials, &values), events }
+    Point { exponentials: freedom.exponentials(&point.exponentials, &values), events }
 }

@@ -7,15 +7,15 @@ use super::modal_form::{EventParameters, Exponential, columns, from_shared, shar
 use super::noise::{RingdownNoise, ThermalMode, Wander};
 use super::start::decay_poles;
 use super::whitener::Whitener;
-use super::whittle::{expected_parts, hann, mean_periodogram, variances};
+use super::whittle::{autocorrelation, expected_parts, hann, mean_periodogram, variances};
 use super::{NoiseSource, RingdownOptions, fit_ringdowns};
 use crate::fixture::{Lever, white_noise};
 use crate::model::ModelError;
 use crate::model::orthogonal::cholesky;
 
-const INTERVAL_S: f64 = 2e-7;
+pub(super) const INTERVAL_S: f64 = 2e-7;
 
-fn noise() -> RingdownNoise {
+pub(super) fn noise() -> RingdownNoise {
     RingdownNoise {
         white: 1.5e-6,
         thermal: vec![
@@ -27,7 +27,7 @@ fn noise() -> RingdownNoise {
 }
 
 /// Lower Cholesky factor of the covariance of `samples` samples.
-fn dense_factor(noise: &RingdownNoise, samples: usize) -> Mat<f64> {
+pub(super) fn dense_factor(noise: &RingdownNoise, samples: usize) -> Mat<f64> {
     let variances = noise.variances();
     let covariance = Mat::from_fn(samples, samples, |i, j| {
         let lag = INTERVAL_S * i.abs_diff(j) as f64;
@@ -37,7 +37,7 @@ fn dense_factor(noise: &RingdownNoise, samples: usize) -> Mat<f64> {
 }
 
 /// A record with exactly that covariance.
-fn coloured(factor: &Mat<f64>, seed: u64) -> Vec<f64> {
+pub(super) fn coloured(factor: &Mat<f64>, seed: u64) -> Vec<f64> {
     let deviates = white_noise(factor.nrows(), 1.0, seed);
     (0..factor.nrows()).map(|i| (0..=i).map(|j| factor[(i, j)] * deviates[j]).sum()).collect()
 }
@@ -48,7 +48,7 @@ fn whitening_undoes_the_dense_cholesky_factor() {
     let factor = dense_factor(&noise, 300);
     let deviates = white_noise(300, 1.0, 1);
     let mut signals: Vec<Vec<f64>> = (0..11).map(|_| coloured(&factor, 1)).collect();
-    whiten(&Whitener::new(&noise, INTERVAL_S, 300), &mut signals);
+    whiten(&Whitener::new(&noise, INTERVAL_S, 300, &[]), &mut signals);
     for signal in &signals {
         for (found, wanted) in signal.iter().zip(&deviates) {
             // rounding of a covariance whose condition is 1e3
@@ -115,7 +115,7 @@ fn noise_variances_come_back_from_periodograms() {
     let signals: Vec<Vec<f64>> = (0..records).map(|seed| coloured(&factor, seed)).collect();
     let taper = hann(samples);
     let observed = mean_periodogram(&signals, &taper);
-    let parts = expected_parts(&noise, INTERVAL_S, &taper);
+    let parts = expected_parts(&noise, INTERVAL_S, &autocorrelation(&taper));
     let level: Vec<f64> =
         (0..observed.len()).map(|k| parts.iter().zip(noise.variances()).map(|(p, v)| p[k] * v).sum()).collect();
     let mean_ratio = observed.iter().zip(&level).skip(1).map(|(o, l)| o / l).sum::<f64>() / (observed.len() - 1) as f64;

@@ -9,7 +9,8 @@ pub(crate) const LANES: usize = 8;
 ///
 /// # Method
 /// The Kalman filter of the noise's state space, started in the stationary state: `e(k) = (v(k) - H x(k|k-1)) / sqrt(S(k))` is linear in `v`
-/// and multiplies `v` by the inverse of the Cholesky factor of its covariance. Gains are computed once, for every record.
+/// and multiplies `v` by the inverse of the Cholesky factor of its covariance. Gains are computed once, for every record. Over a missing sample the
+/// state is predicted and not corrected; the filtered record is zero there, so that its energy is that of the samples that are there.
 /// # Shapes
 /// States: two per thermal mode, one per wander; about `10 states` operations per sample and record.
 /// # Accuracy
@@ -22,28 +23,30 @@ pub(crate) struct Whitener {
     decays: Vec<f64>,
     /// `A K` and `1 / sqrt(S)` of each sample; the last entry serves all later ones.
     gains: Vec<(Vec<f64>, f64)>,
+    /// Where samples are missing: which of the gains is each sample's, none for a missing one. Empty where every sample is there.
+    order: Vec<Option<usize>>,
 }
 
 /// Relative change below which the gain counts as constant.
 const SETTLED: f64 = 1e-12;
 
 impl Whitener {
-    /// The filter for records of at most `samples` samples `interval_s` apart.
-    pub fn new(noise: &RingdownNoise, interval_s: f64, samples: usize) -> Self {
+    /// The filter for records of at most `samples` samples `interval_s` apart, some of which are `missing` (empty: none).
+    pub fn new(noise: &RingdownNoise, interval_s: f64, samples: usize, missing: &[bool]) -> Self {
         let thermal: Vec<_> = noise.thermal.iter().filter(|mode| mode.variance > 0.0).collect();
         let wander: Vec<_> = noise.wander.iter().filter(|part| part.variance > 0.0).collect();
         let rotations: Vec<[f64; 4]> = thermal.iter().map(|mode| rotation(mode.pole, interval_s)).collect();
         let decays: Vec<f64> = wander.iter().map(|part| (-part.rate_per_s * interval_s).exp()).collect();
         let stationary: Vec<f64> =
             thermal.iter().flat_map(|mode| [mode.variance; 2]).chain(wander.iter().map(|part| part.variance)).collect();
-        let mut filter = Self { rotations, decays, gains: Vec::new() };
-        filter.gains = filter.riccati(&stationary, noise.white, samples);
+        let mut filter = Self { rotations, decays, gains: Vec::new(), order: Vec::new() };
+        filter.riccati(&stationary, noise.white, samples, missing);
         filter
     }
 
     /// The factor that whitens white noise, where that is all; none where the filter has states.
     pub fn constant(&self) -> Option<f64> {
-        if self.states() > 0 { None } else { self.gains.first().map(|gain| gain.1) }
+        if self.states() > 0 || !self.order.is_empty() { None } else { self.gains.first().map(|gain| gain.1) }
     }
 
     fn states(&self) -> usize {
@@ -63,43 +66,74 @@ impl Whitener {
         x[2 * self.rotations.len()..].iter_mut().zip(&self.decays).for_each(|(x, decay)| *x *= decay);
     }
 
-    fn riccati(&self, stationary: &[f64], white: f64, samples: usize) -> Vec<(Vec<f64>, f64)> {
+    fn riccati(&mut self, stationary: &[f64], white: f64, samples: usize, missing: &[bool]) {
         let n = self.states();
         // deviation from the stationary covariance: P = diag(stationary) - D, D <- A (D + S^-1 (P h)(P h)^T) A^T
         let mut deficit = vec![0.0; n * n];
         let mut gains: Vec<(Vec<f64>, f64)> = Vec::new();
-        let mut rows = vec![0.0; n];
-        for _ in 0..samples.max(1) {
-            let ph: Vec<f64> = (0..n)
-                .map(|i| {
-                    let own = if self.observed(i) { stationary[i] } else { 0.0 };
-                    own - (0..n).filter(|&j| self.observed(j)).map(|j| deficit[i * n + j]).sum::<f64>()
-                })
-                .collect();
-            let s = white + (0..n).filter(|&i| self.observed(i)).map(|i| ph[i]).sum::<f64>();
+        let mut order = Vec::new();
+        let (mut held, mut follows) = (false, false);
+        for k in 0..samples.max(1) {
+            if missing.get(k).copied().unwrap_or(false) {
+                order.push(None);
+                self.predict(&mut deficit);
+                (held, follows) = (false, false);
+                continue;
+            }
+            if held {
+                order.push(gains.len().checked_sub(1));
+                continue;
+            }
+            let (ph, s) = self.innovation(stationary, white, &deficit);
             let mut gain: Vec<f64> = ph.iter().map(|p| p / s).collect();
             self.advance(&mut gain);
             let entry = (gain, 1.0 / s.sqrt());
-            let settled = gains.last().is_some_and(|last| settled(last, &entry));
+            held = follows && gains.last().is_some_and(|last| settled(last, &entry));
+            follows = true;
+            order.push(Some(gains.len()));
             gains.push(entry);
-            if settled {
-                break;
+            if held {
+                if missing.is_empty() {
+                    break;
+                }
+                continue;
             }
             for i in 0..n {
                 for j in 0..n {
                     deficit[i * n + j] += ph[i] * ph[j] / s;
                 }
             }
-            for row in deficit.chunks_exact_mut(n.max(1)) {
-                self.advance(row);
-            }
-            for j in 0..n {
-                (0..n).for_each(|i| rows[i] = deficit[i * n + j]);
-                self.advance(&mut rows);
-                (0..n).for_each(|i| deficit[i * n + j] = rows[i]);
-            }
+            self.predict(&mut deficit);
         }
-        gains
+        self.gains = gains;
+        self.order = if missing.is_empty() { Vec::new() } else { order };
+    }
+
+    /// `P h` and the variance of the next sample's prediction error.
+    fn innovation(&self, stationary: &[f64], white: f64, deficit: &[f64]) -> (Vec<f64>, f64) {
+        let n = self.states();
+        let ph: Vec<f64> = (0..n)
+            .map(|i| {
+                let own = if self.observed(i) { stationary[i] } else { 0.0 };
+                own - (0..n).filter(|&j| self.observed(j)).map(|j| deficit[i * n + j]).sum::<f64>()
+            })
+            .collect();
+        let s = white + (0..n).filter(|&i| self.observed(i)).map(|i| ph[i]).sum::<f64>();
+        (ph, s)
+    }
+
+    /// `D <- A D A^T`.
+    fn predict(&self, deficit: &mut [f64]) {
+        let n = self.states();
+        for row in deficit.chunks_exact_mut(n.max(1)) {
+            self.advance(row);
+        }
+        let mut column = vec![0.0; n];
+        for j in 0..n {
+            (0..n).for_each(|i| column[i] = deficit[i * n + j]);
+            self.advance(&mut column);
+            (0..n).for_each(|i| deficit[i * n + j] = column[i]);
+        }
     }
 
     /// Whitens up to [`LANES`] signals of one length in place.
@@ -107,16 +141,19 @@ impl Whitener {
         let samples = signals.first().map_or(0, |signal| signal.len());
         let modes = self.rotations.len();
         let mut state = vec![[0.0; LANES]; self.states()];
-        let mut gains = self.gains.iter();
-        let Some(mut current) = gains.next() else { return };
+        let Some(last) = self.gains.len().checked_sub(1) else { return };
         for k in 0..samples {
             let mut error = [0.0; LANES];
-            error.iter_mut().zip(signals.iter()).for_each(|(e, signal)| *e = signal[k]);
-            let observed = state[..2 * modes].iter().step_by(2).chain(&state[2 * modes..]);
-            for x in observed {
-                (0..LANES).for_each(|l| error[l] -= x[l]);
+            // where every sample is there they take the gains in turn; over a missing one the error is zero: nothing is corrected
+            let chosen = if self.order.is_empty() { Some(k) } else { self.order.get(k).copied().flatten() };
+            let (gain, scale) = &self.gains[chosen.unwrap_or(last).min(last)];
+            if chosen.is_some() {
+                error.iter_mut().zip(signals.iter()).for_each(|(e, signal)| *e = signal[k]);
+                let observed = state[..2 * modes].iter().step_by(2).chain(&state[2 * modes..]);
+                for x in observed {
+                    (0..LANES).for_each(|l| error[l] -= x[l]);
+                }
             }
-            let (gain, scale) = current;
             for ((pair, [a, b, c, d]), g) in
                 state[..2 * modes].chunks_exact_mut(2).zip(&self.rotations).zip(gain.chunks_exact(2))
             {
@@ -130,9 +167,6 @@ impl Whitener {
                 (0..LANES).for_each(|l| x[l] = decay * x[l] + g * error[l]);
             }
             signals.iter_mut().zip(error).for_each(|(signal, e)| signal[k] = scale * e);
-            if let Some(next) = gains.next() {
-                current = next;
-            }
         }
     }
 }

@@ -43,15 +43,15 @@ pub(super) fn summed_periodograms(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f6
     sum
 }
 
-/// Expected tapered periodogram of each part of the noise at unit variance: parts x bins.
+/// Expected tapered periodogram of each part of the noise at unit variance: parts x bins; `lag_weights`: [`autocorrelation`] of the taper, gaps cut out
+/// of it.
 ///
 /// # Method
 /// Exact for the finite window: the Fourier transform of autocovariance times the taper's autocorrelation, folded to N.
 /// # Source
 /// A. M. Sykulski, S. C. Olhede, A. P. Guillaumin, J. M. Lilly, J. J. Early, Biometrika 106 (2019) 251.
-pub(super) fn expected_parts(noise: &RingdownNoise, interval_s: f64, taper: &[f64]) -> Vec<Vec<f64>> {
-    let n = taper.len();
-    let lag_weights = autocorrelation(taper);
+pub(super) fn expected_parts(noise: &RingdownNoise, interval_s: f64, lag_weights: &[f64]) -> Vec<Vec<f64>> {
+    let n = lag_weights.len();
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n);
     (0..noise.parts())
         .into_par_iter()
@@ -68,7 +68,7 @@ pub(super) fn expected_parts(noise: &RingdownNoise, interval_s: f64, taper: &[f6
 }
 
 /// `sum_k w(k) w(k + lag) / N`.
-fn autocorrelation(taper: &[f64]) -> Vec<f64> {
+pub(super) fn autocorrelation(taper: &[f64]) -> Vec<f64> {
     let n = taper.len();
     let mut planner = RealFftPlanner::<f64>::new();
     let (forward, backward) = (planner.plan_fft_forward(2 * n), planner.plan_fft_inverse(2 * n));

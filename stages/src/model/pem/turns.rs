@@ -1,0 +1,128 @@
+//! Poles and noise in turns, and the output error after them.
+
+use faer::c64;
+use realfft::RealFftPlanner;
+
+use super::conclusion::full_jacobian;
+use super::gradient::{Noise, Point};
+use super::noise::{gain, intensities};
+use super::optimiser::{Ending, Limits, State, minimise};
+use super::options::NoiseModel;
+use super::parametrisation::{coordinates, roots, section_order, sections};
+use super::predictor::Problem;
+use super::starts::{lowest, refined};
+use super::tangent::Tangent;
+use crate::model::error::ModelError;
+
+/// Prediction errors with a noise filter, from the output error's starts.
+pub(super) fn thermal_or_free(
+    problem: &Problem,
+    starts: Vec<State>,
+    limits: Limits,
+    noise: NoiseModel,
+) -> Result<State, ModelError> {
+    let state = thermal(problem, starts, limits)?;
+    if noise == NoiseModel::Thermal {
+        return Ok(state);
+    }
+    let poles = state.point.poles.clone();
+    let c = state.point.predictor_coordinates(problem.order);
+    let next = State::new(problem, Point { poles, noise: Noise::Free(c) })?;
+    minimise(problem, State { iterations: state.iterations, ..next }, limits)
+}
+
+/// Output error from the prediction model's poles as well.
+pub(super) fn simulation(
+    problem: &Problem,
+    starts: Vec<State>,
+    prediction: impl Fn(Vec<State>) -> Result<State, ModelError>,
+    count: usize,
+    limits: Limits,
+) -> Result<State, ModelError> {
+    let white = |poles: Vec<f64>| Point { poles, noise: Noise::White };
+    let mut points: Vec<Point> = starts.iter().map(|state| state.point.clone()).collect();
+    if problem.missing.is_empty()
+        && let Ok(state) = prediction(starts)
+    {
+        points.push(white(state.point.poles));
+    }
+    lowest(problem, points, count + 1, limits)
+}
+
+/// Rounds of noise, then poles: the second changes either by a fraction of its error, the third by less than a hundredth.
+const THERMAL_ROUNDS: usize = 3;
+
+/// Poles and noise intensities in turn.
+///
+/// The noise comes first from the best start alone; under its whitening all starts compete: unwhitened, a spare pole would rather fit the
+/// thermal noise of a strong mode than the detector.
+fn thermal(problem: &Problem, starts: Vec<State>, limits: Limits) -> Result<State, ModelError> {
+    let mut poles: Vec<Vec<f64>> = starts.iter().map(|state| state.point.poles.clone()).collect();
+    let first = refined(problem, starts.into_iter().take(1).collect(), limits)?;
+    if first.ending == Ending::Exact {
+        return minimise(problem, first, limits);
+    }
+    let noise = thermal_noise(problem, &first)?;
+    poles.push(first.point.poles);
+    let whitened = poles.into_iter().map(|poles| State::new(problem, Point { poles, noise: noise.clone() }));
+    let mut state = refined(problem, whitened.filter_map(Result::ok).collect(), limits)?;
+    for round in 0..THERMAL_ROUNDS {
+        if round > 0 {
+            let next = State::new(
+                problem,
+                Point { poles: state.point.poles.clone(), noise: thermal_noise(problem, &state)? },
+            )?;
+            state = State { iterations: state.iterations, ..next };
+        }
+        state = minimise(problem, state, limits)?;
+    }
+    state = without_drift(problem, state, limits)?;
+    // K belongs to the final poles: one more linear solution with exactly that predictor
+    if let Noise::Frozen(_, c) = &state.point.noise {
+        let noise = Noise::Frozen(state.point.a(), c.clone());
+        let point = Point { poles: state.point.poles.clone(), noise };
+        let State { iterations, ending, gradient, .. } = state;
+        state = State { iterations, ending, gradient, ..State::new(problem, point)? };
+    }
+    Ok(state)
+}
+
+/// Exchanges real poles slower than the window for a fast one, unless the data insist on them.
+///
+/// What such a pole explains is the business of offset and drift; its static gain is arbitrary and spoils everyone's share of it.
+fn without_drift(problem: &Problem, state: State, limits: Limits) -> Result<State, ModelError> {
+    let rows = problem.rows() as f64;
+    let all: Vec<c64> =
+        state.point.a().iter().enumerate().flat_map(|(i, &a)| roots(a, section_order(problem.order, i))).collect();
+    let slow = |z: &c64| z.im == 0.0 && z.re > 1.0 - 1.0 / rows;
+    if !all.iter().any(slow) || problem.order == 1 {
+        return Ok(state);
+    }
+    let exchanged: Vec<c64> = all.iter().map(|z| if slow(z) { c64::new(EXCHANGE, 0.0) } else { *z }).collect();
+    let point = Point { poles: coordinates(&exchanged), noise: state.point.noise.clone() };
+    let start = State { iterations: state.iterations, ..State::new(problem, point)? };
+    let other = minimise(problem, start, limits)?;
+    let loss = rows * (other.projection.cost / state.projection.cost - 1.0);
+    // as for a resonance: the best of N chances gains 2 ln N
+    Ok(if loss < 2.0 * rows.ln() { other } else { state })
+}
+
+/// Where an exchanged pole begins: fast, apart from the usual starts.
+const EXCHANGE: f64 = 0.4;
+
+/// Whitening by the noise that the residual shows.
+fn thermal_noise(problem: &Problem, state: &State) -> Result<Noise, ModelError> {
+    let tangent = Tangent::new(&full_jacobian(problem, state))?;
+    let e = state.residual();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let mut top = 0;
+    let mut spectra = Vec::new();
+    for (_, y) in problem.measured() {
+        spectra.push((tangent.spectra(&e, top, y.len(), &mut planner), y.len()));
+        top += y.len();
+    }
+    let a = state.point.a();
+    let intensities = intensities(&a, &state.point.whitening(), &spectra);
+    let (_, predictor) = gain(problem.order, &a, &intensities)?;
+    Ok(Noise::Frozen(a, sections(&coordinates(&predictor))))
+}
