@@ -15,7 +15,7 @@ mod instrumental;
 pub mod modes;
 mod modes_stage;
 mod order;
-mod orthogonal;
+pub(crate) mod orthogonal;
 pub mod pem;
 mod pem_stage;
 mod realised;

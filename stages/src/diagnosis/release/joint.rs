@@ -148,7 +148,7 @@ impl<'a> Problem<'a> {
         basis[count - 2] = vec![1.0; samples];
         basis[count - 1] = (0..samples).map(|k| (k as f64 - centre) / centre).collect();
         basis.push((0..samples).map(|k| if k < before { 1.0 } else { 0.0 }).collect());
-        let whitener = Whitener::new(&self.noise, self.cut.interval_s, samples);
+        let whitener = Whitener::new(&self.noise, self.cut.interval_s, samples, &[]);
         whiten(&whitener, &mut basis);
         let qr = Qr::new(Mat::from_fn(samples, basis.len(), |i, j| basis[j][i]));
         let r = qr.r();

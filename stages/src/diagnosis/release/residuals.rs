@@ -42,7 +42,7 @@ pub fn residuals(problem: &Problem<'_>, state: &State, starts: &[usize]) -> Vec<
 
 /// Whitens residuals: unit variance where the noise model holds.
 pub fn whitened(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let whitener = Whitener::new(&problem.noise, problem.cut.interval_s, problem.cut.samples);
+    let whitener = Whitener::new(&problem.noise, problem.cut.interval_s, problem.cut.samples, &[]);
     let mut out = residuals.to_vec();
     out.par_chunks_mut(LANES).for_each(|chunk| {
         let mut lanes: Vec<&mut [f64]> = chunk.iter_mut().map(Vec::as_mut_slice).collect();
