@@ -117,6 +117,24 @@ impl Effects {
         !self.modal_force.is_empty()
     }
 
+    /// Whether anything but frequencies changes in the signal of one event.
+    pub fn change_the_shape(&self) -> bool {
+        let parts = [
+            self.remaining_load.is_empty(),
+            self.modal_force.is_empty(),
+            self.extra_modes.is_empty(),
+            self.optics.is_empty(),
+            self.electronics.is_empty(),
+            self.feedthrough == 0.0,
+        ];
+        parts.contains(&false)
+    }
+
+    /// Relative change of all frequencies there and then.
+    pub fn frequency_change(&self, at: &Instant) -> f64 {
+        self.frequency.iter().map(|change| change(at)).sum()
+    }
+
     /// Share of the load that acts `t` seconds after the release, before it for t < 0.
     pub fn load(&self, t: f64) -> f64 {
         if t < 0.0 { 1.0 } else { self.remaining_load.iter().map(|load| load(t)).sum() }

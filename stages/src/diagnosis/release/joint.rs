@@ -1,6 +1,6 @@
 //! The joint fit of lever and causes to all events.
 
-use faer::Mat;
+use faer::{Mat, c64};
 use rayon::prelude::*;
 
 use super::lever::{Lever, LeverMode};
@@ -102,6 +102,10 @@ pub(super) struct Linearised {
     /// Within the basis: per shared parameter of the lever, then the event's own four.
     pub lever: Mat<f64>,
     pub own: Mat<f64>,
+    /// What the causes' change adds to both, all coordinates; empty where there is none.
+    pub crossed: Vec<Vec<f64>>,
+    /// Factor of that.
+    pub scale: f64,
     /// All coordinates: per parameter of the causes.
     pub causes: Vec<Vec<f64>>,
 }
@@ -167,15 +171,8 @@ impl<'a> Problem<'a> {
     pub(super) fn changed(&self, turned: &Turned, state: &State, sets: &[Effects]) -> Vec<Vec<Vec<f64>>> {
         let simulated = (0..state.events.len()).into_par_iter().map(|event| {
             let (own, instant) = (&state.events[event], self.windows[event].first);
-            let release = |effects: &Effects| Release {
-                amplitude: own.amplitude,
-                lead_s: -own.onset_s,
-                before: self.cut.before,
-                samples: self.cut.samples,
-                interval_s: self.cut.interval_s,
-                frequency_change: effects.frequency.iter().map(|change| change(&instant)).sum(),
-            };
-            differences(&state.lever, sets.iter().map(|effects| (effects, release(effects))))
+            let release = self.release(own);
+            differences(&state.lever, sets.iter().map(|effects| (effects, release, effects.frequency_change(&instant))))
         });
         let mut all: Vec<Vec<f64>> = simulated.collect::<Vec<_>>().into_iter().flatten().collect();
         all.par_chunks_mut(LANES).for_each(|chunk| {
@@ -187,12 +184,28 @@ impl<'a> Problem<'a> {
         (0..state.events.len()).map(|_| all.by_ref().take(sets.len()).collect()).collect()
     }
 
-    /// Sets of effects: the hypotheses as they are, then each parameter moved by its step.
-    fn variants(&self, state: &State, hold: Hold) -> (Vec<Effects>, Vec<f64>) {
-        let (mut sets, mut steps) = (vec![state.effects()], Vec::new());
-        if hold == Hold::Shared {
-            return (sets, steps);
+    /// An event as it is to be simulated.
+    pub(super) fn release(&self, own: &EventParameters) -> Release {
+        Release {
+            amplitude: own.amplitude,
+            lead_s: -own.onset_s,
+            before: self.cut.before,
+            samples: self.cut.samples,
+            interval_s: self.cut.interval_s,
         }
+    }
+
+    /// What the hypotheses change as they are: by event; nothing where there are none.
+    fn base(&self, turned: &Turned, state: &State) -> Vec<Vec<f64>> {
+        if state.hypotheses.is_empty() {
+            return vec![Vec::new(); state.events.len()];
+        }
+        self.changed(turned, state, &[state.effects()]).into_iter().map(|mut sets| sets.swap_remove(0)).collect()
+    }
+
+    /// Derivatives of what the hypotheses change with each of their parameters, by difference quotients: by event, then by parameter.
+    fn slopes(&self, turned: &Turned, state: &State, base: &[Vec<f64>]) -> Vec<Vec<Vec<f64>>> {
+        let (mut sets, mut steps) = (Vec::new(), Vec::new());
         for (h, hypothesis) in state.hypotheses.iter().enumerate() {
             for p in 0..hypothesis.values.len() {
                 let mut moved = state.clone();
@@ -201,31 +214,84 @@ impl<'a> Problem<'a> {
                 sets.push(moved.effects());
             }
         }
-        (sets, steps)
+        if sets.is_empty() {
+            return vec![Vec::new(); state.events.len()];
+        }
+        let mut all = self.changed(turned, state, &sets);
+        all.par_iter_mut().zip(base).for_each(|(event, base)| {
+            for (moved, step) in event.iter_mut().zip(&steps) {
+                moved.iter_mut().zip(base).for_each(|(m, b)| *m = (*m - b) / step);
+            }
+        });
+        all
     }
 
     /// Residuals and derivatives of every event at `state`.
-    pub(super) fn linearised(&self, turned: &Turned, state: &State, hold: Hold) -> Vec<Linearised> {
+    pub(super) fn linearised(&self, turned: &Turned, state: &State) -> Vec<Linearised> {
+        let base = self.base(turned, state);
+        let slopes = Slopes::of(self, turned, state, &base, Hold::Nothing);
+        self.linearised_with(turned, state, &base, &slopes)
+    }
+
+    /// How the change that the hypotheses make moves with the lever's parameters, and with amplitude and onset: by difference quotients on an event
+    /// of middling amplitude, which stands for all.
+    fn crossed(&self, turned: &Turned, state: &State) -> Crossed {
+        let mut order: Vec<usize> = (0..state.events.len()).collect();
+        order.sort_by(|&a, &b| state.events[a].amplitude.total_cmp(&state.events[b].amplitude));
+        let Some(&middle) = order.get(order.len() / 2) else { return Crossed::default() };
+        let (own, instant, effects) = (state.events[middle], self.windows[middle].first, state.effects());
+        let values = state.lever.parameters();
+        let time_step = 1e-2 * self.cut.interval_s;
+        let mut levers = vec![state.lever.clone(); values.len() + 3];
+        let mut releases = vec![self.release(&own); values.len() + 3];
+        for (j, lever) in levers.iter_mut().enumerate().skip(1).take(values.len()) {
+            let mut moved = values.clone();
+            moved[j - 1] += LEVER_STEP;
+            *lever = state.lever.with(&moved);
+        }
+        let last = values.len();
+        releases[last + 1].amplitude *= 1.0 + LEVER_STEP;
+        releases[last + 2].lead_s -= time_step;
+        let change = effects.frequency_change(&instant);
+        let mut all: Vec<Vec<f64>> = levers
+            .par_iter()
+            .zip(&releases)
+            .map(|(lever, release)| differences(lever, std::iter::once((&effects, *release, change))).swap_remove(0))
+            .collect();
+        all.par_chunks_mut(LANES).for_each(|chunk| {
+            let mut lanes: Vec<&mut [f64]> = chunk.iter_mut().map(Vec::as_mut_slice).collect();
+            turned.whitener.apply(&mut lanes);
+            rotate(&turned.qr, chunk);
+        });
+        let base = all.remove(0);
+        for (j, moved) in all.iter_mut().enumerate() {
+            let step = match j {
+                _ if j < last => LEVER_STEP,
+                _ if j == last => LEVER_STEP * own.amplitude,
+                _ => time_step,
+            };
+            moved.iter_mut().zip(&base).for_each(|(m, b)| *m = (*m - b) / step);
+        }
+        Crossed { columns: all, amplitude: own.amplitude }
+    }
+
+    fn linearised_with(&self, turned: &Turned, state: &State, base: &[Vec<f64>], slopes: &Slopes) -> Vec<Linearised> {
         let shared = Shared::of(&state.lever);
-        let (sets, steps) = self.variants(state, hold);
-        let mut changes =
-            if steps.is_empty() { vec![Vec::new(); state.events.len()] } else { self.changed(turned, state, &sets) };
-        changes
-            .par_iter_mut()
-            .enumerate()
-            .map(|(event, change)| self.linearise(turned, state, &shared, event, std::mem::take(change), &steps))
+        (0..state.events.len())
+            .into_par_iter()
+            .map(|event| self.linearise(turned, state, &shared, event, &base[event], slopes))
             .collect()
     }
 
-    /// Residual and derivatives of one event at `state`; `changes`: of all hypotheses, then with each parameter moved.
+    /// Residual and derivatives of one event at `state`, from what the hypotheses change in it.
     fn linearise(
         &self,
         turned: &Turned,
         state: &State,
         shared: &Shared,
         event: usize,
-        mut changes: Vec<Vec<f64>>,
-        steps: &[f64],
+        base: &[f64],
+        slopes: &Slopes,
     ) -> Linearised {
         let own = &state.events[event];
         let w = weights(&turned.reference, &shared.exponentials, own);
@@ -245,23 +311,15 @@ impl<'a> Problem<'a> {
         let own_columns: Vec<Vec<f64>> =
             w.own.iter().enumerate().map(|(k, column)| full(column, if k == 0 { -1.0 } else { 0.0 })).collect();
         let own = Mat::from_fn(width, 4, |i, j| own_columns[j][i]);
-        let mut causes = Vec::new();
-        if !changes.is_empty() {
-            let base = changes.remove(0);
-            residual.iter_mut().zip(&base).for_each(|(r, b)| *r -= b);
-            for (mut moved, step) in changes.into_iter().zip(steps) {
-                moved.iter_mut().zip(&base).for_each(|(m, b)| *m = (*m - b) / step);
-                causes.push(moved);
-            }
-        }
-        Linearised { residual, lever, own, causes }
+        residual.iter_mut().zip(base).for_each(|(r, b)| *r -= b);
+        let causes = slopes.values[event].clone();
+        let scale = state.events[event].amplitude / slopes.crossed.amplitude;
+        Linearised { residual, lever, own, crossed: slopes.crossed.columns.clone(), scale, causes }
     }
 
     /// Squared whitened residual of every event at `state`.
-    fn costs(&self, turned: &Turned, state: &State) -> Vec<f64> {
+    fn costs(&self, turned: &Turned, state: &State, base: &[Vec<f64>]) -> Vec<f64> {
         let shared = Shared::of(&state.lever);
-        let bent = !state.hypotheses.is_empty();
-        let changes = if bent { self.changed(turned, state, &[state.effects()]) } else { Vec::new() };
         (0..state.events.len())
             .into_par_iter()
             .map(|event| {
@@ -273,9 +331,7 @@ impl<'a> Problem<'a> {
                     let head: f64 = (i..width - 1).map(|j| turned.r[(i, j)] * w.value[j]).sum();
                     residual[i] -= head - turned.r[(i, width - 1)] * own.amplitude;
                 }
-                if let Some(change) = changes.get(event).and_then(|c| c.first()) {
-                    residual.iter_mut().zip(change).for_each(|(r, c)| *r -= c);
-                }
+                residual.iter_mut().zip(&base[event]).for_each(|(r, b)| *r -= b);
                 residual.iter().map(|r| r * r).sum()
             })
             .collect()
@@ -346,6 +402,68 @@ impl Shared {
     }
 }
 
+/// Least factor by which a cause is taken to weaken a mode.
+const SHRUNK: f64 = 0.03;
+
+/// By what a change multiplies the residue of each mode, in one event.
+fn residue_ratios(turned: &Turned, change: &[f64], own: &EventParameters, modes: usize) -> Vec<c64> {
+    let width = turned.r.ncols();
+    let mut weights = change[..width].to_vec();
+    for i in (0..width).rev() {
+        let known: f64 = (i + 1..width).map(|k| turned.r[(i, k)] * weights[k]).sum();
+        weights[i] = if turned.r[(i, i)] == 0.0 { 0.0 } else { (weights[i] - known) / turned.r[(i, i)] };
+    }
+    let one = |(m, e): (usize, &Exponential)| {
+        // six columns per mode; Re(rho z) has the weights Re rho and -Im rho
+        let now = e.residue * (-e.pole * own.onset_s).exp() * own.amplitude;
+        (now + c64::new(weights[6 * m], -weights[6 * m + 1])) / now
+    };
+    turned.reference.iter().enumerate().take(modes).map(one).collect()
+}
+
+/// Moves onsets, shares and amplitudes by what the last hypothesis does to the modes, so that a fit that begins with it begins in phase and at the rings seen.
+///
+/// A slow release delays all modes alike, by several samples: more than the search could find from there, since the high modes turn within one.
+pub fn aligned(problem: &Problem<'_>, state: &mut State, starts: &mut [usize]) -> Result<(), ModelError> {
+    problem.starts(state, starts)?;
+    let mut before = state.clone();
+    before.hypotheses.pop();
+    let turned = problem.turn(state, starts);
+    let both = problem.changed(&turned, state, &[before.effects(), state.effects()]);
+    let count = state.lever.modes.len();
+    let mut shrunk = vec![0.0; count];
+    for (own, sets) in state.events.iter_mut().zip(&both) {
+        let change: Vec<f64> = sets[1].iter().zip(&sets[0]).map(|(a, b)| a - b).collect();
+        let ratios = residue_ratios(&turned, &change, own, count);
+        shrunk.iter_mut().zip(&ratios).for_each(|(s, r)| *s += r.norm() / both.len() as f64);
+        if let (Some(ratio), Some(first)) = (ratios.first(), turned.reference.first()) {
+            let late = -ratio.arg() / first.pole.im;
+            if late.is_finite() && ratio.norm() > 0.5 && ratio.norm() < 2.0 {
+                own.onset_s -= late;
+            }
+        }
+    }
+    // what the cause takes from a mode, its share must have: the rings that were seen are still there
+    let shares: Vec<f64> = state
+        .lever
+        .modes
+        .iter()
+        .zip(&shrunk)
+        .map(|(mode, shrunk)| mode.share / shrunk.clamp(SHRUNK, 1.0 / SHRUNK))
+        .collect();
+    let total: f64 = shares.iter().sum();
+    if total.is_finite() && total > 0.0 {
+        let old = state.lever.modes.first().map_or(1.0, |mode| mode.share);
+        state.lever.modes.iter_mut().zip(&shares).for_each(|(mode, share)| mode.share = share / total);
+        let first = state.lever.modes.first().map_or(1.0, |mode| mode.share);
+        let factor = old / first / shrunk.first().copied().unwrap_or(1.0);
+        if factor > 0.5 && factor < 2.0 {
+            state.events.iter_mut().for_each(|own| own.amplitude *= factor);
+        }
+    }
+    problem.starts(state, starts)
+}
+
 /// A finished fit.
 pub struct JointFit {
     /// Where it ended.
@@ -365,8 +483,8 @@ pub struct JointFit {
 }
 
 /// Turns of the basis, and steps within each.
-const ROUNDS: usize = 6;
-const STEPS: usize = 8;
+const ROUNDS: usize = 10;
+const STEPS: usize = 16;
 /// Fall of the cost that ends the search.
 const ARRIVED: f64 = 0.05;
 
@@ -380,48 +498,110 @@ const ARRIVED: f64 = 0.05;
 pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) -> Result<JointFit, ModelError> {
     let (mut state, mut starts) = (state, starts);
     let mut last_round = f64::INFINITY;
+    let mut damping = 1e-6;
     for round in 0..ROUNDS {
         problem.starts(&mut state, &mut starts)?;
         let turned = problem.turn(&state, &starts);
-        let mut costs = problem.costs(&turned, &state);
+        let mut base = problem.base(&turned, &state);
+        let mut slopes = Slopes::of(problem, &turned, &state, &base, hold);
+        let mut costs = problem.costs(&turned, &state, &base);
         let mut cost = costs.iter().sum::<f64>() + problem.prior_cost(&state);
-        let mut damping = 1e-9;
         let mut converged = false;
         let mut covariance = None;
         for _ in 0..STEPS {
-            let normal = Normal::assemble(problem, &turned, &state, hold);
+            if slopes.are_stale(&state, hold) {
+                slopes = Slopes::of(problem, &turned, &state, &base, hold);
+            }
+            let linearised = problem.linearised_with(&turned, &state, &base, &slopes);
+            let normal = Normal::assemble(problem, &turned, &state, linearised, hold);
             let step = normal.solve(damping);
-            covariance = Some(step.covariance);
             if step.promised < ARRIVED {
+                covariance = Some(symmetric_inverse(&normal.information));
                 converged = true;
                 break;
             }
             let trial = moved(&state, &step.shared, &step.own, hold);
-            let next = problem.costs(&turned, &trial);
+            let next_base = problem.base(&turned, &trial);
+            let next = problem.costs(&turned, &trial, &next_base);
             let next_cost = next.iter().sum::<f64>() + problem.prior_cost(&trial);
             if next_cost <= cost && next_cost.is_finite() {
                 let gain = cost - next_cost;
-                (state, costs, cost) = (trial, next, next_cost);
-                damping = (0.1 * damping).max(1e-12);
+                (state, costs, cost, base) = (trial, next, next_cost, next_base);
+                damping = (0.1 * damping).max(1e-9);
                 if gain < ARRIVED {
+                    covariance = Some(symmetric_inverse(&normal.information));
                     converged = true;
                     break;
                 }
+                // an onset has passed a sample: cut anew
+                if state.events.iter().any(|e| e.onset_s > 0.0 || e.onset_s < -1.5 * problem.cut.interval_s) {
+                    covariance = Some(symmetric_inverse(&normal.information));
+                    break;
+                }
             } else {
-                damping = (damping * 30.0).max(1e-4);
+                damping = (damping * 10.0).max(1e-4);
                 if damping > 1e6 {
+                    covariance = Some(symmetric_inverse(&normal.information));
                     break;
                 }
             }
         }
         if (converged && (last_round - cost).abs() < 1.0) || round + 1 == ROUNDS {
-            let covariance = covariance.ok_or(ModelError::Degenerate("no step was made"))?;
+            let covariance = match covariance {
+                Some(covariance) => covariance,
+                None => {
+                    let linearised = problem.linearised_with(&turned, &state, &base, &slopes);
+                    symmetric_inverse(&Normal::assemble(problem, &turned, &state, linearised, hold).information)
+                }
+            };
             let at_limit = at_limit(&state);
             return Ok(JointFit { state, starts, covariance, costs, cost, converged, at_limit });
         }
         last_round = cost;
     }
     Err(ModelError::Degenerate("no round was made"))
+}
+
+/// Derivatives of the hypotheses' change, kept while their parameters stay near.
+struct Slopes {
+    values: Vec<Vec<Vec<f64>>>,
+    crossed: Crossed,
+    at: Vec<f64>,
+}
+
+/// How the hypotheses' change moves with everything else, of one event.
+#[derive(Default)]
+struct Crossed {
+    /// Per parameter of the lever, then amplitude, then onset; none without hypotheses.
+    columns: Vec<Vec<f64>>,
+    amplitude: f64,
+}
+
+/// Step of the lever's logarithmic parameters and shares in a difference quotient.
+const LEVER_STEP: f64 = 1e-4;
+
+/// Relative change of a shape parameter, and of a strength, beyond which derivatives are taken anew.
+const STALE: [f64; 2] = [0.02, 0.3];
+
+impl Slopes {
+    fn of(problem: &Problem<'_>, turned: &Turned, state: &State, base: &[Vec<f64>], hold: Hold) -> Self {
+        let values = match hold {
+            Hold::Nothing => problem.slopes(turned, state, base),
+            Hold::Shared => vec![Vec::new(); state.events.len()],
+        };
+        let crossed = if state.hypotheses.is_empty() { Crossed::default() } else { problem.crossed(turned, state) };
+        Self { values, crossed, at: numbers(state) }
+    }
+
+    fn are_stale(&self, state: &State, hold: Hold) -> bool {
+        let limits = state.hypotheses.iter().flat_map(|h| (0..h.values.len()).map(|p| STALE[usize::from(p == 0)]));
+        let moved = |((now, then), limit): ((f64, &f64), f64)| (now - then).abs() > limit * then.abs();
+        hold == Hold::Nothing && numbers(state).into_iter().zip(&self.at).zip(limits).any(moved)
+    }
+}
+
+fn numbers(state: &State) -> Vec<f64> {
+    state.hypotheses.iter().flat_map(|h| h.values.iter().copied()).collect()
 }
 
 fn at_limit(state: &State) -> Vec<(usize, usize)> {
@@ -489,7 +669,6 @@ struct Step {
     shared: Vec<f64>,
     own: Vec<[f64; 4]>,
     promised: f64,
-    covariance: Mat<f64>,
 }
 
 /// Columns of one event: shared ones (lever within the basis, causes everywhere), then its own four.
@@ -515,30 +694,43 @@ impl Linearised {
         let lever = if hold.lever() { 0 } else { self.lever.ncols() };
         let width = self.lever.nrows();
         let (causes, total) = (self.causes.len(), lever + self.causes.len() + extra.len() + 4);
+        let within = |matrix: &Mat<f64>, i: usize, j: usize| if i < width { matrix[(i, j)] } else { 0.0 };
+        // the lever's columns first, then amplitude (which the scale is one over of) and onset
+        let crossed = |i: usize, c: usize, scale: f64| self.crossed.get(c).map_or(0.0, |column| scale * column[i]);
+        let known = self.lever.ncols();
         Mat::from_fn(self.residual.len(), total, |i, j| {
             if j < lever {
-                if i < width { self.lever[(i, j)] } else { 0.0 }
+                within(&self.lever, i, j) + crossed(i, j, self.scale)
             } else if j < lever + causes {
                 self.causes[j - lever][i]
             } else if j < lever + causes + extra.len() {
                 extra[j - lever - causes][i]
-            } else if i < width {
-                self.own[(i, j + 4 - total)]
             } else {
-                0.0
+                let own = j + 4 - total;
+                within(&self.own, i, own)
+                    + match own {
+                        0 => crossed(i, known, 1.0),
+                        1 => crossed(i, known + 1, self.scale),
+                        _ => 0.0,
+                    }
             }
         })
     }
 }
 
 impl Normal {
-    fn assemble(problem: &Problem<'_>, turned: &Turned, state: &State, hold: Hold) -> Self {
+    fn assemble(
+        problem: &Problem<'_>,
+        turned: &Turned,
+        state: &State,
+        linearised: Vec<Linearised>,
+        hold: Hold,
+    ) -> Self {
         let lever = if hold.lever() { 0 } else { state.lever.parameters().len() };
         let count = if hold == Hold::Shared { 0 } else { lever + state.causes() };
         let bent = !state.hypotheses.is_empty();
         let width = turned.r.ncols();
-        let events: Vec<Eliminated> = problem
-            .linearised(turned, state, hold)
+        let events: Vec<Eliminated> = linearised
             .into_par_iter()
             .map(|mut event| {
                 if !bent {
@@ -580,7 +772,7 @@ impl Normal {
                 step
             })
             .collect();
-        Step { shared, own, promised, covariance }
+        Step { shared, own, promised }
     }
 }
 

@@ -84,6 +84,12 @@ impl Lever {
         out
     }
 
+    /// The same with all frequencies changed in proportion.
+    pub fn scaled(&self, change: f64) -> Self {
+        let modes = self.modes.iter().map(|m| LeverMode { omega: m.omega * (1.0 + change), ..*m }).collect();
+        Self { modes, poles: self.poles.clone() }
+    }
+
     fn separated(&self) -> Vec<f64> {
         let mut poles: Vec<f64> = Vec::with_capacity(self.poles.len());
         for &pole in &self.poles {

@@ -9,7 +9,7 @@ mod start;
 mod stepper;
 mod window;
 
-pub use joint::{Hold, Hypothesis, JointFit, Problem, SeenMode, State, fit, suggested};
+pub use joint::{Hold, Hypothesis, JointFit, Problem, SeenMode, State, aligned, fit, suggested};
 pub use lever::{Lever, LeverMode};
 pub use residuals::{Tile, common, peaks, residuals, tiles, whitened};
 pub use screen::{Screen, Sign, screen};

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use realfft::RealFftPlanner;
 
 use super::joint::{Problem, State};
-use super::stepper::{Release, differences};
+use super::stepper::differences;
 use crate::calibration::chi_square_tail;
 use crate::model::ringdown::internals::{LANES, Whitener, signal};
 
@@ -23,15 +23,9 @@ pub fn residuals(problem: &Problem<'_>, state: &State, starts: &[usize]) -> Vec<
         let mut modelled = vec![-own.amplitude; cut.before];
         modelled.extend(ringing);
         if !state.hypotheses.is_empty() {
-            let release = Release {
-                amplitude: own.amplitude,
-                lead_s: -own.onset_s,
-                before: cut.before,
-                samples: cut.samples,
-                interval_s: cut.interval_s,
-                frequency_change: effects.frequency.iter().map(|change| change(&window.first)).sum(),
-            };
-            let change = differences(&state.lever, std::iter::once((&effects, release)));
+            let release = problem.release(own);
+            let moved = effects.frequency_change(&window.first);
+            let change = differences(&state.lever, std::iter::once((&effects, release, moved)));
             modelled.iter_mut().zip(change.iter().flatten()).for_each(|(m, c)| *m += c);
         }
         let line = |k: usize| own.offset + own.slope * (k as f64 - centre) / centre;

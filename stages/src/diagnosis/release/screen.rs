@@ -64,7 +64,7 @@ pub fn screen(
     let trials: Vec<(&'static dyn Cause, Vec<f64>)> =
         candidates.iter().flat_map(|cause| cause.trials(scene).into_iter().map(|values| (*cause, values))).collect();
     let turned = problem.turn(state, &fitted.starts);
-    let linearised = problem.linearised(&turned, state, Hold::Nothing);
+    let linearised = problem.linearised(&turned, state);
     let mut sets: Vec<Effects> = vec![state.effects()];
     sets.extend(trials.iter().map(|(cause, values)| {
         let mut effects = state.effects();

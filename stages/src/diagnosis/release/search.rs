@@ -1,6 +1,6 @@
 //! From signs to names: refits, held-out events, and when to abstain.
 
-use super::joint::{Hold, Hypothesis, JointFit, Problem, State, fit};
+use super::joint::{Hold, Hypothesis, JointFit, Problem, State, aligned, fit};
 use super::residuals::{Tile, common, peaks, residuals, tiles, whitened};
 use super::screen::{Screen, Sign, screen};
 use super::window::EventWindow;
@@ -114,8 +114,14 @@ pub fn name_causes(
     catalogue: &[&'static dyn Cause],
     options: &NamingOptions,
 ) -> Result<Naming, ModelError> {
-    let mut candidates: Vec<&'static dyn Cause> =
-        catalogue.iter().copied().filter(|cause| is_candidate(*cause, &options.without)).collect();
+    let mut candidates: Vec<&'static dyn Cause> = Vec::new();
+    for cause in catalogue.iter().copied().filter(|cause| is_candidate(*cause, &options.without)) {
+        // of members of one class the first stands for all
+        if candidates.iter().all(|known| known.about().class != cause.about().class) {
+            candidates.push(cause);
+        }
+    }
+    let clean = (state.clone(), starts.clone());
     let mut fits = vec![fit(problem, state, starts, Hold::Nothing)?];
     let mut named: Vec<Named> = Vec::new();
     let mut nearest = Vec::new();
@@ -130,7 +136,7 @@ pub fn name_causes(
         if last_screen.p_value >= options.false_alarm_rate || named.len() == options.most {
             break;
         }
-        let trials = refits(problem, base, &last_screen.signs, options.refits);
+        let trials = refits(problem, base, &clean, &last_screen.signs, options.refits);
         let Some(best) = trials.first() else {
             verdict = Verdict::Unexplained;
             evidence.push("signs of a cause, but no candidate could be fitted".into());
@@ -231,7 +237,13 @@ struct Trial {
 }
 
 /// The strongest candidates fitted from the present fit, best first.
-fn refits(problem: &Problem<'_>, base: &JointFit, signs: &[Sign], count: usize) -> Vec<Trial> {
+fn refits(
+    problem: &Problem<'_>,
+    base: &JointFit,
+    clean: &(State, Vec<usize>),
+    signs: &[Sign],
+    count: usize,
+) -> Vec<Trial> {
     let samples = (base.state.events.len() * problem.cut.samples) as f64;
     let mut chosen: Vec<&Sign> = Vec::new();
     for sign in signs.iter().filter(|s| s.gain > 0.0) {
@@ -244,9 +256,21 @@ fn refits(problem: &Problem<'_>, base: &JointFit, signs: &[Sign], count: usize) 
         .into_iter()
         .take(count)
         .filter_map(|sign| {
-            let mut state = base.state.clone();
-            state.hypotheses.push(Hypothesis { cause: sign.cause, values: sign.values.clone() });
-            let fitted = fit(problem, state, base.starts.clone(), Hold::Nothing).ok()?;
+            let hypothesis = Hypothesis { cause: sign.cause, values: sign.values.clone() };
+            let from = |lever: &State, starts: &[usize]| {
+                let mut state = lever.clone();
+                state.hypotheses = base.state.hypotheses.clone();
+                state.hypotheses.push(hypothesis.clone());
+                let mut starts = starts.to_vec();
+                aligned(problem, &mut state, &mut starts).ok()?;
+                fit(problem, state, starts, Hold::Nothing).ok()
+            };
+            let mut fitted = from(&base.state, &base.starts);
+            // a baseline that did not arrive has bent to the misfit: begin where free exponentials did
+            if !base.converged || fitted.as_ref().is_none_or(|f| !f.converged) {
+                fitted = fitted.into_iter().chain(from(&clean.0, &clean.1)).min_by(|a, b| a.cost.total_cmp(&b.cost));
+            }
+            let fitted = fitted?;
             let paid = PENALTY * samples.ln() * sign.values.len() as f64;
             Some(Trial { cause: sign.cause, gain: base.cost - fitted.cost - paid, fitted })
         })

@@ -2,12 +2,18 @@
 
 use super::lever::Lever;
 use crate::causes::{Effects, Motion};
+use crate::model::ringdown::EventParameters;
+use crate::model::ringdown::internals::signal;
 
 /// Steps per sample, a power of two: many while edges pass, then fewer.
 const STEPS: usize = 4;
 const LATE_STEPS: usize = 2;
 /// Samples after the release with the finer steps.
-const EARLY: usize = 256;
+const EARLY: usize = 64;
+/// Halvings of a step within which a jump of the load is located: to a ten-thousandth of a sample.
+const HALVINGS: usize = 13;
+/// Error of the mean load over a step, of the load, beyond which it is halved: difference quotients divide it by a thousandth.
+const EVEN: f64 = 1e-9;
 
 /// One release as it is to be simulated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,26 +28,44 @@ pub struct Release {
     pub samples: usize,
     /// Interval of the samples, s.
     pub interval_s: f64,
-    /// Relative change of the modes' frequencies.
-    pub frequency_change: f64,
 }
 
-/// Signals of a release under effects, less that without any: what the causes add to the closed form, V.
+/// Signals of releases under effects, each with the modes' relative change of frequency, less that without any: what the causes add to the closed
+/// form, V.
 ///
 /// # Method
 /// Modes by their exact rotation under the load's mean over each quarter of a sample; forces of causes as kicks at its ends (Strang splitting, error
-/// of second order of the effect alone); optics as maps; poles exact for signals on straight lines. Both runs make the same errors, and the
+/// of second order of the effect alone); optics as maps; poles exact for signals on cubics; changed frequencies in closed form. Both runs make the same errors, and the
 /// difference keeps those of the effect.
 /// # Source
 /// G. Strang, SIAM J. Numer. Anal. 5 (1968) 506.
-pub fn differences<'a>(lever: &Lever, releases: impl Iterator<Item = (&'a Effects, Release)>) -> Vec<Vec<f64>> {
-    let mut without: Option<(Release, Vec<f64>)> = None;
+pub fn differences<'a>(lever: &Lever, releases: impl Iterator<Item = (&'a Effects, Release, f64)>) -> Vec<Vec<f64>> {
+    // runs without effects, for the lever as it is and as it last was scaled
+    let mut without: Vec<(f64, Vec<f64>)> = Vec::new();
     releases
-        .map(|(effects, release)| {
-            let plain = Release { frequency_change: 0.0, ..release };
-            let known = without.take().filter(|(known, _)| *known == plain);
-            let (_, base) = without.insert(known.unwrap_or_else(|| (plain, run(lever, &Effects::default(), &plain))));
-            run(lever, effects, &release).iter().zip(base.iter()).map(|(a, b)| a - b).collect()
+        .map(|(effects, release, change)| {
+            let scaled = lever.scaled(change);
+            let mut out = vec![0.0; release.samples];
+            if effects.change_the_shape() {
+                if !without.iter().any(|(known, _)| *known == change) {
+                    without.truncate(1);
+                    without.push((change, run(&scaled, &Effects::default(), &release)));
+                }
+                let with = run(&scaled, effects, &release);
+                if let Some((_, base)) = without.iter().find(|(known, _)| *known == change) {
+                    out.iter_mut().zip(with.iter().zip(base)).for_each(|(o, (w, b))| *o = w - b);
+                }
+            }
+            if change != 0.0 {
+                let own =
+                    EventParameters { amplitude: release.amplitude, onset_s: -release.lead_s, offset: 0.0, slope: 0.0 };
+                let after = release.samples - release.before;
+                let moved = signal(&scaled.release(), &own, release.interval_s, after);
+                let plain = signal(&lever.release(), &own, release.interval_s, after);
+                let late = out[release.before..].iter_mut();
+                late.zip(moved.iter().zip(&plain)).for_each(|(o, (m, p))| *o += m - p);
+            }
+            out
         })
         .collect()
 }
@@ -55,50 +79,75 @@ fn rotation(omega: f64, quality_factor: f64, h: f64) -> [f64; 4] {
     [decay * (cos + a / b * sin), decay * sin / b, -decay * omega * omega / b * sin, decay * (cos - a / b * sin)]
 }
 
-/// A first-order lag that follows signals on straight lines.
+/// A value and its rate.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    value: f64,
+    rate: f64,
+}
+
+/// A first-order lag that follows signals on cubics through values and rates at the ends of a step.
 struct Lag {
     pole: f64,
     state: f64,
-    decay: f64,
-    /// Delay of the answer to a slope, per rise within a step.
-    late: f64,
+    /// Weights of the state, and of value and rate at the step's beginning and end.
+    weights: [f64; 5],
 }
 
 impl Lag {
     fn new(pole: f64, level: f64) -> Self {
-        Self { pole, state: level, decay: 0.0, late: 0.0 }
+        Self { pole, state: level, weights: [0.0; 5] }
     }
 
+    /// Exact weights: the particular solution is a cubic too, its coefficients from the highest down.
     fn set_step(&mut self, h: f64) {
-        self.decay = (-self.pole * h).exp();
-        self.late = 1.0 / (h * self.pole);
+        let (decay, slow) = ((-self.pole * h).exp(), 1.0 / self.pole);
+        let answer = |from: Level, to: Level| {
+            let rise = (to.value - from.value) / h;
+            let c3 = (from.rate + to.rate - 2.0 * rise) / (h * h);
+            let c2 = (3.0 * rise - 2.0 * from.rate - to.rate) / h;
+            let d2 = c2 - 3.0 * c3 * slow;
+            let d1 = from.rate - 2.0 * d2 * slow;
+            let d0 = from.value - d1 * slow;
+            d0 + h * (d1 + h * (d2 + h * c3)) - d0 * decay
+        };
+        let level = |value: f64, rate: f64| Level { value, rate };
+        let none = level(0.0, 0.0);
+        self.weights = [
+            decay,
+            answer(level(1.0, 0.0), none),
+            answer(level(0.0, 1.0), none),
+            answer(none, level(1.0, 0.0)),
+            answer(none, level(0.0, 1.0)),
+        ];
     }
 
-    fn step(&mut self, from: f64, to: f64) -> f64 {
-        let late = (to - from) * self.late;
-        self.state = to - late + (self.state - from + late) * self.decay;
-        self.state
+    fn step(&mut self, from: Level, to: Level) -> Level {
+        let [a, b, c, d, e] = self.weights;
+        self.state = a * self.state + b * from.value + c * from.rate + d * to.value + e * to.rate;
+        Level { value: self.state, rate: self.pole * (to.value - self.state) }
     }
 }
 
 struct Chain {
     sections: Vec<(Lag, f64, f64)>,
     /// Last input of every section, then the output.
-    levels: Vec<f64>,
+    levels: Vec<Level>,
 }
 
 impl Chain {
     fn new(lever: &Lever, effects: &Effects, level: f64) -> Self {
-        let mut levels = vec![level];
+        let still = |value: f64| Level { value, rate: 0.0 };
+        let mut levels = vec![still(level)];
         let mut sections = Vec::new();
         for &pole in &lever.poles {
             sections.push((Lag::new(pole, level), 1.0, 0.0));
-            levels.push(level);
+            levels.push(still(level));
         }
         for s in &effects.electronics {
-            let input = levels.last().copied().unwrap_or(level);
+            let input = levels.last().map_or(level, |l| l.value);
             sections.push((Lag::new(s.pole, input), s.low, s.high));
-            levels.push(s.low * input);
+            levels.push(still(s.low * input));
         }
         Self { sections, levels }
     }
@@ -107,12 +156,13 @@ impl Chain {
         self.sections.iter_mut().for_each(|s| s.0.set_step(h));
     }
 
-    fn step(&mut self, to: f64) {
+    fn step(&mut self, to: Level) {
         let mut input = to;
         for (i, (lag, low, high)) in self.sections.iter_mut().enumerate() {
             let slow = lag.step(self.levels[i], input);
             self.levels[i] = input;
-            input = *high * input + (*low - *high) * slow;
+            let mix = |fast: f64, slow: f64| *high * fast + (*low - *high) * slow;
+            input = Level { value: mix(input.value, slow.value), rate: mix(input.rate, slow.rate) };
         }
         if let Some(last) = self.levels.last_mut() {
             *last = input;
@@ -120,7 +170,7 @@ impl Chain {
     }
 
     fn output(&self) -> f64 {
-        self.levels.last().copied().unwrap_or(0.0)
+        self.levels.last().map_or(0.0, |level| level.value)
     }
 }
 
@@ -135,13 +185,13 @@ struct Run<'a> {
     acceleration: Vec<f64>,
     amplitude: f64,
     time_s: f64,
+    load_now: f64,
 }
 
 impl<'a> Run<'a> {
     fn new(lever: &Lever, effects: &'a Effects, release: &Release) -> Self {
-        let scale = 1.0 + release.frequency_change;
         let mut shares: Vec<f64> = lever.modes.iter().map(|m| m.share).collect();
-        let mut omega: Vec<f64> = lever.modes.iter().map(|m| m.omega * scale).collect();
+        let mut omega: Vec<f64> = lever.modes.iter().map(|m| m.omega).collect();
         let mut quality: Vec<f64> = lever.modes.iter().map(|m| m.quality_factor).collect();
         for extra in &effects.extra_modes {
             shares.push(extra.share);
@@ -160,6 +210,7 @@ impl<'a> Run<'a> {
             quality,
             amplitude: release.amplitude,
             time_s: 0.0,
+            load_now: -release.amplitude * effects.load(0.0),
         }
     }
 
@@ -171,6 +222,7 @@ impl<'a> Run<'a> {
         -self.amplitude * self.effects.load(t)
     }
 
+    /// Half a step's force of the causes.
     fn kick(&mut self, h: f64) {
         self.acceleration.fill(0.0);
         let own = self.own;
@@ -180,35 +232,59 @@ impl<'a> Run<'a> {
         for force in &self.effects.modal_force {
             force(&motion, &mut self.acceleration[..own]);
         }
-        self.velocity.iter_mut().zip(&self.acceleration).for_each(|(v, a)| *v += 0.5 * h * a);
+        self.velocity.iter_mut().zip(&self.acceleration).for_each(|(v, a)| *v += h * a);
     }
 
+    /// Mean of the load from one time to another, from its values there and in the middle: Simpson's rule, halved where it jumps or bends.
+    fn mean_load(&self, from: (f64, f64), middle: (f64, f64), to: (f64, f64), halvings: usize) -> f64 {
+        let at = |t: f64| (t, self.load(t));
+        let (left, right) = (at(0.5 * (from.0 + middle.0)), at(0.5 * (middle.0 + to.0)));
+        let whole = (from.1 + 4.0 * middle.1 + to.1) / 6.0;
+        let halves = [(from.1 + 4.0 * left.1 + middle.1) / 6.0, (middle.1 + 4.0 * right.1 + to.1) / 6.0];
+        let mean = 0.5 * (halves[0] + halves[1]);
+        let uneven = (mean - whole).abs() > EVEN * self.amplitude.abs();
+        if !uneven || halvings == 0 {
+            return mean;
+        }
+        let deeper = |from, middle, to| self.mean_load(from, middle, to, halvings - 1);
+        0.5 * (deeper(from, left, middle) + deeper(middle, right, to))
+    }
+
+    /// A step between two half kicks.
     fn advance(&mut self, rotations: &[[f64; 4]], h: f64) {
         let bent = self.effects.bend_the_motion();
         if bent {
-            self.kick(h);
+            self.kick(0.5 * h);
         }
-        let u = if self.effects.remaining_load.is_empty() {
-            0.0
-        } else {
-            // mean over the step: the open midpoint rule over quarters, which jumps and kinks need
-            (0..4).map(|i| self.load(self.time_s + h * (0.125 + 0.25 * f64::from(i)))).sum::<f64>() / 4.0
-        };
+        let mut u = 0.0;
+        if !self.effects.remaining_load.is_empty() {
+            let end = self.time_s + h;
+            let (next, middle) = (self.load(end), self.time_s + 0.5 * h);
+            u = self.mean_load((self.time_s, self.load_now), (middle, self.load(middle)), (end, next), HALVINGS);
+            self.load_now = next;
+        }
         for ((q, v), r) in self.position.iter_mut().zip(&mut self.velocity).zip(rotations) {
             let x = *q - u;
             (*q, *v) = (u + r[0] * x + r[1] * *v, r[2] * x + r[3] * *v);
         }
         self.time_s += h;
         if bent {
-            self.kick(h);
+            self.kick(0.5 * h);
         }
     }
 
-    fn signal(&self) -> f64 {
-        let s: f64 = self.position.iter().zip(&self.shares).map(|(q, g)| q * g).sum();
-        let direct =
-            if self.effects.feedthrough == 0.0 { 0.0 } else { self.effects.feedthrough * self.load(self.time_s) };
-        self.effects.seen(s + direct)
+    fn signal(&self) -> Level {
+        let mix = |values: &[f64]| values.iter().zip(&self.shares).map(|(x, g)| x * g).sum::<f64>();
+        let mut s = Level { value: mix(&self.position), rate: mix(&self.velocity) };
+        if self.effects.feedthrough != 0.0 {
+            s.value += self.effects.feedthrough * self.load(self.time_s);
+        }
+        if self.effects.optics.is_empty() {
+            return s;
+        }
+        let step = 1e-4 * self.amplitude.abs();
+        let slope = (self.effects.seen(s.value + step) - self.effects.seen(s.value - step)) / (2.0 * step);
+        Level { value: self.effects.seen(s.value), rate: slope * s.rate }
     }
 
     /// The signal before the release.
@@ -223,15 +299,18 @@ fn run(lever: &Lever, effects: &Effects, release: &Release) -> Vec<f64> {
     let mut chain = Chain::new(lever, effects, state.held());
     let mut out = vec![chain.output(); release.samples];
     let h = release.interval_s / STEPS as f64;
+    // a release behind its sample: that one still shows the held level
+    let (mut lead, mut first) = (release.lead_s, release.before);
+    while lead < 0.0 && first < release.samples {
+        lead += release.interval_s;
+        first += 1;
+    }
     // the first sample after the release lies whole steps and a rest behind it
-    let lead = release.lead_s.max(0.0);
     let whole = (lead / h).floor();
     let rest = lead - whole * h;
     // the instant of the release: optics and electronics see a continuous signal, feedthrough jumps
-    if effects.feedthrough != 0.0 {
-        if let Some(first) = chain.levels.first_mut() {
-            *first = state.signal();
-        }
+    if let Some(first) = chain.levels.first_mut() {
+        *first = state.signal();
     }
     if rest > 0.0 {
         chain.set_step(rest);
@@ -244,7 +323,7 @@ fn run(lever: &Lever, effects: &Effects, release: &Release) -> Vec<f64> {
         state.advance(&rotations, h);
         chain.step(state.signal());
     }
-    let (early, late) = out[release.before..].split_at_mut(EARLY.min(release.samples - release.before));
+    let (early, late) = out[first..].split_at_mut(EARLY.min(release.samples - first));
     let mut sample = |value: &mut f64, rotations: &[[f64; 4]], h: f64, steps: usize, chain: &mut Chain| {
         *value = chain.output();
         for _ in 0..steps {
@@ -254,7 +333,12 @@ fn run(lever: &Lever, effects: &Effects, release: &Release) -> Vec<f64> {
     };
     early.iter_mut().for_each(|value| sample(value, &rotations, h, STEPS, &mut chain));
     let h = release.interval_s / LATE_STEPS as f64;
-    let rotations: Vec<[f64; 4]> = lengthened(&rotations);
+    let mut rotations = rotations;
+    let mut factor = STEPS / LATE_STEPS;
+    while factor > 1 {
+        rotations = lengthened(&rotations);
+        factor /= 2;
+    }
     chain.set_step(h);
     late.iter_mut().for_each(|value| sample(value, &rotations, h, LATE_STEPS, &mut chain));
     out
