@@ -8,12 +8,16 @@ mod adc;
 mod afm;
 mod afm_system;
 mod archive;
+mod chain;
 mod contact;
 mod detector;
 mod discretisation;
 mod error;
+mod hidden;
+mod hidden_motion;
 mod lever;
 mod motion;
+mod optics;
 mod phases;
 mod propagator;
 mod ramp;
@@ -22,6 +26,8 @@ mod recorder;
 mod square;
 mod truth;
 
+#[cfg(test)]
+mod hidden_tests;
 #[cfg(test)]
 mod tests;
 
@@ -33,6 +39,8 @@ pub use contact::{ADHESION_CUT, Contact};
 pub use detector::Detector;
 pub use discretisation::{LinearSystem, Step};
 pub use error::SimulateError;
+pub use hidden::{Hidden, Setting, effects};
+pub use hidden_motion::simulate_hidden;
 pub use lever::{ModalLever, Mode};
 pub use motion::{ContactEvent, Drive, EventKind, Motion, Sampling, simulate_motion};
 pub use phases::{PhaseProblem, RecordPlan, Target};
