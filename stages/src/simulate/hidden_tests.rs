@@ -295,7 +295,7 @@ fn halving_the_step_changes_little_of_what_modal_forces_do() {
     let forces: [(&str, crate::causes::ModalForce); 3] = [
         ("stiffness", Arc::new(|m, a| a[0] -= m.omega[0].powi(2) * 0.01 * m.position[0].powi(3))),
         ("damping", Arc::new(|m, a| a[1] -= m.omega[1] * 2e-3 * m.velocity[1] * m.position[1].powi(2))),
-        ("gap", Arc::new(|m, a| (0..4).for_each(|n| a[n] -= m.omega[n].powi(2) * 0.02 * (-m.gap / 0.1).exp()))),
+        ("gap", Arc::new(|m, a| (0..4).for_each(|n| a[n] -= m.omega[n].powi(2) * 0.01 * (-m.gap / 0.1).exp()))),
     ];
     for (name, force) in forces {
         let effects = Effects { modal_force: vec![force], ..Effects::default() };
