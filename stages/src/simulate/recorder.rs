@@ -205,7 +205,7 @@ impl Microscope {
     }
 
     /// The lever of a record whose frequencies may have changed.
-    fn lever_at(&self, place: Place, effects: &Effects) -> ModalLever {
+    pub(super) fn lever_at(&self, place: Place, effects: &Effects) -> ModalLever {
         let middle = place.instant(0.5 * place.samples as f64 / self.sample_rate_hz, 0.0);
         let change: f64 = effects.frequency.iter().map(|change| change(&middle)).sum();
         let mut lever = self.lever.clone();
@@ -283,7 +283,7 @@ fn jittered(start_s: f64, jitter_s: f64, place: Place) -> f64 {
 
 impl Place {
     /// A time of this record.
-    fn instant(&self, time_s: f64, piezo_m: f64) -> Instant {
+    pub(super) fn instant(&self, time_s: f64, piezo_m: f64) -> Instant {
         let last = self.records.saturating_sub(1).max(1);
         Instant { record: self.record, place: self.record as f64 / last as f64, time_s, piezo_m }
     }
