@@ -1,6 +1,7 @@
 //! `afmid exam`: hides causes in simulated recordings and judges what a config says of them.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use afmid_pipeline::cache::Cache;
 use afmid_pipeline::runner::{Options, Quiet, run as run_plan};
@@ -22,6 +23,15 @@ const SUMMARY: &str = "summary";
 
 /// Runs an exam and prints its score.
 pub fn run(args: &ExamArgs, registry: &Registry) -> Result<(), Failure> {
+    let score = score(args, registry)?;
+    if args.json {
+        let text = serde_json::to_string_pretty(&score).map_err(|error| Failure::failed(error, None))?;
+        return print(&(text + "\n"));
+    }
+    print(&score.text())
+}
+
+fn score(args: &ExamArgs, registry: &Registry) -> Result<Score, Failure> {
     let plan = load(&args.config.config, &args.config.set, registry)?;
     for id in ["records", STAGE] {
         if plan.node(id).is_none() {
@@ -41,12 +51,7 @@ pub fn run(args: &ExamArgs, registry: &Registry) -> Result<(), Failure> {
         say(&told(&one));
         judged.push(one);
     }
-    let score = Score::new(judged);
-    if args.json {
-        let text = serde_json::to_string_pretty(&score).map_err(|error| Failure::failed(error, None))?;
-        return print(&(text + "\n"));
-    }
-    print(&score.text())
+    Ok(Score::new(judged))
 }
 
 fn kind(only: ExamKind) -> Kind {
@@ -128,12 +133,19 @@ fn diagnosed(drawn: &Draw, args: &ExamArgs, registry: &Registry, base: &Path) ->
     }
 }
 
+/// Exams of this process so far: each has a folder of its own.
+static NUMBER: AtomicUsize = AtomicUsize::new(0);
+
 /// A folder of its own below the system's temporary one, removed at the end.
 struct Scratch(PathBuf);
 
 impl Scratch {
     fn new() -> Result<Self, Failure> {
-        let folder = std::env::temp_dir().join(format!("afmid-exam-{}", std::process::id()));
+        let folder = std::env::temp_dir().join(format!(
+            "afmid-exam-{}-{}",
+            std::process::id(),
+            NUMBER.fetch_add(1, Ordering::Relaxed)
+        ));
         std::fs::create_dir_all(&folder).map_err(|error| {
             Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
         })?;
@@ -147,3 +159,7 @@ impl Drop for Scratch {
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
+
+#[cfg(test)]
+#[path = "exam_tests.rs"]
+mod tests;

@@ -11,6 +11,7 @@ fn scene() -> Scene {
         interval_s: 2e-7,
         window_s: 1.4e-3,
         level_v: 0.87,
+        input_level: 0.5,
         noise_v: 3.5e-4,
         residual_peaks_hz: vec![133e3, 92.6e3],
     }
@@ -38,20 +39,6 @@ fn everything_is_said() {
         }
         let no = matches!(about.identifiable, Identifiable::No(_));
         assert!(no || !about.parameters.is_empty(), "{} has no strength", about.id);
-    }
-}
-
-#[test]
-fn classes_are_mutual() {
-    for about in CATALOGUE.iter().map(|cause| cause.about()) {
-        for other in about.class.iter().filter_map(|id| find(id)) {
-            assert!(
-                other.about().class.contains(&about.id),
-                "{} knows {}, not the other way",
-                about.id,
-                other.about().id
-            );
-        }
     }
 }
 

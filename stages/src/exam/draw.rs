@@ -170,7 +170,7 @@ fn plant(
     if wanted == 0 {
         return Some(planted);
     }
-    let limits = Limits::new(&afm.microscope(), releases)?;
+    let limits = Limits::new(&afm.microscope(), releases, afm.samples)?;
     let candidates: Vec<&'static dyn Cause> = catalogue.iter().copied().filter(|cause| nameable(*cause)).collect();
     for _ in 0..ATTEMPTS {
         if planted.len() == wanted || candidates.is_empty() {
@@ -223,6 +223,7 @@ fn scene(afm: &Afm, rng: &mut ChaCha8Rng) -> Scene {
         interval_s: 1.0 / afm.sample_rate_hz,
         window_s: 7168.0 / afm.sample_rate_hz,
         level_v: afm.adhesion_n / afm.stiffness_n_per_m * afm.sensitivity_v_per_m,
+        input_level: 0.0,
         noise_v: afm.white_v / (afm.records as f64).sqrt(),
         residual_peaks_hz: free.into_iter().collect(),
     }

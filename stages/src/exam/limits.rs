@@ -10,6 +10,10 @@ pub const LIMIT_GAIN: f64 = 10.0;
 const CUT: Cut = Cut { before: 1024, samples: 8192 };
 /// Places of the archive at which events are compared: first, middle and last record.
 const PLACES: usize = 3;
+/// Where the 1/f noise is taken for what is added to whole records, Hz.
+const HUM_HZ: f64 = 50.0;
+/// Points of a record at which it is evaluated: 20 kHz in 40 ms.
+const POINTS: usize = 1600;
 
 /// What a baseline can follow, and the noise that hides the rest.
 ///
@@ -24,6 +28,8 @@ const PLACES: usize = 3;
 pub struct Limits {
     microscope: Microscope,
     events: usize,
+    /// Samples of a record.
+    samples: usize,
     variance_v2: f64,
     /// Releases with nothing hidden, one after the other.
     plain: Vec<f64>,
@@ -32,8 +38,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// For an archive of so many events; nothing if the microscope never releases its tip.
-    pub fn new(microscope: &Microscope, events: usize) -> Option<Self> {
+    /// For an archive of so many events in records of so many samples; nothing if the microscope never releases its tip.
+    pub fn new(microscope: &Microscope, events: usize, samples: usize) -> Option<Self> {
         let plain = releases(microscope, &Effects::default(), events)?;
         let mut followed = event_columns(&plain);
         for perturbed in perturbations(microscope) {
@@ -44,7 +50,14 @@ impl Limits {
         }
         let noise = &microscope.noise;
         let variance_v2 = noise.white_v.powi(2) + noise.pink_v.powi(2) + microscope.adc.lsb_v.powi(2) / 12.0;
-        Some(Self { microscope: microscope.clone(), events, variance_v2, plain, followed: orthonormal(followed) })
+        Some(Self {
+            microscope: microscope.clone(),
+            events,
+            samples,
+            variance_v2,
+            plain,
+            followed: orthonormal(followed),
+        })
     }
 
     /// Expected gain of the log likelihood if `effects` are hidden and explained; nothing if the tip is not released.
@@ -53,7 +66,34 @@ impl Limits {
         let mut left: Vec<f64> = with.iter().zip(&self.plain).map(|(a, b)| a - b).collect();
         project_out(&mut left, &self.followed);
         let squares = left.iter().map(|v| v * v).sum::<f64>();
-        Some(0.5 * squares / self.variance_v2 * self.events as f64 / PLACES as f64)
+        let windows = 0.5 * squares / self.variance_v2 * self.events as f64 / PLACES as f64;
+        Some(windows + self.record_gain(effects))
+    }
+
+    /// The same of what is added to whole records, each with an offset of its own, in white and 1/f noise at [`HUM_HZ`].
+    fn record_gain(&self, effects: &Effects) -> f64 {
+        let (noise, rate) = (&self.microscope.noise, self.microscope.sample_rate_hz);
+        // one-sided densities, V^2/Hz: the 1/f noise spreads its variance evenly over the logarithm from 1 Hz to half the rate
+        let white = 2.0 * noise.white_v.powi(2) / rate;
+        let pink = noise.pink_v.powi(2) / (0.5 * rate).ln() / HUM_HZ;
+        let variance_v2 = self.variance_v2 * (1.0 + pink / white.max(f64::MIN_POSITIVE));
+        let points = self.samples.min(POINTS);
+        let records = self.events.max(1);
+        let gain = |record: usize| {
+            let place = Place { record, records, samples: self.samples, margin_samples: 0, seed: 0 };
+            let added: Vec<f64> = (0..points)
+                .map(|i| {
+                    let time_s = i as f64 / points as f64 * self.samples as f64 / rate;
+                    let ramp = &self.microscope.ramp;
+                    let instant = place.instant(time_s, ramp.height_m(ramp.half_cycle(time_s), time_s));
+                    effects.added.iter().map(|added| added(&instant)).sum()
+                })
+                .collect();
+            let mean = added.iter().sum::<f64>() / points.max(1) as f64;
+            let square: f64 = added.iter().map(|v| (v - mean).powi(2)).sum();
+            0.5 * square * self.samples as f64 / points.max(1) as f64 / variance_v2
+        };
+        if effects.added.is_empty() { 0.0 } else { (0..records).map(gain).sum() }
     }
 }
 
@@ -194,13 +234,14 @@ mod tests {
 
     #[test]
     fn limits_are_where_a_prototype_began_to_name() {
-        let limits = Limits::new(&Afm::default().microscope(), 12).unwrap();
+        let limits = Limits::new(&Afm::default().microscope(), 12, 200_000).unwrap();
         for (id, values, low, high) in [
             // smallest strengths that a prototype named with 12 records: 0.5e-3 /V, 1.5e-3 /V^2, 0.3 us; the limit asks for less than naming does
             ("quadratic-detector", vec![0.01], 0.5e-4, 1e-3),
             ("cubic-detector", vec![0.01], 0.5e-4, 3e-3),
             ("finite-rupture", vec![1e-6], 0.3e-7, 6e-7),
             ("tether-tail", vec![0.01, 1e-4], 0.5e-4, 1.5e-3),
+            ("mains-hum", vec![1e-3, 50.0], 1e-6, 1e-3),
         ] {
             let found = limit(&limits, find(id).unwrap(), &values).unwrap();
             println!("{id} {found:e}");

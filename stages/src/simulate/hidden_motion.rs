@@ -15,10 +15,9 @@ use std::f64::consts::TAU;
 /// Simulates a record with causes hidden in it.
 ///
 /// # Model
-/// As [`simulate_motion`], and: from a release on, the tip feels the share of the pull-off force that [`Effects::load`] leaves (where a part leaves
-/// before, the contact holds from the crossing of the threshold to the release as a force); modal forces act always, with the gap since the release (the
-/// base's own motion included; zero while attached; the distance from the surface before any release); the optics' maps act on the lever's signal
-/// before the poles. Further modes, sections and feedthrough are part of `system`.
+/// As [`simulate_motion`], and: from a release on, the tip feels the share of the pull-off force that [`Effects::load`] leaves; modal forces act
+/// always, with the gap since the release (the base's own motion included; zero while attached; the distance from the surface before any release); the
+/// optics' maps act on the lever's signal before the poles. Further modes, sections and feedthrough are part of `system`.
 ///
 /// # Method
 /// Exact linear propagation between instants so close that the load runs straight from one to the next within [`LOAD_TOLERANCE`] (halved where it does
@@ -41,7 +40,7 @@ pub fn simulate_hidden(
     effects: &Effects,
     rng: &mut ChaCha8Rng,
 ) -> Motion {
-    let bent = effects.bend_the_motion() || !effects.remaining_load.is_empty() || !effects.early_loss.is_empty();
+    let bent = effects.bend_the_motion() || !effects.remaining_load.is_empty();
     if !bent && effects.optics.is_empty() && system.signal_direct_m_per_n == 0.0 {
         return simulate_motion(system, lever, contact, drive, sampling, rng);
     }
@@ -76,12 +75,10 @@ const LOAD_FLOOR: f64 = 1e-9;
 #[derive(Debug, Clone, Copy)]
 struct Release {
     time_s: f64,
-    /// Force on the tip just before the first loss, N.
+    /// Force on the tip just before it, N.
     force_n: f64,
     /// Gap at the crossing of the threshold, m.
     gap_m: f64,
-    /// Still before `time_s`.
-    falling: bool,
 }
 
 /// What is hidden in the motion, and the state of its integration.
@@ -91,8 +88,6 @@ pub(super) struct Hidden<'a> {
     /// Volts of static deflection per metre of each mode.
     volts_per_modal_m: Vec<f64>,
     omega: Vec<f64>,
-    /// How long before the release the load begins to leave, s.
-    lead_s: f64,
     /// When the load is gone, s after the release.
     gone_s: f64,
     /// Longest step, s.
@@ -120,8 +115,6 @@ impl<'a> Hidden<'a> {
             volts_per_m,
             volts_per_modal_m: lever.modes.iter().map(|mode| volts_per_m / mode.tip_share).collect(),
             omega,
-            // at zero itself the load has gone
-            lead_s: last_share(|t| 1.0 - effects.load(-t.max(f64::MIN_POSITIVE))),
             gone_s: last_share(|t| effects.load(t)),
             longest_s,
             release: None,
@@ -137,21 +130,14 @@ impl<'a> Hidden<'a> {
     fn force_n(&self, time_s: f64) -> f64 {
         let Some(release) = self.release else { return 0.0 };
         let age = time_s - release.time_s;
-        let share = if release.falling {
-            // the release itself belongs to what follows
-            self.effects.load(age.min(-f64::MIN_POSITIVE))
-        } else if age > self.gone_s {
-            0.0
-        } else {
-            self.effects.load(age.max(0.0))
-        };
+        let share = if age > self.gone_s { 0.0 } else { self.effects.load(age.max(0.0)) };
         release.force_n * share
     }
 
     /// Whether the load runs straight over a step.
     fn straight(&self, time_s: f64, span_s: f64) -> bool {
         let Some(release) = self.release else { return true };
-        if !release.falling && time_s - release.time_s > self.gone_s {
+        if time_s - release.time_s > self.gone_s {
             return true;
         }
         let (start, end) = (self.force_n(time_s), self.force_n(time_s + span_s));
@@ -217,9 +203,7 @@ impl Run<'_> {
         let mut whole = true;
         while self.time_s < end_s {
             let kink_s = self.drive.ramp.end_s(self.half);
-            let falling = hidden.release.filter(|release| release.falling);
-            let release_s = falling.map_or(f64::INFINITY, |release| release.time_s);
-            let stop_s = end_s.min(kink_s).min(release_s);
+            let stop_s = end_s.min(kink_s);
             whole = whole && stop_s == end_s;
             let span_s = if whole { self.interval_s } else { stop_s - self.time_s };
             if span_s > 0.0 && self.walk(hidden, span_s, rng) {
@@ -229,11 +213,6 @@ impl Run<'_> {
             self.time_s = stop_s;
             if stop_s == kink_s {
                 self.half += 1;
-            }
-            if stop_s == release_s
-                && let Some(release) = &mut hidden.release
-            {
-                release.falling = false;
             }
             self.load = hidden.release.map(|_| (hidden.force_n(stop_s), 0.0));
             self.arm();
@@ -264,8 +243,7 @@ impl Run<'_> {
         let (regime, interval_s) = (self.regime(), self.interval_s);
         let ladder = &mut hidden.ladders[self.regime_index()];
         ladder.step(regime, interval_s, span_s).advance(&self.state, first, second, &self.deviates, &mut self.next);
-        let falling = hidden.release.is_some_and(|release| release.falling);
-        if !falling && self.excess(&self.next, self.time_s + span_s) > 0.0 {
+        if self.excess(&self.next, self.time_s + span_s) > 0.0 {
             let before_s = self.time_s;
             self.switch(span_s);
             self.kicked = (0.0, 0.0);
@@ -292,11 +270,8 @@ impl Run<'_> {
             EventKind::SnapOff => {
                 let height = self.drive.height_m(self.half, time_s);
                 let gap_m = self.system.gap_m(&self.state, height);
-                let falling = hidden.lead_s > 0.0;
-                let time_s = time_s + hidden.lead_s;
-                hidden.release = Some(Release { time_s, force_n, gap_m, falling });
+                hidden.release = Some(Release { time_s, force_n, gap_m });
                 self.load = Some((hidden.force_n(self.time_s), 0.0));
-                self.move_last_event(time_s);
             }
         }
     }

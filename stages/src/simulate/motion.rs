@@ -230,13 +230,6 @@ impl<'a> Run<'a> {
         self.events.last()
     }
 
-    /// The last event ends at `time_s`.
-    pub(super) fn move_last_event(&mut self, time_s: f64) {
-        if let Some(event) = self.events.last_mut() {
-            event.time_s = time_s;
-        }
-    }
-
     pub(super) fn into_events(self) -> Vec<ContactEvent> {
         self.events
     }

@@ -109,6 +109,7 @@ enum Stream {
     Readout,
     Monitor,
     Jitter,
+    Intensity,
 }
 
 const STREAMS_PER_RECORD: u64 = 8;
@@ -189,18 +190,21 @@ impl Microscope {
         let drive = Drive { ramp, surface_m: plan.surface_m, pull_off_n: &plan.pull_off_n };
         let interval_s = 1.0 / self.sample_rate_hz;
         // the delay moves the instants, not the samples
-        let start_s = jittered(-self.detector.delay_s, effects.jitter_s, place);
-        let sampling = Sampling { start_s, interval_s, samples: place.samples };
+        let start_s = jittered(-self.detector.delay_s - effects.delay_s, effects.jitter_s, place);
+        let lost = Lost::new(effects, self.sample_rate_hz);
+        let sampling = Sampling { start_s, interval_s, samples: place.samples + lost.total() };
         let mut rng = stream(place.seed, place.record, Stream::Motion);
         let (contact, detector) = (&self.contact, &self.detector);
-        let motion = simulate_hidden(&system, &lever, contact, detector, &drive, sampling, effects, &mut rng);
+        let mut motion = simulate_hidden(&system, &lever, contact, detector, &drive, sampling, effects, &mut rng);
+        lost.drop_from(&mut motion.signal_m);
+        lost.drop_from(&mut motion.force_n);
         let deflection = self.deflection_codes(motion.signal_m, drift, place, &ramp, effects);
         SimulatedRecord {
             saturated: self.adc.saturated(&deflection),
             deflection,
             force_n: motion.force_n,
-            piezo: self.piezo_codes(&ramp, place),
-            events: self.recorded(&motion.events, place),
+            piezo: self.piezo_codes(&ramp, place, &lost),
+            events: self.recorded(&motion.events, place, -start_s, &lost),
         }
     }
 
@@ -224,13 +228,21 @@ impl Microscope {
         effects: &Effects,
     ) -> Vec<i16> {
         let mut volts = signal_m;
+        if effects.intensity != 0.0 {
+            let mut rng = stream(place.seed, place.record, Stream::Intensity);
+            for v in &mut volts {
+                let deviate: f64 = StandardNormal.sample(&mut rng);
+                *v *= 1.0 + effects.intensity * deviate;
+            }
+        }
         for (k, v) in volts.iter_mut().enumerate() {
             let along = (place.record as f64 + k as f64 / place.samples as f64) / place.records as f64;
             *v = self.detector.sensitivity_v_per_m * *v + drift.offset_v(along);
         }
+        let lost = Lost::new(effects, self.sample_rate_hz);
         if !effects.added.is_empty() {
             for (k, v) in volts.iter_mut().enumerate() {
-                let time_s = k as f64 / self.sample_rate_hz;
+                let time_s = lost.taken(k) as f64 / self.sample_rate_hz;
                 let instant = place.instant(time_s, ramp.height_m(ramp.half_cycle(time_s), time_s));
                 *v += effects.added.iter().map(|added| added(&instant)).sum::<f64>();
             }
@@ -242,12 +254,12 @@ impl Microscope {
         volts.into_iter().map(|v| self.adc.code(v)).collect()
     }
 
-    fn piezo_codes(&self, ramp: &TriangleRamp, place: Place) -> Vec<i16> {
+    fn piezo_codes(&self, ramp: &TriangleRamp, place: Place, lost: &Lost) -> Vec<i16> {
         let adc = Adc { bits: 16, lsb_v: self.monitor.lsb_v };
         let mut rng = stream(place.seed, place.record, Stream::Monitor);
         (0..place.samples)
             .map(|k| {
-                let time_s = k as f64 / self.sample_rate_hz;
+                let time_s = lost.taken(k) as f64 / self.sample_rate_hz;
                 let deviate: f64 = StandardNormal.sample(&mut rng);
                 let volts = ramp.height_m(ramp.half_cycle(time_s), time_s) / self.monitor.m_per_v;
                 adc.code(volts + self.monitor.white_v * deviate)
@@ -255,9 +267,9 @@ impl Microscope {
             .collect()
     }
 
-    fn recorded(&self, events: &[ContactEvent], place: Place) -> Vec<RecordedEvent> {
+    fn recorded(&self, events: &[ContactEvent], place: Place, delay_s: f64, lost: &Lost) -> Vec<RecordedEvent> {
         let (margin, samples) = (place.margin_samples as f64, place.samples as f64);
-        let at = |event: &ContactEvent| (event.time_s + self.detector.delay_s) * self.sample_rate_hz;
+        let at = |event: &ContactEvent| lost.stored((event.time_s + delay_s) * self.sample_rate_hz);
         events
             .iter()
             .enumerate()
@@ -281,9 +293,45 @@ fn jittered(start_s: f64, jitter_s: f64, place: Place) -> f64 {
     start_s + jitter_s * deviate
 }
 
+/// Samples that were taken and never stored: the place of each gap among the stored ones, and its length.
+struct Lost(Vec<(usize, usize)>);
+
+impl Lost {
+    fn new(effects: &Effects, sample_rate_hz: f64) -> Self {
+        let mut gaps: Vec<(usize, usize)> =
+            effects.lost.iter().map(|(time_s, count)| ((time_s * sample_rate_hz).max(0.0) as usize, *count)).collect();
+        gaps.sort_unstable();
+        Self(gaps)
+    }
+
+    fn total(&self) -> usize {
+        self.0.iter().map(|(_, count)| count).sum()
+    }
+
+    /// Number among the taken samples of stored sample `k`.
+    fn taken(&self, k: usize) -> usize {
+        k + self.0.iter().filter(|(at, _)| *at <= k).map(|(_, count)| count).sum::<usize>()
+    }
+
+    /// Place among the stored samples of place `taken` among the taken ones; inside a gap, the gap's.
+    fn stored(&self, taken: f64) -> f64 {
+        self.0.iter().rev().fold(taken, |taken, (at, count)| {
+            let at = *at as f64;
+            if taken <= at { taken } else { (taken - *count as f64).max(at) }
+        })
+    }
+
+    fn drop_from(&self, values: &mut Vec<f64>) {
+        for (at, count) in self.0.iter().rev() {
+            let end = (at + count).min(values.len());
+            values.drain((*at).min(end)..end);
+        }
+    }
+}
+
 impl Place {
     /// A time of this record.
-    pub(super) fn instant(&self, time_s: f64, piezo_m: f64) -> Instant {
+    pub(crate) fn instant(&self, time_s: f64, piezo_m: f64) -> Instant {
         let last = self.records.saturating_sub(1).max(1);
         Instant { record: self.record, place: self.record as f64 / last as f64, time_s, piezo_m }
     }
