@@ -22,7 +22,7 @@ use std::f64::consts::TAU;
 /// # Method
 /// Exact linear propagation between instants so close that the load runs straight from one to the next within [`LOAD_TOLERANCE`] (halved where it does
 /// not), which is exact for a straight load. Modal forces by Strang splitting: half a kick, the exact linear flow with its thermal noise, half a kick, in steps in
-/// which the fastest mode turns by less than [`STEP_RADIANS`]. Optics: what a map adds to the lever's signal goes through poles and sections
+/// which the fastest mode turns by less than [`STEP_RADIANS`] while the lever rings, of a sample while it rests. Optics: what a map adds to the lever's signal goes through poles and sections
 /// by itself, on straight lines between [`super::optics::POINTS`] points per sample.
 ///
 /// # Accuracy
@@ -68,6 +68,8 @@ pub const LOAD_TOLERANCE: f64 = 1e-6;
 pub const STEP_RADIANS: f64 = 0.35;
 /// Steps are halved at most this often: 0.05 ns at 5 MS/s, over which a jump of the load is smeared.
 const MAX_HALVINGS: i32 = 12;
+/// Time constants of the slowest mode after which its ringing has gone: a factor 6e-6.
+const RINGING: f64 = 12.0;
 /// Loads below this share count as gone.
 const LOAD_FLOOR: f64 = 1e-9;
 
@@ -90,8 +92,12 @@ pub(super) struct Hidden<'a> {
     omega: Vec<f64>,
     /// When the load is gone, s after the release.
     gone_s: f64,
-    /// Longest step, s.
+    /// Longest step where modal forces matter, s.
     longest_s: f64,
+    /// How long that is after a change of the contact, s.
+    ringing_s: f64,
+    /// Until when that is.
+    fine_until_s: f64,
     release: Option<Release>,
     ladders: [Ladder; 3],
     position: Vec<f64>,
@@ -109,6 +115,8 @@ impl<'a> Hidden<'a> {
         while effects.bend_the_motion() && longest_s * fastest > STEP_RADIANS {
             longest_s *= 0.5;
         }
+        let decay = |mode: &super::Mode| 2.0 * mode.quality_factor / (TAU * mode.frequency_hz);
+        let slowest = lever.modes.iter().map(decay).fold(0.0, f64::max);
         let modes = omega.len();
         Self {
             effects,
@@ -117,6 +125,8 @@ impl<'a> Hidden<'a> {
             omega,
             gone_s: last_share(|t| effects.load(t)),
             longest_s,
+            ringing_s: RINGING * slowest,
+            fine_until_s: f64::NEG_INFINITY,
             release: None,
             ladders: Default::default(),
             position: vec![0.0; modes],
@@ -223,7 +233,8 @@ impl Run<'_> {
     fn walk(&mut self, hidden: &mut Hidden, span_s: f64, rng: &mut ChaCha8Rng) -> bool {
         let shortest = self.interval_s * 0.5f64.powi(MAX_HALVINGS);
         let straight = self.held_n.is_some() || hidden.straight(self.time_s, span_s);
-        if span_s > hidden.longest_s || !straight && span_s > shortest {
+        let longest_s = if self.time_s < hidden.fine_until_s { hidden.longest_s } else { self.interval_s };
+        if span_s > longest_s || !straight && span_s > shortest {
             let half = 0.5 * span_s;
             return self.walk(hidden, half, rng) || self.walk(hidden, half, rng);
         }
@@ -262,6 +273,7 @@ impl Run<'_> {
     /// Begins or ends what follows a release.
     fn note_change(&mut self, hidden: &mut Hidden) {
         let Some(&ContactEvent { kind, time_s, force_n, .. }) = self.last_event() else { return };
+        hidden.fine_until_s = time_s + hidden.ringing_s;
         match kind {
             EventKind::SnapIn => {
                 hidden.release = None;
