@@ -66,6 +66,8 @@ const STRONGEST: f64 = 30.0;
 const LEFT_OUT: f64 = 10.0;
 /// Nominal poles are off by up to this share.
 const POLES_OFF: f64 = 0.15;
+/// Records of an archive whose records hold several cycles.
+const LONG_RECORDS: usize = 6;
 /// Attempts to find a cause whose limit lies within its parameter's limits.
 const ATTEMPTS: usize = 40;
 
@@ -127,10 +129,11 @@ fn described(cause: &dyn Cause, values: &[f64], limit: f64) -> Planted {
 /// The microscope and the number of its releases.
 fn archive(seed: u64, rng: &mut ChaCha8Rng) -> (Afm, usize) {
     let lever = lever(rng);
-    let records = rng.random_range(10..=16);
+    let short = rng.random_range(10..=16);
     let scatter = 0.06 * 4.9f64.powf(rng.random::<f64>());
     let idle = rng.random_range(0..=2);
     let long = rng.random_range(0..10) == 0;
+    let records = if long { LONG_RECORDS } else { short };
     let base = Afm::default();
     // the weakest release must survive the catch: a gap that half of it closes
     let weakest_n = base.adhesion_n * (1.0 - 3.0 * scatter);
@@ -153,7 +156,8 @@ fn archive(seed: u64, rng: &mut ChaCha8Rng) -> (Afm, usize) {
         seed: Some(seed),
         ..base
     };
-    (afm, records - idle)
+    // at least one full cycle in a long record
+    (afm, if long { records } else { records - idle })
 }
 
 type Chosen = (&'static dyn Cause, Vec<f64>, f64);
