@@ -53,6 +53,16 @@ pub enum Command {
         /// The stage to document.
         name: Option<String>,
     },
+    /// List what a simulation can get wrong, or document one cause.
+    Causes {
+        /// The cause to document.
+        name: Option<String>,
+        /// As JSON, alone on stdout.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Hide causes in simulated recordings, diagnose them with a config, and say how well it did.
+    Exam(ExamArgs),
     /// Print the JSON Schema of a config.
     Schema,
     /// Write the generated documentation: the stages' pages and the schema of configs.
@@ -75,6 +85,39 @@ pub struct ConfigArgs {
     /// Set a parameter (or `pipeline.seed`); VALUE is TOML, so text needs quotes of its own.
     #[arg(long = "set", value_name = "ID.PARAM=VALUE")]
     pub set: Vec<String>,
+}
+
+/// How to examine a config.
+#[derive(Debug, Args)]
+pub struct ExamArgs {
+    /// The config, with a stage `records` and a stage `diagnosis`, and what changes it.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Archives to draw.
+    #[arg(long, value_name = "N", default_value_t = 400)]
+    pub seeds: u64,
+    /// Seed of the first archive; the others follow.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub first_seed: u64,
+    /// Hide only this [default: all of them, in fixed shares].
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub only: Option<ExamKind>,
+    /// As JSON, alone on stdout, every archive with its draw.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What an exam hides.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum ExamKind {
+    /// Nothing.
+    Clean,
+    /// One cause.
+    One,
+    /// Two or three causes.
+    Mixture,
+    /// One cause that the diagnosis may not use.
+    LeftOut,
 }
 
 /// How to run a config.

@@ -5,18 +5,23 @@ use std::path::{Path, PathBuf};
 
 use afmid_pipeline::Registry;
 use afmid_pipeline::reference::files;
+use afmid_stages::causes::{CATALOGUE, index, page};
 
 use super::schema;
 use crate::failure::Failure;
 use crate::output::print;
 
-/// Writes `FOLDER/stages/*.md` and `FOLDER/pipeline.schema.json`, or says what would change. Pages of stages that are gone are removed.
+/// Writes `FOLDER/stages/*.md`, `FOLDER/causes/*.md` and `FOLDER/pipeline.schema.json`, or says what would change. Pages of what is gone are removed.
 pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failure> {
     let stages = folder.join("stages");
     let pages = files(registry).map_err(|error| Failure::failed(error, None))?;
     let mut wanted: Vec<(PathBuf, String)> = pages.into_iter().map(|(name, text)| (stages.join(name), text)).collect();
+    let causes = folder.join("causes");
+    wanted.push((causes.join("README.md"), index(CATALOGUE)));
+    wanted.extend(CATALOGUE.iter().map(|cause| (causes.join(format!("{}.md", cause.about().id)), page(*cause))));
     wanted.push((folder.join("pipeline.schema.json"), schema::text(registry)?));
-    let stale = stale(&stages, &wanted);
+    let mut stale = stale(&stages, &wanted);
+    stale.extend(self::stale(&causes, &wanted));
     let changed: Vec<&(PathBuf, String)> =
         wanted.iter().filter(|(path, text)| fs::read_to_string(path).ok().as_ref() != Some(text)).collect();
     if check {
@@ -29,7 +34,9 @@ pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failur
         return Err(Failure::failed(format!("the generated documentation is old: {}", names.join(", ")), Some(help)));
     }
     let fail = |path: &Path, error| Failure::failed(format!("{} cannot be written: {error}", path.display()), None);
-    fs::create_dir_all(&stages).map_err(|error| fail(&stages, error))?;
+    for folder in [&stages, &causes] {
+        fs::create_dir_all(folder).map_err(|error| fail(folder, error))?;
+    }
     let mut done = String::new();
     for (path, text) in changed {
         fs::write(path, text).map_err(|error| fail(path, error))?;
@@ -42,7 +49,7 @@ pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failur
     print(&done)
 }
 
-/// Pages that no stage has any more.
+/// Pages that no stage or cause has any more.
 fn stale(folder: &Path, wanted: &[(PathBuf, String)]) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut stale: Vec<PathBuf> = entries.filter(|path| wanted.iter().all(|(wanted, _)| wanted != path)).collect();

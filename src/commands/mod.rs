@@ -1,7 +1,9 @@
 //! One file per command: each turns arguments into a call of the engine, and its answer into text.
 
+mod causes;
 mod check;
 mod docs;
+mod exam;
 mod explain;
 mod graph;
 mod load;
@@ -28,6 +30,8 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::Check { configs } => check::run(&configs, registry),
         Command::Graph { config, format } => graph::run(&config, format, registry),
         Command::Stages { name } => stages::run(name.as_deref(), registry),
+        Command::Causes { name, json } => causes::run(name.as_deref(), json),
+        Command::Exam(args) => exam::run(&args, registry),
         Command::Schema => schema::run(registry),
         Command::Docs { folder, check } => docs::run(&folder, check, registry),
     }

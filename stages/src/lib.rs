@@ -5,6 +5,7 @@ pub mod causes;
 pub mod diagnosis;
 pub mod ensemble;
 pub mod events;
+pub mod exam;
 pub mod force;
 pub mod io;
 pub mod model;

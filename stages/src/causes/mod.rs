@@ -5,6 +5,7 @@
 
 mod cause;
 mod effects;
+mod page;
 
 mod ac_coupling;
 mod adc_nonlinearity;
@@ -54,6 +55,7 @@ pub use effects::{
     Added, Effects, ExtraMode, FrequencyChange, Instant, Intersample, LinearSection, ModalForce, Motion, RemainingLoad,
     StaticMap,
 };
+pub use page::{as_json, index, page};
 
 /// Every built-in cause.
 pub const CATALOGUE: &[&dyn Cause] = &[
@@ -105,3 +107,6 @@ pub const CATALOGUE: &[&dyn Cause] = &[
 pub fn find(id: &str) -> Option<&'static dyn Cause> {
     CATALOGUE.iter().copied().find(|cause| cause.about().id == id)
 }
+
+#[cfg(test)]
+mod catalogue_tests;

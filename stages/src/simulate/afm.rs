@@ -11,6 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::archive::{Archive, ArchiveLayout};
+use super::hidden::{Hidden, effects};
 use super::recorder::{Microscope, PiezoMonitor, RecordedEvent, Scatter, SimulatedRecord};
 use super::truth::{Truth, counts, record_truth};
 use super::{Adc, Contact, Detector, ModalLever, Mode, ReadoutNoise, Target, TriangleRamp};
@@ -22,15 +23,16 @@ use super::{Adc, Contact, Detector, ModalLever, Mode, ReadoutNoise, Target, Tria
 /// force on every mode, detector poles and delay, white, 1/f and slowly wandering noise of the readout, a converter.
 /// # Method
 /// Between events the system is linear: exact propagation by matrix exponentials with exact noise covariances; events are located to 1e-8 of a
-/// sample. Start phases of the ramp are solved for, so that the archive holds the stated numbers of events.
+/// sample. Start phases of the ramp are solved for, so that the archive holds the stated numbers of events. Hidden causes are integrated in time:
+/// loads on straight lines between exact steps, modal forces by Strang splitting, maps of the optics on eight points per sample.
 /// # Shapes
 /// `records` files of `samples` samples in the folder `out`, channels `deflection` and `piezo`; the truth in `out`.truth.json.
 /// # Units
 /// SI; channels in volts. Deflection away from the sample is positive.
 /// # Accuracy
-/// No integration error. The inertia of the moving base is left out; crossings of a threshold and back within one sample are missed.
+/// No integration error with nothing hidden, below 1 % of a hidden effect otherwise. The inertia of the moving base is left out; crossings of a threshold and back within one sample are missed.
 /// # Errors
-/// Parameters out of range, event totals out of reach, a folder that holds other records already.
+/// Parameters out of range, an unknown cause, event totals out of reach, a folder that holds other records already.
 /// # Source
 /// Stark et al., Rev. Sci. Instrum. 2005, Fig. 1 and section Setup; C. F. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -110,6 +112,9 @@ pub struct Afm {
     pub lsb_v: f64,
     /// Deflate level of the files, 0 (raw) to 9. Default: 4.
     pub compression: u8,
+    /// Causes hidden in the simulation, each a table with the id of a cause (`afmid causes`) and all its parameters within their limits, as in
+    /// `{ cause = "quadratic-detector", a2 = 0.012 }`; they are integrated in time and add up. Default: none, the linear microscope.
+    pub hidden: Vec<Hidden>,
     /// Seed of all random numbers; absent: the pipeline's and the stage's id. Default: absent.
     pub seed: Option<u64>,
 }
@@ -152,6 +157,7 @@ impl Default for Afm {
             adc_bits: 12,
             lsb_v: 0.977e-3,
             compression: 4,
+            hidden: Vec::new(),
             seed: None,
         }
     }
@@ -189,6 +195,7 @@ impl Stage for Afm {
         if self.compression > 9 {
             return Err(StageError::new(format!("`compression` is {}, wanted 0 to 9", self.compression)));
         }
+        effects(&self.hidden)?;
         self.microscope().check().and_then(|()| self.layout(0).check()).map_err(StageError::from_error)
     }
 
@@ -198,13 +205,14 @@ impl Stage for Afm {
         prepare(&folder, &names)?;
         let seed = self.seed.unwrap_or_else(|| cx.seed());
         let (microscope, layout) = (self.microscope(), self.layout(seed));
+        let effects = effects(&self.hidden)?;
         let archive = Archive::plan(&microscope, &layout).map_err(StageError::from_error)?;
         cx.expect(self.records);
         let written = names
             .par_iter()
             .enumerate()
             .map(|(record, name)| {
-                let simulated = archive.simulate(&microscope, record);
+                let simulated = archive.simulate_with(&microscope, record, &effects);
                 let written = self.write(&folder.join(name), record, simulated);
                 cx.tick();
                 written
@@ -253,12 +261,14 @@ impl Stage for Afm {
     }
 
     fn examples() -> Vec<Example> {
-        vec![Example {
-            title: "two short records, each with one snap-off",
-            params: "records = 2\nsamples = 500000\nramp_hz = 10.0\nsnap_offs = 2\nseed = 5",
-            inputs: || Ok(Ports::new()),
-            expect,
-        }]
+        let short = "records = 2\nsamples = 500000\nramp_hz = 10.0\nsnap_offs = 2\nseed = 5";
+        let hidden = "records = 2\nsamples = 500000\nramp_hz = 10.0\nsnap_offs = 2\nseed = 5\n\
+                      hidden = [{ cause = \"quadratic-detector\", a2 = 0.012 }]";
+        let inputs = || Ok(Ports::new());
+        vec![
+            Example { title: "two short records, each with one snap-off", params: short, inputs, expect },
+            Example { title: "the same through a photodiode that bends", params: hidden, inputs, expect },
+        ]
     }
 }
 

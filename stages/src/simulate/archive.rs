@@ -5,6 +5,7 @@ use super::motion::EventKind;
 use super::phases::{PhaseProblem, RecordPlan, Target};
 use super::readout_noise::Drift;
 use super::recorder::{Microscope, Place, RecordedEvent, Scatter, SimulatedRecord, archive_stream, counted};
+use crate::causes::Effects;
 
 /// Size and contents of an archive.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,7 +97,13 @@ impl Archive {
 
     /// Simulates one record of the plan. Panics if `record` is not below the number of records.
     pub fn simulate(&self, microscope: &Microscope, record: usize) -> SimulatedRecord {
-        microscope.record(&self.plans[record], self.phases[record], &self.drift, self.layout.place(record))
+        self.simulate_with(microscope, record, &Effects::default())
+    }
+
+    /// The same with causes hidden in it ([`Microscope::record_with`]).
+    pub fn simulate_with(&self, microscope: &Microscope, record: usize, effects: &Effects) -> SimulatedRecord {
+        let place = self.layout.place(record);
+        microscope.record_with(&self.plans[record], self.phases[record], &self.drift, place, effects)
     }
 
     /// Checks that the simulated events are as many as asked for.

@@ -8,12 +8,17 @@ mod adc;
 mod afm;
 mod afm_system;
 mod archive;
+mod chain;
 mod contact;
 mod detector;
 mod discretisation;
 mod error;
+mod hidden;
+mod hidden_motion;
 mod lever;
 mod motion;
+mod noise_free;
+mod optics;
 mod phases;
 mod propagator;
 mod ramp;
@@ -22,6 +27,8 @@ mod recorder;
 mod square;
 mod truth;
 
+#[cfg(test)]
+mod hidden_tests;
 #[cfg(test)]
 mod tests;
 
@@ -33,8 +40,11 @@ pub use contact::{ADHESION_CUT, Contact};
 pub use detector::Detector;
 pub use discretisation::{LinearSystem, Step};
 pub use error::SimulateError;
+pub use hidden::{Hidden, Setting, effects};
+pub use hidden_motion::simulate_hidden;
 pub use lever::{ModalLever, Mode};
 pub use motion::{ContactEvent, Drive, EventKind, Motion, Sampling, simulate_motion};
+pub use noise_free::Cut;
 pub use phases::{PhaseProblem, RecordPlan, Target};
 pub use ramp::TriangleRamp;
 pub use readout_noise::{Drift, PINK_LOWEST_HZ, ReadoutNoise};

@@ -111,34 +111,38 @@ pub fn simulate_motion(
     let (mut signal_m, mut force_n) = (Vec::with_capacity(sampling.samples), Vec::with_capacity(sampling.samples));
     for k in 0..sampling.samples {
         force_n.push(run.force_n());
-        signal_m.push(dot(&system.signal_weights, &run.state));
+        signal_m.push(run.signal_m());
         run.advance_to(sampling.start_s + (k + 1) as f64 * sampling.interval_s, rng);
     }
     Motion { signal_m, force_n, events: run.events }
 }
 
-struct Run<'a> {
-    system: &'a AfmSystem,
+pub(super) struct Run<'a> {
+    pub(super) system: &'a AfmSystem,
     contact: &'a Contact,
-    drive: &'a Drive<'a>,
+    pub(super) drive: &'a Drive<'a>,
     free: Propagator,
     attached: Propagator,
-    interval_s: f64,
+    pub(super) interval_s: f64,
     /// Lever and contact in series, N/m.
     series_n_per_m: f64,
-    state: Vec<f64>,
-    next: Vec<f64>,
-    deviates: Vec<f64>,
-    time_s: f64,
-    half: i64,
+    pub(super) state: Vec<f64>,
+    pub(super) next: Vec<f64>,
+    pub(super) deviates: Vec<f64>,
+    pub(super) time_s: f64,
+    pub(super) half: i64,
     /// Pull-off force while attached.
-    held_n: Option<f64>,
+    pub(super) held_n: Option<f64>,
+    /// Force on the free tip at the start of a step and its rate, N and N/s, where one is hidden.
+    pub(super) load: Option<(f64, f64)>,
+    /// Acceleration of the tip by modal forces (m/s^2) and length of the step (s), whose half the state has got in advance.
+    pub(super) kicked: (f64, f64),
     armed: bool,
     events: Vec<ContactEvent>,
 }
 
 impl<'a> Run<'a> {
-    fn start(
+    pub(super) fn start(
         system: &'a AfmSystem,
         lever: &ModalLever,
         contact: &'a Contact,
@@ -180,17 +184,58 @@ impl<'a> Run<'a> {
             time_s: sampling.start_s,
             half,
             held_n: attached.then_some(pull_off),
+            load: None,
+            kicked: (0.0, 0.0),
             armed: !attached && height > contact.snap_in_gap_m,
             events: Vec::new(),
         }
     }
 
-    fn regime(&self) -> &'a LinearSystem {
-        if self.held_n.is_some() { &self.system.attached } else { &self.system.free }
+    pub(super) fn regime(&self) -> &'a LinearSystem {
+        match self.regime_index() {
+            0 => &self.system.free,
+            1 => &self.system.attached,
+            _ => &self.system.loaded,
+        }
+    }
+
+    /// 0 free, 1 attached, 2 free under a load.
+    pub(super) fn regime_index(&self) -> usize {
+        match (self.held_n, self.load) {
+            (Some(_), _) => 1,
+            (None, None) => 0,
+            (None, Some(_)) => 2,
+        }
+    }
+
+    /// Height of the base above the surface and its velocity.
+    pub(super) fn base(&self) -> (f64, f64) {
+        (self.drive.height_m(self.half, self.time_s), self.drive.ramp.velocity_m_per_s(self.half))
+    }
+
+    /// What drives the present regime, and its rate: the base, or a load.
+    pub(super) fn inputs(&self) -> (f64, f64) {
+        match (self.held_n, self.load) {
+            (None, Some(load)) => load,
+            _ => self.base(),
+        }
+    }
+
+    /// Detector output now, m.
+    pub(super) fn signal_m(&self) -> f64 {
+        dot(&self.system.signal_weights, &self.state)
+    }
+
+    pub(super) fn last_event(&self) -> Option<&ContactEvent> {
+        self.events.last()
+    }
+
+    pub(super) fn into_events(self) -> Vec<ContactEvent> {
+        self.events
     }
 
     /// Advances to `end_s`, a whole sample at once where nothing happens in it.
-    fn advance_to(&mut self, end_s: f64, rng: &mut ChaCha8Rng) {
+    pub(super) fn advance_to(&mut self, end_s: f64, rng: &mut ChaCha8Rng) {
         let mut whole = true;
         while self.time_s < end_s {
             let kink_s = self.drive.ramp.end_s(self.half);
@@ -223,44 +268,47 @@ impl<'a> Run<'a> {
     }
 
     /// Force of the sample on the tip now.
-    fn force_n(&self) -> f64 {
+    pub(super) fn force_n(&self) -> f64 {
         if self.held_n.is_none() {
-            return 0.0;
+            return self.load.map_or(0.0, |(force_n, _)| force_n);
         }
         let height = self.drive.height_m(self.half, self.time_s);
         -self.system.tension_n(&self.state, height, self.drive.ramp.velocity_m_per_s(self.half))
     }
 
     /// How far `state` at `t_s` lies beyond the threshold of the present regime; positive: it has been crossed.
-    fn excess(&self, state: &[f64], t_s: f64) -> f64 {
+    pub(super) fn excess(&self, state: &[f64], t_s: f64) -> f64 {
         let height = self.drive.height_m(self.half, t_s);
         match self.held_n {
-            Some(pull_off) => {
-                let velocity = self.drive.ramp.velocity_m_per_s(self.half);
-                (self.system.tension_n(state, height, velocity) - pull_off) / self.contact.stiffness_n_per_m
-            }
+            Some(pull_off) => (self.tension_n(state, t_s) - pull_off) / self.contact.stiffness_n_per_m,
             None if self.armed => self.contact.snap_in_gap_m - self.system.gap_m(state, height),
             None => -1.0,
         }
     }
 
+    /// Tension of the contact with `state` at `t_s` within the present step; what a kick gave too early or still owes is put right.
+    fn tension_n(&self, state: &[f64], t_s: f64) -> f64 {
+        let height = self.drive.height_m(self.half, t_s);
+        let velocity = self.drive.ramp.velocity_m_per_s(self.half);
+        let owed = self.kicked.0 * (t_s - self.time_s - 0.5 * self.kicked.1);
+        self.system.tension_n(state, height, velocity) + self.contact.damping_n_s_per_m * owed
+    }
+
     /// The state `span_s` from now, with this step's deviates.
     fn path(&self, span_s: f64) -> Vec<f64> {
-        let height = self.drive.height_m(self.half, self.time_s);
-        let velocity = self.drive.ramp.velocity_m_per_s(self.half);
-        let mut state = self.regime().step(span_s).advance(&self.state, height, velocity, &self.deviates);
+        let (first, second) = self.inputs();
+        let mut state = self.regime().step(span_s).advance(&self.state, first, second, &self.deviates);
         state.resize(self.state.len(), 0.0);
         state
     }
 
     /// Goes to the crossing within `span_s` and changes the regime there.
-    fn switch(&mut self, span_s: f64) {
+    pub(super) fn switch(&mut self, span_s: f64) {
         let (span, state) = self.crossing(span_s);
+        let force_n = -self.tension_n(&state, self.time_s + span);
         self.state = state;
         self.time_s += span;
         let height = self.drive.height_m(self.half, self.time_s);
-        let velocity = self.drive.ramp.velocity_m_per_s(self.half);
-        let force_n = -self.system.tension_n(&self.state, height, velocity);
         let kind = match self.held_n {
             Some(_) => {
                 self.held_n = None;
@@ -310,7 +358,7 @@ impl<'a> Run<'a> {
     }
 
     /// Arms the catch once the gap has exceeded it.
-    fn arm(&mut self) {
+    pub(super) fn arm(&mut self) {
         if self.held_n.is_none() && !self.armed {
             let height = self.drive.height_m(self.half, self.time_s);
             self.armed = self.system.gap_m(&self.state, height) > self.contact.snap_in_gap_m;

@@ -5,11 +5,13 @@ use super::afm_system::AfmSystem;
 use super::contact::{ADHESION_CUT, Contact};
 use super::detector::Detector;
 use super::error::{SimulateError, require};
+use super::hidden_motion::simulate_hidden;
 use super::lever::ModalLever;
-use super::motion::{ContactEvent, Drive, EventKind, Sampling, simulate_motion};
+use super::motion::{ContactEvent, Drive, EventKind, Sampling};
 use super::phases::RecordPlan;
 use super::ramp::TriangleRamp;
 use super::readout_noise::{Drift, ReadoutNoise};
+use crate::causes::{Effects, Instant};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -106,6 +108,8 @@ enum Stream {
     Motion,
     Readout,
     Monitor,
+    Jitter,
+    Intensity,
 }
 
 const STREAMS_PER_RECORD: u64 = 8;
@@ -161,40 +165,101 @@ impl Microscope {
     /// The motion is exact ([`simulate_motion`]); the rest is arithmetic. The same seed gives the same codes on any number of
     /// threads: each record has its own streams.
     pub fn record(&self, plan: &RecordPlan, phase: f64, drift: &Drift, place: Place) -> SimulatedRecord {
-        let system = AfmSystem::new(&self.lever, &self.contact, &self.detector, self.temperature_k);
+        self.record_with(plan, phase, drift, place, &Effects::default())
+    }
+
+    /// Simulates one record with causes hidden in it ([`simulate_hidden`]).
+    ///
+    /// # Model
+    /// Frequencies are those of the record's middle; the sampling instants of the whole record are shifted by one draw of the jitter; volts are added behind
+    /// the electronics and before the noise, limits act in front of the converter.
+    ///
+    /// # Accuracy
+    /// With nothing hidden: the bits of [`Microscope::record`].
+    pub fn record_with(
+        &self,
+        plan: &RecordPlan,
+        phase: f64,
+        drift: &Drift,
+        place: Place,
+        effects: &Effects,
+    ) -> SimulatedRecord {
+        let lever = self.lever_at(place, effects);
+        let system = AfmSystem::with_effects(&lever, &self.contact, &self.detector, self.temperature_k, effects);
         let ramp = TriangleRamp { phase, ..self.ramp };
         let drive = Drive { ramp, surface_m: plan.surface_m, pull_off_n: &plan.pull_off_n };
         let interval_s = 1.0 / self.sample_rate_hz;
         // the delay moves the instants, not the samples
-        let sampling = Sampling { start_s: -self.detector.delay_s, interval_s, samples: place.samples };
+        let start_s = jittered(-self.detector.delay_s - effects.delay_s, effects.jitter_s, place);
+        let lost = Lost::new(effects, self.sample_rate_hz);
+        let sampling = Sampling { start_s, interval_s, samples: place.samples + lost.total() };
         let mut rng = stream(place.seed, place.record, Stream::Motion);
-        let motion = simulate_motion(&system, &self.lever, &self.contact, &drive, sampling, &mut rng);
-        let deflection = self.deflection_codes(motion.signal_m, drift, place);
+        let (contact, detector) = (&self.contact, &self.detector);
+        let mut motion = simulate_hidden(&system, &lever, contact, detector, &drive, sampling, effects, &mut rng);
+        lost.drop_from(&mut motion.signal_m);
+        lost.drop_from(&mut motion.force_n);
+        let deflection = self.deflection_codes(motion.signal_m, drift, place, &ramp, effects);
         SimulatedRecord {
             saturated: self.adc.saturated(&deflection),
             deflection,
             force_n: motion.force_n,
-            piezo: self.piezo_codes(&ramp, place),
-            events: self.recorded(&motion.events, place),
+            piezo: self.piezo_codes(&ramp, place, &lost),
+            events: self.recorded(&motion.events, place, -start_s, &lost),
         }
     }
 
-    fn deflection_codes(&self, signal_m: Vec<f64>, drift: &Drift, place: Place) -> Vec<i16> {
+    /// The lever of a record whose frequencies may have changed.
+    pub(super) fn lever_at(&self, place: Place, effects: &Effects) -> ModalLever {
+        let middle = place.instant(0.5 * place.samples as f64 / self.sample_rate_hz, 0.0);
+        let change: f64 = effects.frequency.iter().map(|change| change(&middle)).sum();
+        let mut lever = self.lever.clone();
+        if change != 0.0 {
+            lever.modes.iter_mut().for_each(|mode| mode.frequency_hz *= 1.0 + change);
+        }
+        lever
+    }
+
+    fn deflection_codes(
+        &self,
+        signal_m: Vec<f64>,
+        drift: &Drift,
+        place: Place,
+        ramp: &TriangleRamp,
+        effects: &Effects,
+    ) -> Vec<i16> {
         let mut volts = signal_m;
+        if effects.intensity != 0.0 {
+            let mut rng = stream(place.seed, place.record, Stream::Intensity);
+            for v in &mut volts {
+                let deviate: f64 = StandardNormal.sample(&mut rng);
+                *v *= 1.0 + effects.intensity * deviate;
+            }
+        }
         for (k, v) in volts.iter_mut().enumerate() {
             let along = (place.record as f64 + k as f64 / place.samples as f64) / place.records as f64;
             *v = self.detector.sensitivity_v_per_m * *v + drift.offset_v(along);
         }
+        let lost = Lost::new(effects, self.sample_rate_hz);
+        if !effects.added.is_empty() {
+            for (k, v) in volts.iter_mut().enumerate() {
+                let time_s = lost.taken(k) as f64 / self.sample_rate_hz;
+                let instant = place.instant(time_s, ramp.height_m(ramp.half_cycle(time_s), time_s));
+                *v += effects.added.iter().map(|added| added(&instant)).sum::<f64>();
+            }
+        }
         self.noise.add_random(&mut volts, self.sample_rate_hz, &mut stream(place.seed, place.record, Stream::Readout));
+        if let Some((low, high)) = effects.limits {
+            volts.iter_mut().for_each(|v| *v = v.max(low).min(high));
+        }
         volts.into_iter().map(|v| self.adc.code(v)).collect()
     }
 
-    fn piezo_codes(&self, ramp: &TriangleRamp, place: Place) -> Vec<i16> {
+    fn piezo_codes(&self, ramp: &TriangleRamp, place: Place, lost: &Lost) -> Vec<i16> {
         let adc = Adc { bits: 16, lsb_v: self.monitor.lsb_v };
         let mut rng = stream(place.seed, place.record, Stream::Monitor);
         (0..place.samples)
             .map(|k| {
-                let time_s = k as f64 / self.sample_rate_hz;
+                let time_s = lost.taken(k) as f64 / self.sample_rate_hz;
                 let deviate: f64 = StandardNormal.sample(&mut rng);
                 let volts = ramp.height_m(ramp.half_cycle(time_s), time_s) / self.monitor.m_per_v;
                 adc.code(volts + self.monitor.white_v * deviate)
@@ -202,9 +267,9 @@ impl Microscope {
             .collect()
     }
 
-    fn recorded(&self, events: &[ContactEvent], place: Place) -> Vec<RecordedEvent> {
+    fn recorded(&self, events: &[ContactEvent], place: Place, delay_s: f64, lost: &Lost) -> Vec<RecordedEvent> {
         let (margin, samples) = (place.margin_samples as f64, place.samples as f64);
-        let at = |event: &ContactEvent| (event.time_s + self.detector.delay_s) * self.sample_rate_hz;
+        let at = |event: &ContactEvent| lost.stored((event.time_s + delay_s) * self.sample_rate_hz);
         events
             .iter()
             .enumerate()
@@ -216,6 +281,59 @@ impl Microscope {
                 RecordedEvent { event: *event, sample, counted: inside && !near_another }
             })
             .collect()
+    }
+}
+
+/// `start_s` shifted by the record's own draw of the jitter.
+fn jittered(start_s: f64, jitter_s: f64, place: Place) -> f64 {
+    if jitter_s == 0.0 {
+        return start_s;
+    }
+    let deviate: f64 = StandardNormal.sample(&mut stream(place.seed, place.record, Stream::Jitter));
+    start_s + jitter_s * deviate
+}
+
+/// Samples that were taken and never stored: the place of each gap among the stored ones, and its length.
+struct Lost(Vec<(usize, usize)>);
+
+impl Lost {
+    fn new(effects: &Effects, sample_rate_hz: f64) -> Self {
+        let mut gaps: Vec<(usize, usize)> =
+            effects.lost.iter().map(|(time_s, count)| ((time_s * sample_rate_hz).max(0.0) as usize, *count)).collect();
+        gaps.sort_unstable();
+        Self(gaps)
+    }
+
+    fn total(&self) -> usize {
+        self.0.iter().map(|(_, count)| count).sum()
+    }
+
+    /// Number among the taken samples of stored sample `k`.
+    fn taken(&self, k: usize) -> usize {
+        k + self.0.iter().filter(|(at, _)| *at <= k).map(|(_, count)| count).sum::<usize>()
+    }
+
+    /// Place among the stored samples of place `taken` among the taken ones; inside a gap, the gap's.
+    fn stored(&self, taken: f64) -> f64 {
+        self.0.iter().rev().fold(taken, |taken, (at, count)| {
+            let at = *at as f64;
+            if taken <= at { taken } else { (taken - *count as f64).max(at) }
+        })
+    }
+
+    fn drop_from(&self, values: &mut Vec<f64>) {
+        for (at, count) in self.0.iter().rev() {
+            let end = (at + count).min(values.len());
+            values.drain((*at).min(end)..end);
+        }
+    }
+}
+
+impl Place {
+    /// A time of this record.
+    pub(crate) fn instant(&self, time_s: f64, piezo_m: f64) -> Instant {
+        let last = self.records.saturating_sub(1).max(1);
+        Instant { record: self.record, place: self.record as f64 / last as f64, time_s, piezo_m }
     }
 }
 

@@ -1,0 +1,35 @@
+//! `afmid causes`: what a simulation can get wrong, as the catalogue documents it.
+
+use afmid_pipeline::config::nearest;
+use afmid_stages::causes::{CATALOGUE, as_json, find, page};
+use serde_json::Value;
+
+use crate::failure::Failure;
+use crate::output::print;
+
+/// Lists all causes, or prints the page of one.
+pub fn run(name: Option<&str>, json: bool) -> Result<(), Failure> {
+    let Some(name) = name else {
+        return print(&if json { pretty(&CATALOGUE.iter().map(|cause| as_json(*cause)).collect())? } else { list() });
+    };
+    let Some(cause) = find(name) else {
+        let nearest = nearest(name, CATALOGUE.iter().map(|cause| cause.about().id));
+        let help =
+            nearest.map_or("`afmid causes` lists all".to_owned(), |nearest| format!("did you mean `{nearest}`?"));
+        return Err(Failure::usage(format!("there is no cause named `{name}`"), Some(help)));
+    };
+    print(&if json { pretty(&as_json(cause))? } else { page(cause) })
+}
+
+fn list() -> String {
+    let width = CATALOGUE.iter().map(|cause| cause.about().id.len()).max().unwrap_or(0);
+    CATALOGUE
+        .iter()
+        .map(|cause| cause.about())
+        .map(|about| format!("{:width$}  {}\n", about.id, about.physics))
+        .collect()
+}
+
+fn pretty(value: &Value) -> Result<String, Failure> {
+    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(|error| Failure::failed(error, None))
+}

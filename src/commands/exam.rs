@@ -1,0 +1,165 @@
+//! `afmid exam`: hides causes in simulated recordings and judges what a config says of them.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use afmid_pipeline::cache::Cache;
+use afmid_pipeline::runner::{Options, Quiet, run as run_plan};
+use afmid_pipeline::stage::NoProgress;
+use afmid_pipeline::{Artifact, Context, Ports, Registry, Stage};
+use afmid_stages::causes::CATALOGUE;
+use afmid_stages::exam::{Draw, Judged, Kind, Score, draw, judge};
+use serde_json::Value;
+
+use super::load::load;
+use crate::cli::{ExamArgs, ExamKind};
+use crate::failure::Failure;
+use crate::output::{print, say};
+
+/// The stage whose JSON is judged.
+const STAGE: &str = "diagnosis";
+/// The port whose document stands for a stage.
+const SUMMARY: &str = "summary";
+
+/// Runs an exam and prints its score.
+pub fn run(args: &ExamArgs, registry: &Registry) -> Result<(), Failure> {
+    let score = score(args, registry)?;
+    if args.json {
+        let text = serde_json::to_string_pretty(&score).map_err(|error| Failure::failed(error, None))?;
+        return print(&(text + "\n"));
+    }
+    print(&score.text())
+}
+
+fn score(args: &ExamArgs, registry: &Registry) -> Result<Score, Failure> {
+    let plan = load(&args.config.config, &args.config.set, registry)?;
+    for id in ["records", STAGE] {
+        if plan.node(id).is_none() {
+            let help =
+                "an exam replaces the recordings of `records` and judges `diagnosis`, as in configs/diagnose.toml";
+            return Err(Failure::usage(format!("the config has no stage `{id}`"), Some(help.to_owned())));
+        }
+    }
+    let folder = Scratch::new()?;
+    let mut judged = Vec::new();
+    for seed in args.first_seed..args.first_seed.saturating_add(args.seeds) {
+        let Some(drawn) = draw(seed, args.only.map(kind), CATALOGUE) else {
+            say(&format!("seed {seed}: no cause of the catalogue can be hidden in this lever at its limit\n"));
+            continue;
+        };
+        let one = sit(&drawn, args, registry, &folder.0)?;
+        say(&told(&one));
+        judged.push(one);
+    }
+    Ok(Score::new(judged))
+}
+
+fn kind(only: ExamKind) -> Kind {
+    match only {
+        ExamKind::Clean => Kind::Clean,
+        ExamKind::One => Kind::One,
+        ExamKind::Mixture => Kind::Mixture,
+        ExamKind::LeftOut => Kind::LeftOut,
+    }
+}
+
+fn told(one: &Judged) -> String {
+    let hidden: Vec<String> =
+        one.planted.iter().map(|planted| format!("{} {:.1}x", planted.id, planted.times_limit())).collect();
+    let hidden = if hidden.is_empty() { "nothing".to_owned() } else { hidden.join(" + ") };
+    let mark = if one.right { "right" } else { "WRONG" };
+    format!("seed {}: {hidden} -> {} {} ({mark})\n", one.seed, one.said.verdict, one.said.named.join(" + "))
+}
+
+/// Writes an archive, has the config diagnose it, judges the JSON; the files are removed.
+fn sit(drawn: &Draw, args: &ExamArgs, registry: &Registry, scratch: &Path) -> Result<Judged, Failure> {
+    let base = scratch.join(drawn.seed.to_string());
+    let json = archive(drawn, &base).and_then(|()| diagnosed(drawn, args, registry, &base));
+    // a folder that stays behind goes with the scratch folder
+    let _ = std::fs::remove_dir_all(&base);
+    match json {
+        Ok(json) => Ok(judge(drawn, Some(&json))),
+        Err(Sitting::Config(failure)) => Err(failure),
+        Err(Sitting::Run(message)) => {
+            say(&format!("seed {}: {message}\n", drawn.seed));
+            Ok(judge(drawn, None))
+        }
+    }
+}
+
+/// Why there is no answer.
+enum Sitting {
+    /// The config cannot be used: no seed will do.
+    Config(Failure),
+    /// This archive could not be made or diagnosed.
+    Run(String),
+}
+
+const OUT: &str = "archive";
+
+fn archive(drawn: &Draw, base: &Path) -> Result<(), Sitting> {
+    let failed = |error: &dyn std::fmt::Display| Sitting::Run(format!("the archive cannot be made: {error}"));
+    std::fs::create_dir_all(base).map_err(|error| failed(&error))?;
+    let mut afm = drawn.afm.clone();
+    afm.out = PathBuf::from(OUT);
+    let context = Context::new(base, drawn.seed, &NoProgress);
+    afm.run(&Ports::new(), &context).map_err(|error| failed(&error))?;
+    Ok(())
+}
+
+fn diagnosed(drawn: &Draw, args: &ExamArgs, registry: &Registry, base: &Path) -> Result<Value, Sitting> {
+    let poles: Vec<String> = drawn.nominal_poles_hz.iter().map(|pole| format!("{pole:?}")).collect();
+    let mut set = args.config.set.clone();
+    set.push(format!("records.files=[{:?}]", base.join(OUT).join("*.h5").display().to_string()));
+    set.push("records.channel='/deflection'".to_owned());
+    set.push(format!("{STAGE}.detector_poles_hz=[{}]", poles.join(", ")));
+    set.push(format!("{STAGE}.without={:?}", drawn.without));
+    let plan = load(&args.config.config, &set, registry).map_err(Sitting::Config)?;
+    let cache = Cache::open(&base.join("cache")).map_err(|error| Sitting::Run(error.to_string()))?;
+    let options = Options {
+        base: plan.config.base().to_owned(),
+        cache: &cache,
+        fresh: true,
+        program: concat!("afmid ", env!("CARGO_PKG_VERSION")).to_owned(),
+        overrides: plan.config.overrides.clone(),
+        observer: &Quiet,
+    };
+    let result = run_plan(&plan, &options)
+        .map_err(|errors| Sitting::Run(errors.iter().map(ToString::to_string).collect::<Vec<String>>().join("; ")))?;
+    let outputs = result.stage(STAGE).map(|stage| &stage.result.outputs);
+    match outputs.and_then(|outputs| outputs.artifact(SUMMARY)) {
+        Some(Artifact::Document(document)) => Ok(document.0.clone()),
+        _ => Err(Sitting::Run(format!("stage `{STAGE}` has no document `{SUMMARY}`"))),
+    }
+}
+
+/// Exams of this process so far: each has a folder of its own.
+static NUMBER: AtomicUsize = AtomicUsize::new(0);
+
+/// A folder of its own below the system's temporary one, removed at the end.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new() -> Result<Self, Failure> {
+        let folder = std::env::temp_dir().join(format!(
+            "afmid-exam-{}-{}",
+            std::process::id(),
+            NUMBER.fetch_add(1, Ordering::Relaxed)
+        ));
+        std::fs::create_dir_all(&folder).map_err(|error| {
+            Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
+        })?;
+        Ok(Self(folder))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // what cannot be removed is the system's to clean
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[cfg(test)]
+#[path = "exam_tests.rs"]
+mod tests;

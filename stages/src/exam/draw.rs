@@ -1,0 +1,264 @@
+//! An archive's recipe from a seed.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+use super::levers::lever;
+use super::limits::{Limits, limit};
+use crate::causes::{Cause, Domain, Identifiable, Scene};
+use crate::simulate::{Afm, Hidden};
+
+/// What is hidden in an archive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Nothing.
+    Clean,
+    /// One cause.
+    One,
+    /// Two or three of different classes.
+    Mixture,
+    /// One that the diagnosis may not use.
+    LeftOut,
+}
+
+/// A hidden cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Planted {
+    /// Its id.
+    pub id: String,
+    /// What it can't be told from.
+    pub class: Vec<String>,
+    /// Its parameters' names and values; the first is the main one.
+    pub parameters: Vec<(String, f64)>,
+    /// Strength at which the expected gain is [`super::LIMIT_GAIN`].
+    pub limit: f64,
+}
+
+impl Planted {
+    /// Strength over the limit.
+    pub fn times_limit(&self) -> f64 {
+        self.parameters.first().map_or(0.0, |(_, value)| value.abs() / self.limit)
+    }
+}
+
+/// An archive's recipe.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Draw {
+    /// Where everything comes from.
+    pub seed: u64,
+    /// What is hidden.
+    pub kind: Kind,
+    /// The hidden causes.
+    pub planted: Vec<Planted>,
+    /// Ids that the diagnosis may not use.
+    pub without: Vec<String>,
+    /// Detector poles as the diagnosis is told, up to 15 % off, Hz.
+    pub nominal_poles_hz: Vec<f64>,
+    /// The simulation.
+    pub afm: Afm,
+}
+
+/// Strengths reach from the limit to this many times.
+const STRONGEST: f64 = 30.0;
+/// A left-out cause has this strength at least: the verdict must say that something is wrong.
+const LEFT_OUT: f64 = 10.0;
+/// Nominal poles are off by up to this share.
+const POLES_OFF: f64 = 0.15;
+/// Records of an archive whose records hold several cycles.
+const LONG_RECORDS: usize = 6;
+/// Attempts to find a cause whose limit lies within its parameter's limits.
+const ATTEMPTS: usize = 40;
+
+/// Draws an archive: lever, records, scatter, causes and strengths.
+///
+/// # Method
+/// Kinds in the shares 25 % clean, 45 % one, 15 % mixtures, 15 % left out, unless given. Causes of equal chance among those of `catalogue` that act on releases
+/// and can be named; further parameters from one of the cause's own trials, up to 25 % off; strength log-uniform from the limit to 30 times (a left-out
+/// cause from 10 times). Records are parts of a cycle with one release or none; one archive in ten has records of several cycles.
+///
+/// # Errors
+/// None: nothing if the catalogue holds no such cause.
+pub fn draw(seed: u64, kind: Option<Kind>, catalogue: &[&'static dyn Cause]) -> Option<Draw> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let kind = kind.unwrap_or_else(|| match rng.random_range(0..20) {
+        0..5 => Kind::Clean,
+        5..14 => Kind::One,
+        14..17 => Kind::Mixture,
+        _ => Kind::LeftOut,
+    });
+    let (mut afm, releases) = archive(seed, &mut rng);
+    let wanted = match kind {
+        Kind::Clean => 0,
+        Kind::One | Kind::LeftOut => 1,
+        Kind::Mixture => rng.random_range(2..4),
+    };
+    let planted = plant(wanted, kind, &afm, releases, catalogue, &mut rng)?;
+    afm.hidden = planted.iter().map(|(cause, values, _)| Hidden::new(cause.about(), values)).collect();
+    let without = match kind {
+        Kind::LeftOut => planted.iter().flat_map(|(cause, ..)| class(*cause)).collect(),
+        _ => Vec::new(),
+    };
+    let off = |pole: &f64| pole * (1.0 + POLES_OFF * (2.0 * rng.random::<f64>() - 1.0));
+    Some(Draw {
+        seed,
+        kind,
+        without,
+        nominal_poles_hz: afm.detector_poles_hz.iter().map(off).collect(),
+        planted: planted.into_iter().map(|(cause, values, limit)| described(cause, &values, limit)).collect(),
+        afm,
+    })
+}
+
+fn class(cause: &dyn Cause) -> Vec<String> {
+    cause.about().class.iter().map(|id| (*id).to_owned()).collect()
+}
+
+fn described(cause: &dyn Cause, values: &[f64], limit: f64) -> Planted {
+    let about = cause.about();
+    let named = about.parameters.iter().zip(values);
+    Planted {
+        id: about.id.to_owned(),
+        class: class(cause),
+        parameters: named.map(|(parameter, value)| (parameter.name.to_owned(), *value)).collect(),
+        limit,
+    }
+}
+
+/// The microscope and the number of its releases.
+fn archive(seed: u64, rng: &mut ChaCha8Rng) -> (Afm, usize) {
+    let lever = lever(rng);
+    let short = rng.random_range(10..=16);
+    let scatter = 0.06 * 4.9f64.powf(rng.random::<f64>());
+    let idle = rng.random_range(0..=2);
+    let long = rng.random_range(0..10) == 0;
+    let records = if long { LONG_RECORDS } else { short };
+    let base = Afm::default();
+    // the weakest release must survive the catch: a gap that half of it closes
+    let weakest_n = base.adhesion_n * (1.0 - 3.0 * scatter);
+    let afm = Afm {
+        records,
+        // 40 ms of a cycle of 0.36 s, or a cycle and a half
+        samples: if long { 2_700_000 } else { 200_000 },
+        snap_offs: (!long).then_some(records - idle),
+        // room for the strongest releases, at the paper's 2.2 um/s
+        ramp_m: 400e-9,
+        ramp_hz: 2.79,
+        surface_m: -100e-9,
+        snap_in_gap_m: (0.5 * weakest_n / base.contact_stiffness_n_per_m).min(base.snap_in_gap_m),
+        adhesion_scatter: scatter.min(0.29),
+        frequencies_hz: lever.frequencies_hz,
+        quality_factors: lever.quality_factors,
+        tip_shares: lever.tip_shares,
+        detector_shares: lever.detector_shares,
+        compression: 0,
+        seed: Some(seed),
+        ..base
+    };
+    // at least one full cycle in a long record
+    (afm, if long { records } else { records - idle })
+}
+
+type Chosen = (&'static dyn Cause, Vec<f64>, f64);
+
+fn plant(
+    wanted: usize,
+    kind: Kind,
+    afm: &Afm,
+    releases: usize,
+    catalogue: &[&'static dyn Cause],
+    rng: &mut ChaCha8Rng,
+) -> Option<Vec<Chosen>> {
+    let mut planted: Vec<Chosen> = Vec::new();
+    if wanted == 0 {
+        return Some(planted);
+    }
+    let limits = Limits::new(&afm.microscope(), releases, afm.samples)?;
+    let candidates: Vec<&'static dyn Cause> = catalogue.iter().copied().filter(|cause| nameable(*cause)).collect();
+    for _ in 0..ATTEMPTS {
+        if planted.len() == wanted || candidates.is_empty() {
+            break;
+        }
+        let cause = candidates[rng.random_range(0..candidates.len())];
+        let about = cause.about();
+        let taken = planted.iter().any(|(other, ..)| other.about().class.contains(&about.id));
+        let trials = cause.trials(&scene(afm, rng));
+        if taken || trials.is_empty() {
+            continue;
+        }
+        let mut values = trials[rng.random_range(0..trials.len())].clone();
+        for (value, parameter) in values.iter_mut().zip(about.parameters).skip(1) {
+            *value = (*value * (0.8 + 0.45 * rng.random::<f64>())).clamp(parameter.low, parameter.high);
+        }
+        let signed = about.parameters.first().is_some_and(|parameter| parameter.low < 0.0);
+        if signed && rng.random::<bool>() {
+            values[0] = -values[0];
+        }
+        let Some(limit) = limit(&limits, cause, &values) else { continue };
+        let weakest = if kind == Kind::LeftOut { LEFT_OUT } else { 1.0 };
+        let times = weakest * (STRONGEST / weakest).powf(rng.random::<f64>());
+        let highest = about.parameters.first().map_or(0.0, |p| if values[0] < 0.0 { -p.low } else { p.high });
+        if weakest * limit > highest {
+            continue;
+        }
+        values[0] = values[0].signum() * (times * limit).min(highest);
+        planted.push((cause, values, limit));
+    }
+    (planted.len() == wanted).then_some(planted)
+}
+
+fn nameable(cause: &dyn Cause) -> bool {
+    let about = cause.about();
+    about.domain != Domain::InputOutput && !matches!(about.identifiable, Identifiable::No(_))
+}
+
+/// What trial values come from: the truth, and a frequency where nothing rings yet.
+fn scene(afm: &Afm, rng: &mut ChaCha8Rng) -> Scene {
+    let first = afm.frequencies_hz.iter().copied().fold(f64::INFINITY, f64::min);
+    let last = afm.frequencies_hz.iter().copied().fold(0.0, f64::max);
+    let free = (0..ATTEMPTS).map(|_| first * (last / first).powf(rng.random::<f64>())).find(|f| {
+        // no nearer than 6 % to any mode: two lines of one resonance are another cause
+        afm.frequencies_hz.iter().all(|mode| (f / mode - 1.0).abs() > 0.06)
+    });
+    Scene {
+        frequency_hz: afm.frequencies_hz.clone(),
+        quality_factor: afm.quality_factors.clone(),
+        interval_s: 1.0 / afm.sample_rate_hz,
+        window_s: 7168.0 / afm.sample_rate_hz,
+        level_v: afm.adhesion_n / afm.stiffness_n_per_m * afm.sensitivity_v_per_m,
+        input_level: 0.0,
+        noise_v: afm.white_v / (afm.records as f64).sqrt(),
+        residual_peaks_hz: free.into_iter().collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::causes::CATALOGUE;
+    use afmid_pipeline::Stage;
+
+    #[test]
+    fn every_draw_is_a_valid_simulation_and_the_same_again() {
+        for seed in 0..12 {
+            let one = draw(seed, None, CATALOGUE).unwrap();
+            assert_eq!(one, draw(seed, None, CATALOGUE).unwrap());
+            one.afm.check().unwrap();
+            assert_eq!(one.planted.len(), one.afm.hidden.len());
+            for planted in &one.planted {
+                assert!(planted.times_limit() > 0.0 && planted.times_limit() <= STRONGEST * 1.0001, "{planted:?}");
+            }
+            for (nominal, pole) in one.nominal_poles_hz.iter().zip(&one.afm.detector_poles_hz) {
+                assert!((nominal / pole - 1.0).abs() <= POLES_OFF);
+            }
+        }
+    }
+
+    #[test]
+    fn a_left_out_cause_is_left_out_with_its_class() {
+        let draw = draw(3, Some(Kind::LeftOut), CATALOGUE).unwrap();
+        assert!(draw.without.contains(&draw.planted[0].id));
+        assert!(draw.planted[0].class.iter().all(|id| draw.without.contains(id)));
+    }
+}
