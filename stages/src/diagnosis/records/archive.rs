@@ -66,7 +66,13 @@ impl Archive {
             .collect()
     }
 
-    fn record(&self, level: f64, drift: f64, fringe_phase: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, Vec<f64>, Vec<RecordEvent>) {
+    fn record(
+        &self,
+        level: f64,
+        drift: f64,
+        fringe_phase: f64,
+        rng: &mut ChaCha8Rng,
+    ) -> (Vec<f64>, Vec<f64>, Vec<RecordEvent>) {
         let n = self.samples as f64;
         let (turn, back) = (0.43 * n, 0.93 * n);
         let (touch, load) = (rng.random_range(0.22..0.27) * n, 0.9 * (1.0 + 0.06 * normal(rng)));
@@ -76,10 +82,15 @@ impl Archive {
         let peak = slope * (turn - touch) - 0.04;
         let rupture = (turn + (peak + load) / slope).min(0.91 * n);
         let line_phase = rng.random_range(0.0..std::f64::consts::TAU);
-        let (turns, tau) = (std::f64::consts::TAU * 20e3 * self.interval_s(), 60.0 / (std::f64::consts::PI * 20e3) / self.interval_s());
+        let (turns, tau) = (
+            std::f64::consts::TAU * 20e3 * self.interval_s(),
+            60.0 / (std::f64::consts::PI * 20e3) / self.interval_s(),
+        );
         // 1/f noise as a sum of random walks with a loss, one per octave of time constants
-        let mut octaves: Vec<(f64, f64, f64)> =
-            (3..18).map(|k| 2f64.powi(k)).map(|t| ((-1.0 / t).exp(), (1.0 - (-2.0 / t).exp()).sqrt(), normal(rng))).collect();
+        let mut octaves: Vec<(f64, f64, f64)> = (3..18)
+            .map(|k| 2f64.powi(k))
+            .map(|t| ((-1.0 / t).exp(), (1.0 - (-2.0 / t).exp()).sqrt(), normal(rng)))
+            .collect();
         let (mut deflection, mut piezo) = (Vec::with_capacity(self.samples), Vec::with_capacity(self.samples));
         for k in 0..self.samples {
             let k = k as f64;
@@ -100,7 +111,11 @@ impl Archive {
             let t = k * self.interval_s();
             let hidden = self.line.0 * (std::f64::consts::TAU * self.line.1 * t + line_phase).sin()
                 + self.crosstalk * z
-                + if self.fringe.0 > 0.0 { self.fringe.0 * (4.0 * std::f64::consts::PI * z / self.fringe.1 + fringe_phase).cos() } else { 0.0 };
+                + if self.fringe.0 > 0.0 {
+                    self.fringe.0 * (4.0 * std::f64::consts::PI * z / self.fringe.1 + fringe_phase).cos()
+                } else {
+                    0.0
+                };
             let volts = level + drift * k / n + lever + noise + hidden;
             let volts = if self.limit > 0.0 { volts.clamp(-self.limit, self.limit) } else { volts };
             deflection.push((volts / CODE_V).round() * CODE_V);

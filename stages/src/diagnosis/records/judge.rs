@@ -75,7 +75,9 @@ pub fn judge(records: &[RecordSummary], options: &JudgeOptions) -> Vec<RecordSig
 pub fn abstentions(records: &[RecordSummary]) -> Vec<Abstention> {
     let mut abstentions = cannot_judge(records);
     if records.iter().all(|record| record.spectra.is_none()) {
-        let reason = "no record has a free stretch of a sixteenth of its length without gaps: no periodogram for fast lines".to_owned();
+        let reason =
+            "no record has a free stretch of a sixteenth of its length without gaps: no periodogram for fast lines"
+                .to_owned();
         abstentions.push(Abstention { id: "spurious-line", reason });
     }
     if records.iter().all(|record| record.segments.is_empty()) {

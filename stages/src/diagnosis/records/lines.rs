@@ -56,7 +56,8 @@ pub(super) fn judge_lines(records: &[RecordSummary], slow_hz: &[f64], options: &
         if p.is_nan() || p >= options.false_alarm_rate || passed.len() >= MOST_PEAKS {
             break;
         }
-        let shadowed = passed.iter().any(|&peak| k.abs_diff(peak) <= NEAR.1 + 1) || found.iter().any(|line| leaks(line, k, ratios[k]));
+        let shadowed = passed.iter().any(|&peak| k.abs_diff(peak) <= NEAR.1 + 1)
+            || found.iter().any(|line| leaks(line, k, ratios[k]));
         if shadowed {
             continue;
         }
@@ -121,7 +122,8 @@ fn is_narrow(long: &[f64], short: &[f64], k: usize, of_long: &Yardstick, of_shor
 impl<'a> Archive<'a> {
     /// The records whose spectra have the commonest length and interval.
     fn new(records: &'a [RecordSummary]) -> Option<Self> {
-        let key = |record: &RecordSummary| record.spectra.as_ref().map(|s| (s.long.length, record.interval_s.to_bits()));
+        let key =
+            |record: &RecordSummary| record.spectra.as_ref().map(|s| (s.long.length, record.interval_s.to_bits()));
         let mut keys: Vec<_> = records.iter().filter_map(key).collect();
         keys.sort_unstable();
         let commonest = keys.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?[0];

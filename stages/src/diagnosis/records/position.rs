@@ -41,7 +41,8 @@ struct Range {
 
 impl FreeRecord {
     fn new(record: &RecordSummary, known_hz: &[f64]) -> Option<Self> {
-        let (mut position_m, mut deflection, mut time, mut stretches) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut position_m, mut deflection, mut time, mut stretches) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for segment in record.segments.iter().filter(|segment| segment.kind != SegmentKind::Contact) {
             let start = position_m.len();
             position_m.extend_from_slice(segment.piezo.as_ref()?);
@@ -63,7 +64,13 @@ impl FreeRecord {
             nuisance.push(time.iter().map(|t| phase(t).1).collect());
         }
         let left_v = nuisance.residual(&deflection);
-        (contrast.is_finite() && left_v.len() > 24).then_some(Self { position_m, left_v, nuisance, stretches, contrast })
+        (contrast.is_finite() && left_v.len() > 24).then_some(Self {
+            position_m,
+            left_v,
+            nuisance,
+            stretches,
+            contrast,
+        })
     }
 
     /// Least-squares weight of `shape`, less what the nuisances and `lower` shapes explain.
@@ -183,7 +190,8 @@ fn straight_held_out(free: &[FreeRecord]) -> Vec<(f64, f64)> {
 
 fn fringe_held_out(free: &[FreeRecord], light: Option<(f64, f64)>) -> Vec<(f64, f64)> {
     let fits = [0, 1].map(|parity| {
-        let others: Vec<&FreeRecord> = free.iter().enumerate().filter(|(k, _)| k % 2 != parity).map(|(_, r)| r).collect();
+        let others: Vec<&FreeRecord> =
+            free.iter().enumerate().filter(|(k, _)| k % 2 != parity).map(|(_, r)| r).collect();
         fit_fringe(others, light)
     });
     held_out(free, |parity, record| fits[parity].as_ref().map(|fit| fit.shape(&record.position_m)))

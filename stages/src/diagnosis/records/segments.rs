@@ -47,7 +47,8 @@ pub(super) struct Stretch {
 /// The stretches of a record. Between two ruptures (or the record's start and one) without a snap-in in between, the contact is taken to begin
 /// where two straight lines fit best.
 pub(super) fn stretches(points: &Points, events: &[RecordEvent]) -> Vec<Stretch> {
-    let mut marks: Vec<(usize, EventKind)> = events.iter().map(|event| (event.sample / points.step, event.kind)).collect();
+    let mut marks: Vec<(usize, EventKind)> =
+        events.iter().map(|event| (event.sample / points.step, event.kind)).collect();
     marks.sort_by_key(|&(block, _)| block);
     let total = points.values.len();
     let mut found = Vec::new();

@@ -142,9 +142,10 @@ fn describe(slow: &[Option<SlowRecord>], look: &Look, step: f64, p_value: f64, m
     };
     let mains = mains.iter().filter(near).min_by_key(|m| m.1).copied();
     let sines: Vec<Option<Sine>> = slow.iter().map(|record| record.as_ref().and_then(|record| record.fit(f))).collect();
-    // noise adds its own square: its share of the power is one over the ratio
-    let share = (1.0 - 1.0 / look.ratio).max(0.0);
-    let squares: Vec<f64> = sines.iter().flatten().map(|sine| sine.amplitude().powi(2) * share).collect();
+    let fitted: Vec<(&SlowRecord, Sine)> =
+        slow.iter().zip(&sines).filter_map(|(record, sine)| Some((record.as_ref()?, (*sine)?))).collect();
+    let share = (1.0 - noise_share(&fitted, f, step)).clamp(1e-6, 1.0);
+    let squares: Vec<f64> = fitted.iter().map(|(_, sine)| sine.amplitude().powi(2) * share).collect();
     let (mean, error) = mean_and_error(&squares);
     let amplitude = mean.sqrt();
     SlowLine {
@@ -156,6 +157,22 @@ fn describe(slow: &[Option<SlowRecord>], look: &Look, step: f64, p_value: f64, m
         rms: held_out(slow, step, look.frequency_hz),
         sines,
     }
+}
+
+/// Noise's share of the sine's power, from the frequencies round it once the sine is gone.
+fn noise_share(fitted: &[(&SlowRecord, Sine)], frequency_hz: f64, step: f64) -> f64 {
+    let offsets = [-8.0, -6.0, -4.0, 4.0, 6.0, 8.0].map(|offset| frequency_hz + offset * step);
+    let (mut noise, mut own) = (0.0, 0.0);
+    for (record, sine) in fitted {
+        let left = record.without(sine);
+        let near: Vec<f64> =
+            offsets.iter().filter(|f| **f > 3.0 * step).filter_map(|&f| left.fit(f)).map(|sine| sine.power).collect();
+        if !near.is_empty() {
+            noise += near.iter().sum::<f64>() / near.len() as f64;
+            own += sine.power;
+        }
+    }
+    if own > 0.0 { noise / own } else { 0.0 }
 }
 
 /// The frequency where the summed power is highest, by a parabola, and its error by leaving out records.
@@ -186,11 +203,8 @@ fn refined(slow: &[Option<SlowRecord>], frequency_hz: f64, step: f64) -> (f64, f
 fn held_out(slow: &[Option<SlowRecord>], step: f64, frequency_hz: f64) -> (f64, f64) {
     let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
     for parity in 0..2 {
-        let others: Vec<Option<SlowRecord>> = slow
-            .iter()
-            .enumerate()
-            .map(|(k, record)| if k % 2 == parity { None } else { record.clone() })
-            .collect();
+        let others: Vec<Option<SlowRecord>> =
+            slow.iter().enumerate().map(|(k, record)| if k % 2 == parity { None } else { record.clone() }).collect();
         let f = if others.iter().any(Option::is_some) { refined(&others, frequency_hz, step).0 } else { frequency_hz };
         for (b, a) in slow.iter().skip(parity).step_by(2).flatten().filter_map(|record| record.held_out(f)) {
             (before, after, count) = (before + b, after + a, count + 1.0);
@@ -208,7 +222,13 @@ pub(super) fn slow_signs(lines: &[SlowLine], records: usize) -> Vec<RecordSign> 
     hum.into_iter().chain(line).collect()
 }
 
-fn sign_of(id: &'static str, amplitude: &'static str, line: &SlowLine, more: &[&SlowLine], records: usize) -> RecordSign {
+fn sign_of(
+    id: &'static str,
+    amplitude: &'static str,
+    line: &SlowLine,
+    more: &[&SlowLine],
+    records: usize,
+) -> RecordSign {
     let further: Vec<String> =
         more.iter().map(|l| format!("{:.1} Hz ({:.2e} V)", l.frequency_hz.0, l.amplitude_v.0)).collect();
     let further = if further.is_empty() { String::new() } else { format!("; also at {}", further.join(", ")) };

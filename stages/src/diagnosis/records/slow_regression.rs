@@ -65,7 +65,8 @@ impl SlowRecord {
             .filter_map(|segment| {
                 let middle = |k: usize| ((segment.first + k) as f64 + 0.5) * record.block_s;
                 let time_s: Vec<f64> = (0..segment.values.len()).map(middle).collect();
-                let removed = |(t, v): (&f64, &f64)| v - known.iter().map(|sine| sine.at(*t, record.block_s)).sum::<f64>();
+                let removed =
+                    |(t, v): (&f64, &f64)| v - known.iter().map(|sine| sine.at(*t, record.block_s)).sum::<f64>();
                 let raw: Vec<f64> = time_s.iter().zip(&segment.values).map(removed).collect();
                 let basis = polynomials(segment.piezo.as_ref().unwrap_or(&time_s), DEGREE);
                 let mut values = basis.residual(&raw);
@@ -112,6 +113,19 @@ impl SlowRecord {
         }
         let (cosine, sine) = ((ss * yc - cs * ys) / determinant, (cc * ys - cs * yc) / determinant);
         Some(Sine { frequency_hz, cosine, sine, power: cosine * yc + sine * ys })
+    }
+
+    /// The record without that sine.
+    pub fn without(&self, sine: &Sine) -> Self {
+        let mut left = self.clone();
+        for part in &mut left.parts {
+            for (t, value) in part.time_s.iter().zip(&mut part.raw) {
+                *value -= sine.at(*t, self.block_s);
+            }
+            part.values = part.basis.residual(&part.raw);
+            part.values.iter_mut().for_each(|value| *value *= part.weight);
+        }
+        left
     }
 
     /// Mean squares of the last free stretch about its mean, without and with the sine that all others show at that frequency.
