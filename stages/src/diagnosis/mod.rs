@@ -1,5 +1,6 @@
 //! What the simulation gets wrong: the verdict of a diagnosis.
 
+pub mod records;
 pub mod release;
 mod verdict;
 
