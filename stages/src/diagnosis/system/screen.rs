@@ -1,0 +1,173 @@
+//! Which causes could make what a model leaves: a score test aimed at each.
+
+use rayon::prelude::*;
+use realfft::RealFftPlanner;
+
+use super::bench::Bench;
+use super::blocks::Blocks;
+use super::fisher::f_tail;
+use super::fit::Fit;
+use super::linear_algebra::{Cholesky, dot};
+use super::misfit::Floor;
+use crate::causes::{Cause, Scene};
+
+/// A cause tried at one of its trial values.
+#[derive(Clone)]
+pub(super) struct Promise {
+    pub cause: &'static dyn Cause,
+    /// Values at which the fit begins: the trial's, its strength scaled to what the residual asks for.
+    pub values: Vec<f64>,
+    /// The trial's own.
+    pub trial: Vec<f64>,
+    /// What the loss would fall by, to first order.
+    pub gain: f64,
+    /// Trials of this cause, for the correction of its significance.
+    pub tries: usize,
+}
+
+/// The part of `direction` that the fit's own parameters cannot make.
+pub(super) fn beyond(fit: &Fit, mut direction: Vec<f64>, left_out: std::ops::Range<usize>) -> Vec<f64> {
+    let columns: Vec<&Vec<f64>> =
+        fit.sensitivities.iter().enumerate().filter(|(i, _)| !left_out.contains(i)).map(|(_, column)| column).collect();
+    let curvature: Vec<Vec<f64>> = columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect()).collect();
+    let score: Vec<f64> = columns.iter().map(|a| dot(a, &direction)).collect();
+    let weights = Cholesky::new(&curvature, 1e-12).solve(&score);
+    for (column, weight) in columns.iter().zip(weights) {
+        direction.iter_mut().zip(column.iter()).for_each(|(d, c)| *d -= weight * c);
+    }
+    direction
+}
+
+/// Candidates by falling promise, each at its best trial.
+///
+/// # Method
+/// Score test with secants: the change of the output at each trial value, the baseline's sensitivities projected out, against the residual. A secant at a
+/// finite value has a length where the derivative at zero has none.
+/// # Source
+/// C. R. Rao, Linear Statistical Inference and Its Applications, 2nd ed., 1973, section 6e.
+pub(super) fn screen(bench: &Bench, fit: &Fit, candidates: &[&'static dyn Cause]) -> Vec<Promise> {
+    let scene = scene(bench, fit);
+    let trials: Vec<(&'static dyn Cause, Vec<f64>, usize)> = candidates
+        .iter()
+        .filter(|cause| !fit.model.has(cause.about().id))
+        .flat_map(|cause| {
+            let trials = cause.trials(&scene);
+            let tries = tries(bench, *cause, trials.len());
+            trials.into_iter().map(move |trial| (*cause, trial, tries))
+        })
+        .collect();
+    let promises: Vec<Option<Promise>> = trials.into_par_iter().map(|trial| promise(bench, fit, trial)).collect();
+    let mut best: Vec<Promise> = Vec::new();
+    for next in promises.into_iter().flatten() {
+        match best.iter_mut().find(|other| other.cause.about().id == next.cause.about().id) {
+            Some(other) if other.gain < next.gain => *other = next,
+            Some(_) => {}
+            None => best.push(next),
+        }
+    }
+    best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    best
+}
+
+/// How many trials a significance is corrected for: a frequency is searched among as many as the record resolves.
+fn tries(bench: &Bench, cause: &dyn Cause, trials: usize) -> usize {
+    let searched = cause.about().parameters.iter().any(|parameter| parameter.unit == "Hz");
+    if searched { bench.count / 2 } else { trials.max(1) }
+}
+
+fn promise(bench: &Bench, fit: &Fit, (cause, trial, tries): (&'static dyn Cause, Vec<f64>, usize)) -> Option<Promise> {
+    let changed = bench.simulate(&fit.model.with(cause, trial.clone()));
+    let direction: Vec<f64> = (0..changed.len())
+        .map(|k| if bench.output[k].is_finite() { changed[k] - fit.simulated[k] } else { 0.0 })
+        .collect();
+    let whole = dot(&direction, &direction);
+    let direction = beyond(fit, direction, 0..0);
+    let (length, along) = (dot(&direction, &direction), dot(&direction, &fit.residual));
+    // what is left of a direction that the model makes itself is rounding
+    if !(length > 1e-10 * whole && length.is_finite()) {
+        return None;
+    }
+    let mut values = trial.clone();
+    let parameter = cause.about().parameters.first()?;
+    if !super::model::is_choice(cause) {
+        values[0] = (trial[0] * along / length).clamp(parameter.low, parameter.high);
+    } else if along < 0.0 {
+        return None;
+    }
+    Some(Promise { cause, values, trial, gain: along * along / length, tries })
+}
+
+/// What trial values are taken from.
+fn scene(bench: &Bench, fit: &Fit) -> Scene {
+    let oscillator = &fit.model.oscillator;
+    Scene {
+        frequency_hz: vec![oscillator.frequency_hz],
+        quality_factor: vec![1.0 / oscillator.loss],
+        interval_s: bench.span.interval_s,
+        window_s: bench.span.reference_s,
+        level_v: 1.0,
+        input_level: if bench.driven { 1.0 } else { 0.0 },
+        noise_v: fit.rms(bench),
+        residual_peaks_hz: peaks(&fit.residual, bench.span.interval_s),
+    }
+}
+
+/// Frequencies of the largest peaks of the Hann periodogram, each by a parabola through its logarithms.
+pub(super) fn peaks(residual: &[f64], interval_s: f64) -> Vec<f64> {
+    let n = residual.len();
+    let hann = |k: usize| 0.5 - 0.5 * (2.0 * std::f64::consts::PI * (k as f64 + 0.5) / n as f64).cos();
+    let mut tapered: Vec<f64> = residual.iter().enumerate().map(|(k, r)| r * hann(k)).collect();
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let mut spectrum = transform.make_output_vec();
+    if transform.process(&mut tapered, &mut spectrum).is_err() {
+        return Vec::new();
+    }
+    let power: Vec<f64> = spectrum.iter().map(|z| z.norm_sqr()).collect();
+    let mut tops: Vec<usize> = (2..power.len().saturating_sub(2))
+        .filter(|&i| power[i] > power[i - 1] && power[i] >= power[i + 1] && power[i] > 0.0)
+        .collect();
+    tops.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+    let place = |i: usize| {
+        let [a, b, c] = [power[i - 1], power[i], power[i + 1]].map(|p| p.max(f64::MIN_POSITIVE).ln());
+        let bend = a - 2.0 * b + c;
+        (i as f64 + if bend < 0.0 { 0.5 * (a - c) / bend } else { 0.0 }) / (n as f64 * interval_s)
+    };
+    tops.into_iter().take(4).map(place).collect()
+}
+
+/// How sure one of a fit's causes is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Significance {
+    /// Probability of so large a gain without the cause, before any correction.
+    pub p_value: f64,
+    /// How much longer the score's scatter between blocks is than white residuals would make it, as a ratio of variances.
+    pub inflation: f64,
+}
+
+/// Tests cause `which` of a fit against the fit without it, whose loss is `loss_without`.
+///
+/// # Method
+/// The gain over the floor's mean square times the scatter of the cause's score between blocks, as an F ratio of the cause's parameters and one fewer than
+/// the blocks: a t test by blocks for one parameter, right for residuals that are coloured or not the same everywhere.
+pub(super) fn significance(bench: &Bench, fit: &Fit, which: usize, loss_without: f64, floor: &Floor, blocks: &Blocks) -> Significance {
+    let without = bench.simulate(&fit.model.without(which));
+    let direction: Vec<f64> = (0..without.len())
+        .map(|k| if bench.output[k].is_finite() { fit.simulated[k] - without[k] } else { 0.0 })
+        .collect();
+    let places = fit.model.places(which);
+    let parameters = places.len().max(1);
+    let direction = beyond(fit, direction, places);
+    let length = dot(&direction, &direction);
+    let mean_square = floor.mean_square;
+    let scores: Vec<f64> =
+        (0..blocks.count).map(|b| dot(&direction[blocks.range(b)], &floor.residual[blocks.range(b)])).collect();
+    let count = blocks.count as f64;
+    let mean = scores.iter().sum::<f64>() / count;
+    let scatter = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() * count / (count - 1.0);
+    if !(length > 0.0 && mean_square > 0.0 && length.is_finite()) {
+        return Significance { p_value: 1.0, inflation: 1.0 };
+    }
+    let inflation = (scatter / (mean_square * length)).max(1e-3);
+    let ratio = (loss_without - fit.loss) / (parameters as f64 * mean_square * inflation);
+    Significance { p_value: f_tail(ratio, parameters as f64, count - 1.0), inflation }
+}
