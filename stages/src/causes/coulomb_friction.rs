@@ -13,7 +13,7 @@ const ABOUT: About = About {
     part: Part::Lever,
     domain: Domain::Both,
     parameters: &[
-        Parameter { name: "c", unit: "V", meaning: "static deflection that the friction holds", low: -10.0, high: 10.0 },
+        Parameter { name: "c", unit: "V", meaning: "static deflection that the friction holds", low: 0.0, high: 10.0 },
     ],
     class: &["coulomb-friction"],
     resembles: "a higher loss: decays exponentially at small amplitudes, where friction stops the motion",

@@ -220,7 +220,7 @@ impl Findings<'_> {
             .collect();
         for chosen in self.choice.chosen.iter().filter(|chosen| chosen.tied) {
             let rival = chosen.runner_up.map_or("nothing", |(id, _)| id);
-            lines.push(format!("{} can't be told from {rival}: their held-out losses differ by less than 4 variances of the noise", chosen.id));
+            lines.push(format!("{} can't be told from {rival}: their losses differ by less than 4 variances of the noise", chosen.id));
         }
         let share = 100.0 * self.misfit.ratio.powi(2) / (1.0 + self.misfit.ratio.powi(2));
         if self.misfit.significance > SIGNIFICANT {

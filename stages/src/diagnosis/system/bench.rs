@@ -33,7 +33,7 @@ pub struct Recorded<'a> {
 /// Fewest samples of a training part: a hundred periods' worth of nothing is not enough, a few of a ringdown are.
 const LEAST_SAMPLES: usize = 128;
 /// Largest angle of a step, rad: the scheme's error is its fourth power over 100 of what is not linear.
-const ANGLE: f64 = 0.3;
+const ANGLE: f64 = 0.45;
 /// Most steps between samples.
 const MOST_STEPS: usize = 16;
 

@@ -6,16 +6,17 @@ use super::fit::Fit;
 use super::linear_algebra::dot;
 use super::misfit::Floor;
 use super::options::SystemOptions;
-use super::screen::{Promise, screen, significance};
+use super::model::Model;
+use super::screen::{Promise, Sample, screen, significance};
 use crate::causes::Cause;
 
 /// Candidates that are fitted at each step.
 const REFITTED: usize = 5;
-/// Steps of a fit that only has to be compared.
-const FEW: usize = 8;
+/// Samples times steps of a fit that only has to be compared: ten steps of the longest sample.
+const WORK: usize = 160_000;
 /// Rivals that a named cause is held against.
 const RIVALS: usize = 2;
-/// Two models tie whose held-out losses differ by less than this many variances of the floor: a likelihood ratio of 7.
+/// Two models tie whose losses differ by less than this many variances of the floor: a likelihood ratio of 7.
 const TIE: f64 = 4.0;
 
 /// A model with what it loses on folds that it has not seen, block by block.
@@ -66,6 +67,9 @@ pub(super) struct Choice {
 pub(super) struct Search<'a> {
     pub bench: &'a Bench,
     pub blocks: Blocks,
+    /// The beginning of the training part, where candidates are compared; all of it where it is short.
+    pub sample: Bench,
+    pub sample_blocks: Blocks,
     pub options: &'a SystemOptions,
     pub candidates: Vec<&'static dyn Cause>,
 }
@@ -74,21 +78,18 @@ impl Search<'_> {
     /// Adds causes until nothing is significant, drops what later ones make superfluous, exchanges what a rival does better.
     ///
     /// # Method
-    /// Score screen, joint refits of the best five, the largest gain of the held-out log likelihood less half the Bayesian penalty; a cause stays while its
-    /// F test by blocks, corrected for the number of trials, and its share of the held-out error both pass.
+    /// Score screen, joint refits of the best five to a sample, the largest gain of the log likelihood less the Bayesian penalty; a cause stays
+    /// while its F test by blocks, corrected for the number of trials, and its share of the held-out error both pass.
     /// # Source
     /// S. A. Billings, Nonlinear System Identification, 2013, chapter 3, on forward selection; G. Schwarz, Ann. Stat. 6 (1978) 461.
     pub fn run(&self, baseline: Fit) -> Choice {
         let mut ladder = vec![Judged::new(baseline, &self.blocks)];
         let mut nearest = Vec::new();
-        // each exchange lowers the held-out loss, so that this ends; the bound is for ties by rounding
+        // each exchange lowers the loss, so that this ends; the bound is for ties by rounding
         for _ in 0..3 {
             nearest = self.climb(&mut ladder);
-            let (fit, changed) = self.reconsider(&ladder);
-            if !changed {
-                break;
-            }
-            ladder = self.rebuilt(&ladder[0], &fit);
+            let Some(better) = ladder.last().and_then(|last| self.reconsidered(last)) else { break };
+            ladder = self.rebuilt(&ladder[0], &better);
         }
         let chosen = self.audited(&ladder);
         Choice { ladder, chosen, nearest }
@@ -112,24 +113,27 @@ impl Search<'_> {
 
     /// The best of the first few promises that passes.
     fn best(&self, current: &Judged, promises: &[Promise]) -> Option<Judged> {
-        let mut tried: Vec<(f64, Judged)> = Vec::new();
-        for promise in promises.iter().take(REFITTED) {
-            if !self.could_matter(current, promise) {
-                continue;
-            }
-            let Some(next) = self.extended(current, promise) else { continue };
-            let parameters = next.fit.model.vector().len().saturating_sub(current.fit.model.vector().len()).max(1);
-            let effective = self.bench.count as f64;
-            let gain = 0.5 * effective * (current.unseen() / next.unseen()).ln();
-            tried.push((gain - 0.5 * parameters as f64 * effective.ln(), next));
+        let promising: Vec<&Promise> =
+            promises.iter().take(REFITTED).filter(|promise| self.could_matter(current, promise)).collect();
+        if promising.is_empty() {
+            return None;
+        }
+        let here = self.on_sample(&current.fit.model)?;
+        let mut tried: Vec<(f64, Model)> = Vec::new();
+        for promise in promising {
+            let Some(next) = self.extended(&here.fit.model, promise) else { continue };
+            let parameters = next.fit.model.vector().len().saturating_sub(here.fit.model.vector().len()).max(1);
+            let samples = self.sample.count as f64;
+            let gain = 0.5 * samples * (here.fit.loss / next.fit.loss).ln();
+            tried.push((gain - 0.5 * parameters as f64 * samples.ln(), next.fit.model));
         }
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let floor = Floor::new(self.bench, &current.fit, &self.blocks);
-        for (gain, next) in tried {
-            let fit = Fit::new(self.bench, &next.fit.model, None)?;
-            let next = Judged::new(fit, &self.blocks);
+        if std::env::var_os("DBG").is_some() { eprintln!("step"); for (g,m) in &tried { eprintln!("  {} {g:.2}",m.causes.last().unwrap().id()); } }
+        let sample = self.sampled(&here.fit);
+        for (_, model) in tried.into_iter().filter(|(gain, _)| gain.is_finite()) {
+            let next = Judged::new(Fit::new(self.bench, &model, None)?, &self.blocks);
             let which = next.fit.model.causes.len() - 1;
-            if gain.is_finite() && self.passes(&next, which, current, &floor) {
+            if self.passes(&sample, &next, which, current) {
                 return Some(next);
             }
         }
@@ -143,109 +147,151 @@ impl Search<'_> {
         promise.gain > 2.0 * mean_square && 3.0 * promise.gain / current.fit.loss > self.options.least_gain
     }
 
-    fn extended(&self, current: &Judged, promise: &Promise) -> Option<Judged> {
-        let start = |values: &Vec<f64>| current.fit.model.with(promise.cause, values.clone());
+    /// Training part over sample, in samples.
+    fn scale(&self) -> f64 {
+        self.bench.count as f64 / self.sample.count as f64
+    }
+
+    /// Steps of a fit that only has to be compared.
+    fn few(&self) -> usize {
+        (WORK / self.sample.count.max(1)).clamp(10, 40)
+    }
+
+    /// A model fitted to the sample.
+    fn on_sample(&self, model: &Model) -> Option<Judged> {
+        Some(Judged::new(Fit::new(&self.sample, model, Some(self.few()))?, &self.sample_blocks))
+    }
+
+    fn sampled<'b>(&'b self, fit: &'b Fit) -> Sample<'b> {
+        let floor = Floor::new(&self.sample, fit, &self.sample_blocks);
+        Sample { bench: &self.sample, blocks: self.sample_blocks, fit, floor }
+    }
+
+    /// A promise fitted jointly with a model to the sample.
+    fn extended(&self, model: &Model, promise: &Promise) -> Option<Judged> {
+        let start = |values: &Vec<f64>| model.with(promise.cause, values.clone());
         let loss = |values: &Vec<f64>| {
-            let rest = self.bench.residual(&self.bench.simulate(&start(values)));
+            let rest = self.sample.residual(&self.sample.simulate(&start(values)));
             let loss = dot(&rest, &rest);
             if loss.is_finite() { loss } else { f64::INFINITY }
         };
         // the strength that the score asks for may be far outside where it is linear
         let from = if loss(&promise.values) <= loss(&promise.trial) { &promise.values } else { &promise.trial };
-        Some(Judged::new(Fit::new(self.bench, &start(from), Some(FEW))?, &self.blocks))
+        self.on_sample(&start(from))
     }
 
     /// Whether cause `which` of a model is significant and large enough against the model without it.
-    fn passes(&self, with: &Judged, which: usize, without: &Judged, floor: &Floor) -> bool {
-        let significance = significance(self.bench, &with.fit, which, without.fit.loss, floor, &self.blocks);
-        let share = 1.0 - (with.unseen() / without.unseen()).sqrt();
-        let p_value = self.corrected(significance.p_value, with.fit.model.causes[which].cause);
+    fn passes(&self, sample: &Sample<'_>, with: &Judged, which: usize, without: &Judged) -> bool {
+        let gain = without.fit.loss - with.fit.loss;
+        let sign = significance(sample, &with.fit.model, which, gain, self.scale());
+        let share = 1.0 - (with.fit.loss / without.fit.loss).sqrt();
+        let p_value = self.corrected(sign.p_value, with.fit.model.causes[which].cause);
+        if std::env::var_os("DBG").is_some() { eprintln!("   {} p {p_value:.2e} share {share:.4} infl {:.2} gain {gain:.3e} loss {:.3e} floor {:.3e} conv {} {:?}", with.fit.model.causes[which].id(), sign.inflation, with.fit.loss, sample.floor.mean_square*self.bench.count as f64, with.fit.converged, with.fit.model.vector()); }
         p_value < self.options.false_alarm_rate && share > self.options.least_gain
     }
 
-    /// Bonferroni over all candidates' trials.
+    /// Bonferroni over all candidates' trials; a frequency is searched among as many as the record resolves.
     fn corrected(&self, p_value: f64, cause: &dyn Cause) -> f64 {
         let searched = cause.about().parameters.iter().any(|parameter| parameter.unit == "Hz");
         let tries = self.candidates.len() * if searched { self.bench.count / 2 } else { 1 };
         (p_value * tries as f64).min(1.0)
     }
 
-    /// Drops the weakest cause that no longer passes, or exchanges one for a rival that does better.
-    fn reconsider(&self, ladder: &[Judged]) -> (Fit, bool) {
-        let last = &ladder[ladder.len() - 1];
-        let causes = last.fit.model.causes.len();
-        let floor = Floor::new(self.bench, &last.fit, &self.blocks);
-        for which in 0..causes.saturating_sub(1) {
-            let Some(without) = self.refitted(&last.fit, which) else { continue };
-            if !self.passes(last, which, &without, &floor) {
-                return (without.fit, true);
-            }
-            if let Some((rival, _)) = self.rival(last, which, &without)
-                && rival.unseen() - last.unseen() < -TIE * floor.mean_square
+    /// The model without its weakest cause, if that no longer passes, or with a rival in a cause's place that does better.
+    fn reconsidered(&self, last: &Judged) -> Option<Model> {
+        let here = self.on_sample(&last.fit.model)?;
+        let sample = self.sampled(&here.fit);
+        for which in 0..last.fit.model.causes.len().saturating_sub(1) {
+            let model = last.fit.model.without(which);
+            let Some(without) = self.on_sample(&model) else { continue };
+            let scale = self.scale();
+            let gain = scale * (without.fit.loss - here.fit.loss);
+            let p_value = significance(&sample, &here.fit.model, which, gain, scale).p_value;
+            let share = 1.0 - (here.fit.loss / without.fit.loss).sqrt();
+            if self.corrected(p_value, last.fit.model.causes[which].cause) > self.options.false_alarm_rate
+                || share < self.options.least_gain
             {
-                return (rival.fit, true);
+                return Some(model);
+            }
+            if let Some((rival, _)) = self.rival(&here, which, &without)
+                && rival.fit.loss - here.fit.loss < -TIE * sample.floor.mean_square
+            {
+                return Some(rival.fit.model);
             }
         }
-        (last.fit.clone(), false)
+        None
     }
 
-    fn refitted(&self, fit: &Fit, which: usize) -> Option<Judged> {
-        Some(Judged::new(Fit::new(self.bench, &fit.model.without(which), Some(FEW))?, &self.blocks))
-    }
-
-    /// The best model with another cause in the place of `which`, of another class.
-    fn rival(&self, last: &Judged, which: usize, without: &Judged) -> Option<(Judged, &'static str)> {
-        let class = last.fit.model.causes[which].cause.about().class;
+    /// The best model with another cause in the place of `which`, of another class; all on the sample.
+    fn rival(&self, here: &Judged, which: usize, without: &Judged) -> Option<(Judged, &'static str)> {
+        let class = here.fit.model.causes[which].cause.about().class;
         let others: Vec<&'static dyn Cause> = self
             .candidates
             .iter()
             .copied()
-            .filter(|cause| !class.contains(&cause.about().id) && !last.fit.model.has(cause.about().id))
+            .filter(|cause| !class.contains(&cause.about().id) && !here.fit.model.has(cause.about().id))
             .collect();
-        let promises = screen(self.bench, &without.fit, &others);
+        let promises = screen(&self.sample, &without.fit, &others);
+        let sample = self.sampled(&without.fit);
         let extended = promises.iter().take(RIVALS).filter_map(|promise| {
-            let rival = self.extended(without, promise)?;
-            Some((rival, promise.cause.about().id))
+            let rival = self.extended(&without.fit.model, promise)?;
+            // what is not significant by itself is no rival
+            self.passes(&sample, &rival, rival.fit.model.causes.len() - 1, without).then_some((rival, promise.cause.about().id))
         });
-        extended.min_by(|a, b| a.0.unseen().total_cmp(&b.0.unseen()))
+        extended.min_by(|a, b| a.0.fit.loss.total_cmp(&b.0.fit.loss))
     }
 
     /// The ladder to a model's causes, in their order.
-    fn rebuilt(&self, baseline: &Judged, fit: &Fit) -> Vec<Judged> {
+    fn rebuilt(&self, baseline: &Judged, model: &Model) -> Vec<Judged> {
         let mut ladder = vec![baseline.clone()];
-        for added in &fit.model.causes {
+        for added in &model.causes {
             let Some(current) = ladder.last() else { break };
-            let start = current.fit.model.with(added.cause, added.values.clone());
+            // from what this rung asks for, not from values that only hold beside the causes to come
+            let promise = screen(self.bench, &current.fit, &[added.cause]).into_iter().next();
+            let values = promise.map_or_else(|| added.values.clone(), |promise| promise.values);
+            let start = current.fit.model.with(added.cause, values);
             let Some(next) = Fit::new(self.bench, &start, None) else { break };
             ladder.push(Judged::new(next, &self.blocks));
+        }
+        // the last from where it was found, if that is the better
+        let found = Fit::new(self.bench, model, None);
+        if let (Some(last), Some(found)) = (ladder.last_mut(), found)
+            && (found.loss < last.fit.loss || last.fit.model.causes.len() < model.causes.len())
+        {
+            *last = Judged::new(found, &self.blocks);
         }
         ladder
     }
 
     /// Each cause of the last model with its p-value and its runner-up.
     fn audited(&self, ladder: &[Judged]) -> Vec<Chosen> {
-        let last = &ladder[ladder.len() - 1];
-        let floor = Floor::new(self.bench, &last.fit, &self.blocks);
-        (0..last.fit.model.causes.len())
-            .map(|which| {
-                let added = &last.fit.model.causes[which];
-                let Some(without) = self.refitted(&last.fit, which) else {
-                    return Chosen { id: added.id(), p_value: 1.0, inflation: 1.0, runner_up: None, tied: true };
-                };
-                let sign = significance(self.bench, &last.fit, which, without.fit.loss, &floor, &self.blocks);
-                let rival = self.rival(last, which, &without);
-                let gain = without.fit.loss - last.fit.loss;
-                let tied = rival.as_ref().is_some_and(|(rival, _)| {
-                    rival.unseen() - last.unseen() < TIE * floor.mean_square * sign.inflation.max(1.0)
-                });
-                Chosen {
-                    id: added.id(),
-                    p_value: self.corrected(sign.p_value, added.cause),
-                    inflation: sign.inflation,
-                    runner_up: rival.map(|(rival, id)| (id, (without.fit.loss - rival.fit.loss) / gain)),
-                    tied,
-                }
+        let Some(here) = ladder.last().and_then(|last| self.on_sample(&last.fit.model)) else { return Vec::new() };
+        let sample = self.sampled(&here.fit);
+        (0..here.fit.model.causes.len())
+            .filter_map(|which| {
+                let without = self
+                    .on_sample(&here.fit.model.without(which))
+                    .filter(|without| without.fit.loss > here.fit.loss)
+                    // the others' values may diverge without it: then the model before it came
+                    .or_else(|| self.on_sample(&ladder.get(which)?.fit.model))?;
+                Some(self.audit(&sample, &here, which, &without))
             })
             .collect()
+    }
+
+    fn audit(&self, sample: &Sample<'_>, here: &Judged, which: usize, without: &Judged) -> Chosen {
+        let added = &here.fit.model.causes[which];
+        let gain = without.fit.loss - here.fit.loss;
+        let scale = self.scale();
+        let sign = significance(sample, &here.fit.model, which, gain * scale, scale);
+        let rival = self.rival(here, which, without);
+        let tie = TIE * sample.floor.mean_square * sign.inflation.max(1.0);
+        Chosen {
+            id: added.id(),
+            p_value: self.corrected(sign.p_value, added.cause),
+            inflation: sign.inflation,
+            tied: rival.as_ref().is_some_and(|(rival, _)| scale * (rival.fit.loss - here.fit.loss) < tie),
+            runner_up: rival.map(|(rival, id)| (id, (without.fit.loss - rival.fit.loss) / gain)),
+        }
     }
 }

@@ -29,16 +29,21 @@ pub struct SystemDiagnosis {
     pub scales: (f64, f64),
 }
 
-/// Fewest and most blocks: fewer leave the errors' own error above a fifth, more cut periods.
-const BLOCKS: (usize, usize) = (24, 64);
+/// Fewest and most blocks: fewer leave the errors' own error above a fifth, more gain nothing.
+const BLOCKS: (usize, usize) = (24, 128);
+/// Periods of the oscillator in a block at least. Much longer blocks would hold all that a decay tells of its large swings in one.
+const PERIODS: f64 = 2.0;
+
+/// Samples that candidates are compared on; all samples fit what was chosen.
+const SAMPLE: usize = 16_384;
 
 /// Says what a linear oscillator gets wrong in a measured input and output.
 ///
 /// # Model
 /// `q'' + (w/Q) q' + w^2 q = w^2 g u(t)`, y = q, free-running from a free state; the input held between samples; all else is a cause.
 /// # Method
-/// Least squares of the free-run error on the training part; causes added by score screen, joint refits of the best five, and held-out likelihood less half the
-/// Bayesian penalty; dropped or exchanged where later ones do better; each tested by blocks against its best rival. What a library of general terms still
+/// Least squares of the free-run error on the training part; causes added by score screen, joint refits of the best five, and likelihood less the Bayesian
+/// penalty; dropped or exchanged where later ones do better; each tested by blocks against its best rival. What a library of general terms still
 /// predicts of the residual decides whether the causes are the whole story.
 /// # Shapes
 /// Input and output of equal length; the answer's simulations are those of the training part.
@@ -57,7 +62,15 @@ pub fn diagnose_system(record: &Recorded<'_>, options: &SystemOptions) -> Result
     let bench = Bench::new(record, options.training, start.model.oscillator.frequency_hz)?;
     let fit = super::fit::Fit::new(&bench, &start.model, None).ok_or(SystemError::NoBaseline)?;
     let blocks = blocks(&bench, &fit);
-    let search = Search { bench: &bench, blocks, options, candidates: candidates(options, bench.driven)? };
+    let sample = bench.cut(0, bench.output.len().min(SAMPLE));
+    let search = Search {
+        bench: &bench,
+        blocks,
+        sample_blocks: Blocks { samples: sample.output.len(), ..blocks },
+        sample,
+        options,
+        candidates: candidates(options, bench.driven)?,
+    };
     let choice = search.run(fit);
     let Some(last) = choice.ladder.last() else { return Err(SystemError::NoBaseline) };
     let misfit = misfit(&bench, &last.fit, &blocks);
@@ -75,12 +88,10 @@ pub fn diagnose_system(record: &Recorded<'_>, options: &SystemOptions) -> Result
     })
 }
 
-/// Blocks long enough that the oscillator forgets within one, as far as there are enough of them.
+/// Blocks of a few periods, as far as there are enough of them.
 fn blocks(bench: &Bench, fit: &super::fit::Fit) -> Blocks {
-    let oscillator = &fit.model.oscillator;
-    let memory_s = 1.0 / (std::f64::consts::PI * oscillator.frequency_hz * oscillator.loss);
     let samples = bench.output.len();
-    let count = (bench.span.reference_s / (2.0 * memory_s)) as usize;
+    let count = (bench.span.reference_s * fit.model.oscillator.frequency_hz / PERIODS) as usize;
     Blocks { samples, count: count.clamp(BLOCKS.0, BLOCKS.1).min(samples / 4) }
 }
 
