@@ -18,6 +18,7 @@ use afmid_pipeline::{Entry, Registry};
 #[rustfmt::skip]
 const DOMAINS: &[&[Entry]] = &[
     calibration::STAGES,
+    diagnosis::STAGES,
     ensemble::STAGES,
     events::STAGES,
     force::STAGES,

@@ -48,11 +48,12 @@ impl Findings<'_> {
     }
 
     fn verdict(&self) -> Verdict {
-        let tied = self.choice.chosen.iter().any(|chosen| chosen.tied);
-        match (self.choice.chosen.is_empty(), self.systematic() || tied) {
+        let untied = self.choice.chosen.iter().any(|chosen| !chosen.tied);
+        match (self.choice.chosen.is_empty(), self.systematic()) {
             (_, true) => Verdict::Unexplained,
             (true, false) => Verdict::Clean,
-            (false, false) => Verdict::Named,
+            (false, false) if untied => Verdict::Named,
+            (false, false) => Verdict::Unexplained,
         }
     }
 
@@ -81,7 +82,8 @@ impl Findings<'_> {
             Some(part) => (part.end - part.first - part.state_samples, format!("part {}", part.name)),
             None => (self.bench.count, format!("{} folds of the training part in turn", super::blocks::FOLDS)),
         };
-        let one = |(which, chosen): (usize, &Chosen)| {
+        let one = |chosen: &Chosen| {
+            let which = chosen.place;
             let (before, after) = (held_out[which], held_out[which + 1]);
             let gain = before.zip(after).and_then(|(b, a)| finite(self.effective(count) * (b / a).ln()));
             let about = crate::causes::find(chosen.id).map(|cause| cause.about());
@@ -103,7 +105,7 @@ impl Findings<'_> {
                 next_measurement: about.map_or(String::new(), |about| about.next_measurement.to_owned()),
             }
         };
-        self.choice.chosen.iter().enumerate().map(one).collect()
+        self.choice.chosen.iter().filter(|chosen| !chosen.tied).map(one).collect()
     }
 
     fn parameters(&self, which: usize) -> BTreeMap<String, Value> {

@@ -8,12 +8,14 @@ use super::misfit::Floor;
 use super::options::SystemOptions;
 use super::model::Model;
 use super::screen::{Promise, Sample, screen, significance};
-use crate::causes::Cause;
+use crate::causes::{Cause, Part};
 
 /// Candidates that are fitted at each step.
 const REFITTED: usize = 5;
 /// Samples times steps of a fit that only has to be compared: ten steps of the longest sample.
 const WORK: usize = 160_000;
+/// Times that a model may be changed after its causes were held against their rivals.
+const ROUNDS: usize = 4;
 /// Rivals that a named cause is held against.
 const RIVALS: usize = 2;
 /// Two models tie whose losses differ by less than this many variances of the floor: a likelihood ratio of 7.
@@ -43,6 +45,8 @@ impl Judged {
 pub(super) struct Chosen {
     /// Its id.
     pub id: &'static str,
+    /// Its place among the model's causes.
+    pub place: usize,
     /// Corrected for all candidates and their trials.
     pub p_value: f64,
     /// Ratio of the score's scatter between blocks to that of white residuals.
@@ -84,14 +88,19 @@ impl Search<'_> {
     /// S. A. Billings, Nonlinear System Identification, 2013, chapter 3, on forward selection; G. Schwarz, Ann. Stat. 6 (1978) 461.
     pub fn run(&self, baseline: Fit) -> Choice {
         let mut ladder = vec![Judged::new(baseline, &self.blocks)];
+        let mut chosen = Vec::new();
         let mut nearest = Vec::new();
-        // each exchange lowers the loss, so that this ends; the bound is for ties by rounding
-        for _ in 0..3 {
+        // an exchange lowers the loss, so that this ends; the bound is for ties by rounding
+        for round in 0..ROUNDS {
             nearest = self.climb(&mut ladder);
-            let Some(better) = ladder.last().and_then(|last| self.reconsidered(last)) else { break };
-            ladder = self.rebuilt(&ladder[0], &better);
+            match self.examined(&ladder, round + 1 < ROUNDS) {
+                Examined::Stands(causes) => {
+                    chosen = causes;
+                    break;
+                }
+                Examined::Changes(model) => ladder = self.rebuilt(&ladder[0], &model),
+            }
         }
-        let chosen = self.audited(&ladder);
         Choice { ladder, chosen, nearest }
     }
 
@@ -128,7 +137,6 @@ impl Search<'_> {
             tried.push((gain - 0.5 * parameters as f64 * samples.ln(), next.fit.model));
         }
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        if std::env::var_os("DBG").is_some() { eprintln!("step"); for (g,m) in &tried { eprintln!("  {} {g:.2}",m.causes.last().unwrap().id()); } }
         let sample = self.sampled(&here.fit);
         for (_, model) in tried.into_iter().filter(|(gain, _)| gain.is_finite()) {
             let next = Judged::new(Fit::new(self.bench, &model, None)?, &self.blocks);
@@ -143,8 +151,9 @@ impl Search<'_> {
     /// Whether a promise, taken at its word, could be significant or large: a fit of what is neither is time lost.
     fn could_matter(&self, current: &Judged, promise: &Promise) -> bool {
         let mean_square = current.fit.loss / self.bench.count as f64;
-        // a kinked or nonlinear cause may hold more than its secant promises: a factor of 3
-        promise.gain > 2.0 * mean_square && 3.0 * promise.gain / current.fit.loss > self.options.least_gain
+        // a cause that only works beside refitted others holds far more than its secant promises: where fits are cheap they decide
+        let cheap = self.sample.count == self.bench.count;
+        promise.gain > 2.0 * mean_square && (cheap || 5.0 * promise.gain / current.fit.loss > self.options.least_gain)
     }
 
     /// Training part over sample, in samples.
@@ -186,7 +195,6 @@ impl Search<'_> {
         let sign = significance(sample, &with.fit.model, which, gain, self.scale());
         let share = 1.0 - (with.fit.loss / without.fit.loss).sqrt();
         let p_value = self.corrected(sign.p_value, with.fit.model.causes[which].cause);
-        if std::env::var_os("DBG").is_some() { eprintln!("   {} p {p_value:.2e} share {share:.4} infl {:.2} gain {gain:.3e} loss {:.3e} floor {:.3e} conv {} {:?}", with.fit.model.causes[which].id(), sign.inflation, with.fit.loss, sample.floor.mean_square*self.bench.count as f64, with.fit.converged, with.fit.model.vector()); }
         p_value < self.options.false_alarm_rate && share > self.options.least_gain
     }
 
@@ -197,39 +205,49 @@ impl Search<'_> {
         (p_value * tries as f64).min(1.0)
     }
 
-    /// The model without its weakest cause, if that no longer passes, or with a rival in a cause's place that does better.
-    fn reconsidered(&self, last: &Judged) -> Option<Model> {
-        let here = self.on_sample(&last.fit.model)?;
+    /// Holds each cause of the last model against its absence and against its rivals.
+    fn examined(&self, ladder: &[Judged], may_change: bool) -> Examined {
+        let Some(here) = ladder.last().and_then(|last| self.on_sample(&last.fit.model)) else {
+            return Examined::Stands(Vec::new());
+        };
         let sample = self.sampled(&here.fit);
-        for which in 0..last.fit.model.causes.len().saturating_sub(1) {
-            let model = last.fit.model.without(which);
-            let Some(without) = self.on_sample(&model) else { continue };
-            let scale = self.scale();
-            let gain = scale * (without.fit.loss - here.fit.loss);
-            let p_value = significance(&sample, &here.fit.model, which, gain, scale).p_value;
+        let mut chosen = Vec::new();
+        for which in 0..here.fit.model.causes.len() {
+            let without = self
+                .on_sample(&here.fit.model.without(which))
+                .filter(|without| without.fit.loss > here.fit.loss)
+                // the others' values may diverge without it: then the model before it came
+                .or_else(|| self.on_sample(&ladder.get(which)?.fit.model));
+            let Some(without) = without else { continue };
+            let rival = self.rival(&here, which, &without);
+            let found = self.audit(&sample, &here, which, &without, rival.as_ref());
             let share = 1.0 - (here.fit.loss / without.fit.loss).sqrt();
-            if self.corrected(p_value, last.fit.model.causes[which].cause) > self.options.false_alarm_rate
-                || share < self.options.least_gain
-            {
-                return Some(model);
+            let weak = found.p_value > self.options.false_alarm_rate || share < self.options.least_gain;
+            // the last has just passed
+            if may_change && weak && which + 1 < here.fit.model.causes.len() {
+                return Examined::Changes(without.fit.model);
             }
-            if let Some((rival, _)) = self.rival(&here, which, &without)
+            if let Some((rival, _)) = rival.filter(|_| may_change)
                 && rival.fit.loss - here.fit.loss < -TIE * sample.floor.mean_square
             {
-                return Some(rival.fit.model);
+                return Examined::Changes(rival.fit.model);
             }
+            chosen.push(found);
         }
-        None
+        Examined::Stands(chosen)
     }
 
     /// The best model with another cause in the place of `which`, of another class; all on the sample.
     fn rival(&self, here: &Judged, which: usize, without: &Judged) -> Option<(Judged, &'static str)> {
-        let class = here.fit.model.causes[which].cause.about().class;
+        let about = here.fit.model.causes[which].cause.about();
+        // over the beginning of a record an offset, a drift and a slow line are one
+        let short = self.sample.count < self.bench.count && about.part == Part::Record;
         let others: Vec<&'static dyn Cause> = self
             .candidates
             .iter()
             .copied()
-            .filter(|cause| !class.contains(&cause.about().id) && !here.fit.model.has(cause.about().id))
+            .filter(|cause| !about.class.contains(&cause.about().id) && !here.fit.model.has(cause.about().id))
+            .filter(|cause| !(short && cause.about().part == Part::Record))
             .collect();
         let promises = screen(&self.sample, &without.fit, &others);
         let sample = self.sampled(&without.fit);
@@ -263,35 +281,35 @@ impl Search<'_> {
         ladder
     }
 
-    /// Each cause of the last model with its p-value and its runner-up.
-    fn audited(&self, ladder: &[Judged]) -> Vec<Chosen> {
-        let Some(here) = ladder.last().and_then(|last| self.on_sample(&last.fit.model)) else { return Vec::new() };
-        let sample = self.sampled(&here.fit);
-        (0..here.fit.model.causes.len())
-            .filter_map(|which| {
-                let without = self
-                    .on_sample(&here.fit.model.without(which))
-                    .filter(|without| without.fit.loss > here.fit.loss)
-                    // the others' values may diverge without it: then the model before it came
-                    .or_else(|| self.on_sample(&ladder.get(which)?.fit.model))?;
-                Some(self.audit(&sample, &here, which, &without))
-            })
-            .collect()
-    }
-
-    fn audit(&self, sample: &Sample<'_>, here: &Judged, which: usize, without: &Judged) -> Chosen {
+    /// A cause with its p-value and its runner-up.
+    fn audit(
+        &self,
+        sample: &Sample<'_>,
+        here: &Judged,
+        which: usize,
+        without: &Judged,
+        rival: Option<&(Judged, &'static str)>,
+    ) -> Chosen {
         let added = &here.fit.model.causes[which];
         let gain = without.fit.loss - here.fit.loss;
         let scale = self.scale();
         let sign = significance(sample, &here.fit.model, which, gain * scale, scale);
-        let rival = self.rival(here, which, without);
         let tie = TIE * sample.floor.mean_square * sign.inflation.max(1.0);
         Chosen {
             id: added.id(),
+            place: which,
             p_value: self.corrected(sign.p_value, added.cause),
             inflation: sign.inflation,
-            tied: rival.as_ref().is_some_and(|(rival, _)| scale * (rival.fit.loss - here.fit.loss) < tie),
-            runner_up: rival.map(|(rival, id)| (id, (without.fit.loss - rival.fit.loss) / gain)),
+            tied: rival.is_some_and(|(rival, _)| scale * (rival.fit.loss - here.fit.loss) < tie),
+            runner_up: rival.map(|(rival, id)| (*id, (without.fit.loss - rival.fit.loss) / gain)),
         }
     }
+}
+
+/// Whether a model's causes stand.
+enum Examined {
+    /// Each, with what it was held against.
+    Stands(Vec<Chosen>),
+    /// The model without a superfluous cause, or with a better one in its place.
+    Changes(Model),
 }
