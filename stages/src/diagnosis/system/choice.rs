@@ -76,6 +76,8 @@ pub(super) struct Search<'a> {
     pub sample_blocks: Blocks,
     pub options: &'a SystemOptions,
     pub candidates: Vec<&'static dyn Cause>,
+    /// Trials of all candidates together.
+    pub trials: usize,
 }
 
 impl Search<'_> {
@@ -201,7 +203,7 @@ impl Search<'_> {
     /// Bonferroni over all candidates' trials; a frequency is searched among as many as the record resolves.
     fn corrected(&self, p_value: f64, cause: &dyn Cause) -> f64 {
         let searched = cause.about().parameters.iter().any(|parameter| parameter.unit == "Hz");
-        let tries = self.candidates.len() * if searched { self.bench.count / 2 } else { 1 };
+        let tries = self.trials * if searched { self.bench.count / 2 } else { 1 };
         (p_value * tries as f64).min(1.0)
     }
 

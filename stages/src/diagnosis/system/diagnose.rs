@@ -63,13 +63,15 @@ pub fn diagnose_system(record: &Recorded<'_>, options: &SystemOptions) -> Result
     let fit = super::fit::Fit::new(&bench, &start.model, None).ok_or(SystemError::NoBaseline)?;
     let blocks = blocks(&bench, &fit);
     let sample = bench.cut(0, bench.output.len().min(SAMPLE));
+    let candidates = candidates(options, bench.driven)?;
     let search = Search {
         bench: &bench,
         blocks,
         sample_blocks: Blocks { samples: sample.output.len(), ..blocks },
         sample,
         options,
-        candidates: candidates(options, bench.driven)?,
+        trials: super::screen::trials(&bench, &fit, &candidates),
+        candidates,
     };
     let choice = search.run(fit);
     let Some(last) = choice.ladder.last() else { return Err(SystemError::NoBaseline) };

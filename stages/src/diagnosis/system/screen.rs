@@ -21,7 +21,6 @@ pub(super) struct Sample<'a> {
 }
 
 /// A cause tried at one of its trial values.
-#[derive(Clone)]
 pub(super) struct Promise {
     pub cause: &'static dyn Cause,
     /// Values at which the fit begins: the trial's, its strength scaled to what the residual asks for.
@@ -30,8 +29,6 @@ pub(super) struct Promise {
     pub trial: Vec<f64>,
     /// What the loss would fall by, to first order.
     pub gain: f64,
-    /// Trials of this cause, for the correction of its significance.
-    pub tries: usize,
 }
 
 /// The part of `direction` that the fit's own parameters cannot make.
@@ -56,19 +53,14 @@ pub(super) fn beyond(fit: &Fit, mut direction: Vec<f64>, left_out: std::ops::Ran
 /// C. R. Rao, Linear Statistical Inference and Its Applications, 2nd ed., 1973, section 6e.
 pub(super) fn screen(bench: &Bench, fit: &Fit, candidates: &[&'static dyn Cause]) -> Vec<Promise> {
     let scene = scene(bench, fit);
-    let trials: Vec<(&'static dyn Cause, Vec<f64>, usize)> = candidates
-        .iter()
-        .filter(|cause| !fit.model.has(cause.about().id))
-        .flat_map(|cause| {
-            let trials = cause.trials(&scene);
-            let tries = tries(bench, *cause, trials.len());
-            trials.into_iter().map(move |trial| (*cause, trial, tries))
-        })
-        .collect();
     // a free decay whose law is not yet known leaves what looks like a line near its own frequency
     let own = |frequency_hz: f64| !bench.driven && (frequency_hz / fit.model.oscillator.frequency_hz - 1.0).abs() < 0.2;
-    let trials = trials.into_iter().filter(|(cause, trial, _)| !frequency(*cause, trial).is_some_and(own));
-    let trials: Vec<(&'static dyn Cause, Vec<f64>, usize)> = trials.collect();
+    let trials: Vec<(&'static dyn Cause, Vec<f64>)> = candidates
+        .iter()
+        .filter(|cause| !fit.model.has(cause.about().id))
+        .flat_map(|cause| cause.trials(&scene).into_iter().map(move |trial| (*cause, trial)))
+        .filter(|(cause, trial)| !frequency(*cause, trial).is_some_and(own))
+        .collect();
     let promises: Vec<Option<Promise>> = trials.into_par_iter().map(|trial| promise(bench, fit, trial)).collect();
     let mut best: Vec<Promise> = Vec::new();
     for next in promises.into_iter().flatten() {
@@ -87,13 +79,13 @@ fn frequency(cause: &dyn Cause, values: &[f64]) -> Option<f64> {
     cause.about().parameters.iter().zip(values).find(|(parameter, _)| parameter.unit == "Hz").map(|(_, value)| *value)
 }
 
-/// How many trials a significance is corrected for: a frequency is searched among as many as the record resolves.
-fn tries(bench: &Bench, cause: &dyn Cause, trials: usize) -> usize {
-    let searched = cause.about().parameters.iter().any(|parameter| parameter.unit == "Hz");
-    if searched { bench.count / 2 } else { trials.max(1) }
+/// Trials of all candidates together: a significance is corrected for them.
+pub(super) fn trials(bench: &Bench, fit: &Fit, candidates: &[&'static dyn Cause]) -> usize {
+    let scene = scene(bench, fit);
+    candidates.iter().map(|cause| cause.trials(&scene).len()).sum::<usize>().max(1)
 }
 
-fn promise(bench: &Bench, fit: &Fit, (cause, trial, tries): (&'static dyn Cause, Vec<f64>, usize)) -> Option<Promise> {
+fn promise(bench: &Bench, fit: &Fit, (cause, trial): (&'static dyn Cause, Vec<f64>)) -> Option<Promise> {
     let changed = bench.simulate(&fit.model.with(cause, trial.clone()));
     let direction: Vec<f64> = (0..changed.len())
         .map(|k| if bench.output[k].is_finite() { changed[k] - fit.simulated[k] } else { 0.0 })
@@ -109,10 +101,14 @@ fn promise(bench: &Bench, fit: &Fit, (cause, trial, tries): (&'static dyn Cause,
     let parameter = cause.about().parameters.first()?;
     if !super::model::is_choice(cause) {
         values[0] = (trial[0] * along / length).clamp(parameter.low, parameter.high);
+        // the residual asks for a strength of the sign that the cause can't have
+        if values[0] == 0.0 {
+            return None;
+        }
     } else if along < 0.0 {
         return None;
     }
-    Some(Promise { cause, values, trial, gain: along * along / length, tries })
+    Some(Promise { cause, values, trial, gain: along * along / length })
 }
 
 /// What trial values are taken from.
@@ -180,6 +176,11 @@ pub(super) fn significance(sample: &Sample<'_>, model: &Model, which: usize, gai
         .collect();
     // the cause's own sensitivities don't count as the others'
     let own = if fit.model.has(added.id()) { fit.model.places(which) } else { 0..0 };
+    // a motion that diverges without the cause leaves its sensitivity to compare with
+    let direction = match own.clone().next().and_then(|place| fit.sensitivities.get(place)) {
+        Some(column) if direction.iter().any(|value| !value.is_finite()) => column.clone(),
+        _ => direction,
+    };
     let direction = beyond(fit, direction, own);
     let length = dot(&direction, &direction);
     let stationary = added.cause.about().part == crate::causes::Part::Record;
