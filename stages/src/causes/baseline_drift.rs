@@ -13,7 +13,13 @@ const ABOUT: About = About {
     part: Part::Record,
     domain: Domain::InputOutput,
     parameters: &[
-        Parameter { name: "slope", unit: "V", meaning: "half the rise of the straight line over the record", low: -1e6, high: 1e6 },
+        Parameter {
+            name: "slope",
+            unit: "V",
+            meaning: "half the rise of the straight line over the record",
+            low: -1e6,
+            high: 1e6,
+        },
         Parameter { name: "bend", unit: "V", meaning: "weight of the second polynomial", low: -1e6, high: 1e6 },
         Parameter { name: "twist", unit: "V", meaning: "weight of the third", low: -1e6, high: 1e6 },
     ],

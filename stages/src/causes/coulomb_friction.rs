@@ -12,9 +12,13 @@ const ABOUT: About = About {
     physics: "two surfaces rub: a force of constant size against the motion, so that the envelope falls on a straight line and stops",
     part: Part::Lever,
     domain: Domain::Both,
-    parameters: &[
-        Parameter { name: "c", unit: "V", meaning: "static deflection that the friction holds", low: 0.0, high: 10.0 },
-    ],
+    parameters: &[Parameter {
+        name: "c",
+        unit: "V",
+        meaning: "static deflection that the friction holds",
+        low: 0.0,
+        high: 10.0,
+    }],
     class: &["coulomb-friction"],
     resembles: "a higher loss: decays exponentially at small amplitudes, where friction stops the motion",
     next_measurement: "let it ring until it stops: under friction it stops off zero, within the static deflection that it holds",

@@ -13,7 +13,13 @@ const ABOUT: About = About {
     part: Part::Input,
     domain: Domain::InputOutput,
     parameters: &[
-        Parameter { name: "share", unit: "1", meaning: "share that is lost of what exceeds the level", low: 0.0, high: 2.0 },
+        Parameter {
+            name: "share",
+            unit: "1",
+            meaning: "share that is lost of what exceeds the level",
+            low: 0.0,
+            high: 2.0,
+        },
         Parameter { name: "level", unit: "input", meaning: "level beyond which it is lost", low: 0.0, high: 1e6 },
     ],
     class: &["input-saturation"],

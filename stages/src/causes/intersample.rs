@@ -10,9 +10,13 @@ const ABOUT: About = About {
     physics: "the input was measured through an anti-alias filter or made without a hold: between samples it does not stay where it was",
     part: Part::Input,
     domain: Domain::InputOutput,
-    parameters: &[
-        Parameter { name: "kind", unit: "1", meaning: "0 held, 1 linear, 2 band-limited", low: 0.0, high: 2.0 },
-    ],
+    parameters: &[Parameter {
+        name: "kind",
+        unit: "1",
+        meaning: "0 held, 1 linear, 2 band-limited",
+        low: 0.0,
+        high: 2.0,
+    }],
     class: &["intersample"],
     resembles: "a delay of half a sample: the same at low frequencies, not near the Nyquist frequency",
     next_measurement: "sample input and output faster: the difference falls with the interval",

@@ -12,9 +12,13 @@ const ABOUT: About = About {
     physics: "energy is lost in strongly bent parts or by coupling: the loss factor grows with the square of the deflection",
     part: Part::Lever,
     domain: Domain::Both,
-    parameters: &[
-        Parameter { name: "c", unit: "1/V^2", meaning: "loss 1/Q per square of the first mode's deflection signal", low: -10.0, high: 10.0 },
-    ],
+    parameters: &[Parameter {
+        name: "c",
+        unit: "1/V^2",
+        meaning: "loss 1/Q per square of the first mode's deflection signal",
+        low: -10.0,
+        high: 10.0,
+    }],
     class: &["nonlinear-damping"],
     resembles: "quadratic-damping: grows with the amplitude, not its square; cubic-detector: bends the envelope too, but makes a third harmonic",
     next_measurement: "let it ring from twice the amplitude: the early loss grows fourfold (quadratic-damping: twofold)",

@@ -12,9 +12,13 @@ const ABOUT: About = About {
     physics: "the sensor or its amplifier adds a constant",
     part: Part::Record,
     domain: Domain::InputOutput,
-    parameters: &[
-        Parameter { name: "offset", unit: "V", meaning: "constant part of the output", low: -1e6, high: 1e6 },
-    ],
+    parameters: &[Parameter {
+        name: "offset",
+        unit: "V",
+        meaning: "constant part of the output",
+        low: -1e6,
+        high: 1e6,
+    }],
     class: &["offset"],
     resembles: "a constant force or input: the same in a linear system, but it shifts the resonance of a nonlinear one",
     next_measurement: "record without input before and after",

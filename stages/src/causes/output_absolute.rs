@@ -12,9 +12,13 @@ const ABOUT: About = About {
     physics: "the sensor has one sensitivity to one side and another to the other",
     part: Part::Detector,
     domain: Domain::InputOutput,
-    parameters: &[
-        Parameter { name: "a", unit: "1", meaning: "half the difference of the two sensitivities", low: -1.0, high: 1.0 },
-    ],
+    parameters: &[Parameter {
+        name: "a",
+        unit: "1",
+        meaning: "half the difference of the two sensitivities",
+        low: -1.0,
+        high: 1.0,
+    }],
     class: &["output-absolute"],
     resembles: "output-quadratic: differs at small outputs, where two slopes stay two slopes",
     next_measurement: "calibrate the sensor statically on both sides of zero",

@@ -12,9 +12,13 @@ const ABOUT: About = About {
     physics: "the sensor flattens or steepens symmetrically: a term in the cube of the motion",
     part: Part::Detector,
     domain: Domain::InputOutput,
-    parameters: &[
-        Parameter { name: "a", unit: "1/V^2", meaning: "weight of the cube of the output", low: -10.0, high: 10.0 },
-    ],
+    parameters: &[Parameter {
+        name: "a",
+        unit: "1/V^2",
+        meaning: "weight of the cube of the output",
+        low: -10.0,
+        high: 10.0,
+    }],
     class: &["output-cubic"],
     resembles: "duffing: also odd harmonics, but it shifts the resonance; output-saturation: hurts large outputs only",
     next_measurement: "calibrate the sensor statically, or read the motion with a second one",

@@ -12,9 +12,13 @@ const ABOUT: About = About {
     physics: "the sensor answers more to one side than to the other: a term in the square of the motion",
     part: Part::Detector,
     domain: Domain::InputOutput,
-    parameters: &[
-        Parameter { name: "a", unit: "1/V", meaning: "weight of the square of the output", low: -10.0, high: 10.0 },
-    ],
+    parameters: &[Parameter {
+        name: "a",
+        unit: "1/V",
+        meaning: "weight of the square of the output",
+        low: -10.0,
+        high: 10.0,
+    }],
     class: &["output-quadratic"],
     resembles: "quadratic-stiffness: also even harmonics, but it lowers the resonance",
     next_measurement: "calibrate the sensor statically, or read the motion with a second one",

@@ -12,9 +12,13 @@ const ABOUT: About = About {
     physics: "stiffness changes with the side that the oscillator swings to: a bias, a magnet or gravity acts from one side",
     part: Part::Lever,
     domain: Domain::InputOutput,
-    parameters: &[
-        Parameter { name: "k2", unit: "1/V", meaning: "relative change of stiffness per deflection", low: -10.0, high: 10.0 },
-    ],
+    parameters: &[Parameter {
+        name: "k2",
+        unit: "1/V",
+        meaning: "relative change of stiffness per deflection",
+        low: -10.0,
+        high: 10.0,
+    }],
     class: &["quadratic-stiffness"],
     resembles: "output-quadratic: also even harmonics, but it shifts no frequency and follows the output instantly",
     next_measurement: "drive at two amplitudes: the mean output moves with the square and the resonance falls with it",

@@ -12,9 +12,13 @@ const ABOUT: About = About {
     physics: "stiffness grows with the fourth power of the deflection: contact, magnets or geometry at large swings",
     part: Part::Lever,
     domain: Domain::InputOutput,
-    parameters: &[
-        Parameter { name: "k5", unit: "1/V^4", meaning: "relative change of stiffness per fourth power of the deflection", low: -10.0, high: 10.0 },
-    ],
+    parameters: &[Parameter {
+        name: "k5",
+        unit: "1/V^4",
+        meaning: "relative change of stiffness per fourth power of the deflection",
+        low: -10.0,
+        high: 10.0,
+    }],
     class: &["quintic-stiffness"],
     resembles: "duffing: grows with the square; only a range of amplitudes tells the two apart",
     next_measurement: "drive at three amplitudes: the shift of the resonance against amplitude on logarithmic axes has slope 4, not 2",

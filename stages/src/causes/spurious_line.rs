@@ -16,7 +16,13 @@ const ABOUT: About = About {
     parameters: &[
         Parameter { name: "amplitude", unit: "V", meaning: "amplitude of the line", low: -1e6, high: 1e6 },
         Parameter { name: "frequency_hz", unit: "Hz", meaning: "its frequency", low: 0.0, high: 1e9 },
-        Parameter { name: "phase_rad", unit: "rad", meaning: "its phase at the first sample of the record", low: -100.0, high: 100.0 },
+        Parameter {
+            name: "phase_rad",
+            unit: "rad",
+            meaning: "its phase at the first sample of the record",
+            low: -100.0,
+            high: 100.0,
+        },
     ],
     class: &["spurious-line"],
     resembles: "extra-mode: also a line, but it is driven by the input and decays",

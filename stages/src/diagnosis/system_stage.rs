@@ -122,7 +122,8 @@ impl Stage for SystemDiagnose {
                 .help("choose one column as input; an oscillator under several inputs is beyond this stage"));
         }
         let stretch = &pair.axis("time_identification")?.values;
-        let first = stretch.first().zip(pair.axis("time")?.values.first()).map_or(0.0, |(a, b)| ((a - b) * rate).round());
+        let first =
+            stretch.first().zip(pair.axis("time")?.values.first()).map_or(0.0, |(a, b)| ((a - b) * rate).round());
         let training = (first as usize, first as usize + stretch.len());
         let unit = |name: &str| pair.variable(name).map(|variable| variable.unit.clone());
         let options = self.options(training, unit("response")?, unit("force")?);
@@ -164,8 +165,9 @@ impl SystemDiagnose {
 fn ladder(found: &SystemDiagnosis) -> Table {
     let rungs = &found.diagnosis.ladder;
     let unit = &found.diagnosis.ladder.first().map_or(String::new(), |rung| rung.unit.clone());
-    let column =
-        |value: fn(&super::Rung) -> Option<f64>| rungs.iter().map(|r| value(r).unwrap_or(f64::NAN)).collect::<Vec<f64>>();
+    let column = |value: fn(&super::Rung) -> Option<f64>| {
+        rungs.iter().map(|r| value(r).unwrap_or(f64::NAN)).collect::<Vec<f64>>()
+    };
     Table::new()
         .with("added", "1", "what was added", rungs.iter().map(|rung| rung.added.clone()).collect::<Vec<String>>())
         .with("parameters", "1", "parameters so far", rungs.iter().map(|r| r.parameters as f64).collect::<Vec<f64>>())

@@ -7,9 +7,7 @@ use super::choice::{Choice, Chosen, Judged};
 use super::misfit::Misfit;
 use super::options::SystemOptions;
 use super::validation::free_run_rms;
-use crate::diagnosis::{
-    DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
-};
+use crate::diagnosis::{DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};
 
 /// Block-wise standard errors beyond which a misfit is one: one chance in six hundred.
 const SIGNIFICANT: f64 = 3.0;
@@ -195,7 +193,8 @@ impl Findings<'_> {
 
     fn nearest(&self) -> Vec<RunnerUp> {
         let chosen = self.choice.chosen.iter().map(|chosen| (chosen.id, None));
-        let rivals = self.choice.chosen.iter().filter_map(|chosen| chosen.runner_up).map(|(id, share)| (id, Some(share)));
+        let rivals =
+            self.choice.chosen.iter().filter_map(|chosen| chosen.runner_up).map(|(id, share)| (id, Some(share)));
         let left = self.choice.nearest.iter().map(|(id, share)| (*id, Some(*share)));
         let all: Vec<(&str, Option<f64>)> = chosen.chain(rivals).chain(left).collect();
         let mut nearest: Vec<RunnerUp> = Vec::new();
@@ -214,22 +213,32 @@ impl Findings<'_> {
             .ladder
             .windows(2)
             .map(|pair| {
-                let rms = |judged: &Judged| (judged.fit.loss / self.bench.count as f64).sqrt() * self.bench.output_scale;
+                let rms =
+                    |judged: &Judged| (judged.fit.loss / self.bench.count as f64).sqrt() * self.bench.output_scale;
                 let added = pair[1].fit.model.causes.last().map_or("", |added| added.id());
                 let [before, after] = [rms(&pair[0]), rms(&pair[1])];
-                format!("{added} lowers the free-run error of the training part from {before:.4e} to {after:.4e} {unit}")
+                format!(
+                    "{added} lowers the free-run error of the training part from {before:.4e} to {after:.4e} {unit}"
+                )
             })
             .collect();
         for chosen in self.choice.chosen.iter().filter(|chosen| chosen.tied) {
             let rival = chosen.runner_up.map_or("nothing", |(id, _)| id);
-            lines.push(format!("{} can't be told from {rival}: their losses differ by less than 4 variances of the noise", chosen.id));
+            lines.push(format!(
+                "{} can't be told from {rival}: their losses differ by less than 4 variances of the noise",
+                chosen.id
+            ));
         }
         let share = 100.0 * self.misfit.ratio.powi(2) / (1.0 + self.misfit.ratio.powi(2));
         if self.misfit.significance > SIGNIFICANT {
             lines.push(format!(
                 "motion and input predict another {share:.1} % of the squared residual ({:.1} standard errors), {}",
                 self.misfit.significance,
-                if verdict == Verdict::Unexplained && self.systematic() { "more than is tolerated" } else { "which is tolerated" }
+                if verdict == Verdict::Unexplained && self.systematic() {
+                    "more than is tolerated"
+                } else {
+                    "which is tolerated"
+                }
             ));
         }
         if let Some((id, share)) = self.choice.nearest.first().filter(|_| verdict == Verdict::Named) {

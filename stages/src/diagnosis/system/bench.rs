@@ -69,7 +69,8 @@ impl Bench {
     pub fn new(record: &Recorded<'_>, training: (usize, usize), highest_hz: f64) -> Result<Self, SystemError> {
         check(record, training)?;
         let (first, end) = training;
-        let largest = |values: &[f64]| values.iter().filter(|v| v.is_finite()).fold(0.0_f64, |most, v| most.max(v.abs()));
+        let largest =
+            |values: &[f64]| values.iter().filter(|v| v.is_finite()).fold(0.0_f64, |most, v| most.max(v.abs()));
         let output_scale = largest(&record.output[first..end]);
         let moves = record.output[first..end].iter().filter(|v| v.is_finite()).any(|v| *v != record.output[first]);
         if output_scale == 0.0 || !moves {

@@ -5,8 +5,8 @@ use super::blocks::Blocks;
 use super::fit::Fit;
 use super::linear_algebra::dot;
 use super::misfit::Floor;
-use super::options::SystemOptions;
 use super::model::Model;
+use super::options::SystemOptions;
 use super::screen::{Promise, Sample, screen, significance};
 use crate::causes::{Cause, Part};
 
@@ -256,7 +256,8 @@ impl Search<'_> {
         let extended = promises.iter().take(RIVALS).filter_map(|promise| {
             let rival = self.extended(&without.fit.model, promise)?;
             // what is not significant by itself is no rival
-            self.passes(&sample, &rival, rival.fit.model.causes.len() - 1, without).then_some((rival, promise.cause.about().id))
+            self.passes(&sample, &rival, rival.fit.model.causes.len() - 1, without)
+                .then_some((rival, promise.cause.about().id))
         });
         extended.min_by(|a, b| a.0.fit.loss.total_cmp(&b.0.fit.loss))
     }

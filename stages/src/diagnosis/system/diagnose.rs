@@ -104,9 +104,11 @@ fn candidates(options: &SystemOptions, driven: bool) -> Result<Vec<&'static dyn 
         about.domain != Domain::Release && (driven || about.part != crate::causes::Part::Input)
     };
     let all = || CATALOGUE.iter().copied().filter(usable);
-    if let Some(unknown) = options.candidates.iter().find(|id| {
-        !CATALOGUE.iter().any(|cause| cause.about().id == **id && cause.about().domain != Domain::Release)
-    }) {
+    if let Some(unknown) = options
+        .candidates
+        .iter()
+        .find(|id| !CATALOGUE.iter().any(|cause| cause.about().id == **id && cause.about().domain != Domain::Release))
+    {
         return Err(SystemError::Cause(unknown.clone()));
     }
     let wanted = |cause: &&'static dyn Cause| {

@@ -96,7 +96,8 @@ impl Fit {
                 (model.vector()[i] - vector[i], model)
             };
             // at an upper limit the other side
-            let (by, model) = [step, -step].map(shifted).into_iter().find(|(by, _)| *by != 0.0).unwrap_or_else(|| shifted(step));
+            let (by, model) =
+                [step, -step].map(shifted).into_iter().find(|(by, _)| *by != 0.0).unwrap_or_else(|| shifted(step));
             let moved = bench.simulate(&model);
             let slope = |(k, (a, b)): (usize, (&f64, &f64))| {
                 if by != 0.0 && bench.output[k].is_finite() { (a - b) / by } else { 0.0 }

@@ -144,8 +144,7 @@ fn with_input(effects: &Effects, map: Arc<dyn Fn(f64) -> f64 + Send + Sync>) -> 
 fn slow(bench: &Bench, fit: &Fit) -> Vec<Vec<f64>> {
     let n = bench.output.len();
     let time = |k: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
-    let mut columns: Vec<Vec<f64>> =
-        (1..=4).map(|power| (0..n).map(|k| time(k).powi(power)).collect()).collect();
+    let mut columns: Vec<Vec<f64>> = (1..=4).map(|power| (0..n).map(|k| time(k).powi(power)).collect()).collect();
     for frequency_hz in peaks(&fit.residual, bench.span.interval_s).into_iter().take(1) {
         let angle = 2.0 * std::f64::consts::PI * frequency_hz * bench.span.interval_s;
         columns.push((0..n).map(|k| (angle * k as f64).cos()).collect());

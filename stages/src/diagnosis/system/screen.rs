@@ -171,9 +171,8 @@ pub(super) fn significance(sample: &Sample<'_>, model: &Model, which: usize, gai
     let blocks = &sample.blocks;
     let Some(added) = model.causes.get(which) else { return Significance { p_value: 1.0, inflation: 1.0 } };
     let (with, without) = (bench.simulate(model), bench.simulate(&model.without(which)));
-    let direction: Vec<f64> = (0..without.len())
-        .map(|k| if bench.output[k].is_finite() { with[k] - without[k] } else { 0.0 })
-        .collect();
+    let direction: Vec<f64> =
+        (0..without.len()).map(|k| if bench.output[k].is_finite() { with[k] - without[k] } else { 0.0 }).collect();
     // the cause's own sensitivities don't count as the others'
     let own = if fit.model.has(added.id()) { fit.model.places(which) } else { 0..0 };
     // a motion that diverges without the cause leaves its sensitivity to compare with

@@ -23,7 +23,12 @@ struct Drive {
 impl Drive {
     fn new(rng: &mut ChaCha8Rng, resonance_hz: f64) -> Self {
         let lines: Vec<(f64, f64)> = (1..=60)
-            .map(|i| (resonance_hz * 0.05 * f64::from(i) * rng.random_range(0.99..1.01), rng.random_range(0.0..std::f64::consts::TAU)))
+            .map(|i| {
+                (
+                    resonance_hz * 0.05 * f64::from(i) * rng.random_range(0.99..1.01),
+                    rng.random_range(0.0..std::f64::consts::TAU),
+                )
+            })
             .collect();
         Self { scale: 2.0 / (lines.len() as f64).sqrt(), lines }
     }
@@ -59,7 +64,8 @@ fn simulated(seed: u64, hidden: &[(&str, Vec<f64>)], noise: f64) -> (Vec<f64>, V
         let white: f64 = StandardNormal.sample(&mut rng);
         output.push(effects.seen(q) + effects.added.iter().map(|added| added(&instant)).sum::<f64>() + noise * white);
         for i in 0..STEPS {
-            let input = |part: f64| if held { *u } else { drive.at((k as f64 + (i as f64 + part) / STEPS as f64) / RATE_HZ) };
+            let input =
+                |part: f64| if held { *u } else { drive.at((k as f64 + (i as f64 + part) / STEPS as f64) / RATE_HZ) };
             let (u0, u1, u2) = (input(0.0), input(0.5), input(1.0));
             let (a1, v1) = (acceleration(q, v, u0), v);
             let (v2, a2) = (v + 0.5 * h * a1, acceleration(q + 0.5 * h * v1, v + 0.5 * h * a1, u1));
@@ -138,8 +144,9 @@ fn rounds(default: u64) -> u64 {
 
 #[test]
 fn one_hidden_cause_is_named_with_its_parameters() {
-    let jobs: Vec<(u64, &str)> =
-        (0..rounds(2)).flat_map(|round| IDS.iter().enumerate().map(move |(i, id)| (1000 * round + i as u64, *id))).collect();
+    let jobs: Vec<(u64, &str)> = (0..rounds(2))
+        .flat_map(|round| IDS.iter().enumerate().map(move |(i, id)| (1000 * round + i as u64, *id)))
+        .collect();
     let results: Vec<(bool, usize, usize)> = jobs
         .par_iter()
         .map(|(seed, id)| {
@@ -164,7 +171,12 @@ fn one_hidden_cause_is_named_with_its_parameters() {
                     }
                 }
             } else {
-                println!("{id} {values:?} {seed}: {:?} {:?} {:?}", diagnosis.verdict, names(&diagnosis), diagnosis.evidence);
+                println!(
+                    "{id} {values:?} {seed}: {:?} {:?} {:?}",
+                    diagnosis.verdict,
+                    names(&diagnosis),
+                    diagnosis.evidence
+                );
             }
             (right, inside, all)
         })
@@ -240,7 +252,12 @@ fn a_cause_left_out_of_the_catalogue_is_unexplained() {
             let (id, values, without) = &left_out[*i];
             let diagnosis = diagnosed(seed + 20_000, &[(id, values.clone())], without);
             if diagnosis.verdict != Verdict::Unexplained {
-                println!("{id} left out, {seed}: {:?} {:?} {:?}", diagnosis.verdict, names(&diagnosis), diagnosis.evidence);
+                println!(
+                    "{id} left out, {seed}: {:?} {:?} {:?}",
+                    diagnosis.verdict,
+                    names(&diagnosis),
+                    diagnosis.evidence
+                );
             }
             diagnosis.verdict == Verdict::Unexplained
         })
