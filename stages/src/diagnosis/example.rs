@@ -36,7 +36,7 @@ fn pair() -> Array {
     let omega = std::f64::consts::TAU * 80.0;
     let phase = |line: usize| (line * line) as f64 * 2.4;
     let input: Vec<f64> = (0..SAMPLES)
-        .map(|k| (1..=40).map(|line| (0.0245 * line as f64 * k as f64 + phase(line)).sin()).sum::<f64>() * 0.15)
+        .map(|k| (1..=40).map(|line| (0.0245 * line as f64 * k as f64 + phase(line)).sin()).sum::<f64>() * 0.03)
         .collect();
     let (mut q, mut v, mut state, mut output) = (0.0_f64, 0.0_f64, 12345_u32, Vec::with_capacity(SAMPLES));
     let step = 1.0 / RATE_HZ / STEPS as f64;

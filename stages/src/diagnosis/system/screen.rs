@@ -196,6 +196,7 @@ pub(super) fn significance(sample: &Sample<'_>, model: &Model, which: usize, gai
     let parameters = model.places(which).len().max(1) as f64;
     let inflation = (scatter / (mean_square * length)).max(1e-3);
     // what the others' refit takes along is no sign of a line
-    let gain = if stationary { gain.min((mean * count).powi(2) / length * scale) } else { gain };
+    // (in a fit that has the cause the scores add up to nothing)
+    let gain = if stationary && !fit.model.has(added.id()) { gain.min((mean * count).powi(2) / length * scale) } else { gain };
     Significance { p_value: f_tail(gain / (parameters * mean_square * inflation), parameters, count - 1.0), inflation }
 }
