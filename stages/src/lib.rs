@@ -19,6 +19,7 @@ use afmid_pipeline::{Entry, Registry};
 #[rustfmt::skip]
 const DOMAINS: &[&[Entry]] = &[
     calibration::STAGES,
+    diagnosis::STAGES,
     ensemble::STAGES,
     events::STAGES,
     force::STAGES,

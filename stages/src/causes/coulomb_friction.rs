@@ -16,7 +16,7 @@ const ABOUT: About = About {
         name: "c",
         unit: "V",
         meaning: "static deflection that the friction holds",
-        low: -10.0,
+        low: 0.0,
         high: 10.0,
     }],
     class: &["coulomb-friction"],

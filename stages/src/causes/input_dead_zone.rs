@@ -13,7 +13,7 @@ const ABOUT: About = About {
     part: Part::Input,
     domain: Domain::InputOutput,
     parameters: &[
-        Parameter { name: "share", unit: "1", meaning: "share that is lost within the zone", low: -2.0, high: 2.0 },
+        Parameter { name: "share", unit: "1", meaning: "share that is lost within the zone", low: 0.0, high: 2.0 },
         Parameter { name: "width", unit: "input", meaning: "half width of the zone", low: 0.0, high: 1e6 },
     ],
     class: &["input-dead-zone"],

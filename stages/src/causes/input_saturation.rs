@@ -17,7 +17,7 @@ const ABOUT: About = About {
             name: "share",
             unit: "1",
             meaning: "share that is lost of what exceeds the level",
-            low: -2.0,
+            low: 0.0,
             high: 2.0,
         },
         Parameter { name: "level", unit: "input", meaning: "level beyond which it is lost", low: 0.0, high: 1e6 },

@@ -1,7 +1,24 @@
-//! What the simulation gets wrong: the verdict of a diagnosis.
+//! What the simulation gets wrong: the verdict of a diagnosis, and the diagnosis of a measured input and output.
 
+mod example;
 pub mod records;
 pub mod release;
+mod release_stage;
+pub mod system;
+mod system_stage;
 mod verdict;
 
+pub use release_stage::ReleaseDiagnose;
+pub use system_stage::{JudgedPart, SystemDiagnose};
 pub use verdict::{DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};
+
+use afmid_pipeline::Entry;
+
+/// The stages of this domain.
+pub const STAGES: &[Entry] = &[Entry::of::<ReleaseDiagnose>(), Entry::of::<SystemDiagnose>()];
+
+#[cfg(test)]
+#[test]
+fn examples_hold() {
+    crate::ensemble::example::run_examples(STAGES);
+}

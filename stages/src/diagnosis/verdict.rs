@@ -121,6 +121,8 @@ pub struct Rung {
 pub struct Diagnosis {
     /// What is concluded.
     pub verdict: Verdict,
+    /// Probability of so strong a sign where nothing is wrong, of the strongest; null where it could not be had.
+    pub p_value: Option<f64>,
     /// The causes, in the order in which they were found; empty unless named.
     pub causes: Vec<NamedCause>,
     /// What gave them away, or what remains, in plain sentences.

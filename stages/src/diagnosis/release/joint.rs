@@ -483,8 +483,8 @@ pub struct JointFit {
 }
 
 /// Turns of the basis, and steps within each.
-const ROUNDS: usize = 10;
-const STEPS: usize = 16;
+const ROUNDS: usize = 6;
+const STEPS: usize = 10;
 /// Fall of the cost that ends the search.
 const ARRIVED: f64 = 0.05;
 

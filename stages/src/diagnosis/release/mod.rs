@@ -1,5 +1,6 @@
 //! Diagnosis of releases: what a linear lever and detector leave unexplained in snap-off events, and why.
 
+mod answer;
 mod joint;
 mod lever;
 mod residuals;
@@ -9,6 +10,7 @@ mod start;
 mod stepper;
 mod window;
 
+pub use answer::answer;
 pub use joint::{Hold, Hypothesis, JointFit, Problem, SeenMode, State, aligned, fit, suggested};
 pub use lever::{Lever, LeverMode};
 pub use residuals::{Tile, common, peaks, residuals, tiles, whitened};

@@ -25,7 +25,7 @@ pub struct NamingOptions {
 
 impl Default for NamingOptions {
     fn default() -> Self {
-        Self { false_alarm_rate: 0.01, without: Vec::new(), most: 4, refits: 5, seed: 1 }
+        Self { false_alarm_rate: 0.01, without: Vec::new(), most: 4, refits: 3, seed: 1 }
     }
 }
 
@@ -51,6 +51,8 @@ pub struct Naming {
     pub fits: Vec<JointFit>,
     /// The last screen.
     pub screen: Screen,
+    /// Probability of the strongest sign of the first screen.
+    pub first_p_value: f64,
     /// Tiles of the common residual, strongest first: of the baseline and of the last fit.
     pub tiles: [Vec<Tile>; 2],
     /// Nearest candidates where there is no name.
@@ -129,10 +131,12 @@ pub fn name_causes(
     let mut verdict = Verdict::Clean;
     let first_tiles = tiles_of(problem, &fits[0]);
     let mut last_screen;
+    let mut first_p_value = None;
     loop {
         let base = &fits[fits.len() - 1];
         let common = common_of(problem, base);
         last_screen = screen(problem, base, &candidates, &scene(problem, base, &common), options.seed);
+        first_p_value.get_or_insert(last_screen.p_value);
         if last_screen.p_value >= options.false_alarm_rate || named.len() == options.most {
             break;
         }
@@ -193,7 +197,7 @@ pub fn name_causes(
             evidence.push(reason);
         }
     }
-    Ok(Naming { verdict, named, fits, screen: last_screen, tiles: [first_tiles, last_tiles], nearest, evidence })
+    Ok(Naming { verdict, named, fits, first_p_value: first_p_value.unwrap_or(1.0), screen: last_screen, tiles: [first_tiles, last_tiles], nearest, evidence })
 }
 
 fn same_class(a: &dyn Cause, b: &dyn Cause) -> bool {

@@ -32,8 +32,11 @@ pub struct Recorded<'a> {
 
 /// Fewest samples of a training part: a hundred periods' worth of nothing is not enough, a few of a ringdown are.
 const LEAST_SAMPLES: usize = 128;
-/// Largest angle of a step, rad: the scheme's error is its fourth power over 100 of what is not linear.
-const ANGLE: f64 = 0.3;
+/// Largest angle of a step, rad: the scheme's error is its fourth power over a hundred of what is not linear. Records of more than [`LONG`] samples take the
+/// second, whose error is still a thousandth of what a cause has to buy there.
+const ANGLES: [f64; 2] = [0.15, 0.45];
+/// Samples beyond which time counts.
+const LONG: usize = 16_384;
 /// Most steps between samples.
 const MOST_STEPS: usize = 16;
 
@@ -66,7 +69,8 @@ impl Bench {
     pub fn new(record: &Recorded<'_>, training: (usize, usize), highest_hz: f64) -> Result<Self, SystemError> {
         check(record, training)?;
         let (first, end) = training;
-        let largest = |values: &[f64]| values.iter().filter(|v| v.is_finite()).fold(0.0_f64, |most, v| most.max(v.abs()));
+        let largest =
+            |values: &[f64]| values.iter().filter(|v| v.is_finite()).fold(0.0_f64, |most, v| most.max(v.abs()));
         let output_scale = largest(&record.output[first..end]);
         let moves = record.output[first..end].iter().filter(|v| v.is_finite()).any(|v| *v != record.output[first]);
         if output_scale == 0.0 || !moves {
@@ -77,7 +81,8 @@ impl Bench {
         let input_scale = if driven { input_scale } else { 1.0 };
         let scaled: Vec<f64> = record.input.iter().map(|u| u / input_scale).collect();
         let angle = 2.0 * std::f64::consts::PI * highest_hz * record.interval_s;
-        let steps = ((angle / ANGLE).ceil() as usize).clamp(1, MOST_STEPS);
+        let largest_angle = ANGLES[usize::from(end - first > LONG)];
+        let steps = ((angle / largest_angle).ceil() as usize).clamp(1, MOST_STEPS);
         let kinds = [Intersample::Held, Intersample::Linear, Intersample::BandLimited];
         let output: Vec<f64> = record.output[first..end].iter().map(|y| y / output_scale).collect();
         Ok(Self {
@@ -135,16 +140,6 @@ impl Bench {
         let span = Span { begin_s: part.0 as f64 * self.span.interval_s, ..self.span };
         self.over(&effects, part.0, part.1, |nodes, steps| {
             free_run(&model.oscillator, state, nodes, steps, &effects, &span)
-        })
-    }
-
-    /// The scaled input at the training part's samples, as the effects see it between them.
-    pub(super) fn drive(&self, effects: &Effects) -> Vec<f64> {
-        let (first, end) = self.training;
-        self.over(effects, first, end, |nodes, steps| {
-            let mut at: Vec<f64> = nodes.iter().step_by(2 * steps + 1).copied().collect();
-            at.extend(nodes.last());
-            at
         })
     }
 

@@ -12,7 +12,9 @@ pub enum SystemError {
         output: usize,
     },
     /// A stretch beyond the record, or too short.
-    #[error("part `{name}` is samples {first} to {end} of {samples}; wanted at least {least} samples within the record")]
+    #[error(
+        "part `{name}` is samples {first} to {end} of {samples}; wanted at least {least} samples within the record"
+    )]
     Part {
         /// Its name.
         name: String,
@@ -26,7 +28,9 @@ pub enum SystemError {
         least: usize,
     },
     /// A part that goes on from the training part but does not begin in it or behind it.
-    #[error("part `{name}` begins at sample {first}, before the training part at {training}; wanted a later one, or `state_samples` above 0")]
+    #[error(
+        "part `{name}` begins at sample {first}, before the training part at {training}; wanted a later one, or `state_samples` above 0"
+    )]
     Before {
         /// Its name.
         name: String,
@@ -42,7 +46,9 @@ pub enum SystemError {
     #[error("the output of the training part does not move: there is nothing to identify")]
     Silent,
     /// No oscillator follows the output.
-    #[error("no oscillator follows the output: every start of the fit diverged; check that input and output belong together")]
+    #[error(
+        "no oscillator follows the output: every start of the fit diverged; check that input and output belong together"
+    )]
     NoBaseline,
     /// An unknown cause.
     #[error("there is no cause `{0}` for input and output")]

@@ -20,14 +20,14 @@ pub struct Fit {
     pub sensitivities: Vec<Vec<f64>>,
     /// Sum of squares that is left.
     pub loss: f64,
-    /// Whether the last step was below a hundredth of a standard error.
+    /// Whether the last step was below a thirtieth of a standard error.
     pub converged: bool,
 }
 
-/// Steps after which a fit is given up; three to ten are usual.
-const STEPS: usize = 25;
-/// A step this small against the residual's own scatter, squared: a hundredth of a standard error.
-const SMALL: f64 = 1e-4;
+/// Steps after which a fit is given up; three to ten are usual, more where much is left unexplained.
+const STEPS: usize = 60;
+/// A step this small against the residual's own scatter, squared: a thirtieth of a standard error.
+const SMALL: f64 = 1e-3;
 
 impl Fit {
     /// Least squares of the free-run error from a start.
@@ -96,7 +96,8 @@ impl Fit {
                 (model.vector()[i] - vector[i], model)
             };
             // at an upper limit the other side
-            let (by, model) = [step, -step].map(shifted).into_iter().find(|(by, _)| *by != 0.0).unwrap_or_else(|| shifted(step));
+            let (by, model) =
+                [step, -step].map(shifted).into_iter().find(|(by, _)| *by != 0.0).unwrap_or_else(|| shifted(step));
             let moved = bench.simulate(&model);
             let slope = |(k, (a, b)): (usize, (&f64, &f64))| {
                 if by != 0.0 && bench.output[k].is_finite() { (a - b) / by } else { 0.0 }

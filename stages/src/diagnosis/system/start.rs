@@ -50,9 +50,8 @@ pub(super) fn baseline(bench: &Bench) -> Option<Fit> {
 
 /// First sample of the window of the largest mean square.
 fn loudest(output: &[f64], window: usize) -> usize {
-    let power = |first: usize| -> f64 {
-        output[first..first + window].iter().filter(|y| y.is_finite()).map(|y| y * y).sum()
-    };
+    let power =
+        |first: usize| -> f64 { output[first..first + window].iter().filter(|y| y.is_finite()).map(|y| y * y).sum() };
     let starts = (0..=output.len() - window).step_by(window / 4);
     starts.map(|first| (power(first), first)).fold((-1.0, 0), |best, next| if next.0 > best.0 { next } else { best }).1
 }

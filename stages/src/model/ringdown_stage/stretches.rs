@@ -10,7 +10,7 @@ use crate::calibration::reading::{common_rate, read_blocks, read_free};
 const WINDOWS: usize = 256;
 
 /// Windows of `samples` samples from the free stretches of the records, as many of each record, evenly spread over it.
-pub(super) fn windows(
+pub(crate) fn windows(
     recording: &Recording,
     settings: FreeSettings,
     samples: usize,

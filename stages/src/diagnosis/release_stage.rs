@@ -1,0 +1,288 @@
+//! The stage `diagnosis.release`.
+
+use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::records::{CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, judge, summarise};
+use super::release::{
+    Cut, EventWindow, Naming, NamingOptions, Problem, answer, common, name_causes, residuals, start,
+};
+use crate::calibration::FreeSettings;
+use crate::causes::{CATALOGUE, Instant, find};
+use crate::events::EventKind;
+use crate::model::free_windows;
+
+/// Says what a linear lever and detector get wrong in snap-off events: names the causes, extends the model, measures the gain.
+///
+/// # Model
+/// Modes with real static shares behind real detector poles, released from a load at an instant of each event's own; white, 1/f and thermal noise.
+/// Whatever else there is, is a cause of the catalogue (`afmid causes`).
+/// # Method
+/// Whole records first: codes, lines, piezo position. Then the events, jointly: score screen of all causes with the joint distribution of all
+/// scores, the strongest fitted in full, judged on held-out halves and against the best of another class, greedily; at last a test
+/// of the residual common to all events, which a cause outside the catalogue leaves.
+/// # Shapes
+/// `summary`: the answer as JSON; `residuals` over the time of an event: common to all events, before and after the extension.
+/// # Units
+/// V, Hz, s; strengths relative to volts of static deflection.
+/// # Accuracy
+/// Right names, parameters and false alarms over many seeds, and what falls short: docs/diagnosis.md.
+/// # Errors
+/// No event, a record without the channel, windows that leave their records, fewer oscillations than `modes`, an unknown cause in `without`.
+/// # Source
+/// C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50; R. W. Stark et al., Rev. Sci. Instrum. 76 (2005).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReleaseDiagnose {
+    /// Oscillating modes of the lever, 1 to 12. Default: 4, the paper's.
+    pub modes: usize,
+    /// Samples of an event that are compared, 512 to 1000000. Default: 8000, 1.6 ms at 5 MS/s: six decay times of the paper's mode 1.
+    pub window_samples: usize,
+    /// Samples of it before the release, 8 to 4096. Default: 16.
+    pub before_samples: usize,
+    /// Nominal poles of the detector in Hz, 1 to 8 of them. Default: 1.3, 1.9 and 2.4 MHz. They are estimated along.
+    pub detector_poles_hz: Vec<f64>,
+    /// Relative standard deviation of what is known of them, 0.001 to 2. Default: 0.15.
+    pub detector_pole_std: f64,
+    /// Probability of any other verdict than `clean` where nothing is wrong, 1e-6 to 0.5. Default: 0.01.
+    pub false_alarm_rate: f64,
+    /// Causes that are not considered, by id. Default: none.
+    pub without: Vec<String>,
+    /// Most causes named from the events' shapes, 1 to 8. Default: 4.
+    pub most_causes: usize,
+    /// Metres per unit of the piezo channel, above 0. Default: 1e-8.
+    pub piezo_m_per_unit: f64,
+    /// What counts as free in a record.
+    pub free: FreeSettings,
+}
+
+impl Default for ReleaseDiagnose {
+    fn default() -> Self {
+        Self {
+            modes: 4,
+            window_samples: 8000,
+            before_samples: 16,
+            detector_poles_hz: vec![1.3e6, 1.9e6, 2.4e6],
+            detector_pole_std: 0.15,
+            false_alarm_rate: 0.01,
+            without: Vec::new(),
+            most_causes: 4,
+            piezo_m_per_unit: 1e-8,
+            free: FreeSettings::default(),
+        }
+    }
+}
+
+const RECORDS: Port<Recording> = Port::new("records", "records", "records with channel `deflection`, `piezo` if there is one");
+const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "snap-off events of these records");
+const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict: causes, evidence, gains, ladder");
+const RESIDUALS: Port<Array> =
+    Port::new("residuals", "diagnosis-residuals", "residual common to all events, before and after the extension");
+
+/// Room on either side of a window, within which its onset may move.
+const MARGIN: usize = 64;
+/// Shares of the false-alarm rate: shapes of the events, each channel of the records.
+const SHAPES_SHARE: f64 = 0.5;
+const CHANNEL_SHARE: f64 = 0.5 / CHANNELS as f64;
+
+impl Stage for ReleaseDiagnose {
+    const SPEC: Spec = Spec {
+        name: "diagnosis.release",
+        version: 1,
+        summary: "names what a linear lever and detector get wrong in snap-off events",
+        inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
+        outputs: &[SUMMARY.spec(), RESIDUALS.spec()],
+        caching: Caching::Stored,
+        seeded: true,
+        source: "C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        for (name, value, least, most) in [
+            ("modes", self.modes as f64, 1.0, 12.0),
+            ("window_samples", self.window_samples as f64, 512.0, 1e6),
+            ("before_samples", self.before_samples as f64, 8.0, 4096.0),
+            ("detector_pole_std", self.detector_pole_std, 1e-3, 2.0),
+            ("false_alarm_rate", self.false_alarm_rate, 1e-6, 0.5),
+            ("most_causes", self.most_causes as f64, 1.0, 8.0),
+            ("piezo_m_per_unit", self.piezo_m_per_unit, f64::MIN_POSITIVE, 1.0),
+            ("number of detector_poles_hz", self.detector_poles_hz.len() as f64, 1.0, 8.0),
+        ] {
+            if !(least..=most).contains(&value) {
+                return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
+            }
+        }
+        if let Some(pole) = self.detector_poles_hz.iter().find(|pole| !(**pole > 0.0 && pole.is_finite())) {
+            return Err(StageError::new(format!("`detector_poles_hz` holds {pole}, wanted frequencies above 0")));
+        }
+        if 2 * self.before_samples > self.window_samples {
+            return Err(StageError::new(format!(
+                "`before_samples` is {}, wanted at most half of `window_samples`, {}",
+                self.before_samples, self.window_samples
+            )));
+        }
+        if let Some(id) = self.without.iter().find(|id| find(id).is_none()) {
+            return Err(StageError::new(format!("`without` names `{id}`, which is no cause"))
+                .help("`afmid causes` lists them"));
+        }
+        self.free.check()
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let (recording, ensemble) = (inputs.get(&RECORDS)?, inputs.get(&ENSEMBLE)?);
+        let rate = ensemble.number("sample_rate_hz")?;
+        let cut = Cut { before: self.before_samples, samples: self.window_samples, interval_s: 1.0 / rate };
+        let onsets = onsets(ensemble, rate)?;
+        let windows = self.windows(recording, &onsets, &cut)?;
+        let free = free_windows(recording, self.free, self.window_samples, rate)?;
+        let lent: Vec<&[f64]> = free.iter().map(Vec::as_slice).collect();
+        let poles: Vec<f64> = self.detector_poles_hz.iter().map(|f| std::f64::consts::TAU * f).collect();
+        let begin = start(&windows, &lent, &cut, self.modes, &poles).map_err(StageError::from_error)?;
+        let resonances = begin
+            .seen
+            .iter()
+            .map(|seen| Resonance {
+                frequency_hz: seen.mode.omega / std::f64::consts::TAU,
+                quality_factor: seen.mode.quality_factor,
+            })
+            .collect();
+        let problem = Problem {
+            windows: &windows,
+            cut,
+            noise: begin.noise,
+            nominal_poles: poles,
+            pole_std: self.detector_pole_std,
+            seen: begin.seen,
+        };
+        let options = NamingOptions {
+            false_alarm_rate: SHAPES_SHARE * self.false_alarm_rate,
+            without: self.without.clone(),
+            most: self.most_causes,
+            seed: cx.seed,
+            ..NamingOptions::default()
+        };
+        let naming = name_causes(&problem, begin.state, begin.starts, CATALOGUE, &options).map_err(StageError::from_error)?;
+        let signs = self.record_signs(recording, &onsets, rate, resonances)?;
+        let found = answer(&problem, &naming, &signs, self.false_alarm_rate);
+        Ok(Ports::new().with(&SUMMARY, Document::new(&found)?).with(&RESIDUALS, residual_array(&problem, &naming)))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::release_example::examples()
+    }
+}
+
+/// Record and onset (samples) of each event.
+fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, StageError> {
+    let records = ensemble.integer("record")?;
+    let onsets = ensemble.real("onset")?;
+    Ok(records.iter().zip(onsets).map(|(r, t)| (usize::try_from(*r).unwrap_or(usize::MAX), t * rate)).collect())
+}
+
+impl ReleaseDiagnose {
+    fn windows(&self, recording: &Recording, onsets: &[(usize, f64)], cut: &Cut) -> Result<Vec<EventWindow>, StageError> {
+        let records = recording.records.len();
+        let span = (records.max(2) - 1) as f64;
+        let one = |&(number, onset): &(usize, f64)| -> Result<Option<EventWindow>, StageError> {
+            let record = recording.records.get(number).ok_or_else(|| {
+                StageError::new(format!("an event is of record {number}, and there are {records}"))
+                    .help("wire the records that the events were found in")
+            })?;
+            let channel = record.channel("deflection")?;
+            let first = onset.floor() - (MARGIN + cut.before) as f64;
+            let length = cut.samples + 2 * MARGIN;
+            if first < 0.0 || first as usize + length > channel.samples {
+                return Ok(None);
+            }
+            let values = channel.read(first as usize, length)?;
+            if values.iter().any(|v| !v.is_finite()) {
+                return Ok(None);
+            }
+            let place = number as f64 / span;
+            let at = Instant { record: number, place, time_s: first * cut.interval_s, piezo_m: 0.0 };
+            Ok(Some(EventWindow { values, onset: onset - first, first: at }))
+        };
+        let windows: Vec<EventWindow> =
+            onsets.par_iter().map(one).collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+        if windows.len() < 2 {
+            return Err(StageError::new(format!(
+                "{} of {} events have {} samples after them without a gap, wanted at least 2",
+                windows.len(),
+                onsets.len(),
+                cut.samples
+            ))
+            .help("shorten `window_samples`, or look for more events"));
+        }
+        Ok(windows)
+    }
+
+    fn record_signs(
+        &self,
+        recording: &Recording,
+        onsets: &[(usize, f64)],
+        rate: f64,
+        resonances: Vec<Resonance>,
+    ) -> Result<Vec<RecordSign>, StageError> {
+        let summaries: Vec<RecordSummary> = recording
+            .records
+            .par_iter()
+            .enumerate()
+            .map(|(number, record)| self.record_summary(number, record, onsets, rate))
+            .collect::<Result<_, _>>()?;
+        let options = JudgeOptions {
+            false_alarm_rate: CHANNEL_SHARE * self.false_alarm_rate,
+            resonances,
+            ..JudgeOptions::default()
+        };
+        let mut signs = judge(&summaries, &options);
+        signs.retain(|sign| !self.without.iter().any(|id| id == sign.id));
+        Ok(signs)
+    }
+
+    fn record_summary(
+        &self,
+        number: usize,
+        record: &Record,
+        onsets: &[(usize, f64)],
+        rate: f64,
+    ) -> Result<RecordSummary, StageError> {
+        let channel = record.channel("deflection")?;
+        let deflection = channel.read(0, channel.samples)?;
+        let piezo: Option<Vec<f64>> = match record.channel("piezo") {
+            Ok(piezo) if piezo.samples == channel.samples => {
+                Some(piezo.read(0, piezo.samples)?.into_iter().map(|v| v * self.piezo_m_per_unit).collect())
+            }
+            _ => None,
+        };
+        let events: Vec<RecordEvent> = onsets
+            .iter()
+            .filter(|(of, _)| *of == number)
+            .map(|(_, onset)| RecordEvent { kind: EventKind::SnapOff, sample: onset.round().max(0.0) as usize })
+            .collect();
+        let input = RecordInput {
+            deflection: &deflection,
+            piezo: piezo.as_deref(),
+            events: &events,
+            interval_s: 1.0 / rate,
+        };
+        summarise(&input).map_err(StageError::from_error)
+    }
+}
+
+fn residual_array(problem: &Problem<'_>, naming: &Naming) -> Array {
+    let mean = |fitted: &super::release::JointFit| -> Vec<f64> {
+        let scale = (fitted.state.events.len() as f64).sqrt().recip();
+        let all = residuals(problem, &fitted.state, &fitted.starts);
+        common(&fitted.state, &all).into_iter().map(|v| v * scale).collect()
+    };
+    let before = naming.fits.first().map(mean).unwrap_or_default();
+    let after = naming.fits.last().map(mean).unwrap_or_default();
+    let time = (0..problem.cut.samples)
+        .map(|k| (k as f64 - problem.cut.before as f64) * problem.cut.interval_s)
+        .collect();
+    Array::over(vec![Axis::new("time", "s", "time after the release", time)])
+        .with("before", "V", "mean residual of the linear model", &["time"], before)
+        .with("after", "V", "mean residual of the extended model", &["time"], after)
+}
