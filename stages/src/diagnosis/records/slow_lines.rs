@@ -46,8 +46,8 @@ struct Look {
 ///
 /// # Method
 /// In every record, each stretch (free or loaded, one way of the piezo) is freed from a cubic in the piezo position and weighted by what that
-/// leaves; then a sine of one phase for the whole record. Its power over the power at neighbouring frequencies of the same regression, averaged
-/// over records; its law is taken from all other frequencies. Greedily: a line found is taken out, with its phase in each record.
+/// leaves; then a sine of one phase for the whole record. Its power, averaged over records, over that at neighbouring frequencies of the
+/// same regression; its law is taken from all other frequencies. Greedily: a line found is taken out, with its phase in each record.
 pub(super) fn slow_lines(records: &[RecordSummary], options: &JudgeOptions) -> Vec<SlowLine> {
     let mut known: Vec<Vec<Sine>> = vec![Vec::new(); records.len()];
     let mut lines = Vec::new();
@@ -75,7 +75,7 @@ fn strongest(slow: &[Option<SlowRecord>], options: &JudgeOptions) -> Option<Slow
     let count = ((highest / step) as usize + 12).min(MOST_FREQUENCIES);
     // one and a half periods in the record are the least that a cubic leaves
     let grid: Vec<f64> = (3..count).map(|k| k as f64 * step).collect();
-    let powers: Vec<Vec<f64>> = slow.iter().flatten().map(|record| log_powers(record, &grid)).collect();
+    let powers: Vec<f64> = grid.iter().map(|&f| mean_power(slow, f)).collect();
     let looks: Vec<Look> = grid.iter().filter_map(|&f| look(slow, &powers, &grid, f, step)).collect();
     let yardstick = Yardstick::new(&looks.iter().map(|look| look.ratio).collect::<Vec<_>>())?;
     let mains: Vec<(f64, usize)> =
@@ -94,29 +94,24 @@ fn strongest(slow: &[Option<SlowRecord>], options: &JudgeOptions) -> Option<Slow
     (p_value < options.false_alarm_rate).then(|| describe(slow, &look, step, p_value, &mains))
 }
 
-fn log_powers(record: &SlowRecord, grid: &[f64]) -> Vec<f64> {
-    grid.iter().map(|&f| record.fit(f).map_or(f64::NAN, |sine| sine.power.ln())).collect()
+/// Mean over the records where the frequency can be asked for; NaN where there is none.
+fn mean_power(slow: &[Option<SlowRecord>], frequency_hz: f64) -> f64 {
+    let powers: Vec<f64> =
+        slow.iter().flatten().filter_map(|record| record.fit(frequency_hz)).map(|s| s.power).collect();
+    powers.iter().sum::<f64>() / powers.len() as f64
 }
 
-/// Mean over records of the power over that of the neighbours, whose logarithms a straight line in `ln f` interpolates.
-fn look(slow: &[Option<SlowRecord>], powers: &[Vec<f64>], grid: &[f64], frequency_hz: f64, step: f64) -> Option<Look> {
+/// Power over that of the neighbours, both means over records (which are weighted alike); a straight line in logarithms interpolates the neighbours.
+fn look(slow: &[Option<SlowRecord>], powers: &[f64], grid: &[f64], frequency_hz: f64, step: f64) -> Option<Look> {
     let near = |f: f64| NEIGHBOURS.contains(&((f - frequency_hz).abs() / step));
-    let neighbours: Vec<usize> = (0..grid.len()).filter(|&k| near(grid[k])).collect();
-    let on_grid = grid.iter().position(|&f| f == frequency_hz);
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (record, powers) in slow.iter().flatten().zip(powers) {
-        let own = match on_grid {
-            Some(k) => powers[k],
-            None => record.fit(frequency_hz).map_or(f64::NAN, |sine| sine.power.ln()),
-        };
-        let pairs = neighbours.iter().map(|&k| ((grid[k] / frequency_hz).ln(), powers[k])).filter(|p| p.1.is_finite());
-        let Some(expected) = line_at_zero(&pairs.collect::<Vec<_>>()) else { continue };
-        if own.is_finite() {
-            sum += (own - expected).exp();
-            count += 1.0;
-        }
-    }
-    (count > 0.0).then_some(Look { frequency_hz, ratio: sum / count })
+    let neighbours = (0..grid.len()).filter(|&k| near(grid[k]));
+    let own = match grid.iter().position(|&f| f == frequency_hz) {
+        Some(k) => powers[k],
+        None => mean_power(slow, frequency_hz),
+    };
+    let pairs = neighbours.map(|k| ((grid[k] / frequency_hz).ln(), powers[k].ln())).filter(|p| p.1.is_finite());
+    let expected = line_at_zero(&pairs.collect::<Vec<_>>())?.exp();
+    (own.is_finite() && expected > 0.0).then_some(Look { frequency_hz, ratio: own / expected })
 }
 
 /// Value at zero of the straight line through points; none with fewer than six, or all to one side.
