@@ -3,6 +3,7 @@
 mod example;
 pub mod records;
 pub mod release;
+mod release_example;
 mod release_stage;
 pub mod system;
 mod system_stage;

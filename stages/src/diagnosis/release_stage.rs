@@ -1,14 +1,16 @@
 //! The stage `diagnosis.release`.
 
-use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
+use afmid_pipeline::{
+    Array, Axis, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Values,
+};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::records::{CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, judge, summarise};
-use super::release::{
-    Cut, EventWindow, Naming, NamingOptions, Problem, answer, common, name_causes, residuals, start,
+use super::records::{
+    CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, judge, summarise,
 };
+use super::release::{Cut, EventWindow, Naming, NamingOptions, Problem, answer, common, name_causes, residuals, start};
 use crate::calibration::FreeSettings;
 use crate::causes::{CATALOGUE, Instant, find};
 use crate::events::EventKind;
@@ -75,7 +77,8 @@ impl Default for ReleaseDiagnose {
     }
 }
 
-const RECORDS: Port<Recording> = Port::new("records", "records", "records with channel `deflection`, `piezo` if there is one");
+const RECORDS: Port<Recording> =
+    Port::new("records", "records", "records with channel `deflection`, `piezo` if there is one");
 const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "snap-off events of these records");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict: causes, evidence, gains, ladder");
 const RESIDUALS: Port<Array> =
@@ -124,8 +127,9 @@ impl Stage for ReleaseDiagnose {
             )));
         }
         if let Some(id) = self.without.iter().find(|id| find(id).is_none()) {
-            return Err(StageError::new(format!("`without` names `{id}`, which is no cause"))
-                .help("`afmid causes` lists them"));
+            return Err(
+                StageError::new(format!("`without` names `{id}`, which is no cause")).help("`afmid causes` lists them")
+            );
         }
         self.free.check()
     }
@@ -160,10 +164,11 @@ impl Stage for ReleaseDiagnose {
             false_alarm_rate: SHAPES_SHARE * self.false_alarm_rate,
             without: self.without.clone(),
             most: self.most_causes,
-            seed: cx.seed,
+            seed: cx.seed(),
             ..NamingOptions::default()
         };
-        let naming = name_causes(&problem, begin.state, begin.starts, CATALOGUE, &options).map_err(StageError::from_error)?;
+        let naming =
+            name_causes(&problem, begin.state, begin.starts, CATALOGUE, &options).map_err(StageError::from_error)?;
         let signs = self.record_signs(recording, &onsets, rate, resonances)?;
         let found = answer(&problem, &naming, &signs, self.false_alarm_rate);
         Ok(Ports::new().with(&SUMMARY, Document::new(&found)?).with(&RESIDUALS, residual_array(&problem, &naming)))
@@ -176,13 +181,20 @@ impl Stage for ReleaseDiagnose {
 
 /// Record and onset (samples) of each event.
 fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, StageError> {
-    let records = ensemble.integer("record")?;
+    let Values::Integer(records) = &ensemble.variable("record")?.values else {
+        return Err(StageError::new("variable `record`: wanted whole numbers"));
+    };
     let onsets = ensemble.real("onset")?;
     Ok(records.iter().zip(onsets).map(|(r, t)| (usize::try_from(*r).unwrap_or(usize::MAX), t * rate)).collect())
 }
 
 impl ReleaseDiagnose {
-    fn windows(&self, recording: &Recording, onsets: &[(usize, f64)], cut: &Cut) -> Result<Vec<EventWindow>, StageError> {
+    fn windows(
+        &self,
+        recording: &Recording,
+        onsets: &[(usize, f64)],
+        cut: &Cut,
+    ) -> Result<Vec<EventWindow>, StageError> {
         let records = recording.records.len();
         let span = (records.max(2) - 1) as f64;
         let one = |&(number, onset): &(usize, f64)| -> Result<Option<EventWindow>, StageError> {
@@ -261,12 +273,8 @@ impl ReleaseDiagnose {
             .filter(|(of, _)| *of == number)
             .map(|(_, onset)| RecordEvent { kind: EventKind::SnapOff, sample: onset.round().max(0.0) as usize })
             .collect();
-        let input = RecordInput {
-            deflection: &deflection,
-            piezo: piezo.as_deref(),
-            events: &events,
-            interval_s: 1.0 / rate,
-        };
+        let input =
+            RecordInput { deflection: &deflection, piezo: piezo.as_deref(), events: &events, interval_s: 1.0 / rate };
         summarise(&input).map_err(StageError::from_error)
     }
 }
@@ -279,9 +287,8 @@ fn residual_array(problem: &Problem<'_>, naming: &Naming) -> Array {
     };
     let before = naming.fits.first().map(mean).unwrap_or_default();
     let after = naming.fits.last().map(mean).unwrap_or_default();
-    let time = (0..problem.cut.samples)
-        .map(|k| (k as f64 - problem.cut.before as f64) * problem.cut.interval_s)
-        .collect();
+    let time =
+        (0..problem.cut.samples).map(|k| (k as f64 - problem.cut.before as f64) * problem.cut.interval_s).collect();
     Array::over(vec![Axis::new("time", "s", "time after the release", time)])
         .with("before", "V", "mean residual of the linear model", &["time"], before)
         .with("after", "V", "mean residual of the extended model", &["time"], after)

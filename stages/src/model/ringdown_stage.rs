@@ -19,7 +19,7 @@ use self::gaps::{gaps, total};
 use self::known::named;
 pub use self::known::{KnownNumber, KnownQuantity};
 pub use self::mode_number::ModeNumber;
-use self::stretches::windows;
+pub(crate) use self::stretches::windows as free_windows;
 use self::summary::summary;
 use self::tables::{event_table, mode_table, poles, spectrum};
 use super::ringdown::{
@@ -190,7 +190,7 @@ impl Stage for RingdownFit {
         let events: Vec<&[f64]> = signal.chunks_exact(samples).map(|event| &event[first..]).collect();
         let gaps = self.gaps(&events);
         let free = match inputs.find(&FREE)? {
-            Some(records) => windows(records, self.free, samples - first, rate)?,
+            Some(records) => free_windows(records, self.free, samples - first, rate)?,
             None => Vec::new(),
         };
         let lent: Vec<&[f64]> = free.iter().map(Vec::as_slice).collect();

@@ -5,11 +5,9 @@ use std::f64::consts::TAU;
 
 use super::joint::{JointFit, Problem};
 use super::residuals::Tile;
-use super::search::{Naming, Named};
+use super::search::{Named, Naming};
 use crate::diagnosis::records::RecordSign;
-use crate::diagnosis::verdict::{
-    DiagnosedMode, Diagnosis, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
-};
+use crate::diagnosis::verdict::{DiagnosedMode, Diagnosis, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};
 
 /// Puts shapes and whole records together.
 ///

@@ -197,7 +197,16 @@ pub fn name_causes(
             evidence.push(reason);
         }
     }
-    Ok(Naming { verdict, named, fits, first_p_value: first_p_value.unwrap_or(1.0), screen: last_screen, tiles: [first_tiles, last_tiles], nearest, evidence })
+    Ok(Naming {
+        verdict,
+        named,
+        fits,
+        first_p_value: first_p_value.unwrap_or(1.0),
+        screen: last_screen,
+        tiles: [first_tiles, last_tiles],
+        nearest,
+        evidence,
+    })
 }
 
 fn same_class(a: &dyn Cause, b: &dyn Cause) -> bool {

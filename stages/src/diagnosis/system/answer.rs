@@ -29,6 +29,7 @@ impl Findings<'_> {
         let verdict = self.verdict();
         let causes = if verdict == Verdict::Named { self.named() } else { Vec::new() };
         Diagnosis {
+            p_value: None,
             verdict,
             causes,
             evidence: self.evidence(verdict),

@@ -197,6 +197,7 @@ pub(super) fn significance(sample: &Sample<'_>, model: &Model, which: usize, gai
     let inflation = (scatter / (mean_square * length)).max(1e-3);
     // what the others' refit takes along is no sign of a line
     // (in a fit that has the cause the scores add up to nothing)
-    let gain = if stationary && !fit.model.has(added.id()) { gain.min((mean * count).powi(2) / length * scale) } else { gain };
+    let gain =
+        if stationary && !fit.model.has(added.id()) { gain.min((mean * count).powi(2) / length * scale) } else { gain };
     Significance { p_value: f_tail(gain / (parameters * mean_square * inflation), parameters, count - 1.0), inflation }
 }

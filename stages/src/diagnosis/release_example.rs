@@ -1,0 +1,85 @@
+//! The example of `diagnosis.release`: releases seen through a photodiode that bends.
+
+use afmid_pipeline::recording::Raw;
+use afmid_pipeline::{Array, Axis, Document, Example, Port, Ports, Recording, Shaped};
+
+use super::release::{Lever, LeverMode};
+use crate::io::{memory_channel, memory_record};
+
+const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict");
+/// Weight of the square of the signal, 1/V.
+const BEND: f64 = 0.02;
+const RATE_HZ: f64 = 5e6;
+const RECORDS: usize = 8;
+/// First sample after the release.
+const RELEASE: usize = 6000;
+const SAMPLES: usize = 60_000;
+
+pub(super) fn examples() -> Vec<Example> {
+    vec![Example {
+        title: "eight releases through a detector with 0.02 per volt of the square",
+        params: "modes = 2\ndetector_poles_hz = [1.5e6]\nwindow_samples = 4000\n[free]\nsettle_s = 2e-3",
+        inputs: || Ok(inputs()),
+        expect: |outputs| {
+            let told = |error: afmid_pipeline::StageError| error.to_string();
+            let found = &outputs.get(&SUMMARY).map_err(told)?.0;
+            let cause = &found["causes"][0];
+            let a2 = &cause["parameters"]["a2"];
+            let (value, std) = (a2["value"].as_f64().unwrap_or(f64::NAN), a2["std"].as_f64().unwrap_or(f64::NAN));
+            // four standard errors
+            if found["verdict"] == "named" && cause["id"] == "quadratic-detector" && (value - BEND).abs() < 4.0 * std {
+                Ok(format!("named: quadratic-detector, a2 = {value:.4} +- {std:.4} 1/V."))
+            } else {
+                Err(found.to_string())
+            }
+        },
+    }]
+}
+
+fn inputs() -> Ports {
+    let mode = |frequency_hz: f64, quality_factor: f64, share: f64| LeverMode {
+        omega: std::f64::consts::TAU * frequency_hz,
+        quality_factor,
+        share,
+    };
+    let lever = Lever {
+        modes: vec![mode(46.3e3, 40.8, 0.92), mode(247.4e3, 193.2, 0.08)],
+        poles: vec![std::f64::consts::TAU * 1.5e6],
+    };
+    let exponentials = lever.release();
+    let mut state = 4711_u32;
+    // a linear congruential generator (Numerical Recipes); twelve of them make a normal deviate
+    let mut draw = move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state) / f64::from(u32::MAX)
+    };
+    let (mut records, mut onsets) = (Vec::new(), Vec::new());
+    for number in 0..RECORDS {
+        let load = 0.8 + 0.3 * draw();
+        let lead = draw();
+        onsets.push((RELEASE as f64 - lead) / RATE_HZ);
+        let values: Vec<f64> = (0..SAMPLES)
+            .map(|k| {
+                let s = match k.checked_sub(RELEASE) {
+                    None => -load,
+                    Some(after) => {
+                        let t = (after as f64 + lead) / RATE_HZ;
+                        load * exponentials.iter().map(|e| e.value(t)).sum::<f64>()
+                    }
+                };
+                let noise: f64 = (0..12).map(|_| draw()).sum::<f64>() - 6.0;
+                s + BEND * s * s + 1.2e-3 * noise
+            })
+            .collect();
+        let channel = memory_channel("deflection", Raw::Float64(values), 1.0);
+        records.push(memory_record(&format!("record_{number}.h5"), RATE_HZ, vec![channel]));
+    }
+    let ensemble = Array::over(vec![Axis::new("event", "1", "event", (0..RECORDS).map(|k| k as f64).collect())])
+        .with("onset", "s", "time of the onset in its record", &["event"], onsets)
+        .with("record", "1", "number of the record", &["event"], (0..RECORDS as i64).collect::<Vec<_>>())
+        .attribute("sample_rate_hz", RATE_HZ);
+    let mut ports = Ports::new();
+    ports.insert("records", Recording { records }.wrap());
+    ports.insert("ensemble", ensemble.wrap());
+    ports
+}
