@@ -1,4 +1,7 @@
 //! False alarms, power and coverage over seeds.
+//!
+//! Clean, 200 archives of 10 records, 4 channels at 1 %: 8 alarms in 800 (1.0 %; Clopper-Pearson, 95 %: 0.43 to 1.96 %): slow lines 2, fast lines 3,
+//! position 3, clipping 0. Found in half of 16 archives of that kind: hum 1.8e-4 V, crosstalk 3.5e3 V/m, fringe 4e-4 to 5e-4 V.
 
 use super::archive::Archive;
 use super::{JudgeOptions, RecordSign, judge};
