@@ -17,7 +17,7 @@ const ABOUT: About = About {
             name: "damping",
             unit: "1",
             meaning: "additional damping rate at the point of release over the first mode's angular frequency",
-            low: -1.0,
+            low: 0.0,
             high: 1.0,
         },
         Parameter { name: "length_v", unit: "V", meaning: "its decay length, as deflection", low: 1e-3, high: 10.0 },

@@ -327,9 +327,9 @@ impl<'a> Problem<'a> {
                 let w = weights(&turned.reference, &shared.exponentials, own);
                 let width = turned.r.ncols();
                 let mut residual = turned.events[event].clone();
-                for i in 0..width {
+                for (i, value) in residual.iter_mut().enumerate().take(width) {
                     let head: f64 = (i..width - 1).map(|j| turned.r[(i, j)] * w.value[j]).sum();
-                    residual[i] -= head - turned.r[(i, width - 1)] * own.amplitude;
+                    *value -= head - turned.r[(i, width - 1)] * own.amplitude;
                 }
                 residual.iter_mut().zip(&base[event]).for_each(|(r, b)| *r -= b);
                 residual.iter().map(|r| r * r).sum()
@@ -482,6 +482,8 @@ pub struct JointFit {
     pub at_limit: Vec<(usize, usize)>,
 }
 
+/// Most trial steps of a fit, over all turns: what has not arrived by then has no likelihood worth the time.
+const EVALUATIONS: usize = 28;
 /// Turns of the basis, and steps within each.
 const ROUNDS: usize = 6;
 const STEPS: usize = 10;
@@ -499,6 +501,7 @@ pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) 
     let (mut state, mut starts) = (state, starts);
     let mut last_round = f64::INFINITY;
     let mut damping = 1e-6;
+    let mut evaluations = 0;
     for round in 0..ROUNDS {
         problem.starts(&mut state, &mut starts)?;
         let turned = problem.turn(&state, &starts);
@@ -520,6 +523,11 @@ pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) 
                 converged = true;
                 break;
             }
+            if evaluations == EVALUATIONS {
+                covariance = Some(symmetric_inverse(&normal.information));
+                break;
+            }
+            evaluations += 1;
             let trial = moved(&state, &step.shared, &step.own, hold);
             let next_base = problem.base(&turned, &trial);
             let next = problem.costs(&turned, &trial, &next_base);
@@ -546,7 +554,7 @@ pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) 
                 }
             }
         }
-        if (converged && (last_round - cost).abs() < 1.0) || round + 1 == ROUNDS {
+        if (converged && (last_round - cost).abs() < 1.0) || round + 1 == ROUNDS || evaluations == EVALUATIONS {
             let covariance = match covariance {
                 Some(covariance) => covariance,
                 None => {

@@ -99,7 +99,7 @@ pub fn screen(
     let (mut used, mut strongest) = (Vec::new(), 0.0f64);
     for (c, (cause, values)) in trials.iter().enumerate() {
         let seen = projection.information[(c, c)];
-        if !(seen > VISIBLE * raw[c]) {
+        if seen.is_nan() || seen <= VISIBLE * raw[c] {
             continue;
         }
         used.push(c);

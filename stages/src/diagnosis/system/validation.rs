@@ -51,7 +51,8 @@ fn initial_state(bench: &Bench, model: &Model, part: &Part, output: &[f64]) -> [
         let step = Cholesky::new(&curvature, 1e-9).solve(&score);
         let next = [state[0] + step[0], state[1] + step[1]];
         let left = residual(next);
-        if !(dot(&left, &left) < dot(&rest, &rest)) {
+        let (with, without) = (dot(&left, &left), dot(&rest, &rest));
+        if with.is_nan() || with >= without {
             break;
         }
         (state, rest) = (next, left);
