@@ -20,10 +20,10 @@ use std::f64::consts::TAU;
 /// optics' maps act on the lever's signal before the poles. Further modes, sections and feedthrough are part of `system`.
 ///
 /// # Method
-/// Exact linear propagation between instants so close that the load runs straight from one to the next within [`LOAD_TOLERANCE`] (halved where it does
+/// Exact linear propagation between instants so close that the load runs straight from one to the next within a millionth (halved where it does
 /// not), which is exact for a straight load. Modal forces by Strang splitting: half a kick, the exact linear flow with its thermal noise, half a kick, in steps in
-/// which the fastest mode turns by less than [`STEP_RADIANS`] while the lever rings, of a sample while it rests. Optics: what a map adds to the lever's signal goes through poles and sections
-/// by itself, on straight lines between [`super::optics::POINTS`] points per sample.
+/// which the fastest mode turns by less than a fraction of a radian while the lever rings, of a sample while it rests. Optics: what a map adds to the lever's signal goes through poles and sections
+/// by itself, on straight lines between several points per sample.
 ///
 /// # Accuracy
 /// Loads: 1e-6 of the pull-off force. Modal forces: second order, about `STEP_RADIANS^2 / 12`, 1 % of their effect on the fastest mode and 1e-4 of that on a

@@ -162,7 +162,7 @@ impl Microscope {
     /// Simulates one record.
     ///
     /// # Accuracy
-    /// The motion is exact ([`simulate_motion`]); the rest is arithmetic. The same seed gives the same codes on any number of
+    /// The motion is exact (`simulate_motion`); the rest is arithmetic. The same seed gives the same codes on any number of
     /// threads: each record has its own streams.
     pub fn record(&self, plan: &RecordPlan, phase: f64, drift: &Drift, place: Place) -> SimulatedRecord {
         self.record_with(plan, phase, drift, place, &Effects::default())
