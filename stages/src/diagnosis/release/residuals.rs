@@ -70,8 +70,18 @@ pub struct Tile {
     pub peak_hz: f64,
     /// Energy over what white noise of unit variance has.
     pub excess: f64,
+    /// Degrees of freedom.
+    pub degrees: usize,
     /// Probability of so much energy in white noise, this tile alone.
     pub p_value: f64,
+}
+
+impl Tile {
+    /// The same where the noise has `level` times unit variance.
+    pub fn against(self, level: f64) -> Self {
+        let excess = self.excess / level;
+        Self { excess, p_value: chi_square_tail(excess * self.degrees as f64, self.degrees), ..self }
+    }
 }
 
 /// Frequency bins of a tile.
@@ -106,6 +116,7 @@ pub fn tiles(values: &[f64], before: usize, interval_s: f64) -> Vec<Tile> {
                 high_hz: last as f64 * resolution,
                 peak_hz: peak as f64 * resolution,
                 excess: energy / degrees as f64,
+                degrees,
                 p_value: chi_square_tail(energy, degrees),
             });
         }

@@ -237,8 +237,21 @@ fn common_of(problem: &Problem<'_>, fitted: &JointFit) -> Vec<f64> {
     common(&fitted.state, &whitened(problem, &residuals))
 }
 
+/// Tiles of the common residual, judged by what the events have there each for themselves: the noise model is an estimate.
 fn tiles_of(problem: &Problem<'_>, fitted: &JointFit) -> Vec<Tile> {
-    let mut all = tiles(&common_of(problem, fitted), problem.cut.before, problem.cut.interval_s);
+    let (before, interval_s) = (problem.cut.before, problem.cut.interval_s);
+    let single = whitened(problem, &residuals(problem, &fitted.state, &fitted.starts));
+    let mut all = tiles(&common(&fitted.state, &single), before, interval_s);
+    let mut own = vec![0.0; all.len()];
+    for event in &single {
+        let energies = tiles(event, before, interval_s);
+        own.iter_mut().zip(&energies).for_each(|(sum, tile)| *sum += tile.excess / single.len() as f64);
+    }
+    for (tile, own) in all.iter_mut().zip(own) {
+        // what is common is in every event as well: its share, one over their number, is taken off
+        let alone = (own - (tile.excess - 1.0).max(0.0) / single.len() as f64).max(1.0);
+        *tile = tile.against(alone);
+    }
     all.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
     all
 }
