@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 
 use super::joint::{JointFit, Problem};
 use super::residuals::Tile;
-use super::search::{Named, Naming};
+use super::search::{Named, Naming, stands_out};
 use crate::diagnosis::records::RecordSign;
-use crate::diagnosis::verdict::{DiagnosedMode, Diagnosis, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};
+use crate::diagnosis::verdict::{DiagnosedMode, Diagnosis, NamedCause, Rung, RunnerUp, Value, Verdict};
 
 /// Puts shapes and whole records together.
 ///
@@ -15,9 +15,15 @@ use crate::diagnosis::verdict::{DiagnosedMode, Diagnosis, NamedCause, Rung, Runn
 pub fn answer(problem: &Problem<'_>, naming: &Naming, records: &[RecordSign], false_alarm_rate: f64) -> Diagnosis {
     let mut evidence: Vec<String> = Vec::new();
     let modes = modes_of(&naming.fits[0]);
-    if let Some(tile) = naming.tiles[0].first().filter(|t| !naming.named.is_empty() || t.p_value < 1e-6) {
+    let tiles = &naming.tiles[0];
+    if let Some(tile) = tiles.first().filter(|tile| stands_out(tile, tiles.len(), false_alarm_rate)) {
         evidence.push(sentence(tile, &modes));
     }
+    let score = |named: &Named| {
+        let id = named.cause.about().id;
+        format!("the events' residuals lie along the effect of {id}: {:.1} standard deviations", named.score.abs())
+    };
+    evidence.extend(naming.named.iter().map(score));
     evidence.extend(naming.evidence.iter().cloned());
     evidence.extend(records.iter().map(|sign| sign.evidence.clone()));
     let verdict = match naming.verdict {
@@ -40,16 +46,7 @@ pub fn answer(problem: &Problem<'_>, naming: &Naming, records: &[RecordSign], fa
         nearest: naming.nearest.clone(),
         modes_before: modes,
         modes_after: modes_of(last),
-        validation: naming
-            .named
-            .iter()
-            .map(|named| Validation {
-                name: format!("held-out events, {}", named.cause.about().id),
-                rms_before: named.gain.rms_before,
-                rms_after: named.gain.rms_after,
-                unit: named.gain.unit.clone(),
-            })
-            .collect(),
+        validation: Vec::new(),
         ladder: ladder(problem, naming),
         false_alarm_rate,
     }

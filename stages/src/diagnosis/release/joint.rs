@@ -9,7 +9,7 @@ use super::window::{Cut, EventWindow};
 use crate::causes::{Cause, Effects};
 use crate::model::ModelError;
 use crate::model::orthogonal::{Qr, product};
-use crate::model::ringdown::internals::{Whitener, columns, symmetric_inverse, weights, whiten};
+use crate::model::ringdown::internals::{Whitener, columns, shared, symmetric_inverse, weights, whiten};
 use crate::model::ringdown::{EventParameters, Exponential, RingdownNoise};
 
 /// A cause with its present values.
@@ -28,12 +28,6 @@ pub enum Hold {
     Nothing,
     /// Lever and causes: the events' own parameters are fitted, as on held-out events.
     Shared,
-}
-
-impl Hold {
-    fn lever(self) -> bool {
-        self == Self::Shared
-    }
 }
 
 /// Everything that is fitted.
@@ -239,7 +233,7 @@ impl<'a> Problem<'a> {
         let mut order: Vec<usize> = (0..state.events.len()).collect();
         order.sort_by(|&a, &b| state.events[a].amplitude.total_cmp(&state.events[b].amplitude));
         let Some(&middle) = order.get(order.len() / 2) else { return Crossed::default() };
-        let (own, instant, effects) = (state.events[middle], self.windows[middle].first, state.effects());
+        let (own, effects) = (state.events[middle], state.effects());
         let values = state.lever.parameters();
         let time_step = 1e-2 * self.cut.interval_s;
         let mut levers = vec![state.lever.clone(); values.len() + 3];
@@ -252,11 +246,11 @@ impl<'a> Problem<'a> {
         let last = values.len();
         releases[last + 1].amplitude *= 1.0 + LEVER_STEP;
         releases[last + 2].lead_s -= time_step;
-        let change = effects.frequency_change(&instant);
+        // a change of frequency is each event's own, and what it moves of these derivatives is small
         let mut all: Vec<Vec<f64>> = levers
             .par_iter()
             .zip(&releases)
-            .map(|(lever, release)| differences(lever, std::iter::once((&effects, *release, change))).swap_remove(0))
+            .map(|(lever, release)| differences(lever, std::iter::once((&effects, *release, 0.0))).swap_remove(0))
             .collect();
         all.par_chunks_mut(LANES).for_each(|chunk| {
             let mut lanes: Vec<&mut [f64]> = chunk.iter_mut().map(Vec::as_mut_slice).collect();
@@ -372,20 +366,7 @@ pub(super) struct Shared {
 impl Shared {
     pub fn of(lever: &Lever) -> Self {
         let values = lever.parameters();
-        let numbers = |values: &[f64]| -> Vec<f64> {
-            lever
-                .with(values)
-                .release()
-                .iter()
-                .flat_map(|e| {
-                    if e.oscillates() {
-                        vec![e.pole.re, e.pole.im, e.residue.re, e.residue.im]
-                    } else {
-                        vec![e.pole.re, e.residue.re]
-                    }
-                })
-                .collect()
-        };
+        let numbers = |values: &[f64]| shared(&lever.with(values).release());
         let exponentials = lever.release();
         let rows = numbers(&values).len();
         let mut chain = Mat::zeros(rows, values.len());
@@ -616,9 +597,8 @@ fn at_limit(state: &State) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
     for (h, hypothesis) in state.hypotheses.iter().enumerate() {
         for (p, (parameter, value)) in hypothesis.cause.about().parameters.iter().zip(&hypothesis.values).enumerate() {
-            let near = 1e-6 * (parameter.high - parameter.low);
-            let open = parameter.low == 0.0 && *value > 0.0 && p > 0;
-            if (*value - parameter.low).abs() < near && !open || (parameter.high - *value).abs() < near {
+            // steps are cut at the limits
+            if *value <= parameter.low || *value >= parameter.high {
                 out.push((h, p));
             }
         }
@@ -631,14 +611,13 @@ const STRETCH: f64 = 2.0;
 
 fn moved(state: &State, shared: &[f64], own: &[[f64; 4]], hold: Hold) -> State {
     let mut out = state.clone();
-    let lever = if hold.lever() { 0 } else { state.lever.parameters().len() };
-    if !hold.lever() {
+    let lever = if hold == Hold::Shared { 0 } else { state.lever.parameters().len() };
+    if hold == Hold::Nothing {
         let values: Vec<f64> = state.lever.parameters().iter().zip(shared).map(|(v, s)| v + s).collect();
         out.lever = state.lever.with(&values);
     }
     let mut next = lever;
-    let held = hold == Hold::Shared;
-    for hypothesis in out.hypotheses.iter_mut().filter(|_| !held) {
+    for hypothesis in out.hypotheses.iter_mut().filter(|_| hold == Hold::Nothing) {
         let about = hypothesis.cause.about();
         for (p, (value, parameter)) in hypothesis.values.iter_mut().zip(about.parameters).enumerate() {
             let mut goal = *value + shared[next];
@@ -699,7 +678,7 @@ pub(super) fn eliminate(columns: &Mat<f64>, residual: &[f64], shared: usize) -> 
 impl Linearised {
     /// All columns: lever (unless held), causes, `extra`, own.
     pub fn matrix(&self, hold: Hold, extra: &[Vec<f64>]) -> Mat<f64> {
-        let lever = if hold.lever() { 0 } else { self.lever.ncols() };
+        let lever = if hold == Hold::Shared { 0 } else { self.lever.ncols() };
         let width = self.lever.nrows();
         let (causes, total) = (self.causes.len(), lever + self.causes.len() + extra.len() + 4);
         let within = |matrix: &Mat<f64>, i: usize, j: usize| if i < width { matrix[(i, j)] } else { 0.0 };
@@ -734,7 +713,7 @@ impl Normal {
         linearised: Vec<Linearised>,
         hold: Hold,
     ) -> Self {
-        let lever = if hold.lever() { 0 } else { state.lever.parameters().len() };
+        let lever = if hold == Hold::Shared { 0 } else { state.lever.parameters().len() };
         let count = if hold == Hold::Shared { 0 } else { lever + state.causes() };
         let bent = !state.hypotheses.is_empty();
         let width = turned.r.ncols();
@@ -754,7 +733,7 @@ impl Normal {
             information += &event.information;
             gradient.iter_mut().zip(&event.gradient).for_each(|(g, e)| *g += e);
         }
-        if !hold.lever() {
+        if hold == Hold::Nothing {
             problem.add_prior(&state.lever, &mut information, &mut gradient);
         }
         Self { information, gradient, events }

@@ -35,6 +35,8 @@ pub struct Named {
     pub cause: &'static dyn Cause,
     /// Probability of so strong a sign without any cause.
     pub p_value: f64,
+    /// Its score when it was found, in standard deviations.
+    pub score: f64,
     /// What it buys on held-out events.
     pub gain: Gain,
     /// The next best candidate of another class.
@@ -200,7 +202,13 @@ pub fn name_causes(
             break;
         }
         let cause = best.cause;
-        named.push(Named { cause, p_value: last_screen.p_value, gain: held_out.report(), runner_up });
+        named.push(Named {
+            cause,
+            p_value: last_screen.p_value,
+            score: best.score,
+            gain: held_out.report(),
+            runner_up,
+        });
         candidates.retain(|candidate| !same_class(*candidate, cause));
         verdict = Verdict::Named;
         if let Some(best) = trials.into_iter().next() {
@@ -256,11 +264,16 @@ fn tiles_of(problem: &Problem<'_>, fitted: &JointFit) -> Vec<Tile> {
     all
 }
 
+/// Whether one of `count` tiles is more than noise.
+pub(super) fn stands_out(tile: &Tile, count: usize, false_alarm_rate: f64) -> bool {
+    tile.p_value < OMNIBUS * false_alarm_rate / count.max(1) as f64
+}
+
 /// What remains in the common residual, if it is more than noise and more than a small share of what there was.
 fn remainder(before: &[Tile], after: &[Tile], false_alarm_rate: f64) -> Option<String> {
-    let limit = OMNIBUS * false_alarm_rate / after.len().max(1) as f64;
-    let strongest = after.first().filter(|t| t.p_value < limit)?;
-    let energy = |tiles: &[Tile]| tiles.iter().filter(|t| t.p_value < limit).map(|t| t.excess - 1.0).sum::<f64>();
+    let out = |tile: &&Tile| stands_out(tile, after.len(), false_alarm_rate);
+    let strongest = after.first().filter(out)?;
+    let energy = |tiles: &[Tile]| tiles.iter().filter(out).map(|t| t.excess - 1.0).sum::<f64>();
     let share = energy(after) / energy(before).max(f64::MIN_POSITIVE);
     (share > REMAINDER).then(|| {
         format!(
@@ -277,7 +290,8 @@ fn remainder(before: &[Tile], after: &[Tile], false_alarm_rate: f64) -> Option<S
 struct Trial {
     cause: &'static dyn Cause,
     fitted: JointFit,
-    /// Fall that its score promised.
+    /// Score of the sign that it began with, and the fall of the cost that this promised.
+    score: f64,
     promised: f64,
     /// Fall of the cost less what the parameters must pay.
     gain: f64,
@@ -359,7 +373,13 @@ fn refits(
             }
             let fitted = fitted?;
             let paid = PENALTY * samples.ln() * sign.values.len() as f64;
-            Some(Trial { cause: sign.cause, promised: sign.gain, gain: base.cost - fitted.cost - paid, fitted })
+            Some(Trial {
+                cause: sign.cause,
+                score: sign.z,
+                promised: sign.gain,
+                gain: base.cost - fitted.cost - paid,
+                fitted,
+            })
         })
         .collect();
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));

@@ -96,7 +96,7 @@ pub(crate) struct Weights {
 }
 
 /// The shared parameters as numbers: per mode Re and Im of pole and residue, per real pole the pole and the residue.
-pub(super) fn shared(exponentials: &[Exponential]) -> Vec<f64> {
+pub(crate) fn shared(exponentials: &[Exponential]) -> Vec<f64> {
     exponentials
         .iter()
         .flat_map(|e| {
