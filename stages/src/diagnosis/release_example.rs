@@ -18,7 +18,7 @@ const SAMPLES: usize = 60_000;
 pub(super) fn examples() -> Vec<Example> {
     vec![Example {
         title: "eight releases through a detector with 0.02 per volt of the square",
-        params: "modes = 2\ndetector_poles_hz = [1.5e6]\nwindow_samples = 4000\n[free]\nsettle_s = 2e-3",
+        params: "modes = 2\ndetector_poles_hz = [1.5e6]\nwindow_samples = 4000",
         inputs: || Ok(inputs()),
         expect: |outputs| {
             let told = |error: afmid_pipeline::StageError| error.to_string();

@@ -11,10 +11,9 @@ use super::records::{
     CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, judge, summarise,
 };
 use super::release::{Cut, EventWindow, Naming, NamingOptions, Problem, answer, common, name_causes, residuals, start};
-use crate::calibration::FreeSettings;
 use crate::causes::{CATALOGUE, Instant, find};
 use crate::events::EventKind;
-use crate::model::free_windows;
+use crate::model::ModeNumber;
 
 /// Says what a linear lever and detector get wrong in snap-off events: names the causes, extends the model, measures the gain.
 ///
@@ -38,8 +37,8 @@ use crate::model::free_windows;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReleaseDiagnose {
-    /// Oscillating modes of the lever, 1 to 12. Default: 4, the paper's.
-    pub modes: usize,
+    /// Flexural modes of the lever, 1 to 12, or `auto`: as many resonances as ring with falling shares. Default: `auto`.
+    pub modes: ModeNumber,
     /// Samples of an event that are compared, 512 to 1000000. Default: 8000, 1.6 ms at 5 MS/s: six decay times of the paper's mode 1.
     pub window_samples: usize,
     /// Samples of it before the release, 8 to 4096. Default: 16.
@@ -56,14 +55,12 @@ pub struct ReleaseDiagnose {
     pub most_causes: usize,
     /// Metres per unit of the piezo channel, above 0. Default: 1e-8.
     pub piezo_m_per_unit: f64,
-    /// What counts as free in a record.
-    pub free: FreeSettings,
 }
 
 impl Default for ReleaseDiagnose {
     fn default() -> Self {
         Self {
-            modes: 4,
+            modes: ModeNumber::Auto,
             window_samples: 8000,
             before_samples: 16,
             detector_poles_hz: vec![1.3e6, 1.9e6, 2.4e6],
@@ -72,7 +69,6 @@ impl Default for ReleaseDiagnose {
             without: Vec::new(),
             most_causes: 4,
             piezo_m_per_unit: 1e-8,
-            free: FreeSettings::default(),
         }
     }
 }
@@ -86,6 +82,8 @@ const RESIDUALS: Port<Array> =
 
 /// Room on either side of a window, within which its onset may move.
 const MARGIN: usize = 64;
+/// Samples of free stretches that the noise is estimated from: 24 MB.
+const FREE_SAMPLES: usize = 3_000_000;
 /// Shares of the false-alarm rate: shapes of the events, each channel of the records.
 const SHAPES_SHARE: f64 = 0.5;
 const CHANNEL_SHARE: f64 = 0.5 / CHANNELS as f64;
@@ -93,7 +91,7 @@ const CHANNEL_SHARE: f64 = 0.5 / CHANNELS as f64;
 impl Stage for ReleaseDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.release",
-        version: 1,
+        version: 2,
         summary: "names what a linear lever and detector get wrong in snap-off events",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
         outputs: &[SUMMARY.spec(), RESIDUALS.spec()],
@@ -103,8 +101,9 @@ impl Stage for ReleaseDiagnose {
     };
 
     fn check(&self) -> Result<(), StageError> {
+        let modes = self.mode_number();
         for (name, value, least, most) in [
-            ("modes", self.modes as f64, 1.0, 12.0),
+            ("modes", modes.unwrap_or(1) as f64, 1.0, 12.0),
             ("window_samples", self.window_samples as f64, 512.0, 1e6),
             ("before_samples", self.before_samples as f64, 8.0, 4096.0),
             ("detector_pole_std", self.detector_pole_std, 1e-3, 2.0),
@@ -131,7 +130,7 @@ impl Stage for ReleaseDiagnose {
                 StageError::new(format!("`without` names `{id}`, which is no cause")).help("`afmid causes` lists them")
             );
         }
-        self.free.check()
+        Ok(())
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -140,10 +139,11 @@ impl Stage for ReleaseDiagnose {
         let cut = Cut { before: self.before_samples, samples: self.window_samples, interval_s: 1.0 / rate };
         let onsets = onsets(ensemble, rate)?;
         let windows = self.windows(recording, &onsets, &cut)?;
-        let free = free_windows(recording, self.free, self.window_samples, rate)?;
-        let lent: Vec<&[f64]> = free.iter().map(Vec::as_slice).collect();
+        let summaries = self.record_summaries(recording, &onsets, rate)?;
+        let (summaries, free): (Vec<RecordSummary>, Vec<Vec<f64>>) = summaries.into_iter().unzip();
+        let lent: Vec<&[f64]> = free.iter().flat_map(|record| record.chunks_exact(self.window_samples)).collect();
         let poles: Vec<f64> = self.detector_poles_hz.iter().map(|f| std::f64::consts::TAU * f).collect();
-        let begin = start(&windows, &lent, &cut, self.modes, &poles).map_err(StageError::from_error)?;
+        let begin = start(&windows, &lent, &cut, self.mode_number(), &poles).map_err(StageError::from_error)?;
         let resonances = begin
             .seen
             .iter()
@@ -169,7 +169,7 @@ impl Stage for ReleaseDiagnose {
         };
         let naming =
             name_causes(&problem, begin.state, begin.starts, CATALOGUE, &options).map_err(StageError::from_error)?;
-        let signs = self.record_signs(recording, &onsets, rate, resonances)?;
+        let signs = self.record_signs(&summaries, resonances);
         let found = answer(&problem, &naming, &signs, self.false_alarm_rate);
         Ok(Ports::new().with(&SUMMARY, Document::new(&found)?).with(&RESIDUALS, residual_array(&problem, &naming)))
     }
@@ -189,6 +189,14 @@ fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, StageError> 
 }
 
 impl ReleaseDiagnose {
+    /// The number of modes, none where it is to be found.
+    fn mode_number(&self) -> Option<usize> {
+        match self.modes {
+            ModeNumber::Fixed(modes) => Some(modes),
+            ModeNumber::Auto => None,
+        }
+    }
+
     fn windows(
         &self,
         recording: &Recording,
@@ -230,27 +238,31 @@ impl ReleaseDiagnose {
         Ok(windows)
     }
 
-    fn record_signs(
-        &self,
-        recording: &Recording,
-        onsets: &[(usize, f64)],
-        rate: f64,
-        resonances: Vec<Resonance>,
-    ) -> Result<Vec<RecordSign>, StageError> {
-        let summaries: Vec<RecordSummary> = recording
-            .records
-            .par_iter()
-            .enumerate()
-            .map(|(number, record)| self.record_summary(number, record, onsets, rate))
-            .collect::<Result<_, _>>()?;
+    fn record_signs(&self, summaries: &[RecordSummary], resonances: Vec<Resonance>) -> Vec<RecordSign> {
         let options = JudgeOptions {
             false_alarm_rate: CHANNEL_SHARE * self.false_alarm_rate,
             resonances,
             ..JudgeOptions::default()
         };
-        let mut signs = judge(&summaries, &options);
+        let mut signs = judge(summaries, &options);
         signs.retain(|sign| !self.without.iter().any(|id| id == sign.id));
-        Ok(signs)
+        signs
+    }
+
+    /// Every record's summary, and whole windows of its free stretches one after the other.
+    fn record_summaries(
+        &self,
+        recording: &Recording,
+        onsets: &[(usize, f64)],
+        rate: f64,
+    ) -> Result<Vec<(RecordSummary, Vec<f64>)>, StageError> {
+        let most = FREE_SAMPLES / self.window_samples / recording.records.len().max(1);
+        recording
+            .records
+            .par_iter()
+            .enumerate()
+            .map(|(number, record)| self.record_summary(number, record, onsets, rate, most.max(1)))
+            .collect()
     }
 
     fn record_summary(
@@ -259,7 +271,8 @@ impl ReleaseDiagnose {
         record: &Record,
         onsets: &[(usize, f64)],
         rate: f64,
-    ) -> Result<RecordSummary, StageError> {
+        most: usize,
+    ) -> Result<(RecordSummary, Vec<f64>), StageError> {
         let channel = record.channel("deflection")?;
         let deflection = channel.read(0, channel.samples)?;
         let piezo: Option<Vec<f64>> = match record.channel("piezo") {
@@ -275,7 +288,11 @@ impl ReleaseDiagnose {
             .collect();
         let input =
             RecordInput { deflection: &deflection, piezo: piezo.as_deref(), events: &events, interval_s: 1.0 / rate };
-        summarise(&input).map_err(StageError::from_error)
+        let summary = summarise(&input).map_err(StageError::from_error)?;
+        let windows = summary.free.iter().flat_map(|range| deflection[range.clone()].chunks_exact(self.window_samples));
+        let whole: Vec<f64> =
+            windows.filter(|w| w.iter().all(|v| v.is_finite())).take(most).flatten().copied().collect();
+        Ok((summary, whole))
     }
 }
 

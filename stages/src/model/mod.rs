@@ -51,7 +51,6 @@ pub use modes_stage::Modes;
 pub use order::{Order, OrderCandidate, OrderChoice, choose_order};
 pub use pem_stage::{DataSet, FocusKind, NoiseKind, Pem};
 pub use residual::{TestResult, input_dependence, whiteness};
-pub(crate) use ringdown_stage::free_windows;
 pub use ringdown_stage::{ErrorSource, JointNoise, KnownNumber, KnownQuantity, ModeNumber, RingdownFit};
 pub use stabilisation_stage::{PoleMethod, StabilisationDiagram};
 pub use subspace::Subspace;

@@ -40,6 +40,26 @@ impl Qr {
         Mat::from_fn(size, self.packed.ncols(), |i, j| if i <= j { self.packed[(i, j)] } else { 0.0 })
     }
 
+    /// The orthonormal columns: rows x `min(rows, columns)`.
+    pub fn q(&self) -> Mat<f64> {
+        let size = self.packed.nrows().min(self.packed.ncols());
+        let mut q = Mat::from_fn(self.packed.nrows(), size, |i, j| if i == j { 1.0 } else { 0.0 });
+        let scratch = householder::apply_block_householder_sequence_on_the_left_in_place_scratch::<f64>(
+            self.packed.nrows(),
+            self.coefficients.nrows(),
+            size,
+        );
+        householder::apply_block_householder_sequence_on_the_left_in_place_with_conj(
+            self.packed.as_ref().get(.., ..size),
+            self.coefficients.as_ref(),
+            Conj::No,
+            q.as_mut(),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+        );
+        q
+    }
+
     /// Overwrites `other` with `Q^T other`.
     pub fn apply_transpose(&self, other: MatMut<'_, f64>) {
         let size = self.packed.nrows().min(self.packed.ncols());

@@ -19,7 +19,7 @@ use self::gaps::{gaps, total};
 use self::known::named;
 pub use self::known::{KnownNumber, KnownQuantity};
 pub use self::mode_number::ModeNumber;
-pub(crate) use self::stretches::windows as free_windows;
+use self::stretches::windows as free_windows;
 use self::summary::summary;
 use self::tables::{event_table, mode_table, poles, spectrum};
 use super::ringdown::{

@@ -43,6 +43,8 @@ pub struct RecordSummary {
     pub block_s: f64,
     /// Free and loaded stretches as block means, split where the piezo turns, ascending.
     pub segments: Vec<Segment>,
+    /// Samples of the free stretches, ascending.
+    pub free: Vec<std::ops::Range<usize>>,
     /// Standard deviation of the samples about their block means where the lever is free, V; NaN if it never is.
     pub free_std: f64,
     /// Periodograms of the free stretches before contact (of all free ones where these are too short).
@@ -91,6 +93,7 @@ pub fn summarise(record: &RecordInput) -> Result<RecordSummary, RecordError> {
         segments: stretches.iter().map(|stretch| segment(&points, stretch)).collect(),
         free_std: (quiet.iter().sum::<f64>() / quiet.len() as f64).sqrt(),
         spectra,
+        free,
         extremes: extremes(record.deflection),
     })
 }

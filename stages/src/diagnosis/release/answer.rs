@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use super::joint::{JointFit, Problem};
+use super::joint::JointFit;
+use super::problem::Problem;
 use super::residuals::Tile;
 use super::search::{Named, Naming, stands_out};
 use crate::diagnosis::records::RecordSign;

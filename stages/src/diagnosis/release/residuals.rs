@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 use realfft::RealFftPlanner;
 
-use super::joint::{Problem, State};
+use super::problem::Problem;
+use super::state::State;
 use super::stepper::differences;
 use crate::calibration::chi_square_tail;
 use crate::model::ringdown::internals::{LANES, Whitener, signal};

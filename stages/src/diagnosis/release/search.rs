@@ -1,8 +1,11 @@
 //! From signs to names: refits, held-out events, and when to abstain.
 
-use super::joint::{Hold, Hypothesis, JointFit, Problem, State, aligned, fit};
+use super::align::aligned;
+use super::joint::{JointFit, fit};
+use super::problem::Problem;
 use super::residuals::{Tile, common, peaks, residuals, tiles, whitened};
 use super::screen::{Screen, Sign, screen};
+use super::state::{Hold, Hypothesis, State};
 use super::window::EventWindow;
 use crate::causes::{Cause, Domain, Identifiable, Part, Scene};
 use crate::diagnosis::verdict::{Gain, RunnerUp, Verdict};
@@ -141,7 +144,7 @@ pub fn name_causes(
     loop {
         let base = &fits[fits.len() - 1];
         let common = common_of(problem, base);
-        last_screen = screen(problem, base, &candidates, &scene(problem, base, &common), options.seed);
+        last_screen = screen(problem, base, &candidates, &scene(problem, base, &common), options.seed)?;
         first_p_value.get_or_insert(last_screen.p_value);
         if last_screen.p_value >= options.false_alarm_rate || named.len() == options.most {
             break;

@@ -1,8 +1,12 @@
 //! Where the joint fit begins: noise and modes from free exponentials.
 
-use super::joint::{SeenMode, State, suggested};
+use super::align::suggested;
+use super::lever_modes::lever_modes;
+use super::problem::SeenMode;
+use super::state::State;
 use super::window::{Cut, EventWindow};
 use crate::model::ModelError;
+use crate::model::ringdown::internals::fit_all_that_rings;
 use crate::model::ringdown::{
     EventParameters, Exponential, ModeEstimate, Ringdown, RingdownNoise, RingdownOptions, fit_ringdowns,
 };
@@ -28,10 +32,12 @@ const NEAR: f64 = 0.006;
 /// How far the fit may go from free exponentials, in their standard errors, and at least (relative, of f and Q): a cause biases them.
 const HELD_ERRORS: f64 = 5.0;
 const HELD_LEAST: [f64; 2] = [1e-3, 0.05];
+/// Most modes that are looked for: a lever's, and what else rings.
+const MOST: usize = 10;
 /// Tries with more exponentials where combinations took the place of modes.
 const TRIES: usize = 3;
 
-/// Fits free exponentials to all events, combination lines (2 f1, 3 f1, f2 +- f1: signs of a nonlinearity, not modes) set aside.
+/// Fits free exponentials to all events, `modes` of them a lever's or (none) as many as seem to be; combination lines (2 f1, 3 f1, f2 +- f1: signs of a nonlinearity, not modes) set aside.
 ///
 /// # Errors
 /// Those of [`fit_ringdowns`]; an event whose window leaves its samples.
@@ -39,7 +45,7 @@ pub fn start(
     windows: &[EventWindow],
     free: &[&[f64]],
     cut: &Cut,
-    modes: usize,
+    modes: Option<usize>,
     nominal_poles: &[f64],
 ) -> Result<Start, ModelError> {
     let mut starts = Vec::with_capacity(windows.len());
@@ -51,34 +57,15 @@ pub fn start(
         .zip(&starts)
         .map(|(window, start)| &window.values[start + cut.before + SKIPPED..start + cut.samples])
         .collect();
-    let (mut fitted, mut lines) = (None, Vec::new());
-    for extra in 0..TRIES {
-        let options = RingdownOptions { modes: modes + extra, ..RingdownOptions::default() };
-        let found = match fit_ringdowns(&after, free, cut.interval_s, &options) {
-            Ok(found) => found,
-            Err(error) if fitted.is_none() => return Err(error),
-            Err(_) => break,
-        };
-        lines = combinations(&found.exponentials);
-        let enough = found.exponentials.iter().filter(|e| e.oscillates()).count() - lines.len() >= modes;
-        fitted = Some(found);
-        if enough {
-            break;
-        }
-    }
-    let fitted: Ringdown = fitted.ok_or(ModelError::Degenerate("no exponentials"))?;
+    let (fitted, chosen, lines) = match modes {
+        Some(modes) => given(&after, free, cut.interval_s, modes)?,
+        None => found(&after, free, cut.interval_s, nominal_poles)?,
+    };
     // modes come first, in the same order
-    let mut kept: Vec<(Exponential, ModeEstimate)> = fitted
-        .exponentials
+    let mut kept: Vec<(Exponential, ModeEstimate)> = chosen
         .iter()
-        .zip(fitted.modes())
-        .enumerate()
-        .filter(|(i, (e, _))| e.oscillates() && !lines.contains(i))
-        .map(|(_, (e, mode))| (*e, mode))
+        .filter_map(|&i| fitted.exponentials.get(i).copied().zip(fitted.modes().get(i).copied()))
         .collect();
-    // too many are left where fewer lines than tries were combinations
-    kept.sort_by(|a, b| energy(&b.0).total_cmp(&energy(&a.0)));
-    kept.truncate(modes);
     kept.sort_by(|a, b| a.0.pole.im.total_cmp(&b.0.pole.im));
     let (kept, estimates): (Vec<Exponential>, Vec<ModeEstimate>) = kept.into_iter().unzip();
     let lever = suggested(&kept, nominal_poles);
@@ -120,6 +107,44 @@ pub fn start(
         seen,
         combinations_hz,
     })
+}
+
+/// A fit, which of its exponentials are the lever's modes, and which are combinations of others.
+type Chosen = (Ringdown, Vec<usize>, Vec<usize>);
+
+/// So many modes: the strongest that are no combinations.
+fn given(after: &[&[f64]], free: &[&[f64]], interval_s: f64, modes: usize) -> Result<Chosen, ModelError> {
+    let (mut fitted, mut lines) = (None, Vec::new());
+    for extra in 0..TRIES {
+        let options = RingdownOptions { modes: modes + extra, ..RingdownOptions::default() };
+        let found = match fit_ringdowns(after, free, interval_s, &options) {
+            Ok(found) => found,
+            Err(error) if fitted.is_none() => return Err(error),
+            Err(_) => break,
+        };
+        lines = combinations(&found.exponentials);
+        let enough = found.exponentials.iter().filter(|e| e.oscillates()).count() - lines.len() >= modes;
+        fitted = Some(found);
+        if enough {
+            break;
+        }
+    }
+    let fitted: Ringdown = fitted.ok_or(ModelError::Degenerate("no exponentials"))?;
+    let ringing = |i: &usize| fitted.exponentials[*i].oscillates() && !lines.contains(i);
+    let mut chosen: Vec<usize> = (0..fitted.exponentials.len()).filter(ringing).collect();
+    // too many are left where fewer lines than tries were combinations
+    chosen.sort_by(|&a, &b| energy(&fitted.exponentials[b]).total_cmp(&energy(&fitted.exponentials[a])));
+    chosen.truncate(modes);
+    Ok((fitted, chosen, lines))
+}
+
+/// As many modes as are a lever's, among all that rings.
+fn found(after: &[&[f64]], free: &[&[f64]], interval_s: f64, nominal_poles: &[f64]) -> Result<Chosen, ModelError> {
+    let fitted = fit_all_that_rings(after, free, interval_s, MOST, &RingdownOptions::default())?;
+    let lines = combinations(&fitted.exponentials);
+    let thermal: Vec<f64> = fitted.noise.thermal.iter().map(|mode| mode.variance).collect();
+    let chosen = lever_modes(&fitted.exponentials, &thermal, &lines, nominal_poles);
+    Ok((fitted, chosen, lines))
 }
 
 fn energy(e: &Exponential) -> f64 {

@@ -95,6 +95,20 @@ pub fn fit_counted_ringdowns(
     Ok(CountedRingdown { fit, modes: chosen + 1, seen })
 }
 
+/// [`fit_ringdowns`] with as many modes, up to `most`, as lower the BIC under white noise: all that rings, whatever its reason. Errors: those of that.
+pub(crate) fn fit_all_that_rings(
+    events: &[&[f64]],
+    free: &[&[f64]],
+    interval_s: f64,
+    most: usize,
+    options: &RingdownOptions,
+) -> Result<Ringdown, ModelError> {
+    check(most, options)?;
+    let all = Data { events, free, interval_s };
+    let ladder = ladder(&all, most, options)?;
+    all.fitted(&ladder.steps[ladder.best], options)
+}
+
 fn check(most: usize, options: &RingdownOptions) -> Result<(), ModelError> {
     if most == 0 {
         return Err(ModelError::Parameter { name: "largest number of modes", found: 0.0, wanted: "at least 1" });

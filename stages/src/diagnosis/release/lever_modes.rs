@@ -1,0 +1,149 @@
+//! Which resonances are the lever's own.
+
+use super::align::suggested;
+use crate::model::ringdown::Exponential;
+
+/// Least quality factor of a mode: below it, an exponential stands for a drift or a tail.
+const LEAST_QUALITY: f64 = 3.0;
+/// Least ratio of neighbouring modes: flexural ones are farther apart; closer ones are one mode whose frequency moves, or another part's.
+const LEAST_RATIO: f64 = 1.25;
+/// By how much a highest mode's share, or its thermal motion, may lie below the power law of those under it.
+const BELOW_THE_LAW: f64 = 5.0;
+/// Most resonances that are sorted out exhaustively.
+const MOST: usize = 12;
+
+/// Which of a fit's exponentials are the flexural modes of one lever; `lines` are set aside.
+///
+/// # Model
+/// A force at the tip bends the modes of a lever by shares of the static deflection that fall with frequency (for a beam as its inverse square, seen by the slope
+/// as somewhat less). What rings out of that order, or close beside a stronger one, is something else: torsion, holder, a cause.
+/// # Method
+/// The largest set that holds the strongest resonance as its lowest and whose shares fall; then, from the third on, while the highest is far below the
+/// power law of the others, it is taken off; unless its thermal motion is not: a slow rupture weakens the high modes, and
+/// leaves that. Shares as the nominal detector shows them; `thermal` has the variances of the oscillating exponentials, in their order.
+pub(super) fn lever_modes(
+    exponentials: &[Exponential],
+    thermal: &[f64],
+    lines: &[usize],
+    nominal_poles: &[f64],
+) -> Vec<usize> {
+    let quality = |e: &Exponential| e.pole.norm() / (-2.0 * e.pole.re);
+    let ringing = |i: &usize| {
+        let e = &exponentials[*i];
+        e.oscillates() && !lines.contains(i) && quality(e) >= LEAST_QUALITY
+    };
+    let mut places: Vec<usize> = (0..exponentials.len()).filter(ringing).collect();
+    places.sort_by(|&a, &b| exponentials[a].pole.im.total_cmp(&exponentials[b].pole.im));
+    let resonances: Vec<Exponential> = places.iter().map(|&i| exponentials[i]).collect();
+    let lever = suggested(&resonances, nominal_poles);
+    let oscillating: Vec<usize> = (0..exponentials.len()).filter(|&i| exponentials[i].oscillates()).collect();
+    let motion = |place: usize| {
+        let number = oscillating.iter().position(|&i| i == place);
+        number.and_then(|number| thermal.get(number)).copied().unwrap_or(0.0)
+    };
+    let modes = lever.modes.iter().zip(&places);
+    let seen: Vec<Seen> =
+        modes.map(|(mode, &i)| Seen { omega: mode.omega, share: mode.share, motion: motion(i) }).collect();
+    in_order(&seen).into_iter().map(|i| places[i]).collect()
+}
+
+/// A resonance: angular frequency, share of the static response, variance of its thermal motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Seen {
+    omega: f64,
+    share: f64,
+    motion: f64,
+}
+
+/// Which of some resonances, ascending, are in order.
+fn in_order(seen: &[Seen]) -> Vec<usize> {
+    let Some(first) = (0..seen.len()).max_by(|&a, &b| seen[a].share.total_cmp(&seen[b].share)) else {
+        return Vec::new();
+    };
+    let above: Vec<usize> = (first + 1..seen.len()).take(MOST).collect();
+    let follows = |low: Seen, high: Seen| high.omega >= LEAST_RATIO * low.omega && high.share < low.share;
+    let mut best = (0usize, f64::NEG_INFINITY, vec![first]);
+    for set in 0u32..1 << above.len() {
+        let mut kept = vec![first];
+        kept.extend(above.iter().enumerate().filter(|(k, _)| set >> k & 1 == 1).map(|(_, &i)| i));
+        if kept.windows(2).all(|pair| follows(seen[pair[0]], seen[pair[1]])) {
+            // of sets of one size the one with the larger shares
+            let weight: f64 = kept.iter().map(|&i| seen[i].share.ln()).sum();
+            if (kept.len(), weight) > (best.0, best.1) {
+                best = (kept.len(), weight, kept);
+            }
+        }
+    }
+    let mut kept = best.2;
+    let far_below = |kept: &[usize], size: fn(&Seen) -> f64| {
+        below_the_law(&kept.iter().map(|&i| (seen[i].omega, size(&seen[i]))).collect::<Vec<_>>())
+    };
+    while kept.len() > 2 && far_below(&kept, |s| s.share) && far_below(&kept, |s| s.motion) {
+        kept.pop();
+    }
+    kept
+}
+
+/// Whether the last of some sizes over frequency is far below the power law through the others.
+fn below_the_law(seen: &[(f64, f64)]) -> bool {
+    let (Some((last, others)), Some(first)) = (seen.split_last(), seen.first()) else { return false };
+    let Some(before) = others.last().filter(|_| others.len() > 1) else { return false };
+    let power = (before.1 / first.1).ln() / (before.0 / first.0).ln();
+    let expected = before.1 * (last.0 / before.0).powf(power);
+    // no motion at all is below any law
+    expected.is_nan() || last.1 * BELOW_THE_LAW < expected
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Seen, in_order};
+
+    /// Shares of the paper's lever.
+    const PAPER: [(f64, f64); 4] = [(46.0, 0.9), (247.0, 0.075), (580.0, 0.02), (1050.0, 0.008)];
+
+    /// Frequencies of those in order; thermal motion goes with the square of the share, that of `still` is none.
+    fn kept(resonances: &[(f64, f64)], still: &[f64]) -> Vec<f64> {
+        let mut seen: Vec<Seen> = resonances
+            .iter()
+            .map(|&(omega, share)| Seen {
+                omega,
+                share,
+                motion: if still.contains(&omega) { 0.0 } else { share * share },
+            })
+            .collect();
+        seen.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+        in_order(&seen).into_iter().map(|i| seen[i].omega).collect()
+    }
+
+    fn beside_the_paper(extra: (f64, f64)) -> Vec<f64> {
+        kept(&[&PAPER[..], &[extra]].concat(), &[extra.0])
+    }
+
+    #[test]
+    fn a_lever_is_all_in_order() {
+        assert_eq!(kept(&PAPER, &[]), [46.0, 247.0, 580.0, 1050.0]);
+        let six = [(43.0, 0.645), (88.0, 0.22), (152.0, 0.085), (279.0, 0.032), (604.0, 0.011), (1083.0, 0.006)];
+        assert_eq!(kept(&six, &[]).len(), 6);
+    }
+
+    #[test]
+    fn a_weak_resonance_between_modes_is_not_the_levers() {
+        for frequency in [100.0, 200.0, 330.0, 700.0] {
+            assert_eq!(beside_the_paper((frequency, 0.004)), [46.0, 247.0, 580.0, 1050.0]);
+        }
+    }
+
+    #[test]
+    fn a_resonance_beside_a_mode_below_the_first_or_far_below_the_law_is_not_the_levers() {
+        for extra in [(20.0, 0.01), (46.5, 0.05), (1400.0, 0.0003)] {
+            assert_eq!(beside_the_paper(extra), [46.0, 247.0, 580.0, 1050.0], "{extra:?}");
+        }
+    }
+
+    #[test]
+    fn a_mode_that_a_slow_rupture_weakens_is_the_levers_by_its_thermal_motion() {
+        let mut weakened = PAPER.map(|(omega, share)| Seen { omega, share, motion: share * share });
+        weakened[3].share *= 0.05;
+        assert_eq!(in_order(&weakened).len(), 4);
+    }
+}

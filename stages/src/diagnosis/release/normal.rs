@@ -1,0 +1,202 @@
+//! Normal equations of the joint fit, the events' own parameters eliminated.
+
+use faer::Mat;
+use rayon::prelude::*;
+
+use super::basis::{Basis, Place};
+use super::change::Slopes;
+use super::problem::Problem;
+use super::signals::Signals;
+use super::state::{Hold, State, Step};
+use crate::model::orthogonal::product;
+use crate::model::ringdown::internals::symmetric_inverse;
+
+/// One event at one point.
+pub(super) struct Event<'a> {
+    /// Coordinates of the linear model and how they move.
+    pub place: Place,
+    /// Whitened samples less what the hypotheses change.
+    pub rest: &'a [f64],
+    /// Their coordinates.
+    pub rest_head: &'a [f64],
+    /// Over the amplitude that the crossed derivatives were taken at.
+    pub scale: f64,
+    /// Derivatives with the causes' parameters, whole signals.
+    pub causes: Option<&'a Signals>,
+}
+
+/// Crossed derivatives, the same for all events, with their coordinates and products.
+pub(super) struct Crossed<'a> {
+    signals: &'a Signals,
+    heads: Mat<f64>,
+    gram: Mat<f64>,
+}
+
+impl<'a> Crossed<'a> {
+    pub fn of(basis: &Basis, slopes: &'a Slopes) -> Self {
+        let matrix = slopes.crossed.matrix();
+        let gram = product(matrix.transpose(), matrix);
+        Self { signals: &slopes.crossed, heads: basis.project(matrix), gram }
+    }
+}
+
+/// Products of one event's columns (lever unless held, causes, extra ones, own four) with each other and with the residual.
+pub(super) struct Products {
+    gram: Mat<f64>,
+    right: Vec<f64>,
+}
+
+impl Event<'_> {
+    /// # Method
+    /// A column is a place in the basis, a signal, or both: what lies in the basis is multiplied there, and only signals at full length.
+    pub fn products(&self, basis: &Basis, crossed: &Crossed<'_>, hold: Hold, extra: Option<&Signals>) -> Products {
+        let lever = self.place.slopes.ncols() - 4;
+        let mut full = Signals::with_capacity(self.rest.len(), 0);
+        for signals in self.causes.iter().copied().chain(extra) {
+            (0..signals.count()).for_each(|i| full.push(signals.get(i)));
+        }
+        let (bent, added) = (crossed.signals.count(), full.count());
+        // where each column has its place and its signal (crossed ones first), and the factor of that
+        let mut columns: Vec<(Option<usize>, Option<(usize, f64)>)> = Vec::new();
+        let signal = |i: usize, factor: f64| (i < bent).then_some((i, factor));
+        if hold == Hold::Nothing {
+            columns.extend((0..lever).map(|j| (Some(j), signal(j, self.scale))));
+        }
+        columns.extend((0..added).map(|i| (None, Some((bent + i, 1.0)))));
+        columns.push((Some(lever), signal(lever, 1.0)));
+        columns.push((Some(lever + 1), signal(lever + 1, self.scale)));
+        columns.extend([(Some(lever + 2), None), (Some(lever + 3), None)]);
+
+        let matrix = full.matrix();
+        let own_heads = basis.project(matrix);
+        let heads = Mat::from_fn(own_heads.nrows(), bent + added, |i, j| {
+            if j < bent { crossed.heads[(i, j)] } else { own_heads[(i, j - bent)] }
+        });
+        let (own, cross) = (product(matrix.transpose(), matrix), product(crossed.signals.matrix().transpose(), matrix));
+        let signals = |i: usize, j: usize| match (i < bent, j < bent) {
+            (true, true) => crossed.gram[(i, j)],
+            (true, false) => cross[(i, j - bent)],
+            (false, true) => cross[(j, i - bent)],
+            (false, false) => own[(i - bent, j - bent)],
+        };
+        let places = product(self.place.slopes.transpose(), self.place.slopes.as_ref());
+        let mixed = product(self.place.slopes.transpose(), heads.as_ref());
+        let gram = Mat::from_fn(columns.len(), columns.len(), |i, j| {
+            let ((p, f), (q, g)) = (columns[i], columns[j]);
+            let mut sum = 0.0;
+            if let (Some(p), Some(q)) = (p, q) {
+                sum += places[(p, q)];
+            }
+            if let (Some(p), Some((g, factor))) = (p, g) {
+                sum += factor * mixed[(p, g)];
+            }
+            if let (Some(q), Some((f, factor))) = (q, f) {
+                sum += factor * mixed[(q, f)];
+            }
+            if let (Some((f, a)), Some((g, b))) = (f, g) {
+                sum += a * b * signals(f, g);
+            }
+            sum
+        });
+        let left: Vec<f64> = self.rest_head.iter().zip(&self.place.value).map(|(r, v)| r - v).collect();
+        let column = |values: &[f64]| Mat::from_fn(values.len(), 1, |i, _| values[i]);
+        let (rest, value) = (column(self.rest), column(&self.place.value));
+        let by_place = product(self.place.slopes.transpose(), column(&left).as_ref());
+        let by_crossed = product(crossed.signals.matrix().transpose(), rest.as_ref());
+        let by_full = product(matrix.transpose(), rest.as_ref());
+        let modelled = product(heads.transpose(), value.as_ref());
+        let right = columns
+            .iter()
+            .map(|(place, signal)| {
+                let within = place.map_or(0.0, |p| by_place[(p, 0)]);
+                let beyond = signal.map_or(0.0, |(f, factor)| {
+                    let all = if f < bent { by_crossed[(f, 0)] } else { by_full[(f - bent, 0)] };
+                    factor * (all - modelled[(f, 0)])
+                });
+                within + beyond
+            })
+            .collect();
+        Products { gram, right }
+    }
+}
+
+/// Normal equations of the shared parameters.
+pub(super) struct Normal {
+    pub information: Mat<f64>,
+    pub gradient: Vec<f64>,
+    events: Vec<Eliminated>,
+}
+
+/// One event's share of them.
+pub(super) struct Eliminated {
+    inverse: Mat<f64>,
+    coupling: Mat<f64>,
+    own_gradient: Vec<f64>,
+    pub information: Mat<f64>,
+    pub gradient: Vec<f64>,
+}
+
+/// Takes the last columns, the event's own four, out.
+pub(super) fn eliminate(products: &Products) -> Eliminated {
+    let Products { gram, right } = products;
+    let shared = right.len() - 4;
+    let inverse = symmetric_inverse(&Mat::from_fn(4, 4, |i, j| gram[(shared + i, shared + j)]));
+    let cross = Mat::from_fn(4, shared, |i, j| gram[(shared + i, j)]);
+    let coupling = product(inverse.as_ref(), cross.as_ref());
+    let taken = product(cross.transpose(), coupling.as_ref());
+    let information = Mat::from_fn(shared, shared, |i, j| gram[(i, j)] - taken[(i, j)]);
+    let own_gradient: Vec<f64> = right[shared..].to_vec();
+    let gradient =
+        (0..shared).map(|j| right[j] - (0..4).map(|i| coupling[(i, j)] * own_gradient[i]).sum::<f64>()).collect();
+    Eliminated { inverse, coupling, own_gradient, information, gradient }
+}
+
+impl Normal {
+    pub fn assemble(
+        problem: &Problem<'_>,
+        basis: &Basis,
+        state: &State,
+        events: &[Event<'_>],
+        slopes: &Slopes,
+        hold: Hold,
+    ) -> Self {
+        let count = if hold == Hold::Shared { 0 } else { state.lever.parameters().len() + state.causes() };
+        let crossed = Crossed::of(basis, slopes);
+        let events: Vec<Eliminated> =
+            events.par_iter().map(|event| eliminate(&event.products(basis, &crossed, hold, None))).collect();
+        let mut information = Mat::zeros(count, count);
+        let mut gradient = vec![0.0; count];
+        for event in &events {
+            information += &event.information;
+            gradient.iter_mut().zip(&event.gradient).for_each(|(g, e)| *g += e);
+        }
+        if hold == Hold::Nothing {
+            problem.add_prior(&state.lever, &mut information, &mut gradient);
+        }
+        Self { information, gradient, events }
+    }
+
+    /// The step of a search whose diagonal is enlarged by `damping`.
+    pub fn solve(&self, damping: f64) -> Step {
+        let n = self.gradient.len();
+        let mut damped = self.information.clone();
+        (0..n).for_each(|i| damped[(i, i)] *= 1.0 + damping);
+        let covariance = symmetric_inverse(&damped);
+        let shared: Vec<f64> = (0..n).map(|i| (0..n).map(|j| covariance[(i, j)] * self.gradient[j]).sum()).collect();
+        let mut promised: f64 = shared.iter().zip(&self.gradient).map(|(s, g)| s * g).sum();
+        let own = self
+            .events
+            .iter()
+            .map(|event| {
+                let mut step = [0.0; 4];
+                for (i, value) in step.iter_mut().enumerate() {
+                    let alone: f64 = (0..4).map(|k| event.inverse[(i, k)] * event.own_gradient[k]).sum();
+                    promised += alone * event.own_gradient[i];
+                    *value = alone - (0..n).map(|j| event.coupling[(i, j)] * shared[j]).sum::<f64>();
+                }
+                step
+            })
+            .collect();
+        Step { shared, own, promised }
+    }
+}

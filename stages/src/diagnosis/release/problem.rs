@@ -1,0 +1,129 @@
+//! The data of a joint fit, and what is known beforehand.
+
+use faer::Mat;
+
+use super::lever::{Lever, LeverMode};
+use super::signals::Signals;
+use super::state::State;
+use super::stepper::Release;
+use super::window::{Cut, EventWindow};
+use crate::model::ModelError;
+use crate::model::ringdown::internals::Whitener;
+use crate::model::ringdown::{EventParameters, RingdownNoise};
+
+/// The data and what is known beforehand.
+pub struct Problem<'a> {
+    /// The events.
+    pub windows: &'a [EventWindow],
+    /// How their windows are cut.
+    pub cut: Cut,
+    /// Noise that they are weighted with.
+    pub noise: RingdownNoise,
+    /// Nominal detector poles, rad/s.
+    pub nominal_poles: Vec<f64>,
+    /// Standard deviation of their logarithms.
+    pub pole_std: f64,
+    /// What free exponentials say of the modes; weakly held, so that no weak mode runs off to absorb a misfit of another kind.
+    pub seen: Vec<SeenMode>,
+}
+
+/// A mode as free exponentials show it, and how weakly the fit is held to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenMode {
+    /// The mode.
+    pub mode: LeverMode,
+    /// Standard deviations of ln w and ln Q.
+    pub std: [f64; 2],
+}
+
+/// Samples by which an onset may pass its interval: a release begins with the fifth power of time (a mode and three poles), so that at a fifth of a sample
+/// the model still is right to a hundred-thousandth.
+const SLACK: f64 = 0.2;
+
+impl Problem<'_> {
+    /// The same knowledge about other events.
+    pub fn with_windows<'b>(&self, windows: &'b [EventWindow]) -> Problem<'b> {
+        Problem {
+            windows,
+            cut: self.cut,
+            noise: self.noise.clone(),
+            nominal_poles: self.nominal_poles.clone(),
+            pole_std: self.pole_std,
+            seen: self.seen.clone(),
+        }
+    }
+
+    /// Whether an event's onset has left the interval before its release sample by more than [`SLACK`].
+    pub(super) fn have_passed(&self, state: &State) -> bool {
+        state.events.iter().any(|own| self.has_passed(own))
+    }
+
+    fn has_passed(&self, own: &EventParameters) -> bool {
+        let onset = own.onset_s / self.cut.interval_s;
+        !(-1.0 - SLACK..=SLACK).contains(&onset)
+    }
+
+    /// Starts of the windows for the events' present onsets. Errors: an event that leaves its samples.
+    pub(super) fn starts(&self, state: &mut State, starts: &mut [usize]) -> Result<(), ModelError> {
+        for ((own, start), window) in state.events.iter_mut().zip(starts.iter_mut()).zip(self.windows) {
+            if !self.has_passed(own) {
+                continue;
+            }
+            let onset = *start as f64 + self.cut.before as f64 + own.onset_s / self.cut.interval_s;
+            let next = window.start(onset, &self.cut).ok_or(ModelError::Degenerate("an onset left its window"))?;
+            own.onset_s += (*start as f64 - next as f64) * self.cut.interval_s;
+            *start = next;
+        }
+        Ok(())
+    }
+
+    pub(super) fn whitener(&self) -> Whitener {
+        Whitener::new(&self.noise, self.cut.interval_s, self.cut.samples, &[])
+    }
+
+    /// The events cut at `starts` and whitened.
+    pub(super) fn data(&self, whitener: &Whitener, starts: &[usize]) -> Signals {
+        let mut out = Signals::with_capacity(self.cut.samples, starts.len());
+        for (window, &start) in self.windows.iter().zip(starts) {
+            out.push(&window.values[start..start + self.cut.samples]);
+        }
+        out.whiten(whitener);
+        out
+    }
+
+    /// An event as it is to be simulated.
+    pub(super) fn release(&self, own: &EventParameters) -> Release {
+        Release {
+            amplitude: own.amplitude,
+            lead_s: -own.onset_s,
+            before: self.cut.before,
+            samples: self.cut.samples,
+            interval_s: self.cut.interval_s,
+        }
+    }
+
+    /// Parameters of which something is known: number, distance from it, its standard deviation.
+    fn known(&self, lever: &Lever) -> Vec<(usize, f64, f64)> {
+        let first = lever.parameters().len() - lever.poles.len();
+        let poles = lever.poles.iter().zip(&self.nominal_poles).enumerate();
+        let poles = poles.map(|(k, (pole, nominal))| (first + k, (pole / nominal).ln(), self.pole_std));
+        let modes = lever.modes.iter().zip(&self.seen).enumerate().flat_map(|(m, (now, seen))| {
+            [
+                (2 * m, (now.omega / seen.mode.omega).ln(), seen.std[0]),
+                (2 * m + 1, (now.quality_factor / seen.mode.quality_factor).ln(), seen.std[1]),
+            ]
+        });
+        poles.chain(modes).collect()
+    }
+
+    pub(super) fn prior_cost(&self, lever: &Lever) -> f64 {
+        self.known(lever).iter().map(|(_, distance, std)| (distance / std).powi(2)).sum()
+    }
+
+    pub(super) fn add_prior(&self, lever: &Lever, information: &mut Mat<f64>, gradient: &mut [f64]) {
+        for (parameter, distance, std) in self.known(lever) {
+            information[(parameter, parameter)] += std.powi(-2);
+            gradient[parameter] -= distance / (std * std);
+        }
+    }
+}
