@@ -96,7 +96,7 @@ impl Ringing {
     }
 
     /// The mode whose residue is the reference; none without residues.
-    pub(super) fn reference(&self) -> Option<usize> {
+    pub fn reference(&self) -> Option<usize> {
         self.residues.as_ref()?;
         (0..self.poles.len()).find(|j| self.covariance[(4 * j + 2, 4 * j + 2)] == 0.0)
     }
