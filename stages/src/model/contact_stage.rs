@@ -161,14 +161,16 @@ impl Stage for ContactFit {
 }
 
 fn warn(contact: &JointContact, cx: &Context) {
-    if let Some(test) = contact.residues.filter(|test| !test.used) {
+    // where poles alone disagree already, residues cannot say more
+    let disagree = contact.p_value < DISAGREEMENT;
+    if let Some(test) = contact.residues.filter(|test| !test.used && !disagree) {
         cx.warn(format!(
             "the residues are not those of a step of force at the tip (chi square {:.1} with {} degrees of freedom, p = {:.1e}): poles alone are used; \
              the catch takes time, or the detector is not the free lever's",
             test.chi_square, test.freedom, test.p_value
         ));
     }
-    if contact.p_value < DISAGREEMENT {
+    if disagree {
         cx.warn(format!(
             "poles{} disagree on the contact: chi square {:.1} with {} degrees of freedom (p = {:.1e}); its errors are too small: missing modes, a \
              nonlinear contact, or given shares that are wrong",

@@ -93,7 +93,7 @@ pub fn joint_contact(
     let freedom = all.freedom.saturating_sub(without.freedom);
     let chi_square = (all.minimum.cost - without.minimum.cost).max(0.0);
     let p_value = chi_square_tail(chi_square, freedom);
-    let used = !(p_value < RESIDUES_MISFIT);
+    let used = p_value.is_nan() || p_value >= RESIDUES_MISFIT;
     let test = Some(ResidueTest { chi_square, freedom, p_value, used });
     Ok(if used { all.result(lever, test) } else { of_poles(options.law)?.result(lever, test) })
 }

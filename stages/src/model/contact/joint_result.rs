@@ -239,7 +239,7 @@ impl<'a> Solved<'a> {
         let gain = &self.minimum.covariance * self.minimum.slope.transpose();
         let (free, data) = (self.model.rows[0].len(), self.model.factor.nrows());
         let part = |rows: std::ops::Range<usize>| match self.index(Quantity::Stiffness) {
-            Some(p) => rows.map(|row| gain[(p, row)] * gain[(p, row)]).sum::<f64>().sqrt(),
+            Some(p) => rows.map(|row| gain[(p, row)] * gain[(p, row)]).fold(0.0, |a, b| a + b).sqrt(),
             None => 0.0,
         };
         JointBudget {
