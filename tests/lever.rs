@@ -62,4 +62,11 @@ fn the_coupled_lever_keeps_the_zeros_and_moves_the_resonances_up() {
     for shift in comparison["pole_shifts"].as_array().expect("pole shifts") {
         assert!(number(shift, "/shift_hz") > 0.0, "contact stiffens: {shift}");
     }
+    let contact = shown(here, "c.h5", "contact");
+    let (found, std) =
+        (number(&contact, "/contact_stiffness_n_per_m"), number(&contact, "/contact_stiffness_std_n_per_m"));
+    let truth = archive.truth.contact_stiffness_n_per_m;
+    // 3.5 standard errors, and these within a per cent: 24 events
+    assert!((found - truth).abs() < 3.5 * std && std < 0.01 * truth, "{found} +- {std}, {truth}: {contact}");
+    assert!(number(&contact, "/p_value") > 1e-3, "poles and residues agree: {contact}");
 }

@@ -14,7 +14,7 @@ pub const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 pub struct Archive {
     /// Its folder.
     pub folder: PathBuf,
-    /// Frequencies, quality factors and numbers of events.
+    /// Frequencies, quality factors, contact and numbers of events.
     pub truth: Truth,
     /// Whether it is simulated in place of a recording that is not here.
     pub stand_in: bool,
@@ -25,6 +25,7 @@ pub struct Archive {
 pub struct Truth {
     pub frequency_hz: Vec<f64>,
     pub quality_factor: Vec<f64>,
+    pub contact_stiffness_n_per_m: f64,
     pub snap_offs: u64,
     pub snap_ins: u64,
 }
@@ -72,6 +73,7 @@ pub fn lever_a(scratch: &Path) -> Archive {
         let truth = Truth {
             frequency_hz: numbers(&json["truth"]["f"]),
             quality_factor: numbers(&json["truth"]["Q"]),
+            contact_stiffness_n_per_m: number(&json, "/truth/k_contact"),
             snap_offs: count(2.0) as u64,
             snap_ins: count(1.0) as u64,
         };
@@ -96,6 +98,7 @@ pub fn simulated(scratch: &Path, name: &str, records: u64, seed: u64) -> Archive
     let truth = Truth {
         frequency_hz: vec![46.3e3, 247.4e3, 580.8e3, 1051.2e3],
         quality_factor: vec![40.8, 193.2, 358.0, 503.8],
+        contact_stiffness_n_per_m: 60.0,
         snap_offs: records,
         snap_ins: records,
     };

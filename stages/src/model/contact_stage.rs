@@ -1,33 +1,40 @@
 //! The stage `model.contact`.
 
+mod output;
+mod reading;
+#[cfg(test)]
+mod tests;
+
 use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
-use faer::{Mat, c64};
+use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 
+use self::output::{contact_table, share_table, summary};
+use self::reading::ringing;
 use super::contact::{
-    ContactEstimate, CoupledPoles, FreeLever, LOADED_BEAM_SHARES, PoleContact, contact_stiffness, coupled_poles,
+    FreeLever, JointContact, JointOptions, LOADED_BEAM_SHARES, LawChoice, Ringing, coupled_poles, joint_contact,
 };
 use super::ringdown::{Estimate, ModeEstimate};
 use super::ringdown_stage::POLES;
 use crate::calibration::StiffnessSummary;
 use crate::calibration::reading::within;
 
-/// Stiffness and damping of the contact, from the resonances of the free lever and of the lever on the surface.
+/// Stiffness and damping of the contact, contact resonances and tip shares, from the ringings of the free lever and of the lever on the surface.
 ///
-/// Model: at every pole s of the coupled lever kappa(s) = k_c + eta s = -1 / G(s), G(s) = (1/k) (sum_n c_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + 1 -
-/// sum_n c_n) the free lever as its tip sees it: exact for a modal lever with a linear contact at the tip. Detector and excitation are in no pole.
-/// Method: each pole alone gives both numbers; together by generalised least squares over the poles, weighted by their full covariance
-/// plus the free modes' errors and those of stiffness and tip shares, carried to the poles by implicit derivatives.
-/// Shapes: `contact` by coupled pole, ascending.
-/// Units: N/m, N s/m, Hz.
-/// Accuracy: to first order in the errors; known stiffness recovered within its errors over 50 simulated archives (docs/accuracy.md). Bias: modes beyond
-/// the free lever's count as a static compliance only, which the highest pole feels most; tip shares are assumed, not measured, and wrong ones show as
-/// poles that disagree (p-value). A relative error of k is the same relative error of both results.
-/// Errors: as many shares as free modes are wanted; no stiffness; poles that no linear contact on this lever gives. Poles that disagree
-/// are a warning.
-/// Source: U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281.
+/// Model: the free lever as its tip sees it is G(s) = (1/k) (sum_n c_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + 1 - sum_n c_n), as the detector sees it H(s) D(s),
+/// H with real gains in the place of the tip shares c_n, D a chain of real poles. The contact is kappa(s) = k_c + eta s + mu s^2. Poles of the coupled lever are
+/// where 1 + kappa G = 0; its response is H D / (1 + kappa G): zeros and detector are the free lever's. Both ringings follow a step of the tip's force.
+/// Method: generalised least squares of all poles and residues, each ringing with its full covariance, over contact, tip shares, free poles, gains and
+/// detector at once. Without residues, or where they do not fit (p below 0.01, a warning), poles alone.
+/// Shapes: `contact` by coupled pole, ascending; `shares` by free mode.
+/// Units: N/m, N s/m, kg, Hz.
+/// Accuracy: to first order in the errors; known stiffness, damping and shares recovered within their errors over 100 simulated archives (docs/accuracy.md).
+/// Bias: modes beyond the free lever's count as a static compliance only, of what the given shares leave of one; a second-order term below its
+/// threshold shifts shares and stiffness. A relative error of k is the same relative error of the contact.
+/// Errors: as many shares as free modes are wanted; no stiffness; poles that no linear contact on this lever gives; fewer poles than shares and contact
+/// ask for. Poles that disagree are a warning.
+/// Source: U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281; A. C. Aitken, Proc. R. Soc. Edinb. 55 (1936) 42.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactFit {
@@ -35,13 +42,28 @@ pub struct ContactFit {
     pub stiffness_n_per_m: Option<f64>,
     /// Its relative standard error, 0 to 1, where `stiffness` is not wired. Default: 0, errors are then those of the ratio to k.
     pub stiffness_error: f64,
-    /// What each free mode has of the tip's static compliance, ascending, above 0, their sum at most 1; the rest counts as static. Default:
-    /// 0.9713, 0.0247, 0.0032, 0.0008, a beam loaded at its end as in `simulate.afm`: an assumption.
+    /// What each free mode has of the tip's static compliance, ascending, above 0, their sum at most 1; the rest counts as static. Their sum is kept, each
+    /// is a start. Default: 0.9713, 0.0247, 0.0032, 0.0008, a beam loaded at its end.
     pub tip_shares: Vec<f64>,
-    /// Relative standard error of each share but the first, which makes up for the others, 0 to 1. Default: 0, the shares are taken as they are.
-    pub tip_share_error: f64,
+    /// Relative standard error of each share but the first, which makes up for the others, 0 to 10; 0 takes them as they are. Default: absent, the data
+    /// alone say them; wanted where there are fewer coupled poles than shares.
+    pub tip_share_error: Option<f64>,
+    /// The contact's law: `spring-damper`, `second-order`, or `auto`, which takes the second where it lowers chi square by more than 9. Default: auto.
+    pub law: Law,
     /// Coupled poles above this frequency in Hz are left out; above 0. Default: absent, all count.
     pub max_frequency_hz: Option<f64>,
+}
+
+/// The contact's force by frequency.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// `k_c + eta s`.
+    SpringDamper,
+    /// `k_c + eta s + mu s^2`.
+    SecondOrder,
+    /// What the data ask for.
+    Auto,
 }
 
 impl Default for ContactFit {
@@ -50,16 +72,25 @@ impl Default for ContactFit {
             stiffness_n_per_m: None,
             stiffness_error: 0.0,
             tip_shares: LOADED_BEAM_SHARES.to_vec(),
-            tip_share_error: 0.0,
+            tip_share_error: None,
+            law: Law::Auto,
             max_frequency_hz: None,
         }
     }
 }
 
 const FREE: Port<Table> = Port::new("free", "", "modes of the free lever: of `model.ringdown` or `model.modes`");
+const FREE_POLES: Port<Array> = Port::optional(
+    "free_poles",
+    "ringdown-poles",
+    "the same fit's poles and residues: what zeros and detector are known from",
+);
 const STIFFNESS: Port<Document> = Port::optional("stiffness", "stiffness", "the summary of `calibration.stiffness`");
-const CONTACT: Port<Table> = Port::new("contact", "contact-poles", "what each coupled pole says, and what it counts");
-const SUMMARY: Port<Document> = Port::new("summary", "summary", "contact stiffness and damping with their errors");
+const CONTACT: Port<Table> =
+    Port::new("contact", "contact-poles", "contact resonances; what each says alone, and what it counts");
+const SHARES: Port<Table> = Port::new("shares", "tip-shares", "tip shares of the free modes");
+const SUMMARY: Port<Document> =
+    Port::new("summary", "summary", "the contact with its errors, shares, resonances, tests");
 
 /// Poles that agree give a smaller p-value once in a hundred archives.
 const DISAGREEMENT: f64 = 0.01;
@@ -67,10 +98,10 @@ const DISAGREEMENT: f64 = 0.01;
 impl Stage for ContactFit {
     const SPEC: Spec = Spec {
         name: "model.contact",
-        version: 1,
-        summary: "contact stiffness and damping from the poles that the contact moves",
-        inputs: &[FREE.spec(), POLES.spec(), STIFFNESS.spec()],
-        outputs: &[CONTACT.spec(), SUMMARY.spec()],
+        version: 2,
+        summary: "contact stiffness, damping and resonances, sharing zeros and detector with the free lever",
+        inputs: &[FREE.spec(), FREE_POLES.spec(), POLES.spec(), STIFFNESS.spec()],
+        outputs: &[CONTACT.spec(), SHARES.spec(), SUMMARY.spec()],
         caching: Caching::Stored,
         seeded: false,
         source: "U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281",
@@ -79,7 +110,7 @@ impl Stage for ContactFit {
     fn check(&self) -> Result<(), StageError> {
         within("stiffness_n_per_m", self.stiffness_n_per_m.unwrap_or(1.0), 1e-6, 1e6)?;
         within("stiffness_error", self.stiffness_error, 0.0, 1.0)?;
-        within("tip_share_error", self.tip_share_error, 0.0, 1.0)?;
+        within("tip_share_error", self.tip_share_error.unwrap_or(1.0), 0.0, 10.0)?;
         within("max_frequency_hz", self.max_frequency_hz.unwrap_or(1.0), 1e-6, 1e12)?;
         for &share in &self.tip_shares {
             within("tip_shares", share, 1e-12, 1.0)?;
@@ -90,25 +121,23 @@ impl Stage for ContactFit {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let lever = self.lever(inputs.get(&FREE)?, inputs.find(&STIFFNESS)?)?;
-        let coupled = self.coupled(inputs.get(&POLES)?)?;
-        let contact = contact_stiffness(&lever, &coupled).map_err(|error| {
-            StageError::from_error(error)
-                .help("look at the coupled modes: leave wrong ones out with `max_frequency_hz` or fit fewer `modes`")
+        let free = match inputs.find(&FREE_POLES)? {
+            Some(array) => ringing(array, f64::INFINITY)?,
+            None => Ringing::of_modes(&lever),
+        };
+        let most = self.max_frequency_hz.map_or(f64::INFINITY, |f| std::f64::consts::TAU * f);
+        let coupled = ringing(inputs.get(&POLES)?, most)?;
+        let contact = joint_contact(&lever, &free, &coupled, &self.options()).map_err(|error| {
+            StageError::from_error(error).help(
+                "look at the coupled modes: leave wrong ones out with `max_frequency_hz` or fit fewer `modes`; with fewer poles than shares give \
+                 `tip_share_error`",
+            )
         })?;
-        if contact.p_value < DISAGREEMENT {
-            cx.warn(format!(
-                "the poles disagree on the contact: chi square {:.1} with {} degrees of freedom (p = {:.1e}); its errors are too small: tip shares, \
-                 missing modes or a nonlinear contact (see `contact`)",
-                contact.chi_square, contact.freedom, contact.p_value
-            ));
-        }
-        if contact.stiffness_n_per_m.value <= 0.0 || contact.damping_n_s_per_m.value < 0.0 {
-            cx.warn(format!(
-                "a contact of {:.3e} N/m and {:.3e} N s/m: not of a surface that only holds and damps",
-                contact.stiffness_n_per_m.value, contact.damping_n_s_per_m.value
-            ));
-        }
-        Ok(Ports::new().with(&CONTACT, table(&contact)).with(&SUMMARY, summary(&contact, &lever)?))
+        warn(&contact, cx);
+        Ok(Ports::new()
+            .with(&CONTACT, contact_table(&contact))
+            .with(&SHARES, share_table(&contact, &lever, &self.tip_shares))
+            .with(&SUMMARY, summary(&contact, &lever)?))
     }
 
     fn examples() -> Vec<Example> {
@@ -131,7 +160,56 @@ impl Stage for ContactFit {
     }
 }
 
+fn warn(contact: &JointContact, cx: &Context) {
+    // where poles alone disagree already, residues cannot say more
+    let disagree = contact.p_value < DISAGREEMENT;
+    if let Some(test) = contact.residues.filter(|test| !test.used && !disagree) {
+        cx.warn(format!(
+            "the residues are not those of a step of force at the tip (chi square {:.1} with {} degrees of freedom, p = {:.1e}): poles alone are used; \
+             the catch takes time, or the detector is not the free lever's",
+            test.chi_square, test.freedom, test.p_value
+        ));
+    }
+    if disagree {
+        cx.warn(format!(
+            "poles{} disagree on the contact: chi square {:.1} with {} degrees of freedom (p = {:.1e}); its errors are too small: missing modes, a \
+             nonlinear contact, or given shares that are wrong",
+            if contact.residues.is_some_and(|test| test.used) { " and residues" } else { "" },
+            contact.chi_square,
+            contact.freedom,
+            contact.p_value
+        ));
+    }
+    if let (Some(gain), Some(inertia)) = (contact.law_gain, contact.inertia_kg) {
+        cx.warn(format!(
+            "not a contact of spring and damper: a term of {:.2e} +- {:.1e} kg lowers chi square by {gain:.1}; {}",
+            inertia.value,
+            inertia.std,
+            if inertia.value < 0.0 {
+                "it stiffens with frequency, as one that relaxes or whose force comes late"
+            } else {
+                "it moves a mass"
+            }
+        ));
+    }
+    if contact.stiffness_n_per_m.value <= 0.0 || contact.damping_n_s_per_m.value < 0.0 {
+        cx.warn(format!(
+            "a contact of {:.3e} N/m and {:.3e} N s/m: not of a surface that only holds and damps",
+            contact.stiffness_n_per_m.value, contact.damping_n_s_per_m.value
+        ));
+    }
+}
+
 impl ContactFit {
+    fn options(&self) -> JointOptions {
+        let law = match self.law {
+            Law::SpringDamper => LawChoice::SpringDamper,
+            Law::SecondOrder => LawChoice::SecondOrder,
+            Law::Auto => LawChoice::Auto,
+        };
+        JointOptions { law, share_error: self.tip_share_error }
+    }
+
     fn lever(&self, free: &Table, wired: Option<&Document>) -> Result<FreeLever, StageError> {
         let stiffness = match (wired, self.stiffness_n_per_m) {
             (Some(document), _) => {
@@ -160,80 +238,9 @@ impl ContactFit {
         let modes = (0..f.len())
             .map(|i| ModeEstimate { frequency_hz: estimate(f, f_std, i), quality_factor: estimate(q, q_std, i) })
             .collect();
-        FreeLever::new(stiffness, modes, self.tip_shares.clone(), self.tip_share_error).map_err(StageError::from_error)
+        // shares with an error are the joint estimate's to count
+        FreeLever::new(stiffness, modes, self.tip_shares.clone(), 0.0).map_err(StageError::from_error)
     }
-
-    fn coupled(&self, array: &Array) -> Result<CoupledPoles, StageError> {
-        let (values, covariance) = (array.real("pole")?, array.real("covariance")?);
-        let count = values.len();
-        if covariance.len() != count * count || !count.is_multiple_of(2) {
-            return Err(StageError::new(format!(
-                "{count} parts of poles with {} covariances, wanted two parts of each pole and the square of their number",
-                covariance.len()
-            )));
-        }
-        let most = self.max_frequency_hz.map_or(f64::INFINITY, |f| std::f64::consts::TAU * f);
-        let kept: Vec<usize> = (0..count / 2).filter(|&j| values[2 * j].hypot(values[2 * j + 1]) <= most).collect();
-        let rows: Vec<usize> = kept.iter().flat_map(|&j| [2 * j, 2 * j + 1]).collect();
-        Ok(CoupledPoles {
-            poles: kept.iter().map(|&j| c64::new(values[2 * j], values[2 * j + 1])).collect(),
-            covariance: Mat::from_fn(rows.len(), rows.len(), |i, j| covariance[rows[i] * count + rows[j]]),
-        })
-    }
-}
-
-fn table(contact: &ContactEstimate) -> Table {
-    let column = |value: fn(&PoleContact) -> f64| contact.poles.iter().map(value).collect::<Vec<f64>>();
-    Table::new()
-        .with("frequency_hz", "Hz", "coupled resonance", column(|p| p.pole.norm() / std::f64::consts::TAU))
-        .with("quality_factor", "1", "its quality factor", column(|p| p.pole.norm() / (-2.0 * p.pole.re)))
-        .with("fitted_hz", "Hz", "where the contact puts it", column(|p| p.fitted.norm() / std::f64::consts::TAU))
-        .with(
-            "fitted_quality_factor",
-            "1",
-            "quality factor that the contact gives it",
-            column(|p| p.fitted.norm() / (-2.0 * p.fitted.re)),
-        )
-        .with("stiffness", "N/m", "contact stiffness from this pole alone", column(|p| p.stiffness_n_per_m.value))
-        .with("stiffness_std", "N/m", "its standard error", column(|p| p.stiffness_n_per_m.std))
-        .with("damping", "N s/m", "contact damping from this pole alone", column(|p| p.damping_n_s_per_m.value))
-        .with("damping_std", "N s/m", "its standard error", column(|p| p.damping_n_s_per_m.std))
-        .with("stiffness_weight", "1", "what it counts in the stiffness", column(|p| p.stiffness_weight))
-        .with("damping_weight", "1", "what it counts in the damping", column(|p| p.damping_weight))
-}
-
-fn summary(contact: &ContactEstimate, lever: &FreeLever) -> Result<Document, StageError> {
-    let poles: Vec<Value> = contact
-        .poles
-        .iter()
-        .map(|p| {
-            json!({
-                "frequency_hz": p.pole.norm() / std::f64::consts::TAU,
-                "contact_stiffness_n_per_m": p.stiffness_n_per_m.value,
-                "contact_stiffness_std_n_per_m": p.stiffness_n_per_m.std,
-                "stiffness_weight": p.stiffness_weight,
-                "damping_weight": p.damping_weight,
-            })
-        })
-        .collect();
-    Document::new(&json!({
-        "contact_stiffness_n_per_m": contact.stiffness_n_per_m.value,
-        "contact_stiffness_std_n_per_m": contact.stiffness_n_per_m.std,
-        "contact_damping_n_s_per_m": contact.damping_n_s_per_m.value,
-        "contact_damping_std_n_s_per_m": contact.damping_n_s_per_m.std,
-        "correlation": contact.correlation,
-        "lever_stiffness_n_per_m": lever.stiffness().value,
-        "chi_square": contact.chi_square,
-        "freedom": contact.freedom,
-        "p_value": if contact.p_value.is_nan() { Value::Null } else { json!(contact.p_value) },
-        "stiffness_std_by_origin_n_per_m": {
-            "poles": contact.budget.poles,
-            "lever_stiffness": contact.budget.stiffness,
-            "free_modes": contact.budget.free_modes,
-            "tip_shares": contact.budget.tip_shares,
-        },
-        "poles": poles,
-    }))
 }
 
 /// A lever of two modes, and its exact poles on a contact of 60 N/m and 8e-6 N s/m.

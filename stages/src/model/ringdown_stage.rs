@@ -35,8 +35,8 @@ use crate::calibration::FreeSettings;
 /// events' own parameters eliminated; noise variances by a restricted Whittle likelihood of the residuals, and of the free stretches of the records where
 /// they are wired to `free`, in turns with the fit. Missing samples are predicted by the noise's filter and weigh nothing; for the noise's variances they
 /// are cut out of the taper and of what is expected of it alike. Bounds by an active set.
-/// Shapes: `modes` by mode ascending in frequency, `events` by event, `spectrum` over frequency, `poles` and their covariance over real and imaginary
-/// part of each mode in turn.
+/// Shapes: `modes` by mode ascending in frequency, `events` by event, `spectrum` over frequency, `poles`, their residues and covariances over real
+/// and imaginary part of each mode in turn.
 /// Units: Hz; volts; onsets in seconds after the ensemble's first sample used.
 /// Accuracy: rms errors within a few per cent of the Cramer-Rao bound and intervals that hold, for one event and for many (docs/accuracy.md). Standard
 /// errors count thermal, 1/f and white noise; `error_source = "events"` takes them from the events' scatter, right under a wrong noise model too.
@@ -129,7 +129,7 @@ const EVENTS: Port<Table> = Port::new("events", "ringdown-events", "what each ev
 const SPECTRUM: Port<Array> =
     Port::new("spectrum", "residual-spectrum", "what the fit leaves, and what the noise model expects");
 pub(super) const POLES: Port<Array> =
-    Port::new("poles", "ringdown-poles", "poles of the modes with their full covariance");
+    Port::new("poles", "ringdown-poles", "poles and residues of the modes with their full covariance");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "modes, noise, convergence");
 
 /// Standard errors from the events' scatter that differ from the noise model's by this factor are worth a warning: with 24 events theirs scatters
@@ -141,7 +141,7 @@ const EXCESS: f64 = 1.1;
 impl Stage for RingdownFit {
     const SPEC: Spec = Spec {
         name: "model.ringdown",
-        version: 3,
+        version: 4,
         summary: "fits the modes of all events jointly, at the limit of their noise",
         inputs: &[ENSEMBLE.spec(), FREE.spec()],
         outputs: &[MODES.spec(), EVENTS.spec(), SPECTRUM.spec(), POLES.spec(), SUMMARY.spec()],

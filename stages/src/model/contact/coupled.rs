@@ -2,6 +2,7 @@
 
 use faer::{Mat, c64};
 
+use super::law::ContactLaw;
 use super::lever::FreeLever;
 use crate::model::ringdown::Ringdown;
 
@@ -44,24 +45,25 @@ const ROUNDING: f64 = 1e-13;
 /// A root found to this share is one: rounding of the sums where a contact moves a pole by little.
 const FOUND: f64 = 1e-9;
 
-/// Poles of the lever with a contact of stiffness `contact[0]` (N/m) and damping `contact[1]` (N s/m) at its tip, one from each start.
+/// Poles of the lever with a contact at its tip, one from each start; `[k_c, eta]` (N/m, N s/m) is a contact too.
 ///
 /// # Model
-/// `1 + (k_c + eta s) G(s) = 0`, exact for a modal lever with a linear contact at the tip.
+/// `1 + kappa(s) G(s) = 0`, exact for a modal lever with a linear contact at the tip.
 /// # Method
 /// Newton's method on the polynomial that this is the quotient of, in product form, the roots found by the other starts and all
 /// conjugates divided out, all at once (Ehrlich and Aberth): distinct starts end in distinct roots. None without convergence, or where a root does
 /// not oscillate. About `20 M N` operations a round for M starts and N modes.
 /// # Source
 /// O. Aberth, Math. Comp. 27 (1973) 339.
-pub fn coupled_poles(lever: &FreeLever, contact: [f64; 2], start: &[c64]) -> Option<Vec<c64>> {
+pub fn coupled_poles(lever: &FreeLever, contact: impl Into<ContactLaw>, start: &[c64]) -> Option<Vec<c64>> {
+    let law = contact.into();
     let mut roots = start.to_vec();
     let mut last = f64::INFINITY;
     for _ in 0..ROUNDS {
         let mut largest: f64 = 0.0;
         for j in 0..roots.len() {
             let s = roots[j];
-            let step = newton_step(lever, contact, &roots, j);
+            let step = newton_step(lever, law, &roots, j);
             if !(step.re.is_finite() && step.im.is_finite()) {
                 return None;
             }
@@ -76,12 +78,12 @@ pub fn coupled_poles(lever: &FreeLever, contact: [f64; 2], start: &[c64]) -> Opt
     None
 }
 
-fn newton_step(lever: &FreeLever, [k_c, eta]: [f64; 2], roots: &[c64], j: usize) -> c64 {
+fn newton_step(lever: &FreeLever, law: ContactLaw, roots: &[c64], j: usize) -> c64 {
     let s = roots[j];
     let g = lever.compliance(s);
-    let kappa = s * eta + k_c;
+    let kappa = law.at(s);
     let f = kappa * g.value + 1.0;
-    let slope = g.value * eta + kappa * g.by_s + f * lever.denominators_slope(s);
+    let slope = law.slope(s) * g.value + kappa * g.by_s + f * lever.denominators_slope(s);
     let one = c64::new(1.0, 0.0);
     let others = roots.iter().enumerate().fold(one / (s - s.conj()), |sum, (i, &other)| {
         if i == j { sum } else { sum + one / (s - other) + one / (s - other.conj()) }

@@ -174,6 +174,16 @@ impl Single {
     }
 }
 
+/// Stiffness and damping from each pole alone.
+pub(super) fn single_poles(lever: &FreeLever, measured: &CoupledPoles) -> Vec<[Estimate; 2]> {
+    (0..measured.poles.len())
+        .map(|j| {
+            let one = Single::of(lever, measured, j);
+            [0, 1].map(|i| Estimate { value: one.contact[i], std: one.std[i] })
+        })
+        .collect()
+}
+
 /// The best of what single poles say, and of their weighted mean.
 fn start(lever: &FreeLever, measured: &CoupledPoles, single: &[Single]) -> Result<Linear, ModelError> {
     let mean = [0, 1].map(|i| {
@@ -311,7 +321,7 @@ fn residuals(measured: &CoupledPoles, poles: &[c64]) -> Mat<f64> {
 }
 
 /// `factor^-1 matrix` for a lower triangle.
-fn whitened(factor: &Mat<f64>, matrix: &Mat<f64>) -> Mat<f64> {
+pub(super) fn whitened(factor: &Mat<f64>, matrix: &Mat<f64>) -> Mat<f64> {
     let mut out = matrix.clone();
     for j in 0..out.ncols() {
         for i in 0..out.nrows() {

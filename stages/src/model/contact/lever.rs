@@ -81,6 +81,11 @@ impl FreeLever {
         self.stiffness_n_per_m
     }
 
+    /// Its free modes.
+    pub fn modes(&self) -> &[ModeEstimate] {
+        &self.modes
+    }
+
     /// Standard errors of the parameters: stiffness, then per mode angular frequency (rad/s), quality factor and share.
     pub(super) fn parameter_std(&self) -> Vec<f64> {
         let modes = self.modes.iter().zip(&self.tip_share).flat_map(|(mode, share)| {

@@ -19,14 +19,28 @@
 //! ```
 
 mod coupled;
+mod detector;
 mod estimate;
+mod joint;
+mod joint_model;
+mod joint_result;
+#[cfg(test)]
+mod joint_tests;
+mod law;
+mod least_squares;
 mod lever;
+mod quantities;
+mod ringing;
 #[cfg(test)]
 mod tests;
 
 pub use coupled::{CoupledPoles, coupled_poles};
 pub use estimate::{ContactEstimate, ErrorBudget, PoleContact, contact_stiffness};
+pub use joint::{JointOptions, LawChoice, joint_contact};
+pub use joint_result::{ContactResonance, JointBudget, JointContact, ResidueTest};
+pub use law::ContactLaw;
 pub use lever::FreeLever;
+pub use ringing::Ringing;
 
 /// Tip shares of the first four modes of a beam that carries a small load at its end: `simulate.afm`'s, an assumption about the lever.
 pub const LOADED_BEAM_SHARES: [f64; 4] = [0.9713, 0.0247, 0.0032, 0.0008];

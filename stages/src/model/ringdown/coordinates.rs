@@ -6,12 +6,12 @@ use super::modal_form::{Exponential, from_shared, shared};
 use super::normal::Freedom;
 
 /// The pole of `abs(s) = w` and quality factor `q`; not finite for `q < 1/2`.
-pub(super) fn pole_of(w: f64, q: f64) -> c64 {
+pub(crate) fn pole_of(w: f64, q: f64) -> c64 {
     c64::new(-0.5 * w / q, w * (1.0 - 0.25 / (q * q)).sqrt())
 }
 
 /// d Re, d Im by w, then by q.
-fn slopes(pole: c64) -> [[f64; 2]; 2] {
+pub(crate) fn slopes(pole: c64) -> [[f64; 2]; 2] {
     let w = pole.norm();
     let q = -0.5 * w / pole.re;
     let c = (1.0 - 0.25 / (q * q)).sqrt();

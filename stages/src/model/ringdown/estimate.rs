@@ -131,7 +131,7 @@ pub(super) fn modes_of(exponentials: &[Exponential], covariance: &Mat<f64>) -> V
 }
 
 /// Frequency and quality factor of a pole by the delta method.
-fn mode(pole: c64, covariance: &Mat<f64>, first: usize) -> ModeEstimate {
+pub(crate) fn mode(pole: c64, covariance: &Mat<f64>, first: usize) -> ModeEstimate {
     let w = pole.norm();
     let (re, im) = (pole.re, pole.im);
     let spread = |by_re: f64, by_im: f64| {

@@ -55,6 +55,8 @@ mod whittle;
 /// What the diagnosis shares with the fit: whitening, the basis, normal equations.
 pub(crate) mod internals {
     pub(crate) use super::choice::fit_all_that_rings;
+    pub(crate) use super::coordinates::{pole_of, slopes};
+    pub(crate) use super::estimate::mode;
     pub(crate) use super::modal_form::{columns, shared, signal, weights};
     pub(crate) use super::normal::symmetric_inverse;
     pub(crate) use super::whitener::{LANES, Whitener};

@@ -1,9 +1,10 @@
 //! What the stage hands on.
 
 use afmid_pipeline::{Array, Axis, Table};
+use faer::c64;
 
 use super::ErrorSource;
-use crate::model::contact::CoupledPoles;
+use crate::model::contact::Ringing;
 use crate::model::ringdown::{EventParameters, ModeEstimate, Ringdown};
 
 pub(super) fn mode_table(fit: &Ringdown, modes: &[ModeEstimate]) -> Table {
@@ -45,16 +46,32 @@ pub(super) fn poles(fit: &Ringdown, source: ErrorSource) -> Array {
         (ErrorSource::Events, Some(sandwich)) => sandwich,
         _ => &fit.covariance,
     };
-    let poles = CoupledPoles::of(fit, covariance);
-    let count = 2 * poles.poles.len();
+    let ringing = Ringing::of(fit, covariance);
+    let residues = ringing.residues.clone().unwrap_or_default();
+    let count = 2 * ringing.poles.len();
     let axis = |name: &str| {
         Axis::new(name, "1", "real and imaginary part of each pole in turn", (0..count).map(|i| i as f64).collect())
     };
-    let matrix: Vec<f64> = (0..count * count).map(|i| poles.covariance[(i / count, i % count)]).collect();
-    let values: Vec<f64> = poles.poles.iter().flat_map(|pole| [pole.re, pole.im]).collect();
+    // four numbers a mode: a pole's two parts at 0, a residue's at 2
+    let place = |i: usize, what: usize| 4 * (i / 2) + what + i % 2;
+    let block = |row: usize, column: usize| -> Vec<f64> {
+        (0..count * count).map(|i| ringing.covariance[(place(i / count, row), place(i % count, column))]).collect()
+    };
+    let parts = |values: &[c64]| values.iter().flat_map(|v| [v.re, v.im]).collect::<Vec<f64>>();
+    let both = &["parameter", "other"];
     Array::over(vec![axis("parameter"), axis("other")])
-        .with("pole", "rad/s", "poles of the modes, the upper ones of pairs", &["parameter"], values)
-        .with("covariance", "rad^2/s^2", "their covariance", &["parameter", "other"], matrix)
+        .with("pole", "rad/s", "poles of the modes, the upper ones of pairs", &["parameter"], parts(&ringing.poles))
+        .with("covariance", "rad^2/s^2", "their covariance", both, block(0, 0))
+        .with(
+            "residue",
+            "V",
+            "their residues in an event of amplitude 1 at its onset",
+            &["parameter"],
+            parts(&residues),
+        )
+        .with("residue_covariance", "V^2", "covariance of the residues; 0 for the reference's", both, block(2, 2))
+        .with("cross_covariance", "V rad/s", "covariance of poles (first axis) and residues", both, block(0, 2))
+        .attribute("real_poles", ringing.real_poles)
 }
 
 pub(super) fn event_table(fit: &Ringdown) -> Table {
