@@ -10,6 +10,7 @@ mod era_stage;
 mod error;
 mod example;
 mod fit;
+pub mod grey;
 mod innovations;
 mod instrumental;
 pub mod modes;

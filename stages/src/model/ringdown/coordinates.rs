@@ -6,7 +6,7 @@ use super::modal_form::{Exponential, from_shared, shared};
 use super::normal::Freedom;
 
 /// The pole of `abs(s) = w` and quality factor `q`; not finite for `q < 1/2`.
-pub(super) fn pole_of(w: f64, q: f64) -> c64 {
+pub(crate) fn pole_of(w: f64, q: f64) -> c64 {
     c64::new(-0.5 * w / q, w * (1.0 - 0.25 / (q * q)).sqrt())
 }
 

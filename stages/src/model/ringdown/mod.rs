@@ -55,6 +55,7 @@ mod whittle;
 /// What the diagnosis shares with the fit: whitening, the basis, normal equations.
 pub(crate) mod internals {
     pub(crate) use super::compressed::whiten;
+    pub(crate) use super::coordinates::pole_of;
     pub(crate) use super::modal_form::{columns, shared, signal, weights};
     pub(crate) use super::normal::symmetric_inverse;
     pub(crate) use super::whitener::{LANES, Whitener};
