@@ -1,6 +1,5 @@
 //! Each estimator in a few lines, without any config: `cargo run -p afmid-stages --example estimators`.
 
-use afmid_stages::model::grey::{GreyOptions, fit_grey};
 use afmid_stages::model::pem::{Experiment, PemOptions, identify};
 use afmid_stages::model::ringdown::{NoiseSource, RingdownOptions, fit_ringdowns};
 use afmid_stages::model::stabilisation::{StabilisationCriteria, stabilisation};
@@ -13,7 +12,6 @@ const INTERVAL_S: f64 = 1e-6;
 
 fn main() -> Result<(), ModelError> {
     prediction_error_method()?;
-    grey_form()?;
     subspace()?;
     free_decay()?;
     stable_poles()?;
@@ -43,18 +41,6 @@ fn prediction_error_method() -> Result<(), ModelError> {
         "pem: {:.1} Hz, converged: {}",
         z.ln().norm() / (std::f64::consts::TAU * INTERVAL_S),
         fit.verdict.converged
-    );
-    Ok(())
-}
-
-fn grey_form() -> Result<(), ModelError> {
-    let (u, y) = data();
-    let options = GreyOptions { modes: 1, real_poles: 0, ..GreyOptions::default() };
-    let fit = fit_grey(&[Experiment { input: &u, output: &y }], INTERVAL_S, &options)?;
-    let mode = fit.modes()[0];
-    println!(
-        "grey: {:.2} +- {:.2} Hz, Q {:.3}, delay {:.2e} s",
-        mode.frequency_hz.value, mode.frequency_hz.std, mode.quality_factor.value, fit.model.delay_s
     );
     Ok(())
 }
