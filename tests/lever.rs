@@ -38,6 +38,36 @@ fn the_free_lever_comes_out_of_ordinary_force_curves() {
 }
 
 #[test]
+fn the_grey_form_gives_modes_gains_and_delay_of_the_free_lever() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let archive = lever_a(here);
+    afmid(
+        here,
+        &["run", &config("grey-lever.toml"), "--set", &files(&archive.folder), "-o", "g.h5", "--cache", "cache"],
+    );
+
+    let grey = shown(here, "g.h5", "model");
+    assert_eq!(grey["converged"], true);
+    for (n, (f, q)) in archive.truth.frequency_hz.iter().zip(&archive.truth.quality_factor).enumerate() {
+        for (name, std, truth) in [("frequency_hz", "frequency_std_hz", f), ("quality_factor", "quality_factor_std", q)]
+        {
+            let (found, std) =
+                (number(&grey, &format!("/modes/{n}/{name}")), number(&grey, &format!("/modes/{n}/{std}")));
+            // 4 of its own standard errors, which follow the residual's spectrum: one real pole and a delay stand for three poles
+            assert!((found - truth).abs() < 4.0 * std, "mode {}: {name} {found} +- {std}, truth {truth}", n + 1);
+        }
+    }
+    let gain = number(&grey, "/static_gain/value");
+    // the force is given as the static deflection that it causes
+    assert!((gain - 1.0).abs() < 1e-3, "{gain}");
+    // the same poles through the state-space model
+    let modes = shown(here, "g.h5", "modes");
+    let (ours, theirs) = (number(&grey, "/modes/0/frequency_hz"), number(&modes, "/modes/0/frequency_hz"));
+    assert!((ours / theirs - 1.0).abs() < 1e-9, "{ours} {theirs}");
+}
+
+#[test]
 fn the_coupled_lever_keeps_the_zeros_and_moves_the_resonances_up() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();

@@ -22,6 +22,54 @@ pub(super) fn pem() -> Vec<Example> {
     }]
 }
 
+pub(super) fn grey() -> Vec<Example> {
+    vec![Example {
+        title: "One resonance, released a third of a sample late",
+        params: "modes = 1\nreal_poles = 0\nfeedthrough = false\ndrift = false",
+        inputs: || {
+            let pair = pair();
+            let late = shifted(&pair)?;
+            Ok(Ports::new().with(&pem_stage::PAIR, late))
+        },
+        // noise-free: the search ends where the residual is rounding
+        expect: |outputs| {
+            let summary = outputs.get(&pem_stage::SUMMARY).map_err(|error| error.to_string())?;
+            let mode = &summary.0["modes"][0];
+            let number = |value: &serde_json::Value| value.as_f64().unwrap_or(f64::NAN);
+            let (f, q) = (number(&mode["frequency_hz"]), number(&mode["quality_factor"]));
+            let delay = number(&summary.0["delay_s"]["value"]) * SAMPLE_RATE_HZ;
+            if (f / FREQUENCY_HZ - 1.0).abs() < 1e-8
+                && (q / QUALITY_FACTOR - 1.0).abs() < 1e-6
+                && (delay - LATE).abs() < 1e-6
+            {
+                Ok(format!("The mode lies at {f:.1} Hz with Q = {q:.3}, {delay:.4} samples late."))
+            } else {
+                Err(format!("{f} Hz, Q = {q}, {delay} samples"))
+            }
+        },
+    }]
+}
+
+/// Samples by which the example's event is late.
+const LATE: f64 = 1.0 / 3.0;
+
+/// The pair with an event that is [`LATE`].
+fn shifted(pair: &Array) -> Result<Array, StageError> {
+    let samples = pair.axis("time")?.values.len();
+    let time = pair.axis("time")?.values.clone();
+    let late = |k: usize| (k as f64 - T0 as f64 - LATE).max(0.0) / SAMPLE_RATE_HZ;
+    let (w0, a) = (std::f64::consts::TAU * FREQUENCY_HZ, std::f64::consts::PI * FREQUENCY_HZ / QUALITY_FACTOR);
+    let w = (w0 * w0 - a * a).sqrt();
+    let ringing = |t: f64| LOAD_V * (-a * t).exp() * ((w * t).cos() + a / w * (w * t).sin());
+    let response: Vec<f64> = (0..samples).map(|k| ringing(late(k))).collect();
+    Ok(Array::over(vec![Axis::new("time", "s", "time since t0", time)])
+        .with("response", "V", "response", &["time"], response)
+        .with("force", "V", "force", &["time"], pair.real("force")?.to_vec())
+        .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
+        .attribute("t0_sample", T0)
+        .attribute("kind", "snap-off"))
+}
+
 pub(super) fn subspace() -> Vec<Example> {
     vec![Example {
         title: "One resonance, released, without iteration",

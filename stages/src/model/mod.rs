@@ -10,6 +10,8 @@ mod era_stage;
 mod error;
 mod example;
 mod fit;
+pub mod grey;
+mod grey_stage;
 mod innovations;
 mod instrumental;
 pub mod modes;
@@ -45,6 +47,7 @@ pub use era::Era;
 pub use era_stage::EraEstimate;
 pub use error::ModelError;
 pub use fit::{Nuisances, Simulation, fit_percent, noise_ceiling_percent, simulate_held_out};
+pub use grey_stage::{GreyEstimate, GreyNumber, GreyNumberKind, HistoryKind, InputKind};
 pub use innovations::{InnovationsModel, InputGains, Section};
 pub use instrumental::{InstrumentalSubspace, Weight};
 pub use modes_stage::Modes;
@@ -68,6 +71,7 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<EraEstimate>(),
     Entry::of::<VectorFittingEstimate>(),
     Entry::of::<StabilisationDiagram>(),
+    Entry::of::<GreyEstimate>(),
     Entry::of::<Modes>(),
     Entry::of::<BootstrapIntervals>(),
     Entry::of::<Zeros>(),

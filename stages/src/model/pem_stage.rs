@@ -135,7 +135,8 @@ impl Default for Pem {
 pub(super) const PAIR: Port<Array> = Port::new("pair", "pair", "force and response over time since t0");
 pub(super) const MODEL: Port<StateSpace> =
     Port::new("model", "model", "the model, with the covariance of its parameters");
-const RESIDUALS: Port<Array> = Port::new("residuals", "residuals", "prediction errors and predictions over time");
+pub(super) const RESIDUALS: Port<Array> =
+    Port::new("residuals", "residuals", "prediction errors and predictions over time");
 pub(super) const SUMMARY: Port<Document> =
     Port::new("summary", "summary", "convergence, fits of the data that it was fitted to, residual tests");
 
@@ -309,7 +310,7 @@ impl Pem {
     }
 }
 
-fn ending(ending: Ending) -> &'static str {
+pub(super) fn ending(ending: Ending) -> &'static str {
     match ending {
         Ending::Minimum => "minimum",
         Ending::Exact => "exact",

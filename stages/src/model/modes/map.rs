@@ -23,8 +23,19 @@ pub struct Root {
 }
 
 impl Root {
-    /// Maps a root whose derivatives to the parameters are `slopes`, of covariance `covariance`.
+    /// Maps a root whose derivatives to the parameters are `slopes`, of covariance `covariance`. A root at zero is a delay: its numbers are NaN (unknown).
     pub fn new(z: c64, slopes: &[c64], covariance: &Mat<f64>, sample_time_s: f64) -> Self {
+        if z.norm_sqr() == 0.0 {
+            let (unknown, s) = (f64::NAN, c64::new(f64::NAN, f64::NAN));
+            return Self {
+                z,
+                s,
+                frequency_hz: unknown,
+                frequency_std_hz: unknown,
+                quality_factor: unknown,
+                quality_factor_std: unknown,
+            };
+        }
         let s = z.ln() / sample_time_s;
         let magnitude = s.norm();
         let ds: Vec<c64> = slopes.iter().map(|dz| dz / z / sample_time_s).collect();

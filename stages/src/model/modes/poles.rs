@@ -18,6 +18,8 @@ pub enum PoleKind {
     Doubtful,
     /// Real and negative in the z plane: no continuous counterpart.
     Nyquist,
+    /// At z = 0: part of a delay, no continuous counterpart.
+    Delay,
 }
 
 impl PoleKind {
@@ -28,6 +30,7 @@ impl PoleKind {
             Self::Detector => "detector",
             Self::Doubtful => "doubtful",
             Self::Nyquist => "nyquist",
+            Self::Delay => "delay",
         }
     }
 }
@@ -177,6 +180,9 @@ fn significance(amplitude: c64, slopes: &[c64], covariance: &Mat<f64>) -> f64 {
 }
 
 fn classify(root: &Root, significance: f64, criteria: &ModeCriteria) -> PoleKind {
+    if root.z.norm_sqr() == 0.0 {
+        return PoleKind::Delay;
+    }
     if !root.is_complex() {
         return if root.z.re < 0.0 { PoleKind::Nyquist } else { PoleKind::Detector };
     }

@@ -36,7 +36,7 @@ pub(super) fn prior_records(
 }
 
 /// The longest stretch of an experiment without a missing output, its inputs one after the other. Errors: it is too short for the start.
-pub(super) fn complete<'a>(
+pub(crate) fn complete<'a>(
     experiment: &Experiment<'a>,
     options: &PemOptions,
 ) -> Result<(std::borrow::Cow<'a, [f64]>, &'a [f64]), ModelError> {

@@ -58,7 +58,7 @@ impl Quantity {
 
 impl Knowledge {
     /// The allowed value nearest to `found`; three standard deviations round an expected one.
-    pub(super) fn nearest(self, found: f64) -> f64 {
+    pub(crate) fn nearest(self, found: f64) -> f64 {
         match self {
             Self::Free => found,
             Self::Fixed(value) => value,
