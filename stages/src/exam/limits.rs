@@ -1,15 +1,17 @@
 //! The smallest strength of a cause that is worth hiding.
 
 use crate::causes::{Cause, Effects};
-use crate::simulate::{Cut, Microscope, Place};
+use crate::model::ringdown::internals::Whitener;
+use crate::model::ringdown::{RingdownNoise, ThermalMode};
+use crate::simulate::{BOLTZMANN_J_PER_K, Cut, Microscope, Place};
 
 /// Expected gain of the log likelihood over the archive at the limit.
 pub const LIMIT_GAIN: f64 = 10.0;
 
 /// The window in which an effect is measured, as the diagnosis cuts it.
-const CUT: Cut = Cut { before: 1024, samples: 8192 };
-/// Places of the archive at which events are compared: first, middle and last record.
-const PLACES: usize = 3;
+const CUT: Cut = Cut { before: 16, samples: 8000 };
+/// Places of the archive at which events are compared, first and last record among them.
+const PLACES: usize = 5;
 /// Where the 1/f noise is taken for what is added to whole records, Hz.
 const HUM_HZ: f64 = 50.0;
 /// Points of a record at which it is evaluated: 20 kHz in 40 ms.
@@ -20,13 +22,13 @@ const POINTS: usize = 1600;
 /// # Method
 /// Noise-free releases at three places of the archive; what the baseline follows by itself, to first order: amplitude, offset, slope and instant of each
 /// event, and every shared parameter (frequencies, quality factors, shares, detector poles) by a central difference of simulated releases. The expected gain is half
-/// the sum of squares that is left of a cause's difference, over the variance of the noise, for all events.
+/// the sum of squares that is left of a cause's difference, whitened by white and thermal noise, for all events.
 ///
 /// # Accuracy
-/// First order, white noise: the thermal motion near the resonances is left out, so that limits of causes near a resonance are low by up to a few.
-#[derive(Debug, Clone)]
+/// First order; amplitudes of five events stand for those of all.
 pub struct Limits {
     microscope: Microscope,
+    whitener: Whitener,
     events: usize,
     /// Samples of a record.
     samples: usize,
@@ -48,10 +50,13 @@ impl Limits {
                 (releases(&up, &Effects::default(), events)?, releases(&down, &Effects::default(), events)?);
             followed.push(up.iter().zip(&down).map(|(u, d)| u - d).collect());
         }
+        let whitener = whitener(microscope);
+        followed.iter_mut().for_each(|column| whiten(&whitener, column));
         let noise = &microscope.noise;
         let variance_v2 = noise.white_v.powi(2) + noise.pink_v.powi(2) + microscope.adc.lsb_v.powi(2) / 12.0;
         Some(Self {
             microscope: microscope.clone(),
+            whitener,
             events,
             samples,
             variance_v2,
@@ -64,9 +69,10 @@ impl Limits {
     pub fn gain(&self, effects: &Effects) -> Option<f64> {
         let with = releases(&self.microscope, effects, self.events)?;
         let mut left: Vec<f64> = with.iter().zip(&self.plain).map(|(a, b)| a - b).collect();
+        whiten(&self.whitener, &mut left);
         project_out(&mut left, &self.followed);
         let squares = left.iter().map(|v| v * v).sum::<f64>();
-        let windows = 0.5 * squares / self.variance_v2 * self.events as f64 / PLACES as f64;
+        let windows = 0.5 * squares * self.events as f64 / PLACES as f64;
         Some(windows + self.record_gain(effects))
     }
 
@@ -138,6 +144,28 @@ pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> 
     None
 }
 
+/// White, converter's and thermal noise of releases.
+fn whitener(microscope: &Microscope) -> Whitener {
+    let (noise, lever) = (&microscope.noise, &microscope.lever);
+    let thermal = lever.modes.iter().map(|mode| {
+        let omega = std::f64::consts::TAU * mode.frequency_hz;
+        let pole = faer::c64::new(-0.5 * omega / mode.quality_factor, omega);
+        // equipartition of the tip's motion in this mode, seen by the detector's share of it
+        let tip = BOLTZMANN_J_PER_K * microscope.temperature_k * mode.tip_share / lever.stiffness_n_per_m;
+        let seen = mode.detector_share / mode.tip_share * microscope.detector.sensitivity_v_per_m;
+        ThermalMode { pole, variance: tip * seen * seen }
+    });
+    let white = noise.white_v.powi(2) + microscope.adc.lsb_v.powi(2) / 12.0;
+    let noise = RingdownNoise { white, thermal: thermal.collect(), wander: Vec::new() };
+    Whitener::new(&noise, microscope.sample_rate_hz.recip(), CUT.samples, &[])
+}
+
+fn whiten(whitener: &Whitener, events: &mut [f64]) {
+    for event in events.chunks_mut(CUT.samples) {
+        whitener.apply(&mut [event]);
+    }
+}
+
 fn releases(microscope: &Microscope, effects: &Effects, events: usize) -> Option<Vec<f64>> {
     let records = events.max(PLACES);
     let mut all = Vec::with_capacity(PLACES * CUT.samples);
@@ -145,7 +173,7 @@ fn releases(microscope: &Microscope, effects: &Effects, events: usize) -> Option
         let record = i * (records - 1) / (PLACES - 1);
         let place = Place { record, records, samples: CUT.samples, margin_samples: 0, seed: 0 };
         // a tenth more and less than the mean: amplitudes differ as events' do
-        let pull_off_n = microscope.contact.adhesion_n * (0.9 + 0.1 * i as f64);
+        let pull_off_n = microscope.contact.adhesion_n * (0.9 + 0.2 * i as f64 / (PLACES - 1) as f64);
         all.extend(microscope.quiet_release(pull_off_n, effects, place, CUT)?);
     }
     Some(all)

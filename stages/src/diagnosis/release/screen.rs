@@ -42,7 +42,7 @@ pub struct Screen {
     pub alone: f64,
 }
 
-/// Events from which their scatter may widen a score's standard deviation.
+/// Events from which their scatter may widen the scores' standard deviation.
 const SCATTER_EVENTS: usize = 8;
 /// Draws of the scores' joint distribution without any cause.
 const DRAWS: usize = 20_000;
@@ -53,8 +53,8 @@ const VISIBLE: f64 = 1e-4;
 ///
 /// # Model
 /// Scores are linear in the residuals: normal without any cause, their covariance known. Each is taken at a secant of its candidate, the
-/// lever's parameters, those of causes already found and each event's own projected out; where the events' scores scatter by more than the
-/// noise model says, their scatter counts.
+/// lever's parameters, those of causes already found and each event's own projected out; where most trials' scores scatter from event to event by
+/// more than the noise model says, all standard deviations are widened by as much.
 /// # Method
 /// The probability of the strongest of all comes from draws of that joint distribution, beyond them from its effective number of
 /// independent scores.
@@ -106,32 +106,31 @@ pub fn screen(
     let blind = Scene { residual_peaks_hz: Vec::new(), ..scene.clone() };
     let picked: Vec<bool> =
         trials.iter().map(|(cause, values)| !cause.trials(&blind).iter().any(|known| known == values)).collect();
-    let (mut used, mut strongest, mut strongest_picked) = (Vec::new(), 0.0f64, 0.0f64);
+    let (mut used, mut scatters, mut strongest, mut strongest_picked) = (Vec::new(), Vec::new(), 0.0f64, 0.0f64);
     for (c, (cause, values)) in trials.iter().enumerate() {
         let seen = projection.information[(c, c)];
         if seen.is_nan() || seen <= VISIBLE * raw[c] {
             continue;
         }
         let score: f64 = scores.iter().map(|s| s[c]).sum();
-        let scatter: f64 = scores.iter().map(|s| s[c] * s[c]).sum::<f64>() / seen;
-        let widened = if events.len() >= SCATTER_EVENTS { scatter.max(1.0) } else { 1.0 };
-        // one event's score alone must not widen it: a sign that all events share has a scatter of z^2 / events as well
-        let shared = score * score / seen / events.len() as f64;
-        let widened = (widened - shared).max(1.0);
+        let all: f64 = scores.iter().map(|s| s[c] * s[c]).sum();
+        scatters.push((all - score * score / events.len() as f64) / seen);
         let strength = score / seen;
         let parameter = cause.about().parameters[0];
         let inside = strength.clamp(parameter.low, parameter.high);
         let gain = 2.0 * score * inside - seen * inside * inside;
         if picked[c] {
-            strongest_picked = strongest_picked.max(gain / widened);
+            strongest_picked = strongest_picked.max(gain);
         } else {
             used.push(c);
-            strongest = strongest.max(gain / widened);
+            strongest = strongest.max(gain);
         }
         let mut values = values.clone();
         values[0] = inside;
         signs.push(Sign { cause: *cause, values, z: (gain.max(0.0)).sqrt() * score.signum(), gain });
     }
+    let widened = widening(scatters, events.len());
+    (strongest, strongest_picked) = (strongest / widened, strongest_picked / widened);
     let least = joint_probability(&projection.information, &used, strongest, seed)
         .min(picked_probability(strongest_picked, problem.cut.samples));
     // the lesser of two
@@ -146,6 +145,16 @@ pub fn screen(
     }
     best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Ok(Screen { signs: best, p_value, alone: normal_two_sided(strongest.max(strongest_picked).max(0.0).sqrt()) })
+}
+
+/// Median scatter of the events' scores over what the noise model says, at least 1: of most trials, since a cause that acts on few events makes
+/// its own scatter.
+fn widening(mut scatters: Vec<f64>, events: usize) -> f64 {
+    if events < SCATTER_EVENTS || scatters.is_empty() {
+        return 1.0;
+    }
+    scatters.sort_by(f64::total_cmp);
+    scatters[scatters.len() / 2].max(1.0)
 }
 
 /// One event's share of the normal equations of known parameters and trials.
