@@ -45,6 +45,9 @@ pub const HELD_OUT_EVENTS: usize = 4;
 /// Standard errors by which a further mode must do better on held-out events: one that is not there does so once in some ten thousand, one that is
 /// there does where its amplitude is known to a quarter.
 const CLEARLY: f64 = 2.0;
+/// Numbers of modes tried beyond the best; more where a cause may draw poles away from modes.
+const BEYOND: usize = 2;
+const BEYOND_RINGING: usize = 4;
 
 /// [`fit_ringdowns`] with the number of modes chosen among 1 to `most`.
 ///
@@ -72,7 +75,7 @@ pub fn fit_counted_ringdowns(
 ) -> Result<CountedRingdown, ModelError> {
     check(most, options)?;
     let all = Data { events, free, interval_s };
-    let ladder = ladder(&all, most, options)?;
+    let ladder = ladder(&all, most, BEYOND, options)?;
     let sufficient = all.fitted(&ladder.steps[ladder.best], options)?;
     let judged = RingdownOptions { noise: NoiseSource::Known(sufficient.noise.clone()), ..options.clone() };
     let tries: Vec<Try> = ladder.steps.iter().map(|start| Try::of(&all, start, &judged)).collect();
@@ -105,7 +108,7 @@ pub(crate) fn fit_all_that_rings(
 ) -> Result<Ringdown, ModelError> {
     check(most, options)?;
     let all = Data { events, free, interval_s };
-    let ladder = ladder(&all, most, options)?;
+    let ladder = ladder(&all, most, BEYOND_RINGING, options)?;
     all.fitted(&ladder.steps[ladder.best], options)
 }
 

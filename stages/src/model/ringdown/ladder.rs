@@ -19,11 +19,14 @@ pub(super) struct Ladder {
     pub best: usize,
 }
 
-/// Numbers of modes tried beyond the best: one that is not there may hide the next.
-const BEYOND: usize = 2;
-
-/// Fits under white noise with a further pole of the Hankel matrix each, up to `most` modes. Errors: those of the fit with one.
-pub(super) fn ladder(all: &Data<'_>, most: usize, options: &RingdownOptions) -> Result<Ladder, ModelError> {
+/// Fits under white noise with a further pole of the Hankel matrix each, up to `most` modes and `beyond` more than the best: one that is not there may
+/// hide the next. Errors: those of the fit with one.
+pub(super) fn ladder(
+    all: &Data<'_>,
+    most: usize,
+    beyond: usize,
+    options: &RingdownOptions,
+) -> Result<Ladder, ModelError> {
     let gaps = Gaps::of(&options.missing, all.events.len(), all.events.first().map_or(0, |event| event.len()))?;
     let (mut pool, real) = pool(all, &gaps, most, options)?;
     let mean = mean(all, &gaps);
@@ -50,7 +53,7 @@ pub(super) fn ladder(all: &Data<'_>, most: usize, options: &RingdownOptions) -> 
         // the real poles begin anew: their priors are about their start, and would wander from fit to fit
         current = fit.exponentials.into_iter().filter(Exponential::oscillates).chain(real.iter().copied()).collect();
         ladder.steps.push(current.clone());
-        if ladder.steps.len() > ladder.best + BEYOND {
+        if ladder.steps.len() > ladder.best + beyond {
             break;
         }
     }
