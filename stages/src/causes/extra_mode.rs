@@ -19,7 +19,7 @@ const ABOUT: About = About {
     resembles: "every nonlinearity makes lines that a further mode can follow in part: it must beat them by more",
     next_measurement: "thermal spectrum far from the surface: its peak is there without any event; its sign per event tells torsion",
     identifiable: Identifiable::Shape,
-    source: "R. W. Stark et al., Rev. Sci. Instrum. 76 (2005), the unidentified resonances of its Fig. 3",
+    source: "C. P. Green, J. E. Sader, J. Appl. Phys. 92 (2002) 6262 (torsion)",
 };
 
 impl Cause for ExtraModeCause {

@@ -26,7 +26,7 @@ const ABOUT: About = About {
     resembles: "photodiode-tail: the two commute in a linear chain and are one signal in equal events",
     next_measurement: "thermal spectrum: a tail of the photodiode shows there, one of the force does not",
     identifiable: Identifiable::Shape,
-    source: "R. W. Stark et al., Rev. Sci. Instrum. 76 (2005), on the water neck",
+    source: "R. Szoszkiewicz, E. Riedo, Phys. Rev. Lett. 95 (2005) 135502 (water bridges)",
 };
 
 impl Cause for TetherTail {
