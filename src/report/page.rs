@@ -6,6 +6,7 @@ use minijinja::value::Serde;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::diagnosis;
 use super::figure::Figure;
 use super::find::all;
 use super::generic::stage_view;
@@ -50,7 +51,7 @@ struct Page<'a> {
 /// One self-contained HTML page about a run.
 pub(crate) fn report(run: &RunResult) -> Result<String, ReportError> {
     let mut room = SECTION_FIGURES;
-    let sections: Vec<Section> = paper::sections(run).into_iter().map(|drawn| section(drawn, &mut room)).collect();
+    let sections: Vec<Section> = sections(run).map(|drawn| section(drawn, &mut room)).collect();
     let (shown, skipped): (Vec<Section>, Vec<Section>) =
         sections.into_iter().partition(|section| section.missing.is_empty());
     let warnings: Vec<(String, Vec<String>)> = run
@@ -82,12 +83,17 @@ pub(crate) fn report(run: &RunResult) -> Result<String, ReportError> {
     Ok(environment.get_template("report.html")?.render(Serde(page))?)
 }
 
+/// The diagnosis first, where there is one: it is what the run was for.
+fn sections(run: &RunResult) -> impl Iterator<Item = Drawn> {
+    diagnosis::section(run).into_iter().chain(paper::sections(run))
+}
+
 /// Every figure of a run as (file name, SVG file).
 pub(crate) fn figures(run: &RunResult) -> Vec<(String, String)> {
     let style = palette::in_light(include_str!("figure.css"));
-    let of_paper = paper::sections(run).into_iter().flat_map(|drawn| drawn.figures);
+    let of_sections = sections(run).flat_map(|drawn| drawn.figures);
     let of_stages = run.stages.iter().flat_map(|stage| stage_view(run, stage).1.into_iter().flatten());
-    of_paper.chain(of_stages).map(|figure| (format!("{}.svg", figure.id), figure.standalone(&style))).collect()
+    of_sections.chain(of_stages).map(|figure| (format!("{}.svg", figure.id), figure.standalone(&style))).collect()
 }
 
 /// Draws the figures of a section, as long as there is room for them.
@@ -107,6 +113,7 @@ fn section(drawn: Drawn, room: &mut usize) -> Section {
     Section {
         id: drawn.id.to_owned(),
         title: drawn.title.to_owned(),
+        stories: drawn.stories,
         pictures,
         tables: drawn.tables,
         groups: drawn.groups,
@@ -136,7 +143,7 @@ fn facts(run: &RunResult) -> Vec<Fact> {
 
 /// The numbers that matter: records, events, fits.
 fn tiles(run: &RunResult) -> Vec<Tile> {
-    let mut tiles = Vec::new();
+    let mut tiles = diagnosis::verdict_tiles(run);
     let tile = |label: &str, value: String, note: String| Tile { label: label.to_owned(), value, note };
     for found in all::<Recording>(run) {
         let size: u64 = found.value.records.iter().map(|record| record.size).sum();

@@ -20,7 +20,7 @@ fn bare(stages: Vec<afmid_pipeline::StageRecord>) -> RunResult {
 }
 
 /// A page is HTML; with its void elements closed and its script left out it must be well-formed XML.
-fn assert_page(page: &str) {
+pub(super) fn assert_page(page: &str) {
     let (head, rest) = page.split_once("<script>").expect("a script");
     let (_, tail) = rest.split_once("</script>").expect("the end of the script");
     let text = format!("{head}{tail}").replace("<!DOCTYPE html>", "");

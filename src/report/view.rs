@@ -8,6 +8,8 @@ pub(crate) struct TableView {
     pub caption: String,
     pub heads: Vec<Head>,
     pub rows: Vec<Vec<String>>,
+    /// Lengths of bars under the cells, in per cent; 0: none, empty: no bars at all.
+    pub bars: Vec<Vec<f64>>,
     /// What was left out; empty: nothing.
     pub more: String,
 }
@@ -82,11 +84,35 @@ pub(crate) struct Picture {
     pub svg: String,
 }
 
+/// A diagnosis in words.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct StoryView {
+    pub headline: String,
+    pub sentences: Vec<String>,
+    pub causes: Vec<CauseView>,
+    /// What gave the causes away, or what remains.
+    pub evidence: Vec<String>,
+}
+
+/// A named cause.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct CauseView {
+    pub id: String,
+    pub physics: String,
+    pub parameters: TableView,
+    pub facts: Vec<Fact>,
+    /// What looks like it, and what separates the two.
+    pub resembles: String,
+    /// The measurement that would settle it.
+    pub next: String,
+}
+
 /// A section of results: what the run has to say on one subject.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(crate) struct Section {
     pub id: String,
     pub title: String,
+    pub stories: Vec<StoryView>,
     pub pictures: Vec<Picture>,
     pub tables: Vec<TableView>,
     /// Numbers under a name.

@@ -140,7 +140,11 @@ pub(crate) fn spectra(run: &RunResult) -> Drawn {
         ..Drawn::default()
     };
     for found in all::<Array>(run) {
-        let Some(axis) = frequency_axis(found.value) else { continue };
+        // a residual's spectrum stands in the diagnosis' own section
+        let Some(axis) = frequency_axis(found.value).filter(|_| found.value.variable("spectrum_before").is_err())
+        else {
+            continue;
+        };
         let densities: Vec<(&str, &[f64])> = found
             .value
             .variables

@@ -4,13 +4,15 @@ use afmid_pipeline::RunResult;
 
 use super::{checks, coupling, force_curve, frequency_response, modal_table, pole_zero, stabilisation};
 use crate::report::figure::Figure;
-use crate::report::view::{Fact, TableView};
+use crate::report::view::{Fact, StoryView, TableView};
 
 /// A section before its figures are drawn.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Drawn {
     pub id: &'static str,
     pub title: &'static str,
+    /// What it says in words, above everything else.
+    pub stories: Vec<StoryView>,
     pub figures: Vec<Figure>,
     pub tables: Vec<TableView>,
     /// Numbers under a name.
@@ -22,7 +24,7 @@ pub(crate) struct Drawn {
 impl Drawn {
     /// Whether there is anything to show.
     pub fn is_empty(&self) -> bool {
-        self.figures.is_empty() && self.tables.is_empty() && self.groups.is_empty()
+        self.stories.is_empty() && self.figures.is_empty() && self.tables.is_empty() && self.groups.is_empty()
     }
 }
 

@@ -5,8 +5,10 @@ pub mod records;
 pub mod release;
 mod release_example;
 mod release_stage;
+mod release_story;
 pub mod system;
 mod system_stage;
+mod system_story;
 mod verdict;
 
 pub use release_stage::ReleaseDiagnose;

@@ -1,7 +1,7 @@
 //! The stage `diagnosis.release`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Values,
+    Array, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table, Values,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::records::{
     CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, judge, summarise,
 };
-use super::release::{Cut, EventWindow, Naming, NamingOptions, Problem, answer, common, name_causes, residuals, start};
+use super::release::{Cut, EventWindow, NamingOptions, Problem, answer, name_causes, start, story};
+use super::release_story::{residual_array, tile_table};
 use crate::causes::{CATALOGUE, Instant, find};
 use crate::events::EventKind;
 use crate::model::ModeNumber;
@@ -25,7 +26,8 @@ use crate::model::ModeNumber;
 /// scores, the strongest fitted in full, judged on held-out halves and against the best of another class, greedily; at last a test
 /// of the residual common to all events, which a cause outside the catalogue leaves.
 /// # Shapes
-/// `summary`: the answer as JSON; `residuals` over the time of an event: common to all events, before and after the extension.
+/// `summary`: the answer as JSON; `residuals` over time, frequency and event: mean event, models, residuals, their spectra, each event's numbers; `tiles`:
+/// the residual's energy by time and frequency.
 /// # Units
 /// V, Hz, s; strengths relative to volts of static deflection.
 /// # Accuracy
@@ -77,8 +79,13 @@ const RECORDS: Port<Recording> =
     Port::new("records", "records", "records with channel `deflection`, `piezo` if there is one");
 const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "snap-off events of these records");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict: causes, evidence, gains, ladder");
-const RESIDUALS: Port<Array> =
-    Port::new("residuals", "diagnosis-residuals", "residual common to all events, before and after the extension");
+const RESIDUALS: Port<Array> = Port::new(
+    "residuals",
+    "diagnosis-residuals",
+    "mean event, residuals and spectra before and after the extension; events' numbers",
+);
+const TILES: Port<Table> =
+    Port::new("tiles", "diagnosis-tiles", "energy of the residual common to all events over time and frequency");
 
 /// Room on either side of a window, within which its onset may move.
 const MARGIN: usize = 64;
@@ -91,10 +98,10 @@ const CHANNEL_SHARE: f64 = 0.5 / CHANNELS as f64;
 impl Stage for ReleaseDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.release",
-        version: 2,
+        version: 3,
         summary: "names what a linear lever and detector get wrong in snap-off events",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
-        outputs: &[SUMMARY.spec(), RESIDUALS.spec()],
+        outputs: &[SUMMARY.spec(), RESIDUALS.spec(), TILES.spec()],
         caching: Caching::Stored,
         seeded: true,
         source: "C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50",
@@ -171,7 +178,11 @@ impl Stage for ReleaseDiagnose {
             name_causes(&problem, begin.state, begin.starts, CATALOGUE, &options).map_err(StageError::from_error)?;
         let signs = self.record_signs(&summaries, resonances);
         let found = answer(&problem, &naming, &signs, self.false_alarm_rate);
-        Ok(Ports::new().with(&SUMMARY, Document::new(&found)?).with(&RESIDUALS, residual_array(&problem, &naming)))
+        let story = story(&problem, &naming).ok_or_else(|| StageError::new("the search ended without a fit"))?;
+        Ok(Ports::new()
+            .with(&SUMMARY, Document::new(&found)?)
+            .with(&RESIDUALS, residual_array(&story, &cut))
+            .with(&TILES, tile_table(&story)))
     }
 
     fn examples() -> Vec<Example> {
@@ -294,19 +305,4 @@ impl ReleaseDiagnose {
             windows.filter(|w| w.iter().all(|v| v.is_finite())).take(most).flatten().copied().collect();
         Ok((summary, whole))
     }
-}
-
-fn residual_array(problem: &Problem<'_>, naming: &Naming) -> Array {
-    let mean = |fitted: &super::release::JointFit| -> Vec<f64> {
-        let scale = (fitted.state.events.len() as f64).sqrt().recip();
-        let all = residuals(problem, &fitted.state, &fitted.starts);
-        common(&fitted.state, &all).into_iter().map(|v| v * scale).collect()
-    };
-    let before = naming.fits.first().map(mean).unwrap_or_default();
-    let after = naming.fits.last().map(mean).unwrap_or_default();
-    let time =
-        (0..problem.cut.samples).map(|k| (k as f64 - problem.cut.before as f64) * problem.cut.interval_s).collect();
-    Array::over(vec![Axis::new("time", "s", "time after the release", time)])
-        .with("before", "V", "mean residual of the linear model", &["time"], before)
-        .with("after", "V", "mean residual of the extended model", &["time"], after)
 }

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::system::{Part, Recorded, SystemDiagnosis, SystemOptions, diagnose_system};
+use super::system_story::{error_array, error_table};
 
 /// Says what a linear oscillator gets wrong in a measured input and output: names the causes, extends the model, measures the gain.
 ///
@@ -16,7 +17,8 @@ use super::system::{Part, Recorded, SystemDiagnosis, SystemOptions, diagnose_sys
 /// Least squares of the free-run error on the identification stretch; causes by score screen, joint refits, F tests by blocks against the part of the residual
 /// that no general term predicts, corrected for all trials; greedily, each held against its absence and its best rival at the end.
 /// # Shapes
-/// `summary`: the answer as JSON; `ladder` by model; `simulation` over the identification stretch's time.
+/// `summary`: the answer as JSON; `ladder` by model; `simulation` over the identification stretch's time; `errors` by frequency and by the
+/// output's size; `judged` by stretches of time of the parts.
 /// # Units
 /// Those of `pair`; seconds, Hz.
 /// # Accuracy
@@ -77,14 +79,20 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict: ca
 const LADDER: Port<Table> = Port::new("ladder", "model-ladder", "models, each with one more cause");
 const SIMULATION: Port<Array> =
     Port::new("simulation", "simulation", "the identification stretch, simulated before and after the extension");
+const ERRORS: Port<Array> = Port::new(
+    "errors",
+    "diagnosis-errors",
+    "errors over the identification stretch, by frequency and by the output's size",
+);
+const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over the time of the parts to judge on");
 
 impl Stage for SystemDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.system",
-        version: 1,
+        version: 2,
         summary: "names what a linear oscillator gets wrong in a measured input and output",
         inputs: &[PAIR.spec()],
-        outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec()],
+        outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec()],
         caching: Caching::Stored,
         seeded: false,
         source: "J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28",
@@ -132,7 +140,9 @@ impl Stage for SystemDiagnose {
         Ok(Ports::new()
             .with(&SUMMARY, Document::new(&found.diagnosis)?)
             .with(&LADDER, ladder(&found))
-            .with(&SIMULATION, simulation(&found, stretch.clone(), &options.output_unit)))
+            .with(&SIMULATION, simulation(&found, stretch.clone(), &options.output_unit))
+            .with(&ERRORS, error_array(&found.story, &options.output_unit))
+            .with(&JUDGED, error_table(&found.story, &options.output_unit)))
     }
 
     fn examples() -> Vec<Example> {

@@ -16,6 +16,9 @@ mod signals;
 mod start;
 mod state;
 mod stepper;
+mod story;
+mod story_events;
+mod story_spectra;
 mod window;
 
 pub use align::{aligned, suggested};
@@ -29,4 +32,7 @@ pub use search::{Named, Naming, NamingOptions, name_causes, scene};
 pub use start::{Start, start};
 pub use state::{Hold, Hypothesis, State};
 pub use stepper::{Release, differences};
+pub use story::{Story, story};
+pub use story_events::EventStory;
+pub use story_spectra::MeanSpectra;
 pub use window::{Cut, EventWindow};

@@ -9,6 +9,7 @@ use super::misfit::misfit;
 use super::model::Model;
 use super::options::SystemOptions;
 use super::start::baseline;
+use super::story::{SystemStory, story};
 use super::validation::check_part;
 use crate::causes::{CATALOGUE, Cause, Domain};
 use crate::diagnosis::Diagnosis;
@@ -23,6 +24,8 @@ pub struct SystemDiagnosis {
     pub before: Vec<f64>,
     /// The extended model's.
     pub after: Vec<f64>,
+    /// What both models miss, for a person to look at.
+    pub story: SystemStory,
     /// The extended model, in units of the largest output and input.
     pub model: Model,
     /// Those units.
@@ -76,6 +79,9 @@ pub fn diagnose_system(record: &Recorded<'_>, options: &SystemOptions) -> Result
     let choice = search.run(fit);
     let Some(last) = choice.ladder.last() else { return Err(SystemError::NoBaseline) };
     let misfit = misfit(&bench, &last.fit, &blocks);
+    let first = &choice.ladder[0].fit;
+    let simulated = [&first.simulated[..], &last.fit.simulated];
+    let story = story(&bench, record, [&first.model, &last.fit.model], simulated, &options.parts);
     let volts = |values: &[f64]| values.iter().map(|value| value * bench.output_scale).collect();
     let (before, after) = (volts(&choice.ladder[0].fit.simulated), volts(&last.fit.simulated));
     let model = last.fit.model.clone();
@@ -85,6 +91,7 @@ pub fn diagnose_system(record: &Recorded<'_>, options: &SystemOptions) -> Result
         output: volts(&bench.output),
         before,
         after,
+        story,
         model,
         scales: (bench.output_scale, bench.input_scale),
     })

@@ -17,6 +17,7 @@ mod oscillator;
 mod propagator;
 mod screen;
 mod start;
+mod story;
 #[cfg(test)]
 mod tests;
 mod validation;
@@ -30,3 +31,4 @@ pub use misfit::Misfit;
 pub use model::{Added, Model};
 pub use options::SystemOptions;
 pub use oscillator::{Oscillator, Span, free_run};
+pub use story::{Binned, Spectra, SystemStory};

@@ -9,12 +9,22 @@ use super::model::Model;
 /// Steps of the state's fit; two do for a linear model.
 const STEPS: usize = 12;
 
-/// Root mean square of the free-run error over a part, in the output's unit; none if it diverges or has no sample.
+/// The scored samples of a part and their simulation, scaled.
+pub(super) struct FreeRun {
+    /// The first one's place in the record.
+    pub first: usize,
+    /// Measured; NaN where missing.
+    pub output: Vec<f64>,
+    /// Simulated.
+    pub simulated: Vec<f64>,
+}
+
+/// Simulates a part in free run; none if it does not lie in the record.
 ///
 /// # Method
 /// Parameters frozen. Only deflection and rate at the part's first sample are fitted, by Gauss-Newton to its first `state_samples`, which are then not scored;
 /// with none the simulation of the training part goes on into the part. What a cause adds to the record itself (a drift, a line) stays as fitted.
-pub(super) fn free_run_rms(bench: &Bench, record: &Recorded<'_>, model: &Model, part: &Part) -> Option<f64> {
+pub(super) fn free_run_part(bench: &Bench, record: &Recorded<'_>, model: &Model, part: &Part) -> Option<FreeRun> {
     let output: Vec<f64> = record.output.get(part.first..part.end)?.iter().map(|y| y / bench.output_scale).collect();
     let (skipped, simulated) = if part.state_samples == 0 {
         let from = bench.training.0;
@@ -23,13 +33,15 @@ pub(super) fn free_run_rms(bench: &Bench, record: &Recorded<'_>, model: &Model, 
         let state = initial_state(bench, model, part, &output);
         (part.state_samples, bench.simulate_part(model, state, (part.first, part.end)))
     };
-    let squares: Vec<f64> = output
-        .iter()
-        .zip(&simulated)
-        .skip(skipped)
-        .filter(|(y, _)| y.is_finite())
-        .map(|(y, s)| (y - s).powi(2))
-        .collect();
+    let scored = |values: Vec<f64>| values.into_iter().skip(skipped).collect();
+    Some(FreeRun { first: part.first + skipped, output: scored(output), simulated: scored(simulated) })
+}
+
+/// Root mean square of the free-run error over a part, in the output's unit; none if it diverges or has no sample.
+pub(super) fn free_run_rms(bench: &Bench, record: &Recorded<'_>, model: &Model, part: &Part) -> Option<f64> {
+    let run = free_run_part(bench, record, model, part)?;
+    let squares: Vec<f64> =
+        run.output.iter().zip(&run.simulated).filter(|(y, _)| y.is_finite()).map(|(y, s)| (y - s).powi(2)).collect();
     let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt() * bench.output_scale;
     rms.is_finite().then_some(rms)
 }

@@ -1,0 +1,23 @@
+//! The story of a diagnosis on one page: what is wrong, the picture that gave it away, what every further cause bought.
+//!
+//! ```text
+//! told.rs (what a stage says) -> words.rs, overlay.rs, telling.rs + panels, tiles.rs, ladder.rs, modes.rs -> section.rs
+//! ```
+
+mod ladder;
+mod modes;
+mod overlay;
+mod panels;
+mod section;
+mod telling;
+mod tiles;
+mod told;
+mod words;
+
+#[cfg(test)]
+pub(super) mod fixture;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use section::section;
+pub(crate) use words::verdict_tiles;

@@ -1,0 +1,158 @@
+//! The residuals' small multiples: by frequency, over time, event by event, by size.
+
+use super::overlay::{EXTENDED, LINEAR, strokes};
+use super::told::{Curve, Told};
+use crate::report::figure::{Axis, Band, Colour, Mark, Marker, Panel, Points, Stroke};
+
+/// The spectrum of the residual with the places where causes show.
+pub(super) fn spectrum(told: &Told<'_>) -> Option<Panel> {
+    let before = told.curve("frequency", "spectrum_before")?;
+    let y = Axis::new("Density", before.unit).log();
+    let x = Axis { label: "Frequency".to_owned(), ..Axis::frequency() };
+    let mut panel = Panel::new("Spectrum of the residual", x, y);
+    for (name, series, stroke) in [
+        ("spectrum_noise", "noise level", Stroke::solid(Colour::Muted, 1.1)),
+        ("spectrum_output", "output", Stroke::solid(Colour::Muted, 1.1)),
+    ] {
+        if let Some(level) = told.curve("frequency", name) {
+            panel = panel.with(Mark::line(series, level.x, level.y, stroke));
+        }
+    }
+    for (name, (series, stroke)) in ["spectrum_before", "spectrum_after"].into_iter().zip(strokes(1.0)) {
+        if let Some(density) = told.curve("frequency", name).filter(|_| series == LINEAR || told.extended()) {
+            panel = panel.with(Mark::line(series, density.x, density.y, stroke));
+        }
+    }
+    Some(marks(told).into_iter().fold(panel, |panel, (at, label)| panel.with(Mark::at_x(at, &label))))
+}
+
+/// Modes, combinations of the first two, and frequencies that a named cause has.
+fn marks(told: &Told<'_>) -> Vec<(f64, String)> {
+    let modes: Vec<f64> = told.answer.modes_before.iter().map(|mode| mode.frequency_hz).collect();
+    let mut out: Vec<(f64, String)> =
+        modes.iter().enumerate().map(|(m, f)| (*f, format!("f{}", subscript(m + 1)))).collect();
+    if let Some(first) = modes.first() {
+        out.push((2.0 * first, "2 f₁".to_owned()));
+        out.push((3.0 * first, "3 f₁".to_owned()));
+        if let Some(second) = modes.get(1) {
+            out.push((second - first, "f₂ − f₁".to_owned()));
+            out.push((second + first, "f₂ + f₁".to_owned()));
+        }
+    }
+    for cause in &told.answer.causes {
+        let own = cause.parameters.values().filter(|value| value.unit == "Hz").filter_map(|value| value.value);
+        out.extend(own.map(|f| (f, cause.id.clone())));
+    }
+    out
+}
+
+fn subscript(number: usize) -> String {
+    let digits = ['₀', '₁', '₂', '₃', '₄', '₅', '₆', '₇', '₈', '₉'];
+    number.to_string().chars().filter_map(|c| digits.get(c.to_digit(10)? as usize)).collect()
+}
+
+/// The residual over the whole window or record.
+pub(super) fn over_time(told: &Told<'_>) -> Option<Panel> {
+    let event = told.curve("time", "linear").is_some();
+    let x = Axis::new(if event { "Time after the release" } else { "Time" }, "s");
+    let before = told.curve("time", "before")?;
+    let mut panel = Panel::new("Residual over time", x, Axis::new("Residual", before.unit));
+    let measured = told.curve("time", "measured");
+    for (name, (series, stroke)) in ["before", "after"].into_iter().zip(strokes(0.8)) {
+        let Some(curve) = told.curve("time", name).filter(|_| series == LINEAR || told.extended()) else { continue };
+        // of a system the models are stored, of events their residuals
+        let left: Vec<f64> = match measured.filter(|_| !event) {
+            Some(measured) => measured.y.iter().zip(curve.y).map(|(y, s)| y - s).collect(),
+            None => curve.y.to_vec(),
+        };
+        panel = panel.with(Mark::line(series, curve.x, &left, stroke));
+    }
+    Some(panel)
+}
+
+/// The frequency that each event asks of the linear model.
+pub(super) fn detuning(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
+    let (shift, std) = (told.curve("event", "frequency_shift")?, told.curve("event", "frequency_shift_std")?);
+    let (x, axis) = abscissa(told, shift, by_amplitude)?;
+    let ppm = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| 1e6 * value).collect() };
+    let (y, y_error) = (ppm(shift.y), ppm(std.y));
+    let titles = (0..y.len()).map(|k| format!("event {}: {:.0} ± {:.0} ppm", k + 1, y[k], y_error[k])).collect();
+    let points =
+        Points { series: LINEAR.to_owned(), x, y, y_error, titles, marker: Marker::Dot, colour: Colour::Vermillion };
+    let panel = Panel::new("Each event's first mode", axis, Axis::new("f₁ off by", "ppm"));
+    Some(panel.with(Mark::Points(points)).with(Mark::at_y(0.0, "")))
+}
+
+/// The rms residual of each event.
+pub(super) fn event_rms(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
+    let before = told.curve("event", "event_rms_before")?;
+    let (x, axis) = abscissa(told, before, by_amplitude)?;
+    let mut panel = Panel::new("Each event's residual", axis, Axis::new("Residual (rms)", before.unit));
+    for (name, series, marker, colour) in [
+        ("event_rms_before", LINEAR, Marker::Dot, Colour::Vermillion),
+        ("event_rms_after", EXTENDED, Marker::Ring, Colour::Blue),
+    ] {
+        let Some(rms) = told.curve("event", name).filter(|_| series == LINEAR || told.extended()) else { continue };
+        let (series, x, y) = (series.to_owned(), x.clone(), rms.y.to_vec());
+        panel =
+            panel.with(Mark::Points(Points { series, x, y, y_error: Vec::new(), titles: Vec::new(), marker, colour }));
+    }
+    Some(panel)
+}
+
+fn abscissa(told: &Told<'_>, of: Curve<'_>, by_amplitude: bool) -> Option<(Vec<f64>, Axis)> {
+    if by_amplitude {
+        let amplitude = told.curve("event", "amplitude")?;
+        return Some((amplitude.y.to_vec(), Axis::new("Amplitude of the event", amplitude.unit)));
+    }
+    let count = of.x.len() as f64;
+    let axis = Axis::new("Event, in the archive's order", "1").limits(0.5, count + 0.5).whole();
+    Some((of.x.iter().map(|k| k + 1.0).collect(), axis))
+}
+
+/// The error by the size of the output.
+pub(super) fn by_size(told: &Told<'_>) -> Option<Panel> {
+    let before = told.curve("output", "rms_before")?;
+    let y = Axis::new("Error (rms)", before.unit).log();
+    let mut panel = Panel::new("Error by the output's size", Axis::new("Output", before.x_unit), y);
+    for (name, (series, stroke)) in ["rms_before", "rms_after"].into_iter().zip(strokes(1.6)) {
+        if let Some(curve) = told.curve("output", name).filter(|_| series == LINEAR || told.extended()) {
+            panel = panel.with(Mark::line(series, curve.x, curve.y, stroke));
+        }
+    }
+    Some(panel)
+}
+
+/// The error over the time of each part that judges.
+pub(super) fn parts(told: &Told<'_>) -> Vec<Panel> {
+    let Some(table) = told.table("part") else { return Vec::new() };
+    let columns =
+        (table.text("part"), table.real("time_s"), table.real("output"), table.real("before"), table.real("after"));
+    let (Ok(part), Ok(time), Ok(output), Ok(before), Ok(after)) = columns else { return Vec::new() };
+    let unit = table.column("before").map_or("1", |column| &column.unit);
+    let mut names: Vec<&String> = part.iter().collect();
+    names.dedup();
+    let panel = |name: &String| {
+        let own = |values: &[f64]| -> Vec<f64> {
+            part.iter().zip(values).filter(|(part, _)| *part == name).map(|(_, value)| *value).collect()
+        };
+        let x = own(time);
+        let muted = Band {
+            series: "output".to_owned(),
+            low: vec![f64::MIN_POSITIVE; x.len()],
+            high: own(output),
+            x: x.clone(),
+            colour: Colour::Muted,
+            fits: false,
+        };
+        let y = Axis::new("Error (rms)", unit).log();
+        let mut panel = Panel::new(&format!("Part “{name}”"), Axis::new("Time", "s"), y).with(Mark::Band(muted));
+        for (values, (series, stroke)) in [before, after].into_iter().zip(strokes(1.2)) {
+            if series == LINEAR || told.extended() {
+                panel = panel.with(Mark::line(series, &x, &own(values), stroke));
+            }
+        }
+        panel
+    };
+    names.into_iter().map(panel).collect()
+}

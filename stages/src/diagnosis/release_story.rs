@@ -1,0 +1,110 @@
+//! The story of a release diagnosis as artifacts.
+
+use afmid_pipeline::{Array, Axis, Table};
+
+use super::release::{Cut, EventStory, Story, Tile};
+
+/// Residuals, spectra and numbers of single events.
+pub(super) fn residual_array(story: &Story, cut: &Cut) -> Array {
+    let time: Vec<f64> = (0..story.measured.len()).map(|k| (k as f64 - cut.before as f64) * cut.interval_s).collect();
+    let events: Vec<f64> = (0..story.events.len()).map(|k| k as f64).collect();
+    let of = |pick: fn(&EventStory) -> f64| story.events.iter().map(pick).collect::<Vec<f64>>();
+    let records: Vec<i64> = story.events.iter().map(|e| i64::try_from(e.record).unwrap_or(i64::MAX)).collect();
+    let spectra = &story.spectra;
+    let (t, f, e) = (&["time"], &["frequency"], &["event"]);
+    Array::over(vec![
+        Axis::new("time", "s", "time after the release", time),
+        Axis::new("frequency", "Hz", "frequency", spectra.frequency_hz.clone()),
+        Axis::new("event", "1", "event", events),
+    ])
+    .with("before", "V", "mean residual of the linear model", t, story.before.clone())
+    .with("after", "V", "mean residual of the extended model", t, story.after.clone())
+    .with("measured", "V", "mean event, weighted by amplitude, less offset and slope", t, story.measured.clone())
+    .with("linear", "V", "the linear model's mean event", t, story.modelled(&story.before))
+    .with("extended", "V", "the extended model's mean event", t, story.modelled(&story.after))
+    .with("spectrum_before", "V^2/Hz", "density of `before`, one-sided", f, spectra.before.clone())
+    .with("spectrum_after", "V^2/Hz", "density of `after`, one-sided", f, spectra.after.clone())
+    .with("spectrum_noise", "V^2/Hz", "what the scatter of the events leaves in a mean", f, spectra.noise.clone())
+    .with("record", "1", "number of the event's record", e, records)
+    .with("amplitude", "V", "the event's amplitude", e, of(|event| event.amplitude_v))
+    .with("event_rms_before", "V", "rms residual of the linear model", e, of(|event| event.rms_before))
+    .with("event_rms_after", "V", "rms residual of the extended model", e, of(|event| event.rms_after))
+    .with(
+        "frequency_shift",
+        "1",
+        "first mode's frequency against the linear model's, relative",
+        e,
+        of(|event| event.frequency_shift),
+    )
+    .with("frequency_shift_std", "1", "its standard error", e, of(|event| event.frequency_shift_std))
+}
+
+/// Energy of the residual common to all events over time and frequency, before and after.
+pub(super) fn tile_table(story: &Story) -> Table {
+    let of = |which: usize, pick: fn(&Tile) -> f64| story.tiles.iter().map(|t| pick(&t[which])).collect::<Vec<f64>>();
+    Table::new()
+        .with("from_s", "s", "begin, after the release", of(0, |tile| tile.from_s))
+        .with("to_s", "s", "end", of(0, |tile| tile.to_s))
+        .with("low_hz", "Hz", "lowest frequency", of(0, |tile| tile.low_hz))
+        .with("high_hz", "Hz", "highest frequency", of(0, |tile| tile.high_hz))
+        .with("excess_before", "1", "energy over the noise's, linear model", of(0, |tile| tile.excess))
+        .with("excess_after", "1", "energy over the noise's, extended model", of(1, |tile| tile.excess))
+        .with("p_before", "1", "probability of so much in noise, linear model", of(0, |tile| tile.p_value))
+        .with("p_after", "1", "probability of so much in noise, extended model", of(1, |tile| tile.p_value))
+}
+
+#[cfg(test)]
+mod tests {
+    use afmid_pipeline::stage::NoProgress;
+    use afmid_pipeline::{Array, Context, Port, Stage, Table};
+
+    use crate::diagnosis::ReleaseDiagnose;
+
+    const RESIDUALS: Port<Array> = Port::new("residuals", "diagnosis-residuals", "");
+    const TILES: Port<Table> = Port::new("tiles", "diagnosis-tiles", "");
+
+    #[test]
+    fn the_story_agrees_with_itself() {
+        let example = ReleaseDiagnose::examples().remove(0);
+        let stage = ReleaseDiagnose {
+            modes: crate::model::ModeNumber::Fixed(2),
+            detector_poles_hz: vec![1.5e6],
+            window_samples: 4000,
+            ..ReleaseDiagnose::default()
+        };
+        let context = Context::new(std::path::Path::new("."), 7, &NoProgress);
+        let ports = stage.run(&(example.inputs)().expect("inputs"), &context).expect("a diagnosis");
+        let array = ports.get(&RESIDUALS).expect("residuals");
+        let of = |name: &str| array.real(name).expect("a variable");
+        let mean_square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
+        for (model, rest, spectrum) in
+            [("linear", "before", "spectrum_before"), ("extended", "after", "spectrum_after")]
+        {
+            for ((measured, modelled), rest) in of("measured").iter().zip(of(model)).zip(of(rest)) {
+                // rounding
+                assert!((measured - modelled - rest).abs() < 1e-12);
+            }
+            let f = &array.axis("frequency").expect("frequencies").values;
+            // Parseval: the first and the last bin count once, the others twice, and all are written one-sided
+            let spectrum = of(spectrum);
+            let ends = 0.5 * (spectrum[0] + spectrum[spectrum.len() - 1]);
+            let power = (spectrum.iter().sum::<f64>() - ends) * (f[1] - f[0]);
+            assert!((power / mean_square(of(rest)) - 1.0).abs() < 1e-9, "{power} {}", mean_square(of(rest)));
+        }
+        // the bend is common to all events; what is left of it is noise: 1.2 mV white over eight events, 2.5 MHz wide
+        let level = 2.0 * (1.2e-3_f64).powi(2) * 2e-7 / 8.0;
+        let noise = of("spectrum_noise");
+        let mean = noise.iter().sum::<f64>() / noise.len() as f64;
+        // 7 events' freedom in each of 2000 bins: one per cent; a fit of four own parameters takes less
+        assert!((mean / level - 1.0).abs() < 0.05, "{mean} {level}");
+        assert!(mean_square(of("before")) > 1.5 * mean_square(of("after")));
+        for (before, after) in of("event_rms_before").iter().zip(of("event_rms_after")) {
+            assert!(after < before && (after / 1.2e-3 - 1.0).abs() < 0.1, "{before} {after}");
+        }
+        let tiles = ports.get(&TILES).expect("tiles");
+        let (before, after) =
+            (tiles.real("excess_before").expect("before"), tiles.real("excess_after").expect("after"));
+        let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+        assert!(most(before) > 5.0 && most(after) < 4.0, "{} {}", most(before), most(after));
+    }
+}

@@ -1,0 +1,39 @@
+//! The story of a system diagnosis as artifacts.
+
+use afmid_pipeline::{Array, Axis, Table};
+
+use super::system::{Binned, SystemStory};
+
+/// Errors by frequency and by the output's size.
+pub(super) fn error_array(story: &SystemStory, unit: &str) -> Array {
+    let density = format!("{unit}^2/Hz");
+    let of = |pick: fn(&Binned) -> f64| story.sizes.iter().map(pick).collect::<Vec<f64>>();
+    let (f, s) = (&["frequency"], &["output"]);
+    Array::over(vec![
+        Axis::new("frequency", "Hz", "frequency", story.spectra.frequency_hz.clone()),
+        Axis::new("output", unit, "output", of(|bin| bin.at)),
+    ])
+    .with("spectrum_output", &density, "density of the output, one-sided", f, story.spectra.output.clone())
+    .with("spectrum_before", &density, "density of the linear oscillator's error", f, story.spectra.before.clone())
+    .with("spectrum_after", &density, "density of the extended model's error", f, story.spectra.after.clone())
+    .with(
+        "rms_before",
+        unit,
+        "rms error of the linear oscillator where the output is so large",
+        s,
+        of(|bin| bin.before),
+    )
+    .with("rms_after", unit, "rms error of the extended model there", s, of(|bin| bin.after))
+}
+
+/// Errors over time, part by part.
+pub(super) fn error_table(story: &SystemStory, unit: &str) -> Table {
+    let rows = || story.times.iter().flat_map(|(part, bins)| bins.iter().map(move |bin| (part, bin)));
+    let of = |pick: fn(&Binned) -> f64| rows().map(|(_, bin)| pick(bin)).collect::<Vec<f64>>();
+    Table::new()
+        .with("part", "", "part of the record", rows().map(|(part, _)| part.clone()).collect::<Vec<String>>())
+        .with("time_s", "s", "time since the first sample of the record", of(|bin| bin.at))
+        .with("output", unit, "rms of the output", of(|bin| bin.output))
+        .with("before", unit, "rms error of the linear oscillator", of(|bin| bin.before))
+        .with("after", unit, "rms error of the extended model", of(|bin| bin.after))
+}
