@@ -10,20 +10,32 @@ pub(super) fn spectrum(told: &Told<'_>) -> Option<Panel> {
     let y = Axis::new("Density", before.unit).log();
     let x = Axis { label: "Frequency".to_owned(), ..Axis::frequency() };
     let mut panel = Panel::new("Spectrum of the residual", x, y);
-    for (name, series, stroke) in [
-        ("spectrum_noise", "noise level", Stroke::solid(Colour::Muted, 1.1)),
-        ("spectrum_output", "output", Stroke::solid(Colour::Muted, 1.1)),
-    ] {
-        if let Some(level) = told.curve("frequency", name) {
-            panel = panel.with(Mark::line(series, level.x, level.y, stroke));
-        }
-    }
     for (name, (series, stroke)) in ["spectrum_before", "spectrum_after"].into_iter().zip(strokes(1.0)) {
         if let Some(density) = told.curve("frequency", name).filter(|_| series == LINEAR || told.extended()) {
-            panel = panel.with(Mark::line(series, density.x, density.y, stroke));
+            panel = panel.with(Mark::line(series, density.x, &smoothed(density.y), stroke));
+        }
+    }
+    for (name, series) in [("spectrum_noise", "noise level"), ("spectrum_output", "output")] {
+        if let Some(level) = told.curve("frequency", name) {
+            panel = panel.with(Mark::line(series, level.x, level.y, Stroke::solid(Colour::Ink, 1.1)));
         }
     }
     Some(marks(told).into_iter().fold(panel, |panel, (at, label)| panel.with(Mark::at_x(at, &label))))
+}
+
+/// Most bins on either side that a drawn density is averaged over, and the bins of which that is one: a periodogram scatters by as much as it is, and
+/// no peak may vanish, so the average is narrower than a fiftieth of the frequency.
+const SIDE: usize = 6;
+const NARROW: usize = 50;
+
+fn smoothed(density: &[f64]) -> Vec<f64> {
+    (0..density.len())
+        .map(|k| {
+            let side = (k / NARROW).min(SIDE);
+            let near = density.get(k - side..(k + side + 1).min(density.len())).unwrap_or(&[]);
+            near.iter().sum::<f64>() / near.len() as f64
+        })
+        .collect()
 }
 
 /// Modes, combinations of the first two, and frequencies that a named cause has.
@@ -79,7 +91,9 @@ pub(super) fn detuning(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
     let titles = (0..y.len()).map(|k| format!("event {}: {:.0} ± {:.0} ppm", k + 1, y[k], y_error[k])).collect();
     let points =
         Points { series: LINEAR.to_owned(), x, y, y_error, titles, marker: Marker::Dot, colour: Colour::Vermillion };
-    let panel = Panel::new("Each event's first mode", axis, Axis::new("f₁ off by", "ppm"));
+    let ends = points.y.iter().zip(&points.y_error).flat_map(|(y, e)| [y - e, y + e]);
+    let (low, high) = padded(ends);
+    let panel = Panel::new("Each event's first mode", axis, Axis::new("f₁ off by", "ppm").limits(low, high));
     Some(panel.with(Mark::Points(points)).with(Mark::at_y(0.0, "")))
 }
 
@@ -87,7 +101,7 @@ pub(super) fn detuning(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
 pub(super) fn event_rms(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
     let before = told.curve("event", "event_rms_before")?;
     let (x, axis) = abscissa(told, before, by_amplitude)?;
-    let mut panel = Panel::new("Each event's residual", axis, Axis::new("Residual (rms)", before.unit));
+    let mut panel = Panel::new("Each event's residual", axis, Axis::new("Rms residual", before.unit));
     for (name, series, marker, colour) in [
         ("event_rms_before", LINEAR, Marker::Dot, Colour::Vermillion),
         ("event_rms_after", EXTENDED, Marker::Ring, Colour::Blue),
@@ -103,17 +117,26 @@ pub(super) fn event_rms(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
 fn abscissa(told: &Told<'_>, of: Curve<'_>, by_amplitude: bool) -> Option<(Vec<f64>, Axis)> {
     if by_amplitude {
         let amplitude = told.curve("event", "amplitude")?;
-        return Some((amplitude.y.to_vec(), Axis::new("Amplitude of the event", amplitude.unit)));
+        let (low, high) = padded(amplitude.y.iter().copied());
+        return Some((amplitude.y.to_vec(), Axis::new("Amplitude of the event", amplitude.unit).limits(low, high)));
     }
     let count = of.x.len() as f64;
     let axis = Axis::new("Event, in the archive's order", "1").limits(0.5, count + 0.5).whole();
     Some((of.x.iter().map(|k| k + 1.0).collect(), axis))
 }
 
+/// Limits with room for markers.
+fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let finite = values.filter(|value| value.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), value| (l.min(value), h.max(value)));
+    let room = 0.06 * (high - low);
+    (low - room, high + room)
+}
+
 /// The error by the size of the output.
 pub(super) fn by_size(told: &Told<'_>) -> Option<Panel> {
     let before = told.curve("output", "rms_before")?;
-    let y = Axis::new("Error (rms)", before.unit).log();
+    let y = Axis::new("Rms error", before.unit).log();
     let mut panel = Panel::new("Error by the output's size", Axis::new("Output", before.x_unit), y);
     for (name, (series, stroke)) in ["rms_before", "rms_after"].into_iter().zip(strokes(1.6)) {
         if let Some(curve) = told.curve("output", name).filter(|_| series == LINEAR || told.extended()) {
@@ -145,7 +168,7 @@ pub(super) fn parts(told: &Told<'_>) -> Vec<Panel> {
             colour: Colour::Muted,
             fits: false,
         };
-        let y = Axis::new("Error (rms)", unit).log();
+        let y = Axis::new("Rms error", unit).log();
         let mut panel = Panel::new(&format!("Part “{name}”"), Axis::new("Time", "s"), y).with(Mark::Band(muted));
         for (values, (series, stroke)) in [before, after].into_iter().zip(strokes(1.2)) {
             if series == LINEAR || told.extended() {

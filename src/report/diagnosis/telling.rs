@@ -39,7 +39,7 @@ impl View {
             }
             Self::Time => "what the linear model leaves after the release, and how long it lasts",
             Self::Events => {
-                "the frequency that each event asks for: a course over the archive is a drift, a mere scatter is none"
+                "the frequency that each event asks for: a course over the archive is a drift, a mere scatter is none; bars are one standard error"
             }
             Self::Amplitudes => "whether large events leave more than small ones",
             Self::Sizes => "where the output is large, or of one sign, the linear model errs more",
@@ -98,8 +98,8 @@ pub(super) fn figure(told: &Told<'_>) -> Option<Figure> {
     };
     let id = format!("diagnosis-{}-telling", told.slug());
     let mut figure = Figure::new(&id, "The picture that gave it away", &caption).row(Row::one(270.0, large));
-    for pair in small.chunks(2) {
-        figure = figure.row(Row { height: 170.0, panels: pair.to_vec() });
+    if !small.is_empty() {
+        figure = figure.row(Row { height: 170.0, panels: small });
     }
     Some(figure)
 }

@@ -16,9 +16,10 @@ fn page(run: &afmid_pipeline::RunResult) -> String {
 }
 
 /// The part of the page that tells the story: what follows shows every artifact anyway.
-fn section(page: &str) -> &str {
+fn section(page: &str) -> String {
     let (_, rest) = page.split_once("<section id=\"diagnosis\">").expect("the section");
-    rest.split_once("</section>").expect("its end").0
+    // the template escapes slashes, too
+    rest.split_once("</section>").expect("its end").0.replace("&#x2f;", "/")
 }
 
 #[test]

@@ -47,12 +47,13 @@ pub fn story(problem: &Problem<'_>, naming: &Naming) -> Option<Story> {
         common(&last.state, values).into_iter().map(|v| v * scale).collect()
     };
     let mean_before = mean(&before);
+    let (spectra, single) = mean_spectra(&last.state, &mean_before, &after, problem.cut.interval_s);
     Some(Story {
         measured: mean(&levelled(problem, last)),
-        spectra: mean_spectra(&last.state, &mean_before, &after, problem.cut.interval_s),
+        spectra,
         after: mean(&after),
         before: mean_before,
-        events: event_stories(problem, [first, last]),
+        events: event_stories(problem, [first, last], &single),
         tiles: matched(&naming.tiles),
     })
 }

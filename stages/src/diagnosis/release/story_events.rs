@@ -6,6 +6,7 @@ use super::joint::JointFit;
 use super::lever::{Lever, LeverMode};
 use super::problem::Problem;
 use super::residuals::residuals;
+use super::story_spectra::transform;
 use super::window::Cut;
 use crate::model::ringdown::EventParameters;
 use crate::model::ringdown::internals::signal;
@@ -23,7 +24,7 @@ pub struct EventStory {
     pub rms_after: f64,
     /// Relative distance of its first mode's frequency from the linear model's.
     pub frequency_shift: f64,
-    /// Standard error of that, from the event's own residual.
+    /// Standard error of that, from the events' noise at these frequencies.
     pub frequency_shift_std: f64,
 }
 
@@ -31,11 +32,12 @@ pub struct EventStory {
 const FREQUENCY_STEP: f64 = 1e-4;
 const ONSET_STEP_S: f64 = 1e-9;
 
-pub(super) fn event_stories(problem: &Problem<'_>, [first, last]: [&JointFit; 2]) -> Vec<EventStory> {
+/// Every event; `noise` is the density of one event's noise at the bins of its transform, V^2/Hz.
+pub(super) fn event_stories(problem: &Problem<'_>, [first, last]: [&JointFit; 2], noise: &[f64]) -> Vec<EventStory> {
     let [before, after] = [first, last].map(|fitted| residuals(problem, &fitted.state, &fitted.starts));
     let one = |event: usize| {
         let own = &first.state.events[event];
-        let (shift, std) = frequency_shift(&problem.cut, &first.state.lever, own, &before[event]);
+        let (shift, std) = frequency_shift(&problem.cut, &first.state.lever, own, &before[event], noise);
         EventStory {
             record: problem.windows[event].first.record,
             amplitude_v: own.amplitude,
@@ -51,9 +53,10 @@ pub(super) fn event_stories(problem: &Problem<'_>, [first, last]: [&JointFit; 2]
 /// Relative shift of the first mode's frequency that explains most of an event's residual, and its standard error.
 ///
 /// # Method
-/// One Gauss-Newton step in white noise; the event's own onset, amplitude, offset and slope are fitted along by taking their directions out first
-/// (Gram-Schmidt).
-fn frequency_shift(cut: &Cut, lever: &Lever, own: &EventParameters, residual: &[f64]) -> (f64, f64) {
+/// One Gauss-Newton step, unweighted; the event's own onset, amplitude, offset and slope are fitted along by taking their directions out first
+/// (Gram-Schmidt). The error holds the noise as it is at the frequencies that the step looks at, thermal motion of the mode included: its density
+/// is averaged over the energy of the direction's transform.
+fn frequency_shift(cut: &Cut, lever: &Lever, own: &EventParameters, residual: &[f64], noise: &[f64]) -> (f64, f64) {
     let (before, samples) = (cut.before, residual.len());
     let shape = |lever: &Lever, onset_s: f64| -> Vec<f64> {
         let plain = EventParameters { onset_s, offset: 0.0, slope: 0.0, ..*own };
@@ -81,10 +84,11 @@ fn frequency_shift(cut: &Cut, lever: &Lever, own: &EventParameters, residual: &[
     }
     let slope = without(quotient(detuned(1.0), detuned(-1.0), FREQUENCY_STEP), &others);
     let size = dot(&slope, &slope);
-    let residual = without(residual.to_vec(), &others);
-    let shift = dot(&residual, &slope) / size;
-    let left: f64 = residual.iter().zip(&slope).map(|(r, s)| (r - shift * s).powi(2)).sum();
-    (shift, (left / (samples.max(6) - 5) as f64 / size).sqrt())
+    let shift = dot(residual, &slope) / size;
+    let energy: Vec<f64> = transform(&slope).iter().map(|z| z.norm_sqr()).collect();
+    let density = dot(&energy, noise) / energy.iter().sum::<f64>();
+    // white noise of this density has the variance density / (2 dt) in each sample
+    (shift, (density / (2.0 * cut.interval_s) / size).sqrt())
 }
 
 /// A column less its parts along `others`, which are orthogonal.
@@ -131,6 +135,7 @@ mod tests {
             out.extend(signal(&lever.release(), own, cut.interval_s, cut.samples - cut.before));
             out
         };
+        let noise = vec![2.0 * (1.2e-3_f64).powi(2) * cut.interval_s; cut.samples / 2 + 1];
         let mut worst = 0.0_f64;
         for seed in 0..40 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -142,7 +147,7 @@ mod tests {
             let truth = signal_of(&lever(46.3e3 * shift.exp()), &moved);
             let residual: Vec<f64> =
                 truth.iter().zip(signal_of(&model, &own)).map(|(t, m)| t - m + 1.2e-3 * normal()).collect();
-            let (found, std) = frequency_shift(&cut, &model, &own, &residual);
+            let (found, std) = frequency_shift(&cut, &model, &own, &residual, &noise);
             // second order in a shift of 6e-4: the phase at the decay time moves by 0.03 rad, a thousandth of which is of higher order
             assert!((found - shift).abs() < 4.5 * std + 1e-3 * shift.abs(), "{seed}: {found} +- {std}, truth {shift}");
             worst = worst.max((found - shift).abs() / std);

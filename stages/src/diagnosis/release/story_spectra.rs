@@ -23,12 +23,17 @@ pub struct MeanSpectra {
 /// Bins on either side that the noise level is averaged over: it is smooth but near resonances, which are as wide.
 const SIDE: usize = 4;
 
-/// Spectra of the mean residual `before`, and of the residuals `after` of all events with the noise of their mean.
+/// Spectra of the mean residual `before`, and of the residuals `after` of all events with the noise of their mean; beside them the noise of one event, bin by bin.
 ///
 /// # Method
 /// Periodograms without a taper, since what decays from the release on has no edge at its end. With unit weights w of the events and transforms X,
 /// `sum |X|^2 - |sum w X|^2` is n - 1 times the noise of `sum w X`; the mean's is an n-th of that.
-pub(super) fn mean_spectra(state: &State, before: &[f64], after: &[Vec<f64>], interval_s: f64) -> MeanSpectra {
+pub(super) fn mean_spectra(
+    state: &State,
+    before: &[f64],
+    after: &[Vec<f64>],
+    interval_s: f64,
+) -> (MeanSpectra, Vec<f64>) {
     let count = after.len();
     let transforms: Vec<Vec<Complex64>> = after.par_iter().map(|values| transform(values)).collect();
     let scale = 2.0 * interval_s / before.len().max(1) as f64;
@@ -38,15 +43,16 @@ pub(super) fn mean_spectra(state: &State, before: &[f64], after: &[Vec<f64>], in
     let freedom = (count.saturating_sub(1) * count).max(1) as f64;
     let level: Vec<f64> = sum.iter().enumerate().map(|(k, common)| (all(k) - common).max(0.0) / freedom).collect();
     let resolution = 1.0 / (before.len().max(1) as f64 * interval_s);
-    MeanSpectra {
+    let spectra = MeanSpectra {
         frequency_hz: (0..sum.len()).map(|k| k as f64 * resolution).collect(),
         before: power(before),
         after: sum.iter().map(|p| p / count.max(1) as f64).collect(),
         noise: smoothed(&level),
-    }
+    };
+    (spectra, level.iter().map(|v| v * count as f64).collect())
 }
 
-fn transform(values: &[f64]) -> Vec<Complex64> {
+pub(super) fn transform(values: &[f64]) -> Vec<Complex64> {
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(values.len());
     let mut out = fft.make_output_vec();
     match fft.process(&mut values.to_vec(), &mut out) {
