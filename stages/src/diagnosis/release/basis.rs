@@ -145,9 +145,10 @@ impl Basis {
         for e in fast {
             let step = (e.pole.re * self.cut.interval_s).exp();
             let mut value = own.amplitude * e.residue.re * (-e.pole.re * own.onset_s).exp();
-            for k in 0..self.early {
-                out[0][k] += value;
-                out[1][k] -= e.pole.re * value;
+            let [values, slopes] = &mut out;
+            for (sum, slope) in values.iter_mut().zip(slopes) {
+                *sum += value;
+                *slope -= e.pole.re * value;
                 value *= step;
             }
         }

@@ -46,6 +46,13 @@ pub(super) struct Products {
     right: Vec<f64>,
 }
 
+/// Where a column has its place in the basis and its signal (crossed ones first), with the factor of that.
+#[derive(Debug, Clone, Copy)]
+struct Column {
+    place: Option<usize>,
+    signal: Option<(usize, f64)>,
+}
+
 impl Event<'_> {
     /// # Method
     /// A column is a place in the basis, a signal, or both: what lies in the basis is multiplied there, and only signals at full length.
@@ -56,16 +63,15 @@ impl Event<'_> {
             (0..signals.count()).for_each(|i| full.push(signals.get(i)));
         }
         let (bent, added) = (crossed.signals.count(), full.count());
-        // where each column has its place and its signal (crossed ones first), and the factor of that
-        let mut columns: Vec<(Option<usize>, Option<(usize, f64)>)> = Vec::new();
+        let mut columns: Vec<Column> = Vec::new();
         let signal = |i: usize, factor: f64| (i < bent).then_some((i, factor));
         if hold == Hold::Nothing {
-            columns.extend((0..lever).map(|j| (Some(j), signal(j, self.scale))));
+            columns.extend((0..lever).map(|j| Column { place: Some(j), signal: signal(j, self.scale) }));
         }
-        columns.extend((0..added).map(|i| (None, Some((bent + i, 1.0)))));
-        columns.push((Some(lever), signal(lever, 1.0)));
-        columns.push((Some(lever + 1), signal(lever + 1, self.scale)));
-        columns.extend([(Some(lever + 2), None), (Some(lever + 3), None)]);
+        columns.extend((0..added).map(|i| Column { place: None, signal: Some((bent + i, 1.0)) }));
+        columns.push(Column { place: Some(lever), signal: signal(lever, 1.0) });
+        columns.push(Column { place: Some(lever + 1), signal: signal(lever + 1, self.scale) });
+        columns.extend([lever + 2, lever + 3].map(|place| Column { place: Some(place), signal: None }));
 
         let matrix = full.matrix();
         let own_heads = basis.project(matrix);
@@ -82,7 +88,7 @@ impl Event<'_> {
         let places = product(self.place.slopes.transpose(), self.place.slopes.as_ref());
         let mixed = product(self.place.slopes.transpose(), heads.as_ref());
         let gram = Mat::from_fn(columns.len(), columns.len(), |i, j| {
-            let ((p, f), (q, g)) = (columns[i], columns[j]);
+            let (Column { place: p, signal: f }, Column { place: q, signal: g }) = (columns[i], columns[j]);
             let mut sum = 0.0;
             if let (Some(p), Some(q)) = (p, q) {
                 sum += places[(p, q)];
@@ -107,7 +113,7 @@ impl Event<'_> {
         let modelled = product(heads.transpose(), value.as_ref());
         let right = columns
             .iter()
-            .map(|(place, signal)| {
+            .map(|Column { place, signal }| {
                 let within = place.map_or(0.0, |p| by_place[(p, 0)]);
                 let beyond = signal.map_or(0.0, |(f, factor)| {
                     let all = if f < bent { by_crossed[(f, 0)] } else { by_full[(f - bent, 0)] };
