@@ -1,14 +1,21 @@
 //! What the simulation gets wrong: the verdict of a diagnosis, and the diagnosis of a measured input and output.
 
 mod example;
+mod lever_model;
 pub mod records;
 pub mod release;
 mod release_example;
+mod release_model;
 mod release_stage;
 pub mod system;
 mod system_stage;
 mod verdict;
 
+pub(crate) use lever_model::MODEL;
+pub use lever_model::{
+    Estimated, LEVER_MODEL, LeverModel, LinearPart, ModelAmplitude, ModelCause, ModelMode, ModelNoise, ModelThermal,
+    ModelWander,
+};
 pub use release_stage::ReleaseDiagnose;
 pub use system_stage::{JudgedPart, SystemDiagnose};
 pub use verdict::{DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};

@@ -7,10 +7,12 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::lever_model::LEVER_MODEL;
 use super::records::{
     CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, judge, summarise,
 };
 use super::release::{Cut, EventWindow, Naming, NamingOptions, Problem, answer, common, name_causes, residuals, start};
+use super::release_model::lever_model;
 use crate::causes::{CATALOGUE, Instant, find};
 use crate::events::EventKind;
 use crate::model::ModeNumber;
@@ -25,7 +27,8 @@ use crate::model::ModeNumber;
 /// scores, the strongest fitted in full, judged on held-out halves and against the best of another class, greedily; at last a test
 /// of the residual common to all events, which a cause outside the catalogue leaves.
 /// # Shapes
-/// `summary`: the answer as JSON; `residuals` over the time of an event: common to all events, before and after the extension.
+/// `summary`: the answer as JSON; `residuals` over the time of an event: common to all events, before and after the extension;
+/// `model`: lever, detector, noise and causes with all their parameters, for later configs (`diagnosis.replay`, `simulate.model`, `force.reconstruction`).
 /// # Units
 /// V, Hz, s; strengths relative to volts of static deflection.
 /// # Accuracy
@@ -80,6 +83,9 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict: ca
 const RESIDUALS: Port<Array> =
     Port::new("residuals", "diagnosis-residuals", "residual common to all events, before and after the extension");
 
+const MODEL: Port<Document> =
+    Port::new("model", LEVER_MODEL, "lever, detector, noise and named causes: what later configs simulate with");
+
 /// Room on either side of a window, within which its onset may move.
 const MARGIN: usize = 64;
 /// Samples of free stretches that the noise is estimated from: 24 MB.
@@ -91,10 +97,10 @@ const CHANNEL_SHARE: f64 = 0.5 / CHANNELS as f64;
 impl Stage for ReleaseDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.release",
-        version: 2,
+        version: 3,
         summary: "names what a linear lever and detector get wrong in snap-off events",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
-        outputs: &[SUMMARY.spec(), RESIDUALS.spec()],
+        outputs: &[SUMMARY.spec(), RESIDUALS.spec(), MODEL.spec()],
         caching: Caching::Stored,
         seeded: true,
         source: "C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50",
@@ -171,7 +177,12 @@ impl Stage for ReleaseDiagnose {
             name_causes(&problem, begin.state, begin.starts, CATALOGUE, &options).map_err(StageError::from_error)?;
         let signs = self.record_signs(&summaries, resonances);
         let found = answer(&problem, &naming, &signs, self.false_alarm_rate);
-        Ok(Ports::new().with(&SUMMARY, Document::new(&found)?).with(&RESIDUALS, residual_array(&problem, &naming)))
+        let model = lever_model(&problem, &naming, &found, recording.records.len())
+            .ok_or_else(|| StageError::new("the diagnosis ended without any fit"))?;
+        Ok(Ports::new()
+            .with(&SUMMARY, Document::new(&found)?)
+            .with(&RESIDUALS, residual_array(&problem, &naming))
+            .with(&MODEL, Document::new(&model)?))
     }
 
     fn examples() -> Vec<Example> {
