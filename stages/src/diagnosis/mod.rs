@@ -7,6 +7,11 @@ pub mod release;
 mod release_example;
 mod release_model;
 mod release_stage;
+pub mod replay;
+mod replay_example;
+mod replay_stage;
+#[cfg(test)]
+mod replay_tests;
 pub mod system;
 mod system_stage;
 mod verdict;
@@ -17,13 +22,16 @@ pub use lever_model::{
     ModelWander,
 };
 pub use release_stage::ReleaseDiagnose;
+pub(crate) use replay_example::model as example_model;
+pub use replay_stage::ReleaseReplay;
 pub use system_stage::{JudgedPart, SystemDiagnose};
 pub use verdict::{DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};
 
 use afmid_pipeline::Entry;
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] = &[Entry::of::<ReleaseDiagnose>(), Entry::of::<SystemDiagnose>()];
+pub const STAGES: &[Entry] = 
+    &[Entry::of::<ReleaseDiagnose>(), Entry::of::<ReleaseReplay>(), Entry::of::<SystemDiagnose>()];
 
 #[cfg(test)]
 #[test]

@@ -191,7 +191,7 @@ impl Stage for ReleaseDiagnose {
 }
 
 /// Record and onset (samples) of each event.
-fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, StageError> {
+pub(super) fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, StageError> {
     let Values::Integer(records) = &ensemble.variable("record")?.values else {
         return Err(StageError::new("variable `record`: wanted whole numbers"));
     };
