@@ -201,3 +201,40 @@ impl LeverModel {
 
 /// Correlation times within a window from which on wander is no line: three half waves.
 const FAST: f64 = 3.0 * std::f64::consts::PI;
+
+#[cfg(test)]
+impl LeverModel {
+    /// The truth of a simulation as a diagnosis would hand it on.
+    pub(crate) fn of(afm: &crate::simulate::Afm) -> Self {
+        let known = |value: f64| Estimated { value, std: None };
+        let shares = afm.quality_factors.iter().zip(&afm.detector_shares);
+        let modes = afm.frequencies_hz.iter().zip(shares).map(|(f, (q, share))| ModelMode {
+            frequency_hz: known(*f),
+            quality_factor: known(*q),
+            share: known(*share),
+        });
+        let part = LinearPart {
+            modes: modes.collect(),
+            detector_poles_hz: afm.detector_poles_hz.iter().map(|pole| known(*pole)).collect(),
+        };
+        let causes = afm.hidden.iter().map(|entry| {
+            let (cause, values) = entry.resolve().expect("a cause");
+            let names = cause.about().parameters.iter().map(|p| p.name.to_owned());
+            ModelCause {
+                id: cause.about().id.to_owned(),
+                parameters: names.zip(values.into_iter().map(known)).collect(),
+                assumed: Vec::new(),
+            }
+        });
+        let mean_v = afm.adhesion_n / afm.stiffness_n_per_m * afm.sensitivity_v_per_m;
+        Self {
+            sample_rate_hz: afm.sample_rate_hz,
+            records: afm.records,
+            baseline: part.clone(),
+            extended: part,
+            causes: causes.collect(),
+            noise: ModelNoise { white_v2: afm.white_v.powi(2), thermal: Vec::new(), wander: Vec::new() },
+            amplitude: ModelAmplitude { mean_v, scatter_v: afm.adhesion_scatter * mean_v, events: afm.records },
+        }
+    }
+}

@@ -6,9 +6,11 @@ use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Axis, Context, Document, Port, Ports, Recording, Stage};
 use serde_json::Value;
 
+use super::release::{Cut, EventWindow};
+use super::replay::Replayer;
 use super::{LeverModel, MODEL, ReleaseDiagnose, ReleaseReplay};
-use crate::causes::find;
-use crate::simulate::{Afm, AfmOfModel, Hidden};
+use crate::causes::{Instant, find};
+use crate::simulate::{Afm, AfmOfModel, Cut as SimulatedCut, Hidden, Place};
 
 const RECORDS: Port<Recording> = Port::new("records", "records", "records");
 const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "events");
@@ -81,10 +83,10 @@ fn a_hidden_bend_is_found_simulated_again_and_found_again() {
     let first = model.causes[0].parameters["a2"];
     // single events: 80,000 samples, 0.25 %; thermal and 1/f noise of ten windows scatter by some per cent of their small part
     assert!((ratio(&replay, "after", "over_noise") - 1.0).abs() < 0.04, "{replay:#}");
-    assert!(ratio(&replay, "before", "over_noise") > 1.3, "{replay:#}");
-    // the mean of ten: what is common to them beyond noise is less than a third of it
-    assert!(ratio(&replay, "after", "mean_over_noise") < 1.15, "{replay:#}");
-    assert!(ratio(&replay, "before", "mean_over_noise") > 2.5, "{replay:#}");
+    assert!(ratio(&replay, "before", "over_noise") > 1.1, "{replay:#}");
+    // 8000 samples of the mean: 0.8 %, thermal and 1/f parts more
+    assert!((ratio(&replay, "after", "mean_over_noise") - 1.0).abs() < 0.08, "{replay:#}");
+    assert!(ratio(&replay, "before", "mean_over_noise") > 1.8, "{replay:#}");
 
     let again = AfmOfModel { out: PathBuf::from("again"), seed: Some(72), drift_v: 0.0, ..AfmOfModel::default() };
     let ports = Ports::new().with(&MODEL, Document::new(&model).expect("a document"));
@@ -97,4 +99,32 @@ fn a_hidden_bend_is_found_simulated_again_and_found_again() {
     // three standard errors of the second archive's estimate: the first one is its truth
     assert!((second.value - first.value).abs() < 3.0 * second.std.expect("an error"), "{first:?} {second:?}");
     assert!((ratio(&replay, "after", "over_noise") - 1.0).abs() < 0.04, "{replay:#}");
+}
+
+/// A release torn off on the moving ramp, without noise, against the same one let go: instant and load are fitted, lever and cause are the truth.
+#[test]
+fn a_release_that_tears_off_by_itself_is_simulated_again() {
+    let place = Place { record: 0, records: 2, samples: 200_000, margin_samples: 0, seed: 1 };
+    let at = Instant { record: 0, place: 0.0, time_s: 0.0, piezo_m: 0.0 };
+    let cut = Cut { before: 16, samples: 4000, interval_s: 1.0 / RATE_HZ };
+    for (id, values) in [
+        ("quadratic-detector", vec![0.02]),
+        ("tether-tail", vec![0.02, 8e-5]),
+        ("duffing", vec![0.001]),
+        ("finite-rupture", vec![1.28e-6]),
+        ("photodiode-tail", vec![0.02, 8e-5]),
+    ] {
+        let hidden = vec![Hidden::new(find(id).expect("a cause").about(), &values)];
+        let afm = Afm { ramp_hz: 2.0, hidden, ..Afm::default() };
+        let model = LeverModel::of(&afm);
+        let effects = model.effects().expect("effects");
+        let wide = SimulatedCut { before: 100, samples: 4400 };
+        let values = afm.microscope().quiet_release(330e-9, &effects, place, wide).expect("a release");
+        let event = EventWindow { values, onset: 100.0, first: at };
+        let before = Replayer::baseline(&model, cut).replay(&event, &[]).expect("a fit");
+        let after = Replayer::extended(&model, cut).expect("a model").replay(&event, &[]).expect("a fit");
+        println!("{id}: {:.2e} before, {:.2e} after", before.rms_v, after.rms_v);
+        // the base moves by 0.8 um/s: 6 mV of 0.87 V while the lever rings, and 1.5 % of what a map adds to it
+        assert!(after.rms_v < 0.05 * before.rms_v, "{id}: {:.2e} of {:.2e}", after.rms_v, before.rms_v);
+    }
 }
