@@ -30,7 +30,7 @@ pub use verdict::{DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Va
 use afmid_pipeline::Entry;
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] = 
+pub const STAGES: &[Entry] =
     &[Entry::of::<ReleaseDiagnose>(), Entry::of::<ReleaseReplay>(), Entry::of::<SystemDiagnose>()];
 
 #[cfg(test)]

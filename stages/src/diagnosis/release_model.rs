@@ -44,7 +44,9 @@ fn linear(fitted: &JointFit) -> LinearPart {
         let others = 2 * modes..3 * modes - 1;
         let std = match m {
             // one less the others
-            0 => finite(others.clone().map(|i| others.clone().map(|j| variance(i, j)).sum::<f64>()).sum::<f64>().sqrt()),
+            0 => {
+                finite(others.clone().map(|i| others.clone().map(|j| variance(i, j)).sum::<f64>()).sum::<f64>().sqrt())
+            }
             m => std(2 * modes + m - 1),
         };
         Estimated { value, std }
@@ -79,8 +81,7 @@ fn cause(named: &NamedCause) -> Option<ModelCause> {
         };
         (known.name.to_owned(), estimated)
     };
-    let parameters: BTreeMap<String, Estimated> =
-        find(&named.id)?.about().parameters.iter().map(parameter).collect();
+    let parameters: BTreeMap<String, Estimated> = find(&named.id)?.about().parameters.iter().map(parameter).collect();
     Some(ModelCause { id: named.id.clone(), parameters, assumed })
 }
 

@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 
 use afmid_pipeline::{Document, Example, Port};
 
-use super::lever_model::{
-    Estimated, LeverModel, LinearPart, MODEL, ModelAmplitude, ModelCause, ModelMode, ModelNoise,
-};
+use super::lever_model::{Estimated, LeverModel, LinearPart, MODEL, ModelAmplitude, ModelCause, ModelMode, ModelNoise};
 use super::release_example::{BEND, NOISE_V, RATE_HZ, RECORDS, inputs, lever};
 
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "what is left");

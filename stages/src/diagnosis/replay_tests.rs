@@ -48,8 +48,7 @@ fn closed(ports: Ports, base: &Path) -> (Value, Value, LeverModel) {
     let found = stage.run(&ports, &context(base)).expect("a diagnosis");
     let model = found.get(&MODEL).expect("a model").clone();
     let read = LeverModel::read(&model).expect("a valid model");
-    let replayed =
-        ReleaseReplay::default().run(&ports.with(&MODEL, model), &context(base)).expect("a replay");
+    let replayed = ReleaseReplay::default().run(&ports.with(&MODEL, model), &context(base)).expect("a replay");
     let summary = |ports: &Ports| ports.get(&SUMMARY).expect("a summary").0.clone();
     (summary(&found), summary(&replayed), read)
 }

@@ -96,8 +96,11 @@ pub(super) const ENSEMBLE: Port<Array> =
     Port::new("ensemble", "ensemble", "aligned events: signal over event and time");
 pub(super) const MODEL: Port<StateSpace> =
     Port::optional("model", "model", "the model, from force to response; this or `extension`");
-const EXTENSION: Port<Document> =
-    Port::optional("extension", LEVER_MODEL, "the extended model of a diagnosis in its place: detector maps are inverted");
+const EXTENSION: Port<Document> = Port::optional(
+    "extension",
+    LEVER_MODEL,
+    "the extended model of a diagnosis in its place: detector maps are inverted",
+);
 const PAIR: Port<Array> =
     Port::optional("pair", "pair", "the pair that the model was fitted to: its t0, count and newtons");
 pub(super) const FORCE: Port<Array> = Port::new("force", "force", "tip force and its error band over event and time");
