@@ -77,7 +77,7 @@ fn inverse(map: impl Fn(f64) -> f64, value: f64) -> Option<f64> {
         }
         let h = 1e-6 * scale;
         let slope = (map(at + h) - map(at - h)) / (2.0 * h);
-        if !(slope > 0.0) {
+        if slope.is_nan() || slope <= 0.0 {
             return None;
         }
         at -= miss / slope;
