@@ -124,3 +124,19 @@ fn a_cause_that_may_not_be_used_is_not_explained_away() {
     assert_eq!(found["causes"].as_array().map(Vec::len), Some(0));
     assert!(!found["evidence"].as_array().expect("evidence").is_empty());
 }
+
+#[test]
+fn measured_events_are_simulated_again_down_to_the_noise() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let hidden = "[{cause='quadratic-detector',a2=0.012}]";
+    let folder = archive(scratch.path(), "hidden-quadratic-detector", hidden);
+    let (here, out) = (scratch.path(), format!("archive.out='{}'", scratch.path().join("again").display()));
+    let config = config("resimulate.toml");
+    afmid(here, &["run", &config, "--set", &files(&folder), "--set", &out, "-o", "r.h5", "--cache", "cache"]);
+    let replay = shown(here, "r.h5", "replay");
+    let mean = |part: &str| number(&replay, &format!("/{part}/mean_over_noise"));
+    // ten events, 8000 samples: 0.8 %, thermal and 1/f parts more; before: twice what noise leaves
+    assert!((mean("after") - 1.0).abs() < 0.08 && mean("before") > 1.8, "{replay:#}");
+    let again = shown(here, "r.h5", "archive");
+    assert_eq!(again["events"]["snap_off"], again["records"]);
+}

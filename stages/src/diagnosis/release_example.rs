@@ -8,9 +8,11 @@ use crate::io::{memory_channel, memory_record};
 
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict");
 /// Weight of the square of the signal, 1/V.
-const BEND: f64 = 0.02;
-const RATE_HZ: f64 = 5e6;
-const RECORDS: usize = 8;
+pub(super) const BEND: f64 = 0.02;
+pub(super) const RATE_HZ: f64 = 5e6;
+pub(super) const RECORDS: usize = 8;
+/// White noise, V.
+pub(super) const NOISE_V: f64 = 1.2e-3;
 /// First sample after the release.
 const RELEASE: usize = 6000;
 const SAMPLES: usize = 60_000;
@@ -36,17 +38,22 @@ pub(super) fn examples() -> Vec<Example> {
     }]
 }
 
-fn inputs() -> Ports {
+/// The lever that is released.
+pub(super) fn lever() -> Lever {
     let mode = |frequency_hz: f64, quality_factor: f64, share: f64| LeverMode {
         omega: std::f64::consts::TAU * frequency_hz,
         quality_factor,
         share,
     };
-    let lever = Lever {
+    Lever {
         modes: vec![mode(46.3e3, 40.8, 0.92), mode(247.4e3, 193.2, 0.08)],
         poles: vec![std::f64::consts::TAU * 1.5e6],
-    };
-    let exponentials = lever.release();
+    }
+}
+
+/// Eight records with a release each, and their ensemble.
+pub(super) fn inputs() -> Ports {
+    let exponentials = lever().release();
     let mut state = 4711_u32;
     // a linear congruential generator (Numerical Recipes); twelve of them make a normal deviate
     let mut draw = move || {
@@ -68,7 +75,7 @@ fn inputs() -> Ports {
                     }
                 };
                 let noise: f64 = (0..12).map(|_| draw()).sum::<f64>() - 6.0;
-                s + BEND * s * s + 1.2e-3 * noise
+                s + BEND * s * s + NOISE_V * noise
             })
             .collect();
         let channel = memory_channel("deflection", Raw::Float64(values), 1.0);

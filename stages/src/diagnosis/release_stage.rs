@@ -7,10 +7,12 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::lever_model::LEVER_MODEL;
 use super::records::{
     CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, judge, summarise,
 };
 use super::release::{Cut, EventWindow, NamingOptions, Problem, answer, name_causes, start, story};
+use super::release_model::lever_model;
 use super::release_story::{residual_array, tile_table};
 use crate::causes::{CATALOGUE, Instant, find};
 use crate::events::EventKind;
@@ -27,7 +29,7 @@ use crate::model::ModeNumber;
 /// of the residual common to all events, which a cause outside the catalogue leaves.
 /// # Shapes
 /// `summary`: the answer as JSON; `residuals` over time, frequency and event: mean event, models, residuals, their spectra, each event's numbers; `tiles`:
-/// the residual's energy by time and frequency.
+/// the residual's energy by time and frequency; `model`: lever, detector, noise and causes with all their parameters, for later configs (`diagnosis.replay`, `simulate.model`, `force.reconstruction`).
 /// # Units
 /// V, Hz, s; strengths relative to volts of static deflection.
 /// # Accuracy
@@ -87,6 +89,9 @@ const RESIDUALS: Port<Array> = Port::new(
 const TILES: Port<Table> =
     Port::new("tiles", "diagnosis-tiles", "energy of the residual common to all events over time and frequency");
 
+const MODEL: Port<Document> =
+    Port::new("model", LEVER_MODEL, "lever, detector, noise and named causes: what later configs simulate with");
+
 /// Room on either side of a window, within which its onset may move.
 const MARGIN: usize = 64;
 /// Samples of free stretches that the noise is estimated from: 24 MB.
@@ -101,7 +106,7 @@ impl Stage for ReleaseDiagnose {
         version: 3,
         summary: "names what a linear lever and detector get wrong in snap-off events",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
-        outputs: &[SUMMARY.spec(), RESIDUALS.spec(), TILES.spec()],
+        outputs: &[SUMMARY.spec(), RESIDUALS.spec(), TILES.spec(), MODEL.spec()],
         caching: Caching::Stored,
         seeded: true,
         source: "C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50",
@@ -179,10 +184,13 @@ impl Stage for ReleaseDiagnose {
         let signs = self.record_signs(&summaries, resonances);
         let found = answer(&problem, &naming, &signs, self.false_alarm_rate);
         let story = story(&problem, &naming).ok_or_else(|| StageError::new("the search ended without a fit"))?;
+        let model = lever_model(&problem, &naming, &found, recording.records.len())
+            .ok_or_else(|| StageError::new("the diagnosis ended without any fit"))?;
         Ok(Ports::new()
             .with(&SUMMARY, Document::new(&found)?)
             .with(&RESIDUALS, residual_array(&story, &cut))
-            .with(&TILES, tile_table(&story)))
+            .with(&TILES, tile_table(&story))
+            .with(&MODEL, Document::new(&model)?))
     }
 
     fn examples() -> Vec<Example> {
@@ -191,7 +199,7 @@ impl Stage for ReleaseDiagnose {
 }
 
 /// Record and onset (samples) of each event.
-fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, StageError> {
+pub(super) fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, StageError> {
     let Values::Integer(records) = &ensemble.variable("record")?.values else {
         return Err(StageError::new("variable `record`: wanted whole numbers"));
     };

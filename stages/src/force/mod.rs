@@ -8,6 +8,7 @@ use afmid_pipeline::Entry;
 
 mod error;
 mod example;
+mod extension;
 mod extrapolate;
 mod extrapolation;
 mod line;

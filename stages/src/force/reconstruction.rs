@@ -8,11 +8,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::extension::Extension;
 use super::line::correlation_inflation;
 use super::{
     ForcePrior, IdentifiedModel, Reconstruction as Kernel, ReconstructionSettings, Rise, Weighting, band_inflation,
     fit_line, reconstruct, rise,
 };
+use crate::diagnosis::{LEVER_MODEL, LeverModel};
 use crate::ensemble::{Rows, onset_sample};
 
 /// Tip force against time, from single events and an identified model, with its error band.
@@ -33,8 +35,10 @@ use crate::ensemble::{Rows, onset_sample};
 /// shift of the whole trace by less than t0's ambiguity), the force's course within a sample, and, while the tip is held, the contact's own thermal force: that is no
 /// walk, and what is faster than the smoother's memory is averaged. A step comes out no sharper than the detector lets it: `rise_time_s` of a sudden release is
 /// that limit. Cost: 30 ms per pass of the filter over 8192 samples and 12 states, some 25 passes.
+/// With `extension`, the model is the diagnosed lever behind its detector, and maps of the detector are inverted on the event first (but for `(f / pole)^2` of what
+/// they add); linear causes are in the model, those in the force are what is found; others are named in a warning and stay.
 /// # Errors
-/// A model of several inputs or outputs, another sample rate, an event number that is none, too few samples.
+/// Neither or both of `model` and `extension`, a model of several inputs or outputs, another sample rate, an event number that is none, too few samples.
 /// # Source
 /// H. Rauch, F. Tung, C. Striebel, AIAA J. 3 (1965) 1445; P. Park, T. Kailath, IEEE Trans. Autom. Control 40 (1995) 727; Stark et al. 2005, Conclusion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -90,7 +94,13 @@ impl Default for Reconstruction {
 
 pub(super) const ENSEMBLE: Port<Array> =
     Port::new("ensemble", "ensemble", "aligned events: signal over event and time");
-pub(super) const MODEL: Port<StateSpace> = Port::new("model", "model", "the model, from force to response");
+pub(super) const MODEL: Port<StateSpace> =
+    Port::optional("model", "model", "the model, from force to response; this or `extension`");
+const EXTENSION: Port<Document> = Port::optional(
+    "extension",
+    LEVER_MODEL,
+    "the extended model of a diagnosis in its place: detector maps are inverted",
+);
 const PAIR: Port<Array> =
     Port::optional("pair", "pair", "the pair that the model was fitted to: its t0, count and newtons");
 pub(super) const FORCE: Port<Array> = Port::new("force", "force", "tip force and its error band over event and time");
@@ -101,9 +111,9 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Reconstruction {
     const SPEC: Spec = Spec {
         name: "force.reconstruction",
-        version: 1,
+        version: 2,
         summary: "turns single events into tip force against time with an error band",
-        inputs: &[ENSEMBLE.spec(), MODEL.spec(), PAIR.spec()],
+        inputs: &[ENSEMBLE.spec(), MODEL.spec(), PAIR.spec(), EXTENSION.spec()],
         outputs: &[FORCE.spec(), EVENTS.spec(), SUMMARY.spec()],
         caching: Caching::Stored,
         seeded: false,
@@ -121,7 +131,21 @@ impl Stage for Reconstruction {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let (ensemble, model, pair) = (inputs.get(&ENSEMBLE)?, inputs.get(&MODEL)?, inputs.find(&PAIR)?);
+        let (ensemble, pair) = (inputs.get(&ENSEMBLE)?, inputs.find(&PAIR)?);
+        let extension = match inputs.find(&EXTENSION)? {
+            Some(document) => Some(Extension::new(&LeverModel::read(document)?)?),
+            None => None,
+        };
+        let model = match (inputs.find(&MODEL)?, &extension) {
+            (Some(model), None) => model,
+            (None, Some(extension)) => &extension.model,
+            (found, _) => {
+                let both = if found.is_some() { "both are" } else { "neither is" };
+                return Err(StageError::new(format!("wanted `model` or `extension`, {both} wired"))
+                    .help("`model` comes from an identification, `extension` from `diagnosis.release`"));
+            }
+        };
+        extension.iter().flat_map(|extension| &extension.remaining).for_each(|left| cx.warn(left.clone()));
         let samples = ensemble.axis("time")?.values.len();
         let rows = Rows::new(ensemble.real("signal")?, samples).map_err(StageError::from_error)?;
         let rate = ensemble.number("sample_rate_hz")?;
@@ -131,13 +155,16 @@ impl Stage for Reconstruction {
             None => onset_sample(ensemble)?,
         };
         let chosen = self.chosen(rows.count())?;
-        let settings = self.settings(model, pair, event, samples, rate)?;
+        let mut settings = self.settings(model, pair, extension.is_some(), event, samples, rate)?;
+        if let (Some(extension), NoiseSource::Model) = (&extension, self.noise) {
+            settings.noise_variance = Some(extension.model.innovation_variance);
+        }
         let free = self.free_stretch(ensemble, event, samples, rate)?;
         cx.expect(chosen.len());
         let found: Vec<Reconstructed> = chosen
             .par_iter()
             .map(|&number| {
-                let one = self.one(identified, rows.row(number), number, &settings, free.clone());
+                let one = self.one(identified, extension.as_ref(), rows.row(number), number, &settings, free.clone());
                 cx.tick();
                 one
             })
@@ -179,6 +206,7 @@ impl Reconstruction {
         &self,
         model: &StateSpace,
         pair: Option<&Array>,
+        extended: bool,
         event: usize,
         samples: usize,
         rate: f64,
@@ -188,6 +216,7 @@ impl Reconstruction {
             if before + after == 0 { 0..0 } else { event.saturating_sub(before)..(event + after).min(samples) };
         let noise_variance = match self.noise {
             NoiseSource::Estimated => None,
+            NoiseSource::Model if extended => None,
             NoiseSource::Model => {
                 let pair = pair.ok_or_else(|| {
                     StageError::new(
@@ -228,13 +257,17 @@ impl Reconstruction {
     fn one(
         &self,
         model: IdentifiedModel<'_>,
+        extension: Option<&Extension>,
         row: &[f64],
         number: usize,
         settings: &ReconstructionSettings,
         free: std::ops::Range<usize>,
     ) -> Result<Reconstructed, StageError> {
         let line = fit_line(row, free.start, free.end, Weighting::Hann, self.sloped_line);
-        let y: Vec<f64> = row.iter().enumerate().map(|(k, y)| y - line.at(k as f64)).collect();
+        let mut y: Vec<f64> = row.iter().enumerate().map(|(k, y)| y - line.at(k as f64)).collect();
+        if let Some(extension) = extension {
+            extension.straighten(&mut y).map_err(|error| StageError::new(format!("event {number}: {error}")))?;
+        }
         let found =
             reconstruct(model, &y, settings).map_err(|error| StageError::new(format!("event {number}: {error}")))?;
         // the line is of the response's noise: its correlation enlarges the error of a mean
@@ -266,7 +299,7 @@ fn line_inflation(free: &[f64], noise_variance: f64) -> f64 {
 }
 
 /// The model's matrices. Errors: several inputs or outputs, another rate.
-fn identified(model: &StateSpace, rate: f64) -> Result<IdentifiedModel<'_>, StageError> {
+pub(super) fn identified(model: &StateSpace, rate: f64) -> Result<IdentifiedModel<'_>, StageError> {
     if model.b.columns != 1 || model.c.rows != 1 {
         return Err(StageError::new(format!(
             "the model has {} inputs and {} outputs, wanted one of each",

@@ -108,7 +108,7 @@ pub(super) struct Hidden<'a> {
 }
 
 impl<'a> Hidden<'a> {
-    fn new(effects: &'a Effects, lever: &ModalLever, volts_per_m: f64, interval_s: f64) -> Self {
+    pub(super) fn new(effects: &'a Effects, lever: &ModalLever, volts_per_m: f64, interval_s: f64) -> Self {
         let omega: Vec<f64> = lever.modes.iter().map(|mode| TAU * mode.frequency_hz).collect();
         let fastest = omega.iter().copied().fold(0.0, f64::max);
         let mut longest_s = interval_s;
@@ -229,6 +229,23 @@ impl Run<'_> {
         }
     }
 
+    /// Advances to `end_s` within a sample, where nothing changes on the way.
+    pub(super) fn advance_within(&mut self, hidden: &mut Option<Hidden>, end_s: f64, rng: &mut ChaCha8Rng) {
+        let span_s = end_s - self.time_s;
+        if span_s <= 0.0 {
+            return;
+        }
+        match hidden {
+            Some(hidden) => {
+                self.walk(hidden, span_s, rng);
+                self.load = hidden.release.map(|_| (hidden.force_n(end_s), 0.0));
+            }
+            None => self.state = self.path(span_s),
+        }
+        self.time_s = end_s;
+        self.arm();
+    }
+
     /// Goes on by `span_s` in steps short enough; true: the regime changed on the way.
     fn walk(&mut self, hidden: &mut Hidden, span_s: f64, rng: &mut ChaCha8Rng) -> bool {
         let shortest = self.interval_s * 0.5f64.powi(MAX_HALVINGS);
@@ -271,7 +288,7 @@ impl Run<'_> {
     }
 
     /// Begins or ends what follows a release.
-    fn note_change(&mut self, hidden: &mut Hidden) {
+    pub(super) fn note_change(&mut self, hidden: &mut Hidden) {
         let Some(&ContactEvent { kind, time_s, force_n, .. }) = self.last_event() else { return };
         hidden.fine_until_s = time_s + hidden.ringing_s;
         match kind {

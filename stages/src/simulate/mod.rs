@@ -13,9 +13,12 @@ mod contact;
 mod detector;
 mod discretisation;
 mod error;
+mod from_model;
 mod hidden;
 mod hidden_motion;
 mod lever;
+mod model;
+mod model_example;
 mod motion;
 mod noise_free;
 mod optics;
@@ -24,11 +27,14 @@ mod propagator;
 mod ramp;
 mod readout_noise;
 mod recorder;
+mod released;
 mod square;
 mod truth;
 
 #[cfg(test)]
 mod hidden_tests;
+#[cfg(test)]
+mod released_tests;
 #[cfg(test)]
 mod tests;
 
@@ -43,16 +49,18 @@ pub use error::SimulateError;
 pub use hidden::{Hidden, Setting, effects};
 pub use hidden_motion::simulate_hidden;
 pub use lever::{ModalLever, Mode};
+pub use model::AfmOfModel;
 pub use motion::{ContactEvent, Drive, EventKind, Motion, Sampling, simulate_motion};
 pub use noise_free::Cut;
 pub use phases::{PhaseProblem, RecordPlan, Target};
 pub use ramp::TriangleRamp;
 pub use readout_noise::{Drift, PINK_LOWEST_HZ, ReadoutNoise};
 pub use recorder::{Microscope, PiezoMonitor, Place, RecordedEvent, Scatter, SimulatedRecord, archive_stream, counted};
+pub use released::Release;
 pub use square::Square;
 pub use truth::{Counts, EventTruth, RecordTruth, Truth};
 
 use afmid_pipeline::Entry;
 
 /// The stages of this domain.
-pub const STAGES: &[Entry] = &[Entry::of::<Afm>()];
+pub const STAGES: &[Entry] = &[Entry::of::<Afm>(), Entry::of::<AfmOfModel>()];

@@ -295,7 +295,7 @@ impl<'a> Run<'a> {
     }
 
     /// The state `span_s` from now, with this step's deviates.
-    fn path(&self, span_s: f64) -> Vec<f64> {
+    pub(super) fn path(&self, span_s: f64) -> Vec<f64> {
         let (first, second) = self.inputs();
         let mut state = self.regime().step(span_s).advance(&self.state, first, second, &self.deviates);
         state.resize(self.state.len(), 0.0);
@@ -308,6 +308,11 @@ impl<'a> Run<'a> {
         let force_n = -self.tension_n(&state, self.time_s + span);
         self.state = state;
         self.time_s += span;
+        self.change(force_n);
+    }
+
+    /// Changes the regime here and now, under this force on the tip.
+    pub(super) fn change(&mut self, force_n: f64) {
         let height = self.drive.height_m(self.half, self.time_s);
         let kind = match self.held_n {
             Some(_) => {
