@@ -106,7 +106,8 @@ impl Limits {
 /// The strength (first of `values`) at which the expected gain is [`LIMIT_GAIN`]; nothing if the limits of the parameter do not hold it.
 ///
 /// # Method
-/// Secant steps on the logarithms of gain and strength, up to 12, to 5 %.
+/// Secant steps on the logarithms of gain and strength, halved intervals where those leave the bracket (a gain may jump where a release passes a
+/// sample), up to 16, to 5 %.
 pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> {
     let about = cause.about();
     let (parameter, first) = (about.parameters.first()?, *values.first()?);
@@ -120,12 +121,18 @@ pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> 
     };
     // gains grow as the square of a strength; a rupture's time as the fourth power
     let (mut strength, mut power, mut last) = (first.abs().min(highest), 2.0, None::<(f64, f64)>);
-    for _ in 0..12 {
+    let (mut below, mut above) = (0.0f64, f64::INFINITY);
+    for _ in 0..16 {
         let now = gain(strength)?;
         if now <= 0.0 || !now.is_finite() {
             return None;
         }
-        if (now / LIMIT_GAIN).ln().abs() < 0.05 * power {
+        if now < LIMIT_GAIN {
+            below = below.max(strength);
+        } else {
+            above = above.min(strength);
+        }
+        if (now / LIMIT_GAIN).ln().abs() < 0.05 * power || (strength == above && above < 1.05 * below) {
             // more must show more: a level such as that of clipping is no strength
             return (gain((1.2 * strength).min(highest))? >= now).then_some(strength);
         }
@@ -135,7 +142,10 @@ pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> 
             power = ((now / gained).ln() / (strength / before).ln()).clamp(0.5, 8.0);
         }
         last = Some((strength, now));
-        let next = (strength * (LIMIT_GAIN / now).powf(1.0 / power).clamp(1e-3, 1e3)).min(highest);
+        let mut next = (strength * (LIMIT_GAIN / now).powf(1.0 / power).clamp(1e-3, 1e3)).min(highest);
+        if below > 0.0 && above.is_finite() && !(1.02 * below..0.98 * above).contains(&next) {
+            next = if above < 1.05 * below { above } else { (below * above).sqrt() };
+        }
         if next == strength {
             return None;
         }
