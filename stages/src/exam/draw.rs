@@ -210,7 +210,9 @@ fn plant(
 
 fn nameable(cause: &dyn Cause) -> bool {
     let about = cause.about();
-    about.domain != Domain::InputOutput && !matches!(about.identifiable, Identifiable::No(_))
+    // a level at which a signal is cut is no strength: less of it shows more
+    let has_a_strength = about.id != "clipping";
+    has_a_strength && about.domain != Domain::InputOutput && !matches!(about.identifiable, Identifiable::No(_))
 }
 
 /// What trial values come from: the truth, and a frequency where nothing rings yet.
