@@ -102,6 +102,9 @@ pub struct ExamArgs {
     /// Hide only this [default: all of them, in fixed shares].
     #[arg(long, value_enum, value_name = "KIND")]
     pub only: Option<ExamKind>,
+    /// Keep the recordings and the verdict of every archive that was judged wrong, in a folder per seed.
+    #[arg(long, value_name = "FOLDER")]
+    pub keep: Option<PathBuf>,
     /// As JSON, alone on stdout, every archive with its draw.
     #[arg(long)]
     pub json: bool,

@@ -75,16 +75,35 @@ fn told(one: &Judged) -> String {
 fn sit(drawn: &Draw, args: &ExamArgs, registry: &Registry, scratch: &Path) -> Result<Judged, Failure> {
     let base = scratch.join(drawn.seed.to_string());
     let json = archive(drawn, &base).and_then(|()| diagnosed(drawn, args, registry, &base));
-    // a folder that stays behind goes with the scratch folder
-    let _ = std::fs::remove_dir_all(&base);
-    match json {
-        Ok(json) => Ok(judge(drawn, Some(&json))),
-        Err(Sitting::Config(failure)) => Err(failure),
+    let (judged, json) = match json {
+        Ok(json) => (judge(drawn, Some(&json)), json),
+        Err(Sitting::Config(failure)) => return Err(failure),
         Err(Sitting::Run(message)) => {
             say(&format!("seed {}: {message}\n", drawn.seed));
-            Ok(judge(drawn, None))
+            (judge(drawn, None), Value::Null)
         }
+    };
+    if let Some(folder) = args.keep.as_ref().filter(|_| !judged.right) {
+        keep(drawn, &json, &base, &folder.join(drawn.seed.to_string()))?;
     }
+    // a folder that stays behind goes with the scratch folder
+    let _ = std::fs::remove_dir_all(&base);
+    Ok(judged)
+}
+
+/// Copies an archive's recordings, with the draw and the verdict beside them.
+fn keep(drawn: &Draw, verdict: &Value, base: &Path, folder: &Path) -> Result<(), Failure> {
+    let failed = |error: &dyn std::fmt::Display| {
+        Failure::failed(format!("{} cannot be written: {error}", folder.display()), None)
+    };
+    std::fs::create_dir_all(folder).map_err(|error| failed(&error))?;
+    let archive = base.join(OUT);
+    for entry in std::fs::read_dir(&archive).into_iter().flatten().flatten() {
+        std::fs::copy(entry.path(), folder.join(entry.file_name())).map_err(|error| failed(&error))?;
+    }
+    let told = serde_json::json!({ "draw": drawn, "diagnosis": verdict });
+    let text = serde_json::to_string_pretty(&told).map_err(|error| failed(&error))?;
+    std::fs::write(folder.join("exam.json"), text + "\n").map_err(|error| failed(&error))
 }
 
 /// Why there is no answer.

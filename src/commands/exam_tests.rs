@@ -71,7 +71,7 @@ fn exam(config: &str, seeds: u64, only: Option<ExamKind>) -> Result<Score, Failu
     std::fs::write(&path, config).unwrap();
     let registry = crate::registry().unwrap().with(&[Entry::of::<StandIn>()]).unwrap();
     let config = ConfigArgs { config: path, set: Vec::new() };
-    score(&ExamArgs { config, seeds, first_seed: 2, only, json: false }, &registry)
+    score(&ExamArgs { config, seeds, first_seed: 2, only, keep: None, json: false }, &registry)
 }
 
 #[test]

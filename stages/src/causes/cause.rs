@@ -116,6 +116,11 @@ pub trait Cause: Sync {
     ///
     /// The first value of each is a strength that changes the response by about a hundredth.
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>>;
+
+    /// Numbers that differ from record to record by chance, a line's phase among them: each must be found anew in every record.
+    fn free_in_each_record(&self) -> usize {
+        0
+    }
 }
 
 /// Whether `values` lie within the limits. Errors: the parameter, what was found, the limits.

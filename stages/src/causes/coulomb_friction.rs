@@ -50,6 +50,7 @@ impl Cause for CoulombFriction {
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        vec![vec![0.003 * scene.level_v]]
+        // a strong one stops the motion within the window, a weak one shows at its end
+        [3e-5, 3e-3].map(|share| vec![share * scene.level_v]).to_vec()
     }
 }

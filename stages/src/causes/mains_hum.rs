@@ -45,6 +45,11 @@ impl Cause for MainsHum {
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        vec![vec![3.0 * scene.noise_v, 50.0]]
+        [50.0, 60.0].map(|mains_hz| vec![3.0 * scene.noise_v, mains_hz]).to_vec()
+    }
+
+    fn free_in_each_record(&self) -> usize {
+        // its phase, and with that its amplitude
+        2
     }
 }

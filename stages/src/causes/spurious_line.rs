@@ -48,4 +48,9 @@ impl Cause for SpuriousLine {
         let phases = [0.0, 0.25, 0.5, 0.75].map(|half_turns| half_turns * PI);
         peaks.flat_map(|&f| phases.map(|phase| vec![0.01 * scene.level_v, f, phase])).collect()
     }
+
+    fn free_in_each_record(&self) -> usize {
+        // its phase, and with that its amplitude
+        2
+    }
 }

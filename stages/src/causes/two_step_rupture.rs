@@ -40,9 +40,14 @@ impl Cause for TwoStepRupture {
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        // fifths of a decade from four samples to an eighth of the window
+        // fifths of a decade from four samples to an eighth of the window, no further apart than a third of the first mode's period: beyond, one delay's
+        // ringing is another's with the opposite sign
         let (first, last) = (4.0 * scene.interval_s, scene.window_s / 8.0);
-        let count = (5.0 * (last / first).log10()).floor().max(0.0) as i32;
-        (0..=count).map(|i| vec![0.005, first * 10f64.powf(f64::from(i) / 5.0)]).collect()
+        let period = scene.frequency_hz.iter().copied().fold(f64::INFINITY, f64::min).recip();
+        let further = |delay: &f64| Some((delay * 10f64.powf(0.2)).min(delay + period.max(1e-3 * last) / 3.0));
+        std::iter::successors(Some(first), further)
+            .take_while(|delay| *delay <= last)
+            .map(|delay| vec![0.005, delay])
+            .collect()
     }
 }

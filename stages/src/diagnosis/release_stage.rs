@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::lever_model::LEVER_MODEL;
 use super::records::{
-    CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, judge, summarise,
+    Begun, CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, summarise,
+    without_droop,
 };
-use super::release::{Cut, EventWindow, NamingOptions, Problem, answer, name_causes, start, story};
+use super::release::{Cut, EventWindow, Lever, LeverMode, NamingOptions, Problem, answer, name_causes, start, story};
 use super::release_model::lever_model;
 use super::release_story::{residual_array, tile_table};
 use crate::causes::{CATALOGUE, Instant, find};
@@ -150,20 +151,25 @@ impl Stage for ReleaseDiagnose {
         let rate = ensemble.number("sample_rate_hz")?;
         let cut = Cut { before: self.before_samples, samples: self.window_samples, interval_s: 1.0 / rate };
         let onsets = onsets(ensemble, rate)?;
-        let windows = self.windows(recording, &onsets, &cut)?;
+        let mut windows = self.windows(recording, &onsets, &cut)?;
         let summaries = self.record_summaries(recording, &onsets, rate)?;
         let (summaries, free): (Vec<RecordSummary>, Vec<Vec<f64>>) = summaries.into_iter().unzip();
+        let mut options =
+            JudgeOptions { false_alarm_rate: CHANNEL_SHARE * self.false_alarm_rate, ..JudgeOptions::default() };
+        let begun = Begun::judge(&summaries, &options);
+        let mut free = free;
+        if let Some(corner_hz) = begun.coupling_hz().filter(|_| self.may_name("ac-coupling")) {
+            // the lever's own motion is before the capacitor: no event can tell this slow droop from its own slope
+            windows.iter_mut().for_each(|w| w.values = without_droop(&w.values, corner_hz, cut.interval_s));
+            let whole = |record: &Vec<f64>| -> Vec<f64> {
+                let parts = record.chunks_exact(self.window_samples);
+                parts.flat_map(|part| without_droop(part, corner_hz, cut.interval_s)).collect()
+            };
+            free = free.iter().map(whole).collect();
+        }
         let lent: Vec<&[f64]> = free.iter().flat_map(|record| record.chunks_exact(self.window_samples)).collect();
         let poles: Vec<f64> = self.detector_poles_hz.iter().map(|f| std::f64::consts::TAU * f).collect();
         let begin = start(&windows, &lent, &cut, self.mode_number(), &poles).map_err(StageError::from_error)?;
-        let resonances = begin
-            .seen
-            .iter()
-            .map(|seen| Resonance {
-                frequency_hz: seen.mode.omega / std::f64::consts::TAU,
-                quality_factor: seen.mode.quality_factor,
-            })
-            .collect();
         let problem = Problem {
             windows: &windows,
             cut,
@@ -172,17 +178,21 @@ impl Stage for ReleaseDiagnose {
             pole_std: self.detector_pole_std,
             seen: begin.seen,
         };
-        let options = NamingOptions {
+        let naming_options = NamingOptions {
             false_alarm_rate: SHAPES_SHARE * self.false_alarm_rate,
             without: self.without.clone(),
             most: self.most_causes,
             seed: cx.seed(),
             ..NamingOptions::default()
         };
-        let naming =
-            name_causes(&problem, begin.state, begin.starts, CATALOGUE, &options).map_err(StageError::from_error)?;
-        let signs = self.record_signs(&summaries, resonances);
-        let found = answer(&problem, &naming, &signs, self.false_alarm_rate);
+        let naming = name_causes(&problem, begin.state, begin.starts, CATALOGUE, &naming_options)
+            .map_err(StageError::from_error)?;
+        // only the lever's own: a foreign line may ring with them through every event
+        options.resonances = naming.fits.first().map_or_else(Vec::new, |fit| resonances(&fit.state.lever));
+        let signs = begun.finish(&summaries, &options);
+        let (signs, left_out): (Vec<RecordSign>, Vec<RecordSign>) =
+            signs.into_iter().partition(|sign| self.may_name(sign.id));
+        let found = answer(&problem, &naming, &signs, &left_out, self.false_alarm_rate);
         let story = story(&problem, &naming).ok_or_else(|| StageError::new("the search ended without a fit"))?;
         let model = lever_model(&problem, &naming, &found, recording.records.len())
             .ok_or_else(|| StageError::new("the diagnosis ended without any fit"))?;
@@ -205,6 +215,14 @@ pub(super) fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, S
     };
     let onsets = ensemble.real("onset")?;
     Ok(records.iter().zip(onsets).map(|(r, t)| (usize::try_from(*r).unwrap_or(usize::MAX), t * rate)).collect())
+}
+
+fn resonances(lever: &Lever) -> Vec<Resonance> {
+    let one = |mode: &LeverMode| Resonance {
+        frequency_hz: mode.omega / std::f64::consts::TAU,
+        quality_factor: mode.quality_factor,
+    };
+    lever.modes.iter().map(one).collect()
 }
 
 impl ReleaseDiagnose {
@@ -257,15 +275,8 @@ impl ReleaseDiagnose {
         Ok(windows)
     }
 
-    fn record_signs(&self, summaries: &[RecordSummary], resonances: Vec<Resonance>) -> Vec<RecordSign> {
-        let options = JudgeOptions {
-            false_alarm_rate: CHANNEL_SHARE * self.false_alarm_rate,
-            resonances,
-            ..JudgeOptions::default()
-        };
-        let mut signs = judge(summaries, &options);
-        signs.retain(|sign| !self.without.iter().any(|id| id == sign.id));
-        signs
+    fn may_name(&self, cause: &str) -> bool {
+        !self.without.iter().any(|id| id == cause)
     }
 
     /// Every record's summary, and whole windows of its free stretches one after the other.

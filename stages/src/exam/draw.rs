@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::levers::lever;
 use super::limits::{Limits, limit};
-use crate::causes::{Cause, Domain, Identifiable, Scene};
+use crate::causes::{Cause, Domain, Identifiable, Parameter, Scene};
 use crate::simulate::{Afm, Hidden};
 
 /// What is hidden in an archive.
@@ -68,6 +68,12 @@ const LEFT_OUT: f64 = 10.0;
 const POLES_OFF: f64 = 0.15;
 /// Records of an archive whose records hold several cycles.
 const LONG_RECORDS: usize = 6;
+/// Part of a short record in which its release falls, of its length.
+const RELEASED: (f64, f64) = (0.3, 0.6);
+/// Cycle position at which a record without release begins: far above the surface.
+const IDLE: f64 = 0.02;
+/// Part of a parameter's limit that a strength may reach: at the limit itself no fit may say what it is.
+const ROOM: f64 = 0.8;
 /// Attempts to find a cause whose limit lies within its parameter's limits.
 const ATTEMPTS: usize = 40;
 
@@ -141,7 +147,6 @@ fn archive(seed: u64, rng: &mut ChaCha8Rng) -> (Afm, usize) {
         records,
         // 40 ms of a cycle of 0.36 s, or a cycle and a half
         samples: if long { 2_700_000 } else { 200_000 },
-        snap_offs: (!long).then_some(records - idle),
         // room for the strongest releases, at the paper's 2.2 um/s
         ramp_m: 400e-9,
         ramp_hz: 2.79,
@@ -154,10 +159,25 @@ fn archive(seed: u64, rng: &mut ChaCha8Rng) -> (Afm, usize) {
         detector_shares: lever.detector_shares,
         compression: 0,
         seed: Some(seed),
-        ..base
+        ..base.clone()
     };
+    let afm = if long { afm } else { with_phases(afm, idle, rng) };
     // at least one full cycle in a long record
     (afm, if long { records } else { records - idle })
+}
+
+/// Every record but the last `idle` ones around a release, which comes somewhere in its middle (adhesion that scatters may move it further, even out of the
+/// record); those are free all the time.
+fn with_phases(afm: Afm, idle: usize, rng: &mut ChaCha8Rng) -> Afm {
+    let height_m = afm.surface_m + afm.adhesion_n * (1.0 / afm.stiffness_n_per_m + 1.0 / afm.contact_stiffness_n_per_m);
+    // cycle position of the release on the way up, and the cycles of a record
+    let (release, cycles) = (0.75 + 0.5 * height_m / afm.ramp_m, afm.samples as f64 / afm.sample_rate_hz * afm.ramp_hz);
+    let phase = |record: usize| {
+        let before = RELEASED.0 + (RELEASED.1 - RELEASED.0) * rng.random::<f64>();
+        if record + idle < afm.records { (release - before * cycles).rem_euclid(1.0) } else { IDLE }
+    };
+    let phases = (0..afm.records).map(phase).collect();
+    Afm { phases: Some(phases), ..afm }
 }
 
 type Chosen = (&'static dyn Cause, Vec<f64>, f64);
@@ -174,7 +194,7 @@ fn plant(
     if wanted == 0 {
         return Some(planted);
     }
-    let limits = Limits::new(&afm.microscope(), releases, afm.samples)?;
+    let limits = Limits::new(&afm.microscope(), releases, afm.samples, afm.surface_m)?;
     let candidates: Vec<&'static dyn Cause> = catalogue.iter().copied().filter(|cause| nameable(*cause)).collect();
     for _ in 0..ATTEMPTS {
         if planted.len() == wanted || candidates.is_empty() {
@@ -188,7 +208,9 @@ fn plant(
             continue;
         }
         let mut values = trials[rng.random_range(0..trials.len())].clone();
-        for (value, parameter) in values.iter_mut().zip(about.parameters).skip(1) {
+        // a line stands where it stands: at the mains, or far enough from the modes
+        let moves = |parameter: &Parameter| parameter.name != "frequency_hz" || cause.free_in_each_record() == 0;
+        for (value, parameter) in values.iter_mut().zip(about.parameters).skip(1).filter(|(_, p)| moves(p)) {
             *value = (*value * (0.8 + 0.45 * rng.random::<f64>())).clamp(parameter.low, parameter.high);
         }
         let signed = about.parameters.first().is_some_and(|parameter| parameter.low < 0.0);
@@ -198,7 +220,7 @@ fn plant(
         let Some(limit) = limit(&limits, cause, &values) else { continue };
         let weakest = if kind == Kind::LeftOut { LEFT_OUT } else { 1.0 };
         let times = weakest * (STRONGEST / weakest).powf(rng.random::<f64>());
-        let highest = about.parameters.first().map_or(0.0, |p| if values[0] < 0.0 { -p.low } else { p.high });
+        let highest = ROOM * about.parameters.first().map_or(0.0, |p| if values[0] < 0.0 { -p.low } else { p.high });
         if weakest * limit > highest {
             continue;
         }

@@ -5,7 +5,7 @@ use crate::model::ringdown::internals::Whitener;
 use crate::model::ringdown::{RingdownNoise, ThermalMode};
 use crate::simulate::{BOLTZMANN_J_PER_K, Cut, Microscope, Place};
 
-/// Expected gain of the log likelihood over the archive at the limit.
+/// Expected gain of the log likelihood over the archive at the limit, after what numbers found anew in every record cost.
 pub const LIMIT_GAIN: f64 = 10.0;
 
 /// The window in which an effect is measured, as the diagnosis cuts it.
@@ -14,7 +14,9 @@ const CUT: Cut = Cut { before: 16, samples: 8000 };
 const PLACES: usize = 5;
 /// Where the 1/f noise is taken for what is added to whole records, Hz.
 const HUM_HZ: f64 = 50.0;
-/// Points of a record at which it is evaluated: 20 kHz in 40 ms.
+/// Part of a short record in which the lever is free.
+const FREE: f64 = 0.5;
+/// Points of a free stretch at which it is evaluated: 50 us in 80 ms.
 const POINTS: usize = 1600;
 
 /// What a baseline can follow, and the noise that hides the rest.
@@ -33,6 +35,8 @@ pub struct Limits {
     /// Samples of a record.
     samples: usize,
     variance_v2: f64,
+    /// Height of the surface on the ramp's scale, m.
+    surface_m: f64,
     /// Releases with nothing hidden, one after the other.
     plain: Vec<f64>,
     /// Orthonormal.
@@ -40,8 +44,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// For an archive of so many events in records of so many samples; nothing if the microscope never releases its tip.
-    pub fn new(microscope: &Microscope, events: usize, samples: usize) -> Option<Self> {
+    /// For an archive of so many events in records of so many samples, above a surface at that height, m; nothing if the microscope never releases its tip.
+    pub fn new(microscope: &Microscope, events: usize, samples: usize, surface_m: f64) -> Option<Self> {
         let plain = releases(microscope, &Effects::default(), events)?;
         let mut followed = event_columns(&plain);
         for perturbed in perturbations(microscope) {
@@ -59,6 +63,7 @@ impl Limits {
             whitener,
             events,
             samples,
+            surface_m,
             variance_v2,
             plain,
             followed: orthonormal(followed),
@@ -66,40 +71,63 @@ impl Limits {
     }
 
     /// Expected gain of the log likelihood if `effects` are hidden and explained; nothing if the tip is not released.
-    pub fn gain(&self, effects: &Effects) -> Option<f64> {
+    /// `degree`: what a record's level may do by itself, as a polynomial in time.
+    pub fn gain(&self, effects: &Effects, degree: i32) -> Option<f64> {
         let with = releases(&self.microscope, effects, self.events)?;
         let mut left: Vec<f64> = with.iter().zip(&self.plain).map(|(a, b)| a - b).collect();
         whiten(&self.whitener, &mut left);
         project_out(&mut left, &self.followed);
         let squares = left.iter().map(|v| v * v).sum::<f64>();
         let windows = 0.5 * squares * self.events as f64 / PLACES as f64;
-        Some(windows + self.record_gain(effects))
+        Some(windows + self.record_gain(effects, degree))
     }
 
-    /// The same of what is added to whole records, each with an offset of its own, in white and 1/f noise at [`HUM_HZ`].
-    fn record_gain(&self, effects: &Effects) -> f64 {
+    /// The same of what is added to whole records while the lever is free, where each record has a polynomial in time of its own and white and 1/f
+    /// noise as at [`HUM_HZ`].
+    fn record_gain(&self, effects: &Effects, degree: i32) -> f64 {
+        if effects.added.is_empty() {
+            return 0.0;
+        }
         let (noise, rate) = (&self.microscope.noise, self.microscope.sample_rate_hz);
         // one-sided densities, V^2/Hz: the 1/f noise spreads its variance evenly over the logarithm from 1 Hz to half the rate
         let white = 2.0 * noise.white_v.powi(2) / rate;
         let pink = noise.pink_v.powi(2) / (0.5 * rate).ln() / HUM_HZ;
         let variance_v2 = self.variance_v2 * (1.0 + pink / white.max(f64::MIN_POSITIVE));
-        let points = self.samples.min(POINTS);
+        let (path, samples) = self.free_path();
         let records = self.events.max(1);
         let gain = |record: usize| {
             let place = Place { record, records, samples: self.samples, margin_samples: 0, seed: 0 };
-            let added: Vec<f64> = (0..points)
-                .map(|i| {
-                    let time_s = i as f64 / points as f64 * self.samples as f64 / rate;
-                    let ramp = &self.microscope.ramp;
-                    let instant = place.instant(time_s, ramp.height_m(ramp.half_cycle(time_s), time_s));
-                    effects.added.iter().map(|added| added(&instant)).sum()
-                })
-                .collect();
-            let mean = added.iter().sum::<f64>() / points.max(1) as f64;
-            let square: f64 = added.iter().map(|v| (v - mean).powi(2)).sum();
-            0.5 * square * self.samples as f64 / points.max(1) as f64 / variance_v2
+            let added = |&(time_s, height_m): &(f64, f64)| {
+                let instant = place.instant(time_s, height_m);
+                effects.added.iter().map(|added| added(&instant)).sum::<f64>()
+            };
+            let mut added: Vec<f64> = path.iter().map(added).collect();
+            let times = |power: i32| path.iter().map(|(time_s, _)| (time_s - path[0].0).powi(power)).collect();
+            project_out(&mut added, &orthonormal((0..=degree).map(times).collect()));
+            0.5 * dot(&added, &added) * samples / path.len().max(1) as f64 / variance_v2
         };
-        if effects.added.is_empty() { 0.0 } else { (0..records).map(gain).sum() }
+        (0..records).map(gain).sum()
+    }
+
+    /// Time since the record began and height of the base, where the lever is free, and how many samples that stands for: of a record shorter than a cycle
+    /// [`FREE`], after a release; of a longer one all above the height of the release.
+    fn free_path(&self) -> (Vec<(f64, f64)>, f64) {
+        let microscope = &self.microscope;
+        let (ramp, contact) = (&microscope.ramp, &microscope.contact);
+        let height = contact.pull_off_height_m(microscope.lever.stiffness_n_per_m, contact.adhesion_n);
+        let released = self.surface_m + height;
+        let duration_s = self.samples as f64 / microscope.sample_rate_hz;
+        let whole = duration_s * ramp.frequency_hz >= 1.0;
+        // half-cycle 1 is the first retract
+        let begin_s = if whole { 0.0 } else { ramp.passes_s(1, released) };
+        let lasting_s = if whole { duration_s } else { FREE * duration_s };
+        let at = |i: usize| {
+            let time_s = begin_s + lasting_s * i as f64 / POINTS as f64;
+            (time_s, ramp.height_m(ramp.half_cycle(time_s), time_s))
+        };
+        let path: Vec<(f64, f64)> = (0..POINTS).map(at).filter(|(_, z)| *z >= released - 1e-12).collect();
+        let samples = lasting_s * microscope.sample_rate_hz * path.len() as f64 / POINTS as f64;
+        (path, samples)
     }
 }
 
@@ -112,12 +140,16 @@ pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> 
     let about = cause.about();
     let (parameter, first) = (about.parameters.first()?, *values.first()?);
     let (sign, highest) = (first.signum(), if first < 0.0 { -parameter.low } else { parameter.high });
+    // held out, a number that is found anew in every record costs half a unit there
+    let found_anew = 0.5 * (limits.events * cause.free_in_each_record()) as f64;
+    // a sine of a phase of its own is sought beside all that a slow contact or a fringe can do: a cubic; other shapes beside an offset and a drift
+    let degree = if found_anew > 0.0 { 3 } else { 1 };
     let gain = |strength: f64| {
         let mut values = values.to_vec();
         values[0] = sign * strength;
         let mut effects = Effects::default();
         cause.add(&values, &mut effects);
-        limits.gain(&effects)
+        limits.gain(&effects, degree).map(|gain| gain * LIMIT_GAIN / (LIMIT_GAIN + found_anew))
     };
     // gains grow as the square of a strength; a rupture's time as the fourth power
     let (mut strength, mut power, mut last) = (first.abs().min(highest), 2.0, None::<(f64, f64)>);
@@ -134,7 +166,10 @@ pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> 
         }
         if (now / LIMIT_GAIN).ln().abs() < 0.05 * power || (strength == above && above < 1.05 * below) {
             // more must show more: a level such as that of clipping is no strength
-            return (gain((1.2 * strength).min(highest))? >= now).then_some(strength);
+            let more = gain((1.2 * strength).min(highest))?;
+            // and much less must show much less: a step that a release takes past a sample is no effect
+            let less = gain(0.25 * strength)?;
+            return (more >= now && less < 0.5 * now).then_some(strength);
         }
         if let Some((before, gained)) = last
             && before != strength
@@ -273,7 +308,7 @@ mod tests {
 
     #[test]
     fn limits_are_where_a_prototype_began_to_name() {
-        let limits = Limits::new(&Afm::default().microscope(), 12, 200_000).unwrap();
+        let limits = Limits::new(&Afm::default().microscope(), 12, 200_000, Afm::default().surface_m).unwrap();
         for (id, values, low, high) in [
             // smallest strengths that a prototype named with 12 records: 0.5e-3 /V, 1.5e-3 /V^2, 0.3 us; the limit asks for less than naming does
             ("quadratic-detector", vec![0.01], 0.5e-4, 1e-3),

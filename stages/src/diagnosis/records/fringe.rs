@@ -1,142 +1,66 @@
-//! A fringe: amplitude, wavelength and phase over all records.
+//! Light that interferes: the free level waves with the position.
 
-use std::borrow::Borrow;
 use std::f64::consts::PI;
 
-use super::basis::dot;
-use super::position::FreeRecord;
-use super::replicates::jackknife;
+use super::basis::{legendre, span};
+use super::free_level::{FreeLevel, FreeRecord, HeldOut};
+use super::fringe_fit::fit_fringe;
+use super::position::Candidate;
+use super::replicates::t_test;
+use super::sign::{RecordSign, gain, value};
+use super::yardstick::of_many;
 
-/// Wavelengths sought, m: the limits of the catalogue.
-const WAVELENGTHS_M: (f64, f64) = (3e-7, 2e-6);
-/// Wavenumbers tried, evenly spaced: steps of a sixth of a radian over a quarter of a micrometre.
-const STEPS: usize = 64;
+/// Highest degree in the position that is asked for.
+const HIGHEST_DEGREE: usize = 5;
 
-/// A fitted fringe, `B cos(4 pi z / lambda + phi)`; each number with its standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FringeFit {
-    pub amplitude_v: (f64, f64),
-    pub wavelength_m: (f64, f64),
-    pub phase: (f64, f64),
-}
-
-impl FringeFit {
-    pub fn shape(&self, position_m: &[f64]) -> Vec<f64> {
-        let k = 4.0 * PI / self.wavelength_m.0;
-        position_m.iter().map(|z| self.amplitude_v.0 * (k * z + self.phase.0).cos()).collect()
-    }
-}
-
-/// Normal equations of cosine and sine at one wavenumber, one record.
-#[derive(Debug, Clone, Copy, Default)]
-struct Normal {
-    cc: f64,
-    cs: f64,
-    ss: f64,
-    yc: f64,
-    ys: f64,
-}
-
-impl Normal {
-    fn add(&mut self, other: &Normal, sign: f64) {
-        self.cc += sign * other.cc;
-        self.cs += sign * other.cs;
-        self.ss += sign * other.ss;
-        self.yc += sign * other.yc;
-        self.ys += sign * other.ys;
-    }
-
-    /// Weights of cosine and sine, and the fall of the sum of squares.
-    fn solve(&self) -> (f64, f64, f64) {
-        // a millionth of the size keeps a wave that is nearly a straight line from growing without bounds
-        let ridge = 1e-6 * (self.cc + self.ss);
-        let (cc, ss) = (self.cc + ridge, self.ss + ridge);
-        let determinant = cc * ss - self.cs * self.cs;
-        let a = (ss * self.yc - self.cs * self.ys) / determinant;
-        let b = (cc * self.ys - self.cs * self.yc) / determinant;
-        (a, b, a * self.yc + b * self.ys)
-    }
-}
-
-/// Least squares over all records, the wavelength bounded (to `light`, if given); errors by leaving out records.
-pub(super) fn fit_fringe<R: Borrow<FreeRecord>>(
-    records: impl IntoIterator<Item = R>,
-    light: Option<(f64, f64)>,
-) -> Option<FringeFit> {
-    let records: Vec<R> = records.into_iter().collect();
-    let (short, long) = light.unwrap_or(WAVELENGTHS_M);
-    let (first, last) = (4.0 * PI / long, 4.0 * PI / short);
-    let mut wavenumbers: Vec<f64> =
-        (0..STEPS).map(|k| first + (last - first) * k as f64 / (STEPS - 1) as f64).collect();
-    let mut table = normals(&records, &wavenumbers);
-    let best = best_of(&table, None)?;
-    // once more, finer, round the best
-    let width = (last - first) / (STEPS - 1) as f64;
-    let centre = wavenumbers[best];
-    wavenumbers = (-8..=8).map(|k| (centre + width * f64::from(k) / 4.0).clamp(first, last)).collect();
-    table = normals(&records, &wavenumbers);
-    let (k, a, b) = vertex(&table, &wavenumbers, None)?;
-    let all = numbers(k, a, b);
-    let left_out: Vec<[f64; 3]> = (0..records.len())
-        .filter_map(|out| vertex(&table, &wavenumbers, Some(out)).map(|(k, a, b)| numbers(k, a, b)))
-        .collect();
-    let error = |j: usize| jackknife(&left_out.iter().map(|n| n[j]).collect::<Vec<_>>());
-    // phases near the seam are unwrapped towards the estimate
-    let turned: Vec<f64> = left_out.iter().map(|n| wrapped(n[2] - all[2])).collect();
-    Some(FringeFit {
-        amplitude_v: (all[0], error(0)),
-        wavelength_m: (all[1], error(1)),
-        phase: (all[2], jackknife(&turned)),
-    })
-}
-
-fn wrapped(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(2.0 * PI) - PI
-}
-
-fn numbers(k: f64, a: f64, b: f64) -> [f64; 3] {
-    // a cos + b sin = B cos(kz + phi): phi = atan2(-b, a)
-    [a.hypot(b), 4.0 * PI / k, (-b).atan2(a)]
-}
-
-/// For each wavenumber the normal equations of each record.
-fn normals<R: Borrow<FreeRecord>>(records: &[R], wavenumbers: &[f64]) -> Vec<Vec<Normal>> {
-    let one = |record: &FreeRecord, k: f64| {
-        let (mut s, mut c): (Vec<f64>, Vec<f64>) = record.position_m.iter().map(|z| (k * z).sin_cos()).unzip();
-        record.nuisance.remove(&mut s);
-        record.nuisance.remove(&mut c);
-        let y = &record.left_v;
-        Normal { cc: dot(&c, &c), cs: dot(&c, &s), ss: dot(&s, &s), yc: dot(&c, y), ys: dot(&s, y) }
+/// A wave in the position, alike in all records.
+///
+/// # Method
+/// The free level on Legendre polynomials of the position, lower ones projected out; t tests over records of degrees 2 to 5: a bend is what a straight line
+/// can't give. Then a wave by least squares.
+pub(super) fn fringe(level: &FreeLevel) -> Option<Candidate> {
+    let track = level.records.iter().map(|record| span(&record.position_m));
+    let common = track.fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let degrees: Vec<f64> = (2..=HIGHEST_DEGREE).map(|degree| bend_p(&level.records, common, degree)).collect();
+    let fit = fit_fringe(&level.records, None)?;
+    let held_out = fringe_held_out(level, None);
+    let (before, after) = held_out.rms();
+    let sign = RecordSign {
+        id: "interference-fringe",
+        p_value: of_many(degrees.iter().copied().fold(1.0, f64::min), degrees.len()),
+        parameters: vec![
+            ("amplitude_v", value(fit.amplitude_v.0, fit.amplitude_v.1, "V")),
+            ("wavelength_m", value(fit.wavelength_m.0, fit.wavelength_m.1, "m")),
+            ("phase", value(fit.phase.0, fit.phase.1, "rad")),
+        ],
+        evidence: format!(
+            "the free level waves with the piezo position, by {:.2e} V, alike in {} records",
+            fit.amplitude_v.0,
+            level.records.len()
+        ),
+        gain: gain(before, after, "free stretches of the other half of the records"),
+        runner_up: None,
+        tied: false,
     };
-    wavenumbers.iter().map(|&k| records.iter().map(|record| one(record.borrow(), k)).collect()).collect()
+    let wavenumber = 4.0 * PI / fit.wavelength_m.0;
+    let columns = move |record: &FreeRecord| {
+        let (sines, cosines) = record.position_m.iter().map(|z| (wavenumber * z).sin_cos()).unzip();
+        // the straight line goes with it: what is left of a wave longer than the travel is mostly that
+        vec![sines, cosines, record.position_m.clone()]
+    };
+    Some(Candidate { sign, held_out, columns: Box::new(columns) })
 }
 
-fn summed(normals: &[Normal], out: Option<usize>) -> Normal {
-    let mut sum = Normal::default();
-    normals.iter().for_each(|normal| sum.add(normal, 1.0));
-    if let Some(normal) = out.and_then(|out| normals.get(out)) {
-        sum.add(normal, -1.0);
-    }
-    sum
+fn bend_p(records: &[FreeRecord], common: (f64, f64), degree: usize) -> f64 {
+    let factor = |record: &FreeRecord| {
+        let lower: Vec<Vec<f64>> = (1..degree).map(|d| legendre(&record.position_m, common, d)).collect();
+        record.factor(&legendre(&record.position_m, common, degree), &lower)
+    };
+    t_test(&records.iter().filter_map(factor).collect::<Vec<_>>())
 }
 
-fn best_of(table: &[Vec<Normal>], out: Option<usize>) -> Option<usize> {
-    let fall = |k: usize| summed(&table[k], out).solve().2;
-    (0..table.len()).filter(|&k| fall(k).is_finite()).max_by(|&a, &b| fall(a).total_cmp(&fall(b)))
-}
-
-/// Wavenumber of the largest fall by a parabola, and the weights there (interpolated between the nearest two).
-fn vertex(table: &[Vec<Normal>], wavenumbers: &[f64], out: Option<usize>) -> Option<(f64, f64, f64)> {
-    let best = best_of(table, out)?;
-    let at = |k: usize| summed(&table[k], out).solve();
-    let (a, b, peak) = at(best);
-    if best == 0 || best + 1 == table.len() || wavenumbers[best + 1] <= wavenumbers[best - 1] {
-        return Some((wavenumbers[best], a, b));
-    }
-    let (below, above) = (at(best - 1), at(best + 1));
-    let bend = below.2 - 2.0 * peak + above.2;
-    let offset = if bend < 0.0 { (0.5 * (below.2 - above.2) / bend).clamp(-1.0, 1.0) } else { 0.0 };
-    let (toward, share) = if offset >= 0.0 { (above, offset) } else { (below, -offset) };
-    let k = wavenumbers[best] + offset * 0.5 * (wavenumbers[best + 1] - wavenumbers[best - 1]);
-    Some((k, a + share * (toward.0 - a), b + share * (toward.1 - b)))
+/// What a fringe fitted to the records of the other parity takes off each record; its wavelength bounded, if `light` is given.
+pub(super) fn fringe_held_out(level: &FreeLevel, light: Option<(f64, f64)>) -> HeldOut {
+    let fits = [1, 0].map(|other| fit_fringe(level.half(other), light));
+    HeldOut::new(level, |parity, record| fits[parity].as_ref().map(|fit| fit.shape(&record.position_m)))
 }

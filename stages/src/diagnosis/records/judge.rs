@@ -41,8 +41,8 @@ impl Default for JudgeOptions {
 /// What the records show of causes that act on them rather than on the ringdown.
 ///
 /// # Method
-/// Clipping by the histogram's ends; slow lines by regression over the whole record; faster lines by periodograms of free stretches; then, with the
-/// slow lines taken out, the free level against the piezo's position. Each channel keeps its own false-alarm rate and corrects for all that it
+/// Clipping by the histogram's ends; slow lines by regression over the whole record; faster lines by periodograms; then, with the
+/// slow lines taken out, the free level against the piezo's position and the integral of what was measured before. Each channel keeps its own false-alarm rate and corrects for all that it
 /// looks at. Records are replicates and neighbouring frequencies the yardstick, so that 1/f noise, wander and unequal records don't feign a cause.
 /// # Shapes
 /// Records in order of time: even ones fit what odd ones judge, and the other way round.
@@ -55,20 +55,45 @@ impl Default for JudgeOptions {
 /// # Source
 /// Periodograms against their neighbours: D. J. Thomson, Proc. IEEE 70 (1982) 1055. Replicates: R. A. Fisher, The Design of Experiments, 1935.
 pub fn judge(records: &[RecordSummary], options: &JudgeOptions) -> Vec<RecordSign> {
-    let mut signs: Vec<RecordSign> = judge_clipping(records, options.false_alarm_rate).into_iter().collect();
-    let slow = slow_lines(records, options);
-    let mut lines = slow_signs(&slow, records.len());
-    let known: Vec<f64> = slow.iter().map(|line| line.frequency_hz.0).collect();
-    if let Some(fast) = judge_lines(records, &known, options) {
-        match lines.iter_mut().find(|sign| sign.id == fast.id) {
-            Some(sign) if sign.p_value <= fast.p_value => sign.evidence.push_str(&format!("; {}", fast.evidence)),
-            Some(sign) => *sign = fast,
-            None => lines.push(fast),
-        }
+    Begun::judge(records, options).finish(records, options)
+}
+
+/// A judgement that waits for the lever's resonances: all but the fast lines.
+#[derive(Debug, Clone)]
+pub struct Begun {
+    signs: Vec<RecordSign>,
+    slow: Vec<RecordSign>,
+    slow_hz: Vec<f64>,
+}
+
+impl Begun {
+    /// All channels but the fast lines; `options.resonances` is not looked at.
+    pub fn judge(records: &[RecordSummary], options: &JudgeOptions) -> Self {
+        let mut signs: Vec<RecordSign> = judge_clipping(records, options.false_alarm_rate).into_iter().collect();
+        let slow = slow_lines(records, options);
+        signs.extend(judge_position(records, &slow, options.false_alarm_rate));
+        let slow_hz = slow.iter().map(|line| line.frequency_hz.0).collect();
+        Self { signs, slow: slow_signs(&slow, records.len()), slow_hz }
     }
-    signs.extend(lines);
-    signs.extend(judge_position(records, &slow, options.false_alarm_rate));
-    signs
+
+    /// Corner of a coupling capacitor, Hz, if one was found.
+    pub fn coupling_hz(&self) -> Option<f64> {
+        self.signs.iter().find(|sign| sign.id == "ac-coupling")?.parameters.first()?.1.value
+    }
+
+    /// With the fast lines.
+    pub fn finish(self, records: &[RecordSummary], options: &JudgeOptions) -> Vec<RecordSign> {
+        let (mut signs, mut lines) = (self.signs, self.slow);
+        if let Some(fast) = judge_lines(records, &self.slow_hz, options) {
+            match lines.iter_mut().find(|sign| sign.id == fast.id) {
+                Some(sign) if sign.p_value <= fast.p_value => sign.evidence.push_str(&format!("; {}", fast.evidence)),
+                Some(sign) => *sign = fast,
+                None => lines.push(fast),
+            }
+        }
+        signs.extend(lines);
+        signs
+    }
 }
 
 /// What these records can't be asked, with the reason.
@@ -76,8 +101,7 @@ pub fn abstentions(records: &[RecordSummary]) -> Vec<Abstention> {
     let mut abstentions = cannot_judge(records);
     if records.iter().all(|record| record.spectra.is_none()) {
         let reason =
-            "no record has a free stretch of a sixteenth of its length without gaps: no periodogram for fast lines"
-                .to_owned();
+            "no record has a stretch of a sixth of its length without gaps: no periodogram for fast lines".to_owned();
         abstentions.push(Abstention { id: "spurious-line", reason });
     }
     if records.iter().all(|record| record.segments.is_empty()) {

@@ -1,4 +1,4 @@
-//! Lines in the free stretches, faster than the slow channel sees.
+//! Lines in free and loaded stretches, faster than the slow channel sees.
 
 use super::judge::JudgeOptions;
 use super::replicates::jackknife;
@@ -11,6 +11,9 @@ use super::yardstick::{Yardstick, of_many};
 const LOBE: usize = 1;
 /// Neighbours on either side that a line is compared with: beyond its lobe, nearer than the spectrum bends.
 const NEAR: (usize, usize) = (4, 11);
+/// Independent powers among the neighbours over those in the lobe. Hann's bins correlate by 4/9 and 1/36 at one and two bins: the mean of three has 0.537 of one
+/// bin's variance, that of two times eight 0.114.
+const NEIGHBOURS: f64 = 0.537 / 0.114;
 /// First bin looked at: below, the spectrum is too steep (and the slow channel sees it).
 const FIRST_BIN: usize = 12;
 /// Lines looked at before giving up: resonances among them are passed over.
@@ -35,7 +38,7 @@ struct Line {
 /// The strongest line that is none of a resonance's.
 ///
 /// # Method
-/// Per record the mean Hann periodogram of the free stretches before contact, over its median; averaged over records. Three bins against the
+/// Per record the mean Hann periodogram of its stretches, over its median; averaged over records, each as much as it has windows. Three bins against the
 /// sixteen at 4 to 11 bins on either side; the law of that ratio from all bins. A line is as narrow as the window: nothing is left two and three
 /// bins off, and at a quarter of the length its density falls to a quarter, while that of a resonance stays.
 pub(super) fn judge_lines(records: &[RecordSummary], slow_hz: &[f64], options: &JudgeOptions) -> Option<RecordSign> {
@@ -44,9 +47,10 @@ pub(super) fn judge_lines(records: &[RecordSummary], slow_hz: &[f64], options: &
     let short = archive.mean(|spectra| &spectra.short, |_| true);
     let ratios: Vec<f64> = (0..long.len()).map(|k| ratio(&long, k)).collect();
     let searched = FIRST_BIN..long.len().saturating_sub(NEAR.1 + 1);
-    let yardstick = Yardstick::new(ratios.get(searched.clone())?)?;
+    let yardstick = Yardstick::new(ratios.get(searched.clone())?, NEIGHBOURS)?;
     let of_short: Vec<f64> = (0..short.len()).map(|k| ratio(&short, k)).collect();
-    let yardstick_short = Yardstick::new(of_short.get(FIRST_BIN / 4..short.len().saturating_sub(NEAR.1 + 1))?)?;
+    let yardstick_short =
+        Yardstick::new(of_short.get(FIRST_BIN / 4..short.len().saturating_sub(NEAR.1 + 1))?, NEIGHBOURS)?;
     let mut order: Vec<usize> = searched.clone().filter(|&k| ratios[k].is_finite()).collect();
     order.sort_by(|&a, &b| ratios[b].total_cmp(&ratios[a]).then(a.cmp(&b)));
     let mut passed: Vec<usize> = Vec::new();
@@ -129,7 +133,8 @@ impl<'a> Archive<'a> {
         let commonest = keys.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?[0];
         let level = |spectra: &LineSpectra| {
             let mut bins: Vec<f64> = spectra.long.density.iter().map(|&d| f64::from(d)).collect();
-            crate::events::median(&mut bins)
+            // median over mean of a chi-square variable of two degrees for each window (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931) 684)
+            crate::events::median(&mut bins) / (1.0 - 1.0 / (9.0 * spectra.long.windows.max(1) as f64)).powi(3)
         };
         let same = records.iter().filter(|record| key(record) == Some(commonest)).filter_map(|r| r.spectra.as_ref());
         let (spectra, levels): (Vec<_>, Vec<_>) =
@@ -137,7 +142,7 @@ impl<'a> Archive<'a> {
         (!spectra.is_empty()).then_some(Self { spectra, levels, interval_s: f64::from_bits(commonest.1) })
     }
 
-    /// Mean over the chosen records of the spectra over their levels.
+    /// Mean over the chosen records' windows of the spectra over their levels.
     fn mean(&self, which: impl Fn(&LineSpectra) -> &Spectrum, wanted: impl Fn(usize) -> bool) -> Vec<f64> {
         let mut sum = Vec::new();
         let mut count = 0.0;
@@ -147,8 +152,10 @@ impl<'a> Archive<'a> {
             }
             let density = &which(spectra).density;
             sum.resize(density.len(), 0.0);
-            sum.iter_mut().zip(density).for_each(|(sum, d): (&mut f64, _)| *sum += f64::from(*d) / level);
-            count += 1.0;
+            // weights as the windows': otherwise a record of one window would lend the mean its heavy tail
+            let weight = which(spectra).windows as f64;
+            sum.iter_mut().zip(density).for_each(|(sum, d): (&mut f64, _)| *sum += weight * f64::from(*d) / level);
+            count += weight;
         }
         sum.iter_mut().for_each(|sum| *sum /= count);
         sum
@@ -204,21 +211,17 @@ impl<'a> Archive<'a> {
                 ("frequency_hz", value(frequency, errors.1, "Hz")),
             ],
             evidence: format!(
-                "a line at {frequency:.0} Hz in the free stretches, {:.1} times its neighbours and as narrow as the window at two lengths{}",
+                "a line at {frequency:.0} Hz in free and loaded stretches, {:.1} times its neighbours and as narrow as the window at two lengths{}",
                 line.ratio,
                 if others > 0 { format!("; {others} more of the kind") } else { String::new() }
             ),
-            gain: gain(
-                before,
-                after,
-                "free stretches of the other half of the records: amplitude from one half, phase free in each",
-            ),
+            gain: gain(before, after, "the other half of the records: amplitude from one half, phase free in each"),
             runner_up: None,
             tied: false,
         }
     }
 
-    /// Rms of free stretches, V, without and with the line: what the other half's amplitude, at a free phase, takes from (or, where it is too
+    /// Rms of all stretches, V, without and with the line: what the other half's amplitude, at a free phase, takes from (or, where it is too
     /// large, leaves in) the power at its bin.
     fn held_out(&self, k: usize) -> (f64, f64) {
         if self.spectra.len() < 2 {

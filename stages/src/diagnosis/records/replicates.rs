@@ -8,12 +8,29 @@ pub(super) fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
+/// A value of each record, and how much it counts.
+pub(super) type Weighted = (f64, f64);
+
+/// Most that a replicate may count, in medians of all weights: weights are a guess, and one record must not decide alone.
+const MOST_WEIGHT: f64 = 4.0;
+
+/// The same where the replicates' variances are as the inverse of their weights.
+pub(super) fn weighted_mean_and_error(values: &[Weighted]) -> (f64, f64) {
+    let mut weights: Vec<f64> = values.iter().map(|(_, weight)| *weight).collect();
+    let most = MOST_WEIGHT * crate::events::median(&mut weights);
+    let capped = || values.iter().map(|(value, weight)| (*value, weight.min(most)));
+    let sum: f64 = capped().map(|(_, w)| w).sum();
+    let mean = capped().map(|(v, w)| w * v).sum::<f64>() / sum;
+    let variance = capped().map(|(v, w)| w * (v - mean).powi(2)).sum::<f64>() / (values.len() as f64 - 1.0);
+    (mean, (variance / sum).sqrt())
+}
+
 /// Two-sided p-value of Student's t test that the mean of the replicates is zero; 1 where it can't be asked (fewer than three).
-pub(super) fn t_test(values: &[f64]) -> f64 {
+pub(super) fn t_test(values: &[Weighted]) -> f64 {
     if values.len() < 3 {
         return 1.0;
     }
-    let (mean, error) = mean_and_error(values);
+    let (mean, error) = weighted_mean_and_error(values);
     student_two_sided(mean / error, values.len() as f64 - 1.0)
 }
 
@@ -48,7 +65,7 @@ pub(super) fn jackknife(left_out: &[f64]) -> f64 {
 }
 
 /// Regularised incomplete beta function by Lentz's continued fraction (DLMF 8.17.22).
-fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
+pub(super) fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
     if x.is_nan() {
         return f64::NAN;
     }
@@ -107,7 +124,7 @@ mod tests {
         let exact = 1.0 - t / (2.0 + t * t).sqrt();
         assert!((student_two_sided(t, 2.0) / exact - 1.0).abs() < 1e-8);
         assert!((binomial_tail(8, 10, 0.5) - 56.0 / 1024.0).abs() < 1e-10);
-        assert_eq!(t_test(&[1.0, 1.1]), 1.0);
+        assert_eq!(t_test(&[(1.0, 1.0), (1.1, 1.0)]), 1.0);
     }
 
     #[test]

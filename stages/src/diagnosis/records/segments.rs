@@ -25,6 +25,8 @@ pub struct Segment {
     pub first: usize,
     /// Deflection, V.
     pub values: Vec<f64>,
+    /// Deflection summed up from the record's beginning to the middle of the block, V times blocks: what a coupling capacitor has taken up.
+    pub sums: Vec<f64>,
     /// Piezo position, m, smoothed by a polynomial in time: its noise would enter through the contact's steep slope.
     pub piezo: Option<Vec<f64>>,
 }
@@ -182,7 +184,13 @@ fn turn(track: &[f64]) -> Option<usize> {
 pub(super) fn segment(points: &Points, stretch: &Stretch) -> Segment {
     let range = stretch.start..stretch.end;
     let piezo = points.piezo.as_ref().map(|piezo| smooth(&piezo[range.clone()]));
-    Segment { kind: stretch.kind, first: stretch.start, values: points.values[range].to_vec(), piezo }
+    let before: f64 = points.values[..stretch.start].iter().sum();
+    let values = points.values[range].to_vec();
+    let sums = values.iter().scan(before, |sum, value| {
+        *sum += value;
+        Some(*sum - 0.5 * value)
+    });
+    Segment { kind: stretch.kind, first: stretch.start, sums: sums.collect(), values, piezo }
 }
 
 fn smooth(track: &[f64]) -> Vec<f64> {

@@ -77,7 +77,7 @@ fn strongest(slow: &[Option<SlowRecord>], options: &JudgeOptions) -> Option<Slow
     let grid: Vec<f64> = (3..count).map(|k| k as f64 * step).collect();
     let powers: Vec<f64> = grid.iter().map(|&f| mean_power(slow, f)).collect();
     let looks: Vec<Look> = grid.iter().filter_map(|&f| look(slow, &powers, &grid, f, step)).collect();
-    let yardstick = Yardstick::new(&looks.iter().map(|look| look.ratio).collect::<Vec<_>>())?;
+    let yardstick = Yardstick::new(&looks.iter().map(|look| look.ratio).collect::<Vec<_>>(), f64::INFINITY)?;
     let mains: Vec<(f64, usize)> =
         options.mains_hz.iter().flat_map(|&f| (1..=options.mains_orders).map(move |m| (f, m))).collect();
     let top = *grid.last()?;

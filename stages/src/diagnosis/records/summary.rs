@@ -47,7 +47,7 @@ pub struct RecordSummary {
     pub free: Vec<std::ops::Range<usize>>,
     /// Standard deviation of the samples about their block means where the lever is free, V; NaN if it never is.
     pub free_std: f64,
-    /// Periodograms of the free stretches before contact (of all free ones where these are too short).
+    /// Periodograms of all stretches, free and loaded.
     pub spectra: Option<LineSpectra>,
     /// The ends of the histogram of its values.
     pub extremes: Extremes,
@@ -57,7 +57,7 @@ pub struct RecordSummary {
 ///
 /// # Method
 /// A thousand block means of deflection and piezo. Events divide them into free and loaded stretches; the ringing after a rupture is left out as
-/// long as the blocks' variance shows it, and as long again. Hann periodograms of the free stretches at two lengths; the five extreme values at
+/// long as the blocks' variance shows it, and as long again. Hann periodograms of all stretches at two lengths; the five extreme values at
 /// either end with their counts.
 /// # Shapes
 /// As many piezo samples as deflection samples.
@@ -77,10 +77,10 @@ pub fn summarise(record: &RecordInput) -> Result<RecordSummary, RecordError> {
         let kept = stretches.iter().filter(|stretch| wanted.contains(&stretch.kind));
         kept.map(|stretch| stretch.start * points.step..stretch.end * points.step).collect()
     };
-    let approach = in_samples(&[SegmentKind::Approach]);
     let free = in_samples(&[SegmentKind::Approach, SegmentKind::Retract]);
-    let spectra = line_spectra(record.deflection, &approach, record.interval_s)
-        .or_else(|| line_spectra(record.deflection, &free, record.interval_s));
+    // a foreign line is there in contact as well
+    let all = in_samples(&[SegmentKind::Approach, SegmentKind::Contact, SegmentKind::Retract]);
+    let spectra = line_spectra(record.deflection, &all, record.interval_s);
     let quiet: Vec<f64> = stretches
         .iter()
         .filter(|stretch| stretch.kind != SegmentKind::Contact)

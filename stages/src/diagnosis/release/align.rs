@@ -5,6 +5,7 @@ use super::change::changed;
 use super::lever::{Lever, LeverMode};
 use super::problem::Problem;
 use super::state::State;
+use super::stepper::Pace;
 use crate::model::ModelError;
 use crate::model::ringdown::Exponential;
 
@@ -20,7 +21,7 @@ pub fn aligned(problem: &Problem<'_>, state: &mut State, starts: &mut [usize]) -
     before.hypotheses.pop();
     let whitener = problem.whitener();
     let basis = Basis::new(&state.lever, problem.cut, &whitener);
-    let both = changed(problem, &whitener, state, &[before.effects(), state.effects()]);
+    let both = changed(problem, &whitener, state, &[before.effects(), state.effects()], Pace::FINE);
     let (count, first_pole) = (state.lever.modes.len(), state.lever.modes.first().map(LeverMode::pole));
     let mut shrunk = vec![0.0; count];
     for (own, sets) in state.events.iter_mut().zip(&both) {

@@ -12,8 +12,15 @@ use crate::diagnosis::verdict::{DiagnosedMode, Diagnosis, NamedCause, Rung, Runn
 
 /// Puts shapes and whole records together.
 ///
-/// What records show is named whatever the shapes say, unless those end without a name: `unexplained` names nothing.
-pub fn answer(problem: &Problem<'_>, naming: &Naming, records: &[RecordSign], false_alarm_rate: f64) -> Diagnosis {
+/// What records show is named whatever the shapes say, unless those end without a name: `unexplained` names nothing. It is the verdict as well where records
+/// show what may not be named (`left_out`).
+pub fn answer(
+    problem: &Problem<'_>,
+    naming: &Naming,
+    records: &[RecordSign],
+    left_out: &[RecordSign],
+    false_alarm_rate: f64,
+) -> Diagnosis {
     let mut evidence: Vec<String> = Vec::new();
     let modes = modes_of(&naming.fits[0]);
     let tiles = &naming.tiles[0];
@@ -26,8 +33,9 @@ pub fn answer(problem: &Problem<'_>, naming: &Naming, records: &[RecordSign], fa
     };
     evidence.extend(naming.named.iter().map(score));
     evidence.extend(naming.evidence.iter().cloned());
-    evidence.extend(records.iter().map(|sign| sign.evidence.clone()));
+    evidence.extend(records.iter().chain(left_out).map(|sign| sign.evidence.clone()));
     let verdict = match naming.verdict {
+        _ if !left_out.is_empty() => Verdict::Unexplained,
         Verdict::Clean if !records.is_empty() => Verdict::Named,
         verdict => verdict,
     };
@@ -38,7 +46,7 @@ pub fn answer(problem: &Problem<'_>, naming: &Naming, records: &[RecordSign], fa
     }
     let last = naming.fits.last().unwrap_or(&naming.fits[0]);
     let p_shape = naming.first_p_value;
-    let p_value = records.iter().map(|sign| sign.p_value).fold(p_shape, f64::min);
+    let p_value = records.iter().chain(left_out).map(|sign| sign.p_value).fold(p_shape, f64::min);
     Diagnosis {
         verdict,
         p_value: Some(p_value.clamp(0.0, 1.0)),

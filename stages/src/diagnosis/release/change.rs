@@ -5,9 +5,9 @@ use rayon::prelude::*;
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::{Hold, Hypothesis, State};
-use super::stepper::differences;
+use super::stepper::{Pace, differences};
 use crate::causes::Effects;
-use crate::model::ringdown::internals::Whitener;
+use crate::model::ringdown::internals::{LANES, Whitener};
 
 /// Relative step of a cause's parameter in a difference quotient, of its value or of a trial's.
 const STEP: f64 = 1e-3;
@@ -19,17 +19,34 @@ const ONSET_STEP: f64 = 1e-2;
 const STALE: [f64; 2] = [0.02, 0.3];
 
 /// What each set of effects changes in each event, whitened: by event.
-pub(super) fn changed(problem: &Problem<'_>, whitener: &Whitener, state: &State, sets: &[Effects]) -> Vec<Signals> {
+pub(super) fn changed(
+    problem: &Problem<'_>,
+    whitener: &Whitener,
+    state: &State,
+    sets: &[Effects],
+    pace: Pace,
+) -> Vec<Signals> {
+    let together = sets.len() < LANES;
     let one = |event: usize| {
         let (own, instant) = (&state.events[event], problem.windows[event].first);
         let release = problem.release(own);
         let sets = sets.iter().map(|effects| (effects, release, effects.frequency_change(&instant)));
         let mut out = Signals::with_capacity(problem.cut.samples, sets.len());
-        differences(&state.lever, sets).iter().for_each(|signal| out.push(signal));
-        out.whiten(whitener);
+        differences(&state.lever, sets, pace).iter().for_each(|signal| out.push(signal));
+        if !together {
+            out.whiten(whitener);
+        }
         out
     };
-    (0..state.events.len()).into_par_iter().map(one).collect()
+    let events: Vec<Signals> = (0..state.events.len()).into_par_iter().map(one).collect();
+    if !together {
+        return events;
+    }
+    // the filter takes many at a time
+    let mut all = Signals::with_capacity(problem.cut.samples, events.len() * sets.len());
+    events.iter().for_each(|event| (0..event.count()).for_each(|i| all.push(event.get(i))));
+    all.whiten(whitener);
+    all.split(sets.len())
 }
 
 /// What the hypotheses change as they are: one signal per event, none where there are no hypotheses.
@@ -37,7 +54,9 @@ pub(super) fn base(problem: &Problem<'_>, whitener: &Whitener, state: &State) ->
     let count = if state.hypotheses.is_empty() { 0 } else { state.events.len() };
     let mut out = Signals::with_capacity(problem.cut.samples, count);
     if count > 0 {
-        changed(problem, whitener, state, &[state.effects()]).iter().for_each(|event| out.push(event.get(0)));
+        changed(problem, whitener, state, &[state.effects()], Pace::FINE)
+            .iter()
+            .for_each(|event| out.push(event.get(0)));
     }
     out
 }
@@ -98,7 +117,7 @@ fn with_causes(problem: &Problem<'_>, whitener: &Whitener, state: &State) -> Vec
     if steps.is_empty() {
         return Vec::new();
     }
-    let mut all = changed(problem, whitener, state, &sets);
+    let mut all = changed(problem, whitener, state, &sets, Pace::FINE);
     all.par_iter_mut().for_each(|event| event.quotients(&steps));
     all
 }
@@ -126,7 +145,9 @@ fn with_the_rest(problem: &Problem<'_>, whitener: &Whitener, state: &State) -> (
     // a change of frequency is each event's own, and what it moves of these derivatives is small
     let signals: Vec<Vec<f64>> = runs
         .par_iter()
-        .map(|(lever, release)| differences(lever, std::iter::once((&effects, *release, 0.0))).swap_remove(0))
+        .map(|(lever, release)| {
+            differences(lever, std::iter::once((&effects, *release, 0.0)), Pace::FINE).swap_remove(0)
+        })
         .collect();
     let mut all = Signals::with_capacity(problem.cut.samples, signals.len());
     signals.iter().for_each(|signal| all.push(signal));

@@ -26,12 +26,14 @@ pub struct JointFit {
     pub cost: f64,
     /// Whether the last step was small.
     pub converged: bool,
+    /// Trial steps that were spent.
+    pub evaluations: usize,
     /// Parameters of causes that ended at a limit: cause and parameter.
     pub at_limit: Vec<(usize, usize)>,
 }
 
 /// Most trial steps of a fit: what has not arrived by then has no likelihood worth the time.
-const EVALUATIONS: usize = 40;
+pub(super) const EVALUATIONS: usize = 40;
 /// Fall of the cost that ends the search.
 const ARRIVED: f64 = 0.05;
 /// Distance from the basis' lever beyond which the basis is made anew, and beyond which a step is not believed.
@@ -150,6 +152,17 @@ impl Linear {
 /// # Source
 /// D. W. Marquardt, J. Soc. Indust. Appl. Math. 11 (1963) 431.
 pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) -> Result<JointFit, ModelError> {
+    fit_within(problem, state, starts, hold, EVALUATIONS)
+}
+
+/// The same with a limit of trial steps.
+pub(super) fn fit_within(
+    problem: &Problem<'_>,
+    state: State,
+    starts: Vec<usize>,
+    hold: Hold,
+    most: usize,
+) -> Result<JointFit, ModelError> {
     let whitener = problem.whitener();
     let (mut state, mut starts) = (state, starts);
     let mut frame = Frame::new(problem, &whitener, &mut state, &mut starts)?;
@@ -175,7 +188,7 @@ pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) 
         if step.promised < ARRIVED {
             break true;
         }
-        if evaluations == EVALUATIONS || damping > DAMPING[3] {
+        if evaluations >= most || damping > DAMPING[3] {
             break false;
         }
         evaluations += 1;
@@ -207,6 +220,7 @@ pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) 
         costs: point.costs,
         cost: point.cost,
         converged,
+        evaluations,
         at_limit,
     })
 }

@@ -9,6 +9,8 @@ const LEAST_QUALITY: f64 = 3.0;
 const LEAST_RATIO: f64 = 1.25;
 /// By how much a highest mode's share, or its thermal motion, may lie below the power law of those under it.
 const BELOW_THE_LAW: f64 = 5.0;
+/// Part of the quality factor under it below which a highest one without thermal motion is an edge of the detector, not a mode.
+const LEAST_QUALITY_SHARE: f64 = 0.25;
 /// Most resonances that are sorted out exhaustively.
 const MOST: usize = 12;
 
@@ -19,7 +21,7 @@ const MOST: usize = 12;
 /// as somewhat less). What rings out of that order, or close beside a stronger one, is something else: torsion, holder, a cause.
 /// # Method
 /// The largest set that holds the strongest resonance as its lowest and whose shares fall; then, from the third on, while the highest is far below the
-/// power law of the others, it is taken off; unless its thermal motion is not: a slow rupture weakens the high modes, and
+/// power law of the others, or decays much faster than they do, it is taken off; unless its thermal motion is not: a slow rupture weakens the high modes, and
 /// leaves that. Shares as the nominal detector shows them; `thermal` has the variances of the oscillating exponentials, in their order.
 pub(super) fn lever_modes(
     exponentials: &[Exponential],
@@ -42,15 +44,22 @@ pub(super) fn lever_modes(
         number.and_then(|number| thermal.get(number)).copied().unwrap_or(0.0)
     };
     let modes = lever.modes.iter().zip(&places);
-    let seen: Vec<Seen> =
-        modes.map(|(mode, &i)| Seen { omega: mode.omega, share: mode.share, motion: motion(i) }).collect();
+    let seen: Vec<Seen> = modes
+        .map(|(mode, &i)| Seen {
+            omega: mode.omega,
+            quality_factor: mode.quality_factor,
+            share: mode.share,
+            motion: motion(i),
+        })
+        .collect();
     in_order(&seen).into_iter().map(|i| places[i]).collect()
 }
 
-/// A resonance: angular frequency, share of the static response, variance of its thermal motion.
+/// A resonance: angular frequency, quality factor, share of the static response, variance of its thermal motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Seen {
     omega: f64,
+    quality_factor: f64,
     share: f64,
     motion: f64,
 }
@@ -78,6 +87,12 @@ fn in_order(seen: &[Seen]) -> Vec<usize> {
     let far_below = |kept: &[usize], size: fn(&Seen) -> f64| {
         below_the_law(&kept.iter().map(|&i| (seen[i].omega, size(&seen[i]))).collect::<Vec<_>>())
     };
+    while let &[.., before, last] = kept.as_slice()
+        && seen[last].motion == 0.0
+        && seen[last].quality_factor < LEAST_QUALITY_SHARE * seen[before].quality_factor
+    {
+        kept.pop();
+    }
     while kept.len() > 2 && far_below(&kept, |s| s.share) && far_below(&kept, |s| s.motion) {
         kept.pop();
     }
@@ -107,12 +122,26 @@ mod tests {
             .iter()
             .map(|&(omega, share)| Seen {
                 omega,
+                quality_factor: 100.0,
                 share,
                 motion: if still.contains(&omega) { 0.0 } else { share * share },
             })
             .collect();
         seen.sort_by(|a, b| a.omega.total_cmp(&b.omega));
         in_order(&seen).into_iter().map(|i| seen[i].omega).collect()
+    }
+
+    #[test]
+    fn an_edge_above_the_modes_is_no_mode() {
+        let mut seen: Vec<Seen> = PAPER
+            .iter()
+            .map(|&(omega, share)| Seen { omega, quality_factor: 2.0 * omega, share, motion: share * share })
+            .collect();
+        seen.push(Seen { omega: 1358.0, quality_factor: 19.0, share: 0.005, motion: 0.0 });
+        assert_eq!(in_order(&seen), vec![0, 1, 2, 3]);
+        // what is in thermal motion is a mode, however damped
+        seen[4].motion = 1e-5;
+        assert_eq!(in_order(&seen).len(), 5);
     }
 
     fn beside_the_paper(extra: (f64, f64)) -> Vec<f64> {
@@ -142,7 +171,8 @@ mod tests {
 
     #[test]
     fn a_mode_that_a_slow_rupture_weakens_is_the_levers_by_its_thermal_motion() {
-        let mut weakened = PAPER.map(|(omega, share)| Seen { omega, share, motion: share * share });
+        let mut weakened =
+            PAPER.map(|(omega, share)| Seen { omega, quality_factor: 100.0, share, motion: share * share });
         weakened[3].share *= 0.05;
         assert_eq!(in_order(&weakened).len(), 4);
     }

@@ -31,7 +31,7 @@ pub use screen::{Screen, Sign, screen};
 pub use search::{Named, Naming, NamingOptions, name_causes, scene};
 pub use start::{Start, start};
 pub use state::{Hold, Hypothesis, State};
-pub use stepper::{Release, differences};
+pub use stepper::{Pace, Release, differences};
 pub use story::{Story, story};
 pub use story_events::EventStory;
 pub use story_spectra::MeanSpectra;

@@ -5,7 +5,7 @@ use realfft::RealFftPlanner;
 
 use super::problem::Problem;
 use super::state::State;
-use super::stepper::differences;
+use super::stepper::{Pace, differences};
 use crate::calibration::chi_square_tail;
 use crate::model::ringdown::internals::{LANES, Whitener, signal};
 
@@ -26,7 +26,7 @@ pub fn residuals(problem: &Problem<'_>, state: &State, starts: &[usize]) -> Vec<
         if !state.hypotheses.is_empty() {
             let release = problem.release(own);
             let moved = effects.frequency_change(&window.first);
-            let change = differences(&state.lever, std::iter::once((&effects, release, moved)));
+            let change = differences(&state.lever, std::iter::once((&effects, release, moved)), Pace::FINE);
             modelled.iter_mut().zip(change.iter().flatten()).for_each(|(m, c)| *m += c);
         }
         let line = |k: usize| own.offset + own.slope * (k as f64 - centre) / centre;

@@ -13,6 +13,7 @@ use super::normal::{Crossed, Event, eliminate};
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::Hold;
+use super::stepper::Pace;
 use crate::calibration::normal_two_sided;
 use crate::causes::{Cause, Effects, Scene};
 use crate::model::ModelError;
@@ -79,7 +80,7 @@ pub fn screen(
         cause.add(values, &mut effects);
         effects
     }));
-    let mut changes = changed(problem, &linear.whitener, state, &sets);
+    let mut changes = changed(problem, &linear.whitener, state, &sets, Pace::COARSE);
     let strengths: Vec<f64> = trials.iter().map(|(_, values)| values[0]).collect();
     changes.par_iter_mut().for_each(|event| event.quotients(&strengths));
     let crossed = Crossed::of(&linear.basis, &linear.slopes);

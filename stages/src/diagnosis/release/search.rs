@@ -1,7 +1,7 @@
 //! From signs to names: refits, held-out events, and when to abstain.
 
 use super::align::aligned;
-use super::joint::{JointFit, fit};
+use super::joint::{EVALUATIONS, JointFit, fit, fit_within};
 use super::problem::Problem;
 use super::residuals::{Tile, common, peaks, residuals, tiles, whitened};
 use super::screen::{Screen, Sign, screen};
@@ -28,7 +28,7 @@ pub struct NamingOptions {
 
 impl Default for NamingOptions {
     fn default() -> Self {
-        Self { false_alarm_rate: 0.01, without: Vec::new(), most: 4, refits: 3, seed: 1 }
+        Self { false_alarm_rate: 0.01, without: Vec::new(), most: 4, refits: 5, seed: 1 }
     }
 }
 
@@ -149,22 +149,29 @@ pub fn name_causes(
         if last_screen.p_value >= options.false_alarm_rate || named.len() == options.most {
             break;
         }
-        let trials = refits(problem, base, &clean, &last_screen.signs, options.refits);
+        let mut trials = refits(problem, base, &clean, &last_screen.signs, options.refits);
+        if redone < REDONE
+            && let Some(best) = trials.first()
+            && best.beyond_promise(base)
+            && let Some(better) = refitted(problem, base, best)
+        {
+            // the base had not arrived: what a candidate gained was in part its own
+            redone += 1;
+            let own = base.cost - better.cost;
+            let most_of_it = own > OWN * (base.cost - best.fitted.cost);
+            trials.iter_mut().for_each(|trial| trial.gain -= own);
+            let last = fits.len() - 1;
+            fits[last] = better;
+            if most_of_it {
+                continue;
+            }
+        }
+        let base = &fits[fits.len() - 1];
         let Some(best) = trials.first() else {
             verdict = Verdict::Unexplained;
             evidence.push("signs of a cause, but no candidate could be fitted".into());
             break;
         };
-        if redone < REDONE
-            && best.beyond_promise(base)
-            && let Some(better) = refitted(problem, base, best)
-        {
-            // the base had not arrived: what a candidate gained was its own
-            redone += 1;
-            let last = fits.len() - 1;
-            fits[last] = better;
-            continue;
-        }
         let rival = trials.iter().find(|t| !same_class(t.cause, best.cause));
         let share = |t: &Trial| (best.gain > 0.0).then(|| (t.gain / best.gain).clamp(0.0, 1.0));
         let runner_up = rival.map(|t| RunnerUp { id: t.cause.about().id.into(), share_of_gain: share(t) });
@@ -333,14 +340,24 @@ impl Trial {
 fn refitted(problem: &Problem<'_>, base: &JointFit, trial: &Trial) -> Option<JointFit> {
     let mut state = trial.fitted.state.clone();
     state.hypotheses.pop();
-    let better = fit(problem, state, trial.fitted.starts.clone(), Hold::Nothing).ok()?;
+    let better = fit_within(problem, state, trial.fitted.starts.clone(), Hold::Nothing, 3 * LOOK).ok()?;
     (better.cost < base.cost - BETTER).then_some(better)
 }
 
+/// Share of a candidate's gain that a base fitted anew must bring for all to begin anew.
+const OWN: f64 = 0.3;
 /// Fall of the cost that makes a base a better one.
 const BETTER: f64 = 2.0;
 
+/// Trial steps after which a candidate's fit is looked at: who leads goes on.
+const LOOK: usize = 6;
+/// Share of the leader's gain below which a rival is not fitted any further.
+const HOPELESS: f64 = 0.5;
+
 /// The strongest candidates fitted from the present fit, best first.
+///
+/// Every candidate has some steps; then the leader goes on until it has arrived and its nearest rival of another class twice as far, so that candidates
+/// that do not fit cost little.
 fn refits(
     problem: &Problem<'_>,
     base: &JointFit,
@@ -348,7 +365,6 @@ fn refits(
     signs: &[Sign],
     count: usize,
 ) -> Vec<Trial> {
-    let samples = (base.state.events.len() * problem.cut.samples) as f64;
     let mut chosen: Vec<&Sign> = Vec::new();
     for sign in signs.iter().filter(|s| s.gain > 0.0) {
         // members of one class are one signal
@@ -356,38 +372,71 @@ fn refits(
             chosen.push(sign);
         }
     }
-    let mut trials: Vec<Trial> = chosen
-        .into_iter()
-        .take(count)
-        .filter_map(|sign| {
-            let hypothesis = Hypothesis { cause: sign.cause, values: sign.values.clone() };
-            let from = |lever: &State, starts: &[usize]| {
-                let mut state = lever.clone();
-                state.hypotheses = base.state.hypotheses.clone();
-                state.hypotheses.push(hypothesis.clone());
-                let mut starts = starts.to_vec();
-                aligned(problem, &mut state, &mut starts).ok()?;
-                fit(problem, state, starts, Hold::Nothing).ok()
-            };
-            let mut fitted = from(&base.state, &base.starts);
-            // a baseline that did not arrive has bent to the misfit: begin where free exponentials did
-            if !base.converged || fitted.as_ref().is_none_or(|f| !f.converged) {
-                fitted = fitted.into_iter().chain(from(&clean.0, &clean.1)).min_by(|a, b| a.cost.total_cmp(&b.cost));
-            }
-            let fitted = fitted?;
-            let paid = PENALTY * samples.ln() * sign.values.len() as f64;
-            Some(Trial {
-                cause: sign.cause,
-                score: sign.z,
-                promised: sign.gain,
-                gain: base.cost - fitted.cost - paid,
-                fitted,
-            })
-        })
-        .collect();
-    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    trials
+    let mut trials: Vec<Trial> =
+        chosen.into_iter().take(count).filter_map(|sign| Trial::begin(problem, base, clean, sign)).collect();
+    loop {
+        trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let Some(leader) = trials.first() else { return trials };
+        let (own, bar) = (leader.cause, HOPELESS * leader.gain);
+        let behind = |t: &&mut Trial| !same_class(t.cause, own);
+        let goes_on = match trials.first_mut() {
+            Some(leader) if leader.can_go_on(EVALUATIONS) => leader.go_on(problem, base),
+            _ => match trials.iter_mut().find(behind) {
+                Some(rival) if rival.gain > bar && rival.can_go_on(4 * LOOK) => rival.go_on(problem, base),
+                _ => false,
+            },
+        };
+        if !goes_on {
+            return trials;
+        }
+    }
 }
+
+impl Trial {
+    /// The first steps of a candidate, from the present fit and, where that has not arrived, from where free exponentials did.
+    fn begin(problem: &Problem<'_>, base: &JointFit, clean: &(State, Vec<usize>), sign: &Sign) -> Option<Self> {
+        let hypothesis = Hypothesis { cause: sign.cause, values: sign.values.clone() };
+        let from = |lever: &State, starts: &[usize]| {
+            let mut state = lever.clone();
+            state.hypotheses = base.state.hypotheses.clone();
+            state.hypotheses.push(hypothesis.clone());
+            let mut starts = starts.to_vec();
+            aligned(problem, &mut state, &mut starts).ok()?;
+            fit_within(problem, state, starts, Hold::Nothing, LOOK).ok()
+        };
+        let mut fitted = from(&base.state, &base.starts);
+        // a baseline that did not arrive has bent to the misfit
+        if !base.converged || fitted.as_ref().is_none_or(|f| !f.converged) {
+            fitted = fitted.into_iter().chain(from(&clean.0, &clean.1)).min_by(|a, b| a.cost.total_cmp(&b.cost));
+        }
+        let mut trial = Self { cause: sign.cause, score: sign.z, promised: sign.gain, gain: 0.0, fitted: fitted? };
+        trial.weigh(problem, base);
+        Some(trial)
+    }
+
+    fn can_go_on(&self, most: usize) -> bool {
+        !self.fitted.converged && self.fitted.evaluations < most
+    }
+
+    /// Some steps more; whether they could be made.
+    fn go_on(&mut self, problem: &Problem<'_>, base: &JointFit) -> bool {
+        let (state, starts) = (self.fitted.state.clone(), self.fitted.starts.clone());
+        let Ok(further) = fit_within(problem, state, starts, Hold::Nothing, LOOK) else { return false };
+        let spent = self.fitted.evaluations + further.evaluations.max(1);
+        self.fitted = JointFit { evaluations: spent, ..further };
+        self.weigh(problem, base);
+        true
+    }
+
+    fn weigh(&mut self, problem: &Problem<'_>, base: &JointFit) {
+        let samples = (base.state.events.len() * problem.cut.samples) as f64;
+        let parameters = self.fitted.state.hypotheses.last().map_or(0, |h| h.values.len());
+        self.gain = base.cost - self.fitted.cost - PENALTY * samples.ln() * parameters as f64;
+    }
+}
+
+/// Trial steps of a half, which begins where the whole ended.
+const HALF: usize = 8;
 
 /// Two halves of the events, each fitted alone and judged on the other.
 struct Halves<'a> {
@@ -434,7 +483,7 @@ impl<'a> Halves<'a> {
     /// Fits `fitted`'s model to one half, then the other half's own parameters under it.
     fn judged(&self, fitted: &JointFit, half: usize) -> Option<(f64, Vec<f64>)> {
         let (state, starts) = self.state(fitted, half);
-        let trained = fit(&self.part(half), state, starts, Hold::Nothing).ok()?;
+        let trained = fit_within(&self.part(half), state, starts, Hold::Nothing, HALF).ok()?;
         let other = 1 - half;
         let (mut state, starts) = self.state(fitted, other);
         state.lever = trained.state.lever;

@@ -33,6 +33,12 @@ impl Signals {
         &mut self.values[index * self.samples..(index + 1) * self.samples]
     }
 
+    /// Parts of so many signals each.
+    pub fn split(self, count: usize) -> Vec<Self> {
+        let parts = self.values.chunks((count * self.samples).max(1));
+        parts.map(|part| Self { samples: self.samples, values: part.to_vec() }).collect()
+    }
+
     pub fn matrix(&self) -> MatRef<'_, f64> {
         MatRef::from_column_major_slice(&self.values, self.samples, self.count())
     }
