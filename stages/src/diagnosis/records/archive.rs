@@ -23,6 +23,8 @@ pub(super) struct Archive {
     pub crosstalk: f64,
     /// Amplitude, V, and wavelength, m.
     pub fringe: (f64, f64),
+    /// Corner of a coupling capacitor, Hz; 0 for none.
+    pub coupling_hz: f64,
     /// Largest absolute volt; 0 for no limit.
     pub limit: f64,
     pub snap_ins_given: bool,
@@ -35,6 +37,7 @@ impl Archive {
         line: (0.0, 0.0),
         crosstalk: 0.0,
         fringe: (0.0, 0.0),
+        coupling_hz: 0.0,
         limit: 0.0,
         snap_ins_given: true,
     };
@@ -91,6 +94,9 @@ impl Archive {
             .map(|k| 2f64.powi(k))
             .map(|t| ((-1.0 / t).exp(), (1.0 - (-2.0 / t).exp()).sqrt(), normal(rng)))
             .collect();
+        // what the capacitor has taken up; it has forgotten all that was before the record but for the free level
+        let mut taken = level;
+        let keep = (-std::f64::consts::TAU * self.coupling_hz * self.interval_s()).exp();
         let (mut deflection, mut piezo) = (Vec::with_capacity(self.samples), Vec::with_capacity(self.samples));
         for k in 0..self.samples {
             let k = k as f64;
@@ -117,6 +123,12 @@ impl Archive {
                     0.0
                 };
             let volts = level + drift * k / n + lever + noise + hidden;
+            let volts = if self.coupling_hz > 0.0 {
+                taken = volts + keep * (taken - volts);
+                volts - taken
+            } else {
+                volts
+            };
             let volts = if self.limit > 0.0 { volts.clamp(-self.limit, self.limit) } else { volts };
             deflection.push((volts / CODE_V).round() * CODE_V);
             piezo.push(((z + 2.4e-10 * normal(rng)) / 2.4e-10).round() * 2.4e-10);

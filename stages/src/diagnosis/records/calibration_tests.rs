@@ -48,6 +48,16 @@ fn a_hidden_fringe_is_named_with_its_wavelength() {
 }
 
 #[test]
+fn a_hidden_capacitor_is_named_with_its_corner_and_not_for_a_fringe() {
+    let coupled = Archive { coupling_hz: 1.0, ..Archive::CLEAN };
+    finds(coupled, "ac-coupling", "corner_hz", 1.0);
+    for seed in 0..4 {
+        let named: Vec<&str> = signs(&coupled, seed).iter().map(|sign| sign.id).collect();
+        assert!(!named.contains(&"interference-fringe") && !named.contains(&"piezo-crosstalk"), "{named:?}");
+    }
+}
+
+#[test]
 fn a_hidden_limit_is_named_with_its_level() {
     finds(Archive { limit: 0.7, ..Archive::CLEAN }, "clipping", "limit_v", 0.7);
 }

@@ -20,6 +20,8 @@ pub(super) struct FreeRecord {
     pub position_m: Vec<f64>,
     /// Deflection summed up since the record's beginning, V s.
     pub integral_vs: Vec<f64>,
+    /// Time since the record's beginning, s.
+    pub time_s: Vec<f64>,
     /// Deflection, V, less what the nuisances explain.
     pub left_v: Vec<f64>,
     /// An offset for each stretch, slow lines, what was found before; a drift in time where it can be told from the position.
@@ -50,13 +52,12 @@ impl FreeLevel {
     /// Of all records, with the slow lines as nuisances.
     pub fn new(records: &[RecordSummary], slow: &[SlowLine]) -> Self {
         let known: Vec<f64> = slow.iter().map(|line| line.frequency_hz.0).collect();
-        let parts: Vec<(FreeRecord, Vec<f64>)> =
-            records.iter().filter_map(|record| FreeRecord::new(record, &known)).collect();
+        let parts: Vec<FreeRecord> = records.iter().filter_map(|record| FreeRecord::new(record, &known)).collect();
         let both = |record: &FreeRecord| record.contrast >= LEAST_CONTRAST;
-        let two_way = parts.iter().filter(|(record, _)| both(record)).count() >= FEWEST_RECORDS;
-        let settled = parts.into_iter().filter(|(record, _)| !two_way || both(record)).map(|(mut record, time)| {
+        let two_way = parts.iter().filter(|record| both(record)).count() >= FEWEST_RECORDS;
+        let settled = parts.into_iter().filter(|record| !two_way || both(record)).map(|mut record| {
             if two_way {
-                record.explain(time);
+                record.explain(record.time_s.clone());
             }
             record
         });
@@ -86,8 +87,7 @@ impl FreeLevel {
 }
 
 impl FreeRecord {
-    /// And the time of its blocks, s.
-    fn new(record: &RecordSummary, known_hz: &[f64]) -> Option<(Self, Vec<f64>)> {
+    fn new(record: &RecordSummary, known_hz: &[f64]) -> Option<Self> {
         let (mut position_m, mut integral_vs, mut deflection, mut time, mut stretches) =
             (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for segment in record.segments.iter().filter(|segment| segment.kind != SegmentKind::Contact) {
@@ -112,8 +112,8 @@ impl FreeRecord {
             nuisance.push(time.iter().map(|t| phase(t).1).collect());
         }
         let left_v = nuisance.residual(&deflection);
-        let one = Self { position_m, integral_vs, left_v, nuisance, stretches, contrast };
-        (contrast.is_finite() && one.left_v.len() > FEWEST_BLOCKS).then_some((one, time))
+        let one = Self { position_m, integral_vs, time_s: time, left_v, nuisance, stretches, contrast };
+        (contrast.is_finite() && one.left_v.len() > FEWEST_BLOCKS).then_some(one)
     }
 
     /// Takes a column for a nuisance.

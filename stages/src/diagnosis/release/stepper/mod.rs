@@ -152,3 +152,81 @@ fn lengthened(rotations: &[[f64; 4]]) -> Vec<[f64; 4]> {
     let square = |[a, b, c, d]: &[f64; 4]| [a * a + b * c, a * b + b * d, c * a + d * c, c * b + d * d];
     rotations.iter().map(square).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::causes::{LinearSection, find};
+    use crate::diagnosis::release::LeverMode;
+    use crate::model::ringdown::internals::signal;
+
+    fn lever() -> Lever {
+        let modes = [(47e3, 50.0, 0.9), (250e3, 200.0, 0.08), (580e3, 450.0, 0.02)];
+        let mode = |(f, quality_factor, share)| LeverMode { omega: std::f64::consts::TAU * f, quality_factor, share };
+        Lever { modes: modes.map(mode).to_vec(), poles: [1.3e6, 1.9e6].map(|f| std::f64::consts::TAU * f).to_vec() }
+    }
+
+    fn release() -> Release {
+        Release { amplitude: 0.8, lead_s: 1.3e-7, before: 16, samples: 3000, interval_s: 2e-7 }
+    }
+
+    fn largest(signal: &[f64]) -> f64 {
+        signal.iter().fold(0.0, |most, v| most.max(v.abs()))
+    }
+
+    fn apart(a: &[f64], b: &[f64]) -> f64 {
+        largest(&a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_release_with_nothing_hidden_is_the_closed_form() {
+        let (lever, release) = (lever(), release());
+        let stepped = run(&lever, &Effects::default(), &release, Pace::FINE);
+        let own = EventParameters { amplitude: 0.8, onset_s: -release.lead_s, offset: 0.0, slope: 0.0 };
+        let exact = signal(&lever.release(), &own, release.interval_s, release.samples - release.before);
+        // lags follow cubics through values and rates: (w h)^4 / 384 of the fastest mode at a quarter and a half of a sample
+        assert!(
+            apart(&stepped[release.before..], &exact) < 2e-6 * 0.8,
+            "{}",
+            apart(&stepped[release.before..], &exact)
+        );
+        assert!(stepped[..release.before].iter().all(|v| (v + 0.8).abs() < 1e-12));
+    }
+
+    #[test]
+    fn what_rings_freely_is_what_steps_give() {
+        let (lever, release) = (lever(), release());
+        let mut freed = Effects::default();
+        find("two-step-rupture").unwrap().add(&[0.05, 2e-5], &mut freed);
+        find("extra-mode").unwrap().add(&[0.002, 400e3, 300.0], &mut freed);
+        freed.electronics.push(LinearSection { pole: 3e4, low: 0.01, high: 1.0 });
+        // a map that changes nothing keeps all in steps
+        let mut stepped = freed.clone();
+        stepped.optics.push(Arc::new(|v| v));
+        for pace in [Pace::FINE, Pace::COARSE] {
+            let (fast, slow) = (run(&lever, &freed, &release, pace), run(&lever, &stepped, &release, pace));
+            // rounding of three thousand steps
+            assert!(apart(&fast, &slow) < 1e-9, "{pace:?}: {:e}", apart(&fast, &slow));
+        }
+    }
+
+    #[test]
+    fn a_coarse_pace_shows_effects_to_some_per_cent() {
+        let (lever, release) = (lever(), release());
+        for (id, values) in [
+            ("quadratic-detector", vec![0.01]),
+            ("duffing", vec![1e-3]),
+            ("quadratic-damping", vec![1e-3]),
+            ("photodiode-tail", vec![0.01, 5e-5]),
+            ("finite-rupture", vec![1e-6]),
+        ] {
+            let mut effects = Effects::default();
+            find(id).unwrap().add(&values, &mut effects);
+            let at = |pace| differences(&lever, std::iter::once((&effects, release, 0.0)), pace).swap_remove(0);
+            let (fine, coarse) = (at(Pace::FINE), at(Pace::COARSE));
+            assert!(apart(&fine, &coarse) < 0.05 * largest(&fine), "{id}: {}", apart(&fine, &coarse) / largest(&fine));
+        }
+    }
+}
