@@ -28,6 +28,8 @@ pub struct JointFit {
     pub converged: bool,
     /// Trial steps that were spent.
     pub evaluations: usize,
+    /// Damping that the search had come to.
+    pub damping: f64,
     /// Parameters of causes that ended at a limit: cause and parameter.
     pub at_limit: Vec<(usize, usize)>,
 }
@@ -152,16 +154,30 @@ impl Linear {
 /// # Source
 /// D. W. Marquardt, J. Soc. Indust. Appl. Math. 11 (1963) 431.
 pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) -> Result<JointFit, ModelError> {
-    fit_within(problem, state, starts, hold, EVALUATIONS)
+    fit_within(problem, state, starts, hold, Search::new(EVALUATIONS))
 }
 
-/// The same with a limit of trial steps.
+/// How far a search may go, and with what damping it begins.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Search {
+    pub most: usize,
+    pub damping: f64,
+}
+
+impl Search {
+    /// A new one.
+    pub fn new(most: usize) -> Self {
+        Self { most, damping: DAMPING[0] }
+    }
+}
+
+/// The same within limits.
 pub(super) fn fit_within(
     problem: &Problem<'_>,
     state: State,
     starts: Vec<usize>,
     hold: Hold,
-    most: usize,
+    search: Search,
 ) -> Result<JointFit, ModelError> {
     let whitener = problem.whitener();
     let (mut state, mut starts) = (state, starts);
@@ -171,7 +187,7 @@ pub(super) fn fit_within(
     if !point.cost.is_finite() {
         return Err(ModelError::Degenerate("the search has no finite cost where it begins"));
     }
-    let mut damping = DAMPING[0];
+    let mut damping = search.damping;
     let mut evaluations = 0;
     let mut normal = None;
     let converged = loop {
@@ -188,7 +204,7 @@ pub(super) fn fit_within(
         if step.promised < ARRIVED {
             break true;
         }
-        if evaluations >= most || damping > DAMPING[3] {
+        if evaluations >= search.most || damping > DAMPING[3] {
             break false;
         }
         evaluations += 1;
@@ -221,6 +237,7 @@ pub(super) fn fit_within(
         cost: point.cost,
         converged,
         evaluations,
+        damping,
         at_limit,
     })
 }

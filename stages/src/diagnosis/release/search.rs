@@ -1,7 +1,7 @@
 //! From signs to names: refits, held-out events, and when to abstain.
 
 use super::align::aligned;
-use super::joint::{EVALUATIONS, JointFit, fit, fit_within};
+use super::joint::{EVALUATIONS, JointFit, Search, fit, fit_within};
 use super::problem::Problem;
 use super::residuals::{Tile, common, peaks, residuals, tiles, whitened};
 use super::screen::{Screen, Sign, screen};
@@ -305,6 +305,8 @@ struct Trial {
     promised: f64,
     /// Fall of the cost less what the parameters must pay.
     gain: f64,
+    /// Fall of the cost in its last steps.
+    fall: f64,
 }
 
 /// Relative distance within which a frequency is a combination of others.
@@ -340,7 +342,7 @@ impl Trial {
 fn refitted(problem: &Problem<'_>, base: &JointFit, trial: &Trial) -> Option<JointFit> {
     let mut state = trial.fitted.state.clone();
     state.hypotheses.pop();
-    let better = fit_within(problem, state, trial.fitted.starts.clone(), Hold::Nothing, 3 * LOOK).ok()?;
+    let better = fit_within(problem, state, trial.fitted.starts.clone(), Hold::Nothing, Search::new(3 * LOOK)).ok()?;
     (better.cost < base.cost - BETTER).then_some(better)
 }
 
@@ -351,13 +353,19 @@ const BETTER: f64 = 2.0;
 
 /// Trial steps after which a candidate's fit is looked at: who leads goes on.
 const LOOK: usize = 6;
-/// Share of the leader's gain below which a rival is not fitted any further.
+/// Trial steps of a leader at most: along a bent valley (a rupture against the detector's poles) they are short.
+const LEADER: usize = 3 * EVALUATIONS;
+/// Share of the leader's gain below which a rival is not fitted any further, unless it falls so fast that it may get there: so many times as far as in its
+/// last steps.
 const HOPELESS: f64 = 0.5;
+const COMES_UP: f64 = 3.0;
+/// Cost over the base's beyond which the first steps have led nowhere.
+const NOT_LOST: f64 = 1.5;
 
 /// The strongest candidates fitted from the present fit, best first.
 ///
-/// Every candidate has some steps; then the leader goes on until it has arrived and its nearest rival of another class twice as far, so that candidates
-/// that do not fit cost little.
+/// Every candidate has some steps; then the leader goes on until it has arrived, and whoever is not far behind or comes up: candidates that do not fit cost
+/// little.
 fn refits(
     problem: &Problem<'_>,
     base: &JointFit,
@@ -373,28 +381,34 @@ fn refits(
         }
     }
     let mut trials: Vec<Trial> =
-        chosen.into_iter().take(count).filter_map(|sign| Trial::begin(problem, base, clean, sign)).collect();
+        chosen.into_iter().take(count).flat_map(|sign| Trial::begin(problem, base, clean, sign)).collect();
     loop {
         trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let Some(leader) = trials.first() else { return trials };
-        let (own, bar) = (leader.cause, HOPELESS * leader.gain);
-        let behind = |t: &&mut Trial| !same_class(t.cause, own);
-        let goes_on = match trials.first_mut() {
-            Some(leader) if leader.can_go_on(EVALUATIONS) => leader.go_on(problem, base),
-            _ => match trials.iter_mut().find(behind) {
-                Some(rival) if rival.gain > bar && rival.can_go_on(4 * LOOK) => rival.go_on(problem, base),
-                _ => false,
-            },
+        let bar = HOPELESS * leader.gain;
+        // the leader first, then whoever is not far behind or comes up
+        let goes_on = |trial: &Trial| trial.can_go_on(EVALUATIONS) && trial.gain + COMES_UP * trial.fall >= bar;
+        let next = match trials.first().is_some_and(|leader| leader.can_go_on(LEADER)) {
+            true => trials.first_mut(),
+            false => trials.iter_mut().find(|trial| goes_on(trial)),
         };
-        if !goes_on {
-            return trials;
+        if !next.is_some_and(|trial| trial.go_on(problem, base)) {
+            break;
         }
     }
+    // of two beginnings of one candidate the better end
+    let mut best: Vec<Trial> = Vec::new();
+    for trial in trials {
+        if best.iter().all(|known| known.cause.about().id != trial.cause.about().id) {
+            best.push(trial);
+        }
+    }
+    best
 }
 
 impl Trial {
     /// The first steps of a candidate, from the present fit and, where that has not arrived, from where free exponentials did.
-    fn begin(problem: &Problem<'_>, base: &JointFit, clean: &(State, Vec<usize>), sign: &Sign) -> Option<Self> {
+    fn begin(problem: &Problem<'_>, base: &JointFit, clean: &(State, Vec<usize>), sign: &Sign) -> Vec<Self> {
         let hypothesis = Hypothesis { cause: sign.cause, values: sign.values.clone() };
         let from = |lever: &State, starts: &[usize]| {
             let mut state = lever.clone();
@@ -402,27 +416,32 @@ impl Trial {
             state.hypotheses.push(hypothesis.clone());
             let mut starts = starts.to_vec();
             aligned(problem, &mut state, &mut starts).ok()?;
-            fit_within(problem, state, starts, Hold::Nothing, LOOK).ok()
+            let fitted = fit_within(problem, state, starts, Hold::Nothing, Search::new(LOOK)).ok()?;
+            let fall = if fitted.cost < NOT_LOST * base.cost { f64::INFINITY } else { 0.0 };
+            let mut trial = Self { cause: sign.cause, score: sign.z, promised: sign.gain, gain: 0.0, fall, fitted };
+            trial.weigh(problem, base);
+            Some(trial)
         };
-        let mut fitted = from(&base.state, &base.starts);
+        let first = from(&base.state, &base.starts);
         // a baseline that did not arrive has bent to the misfit
-        if !base.converged || fitted.as_ref().is_none_or(|f| !f.converged) {
-            fitted = fitted.into_iter().chain(from(&clean.0, &clean.1)).min_by(|a, b| a.cost.total_cmp(&b.cost));
-        }
-        let mut trial = Self { cause: sign.cause, score: sign.z, promised: sign.gain, gain: 0.0, fitted: fitted? };
-        trial.weigh(problem, base);
-        Some(trial)
+        let again = !base.converged || first.as_ref().is_none_or(|trial| !trial.fitted.converged);
+        let second = if again { from(&clean.0, &clean.1) } else { None };
+        first.into_iter().chain(second).collect()
     }
 
     fn can_go_on(&self, most: usize) -> bool {
-        !self.fitted.converged && self.fitted.evaluations < most
+        !self.fitted.converged && self.fitted.evaluations < most && self.fall > 0.0
     }
 
     /// Some steps more; whether they could be made.
     fn go_on(&mut self, problem: &Problem<'_>, base: &JointFit) -> bool {
         let (state, starts) = (self.fitted.state.clone(), self.fitted.starts.clone());
-        let Ok(further) = fit_within(problem, state, starts, Hold::Nothing, LOOK) else { return false };
+        // a search that has reached the largest damping begins anew
+        let damping = if self.fitted.damping < 1.0 { self.fitted.damping } else { 1e-3 };
+        let search = Search { most: LOOK, damping };
+        let Ok(further) = fit_within(problem, state, starts, Hold::Nothing, search) else { return false };
         let spent = self.fitted.evaluations + further.evaluations.max(1);
+        self.fall = self.fitted.cost - further.cost;
         self.fitted = JointFit { evaluations: spent, ..further };
         self.weigh(problem, base);
         true
@@ -483,7 +502,7 @@ impl<'a> Halves<'a> {
     /// Fits `fitted`'s model to one half, then the other half's own parameters under it.
     fn judged(&self, fitted: &JointFit, half: usize) -> Option<(f64, Vec<f64>)> {
         let (state, starts) = self.state(fitted, half);
-        let trained = fit_within(&self.part(half), state, starts, Hold::Nothing, HALF).ok()?;
+        let trained = fit_within(&self.part(half), state, starts, Hold::Nothing, Search::new(HALF)).ok()?;
         let other = 1 - half;
         let (mut state, starts) = self.state(fitted, other);
         state.lever = trained.state.lever;
