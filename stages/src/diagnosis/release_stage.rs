@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::lever_model::LEVER_MODEL;
 use super::records::{
-    Begun, CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, summarise,
-    without_droop,
+    Begun, CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, abstentions,
+    summarise, without_droop,
 };
 use super::release::{Cut, EventWindow, Lever, LeverMode, NamingOptions, Problem, answer, name_causes, start, story};
 use super::release_model::lever_model;
@@ -192,7 +192,9 @@ impl Stage for ReleaseDiagnose {
         let signs = begun.finish(&summaries, &options);
         let (signs, left_out): (Vec<RecordSign>, Vec<RecordSign>) =
             signs.into_iter().partition(|sign| self.may_name(sign.id));
-        let found = answer(&problem, &naming, &signs, &left_out, self.false_alarm_rate);
+        let mut found = answer(&problem, &naming, &signs, &left_out, self.false_alarm_rate);
+        let not_asked = abstentions(&summaries).into_iter().filter(|one| self.may_name(one.id));
+        found.evidence.extend(not_asked.map(|one| format!("not looked for: {}, since {}", one.id, one.reason)));
         let story = story(&problem, &naming).ok_or_else(|| StageError::new("the search ended without a fit"))?;
         let model = lever_model(&problem, &naming, &found, recording.records.len())
             .ok_or_else(|| StageError::new("the diagnosis ended without any fit"))?;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::levers::lever;
 use super::limits::{Limits, limit};
-use crate::causes::{Cause, Domain, Identifiable, Parameter, Scene};
+use crate::causes::{About, Cause, Domain, Identifiable, Parameter, Scene};
 use crate::simulate::{Afm, Hidden};
 
 /// What is hidden in an archive.
@@ -72,6 +72,8 @@ const LONG_RECORDS: usize = 6;
 const RELEASED: (f64, f64) = (0.3, 0.6);
 /// Cycle position at which a record without release begins: far above the surface.
 const IDLE: f64 = 0.02;
+/// Periods of a line that a record must hold: fewer have no neighbouring frequencies to be compared with.
+const LEAST_PERIODS: f64 = 5.0;
 /// Part of a parameter's limit that a strength may reach: at the limit itself no fit may say what it is.
 const ROOM: f64 = 0.8;
 /// Attempts to find a cause whose limit lies within its parameter's limits.
@@ -217,6 +219,9 @@ fn plant(
         if signed && rng.random::<bool>() {
             values[0] = -values[0];
         }
+        if cause.free_in_each_record() > 0 && periods(about, &values, afm) < LEAST_PERIODS {
+            continue;
+        }
         let Some(limit) = limit(&limits, cause, &values) else { continue };
         let weakest = if kind == Kind::LeftOut { LEFT_OUT } else { 1.0 };
         let times = weakest * (STRONGEST / weakest).powf(rng.random::<f64>());
@@ -228,6 +233,12 @@ fn plant(
         planted.push((cause, values, limit));
     }
     (planted.len() == wanted).then_some(planted)
+}
+
+/// Periods of a line in a record.
+fn periods(about: &About, values: &[f64], afm: &Afm) -> f64 {
+    let frequency_hz = about.parameters.iter().zip(values).find(|(parameter, _)| parameter.name == "frequency_hz");
+    frequency_hz.map_or(f64::INFINITY, |(_, f)| f * afm.samples as f64 / afm.sample_rate_hz)
 }
 
 fn nameable(cause: &dyn Cause) -> bool {

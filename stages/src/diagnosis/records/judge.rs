@@ -4,7 +4,7 @@ use super::clipping::judge_clipping;
 use super::lines::judge_lines;
 use super::position::{cannot_judge, judge_position};
 use super::sign::{Abstention, RecordSign};
-use super::slow_lines::{slow_lines, slow_signs};
+use super::slow_lines::{lowest_line_hz, slow_lines, slow_signs};
 use super::summary::RecordSummary;
 
 /// Channels that [`judge`] looks at, each at its own false-alarm rate: for all of them together multiply p-values by it.
@@ -96,6 +96,9 @@ impl Begun {
     }
 }
 
+/// The lowest mains frequency, Hz.
+const MAINS_HZ: f64 = 50.0;
+
 /// What these records can't be asked, with the reason.
 pub fn abstentions(records: &[RecordSummary]) -> Vec<Abstention> {
     let mut abstentions = cannot_judge(records);
@@ -106,6 +109,11 @@ pub fn abstentions(records: &[RecordSummary]) -> Vec<Abstention> {
     }
     if records.iter().all(|record| record.segments.is_empty()) {
         let reason = "no record has an event that tells free from loaded: nothing to look for the mains in".to_owned();
+        abstentions.push(Abstention { id: "mains-hum", reason });
+    } else if let Some(lowest_hz) = lowest_line_hz(records).filter(|lowest| *lowest > MAINS_HZ) {
+        let reason = format!(
+            "these records are too short for lines below {lowest_hz:.0} Hz: those have no neighbouring frequencies to be compared with"
+        );
         abstentions.push(Abstention { id: "mains-hum", reason });
     }
     abstentions

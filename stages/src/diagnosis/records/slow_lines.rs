@@ -12,6 +12,8 @@ use crate::events::median;
 const MOST_FREQUENCIES: usize = 400;
 /// Highest frequency of this channel, Hz: the mains' harmonics end there.
 const HIGHEST_HZ: f64 = 1e3;
+/// Lowest frequency, in half resolutions: one and a half periods in the record are the least that a cubic leaves.
+const LOWEST: usize = 3;
 /// Neighbours of a frequency, in half resolutions: near enough for the same noise, far enough for the line's own width.
 const NEIGHBOURS: std::ops::RangeInclusive<f64> = 3.9..=11.1;
 /// Lines taken out of an archive at most.
@@ -63,6 +65,14 @@ pub(super) fn slow_lines(records: &[RecordSummary], options: &JudgeOptions) -> V
     lines
 }
 
+/// The lowest frequency, Hz, with two neighbours below it; none without stretches to look in.
+pub(super) fn lowest_line_hz(records: &[RecordSummary]) -> Option<f64> {
+    let mut spans: Vec<f64> = records.iter().filter_map(|record| Some(SlowRecord::new(record, &[])?.span_s)).collect();
+    let span_s = median(&mut spans);
+    // the second nearest neighbour is five half resolutions below, the lowest looked at is at three
+    (span_s > 0.0).then(|| (LOWEST + 5) as f64 * 0.5 / span_s)
+}
+
 fn strongest(slow: &[Option<SlowRecord>], options: &JudgeOptions) -> Option<SlowLine> {
     let mut spans: Vec<f64> = slow.iter().flatten().map(|record| record.span_s).collect();
     let span_s = median(&mut spans);
@@ -73,8 +83,7 @@ fn strongest(slow: &[Option<SlowRecord>], options: &JudgeOptions) -> Option<Slow
     let block_s = slow.iter().flatten().map(SlowRecord::block_s).fold(0.0, f64::max);
     let highest = HIGHEST_HZ.min(0.2 / block_s);
     let count = ((highest / step) as usize + 12).min(MOST_FREQUENCIES);
-    // one and a half periods in the record are the least that a cubic leaves
-    let grid: Vec<f64> = (3..count).map(|k| k as f64 * step).collect();
+    let grid: Vec<f64> = (LOWEST..count).map(|k| k as f64 * step).collect();
     let powers: Vec<f64> = grid.iter().map(|&f| mean_power(slow, f)).collect();
     let looks: Vec<Look> = grid.iter().filter_map(|&f| look(slow, &powers, &grid, f, step)).collect();
     let yardstick = Yardstick::new(&looks.iter().map(|look| look.ratio).collect::<Vec<_>>(), f64::INFINITY)?;

@@ -4,6 +4,7 @@ mod align;
 mod answer;
 mod basis;
 mod change;
+mod halves;
 mod joint;
 mod lever;
 mod lever_modes;
@@ -19,6 +20,7 @@ mod stepper;
 mod story;
 mod story_events;
 mod story_spectra;
+mod trials;
 mod window;
 
 pub use align::{aligned, suggested};

@@ -1,12 +1,12 @@
 //! From signs to names: refits, held-out events, and when to abstain.
 
-use super::align::aligned;
-use super::joint::{EVALUATIONS, JointFit, Search, fit, fit_within};
+use super::halves::Halves;
+use super::joint::{JointFit, fit};
 use super::problem::Problem;
 use super::residuals::{Tile, common, peaks, residuals, tiles, whitened};
-use super::screen::{Screen, Sign, screen};
-use super::state::{Hold, Hypothesis, State};
-use super::window::EventWindow;
+use super::screen::{Screen, screen};
+use super::state::{Hold, State};
+use super::trials::{OWN, REDONE, Trial, combination, refits, refitted};
 use crate::causes::{Cause, Domain, Identifiable, Part, Scene};
 use crate::diagnosis::verdict::{Gain, RunnerUp, Verdict};
 use crate::model::ModelError;
@@ -67,7 +67,7 @@ pub struct Naming {
 }
 
 /// Fall of the sum of squares that a parameter must bring, over the logarithm of the number of samples: as the Bayesian information criterion.
-const PENALTY: f64 = 1.0;
+pub(super) const PENALTY: f64 = 1.0;
 /// Difference of penalised gains below which two classes tie, unless held-out events decide.
 const TIE: f64 = 6.0;
 /// Share of the baseline's excess energy that named causes may leave.
@@ -246,7 +246,7 @@ pub fn name_causes(
     })
 }
 
-fn same_class(a: &dyn Cause, b: &dyn Cause) -> bool {
+pub(super) fn same_class(a: &dyn Cause, b: &dyn Cause) -> bool {
     a.about().class.contains(&b.about().id) || b.about().class.contains(&a.about().id)
 }
 
@@ -294,251 +294,4 @@ fn remainder(before: &[Tile], after: &[Tile], false_alarm_rate: f64) -> Option<S
             strongest.excess
         )
     })
-}
-
-/// A candidate fitted in full.
-struct Trial {
-    cause: &'static dyn Cause,
-    fitted: JointFit,
-    /// Score of the sign that it began with, and the fall of the cost that this promised.
-    score: f64,
-    promised: f64,
-    /// Fall of the cost less what the parameters must pay.
-    gain: f64,
-    /// Fall of the cost in its last steps.
-    fall: f64,
-}
-
-/// Relative distance within which a frequency is a combination of others.
-const NEAR: f64 = 0.01;
-
-/// The combination of the lever's frequencies at which a candidate rings, if there is one.
-fn combination(base: &JointFit, trial: &Trial) -> Option<String> {
-    let hypothesis = trial.fitted.state.hypotheses.last()?;
-    let place = trial.cause.about().parameters.iter().position(|p| p.name == "frequency_hz")?;
-    let found = hypothesis.values.get(place)?;
-    let own: Vec<f64> = base.state.lever.modes.iter().map(|m| m.omega / std::f64::consts::TAU).collect();
-    let first = *own.first()?;
-    let mut lines = vec![("2 f1".to_string(), 2.0 * first), ("3 f1".to_string(), 3.0 * first)];
-    for (m, f) in own.iter().enumerate().skip(1) {
-        lines.push((format!("f{} + f1", m + 1), f + first));
-        lines.push((format!("f{} - f1", m + 1), f - first));
-    }
-    lines.into_iter().find(|(_, f)| (found / f - 1.0).abs() < NEAR).map(|(name, _)| name)
-}
-
-/// Times that a base may be fitted anew.
-const REDONE: usize = 3;
-/// A refit that gains so much more than its score promised has found what the base missed.
-const BEYOND: (f64, f64) = (2.0, 15.0);
-
-impl Trial {
-    fn beyond_promise(&self, base: &JointFit) -> bool {
-        base.cost - self.fitted.cost > BEYOND.0 * self.promised + BEYOND.1
-    }
-}
-
-/// The base fitted from where a candidate has led the lever; none unless it is better there.
-fn refitted(problem: &Problem<'_>, base: &JointFit, trial: &Trial) -> Option<JointFit> {
-    let mut state = trial.fitted.state.clone();
-    state.hypotheses.pop();
-    let better = fit_within(problem, state, trial.fitted.starts.clone(), Hold::Nothing, Search::new(3 * LOOK)).ok()?;
-    (better.cost < base.cost - BETTER).then_some(better)
-}
-
-/// Share of a candidate's gain that a base fitted anew must bring for all to begin anew.
-const OWN: f64 = 0.3;
-/// Fall of the cost that makes a base a better one.
-const BETTER: f64 = 2.0;
-
-/// Trial steps after which a candidate's fit is looked at: who leads goes on.
-const LOOK: usize = 6;
-/// Trial steps of a leader at most: along a bent valley (a rupture against the detector's poles) they are short.
-const LEADER: usize = 3 * EVALUATIONS;
-/// Share of the leader's gain below which a rival is not fitted any further, unless it falls so fast that it may get there: so many times as far as in its
-/// last steps.
-const HOPELESS: f64 = 0.5;
-const COMES_UP: f64 = 3.0;
-/// Cost over the base's beyond which the first steps have led nowhere.
-const NOT_LOST: f64 = 1.5;
-
-/// The strongest candidates fitted from the present fit, best first.
-///
-/// Every candidate has some steps; then the leader goes on until it has arrived, and whoever is not far behind or comes up: candidates that do not fit cost
-/// little.
-fn refits(
-    problem: &Problem<'_>,
-    base: &JointFit,
-    clean: &(State, Vec<usize>),
-    signs: &[Sign],
-    count: usize,
-) -> Vec<Trial> {
-    let mut chosen: Vec<&Sign> = Vec::new();
-    for sign in signs.iter().filter(|s| s.gain > 0.0) {
-        // members of one class are one signal
-        if chosen.iter().all(|c| !same_class(c.cause, sign.cause)) {
-            chosen.push(sign);
-        }
-    }
-    let mut trials: Vec<Trial> =
-        chosen.into_iter().take(count).flat_map(|sign| Trial::begin(problem, base, clean, sign)).collect();
-    loop {
-        trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let Some(leader) = trials.first() else { return trials };
-        let bar = HOPELESS * leader.gain;
-        // the leader first, then whoever is not far behind or comes up
-        let goes_on = |trial: &Trial| trial.can_go_on(EVALUATIONS) && trial.gain + COMES_UP * trial.fall >= bar;
-        let next = match trials.first().is_some_and(|leader| leader.can_go_on(LEADER)) {
-            true => trials.first_mut(),
-            false => trials.iter_mut().find(|trial| goes_on(trial)),
-        };
-        if !next.is_some_and(|trial| trial.go_on(problem, base)) {
-            break;
-        }
-    }
-    // of two beginnings of one candidate the better end
-    let mut best: Vec<Trial> = Vec::new();
-    for trial in trials {
-        if best.iter().all(|known| known.cause.about().id != trial.cause.about().id) {
-            best.push(trial);
-        }
-    }
-    best
-}
-
-impl Trial {
-    /// The first steps of a candidate, from the present fit and, where that has not arrived, from where free exponentials did.
-    fn begin(problem: &Problem<'_>, base: &JointFit, clean: &(State, Vec<usize>), sign: &Sign) -> Vec<Self> {
-        let hypothesis = Hypothesis { cause: sign.cause, values: sign.values.clone() };
-        let from = |lever: &State, starts: &[usize]| {
-            let mut state = lever.clone();
-            state.hypotheses = base.state.hypotheses.clone();
-            state.hypotheses.push(hypothesis.clone());
-            let mut starts = starts.to_vec();
-            aligned(problem, &mut state, &mut starts).ok()?;
-            let fitted = fit_within(problem, state, starts, Hold::Nothing, Search::new(LOOK)).ok()?;
-            let fall = if fitted.cost < NOT_LOST * base.cost { f64::INFINITY } else { 0.0 };
-            let mut trial = Self { cause: sign.cause, score: sign.z, promised: sign.gain, gain: 0.0, fall, fitted };
-            trial.weigh(problem, base);
-            Some(trial)
-        };
-        let first = from(&base.state, &base.starts);
-        // a baseline that did not arrive has bent to the misfit
-        let again = !base.converged || first.as_ref().is_none_or(|trial| !trial.fitted.converged);
-        let second = if again { from(&clean.0, &clean.1) } else { None };
-        first.into_iter().chain(second).collect()
-    }
-
-    fn can_go_on(&self, most: usize) -> bool {
-        !self.fitted.converged && self.fitted.evaluations < most && self.fall > 0.0
-    }
-
-    /// Some steps more; whether they could be made.
-    fn go_on(&mut self, problem: &Problem<'_>, base: &JointFit) -> bool {
-        let (state, starts) = (self.fitted.state.clone(), self.fitted.starts.clone());
-        // a search that has reached the largest damping begins anew
-        let damping = if self.fitted.damping < 1.0 { self.fitted.damping } else { 1e-3 };
-        let search = Search { most: LOOK, damping };
-        let Ok(further) = fit_within(problem, state, starts, Hold::Nothing, search) else { return false };
-        let spent = self.fitted.evaluations + further.evaluations.max(1);
-        self.fall = self.fitted.cost - further.cost;
-        self.fitted = JointFit { evaluations: spent, ..further };
-        self.weigh(problem, base);
-        true
-    }
-
-    fn weigh(&mut self, problem: &Problem<'_>, base: &JointFit) {
-        let samples = (base.state.events.len() * problem.cut.samples) as f64;
-        let parameters = self.fitted.state.hypotheses.last().map_or(0, |h| h.values.len());
-        self.gain = base.cost - self.fitted.cost - PENALTY * samples.ln() * parameters as f64;
-    }
-}
-
-/// Trial steps of a half, which begins where the whole ended.
-const HALF: usize = 8;
-
-/// Two halves of the events, each fitted alone and judged on the other.
-struct Halves<'a> {
-    whole: &'a Problem<'a>,
-    windows: [Vec<EventWindow>; 2],
-    events: [Vec<usize>; 2],
-}
-
-struct HeldOut {
-    log_likelihood: f64,
-    rms: [f64; 2],
-    events: usize,
-}
-
-impl HeldOut {
-    fn report(&self) -> Gain {
-        Gain {
-            rms_before: Some(self.rms[0]),
-            rms_after: Some(self.rms[1]),
-            unit: "V".into(),
-            log_likelihood: Some(self.log_likelihood),
-            held_out: format!("{} events, each judged by a fit to the other half", self.events),
-        }
-    }
-}
-
-impl<'a> Halves<'a> {
-    fn of(whole: &'a Problem<'a>, base: &JointFit) -> Self {
-        let events = [0, 1].map(|half| (0..base.state.events.len()).filter(|i| i % 2 == half).collect::<Vec<usize>>());
-        let windows = events.clone().map(|chosen| chosen.iter().map(|&i| whole.windows[i].clone()).collect());
-        Self { whole, windows, events }
-    }
-
-    fn part(&self, half: usize) -> Problem<'_> {
-        self.whole.with_windows(&self.windows[half])
-    }
-
-    fn state(&self, fitted: &JointFit, half: usize) -> (State, Vec<usize>) {
-        let mut state = fitted.state.clone();
-        state.events = self.events[half].iter().map(|&i| fitted.state.events[i]).collect();
-        (state, self.events[half].iter().map(|&i| fitted.starts[i]).collect())
-    }
-
-    /// Fits `fitted`'s model to one half, then the other half's own parameters under it.
-    fn judged(&self, fitted: &JointFit, half: usize) -> Option<(f64, Vec<f64>)> {
-        let (state, starts) = self.state(fitted, half);
-        let trained = fit_within(&self.part(half), state, starts, Hold::Nothing, Search::new(HALF)).ok()?;
-        let other = 1 - half;
-        let (mut state, starts) = self.state(fitted, other);
-        state.lever = trained.state.lever;
-        state.hypotheses = trained.state.hypotheses;
-        let problem = self.part(other);
-        let judged = fit(&problem, state, starts, Hold::Shared).ok()?;
-        let residuals = residuals(&problem, &judged.state, &judged.starts);
-        Some((judged.costs.iter().sum(), common(&judged.state, &residuals)))
-    }
-
-    /// Gain of the log likelihood on held-out events, and the rms of their common residual where the models differ.
-    fn gain(&self, base: &JointFit, trial: &Trial) -> HeldOut {
-        let count = base.state.events.len();
-        let mut out = HeldOut { log_likelihood: 0.0, rms: [0.0; 2], events: count };
-        let mut weight = 0.0;
-        if self.events[1].is_empty() {
-            return HeldOut { log_likelihood: f64::NEG_INFINITY, ..out };
-        }
-        for half in 0..2 {
-            let (Some(before), Some(after)) = (self.judged(base, half), self.judged(&trial.fitted, half)) else {
-                return HeldOut { log_likelihood: f64::NEG_INFINITY, ..out };
-            };
-            out.log_likelihood += 0.5 * (before.0 - after.0);
-            // of a sum weighted to unit variance: back to volts of one event
-            let scale = (self.events[1 - half].len() as f64).sqrt();
-            let differs: Vec<f64> = before.1.iter().zip(&after.1).map(|(b, a)| (b - a).abs()).collect();
-            let limit = 0.1 * differs.iter().copied().fold(0.0, f64::max);
-            for ((b, a), d) in before.1.iter().zip(&after.1).zip(&differs) {
-                if *d >= limit {
-                    out.rms[0] += (b / scale).powi(2);
-                    out.rms[1] += (a / scale).powi(2);
-                    weight += 1.0;
-                }
-            }
-        }
-        out.rms = out.rms.map(|sum| (sum / f64::max(weight, 1.0)).sqrt());
-        out
-    }
 }
