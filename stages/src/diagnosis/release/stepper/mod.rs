@@ -16,7 +16,7 @@ use run::Run;
 /// Steps per sample, powers of two: many while edges pass, then fewer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pace {
-    /// In the first [`EARLY`] samples after the release.
+    /// In the first 64 samples after the release.
     pub early: usize,
     /// In all later ones, at most as many.
     pub late: usize,
