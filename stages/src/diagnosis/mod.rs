@@ -2,6 +2,7 @@
 
 mod example;
 mod lever_model;
+mod measured_events;
 pub mod records;
 pub mod release;
 mod release_example;

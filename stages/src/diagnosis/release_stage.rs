@@ -1,13 +1,14 @@
 //! The stage `diagnosis.release`.
 
 use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table, Values,
+    Array, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::lever_model::LEVER_MODEL;
+use super::measured_events::{check_cut, cut_out, onsets};
 use super::records::{
     Begun, CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, abstentions,
     summarise, without_droop,
@@ -15,7 +16,7 @@ use super::records::{
 use super::release::{Cut, EventWindow, Lever, LeverMode, NamingOptions, Problem, answer, name_causes, start, story};
 use super::release_model::lever_model;
 use super::release_story::{residual_array, tile_table};
-use crate::causes::{CATALOGUE, Instant, find};
+use crate::causes::{CATALOGUE, find};
 use crate::events::EventKind;
 use crate::model::ModeNumber;
 
@@ -93,8 +94,6 @@ const TILES: Port<Table> =
 const MODEL: Port<Document> =
     Port::new("model", LEVER_MODEL, "lever, detector, noise and named causes: what later configs simulate with");
 
-/// Room on either side of a window, within which its onset may move.
-const MARGIN: usize = 64;
 /// Samples of free stretches that the noise is estimated from: 24 MB.
 const FREE_SAMPLES: usize = 3_000_000;
 /// Shares of the false-alarm rate: shapes of the events, each channel of the records.
@@ -132,12 +131,7 @@ impl Stage for ReleaseDiagnose {
         if let Some(pole) = self.detector_poles_hz.iter().find(|pole| !(**pole > 0.0 && pole.is_finite())) {
             return Err(StageError::new(format!("`detector_poles_hz` holds {pole}, wanted frequencies above 0")));
         }
-        if 2 * self.before_samples > self.window_samples {
-            return Err(StageError::new(format!(
-                "`before_samples` is {}, wanted at most half of `window_samples`, {}",
-                self.before_samples, self.window_samples
-            )));
-        }
+        check_cut(self.window_samples, self.before_samples)?;
         if let Some(id) = self.without.iter().find(|id| find(id).is_none()) {
             return Err(
                 StageError::new(format!("`without` names `{id}`, which is no cause")).help("`afmid causes` lists them")
@@ -210,15 +204,6 @@ impl Stage for ReleaseDiagnose {
     }
 }
 
-/// Record and onset (samples) of each event.
-pub(super) fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, StageError> {
-    let Values::Integer(records) = &ensemble.variable("record")?.values else {
-        return Err(StageError::new("variable `record`: wanted whole numbers"));
-    };
-    let onsets = ensemble.real("onset")?;
-    Ok(records.iter().zip(onsets).map(|(r, t)| (usize::try_from(*r).unwrap_or(usize::MAX), t * rate)).collect())
-}
-
 fn resonances(lever: &Lever) -> Vec<Resonance> {
     let one = |mode: &LeverMode| Resonance {
         frequency_hz: mode.omega / std::f64::consts::TAU,
@@ -242,26 +227,8 @@ impl ReleaseDiagnose {
         onsets: &[(usize, f64)],
         cut: &Cut,
     ) -> Result<Vec<EventWindow>, StageError> {
-        let records = recording.records.len();
-        let span = (records.max(2) - 1) as f64;
         let one = |&(number, onset): &(usize, f64)| -> Result<Option<EventWindow>, StageError> {
-            let record = recording.records.get(number).ok_or_else(|| {
-                StageError::new(format!("an event is of record {number}, and there are {records}"))
-                    .help("wire the records that the events were found in")
-            })?;
-            let channel = record.channel("deflection")?;
-            let first = onset.floor() - (MARGIN + cut.before) as f64;
-            let length = cut.samples + 2 * MARGIN;
-            if first < 0.0 || first as usize + length > channel.samples {
-                return Ok(None);
-            }
-            let values = channel.read(first as usize, length)?;
-            if values.iter().any(|v| !v.is_finite()) {
-                return Ok(None);
-            }
-            let place = number as f64 / span;
-            let at = Instant { record: number, place, time_s: first * cut.interval_s, piezo_m: 0.0 };
-            Ok(Some(EventWindow { values, onset: onset - first, first: at }))
+            Ok(cut_out(recording, number, onset, cut)?.map(|(window, _)| window))
         };
         let windows: Vec<EventWindow> =
             onsets.par_iter().map(one).collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();

@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::lever_model::{LeverModel, MODEL};
+use super::measured_events::{check_cut, cut_out, onsets};
 use super::release::{Cut, EventWindow};
-use super::release_stage::onsets;
 use super::replay::{ReplayedEvent, Replayer};
 use crate::causes::Instant;
 
@@ -56,9 +56,6 @@ const RESIDUALS: Port<Array> =
     Port::new("residuals", "diagnosis-residuals", "mean residual of the events, before and after the extension");
 const EVENTS: Port<Table> = Port::new("events", "replayed-events", "load, instant and residuals of each event");
 
-/// Room on either side of a window, within which its onset may move.
-const MARGIN: usize = 64;
-
 impl Stage for ReleaseReplay {
     const SPEC: Spec = Spec {
         name: "diagnosis.replay",
@@ -81,13 +78,7 @@ impl Stage for ReleaseReplay {
                 return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
             }
         }
-        if 2 * self.before_samples > self.window_samples {
-            return Err(StageError::new(format!(
-                "`before_samples` is {}, wanted at most half of `window_samples`, {}",
-                self.before_samples, self.window_samples
-            )));
-        }
-        Ok(())
+        check_cut(self.window_samples, self.before_samples)
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -161,28 +152,14 @@ impl ReleaseReplay {
         onset: f64,
         cut: &Cut,
     ) -> Result<Option<(EventWindow, Vec<f64>)>, StageError> {
-        let records = recording.records.len();
-        let record = recording.records.get(number).ok_or_else(|| {
-            StageError::new(format!("an event is of record {number}, and there are {records}"))
-                .help("wire the records that the events were found in")
-        })?;
-        let channel = record.channel("deflection")?;
-        let first = onset.floor() - (MARGIN + cut.before) as f64;
-        let length = cut.samples + 2 * MARGIN;
-        if !(first >= 0.0 && first as usize + length <= channel.samples) {
-            return Ok(None);
-        }
-        let values = channel.read(first as usize, length)?;
-        if values.iter().any(|v| !v.is_finite()) {
-            return Ok(None);
-        }
-        let piezo = match record.channel("piezo") {
-            Ok(piezo) if piezo.samples == channel.samples => piezo.read(first as usize, length)?,
-            _ => Vec::new(),
-        };
-        let place = number as f64 / (records.max(2) - 1) as f64;
-        let at = Instant { record: number, place, time_s: first * cut.interval_s, piezo_m: 0.0 };
-        let window = EventWindow { values, onset: onset - first, first: at };
+        let Some((window, range)) = cut_out(recording, number, onset, cut)? else { return Ok(None) };
+        let piezo =
+            match recording.records.get(number).map(|record| (record.channel("piezo"), record.channel("deflection"))) {
+                Some((Ok(piezo), Ok(deflection))) if piezo.samples == deflection.samples => {
+                    piezo.read(range.start, range.len())?
+                }
+                _ => Vec::new(),
+            };
         Ok(Some((window, piezo.into_iter().map(|v| v * self.piezo_m_per_unit).collect())))
     }
 }
