@@ -6,6 +6,7 @@ use super::*;
 
 fn scene() -> Scene {
     Scene {
+        places: Vec::new(),
         frequency_hz: vec![46.3e3, 247.4e3, 580.8e3, 1051.2e3],
         quality_factor: vec![40.8, 193.2, 358.0, 503.8],
         interval_s: 2e-7,

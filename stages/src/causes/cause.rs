@@ -100,6 +100,8 @@ pub struct Scene {
     pub noise_v: f64,
     /// Frequencies at which residuals peak, Hz, strongest first.
     pub residual_peaks_hz: Vec<f64>,
+    /// Where in the archive the events are, 0 its first record, 1 its last, ascending, each place once; empty where nothing is known of it.
+    pub places: Vec<f64>,
 }
 
 /// A cause: one way in which a linear simulation can be wrong.
@@ -120,6 +122,11 @@ pub trait Cause: Sync {
     /// Numbers that differ from record to record by chance, a line's phase among them: each must be found anew in every record.
     fn free_in_each_record(&self) -> usize {
         0
+    }
+
+    /// The parameter that says between which events the effect sets in: it has no slope, its trials are all there is, and its error is the distance of those events.
+    fn sets_in(&self) -> Option<usize> {
+        None
     }
 }
 

@@ -14,6 +14,8 @@ pub struct Motion<'a> {
     pub omega: &'a [f64],
     /// Displacement of the tip since its release, V.
     pub gap: f64,
+    /// Standard deviation of the first mode's thermal motion, as far as `position` is without it, V: a mean motion; 0 where it is the motion itself.
+    pub thermal: f64,
 }
 
 /// Where and when a sample was taken.

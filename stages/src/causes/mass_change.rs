@@ -35,6 +35,9 @@ const ABOUT: About = About {
     source: "J. P. Cleveland et al., Rev. Sci. Instrum. 64 (1993) 403",
 };
 
+/// Most places that are tried.
+const MOST: usize = 24;
+
 impl Cause for MassChange {
     fn about(&self) -> &About {
         &ABOUT
@@ -47,6 +50,15 @@ impl Cause for MassChange {
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
         let own = 0.1 / scene.quality_factor.first().copied().unwrap_or(100.0).max(1.0);
-        [0.2, 0.35, 0.5, 0.65, 0.8].map(|place| vec![0.01 * own, place]).to_vec()
+        let mut between: Vec<f64> = scene.places.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        if between.is_empty() {
+            between = vec![0.2, 0.35, 0.5, 0.65, 0.8];
+        }
+        let every = between.len().div_ceil(MOST);
+        between.into_iter().step_by(every).map(|place| vec![0.01 * own, place]).collect()
+    }
+
+    fn sets_in(&self) -> Option<usize> {
+        Some(1)
     }
 }

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::levers::lever;
-use super::limits::{Limits, limit};
+use super::limits::{Count, Limits, limit};
 use crate::causes::{About, Cause, Domain, Identifiable, Parameter, Scene};
 use crate::simulate::{Afm, Hidden};
 
@@ -196,7 +196,8 @@ fn plant(
     if wanted == 0 {
         return Some(planted);
     }
-    let limits = Limits::new(&afm.microscope(), releases, afm.samples, afm.surface_m)?;
+    let count = Count { events: releases, records: afm.records };
+    let limits = Limits::new(&afm.microscope(), count, afm.samples, afm.surface_m)?;
     let candidates: Vec<&'static dyn Cause> = catalogue.iter().copied().filter(|cause| nameable(*cause)).collect();
     for _ in 0..ATTEMPTS {
         if planted.len() == wanted || candidates.is_empty() {
@@ -265,6 +266,7 @@ fn scene(afm: &Afm, rng: &mut ChaCha8Rng) -> Scene {
         input_level: 0.0,
         noise_v: afm.white_v / (afm.records as f64).sqrt(),
         residual_peaks_hz: free.into_iter().collect(),
+        places: Vec::new(),
     }
 }
 

@@ -19,10 +19,19 @@ const FREE: f64 = 0.5;
 /// Points of a free stretch at which it is evaluated: 50 us in 80 ms.
 const POINTS: usize = 1600;
 
+/// Events of an archive, in the first of its records.
+#[derive(Debug, Clone, Copy)]
+pub struct Count {
+    /// Events, one a record.
+    pub events: usize,
+    /// Records; the last ones may hold none.
+    pub records: usize,
+}
+
 /// What a baseline can follow, and the noise that hides the rest.
 ///
 /// # Method
-/// Noise-free releases at three places of the archive; what the baseline follows by itself, to first order: amplitude, offset, slope and instant of each
+/// Noise-free releases at five places of the archive; what the baseline follows by itself, to first order: amplitude, offset, slope and instant of each
 /// event, and every shared parameter (frequencies, quality factors, shares, detector poles) by a central difference of simulated releases. The expected gain is half
 /// the sum of squares that is left of a cause's difference, whitened by white and thermal noise, for all events.
 ///
@@ -31,7 +40,7 @@ const POINTS: usize = 1600;
 pub struct Limits {
     microscope: Microscope,
     whitener: Whitener,
-    events: usize,
+    count: Count,
     /// Samples of a record.
     samples: usize,
     variance_v2: f64,
@@ -44,14 +53,13 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// For an archive of so many events in records of so many samples, above a surface at that height, m; nothing if the microscope never releases its tip.
-    pub fn new(microscope: &Microscope, events: usize, samples: usize, surface_m: f64) -> Option<Self> {
-        let plain = releases(microscope, &Effects::default(), events)?;
+    /// For an archive of so many events and records of so many samples, above a surface at that height, m; nothing if the microscope never releases its tip.
+    pub fn new(microscope: &Microscope, count: Count, samples: usize, surface_m: f64) -> Option<Self> {
+        let plain = releases(microscope, &Effects::default(), count)?;
         let mut followed = event_columns(&plain);
         for perturbed in perturbations(microscope) {
             let (up, down) = (perturbed(1.0), perturbed(-1.0));
-            let (up, down) =
-                (releases(&up, &Effects::default(), events)?, releases(&down, &Effects::default(), events)?);
+            let (up, down) = (releases(&up, &Effects::default(), count)?, releases(&down, &Effects::default(), count)?);
             followed.push(up.iter().zip(&down).map(|(u, d)| u - d).collect());
         }
         let whitener = whitener(microscope);
@@ -61,7 +69,7 @@ impl Limits {
         Some(Self {
             microscope: microscope.clone(),
             whitener,
-            events,
+            count,
             samples,
             surface_m,
             variance_v2,
@@ -73,12 +81,12 @@ impl Limits {
     /// Expected gain of the log likelihood if `effects` are hidden and explained; nothing if the tip is not released.
     /// `degree`: what a record's level may do by itself, as a polynomial in time.
     pub fn gain(&self, effects: &Effects, degree: i32) -> Option<f64> {
-        let with = releases(&self.microscope, effects, self.events)?;
+        let with = releases(&self.microscope, effects, self.count)?;
         let mut left: Vec<f64> = with.iter().zip(&self.plain).map(|(a, b)| a - b).collect();
         whiten(&self.whitener, &mut left);
         project_out(&mut left, &self.followed);
         let squares = left.iter().map(|v| v * v).sum::<f64>();
-        let windows = 0.5 * squares * self.events as f64 / PLACES as f64;
+        let windows = 0.5 * squares * self.count.events as f64 / PLACES as f64;
         Some(windows + self.record_gain(effects, degree))
     }
 
@@ -94,7 +102,7 @@ impl Limits {
         let pink = noise.pink_v.powi(2) / (0.5 * rate).ln() / HUM_HZ;
         let variance_v2 = self.variance_v2 * (1.0 + pink / white.max(f64::MIN_POSITIVE));
         let (path, samples) = self.free_path();
-        let records = self.events.max(1);
+        let records = self.count.events.max(1);
         let gain = |record: usize| {
             let place = Place { record, records, samples: self.samples, margin_samples: 0, seed: 0 };
             let added = |&(time_s, height_m): &(f64, f64)| {
@@ -141,7 +149,7 @@ pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> 
     let (parameter, first) = (about.parameters.first()?, *values.first()?);
     let (sign, highest) = (first.signum(), if first < 0.0 { -parameter.low } else { parameter.high });
     // held out, a number that is found anew in every record costs half a unit there
-    let found_anew = 0.5 * (limits.events * cause.free_in_each_record()) as f64;
+    let found_anew = 0.5 * (limits.count.events * cause.free_in_each_record()) as f64;
     // a sine of a phase of its own is sought beside all that a slow contact or a fringe can do: a cubic; other shapes beside an offset and a drift
     let degree = if found_anew > 0.0 { 3 } else { 1 };
     let gain = |strength: f64| {
@@ -211,11 +219,12 @@ fn whiten(whitener: &Whitener, events: &mut [f64]) {
     }
 }
 
-fn releases(microscope: &Microscope, effects: &Effects, events: usize) -> Option<Vec<f64>> {
-    let records = events.max(PLACES);
+fn releases(microscope: &Microscope, effects: &Effects, count: Count) -> Option<Vec<f64>> {
+    let Count { events, records } = Count { events: count.events.max(PLACES), records: count.records.max(PLACES) };
     let mut all = Vec::with_capacity(PLACES * CUT.samples);
     for i in 0..PLACES {
-        let record = i * (records - 1) / (PLACES - 1);
+        // the last records may hold none
+        let record = i * (events - 1) / (PLACES - 1);
         let place = Place { record, records, samples: CUT.samples, margin_samples: 0, seed: 0 };
         // a tenth more and less than the mean: amplitudes differ as events' do
         let pull_off_n = microscope.contact.adhesion_n * (0.9 + 0.2 * i as f64 / (PLACES - 1) as f64);
@@ -308,7 +317,13 @@ mod tests {
 
     #[test]
     fn limits_are_where_a_prototype_began_to_name() {
-        let limits = Limits::new(&Afm::default().microscope(), 12, 200_000, Afm::default().surface_m).unwrap();
+        let limits = Limits::new(
+            &Afm::default().microscope(),
+            Count { events: 12, records: 12 },
+            200_000,
+            Afm::default().surface_m,
+        )
+        .unwrap();
         for (id, values, low, high) in [
             // smallest strengths that a prototype named with 12 records: 0.5e-3 /V, 1.5e-3 /V^2, 0.3 us; the limit asks for less than naming does
             ("quadratic-detector", vec![0.01], 0.5e-4, 1e-3),

@@ -327,6 +327,7 @@ impl Run<'_> {
             velocity: &hidden.velocity,
             omega: &hidden.omega,
             gap: hidden.volts_per_m * gap_m,
+            thermal: 0.0,
         };
         for force in &hidden.effects.modal_force {
             force(&motion, &mut hidden.acceleration);

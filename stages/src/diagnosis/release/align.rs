@@ -1,5 +1,7 @@
 //! Where a fit begins: a lever from free exponentials, and a state in phase with a new cause.
 
+use faer::c64;
+
 use super::basis::Basis;
 use super::change::changed;
 use super::lever::{Lever, LeverMode};
@@ -22,14 +24,17 @@ pub fn aligned(problem: &Problem<'_>, state: &mut State, starts: &mut [usize]) -
     let whitener = problem.whitener();
     let basis = Basis::new(&state.lever, problem.cut, &whitener);
     let both = changed(problem, &whitener, state, &[before.effects(), state.effects()], Pace::FINE);
-    let (count, first_pole) = (state.lever.modes.len(), state.lever.modes.first().map(LeverMode::pole));
-    let mut shrunk = vec![0.0; count];
+    let poles: Vec<c64> = state.lever.modes.iter().map(LeverMode::pole).collect();
+    let mut shrunk = vec![0.0; poles.len()];
     for (own, sets) in state.events.iter_mut().zip(&both) {
         let change: Vec<f64> = sets.get(1).iter().zip(sets.get(0)).map(|(a, b)| a - b).collect();
-        let ratios = basis.residue_ratios(&change, own, count);
-        shrunk.iter_mut().zip(&ratios).for_each(|(s, r)| *s += r.norm() / both.len() as f64);
-        if let (Some(ratio), Some(first)) = (ratios.first(), first_pole) {
+        let ratios = basis.residue_ratios(&change, own, poles.len());
+        if let (Some(ratio), Some(first)) = (ratios.first(), poles.first()) {
             let late = -ratio.arg() / first.im;
+            // beside the delay of all, a mode may ring the other way round
+            for (s, (pole, ratio)) in shrunk.iter_mut().zip(poles.iter().zip(&ratios)) {
+                *s += (ratio * (pole * late).exp()).re.signum() * ratio.norm() / both.len() as f64;
+            }
             if late.is_finite() && ratio.norm() > 0.5 && ratio.norm() < 2.0 {
                 own.onset_s -= late;
             }
@@ -41,7 +46,7 @@ pub fn aligned(problem: &Problem<'_>, state: &mut State, starts: &mut [usize]) -
         .modes
         .iter()
         .zip(&shrunk)
-        .map(|(mode, shrunk)| mode.share / shrunk.clamp(SHRUNK, 1.0 / SHRUNK))
+        .map(|(mode, shrunk)| mode.share / (shrunk.signum() * shrunk.abs().clamp(SHRUNK, 1.0 / SHRUNK)))
         .collect();
     let total: f64 = shares.iter().sum();
     if total.is_finite() && total > 0.0 {
@@ -54,6 +59,44 @@ pub fn aligned(problem: &Problem<'_>, state: &mut State, starts: &mut [usize]) -
         }
     }
     problem.starts(state, starts)
+}
+
+/// Part of the first mode's period on either side within which the release is looked for, and steps per period of the last mode.
+const AROUND: f64 = 0.4;
+const STEPS: f64 = 40.0;
+/// Cosine of the phase below which a mode rings the other way round.
+const OTHER_WAY: f64 = -0.5;
+
+/// When a `lever` was released so that it rings in the phase of `exponentials`, s after their time zero and near `guess_s`; modes that ring the other way
+/// round then have a negative share.
+///
+/// Events are found to a few samples, in which a high mode turns by more than a search could mend. Modes count by their share: what is wrong with
+/// the nominal detector turns each by some tenths of a radian, but what weakens a high mode may have turned it round.
+pub fn in_phase(exponentials: &[Exponential], lever: &mut Lever, guess_s: f64) -> f64 {
+    let turned: Vec<(f64, f64, f64)> = exponentials
+        .iter()
+        .filter(|e| e.oscillates())
+        .zip(lever.release())
+        .zip(&lever.modes)
+        .map(|((found, unit), mode)| (mode.share.abs(), found.pole.im, (found.residue * unit.residue.conj()).arg()))
+        .collect();
+    let frequencies = turned.iter().map(|(_, omega, _)| *omega);
+    let (Some(first), Some(last)) = (frequencies.clone().min_by(f64::total_cmp), frequencies.max_by(f64::total_cmp))
+    else {
+        return guess_s;
+    };
+    let (reach, step) = (AROUND * std::f64::consts::TAU / first, std::f64::consts::TAU / (STEPS * last));
+    let count = (reach / step).ceil() as i64;
+    let in_phase =
+        |late: f64| turned.iter().map(|(weight, omega, turn)| weight * (turn + omega * late).cos()).sum::<f64>();
+    let late = (-count..=count)
+        .map(|k| guess_s + k as f64 * step)
+        .max_by(|&a, &b| in_phase(a).total_cmp(&in_phase(b)))
+        .unwrap_or(guess_s);
+    for (mode, (_, omega, turn)) in lever.modes.iter_mut().zip(&turned) {
+        mode.share *= if (turn + omega * late).cos() < OTHER_WAY { -1.0 } else { 1.0 };
+    }
+    late
 }
 
 /// The lever that free exponentials suggest: modes' poles taken over, shares from their residues, poles nominal.

@@ -41,7 +41,7 @@ pub fn answer(
     };
     let mut causes: Vec<NamedCause> = Vec::new();
     if verdict == Verdict::Named {
-        causes.extend(shapes(naming));
+        causes.extend(shapes(problem, naming));
         causes.extend(records.iter().map(from_record));
     }
     let last = naming.fits.last().unwrap_or(&naming.fits[0]);
@@ -65,7 +65,15 @@ fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-fn shapes(naming: &Naming) -> Vec<NamedCause> {
+/// Standard error of a place between two events: uniform over their distance.
+fn between(problem: &Problem<'_>, place: f64) -> Option<f64> {
+    let places = || problem.windows.iter().map(|window| window.first.place);
+    let before = places().filter(|p| *p < place).max_by(f64::total_cmp)?;
+    let after = places().filter(|p| *p >= place).min_by(f64::total_cmp)?;
+    Some((after - before) / 12f64.sqrt())
+}
+
+fn shapes(problem: &Problem<'_>, naming: &Naming) -> Vec<NamedCause> {
     let Some(last) = naming.fits.last() else { return Vec::new() };
     let counts: Vec<usize> = last.state.hypotheses.iter().map(|h| h.values.len()).collect();
     let mut at = last.covariance.nrows() - counts.iter().sum::<usize>();
@@ -78,7 +86,10 @@ fn shapes(naming: &Naming) -> Vec<NamedCause> {
             .zip(&hypothesis.values)
             .enumerate()
             .map(|(p, (parameter, value))| {
-                let std = finite(last.covariance[(at + p, at + p)].max(0.0).sqrt());
+                let std = match named.cause.sets_in() {
+                    Some(place) if place == p => between(problem, *value),
+                    _ => finite(last.covariance[(at + p, at + p)].max(0.0).sqrt()),
+                };
                 (parameter.name.to_string(), Value { value: finite(*value), std, unit: parameter.unit.into() })
             })
             .collect();

@@ -157,6 +157,17 @@ pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) 
     fit_within(problem, state, starts, hold, Search::new(EVALUATIONS))
 }
 
+/// Steps of the events' own parameters before those of all.
+const SETTLING: usize = 6;
+
+/// The events' own parameters fitted to lever and causes as they are: a search from levels that are off goes astray with everything else.
+///
+/// # Errors
+/// Those of [`fit`].
+pub(super) fn settled(problem: &Problem<'_>, state: State, starts: Vec<usize>) -> Result<JointFit, ModelError> {
+    fit_within(problem, state, starts, Hold::Shared, Search::new(SETTLING))
+}
+
 /// How far a search may go, and with what damping it begins.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Search {

@@ -11,6 +11,10 @@ const LEAST_RATIO: f64 = 1.25;
 const BELOW_THE_LAW: f64 = 5.0;
 /// Part of the quality factor under it below which a highest one without thermal motion is an edge of the detector, not a mode.
 const LEAST_QUALITY_SHARE: f64 = 0.25;
+/// Part of half the sample rate above which nothing is a mode: there a detector's edge, a few samples long, looks like a ringing.
+const HIGHEST: f64 = 0.8;
+/// Part of the first mode's decay rate below which no other mode's is: viscous losses and those inside the lever rise with frequency.
+const LEAST_RATE: f64 = 0.25;
 /// Most resonances that are sorted out exhaustively.
 const MOST: usize = 12;
 
@@ -28,11 +32,13 @@ pub(super) fn lever_modes(
     thermal: &[f64],
     lines: &[usize],
     nominal_poles: &[f64],
+    interval_s: f64,
 ) -> Vec<usize> {
     let quality = |e: &Exponential| e.pole.norm() / (-2.0 * e.pole.re);
+    let highest = highest(interval_s);
     let ringing = |i: &usize| {
         let e = &exponentials[*i];
-        e.oscillates() && !lines.contains(i) && quality(e) >= LEAST_QUALITY
+        e.oscillates() && !lines.contains(i) && quality(e) >= LEAST_QUALITY && e.pole.im < highest
     };
     let mut places: Vec<usize> = (0..exponentials.len()).filter(ringing).collect();
     places.sort_by(|&a, &b| exponentials[a].pole.im.total_cmp(&exponentials[b].pole.im));
@@ -55,6 +61,11 @@ pub(super) fn lever_modes(
     in_order(&seen).into_iter().map(|i| places[i]).collect()
 }
 
+/// Angular frequency above which nothing is a mode, rad/s.
+pub(super) fn highest(interval_s: f64) -> f64 {
+    HIGHEST * std::f64::consts::PI / interval_s
+}
+
 /// A resonance: angular frequency, quality factor, share of the static response, variance of its thermal motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Seen {
@@ -69,7 +80,14 @@ fn in_order(seen: &[Seen]) -> Vec<usize> {
     let Some(first) = (0..seen.len()).max_by(|&a, &b| seen[a].share.total_cmp(&seen[b].share)) else {
         return Vec::new();
     };
-    let above: Vec<usize> = (first + 1..seen.len()).take(MOST).collect();
+    let rate = |i: usize| seen[i].omega / seen[i].quality_factor;
+    // what decays more slowly than the first mode by far is another part's; what is broader than the modes on either side, too
+    let foreign = |i: usize| {
+        let beside =
+            |k: usize| seen.get(k).is_some_and(|s| seen[i].quality_factor < LEAST_QUALITY_SHARE * s.quality_factor);
+        rate(i) < LEAST_RATE * rate(first) || (beside(i - 1) && beside(i + 1))
+    };
+    let above: Vec<usize> = (first + 1..seen.len()).filter(|&i| !foreign(i)).take(MOST).collect();
     let follows = |low: Seen, high: Seen| high.omega >= LEAST_RATIO * low.omega && high.share < low.share;
     let mut best = (0usize, f64::NEG_INFINITY, vec![first]);
     for set in 0u32..1 << above.len() {
@@ -146,6 +164,27 @@ mod tests {
 
     fn beside_the_paper(extra: (f64, f64)) -> Vec<f64> {
         kept(&[&PAPER[..], &[extra]].concat(), &[extra.0])
+    }
+
+    #[test]
+    fn what_decays_too_slowly_or_is_broader_than_its_neighbours_is_not_the_levers() {
+        let with = |omega: f64, quality_factor: f64, share: f64| {
+            let mut seen: Vec<Seen> = PAPER
+                .iter()
+                .map(|&(omega, share)| Seen { omega, quality_factor: omega, share, motion: share * share })
+                .collect();
+            seen.push(Seen { omega, quality_factor, share, motion: share * share });
+            seen.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+            in_order(&seen).into_iter().map(|i| seen[i].omega).collect::<Vec<_>>()
+        };
+        let own = [46.0, 247.0, 580.0, 1050.0];
+        // a sixth mode of the law at 1700 belongs to it, unless it rings ten times too long
+        let next = 0.006 * (1700.0f64 / 1050.0).powf(-1.5);
+        assert_eq!(with(1700.0, 1700.0, next).len(), 5);
+        assert_eq!(with(1700.0, 17_000.0, next), own);
+        let between = 0.01;
+        assert_eq!(with(800.0, 800.0, between).len(), 5);
+        assert_eq!(with(800.0, 60.0, between), own);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::stepper::Release;
 use super::window::{Cut, EventWindow};
 use crate::model::ModelError;
 use crate::model::ringdown::internals::Whitener;
-use crate::model::ringdown::{EventParameters, RingdownNoise};
+use crate::model::ringdown::{EventParameters, RingdownNoise, ThermalMode};
 
 /// The data and what is known beforehand.
 pub struct Problem<'a> {
@@ -91,6 +91,15 @@ impl Problem<'_> {
         out
     }
 
+    /// Standard deviation of the first mode's thermal motion, V of its modal coordinate.
+    fn thermal(&self) -> f64 {
+        let Some(first) = self.seen.first().map(|seen| seen.mode) else { return 0.0 };
+        let own = |mode: &&ThermalMode| (mode.pole.im / first.omega - 1.0).abs();
+        let motion = self.noise.thermal.iter().min_by(|a, b| own(a).total_cmp(&own(b)));
+        let seen = motion.filter(|mode| own(mode) < 0.1).map_or(0.0, |mode| mode.variance.sqrt());
+        if first.share == 0.0 { 0.0 } else { seen / first.share.abs() }
+    }
+
     /// An event as it is to be simulated.
     pub(super) fn release(&self, own: &EventParameters) -> Release {
         Release {
@@ -99,6 +108,7 @@ impl Problem<'_> {
             before: self.cut.before,
             samples: self.cut.samples,
             interval_s: self.cut.interval_s,
+            thermal: self.thermal(),
         }
     }
 

@@ -27,6 +27,8 @@ pub struct Sign {
     pub cause: &'static dyn Cause,
     /// Values with the strength that fits best.
     pub values: Vec<f64>,
+    /// Whether several strengths were tried: its effect is not in proportion to it.
+    pub graded: bool,
     /// Score over its standard deviation.
     pub z: f64,
     /// Fall of the sum of squares that its strength promises.
@@ -128,7 +130,9 @@ pub fn screen(
         }
         let mut values = values.clone();
         values[0] = inside;
-        signs.push(Sign { cause: *cause, values, z: (gain.max(0.0)).sqrt() * score.signum(), gain });
+        let graded = cause.about().parameters.len() == 1
+            && trials.iter().filter(|(c, _)| c.about().id == cause.about().id).count() > 1;
+        signs.push(Sign { cause: *cause, values, graded, z: (gain.max(0.0)).sqrt() * score.signum(), gain });
     }
     let widened = widening(scatters, events.len());
     (strongest, strongest_picked) = (strongest / widened, strongest_picked / widened);

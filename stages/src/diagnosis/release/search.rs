@@ -1,7 +1,7 @@
 //! From signs to names: refits, held-out events, and when to abstain.
 
 use super::halves::Halves;
-use super::joint::{JointFit, fit};
+use super::joint::{JointFit, fit, settled};
 use super::problem::Problem;
 use super::residuals::{Tile, common, peaks, residuals, tiles, whitened};
 use super::screen::{Screen, screen};
@@ -75,8 +75,11 @@ const REMAINDER: f64 = 0.05;
 /// Safety of the omnibus test, whose tiles are counted but whose noise model is an estimate.
 const OMNIBUS: f64 = 0.1;
 
-/// Probability of a sign beside named causes above which it does not take their names away: their own model is not exact either.
-const FAINT: f64 = 1e-6;
+/// Probability of a sign beside named causes above which it does not take their names away, and the share of what they have explained below which it does
+/// not either: their own model is not exact.
+const FAINT: [f64; 2] = [1e-6, 0.01];
+/// Gain of the log likelihood on held-out events that one more cause must bring beside others, for the same reason: odds of 20 to 1.
+const ONE_MORE: f64 = 3.0;
 
 /// Whether a candidate belongs into a screen of events' shapes.
 fn is_candidate(cause: &dyn Cause, without: &[String]) -> bool {
@@ -92,7 +95,11 @@ pub fn scene(problem: &Problem<'_>, fitted: &JointFit, common: &[f64]) -> Scene 
     let count = events.len().max(1) as f64;
     let interval_s = problem.cut.interval_s;
     let own: Vec<f64> = modes.iter().map(|m| m.omega / std::f64::consts::TAU).collect();
+    let mut places: Vec<f64> = problem.windows.iter().map(|window| window.first.place).collect();
+    places.sort_by(f64::total_cmp);
+    places.dedup();
     Scene {
+        places,
         quality_factor: modes.iter().map(|m| m.quality_factor).collect(),
         interval_s,
         window_s: problem.cut.samples as f64 * interval_s,
@@ -132,7 +139,8 @@ pub fn name_causes(
         }
     }
     let clean = (state.clone(), starts.clone());
-    let mut fits = vec![fit(problem, state, starts, Hold::Nothing)?];
+    let begun = settled(problem, state, starts)?;
+    let mut fits = vec![fit(problem, begun.state, begun.starts, Hold::Nothing)?];
     let mut named: Vec<Named> = Vec::new();
     let mut nearest = Vec::new();
     let mut evidence = Vec::new();
@@ -186,7 +194,7 @@ pub fn name_causes(
             ))
         } else if !best.fitted.at_limit.is_empty() {
             Some(format!("the nearest candidate, {}, ends at a limit of its parameters", best.cause.about().id))
-        } else if held_out.log_likelihood <= 0.0 {
+        } else if held_out.log_likelihood <= if named.is_empty() { 0.0 } else { ONE_MORE } {
             Some(format!("the nearest candidate, {}, gains nothing on held-out events", best.cause.about().id))
         } else {
             rival.and_then(|rival| {
@@ -198,7 +206,9 @@ pub fn name_causes(
             })
         };
         if let Some(reason) = refusal {
-            if !named.is_empty() && last_screen.p_value > FAINT {
+            let strongest = last_screen.signs.first().map_or(0.0, |sign| sign.gain);
+            let explained = fits.first().map_or(0.0, |first| first.cost - base.cost);
+            if !named.is_empty() && (last_screen.p_value > FAINT[0] || strongest < FAINT[1] * explained) {
                 evidence.push(format!("a faint sign is left (p = {:.1e}): {reason}", last_screen.p_value));
                 break;
             }

@@ -1,14 +1,18 @@
 //! Where the joint fit begins: noise and modes from free exponentials.
 
-use super::align::suggested;
+use faer::c64;
+
+use super::align::{in_phase, suggested};
 use super::lever_modes::lever_modes;
 use super::problem::SeenMode;
+use super::silent_modes::silent_modes;
 use super::state::State;
+use super::thermal_peaks::{ThermalPeak, thermal_peaks};
 use super::window::{Cut, EventWindow};
 use crate::model::ModelError;
-use crate::model::ringdown::internals::fit_all_that_rings;
+use crate::model::ringdown::internals::{fit_all_that_rings, noise_of_stretches};
 use crate::model::ringdown::{
-    EventParameters, Exponential, ModeEstimate, Ringdown, RingdownNoise, RingdownOptions, fit_ringdowns,
+    EventParameters, Exponential, ModeEstimate, Ringdown, RingdownNoise, RingdownOptions, ThermalMode, fit_ringdowns,
 };
 
 /// What the start says.
@@ -32,6 +36,10 @@ const NEAR: f64 = 0.006;
 /// How far the fit may go from free exponentials, in their standard errors, and at least (relative, of f and Q): a cause biases them.
 const HELD_ERRORS: f64 = 5.0;
 const HELD_LEAST: [f64; 2] = [1e-3, 0.05];
+/// The same of a mode that only thermal motion shows: its width is not measured.
+const HELD_SILENT: [f64; 2] = [1e-3, 0.5];
+/// Relative distance within which an exponential stands beside a mode.
+const BESIDE: f64 = 0.02;
 /// Most modes that are looked for: a lever's, and what else rings.
 const MOST: usize = 10;
 /// Tries with more exponentials where combinations took the place of modes.
@@ -57,9 +65,10 @@ pub fn start(
         .zip(&starts)
         .map(|(window, start)| &window.values[start + cut.before + SKIPPED..start + cut.samples])
         .collect();
-    let (fitted, chosen, lines) = match modes {
-        Some(modes) => given(&after, free, cut.interval_s, modes)?,
-        None => found(&after, free, cut.interval_s, nominal_poles)?,
+    let peaks = thermal_peaks(free, cut.samples, cut.interval_s);
+    let (mut fitted, chosen, lines) = match modes {
+        Some(modes) => given(&after, free, cut.interval_s, modes, &peaks)?,
+        None => found(&after, free, cut.interval_s, nominal_poles, &peaks)?,
     };
     // modes come first, in the same order
     let mut kept: Vec<(Exponential, ModeEstimate)> = chosen
@@ -68,11 +77,18 @@ pub fn start(
         .collect();
     kept.sort_by(|a, b| a.0.pole.im.total_cmp(&b.0.pole.im));
     let (kept, estimates): (Vec<Exponential>, Vec<ModeEstimate>) = kept.into_iter().unzip();
-    let lever = suggested(&kept, nominal_poles);
+    let mut lever = suggested(&kept, nominal_poles);
+    let crude = |(window, start): (&EventWindow, &usize)| {
+        (window.onset - (start + cut.before + SKIPPED) as f64) * cut.interval_s
+    };
+    let found: Vec<f64> = windows.iter().zip(&starts).map(crude).collect();
+    let own: Vec<f64> = fitted.events.iter().map(|event| event.onset_s).collect();
+    let late = in_phase(&kept, &mut lever, mean_difference(&found, &own));
     let events = windows
         .iter()
         .zip(&starts)
-        .map(|(window, start)| {
+        .zip(&own)
+        .map(|((window, start), own)| {
             let level = |from: usize, to: usize| {
                 let part = &window.values[from.min(to)..to];
                 part.iter().sum::<f64>() / part.len().max(1) as f64
@@ -80,8 +96,11 @@ pub fn start(
             let first = start + cut.before;
             let held = level(first.saturating_sub(200), first.saturating_sub(4));
             let settled = level(start + cut.samples * 3 / 4, start + cut.samples);
-            let lead = (window.onset - first as f64).clamp(-1.0, 0.0);
-            EventParameters { amplitude: settled - held, onset_s: lead * cut.interval_s, offset: settled, slope: 0.0 }
+            let lead = (window.onset - first as f64).clamp(-1.0, 0.0) * cut.interval_s;
+            let released = own + late + SKIPPED as f64 * cut.interval_s;
+            let fits = window.start(first as f64 + released / cut.interval_s, cut).is_some();
+            let onset_s = if fits { released } else { lead };
+            EventParameters { amplitude: settled - held, onset_s, offset: settled, slope: 0.0 }
         })
         .collect();
     let combinations_hz = lines
@@ -94,12 +113,30 @@ pub fn start(
         [(f.std / f.value, HELD_LEAST[0]), (q.std / q.value, HELD_LEAST[1])]
             .map(|(own, least)| (HELD_ERRORS * own).max(least))
     };
-    let seen = lever
+    let mut seen: Vec<SeenMode> = lever
         .modes
         .iter()
         .zip(&estimates)
         .map(|(mode, estimate)| SeenMode { mode: *mode, std: held(estimate) })
         .collect();
+    let room = modes.map_or(MOST, |modes| modes.saturating_sub(seen.len()));
+    let heard: Vec<f64> = fitted.exponentials.iter().filter(|e| e.oscillates()).map(|e| e.pole.norm()).collect();
+    let mut moving = kept.clone();
+    for silent in silent_modes(&peaks, &lever.modes, &heard, cut.interval_s).into_iter().take(room) {
+        let place = lever.modes.partition_point(|mode| mode.omega < silent.mode.omega);
+        lever.modes.insert(place, silent.mode);
+        seen.insert(place, SeenMode { mode: silent.mode, std: HELD_SILENT });
+        fitted.noise.thermal.push(ThermalMode { pole: silent.mode.pole(), variance: silent.variance });
+        moving.push(Exponential { pole: silent.mode.pole(), residue: c64::new(0.0, 0.0) });
+    }
+    // whatever else rings; not beside a mode, where a misfit would be taken for noise
+    let beside = |e: &Exponential| lever.modes.iter().any(|mode| (e.pole.norm() / mode.omega - 1.0).abs() < BESIDE);
+    moving.extend(fitted.exponentials.iter().filter(|e| e.oscillates() && !beside(e)));
+    if let Some(noise) = noise_of_stretches(free, cut.samples, cut.interval_s, &moving) {
+        fitted.noise = noise;
+    }
+    let total: f64 = lever.modes.iter().map(|mode| mode.share).sum();
+    lever.modes.iter_mut().for_each(|mode| mode.share /= total);
     Ok(Start {
         state: State { lever, hypotheses: Vec::new(), events },
         starts,
@@ -109,11 +146,21 @@ pub fn start(
     })
 }
 
+fn mean_difference(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a - b).sum::<f64>() / a.len().min(b.len()).max(1) as f64
+}
+
 /// A fit, which of its exponentials are the lever's modes, and which are combinations of others.
 type Chosen = (Ringdown, Vec<usize>, Vec<usize>);
 
 /// So many modes: the strongest that are no combinations.
-fn given(after: &[&[f64]], free: &[&[f64]], interval_s: f64, modes: usize) -> Result<Chosen, ModelError> {
+fn given(
+    after: &[&[f64]],
+    free: &[&[f64]],
+    interval_s: f64,
+    modes: usize,
+    peaks: &[ThermalPeak],
+) -> Result<Chosen, ModelError> {
     let (mut fitted, mut lines) = (None, Vec::new());
     for extra in 0..TRIES {
         let options = RingdownOptions { modes: modes + extra, ..RingdownOptions::default() };
@@ -122,7 +169,7 @@ fn given(after: &[&[f64]], free: &[&[f64]], interval_s: f64, modes: usize) -> Re
             Err(error) if fitted.is_none() => return Err(error),
             Err(_) => break,
         };
-        lines = combinations(&found.exponentials);
+        lines = combinations(&found.exponentials, peaks);
         let enough = found.exponentials.iter().filter(|e| e.oscillates()).count() - lines.len() >= modes;
         fitted = Some(found);
         if enough {
@@ -139,11 +186,17 @@ fn given(after: &[&[f64]], free: &[&[f64]], interval_s: f64, modes: usize) -> Re
 }
 
 /// As many modes as are a lever's, among all that rings.
-fn found(after: &[&[f64]], free: &[&[f64]], interval_s: f64, nominal_poles: &[f64]) -> Result<Chosen, ModelError> {
+fn found(
+    after: &[&[f64]],
+    free: &[&[f64]],
+    interval_s: f64,
+    nominal_poles: &[f64],
+    peaks: &[ThermalPeak],
+) -> Result<Chosen, ModelError> {
     let fitted = fit_all_that_rings(after, free, interval_s, MOST, &RingdownOptions::default())?;
-    let lines = combinations(&fitted.exponentials);
+    let lines = combinations(&fitted.exponentials, peaks);
     let thermal: Vec<f64> = fitted.noise.thermal.iter().map(|mode| mode.variance).collect();
-    let chosen = lever_modes(&fitted.exponentials, &thermal, &lines, nominal_poles);
+    let chosen = lever_modes(&fitted.exponentials, &thermal, &lines, nominal_poles, interval_s);
     Ok((fitted, chosen, lines))
 }
 
@@ -151,8 +204,8 @@ fn energy(e: &Exponential) -> f64 {
     e.residue.norm_sqr() / -e.pole.re
 }
 
-/// Which exponentials ring at a combination of stronger ones.
-fn combinations(exponentials: &[Exponential]) -> Vec<usize> {
+/// Which exponentials ring at a combination of stronger ones, and are no modes: those are in thermal motion (`peaks`).
+fn combinations(exponentials: &[Exponential], peaks: &[ThermalPeak]) -> Vec<usize> {
     let modes: Vec<(usize, &Exponential)> = exponentials.iter().enumerate().filter(|(_, e)| e.oscillates()).collect();
     let Some((_, first)) = modes.first() else { return Vec::new() };
     let near = |e: &Exponential, frequency: f64| (e.pole.im / frequency - 1.0).abs() < NEAR;
@@ -162,5 +215,6 @@ fn combinations(exponentials: &[Exponential]) -> Vec<usize> {
         energy(first) > 4.0 * energy(e)
             && beside.chain([3.0 * first.pole.im]).any(|frequency| frequency > 0.0 && near(e, frequency))
     };
-    modes.iter().filter(|(_, e)| is_one(e)).map(|(i, _)| *i).collect()
+    let moves = |e: &Exponential| peaks.iter().any(|peak| near(e, peak.omega));
+    modes.iter().filter(|(_, e)| is_one(e) && !moves(e)).map(|(i, _)| *i).collect()
 }

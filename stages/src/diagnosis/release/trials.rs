@@ -1,7 +1,7 @@
 //! Candidates fitted in full.
 
 use super::align::aligned;
-use super::joint::{EVALUATIONS, JointFit, Search, fit_within};
+use super::joint::{EVALUATIONS, JointFit, Search, fit_within, settled};
 use super::problem::Problem;
 use super::screen::Sign;
 use super::search::{PENALTY, same_class};
@@ -69,10 +69,14 @@ const LOOK: usize = 6;
 const LEADER: usize = 3 * EVALUATIONS;
 /// Share of the leader's gain below which a rival is not fitted any further, unless it falls so fast that it may get there: so many times as far as in its
 /// last steps.
-const HOPELESS: f64 = 0.5;
+const HOPELESS: f64 = 0.8;
 const COMES_UP: f64 = 3.0;
 /// Cost over the base's beyond which the first steps have led nowhere.
 const NOT_LOST: f64 = 1.5;
+
+/// Parts of the strength that the score suggests from which a candidate may begin anew.
+const GRADE: f64 = 0.8;
+const GRADES: std::ops::RangeInclusive<i32> = -10..=6;
 
 /// The strongest candidates fitted from the present fit, best first.
 ///
@@ -121,23 +125,30 @@ pub(super) fn refits(
 impl Trial {
     /// The first steps of a candidate, from the present fit and, where that has not arrived, from where free exponentials did.
     fn begin(problem: &Problem<'_>, base: &JointFit, clean: &(State, Vec<usize>), sign: &Sign) -> Vec<Self> {
-        let hypothesis = Hypothesis { cause: sign.cause, values: sign.values.clone() };
-        let from = |lever: &State, starts: &[usize]| {
+        let settled = |lever: &State, starts: &[usize], part: f64| {
+            let mut values = sign.values.clone();
+            values[0] *= part;
             let mut state = lever.clone();
             state.hypotheses = base.state.hypotheses.clone();
-            state.hypotheses.push(hypothesis.clone());
+            state.hypotheses.push(Hypothesis { cause: sign.cause, values });
             let mut starts = starts.to_vec();
             aligned(problem, &mut state, &mut starts).ok()?;
-            let fitted = fit_within(problem, state, starts, Hold::Nothing, Search::new(LOOK)).ok()?;
+            settled(problem, state, starts).ok()
+        };
+        let from = |begun: JointFit| {
+            let fitted = fit_within(problem, begun.state, begun.starts, Hold::Nothing, Search::new(LOOK)).ok()?;
             let fall = if fitted.cost < NOT_LOST * base.cost { f64::INFINITY } else { 0.0 };
             let mut trial = Self { cause: sign.cause, score: sign.z, promised: sign.gain, gain: 0.0, fall, fitted };
             trial.weigh(problem, base);
             Some(trial)
         };
-        let first = from(&base.state, &base.starts);
-        // a baseline that did not arrive has bent to the misfit
+        let first = settled(&base.state, &base.starts, 1.0).and_then(from);
+        // a baseline that did not arrive has bent to the misfit, and its score is that of another strength
         let again = !base.converged || first.as_ref().is_none_or(|trial| !trial.fitted.converged);
-        let second = if again { from(&clean.0, &clean.1) } else { None };
+        let steps = if sign.graded { GRADES } else { 0..=4 };
+        let parts = steps.filter(|_| again).map(|step| GRADE.powi(step));
+        let begun = parts.filter_map(|part| settled(&clean.0, &clean.1, part));
+        let second = begun.min_by(|a, b| a.cost.total_cmp(&b.cost)).and_then(from);
         first.into_iter().chain(second).collect()
     }
 

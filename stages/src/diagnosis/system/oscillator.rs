@@ -103,7 +103,7 @@ pub(super) fn motion(
 
 fn bend(x: [f64; 2], omega: &[f64; 1], effects: &Effects) -> f64 {
     let (position, velocity) = ([x[0]], [x[1] * omega[0]]);
-    let motion = Motion { position: &position, velocity: &velocity, omega, gap: x[0] };
+    let motion = Motion { position: &position, velocity: &velocity, omega, gap: x[0], thermal: 0.0 };
     let mut acceleration = [0.0];
     effects.modal_force.iter().for_each(|force| force(&motion, &mut acceleration));
     acceleration[0] / omega[0]

@@ -123,6 +123,7 @@ fn scene(bench: &Bench, fit: &Fit) -> Scene {
         input_level: if bench.driven { 1.0 } else { 0.0 },
         noise_v: fit.rms(bench),
         residual_peaks_hz: peaks(&fit.residual, bench.span.interval_s),
+        places: Vec::new(),
     }
 }
 

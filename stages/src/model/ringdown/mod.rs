@@ -58,8 +58,10 @@ pub(crate) mod internals {
     pub(crate) use super::coordinates::{pole_of, slopes};
     pub(crate) use super::estimate::mode;
     pub(crate) use super::modal_form::{columns, shared, signal, weights};
+    pub(crate) use super::noise_estimate::noise_of_stretches;
     pub(crate) use super::normal::symmetric_inverse;
     pub(crate) use super::whitener::{LANES, Whitener};
+    pub(crate) use super::whittle::{hann, mean_periodogram};
 }
 
 pub use choice::{CountedRingdown, HELD_OUT_EVENTS, ModeCount, fit_counted_ringdowns};

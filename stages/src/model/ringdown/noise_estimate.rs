@@ -59,15 +59,7 @@ pub(super) fn estimated(
         let missing = fitted.absorbed(&point.exponentials, freedom, records, &taper);
         observed.iter_mut().zip(missing).for_each(|(o, m)| *o += m);
     }
-    let stretches: Vec<Vec<f64>> = records
-        .free
-        .iter()
-        .flat_map(|stretch| stretch.chunks_exact(samples))
-        .map(|chunk| {
-            let mean = chunk.iter().sum::<f64>() / samples as f64;
-            chunk.iter().map(|v| v - mean).collect()
-        })
-        .collect();
+    let stretches = chunks(records.free, samples);
     let mut lag_weights = records.gaps.lag_weights(&taper);
     if !stretches.is_empty() {
         // events and stretches count by their number
@@ -79,17 +71,56 @@ pub(super) fn estimated(
             lag_weights.iter_mut().zip(whole).for_each(|(l, w)| *l = (own * *l + other * w) / (own + other));
         }
     }
-    let unit = expected_parts(&parts, interval_s, &lag_weights);
+    likeliest(&observed, &parts, interval_s, &lag_weights)
+}
+
+/// Least number of windows in free stretches from which alone the noise is estimated: a quarter of a line's power is its scatter then.
+const ALONE: usize = 16;
+
+/// The noise of free stretches alone: what a fit to the events leaves unexplained is not in it. None where they hold too few windows of `samples`.
+///
+/// Thermal motion at the oscillating ones of `exponentials`, wander and white noise, as in a fit of ringdowns.
+pub(crate) fn noise_of_stretches(
+    free: &[&[f64]],
+    samples: usize,
+    interval_s: f64,
+    exponentials: &[Exponential],
+) -> Option<RingdownNoise> {
+    let stretches = chunks(free, samples);
+    if stretches.len() < ALONE {
+        return None;
+    }
+    let taper = hann(samples);
+    let observed = mean_periodogram(&stretches, &taper);
+    let white = observed.iter().skip(1).sum::<f64>() / (observed.len() - 1) as f64;
+    let parts = parts_of(exponentials, white, interval_s, samples);
+    Some(likeliest(&observed, &parts, interval_s, &autocorrelation(&taper)))
+}
+
+/// Windows of free stretches, their means taken off.
+fn chunks(free: &[&[f64]], samples: usize) -> Vec<Vec<f64>> {
+    free.iter()
+        .flat_map(|stretch| stretch.chunks_exact(samples))
+        .map(|chunk| {
+            let mean = chunk.iter().sum::<f64>() / samples as f64;
+            chunk.iter().map(|v| v - mean).collect()
+        })
+        .collect()
+}
+
+/// Variances of the parts under which a mean periodogram is likeliest.
+fn likeliest(observed: &[f64], parts: &RingdownNoise, interval_s: f64, lag_weights: &[f64]) -> RingdownNoise {
+    let unit = expected_parts(parts, interval_s, lag_weights);
     let mean = observed.iter().skip(1).sum::<f64>() / (observed.len() - 1) as f64;
     let first: Vec<f64> = unit
         .iter()
         .enumerate()
         .map(|(i, part)| {
             let peak = part.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-            if i == 0 { last.white.min(mean) } else { 0.1 * mean / peak }
+            if i == 0 { parts.white.min(mean) } else { 0.1 * mean / peak }
         })
         .collect();
-    let mut values = variances(&observed, &unit, &first);
+    let mut values = variances(observed, &unit, &first);
     // without white noise the filter has no floor: rounding of the records is always there
     values[0] = values[0].max(1e-6 * mean);
     parts.with_variances(&values)

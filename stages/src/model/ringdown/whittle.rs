@@ -6,7 +6,7 @@ use realfft::RealFftPlanner;
 use super::noise::RingdownNoise;
 
 /// Hann taper of unit mean square.
-pub(super) fn hann(samples: usize) -> Vec<f64> {
+pub(crate) fn hann(samples: usize) -> Vec<f64> {
     let scale = (8.0f64 / 3.0).sqrt();
     (0..samples)
         .map(|k| scale * 0.5 * (1.0 - (std::f64::consts::TAU * (k as f64 + 0.5) / samples as f64).cos()))
@@ -14,7 +14,7 @@ pub(super) fn hann(samples: usize) -> Vec<f64> {
 }
 
 /// Mean of the tapered periodograms `|FFT|^2 / N` of several signals, bins 0 to N/2.
-pub(super) fn mean_periodogram(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f64> {
+pub(crate) fn mean_periodogram(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f64> {
     let mut sum = summed_periodograms(signals, taper);
     sum.iter_mut().for_each(|p| *p /= signals.len().max(1) as f64);
     sum

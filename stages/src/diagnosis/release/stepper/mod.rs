@@ -45,6 +45,8 @@ pub struct Release {
     pub samples: usize,
     /// Interval of the samples, s.
     pub interval_s: f64,
+    /// Standard deviation of the first mode's thermal motion beside this mean one, V of its modal coordinate.
+    pub thermal: f64,
 }
 
 /// Signals of releases under effects, each with the modes' relative change of frequency, less that without any: what the causes add to the closed
@@ -169,7 +171,7 @@ mod tests {
     }
 
     fn release() -> Release {
-        Release { amplitude: 0.8, lead_s: 1.3e-7, before: 16, samples: 3000, interval_s: 2e-7 }
+        Release { amplitude: 0.8, lead_s: 1.3e-7, before: 16, samples: 3000, interval_s: 2e-7, thermal: 0.0 }
     }
 
     fn largest(signal: &[f64]) -> f64 {

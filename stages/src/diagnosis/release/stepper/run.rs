@@ -34,6 +34,7 @@ pub(super) struct Run<'a> {
     pub velocity: Vec<f64>,
     acceleration: Vec<f64>,
     amplitude: f64,
+    thermal: f64,
     pub time_s: f64,
     load_now: f64,
 }
@@ -62,6 +63,7 @@ impl<'a> Run<'a> {
             omega,
             quality,
             amplitude: release.amplitude,
+            thermal: release.thermal,
             time_s: 0.0,
             load_now: -release.amplitude * effects.load(0.0),
         }
@@ -80,8 +82,13 @@ impl<'a> Run<'a> {
         self.acceleration.fill(0.0);
         let own = self.own;
         let gap = self.position.iter().zip(&self.tip).map(|(q, share)| share * (q + self.amplitude)).sum();
-        let motion =
-            Motion { position: &self.position[..own], velocity: &self.velocity[..own], omega: &self.omega[..own], gap };
+        let motion = Motion {
+            position: &self.position[..own],
+            velocity: &self.velocity[..own],
+            omega: &self.omega[..own],
+            gap,
+            thermal: self.thermal,
+        };
         for force in &self.effects.modal_force {
             force(&motion, &mut self.acceleration[..own]);
         }
