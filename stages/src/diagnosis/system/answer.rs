@@ -83,7 +83,8 @@ impl Findings<'_> {
         };
         let one = |chosen: &Chosen| {
             let which = chosen.place;
-            let (before, after) = (held_out[which], held_out[which + 1]);
+            let at = |rung: usize| held_out.get(rung).copied().flatten();
+            let (before, after) = (at(which), at(which + 1));
             let gain = before.zip(after).and_then(|(b, a)| finite(self.effective(count) * (b / a).ln()));
             let about = crate::causes::find(chosen.id).map(|cause| cause.about());
             NamedCause {

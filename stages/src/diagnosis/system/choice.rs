@@ -59,7 +59,7 @@ pub(super) struct Chosen {
 
 /// What the search found.
 pub(super) struct Choice {
-    /// The baseline and each model with one more cause, in order.
+    /// The baseline and each model with one more cause, in order: rung n has n causes.
     pub ladder: Vec<Judged>,
     /// The causes of the last.
     pub chosen: Vec<Chosen>,
@@ -267,17 +267,20 @@ impl Search<'_> {
         let mut ladder = vec![baseline.clone()];
         for added in &model.causes {
             let Some(current) = ladder.last() else { break };
-            // from what this rung asks for, not from values that only hold beside the causes to come
+            // from what this rung asks for, not from values that only hold beside the causes to come; where that diverges, from what hardly acts
             let promise = screen(self.bench, &current.fit, &[added.cause]).into_iter().next();
-            let values = promise.map_or_else(|| added.values.clone(), |promise| promise.values);
-            let start = current.fit.model.with(added.cause, values);
-            let Some(next) = Fit::new(self.bench, &start, None) else { break };
+            let asked = promise.into_iter().flat_map(|promise| [promise.values, promise.trial]);
+            let next = asked
+                .chain([added.values.clone()])
+                .find_map(|values| Fit::new(self.bench, &current.fit.model.with(added.cause, values), None));
+            let Some(next) = next else { break };
             ladder.push(Judged::new(next, &self.blocks));
         }
         // the last from where it was found, if that is the better
         let found = Fit::new(self.bench, model, None);
         if let (Some(last), Some(found)) = (ladder.last_mut(), found)
-            && (found.loss < last.fit.loss || last.fit.model.causes.len() < model.causes.len())
+            && last.fit.model.causes.len() == model.causes.len()
+            && found.loss < last.fit.loss
         {
             *last = Judged::new(found, &self.blocks);
         }
