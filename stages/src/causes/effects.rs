@@ -119,6 +119,11 @@ impl Effects {
         !self.modal_force.is_empty()
     }
 
+    /// Whether twice the load makes twice the signal.
+    pub fn are_linear(&self) -> bool {
+        self.modal_force.is_empty() && self.optics.is_empty()
+    }
+
     /// Whether anything but frequencies changes in the signal of one event.
     pub fn change_the_shape(&self) -> bool {
         let parts = [

@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
+use super::lever::Lever;
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::{Hold, Hypothesis, State};
-use super::stepper::{Pace, differences};
+use super::stepper::{Pace, Release, differences};
 use crate::causes::Effects;
 use crate::model::ringdown::internals::{LANES, Whitener};
 
@@ -63,25 +64,52 @@ pub(super) fn base(problem: &Problem<'_>, whitener: &Whitener, state: &State) ->
 
 /// Derivatives of what the hypotheses change, kept while their parameters stay near.
 pub(super) struct Slopes {
-    /// Per event, with each of their parameters; nothing where those are held.
+    /// Per event, with each of the causes' parameters; nothing where those are held.
     pub causes: Vec<Signals>,
-    /// With everything else, of one event that stands for all: per parameter of the lever, then amplitude, then onset.
-    pub crossed: Signals,
-    /// Its amplitude.
-    pub amplitude: f64,
+    /// With everything else.
+    crossed: Vec<CrossedSlopes>,
     at: Vec<f64>,
     starts: Vec<usize>,
 }
 
+/// How what the hypotheses change in an event moves with lever, amplitude and onset.
+pub(super) struct CrossedSlopes {
+    /// Per parameter of the lever (none where it is held), then amplitude, then onset.
+    pub signals: Signals,
+    /// The event's amplitude.
+    pub amplitude: f64,
+}
+
+/// Whose crossed derivatives are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Crossing {
+    /// Those of an event of middling amplitude, which stands for all: enough where causes change little.
+    Middle,
+    /// Each event's own.
+    Each,
+}
+
 impl Slopes {
     /// By difference quotients.
-    pub fn of(problem: &Problem<'_>, whitener: &Whitener, state: &State, starts: &[usize], hold: Hold) -> Self {
+    pub fn of(
+        problem: &Problem<'_>,
+        whitener: &Whitener,
+        state: &State,
+        starts: &[usize],
+        hold: Hold,
+        crossing: Crossing,
+    ) -> Self {
         let causes = match hold {
             Hold::Nothing => with_causes(problem, whitener, state),
             Hold::Shared => Vec::new(),
         };
-        let (crossed, amplitude) = with_the_rest(problem, whitener, state);
-        Self { causes, crossed, amplitude, at: state.cause_values(), starts: starts.to_vec() }
+        let crossed = with_the_rest(problem, whitener, state, hold, crossing);
+        Self { causes, crossed, at: state.cause_values(), starts: starts.to_vec() }
+    }
+
+    /// Those of one event, or those that stand for all.
+    pub fn crossed(&self) -> &[CrossedSlopes] {
+        &self.crossed
     }
 
     /// Whether windows were cut anew, or parameters have moved too far.
@@ -122,36 +150,63 @@ fn with_causes(problem: &Problem<'_>, whitener: &Whitener, state: &State) -> Vec
     all
 }
 
-/// How the change moves with lever, amplitude and onset, on an event of middling amplitude.
-fn with_the_rest(problem: &Problem<'_>, whitener: &Whitener, state: &State) -> (Signals, f64) {
+/// How the change moves with lever, amplitude and onset: of each event, or of one of middling amplitude.
+fn with_the_rest(
+    problem: &Problem<'_>,
+    whitener: &Whitener,
+    state: &State,
+    hold: Hold,
+    crossing: Crossing,
+) -> Vec<CrossedSlopes> {
     let mut order: Vec<usize> = (0..state.events.len()).collect();
-    order.sort_by(|&a, &b| state.events[a].amplitude.total_cmp(&state.events[b].amplitude));
-    let middle = order.get(order.len() / 2).filter(|_| !state.hypotheses.is_empty());
-    let Some(&middle) = middle else { return (Signals::with_capacity(problem.cut.samples, 0), 1.0) };
-    let (own, effects) = (state.events[middle], state.effects());
+    if crossing == Crossing::Middle {
+        order.sort_by(|&a, &b| state.events[a].amplitude.total_cmp(&state.events[b].amplitude));
+        order = order.get(order.len() / 2).copied().into_iter().collect();
+    }
+    if state.hypotheses.is_empty() {
+        order.clear();
+    }
+    let effects = state.effects();
     let values = state.lever.parameters();
-    let mut runs = vec![(state.lever.clone(), problem.release(&own))];
-    let mut steps = vec![LEVER_STEP; values.len()];
-    for j in 0..values.len() {
+    let lever_steps = if hold == Hold::Nothing { values.len() } else { 0 };
+    let mut levers = vec![state.lever.clone()];
+    levers.extend((0..lever_steps).map(|j| {
         let mut moved = values.clone();
         moved[j] += LEVER_STEP;
-        runs.push((state.lever.with(&moved), problem.release(&own)));
-    }
-    let (mut larger, mut later) = (problem.release(&own), problem.release(&own));
-    larger.amplitude *= 1.0 + LEVER_STEP;
-    later.lead_s -= ONSET_STEP * problem.cut.interval_s;
-    steps.extend([LEVER_STEP * own.amplitude, ONSET_STEP * problem.cut.interval_s]);
-    runs.extend([(state.lever.clone(), larger), (state.lever.clone(), later)]);
+        state.lever.with(&moved)
+    }));
     // a change of frequency is each event's own, and what it moves of these derivatives is small
-    let signals: Vec<Vec<f64>> = runs
-        .par_iter()
-        .map(|(lever, release)| {
-            differences(lever, std::iter::once((&effects, *release, 0.0)), Pace::FINE).swap_remove(0)
+    let run = |lever: &Lever, release: Release| {
+        differences(lever, std::iter::once((&effects, release, 0.0)), Pace::FINE).swap_remove(0)
+    };
+    let per_event = levers.len() + 2;
+    let all: Vec<Vec<f64>> = (0..order.len() * per_event)
+        .into_par_iter()
+        .map(|i| {
+            let own = &state.events[order[i / per_event]];
+            let mut release = problem.release(own);
+            match levers.get(i % per_event) {
+                Some(lever) => run(lever, release),
+                None if i % per_event == levers.len() => {
+                    release.amplitude *= 1.0 + LEVER_STEP;
+                    run(&state.lever, release)
+                }
+                None => {
+                    release.lead_s -= ONSET_STEP * problem.cut.interval_s;
+                    run(&state.lever, release)
+                }
+            }
         })
         .collect();
-    let mut all = Signals::with_capacity(problem.cut.samples, signals.len());
-    signals.iter().for_each(|signal| all.push(signal));
-    all.whiten(whitener);
-    all.quotients(&steps);
-    (all, own.amplitude)
+    let mut signals = Signals::with_capacity(problem.cut.samples, all.len());
+    all.iter().for_each(|signal| signals.push(signal));
+    signals.whiten(whitener);
+    let quotients = |(mut signals, event): (Signals, &usize)| {
+        let amplitude = state.events[*event].amplitude;
+        let mut steps = vec![LEVER_STEP; lever_steps];
+        steps.extend([LEVER_STEP * amplitude, ONSET_STEP * problem.cut.interval_s]);
+        signals.quotients(&steps);
+        CrossedSlopes { signals, amplitude }
+    };
+    signals.split(per_event).into_iter().zip(&order).map(quotients).collect()
 }

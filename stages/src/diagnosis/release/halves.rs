@@ -3,20 +3,16 @@
 use super::joint::{JointFit, Search, fit, fit_within};
 use super::problem::Problem;
 use super::residuals::{common, residuals};
-use super::state::{Hold, State};
+use super::state::Hold;
+use super::subset::Subset;
 use super::trials::Trial;
-use super::window::EventWindow;
 use crate::diagnosis::verdict::Gain;
 
 /// Trial steps of a half, which begins where the whole ended.
 const HALF: usize = 8;
 
 /// Two halves of the events, each fitted alone and judged on the other.
-pub(super) struct Halves<'a> {
-    whole: &'a Problem<'a>,
-    windows: [Vec<EventWindow>; 2],
-    events: [Vec<usize>; 2],
-}
+pub(super) struct Halves<'a>([Subset<'a>; 2]);
 
 pub(super) struct HeldOut {
     pub log_likelihood: f64,
@@ -38,30 +34,19 @@ impl HeldOut {
 
 impl<'a> Halves<'a> {
     pub fn of(whole: &'a Problem<'a>, base: &JointFit) -> Self {
-        let events = [0, 1].map(|half| (0..base.state.events.len()).filter(|i| i % 2 == half).collect::<Vec<usize>>());
-        let windows = events.clone().map(|chosen| chosen.iter().map(|&i| whole.windows[i].clone()).collect());
-        Self { whole, windows, events }
-    }
-
-    fn part(&self, half: usize) -> Problem<'_> {
-        self.whole.with_windows(&self.windows[half])
-    }
-
-    fn state(&self, fitted: &JointFit, half: usize) -> (State, Vec<usize>) {
-        let mut state = fitted.state.clone();
-        state.events = self.events[half].iter().map(|&i| fitted.state.events[i]).collect();
-        (state, self.events[half].iter().map(|&i| fitted.starts[i]).collect())
+        let count = base.state.events.len();
+        Self([0, 1].map(|half| Subset::of(whole, (0..count).filter(|i| i % 2 == half).collect())))
     }
 
     /// Fits `fitted`'s model to one half, then the other half's own parameters under it.
     fn judged(&self, fitted: &JointFit, half: usize) -> Option<(f64, Vec<f64>)> {
-        let (state, starts) = self.state(fitted, half);
-        let trained = fit_within(&self.part(half), state, starts, Hold::Nothing, Search::new(HALF)).ok()?;
-        let other = 1 - half;
-        let (mut state, starts) = self.state(fitted, other);
+        let [one, other] = [&self.0[half], &self.0[1 - half]];
+        let (state, starts) = one.state(&fitted.state, &fitted.starts);
+        let trained = fit_within(&one.problem(), state, starts, Hold::Nothing, Search::new(HALF)).ok()?;
+        let (mut state, starts) = other.state(&fitted.state, &fitted.starts);
         state.lever = trained.state.lever;
         state.hypotheses = trained.state.hypotheses;
-        let problem = self.part(other);
+        let problem = other.problem();
         let judged = fit(&problem, state, starts, Hold::Shared).ok()?;
         let residuals = residuals(&problem, &judged.state, &judged.starts);
         Some((judged.costs.iter().sum(), common(&judged.state, &residuals)))
@@ -72,7 +57,7 @@ impl<'a> Halves<'a> {
         let count = base.state.events.len();
         let mut out = HeldOut { log_likelihood: 0.0, rms: [0.0; 2], events: count };
         let mut weight = 0.0;
-        if self.events[1].is_empty() {
+        if self.0[1].is_empty() {
             return HeldOut { log_likelihood: f64::NEG_INFINITY, ..out };
         }
         for half in 0..2 {
@@ -81,7 +66,7 @@ impl<'a> Halves<'a> {
             };
             out.log_likelihood += 0.5 * (before.0 - after.0);
             // of a sum weighted to unit variance: back to volts of one event
-            let scale = (self.events[1 - half].len() as f64).sqrt();
+            let scale = (self.0[1 - half].count() as f64).sqrt();
             let differs: Vec<f64> = before.1.iter().zip(&after.1).map(|(b, a)| (b - a).abs()).collect();
             let limit = 0.1 * differs.iter().copied().fold(0.0, f64::max);
             for ((b, a), d) in before.1.iter().zip(&after.1).zip(&differs) {

@@ -4,7 +4,7 @@ use faer::Mat;
 use rayon::prelude::*;
 
 use super::basis::Basis;
-use super::change::{Slopes, base};
+use super::change::{Crossing, Slopes, base};
 use super::normal::{Event, Normal};
 use super::problem::Problem;
 use super::signals::Signals;
@@ -109,7 +109,7 @@ impl Point {
                 place: basis.place(&shape, &self.state.events[event]),
                 rest: self.rest.get(event),
                 rest_head: &self.heads[event],
-                scale: self.state.events[event].amplitude / slopes.amplitude,
+                amplitude: self.state.events[event].amplitude,
                 causes: slopes.causes.get(event),
             })
             .collect()
@@ -129,7 +129,7 @@ impl Linear {
         let whitener = problem.whitener();
         let (mut state, mut starts) = (fitted.state.clone(), fitted.starts.clone());
         let frame = Frame::new(problem, &whitener, &mut state, &mut starts)?;
-        let slopes = Slopes::of(problem, &whitener, &state, &starts, Hold::Nothing);
+        let slopes = Slopes::of(problem, &whitener, &state, &starts, Hold::Nothing, Crossing::Middle);
         let point = Point::at(problem, &whitener, &frame, state);
         Ok(Self { whitener, basis: frame.basis, slopes, point })
     }
@@ -157,15 +157,16 @@ pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) 
     fit_within(problem, state, starts, hold, Search::new(EVALUATIONS))
 }
 
-/// Steps of the events' own parameters before those of all.
+/// Steps of the events' own parameters before those of all, and the part of the cost that is not worth another.
 const SETTLING: usize = 6;
+const ROUGH: f64 = 1e-3;
 
 /// The events' own parameters fitted to lever and causes as they are: a search from levels that are off goes astray with everything else.
 ///
 /// # Errors
 /// Those of [`fit`].
 pub(super) fn settled(problem: &Problem<'_>, state: State, starts: Vec<usize>) -> Result<JointFit, ModelError> {
-    fit_within(problem, state, starts, Hold::Shared, Search::new(SETTLING))
+    fit_within(problem, state, starts, Hold::Shared, Search { rough: ROUGH, ..Search::new(SETTLING) })
 }
 
 /// How far a search may go, and with what damping it begins.
@@ -173,12 +174,14 @@ pub(super) fn settled(problem: &Problem<'_>, state: State, starts: Vec<usize>) -
 pub(super) struct Search {
     pub most: usize,
     pub damping: f64,
+    /// Part of the cost whose fall is not worth another step.
+    pub rough: f64,
 }
 
 impl Search {
     /// A new one.
     pub fn new(most: usize) -> Self {
-        Self { most, damping: DAMPING[0] }
+        Self { most, damping: DAMPING[0], rough: 0.0 }
     }
 }
 
@@ -193,7 +196,8 @@ pub(super) fn fit_within(
     let whitener = problem.whitener();
     let (mut state, mut starts) = (state, starts);
     let mut frame = Frame::new(problem, &whitener, &mut state, &mut starts)?;
-    let mut slopes = Slopes::of(problem, &whitener, &state, &frame.starts, hold);
+    let mut crossing = if hold == Hold::Shared { Crossing::Each } else { Crossing::Middle };
+    let mut slopes = Slopes::of(problem, &whitener, &state, &frame.starts, hold, crossing);
     let mut point = Point::at(problem, &whitener, &frame, state);
     if !point.cost.is_finite() {
         return Err(ModelError::Degenerate("the search has no finite cost where it begins"));
@@ -203,7 +207,7 @@ pub(super) fn fit_within(
     let mut normal = None;
     let converged = loop {
         if slopes.are_stale(&point.state, &frame.starts, hold) {
-            slopes = Slopes::of(problem, &whitener, &point.state, &frame.starts, hold);
+            slopes = Slopes::of(problem, &whitener, &point.state, &frame.starts, hold, crossing);
             normal = None;
         }
         let equations = normal.take().unwrap_or_else(|| {
@@ -212,7 +216,8 @@ pub(super) fn fit_within(
         });
         let step = equations.solve(damping);
         normal = Some(equations);
-        if step.promised < ARRIVED {
+        let arrived = ARRIVED.max(search.rough * point.cost);
+        if step.promised < arrived {
             break true;
         }
         if evaluations >= search.most || damping > DAMPING[3] {
@@ -221,7 +226,14 @@ pub(super) fn fit_within(
         evaluations += 1;
         let trial = point.state.moved(&step, hold);
         let Some((next, new_frame)) = advance(problem, &whitener, &frame, &point, trial) else {
-            damping = (damping * 10.0).max(DAMPING[2]);
+            if crossing == Crossing::Middle && !point.state.hypotheses.is_empty() {
+                // one event's derivatives have led astray: another instant within the sample, another amplitude
+                crossing = Crossing::Each;
+                slopes = Slopes::of(problem, &whitener, &point.state, &frame.starts, hold, crossing);
+                normal = None;
+            } else {
+                damping = (damping * 10.0).max(DAMPING[2]);
+            }
             continue;
         };
         let gain = point.cost - next.cost;
@@ -231,7 +243,7 @@ pub(super) fn fit_within(
         let cut_anew = new_frame.as_ref().is_some_and(|new_frame| new_frame.starts != frame.starts);
         frame = new_frame.unwrap_or(frame);
         // with other samples in the windows the costs are of other data
-        if gain < ARRIVED && !cut_anew {
+        if gain < arrived && !cut_anew {
             break true;
         }
     };

@@ -1,10 +1,10 @@
 //! Normal equations of the joint fit, the events' own parameters eliminated.
 
-use faer::Mat;
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
 use super::basis::{Basis, Place};
-use super::change::Slopes;
+use super::change::{CrossedSlopes, Slopes};
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::{Hold, State, Step};
@@ -19,24 +19,39 @@ pub(super) struct Event<'a> {
     pub rest: &'a [f64],
     /// Their coordinates.
     pub rest_head: &'a [f64],
-    /// Over the amplitude that the crossed derivatives were taken at.
-    pub scale: f64,
+    /// Its amplitude.
+    pub amplitude: f64,
     /// Derivatives with the causes' parameters, whole signals.
     pub causes: Option<&'a Signals>,
 }
 
-/// Crossed derivatives, the same for all events, with their coordinates and products.
+/// Crossed derivatives with their coordinates and products.
 pub(super) struct Crossed<'a> {
     signals: &'a Signals,
     heads: Mat<f64>,
     gram: Mat<f64>,
+    amplitude: f64,
 }
 
 impl<'a> Crossed<'a> {
-    pub fn of(basis: &Basis, slopes: &'a Slopes) -> Self {
-        let matrix = slopes.crossed.matrix();
+    fn of(basis: &Basis, slopes: &'a CrossedSlopes) -> Self {
+        let matrix = slopes.signals.matrix();
         let gram = product(matrix.transpose(), matrix);
-        Self { signals: &slopes.crossed, heads: basis.project(matrix), gram }
+        Self { signals: &slopes.signals, heads: basis.project(matrix), gram, amplitude: slopes.amplitude }
+    }
+}
+
+/// Crossed derivatives of all events: none, one set for all, or each its own.
+pub(super) struct AllCrossed<'a>(Vec<Crossed<'a>>);
+
+impl<'a> AllCrossed<'a> {
+    pub fn of(basis: &Basis, slopes: &'a Slopes) -> Self {
+        Self(slopes.crossed().par_iter().map(|one| Crossed::of(basis, one)).collect())
+    }
+
+    /// Those of an event.
+    pub fn get(&self, event: usize) -> Option<&Crossed<'a>> {
+        self.0.get(event).or(self.0.first())
     }
 }
 
@@ -56,31 +71,45 @@ struct Column {
 impl Event<'_> {
     /// # Method
     /// A column is a place in the basis, a signal, or both: what lies in the basis is multiplied there, and only signals at full length.
-    pub fn products(&self, basis: &Basis, crossed: &Crossed<'_>, hold: Hold, extra: Option<&Signals>) -> Products {
+    pub fn products(
+        &self,
+        basis: &Basis,
+        crossed: Option<&Crossed<'_>>,
+        hold: Hold,
+        extra: Option<&Signals>,
+    ) -> Products {
         let lever = self.place.slopes.ncols() - 4;
         let mut full = Signals::with_capacity(self.rest.len(), 0);
         for signals in self.causes.iter().copied().chain(extra) {
             (0..signals.count()).for_each(|i| full.push(signals.get(i)));
         }
-        let (bent, added) = (crossed.signals.count(), full.count());
+        let (bent, added) = (crossed.map_or(0, |crossed| crossed.signals.count()), full.count());
+        let scale = crossed.map_or(1.0, |crossed| self.amplitude / crossed.amplitude);
+        // the last two are those with amplitude and onset
+        let signal = |i: usize, factor: f64| (i + bent >= lever + 2).then(|| (i + bent - lever - 2, factor));
         let mut columns: Vec<Column> = Vec::new();
-        let signal = |i: usize, factor: f64| (i < bent).then_some((i, factor));
         if hold == Hold::Nothing {
-            columns.extend((0..lever).map(|j| Column { place: Some(j), signal: signal(j, self.scale) }));
+            columns.extend((0..lever).map(|j| Column { place: Some(j), signal: signal(j, scale) }));
         }
         columns.extend((0..added).map(|i| Column { place: None, signal: Some((bent + i, 1.0)) }));
         columns.push(Column { place: Some(lever), signal: signal(lever, 1.0) });
-        columns.push(Column { place: Some(lever + 1), signal: signal(lever + 1, self.scale) });
+        columns.push(Column { place: Some(lever + 1), signal: signal(lever + 1, scale) });
         columns.extend([lever + 2, lever + 3].map(|place| Column { place: Some(place), signal: None }));
 
         let matrix = full.matrix();
         let own_heads = basis.project(matrix);
+        let bent_head = |i: usize, j: usize| crossed.map_or(0.0, |crossed| crossed.heads[(i, j)]);
         let heads = Mat::from_fn(own_heads.nrows(), bent + added, |i, j| {
-            if j < bent { crossed.heads[(i, j)] } else { own_heads[(i, j - bent)] }
+            if j < bent { bent_head(i, j) } else { own_heads[(i, j - bent)] }
         });
-        let (own, cross) = (product(matrix.transpose(), matrix), product(crossed.signals.matrix().transpose(), matrix));
+        let own = product(matrix.transpose(), matrix);
+        let by_bent = |right: MatRef<'_, f64>| match crossed {
+            Some(crossed) => product(crossed.signals.matrix().transpose(), right),
+            None => Mat::zeros(0, right.ncols()),
+        };
+        let cross = by_bent(matrix);
         let signals = |i: usize, j: usize| match (i < bent, j < bent) {
-            (true, true) => crossed.gram[(i, j)],
+            (true, true) => crossed.map_or(0.0, |crossed| crossed.gram[(i, j)]),
             (true, false) => cross[(i, j - bent)],
             (false, true) => cross[(j, i - bent)],
             (false, false) => own[(i - bent, j - bent)],
@@ -108,7 +137,7 @@ impl Event<'_> {
         let column = |values: &[f64]| Mat::from_fn(values.len(), 1, |i, _| values[i]);
         let (rest, value) = (column(self.rest), column(&self.place.value));
         let by_place = product(self.place.slopes.transpose(), column(&left).as_ref());
-        let by_crossed = product(crossed.signals.matrix().transpose(), rest.as_ref());
+        let by_crossed = by_bent(rest.as_ref());
         let by_full = product(matrix.transpose(), rest.as_ref());
         let modelled = product(heads.transpose(), value.as_ref());
         let right = columns
@@ -167,9 +196,9 @@ impl Normal {
         hold: Hold,
     ) -> Self {
         let count = if hold == Hold::Shared { 0 } else { state.lever.parameters().len() + state.causes() };
-        let crossed = Crossed::of(basis, slopes);
-        let events: Vec<Eliminated> =
-            events.par_iter().map(|event| eliminate(&event.products(basis, &crossed, hold, None))).collect();
+        let crossed = AllCrossed::of(basis, slopes);
+        let one = |(i, event): (usize, &Event<'_>)| eliminate(&event.products(basis, crossed.get(i), hold, None));
+        let events: Vec<Eliminated> = events.par_iter().enumerate().map(one).collect();
         let mut information = Mat::zeros(count, count);
         let mut gradient = vec![0.0; count];
         for event in &events {

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::basis::Basis;
 use super::change::changed;
 use super::joint::{JointFit, Linear};
-use super::normal::{Crossed, Event, eliminate};
+use super::normal::{AllCrossed, Crossed, Event, eliminate};
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::Hold;
@@ -76,21 +76,22 @@ pub fn screen(
     let state = linear.state();
     let trials: Vec<(&'static dyn Cause, Vec<f64>)> =
         candidates.iter().flat_map(|cause| cause.trials(scene).into_iter().map(|values| (*cause, values))).collect();
-    let mut sets: Vec<Effects> = vec![state.effects()];
+    let mut sets: Vec<Effects> = vec![state.linear_effects()];
     sets.extend(trials.iter().map(|(cause, values)| {
-        let mut effects = state.effects();
+        let mut effects = state.linear_effects();
         cause.add(values, &mut effects);
         effects
     }));
     let mut changes = changed(problem, &linear.whitener, state, &sets, Pace::COARSE);
     let strengths: Vec<f64> = trials.iter().map(|(_, values)| values[0]).collect();
     changes.par_iter_mut().for_each(|event| event.quotients(&strengths));
-    let crossed = Crossed::of(&linear.basis, &linear.slopes);
+    let crossed = AllCrossed::of(&linear.basis, &linear.slopes);
     let events: Vec<Scores> = linear
         .events()
         .par_iter()
         .zip(&changes)
-        .map(|(event, changes)| Scores::of(event, &linear.basis, &crossed, changes))
+        .enumerate()
+        .map(|(i, (event, changes))| Scores::of(event, &linear.basis, crossed.get(i), changes))
         .collect();
     let (known, count) = (events.first().map_or(0, |e| e.known), trials.len());
     let total = known + count;
@@ -172,7 +173,7 @@ struct Scores {
 }
 
 impl Scores {
-    fn of(event: &Event<'_>, basis: &Basis, crossed: &Crossed<'_>, trials: &Signals) -> Self {
+    fn of(event: &Event<'_>, basis: &Basis, crossed: Option<&Crossed<'_>>, trials: &Signals) -> Self {
         let eliminated = eliminate(&event.products(basis, crossed, Hold::Nothing, Some(trials)));
         let raw: Vec<f64> = (0..trials.count()).map(|i| trials.get(i).iter().map(|v| v * v).sum()).collect();
         let known = eliminated.gradient.len() - raw.len();

@@ -1,12 +1,13 @@
 //! From signs to names: refits, held-out events, and when to abstain.
 
+use super::contest::refits;
 use super::halves::Halves;
 use super::joint::{JointFit, fit, settled};
 use super::problem::Problem;
 use super::residuals::{Tile, common, peaks, residuals, tiles, whitened};
 use super::screen::{Screen, screen};
 use super::state::{Hold, State};
-use super::trials::{OWN, REDONE, Trial, combination, refits, refitted};
+use super::trials::{OWN, REDONE, combination, refitted};
 use crate::causes::{Cause, Domain, Identifiable, Part, Scene};
 use crate::diagnosis::verdict::{Gain, RunnerUp, Verdict};
 use crate::model::ModelError;
@@ -159,7 +160,7 @@ pub fn name_causes(
         }
         let mut trials = refits(problem, base, &clean, &last_screen.signs, options.refits);
         if redone < REDONE
-            && let Some(best) = trials.first()
+            && let Some(best) = trials.finalists.first()
             && best.beyond_promise(base)
             && let Some(better) = refitted(problem, base, best)
         {
@@ -167,7 +168,7 @@ pub fn name_causes(
             redone += 1;
             let own = base.cost - better.cost;
             let most_of_it = own > OWN * (base.cost - best.fitted.cost);
-            trials.iter_mut().for_each(|trial| trial.gain -= own);
+            trials.lower(own);
             let last = fits.len() - 1;
             fits[last] = better;
             if most_of_it {
@@ -175,14 +176,17 @@ pub fn name_causes(
             }
         }
         let base = &fits[fits.len() - 1];
-        let Some(best) = trials.first() else {
+        let Some(best) = trials.finalists.first() else {
             verdict = Verdict::Unexplained;
             evidence.push("signs of a cause, but no candidate could be fitted".into());
             break;
         };
-        let rival = trials.iter().find(|t| !same_class(t.cause, best.cause));
-        let share = |t: &Trial| (best.gain > 0.0).then(|| (t.gain / best.gain).clamp(0.0, 1.0));
-        let runner_up = rival.map(|t| RunnerUp { id: t.cause.about().id.into(), share_of_gain: share(t) });
+        let rival = trials.finalists.iter().find(|t| !same_class(t.cause, best.cause));
+        let beside = |(cause, gain): (&dyn Cause, f64)| RunnerUp {
+            id: cause.about().id.into(),
+            share_of_gain: (best.gain > 0.0).then(|| (gain / best.gain).clamp(0.0, 1.0)),
+        };
+        let runner_up = trials.rival().map(|(cause, gain)| beside((cause, gain)));
         let halves = Halves::of(problem, base);
         let held_out = halves.gain(base, best);
         let refusal = if best.gain <= 0.0 {
@@ -213,11 +217,7 @@ pub fn name_causes(
                 break;
             }
             verdict = Verdict::Unexplained;
-            nearest = trials
-                .iter()
-                .take(3)
-                .map(|t| RunnerUp { id: t.cause.about().id.into(), share_of_gain: share(t) })
-                .collect();
+            nearest = trials.all().take(3).map(|(cause, gain)| beside((cause, gain))).collect();
             evidence.push(reason);
             break;
         }
@@ -231,7 +231,7 @@ pub fn name_causes(
         });
         candidates.retain(|candidate| !same_class(*candidate, cause));
         verdict = Verdict::Named;
-        if let Some(best) = trials.into_iter().next() {
+        if let Some(best) = trials.finalists.into_iter().next() {
             fits.push(best.fitted);
         }
     }

@@ -52,6 +52,21 @@ impl State {
         effects
     }
 
+    /// Effects of those hypotheses that are linear by themselves.
+    ///
+    /// What a further cause changes beside the others, which are small, it changes without them: an approximation of second order that saves most steps.
+    pub(super) fn linear_effects(&self) -> Effects {
+        let mut effects = Effects::default();
+        for hypothesis in &self.hypotheses {
+            let mut own = Effects::default();
+            hypothesis.cause.add(&hypothesis.values, &mut own);
+            if own.are_linear() {
+                hypothesis.cause.add(&hypothesis.values, &mut effects);
+            }
+        }
+        effects
+    }
+
     /// Number of the causes' parameters.
     pub(super) fn causes(&self) -> usize {
         self.hypotheses.iter().map(|h| h.values.len()).sum()
@@ -65,11 +80,13 @@ impl State {
     /// After a step, causes within their limits.
     pub(super) fn moved(&self, step: &Step, hold: Hold) -> Self {
         let mut out = self.clone();
+        let mut bent_s = 0.0;
         if hold == Hold::Nothing {
             let values = self.lever.parameters();
             let (lever, causes) = step.shared.split_at(values.len());
             let values: Vec<f64> = values.iter().zip(lever).map(|(v, s)| v + s).collect();
             out.lever = self.lever.with(&values);
+            bent_s = self.lever.bent_delay_s(lever, &out.lever);
             let mut causes = causes.iter();
             for hypothesis in &mut out.hypotheses {
                 let parameters = hypothesis.cause.about().parameters;
@@ -84,7 +101,7 @@ impl State {
         }
         for (event, step) in out.events.iter_mut().zip(&step.own) {
             event.amplitude += step[0];
-            event.onset_s += step[1];
+            event.onset_s += step[1] - bent_s;
             event.offset += step[2];
             event.slope += step[3];
         }

@@ -1,11 +1,13 @@
 //! Candidates fitted in full.
 
 use super::align::aligned;
-use super::joint::{EVALUATIONS, JointFit, Search, fit_within, settled};
+use super::contest::Contest;
+use super::joint::{JointFit, Search, fit_within, settled};
 use super::problem::Problem;
 use super::screen::Sign;
-use super::search::{PENALTY, same_class};
+use super::search::PENALTY;
 use super::state::{Hold, Hypothesis, State};
+use super::subset::Subset;
 use crate::causes::Cause;
 
 /// A candidate fitted in full.
@@ -18,7 +20,7 @@ pub(super) struct Trial {
     /// Fall of the cost less what the parameters must pay.
     pub gain: f64,
     /// Fall of the cost in its last steps.
-    fall: f64,
+    pub fall: f64,
 }
 
 /// Relative distance within which a frequency is a combination of others.
@@ -65,66 +67,19 @@ const BETTER: f64 = 2.0;
 
 /// Trial steps after which a candidate's fit is looked at: who leads goes on.
 const LOOK: usize = 6;
-/// Trial steps of a leader at most: along a bent valley (a rupture against the detector's poles) they are short.
-const LEADER: usize = 3 * EVALUATIONS;
-/// Share of the leader's gain below which a rival is not fitted any further, unless it falls so fast that it may get there: so many times as far as in its
-/// last steps.
-const HOPELESS: f64 = 0.8;
-const COMES_UP: f64 = 3.0;
 /// Cost over the base's beyond which the first steps have led nowhere.
 const NOT_LOST: f64 = 1.5;
+/// Cost per sample beyond which a base has left what it may have bent to.
+const BENT: f64 = 1.02;
 
 /// Parts of the strength that the score suggests from which a candidate may begin anew.
 const GRADE: f64 = 0.8;
 const GRADES: std::ops::RangeInclusive<i32> = -10..=6;
 
-/// The strongest candidates fitted from the present fit, best first.
-///
-/// Every candidate has some steps; then the leader goes on until it has arrived, and whoever is not far behind or comes up: candidates that do not fit cost
-/// little.
-pub(super) fn refits(
-    problem: &Problem<'_>,
-    base: &JointFit,
-    clean: &(State, Vec<usize>),
-    signs: &[Sign],
-    count: usize,
-) -> Vec<Trial> {
-    let mut chosen: Vec<&Sign> = Vec::new();
-    for sign in signs.iter().filter(|s| s.gain > 0.0) {
-        // members of one class are one signal
-        if chosen.iter().all(|c| !same_class(c.cause, sign.cause)) {
-            chosen.push(sign);
-        }
-    }
-    let mut trials: Vec<Trial> =
-        chosen.into_iter().take(count).flat_map(|sign| Trial::begin(problem, base, clean, sign)).collect();
-    loop {
-        trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let Some(leader) = trials.first() else { return trials };
-        let bar = HOPELESS * leader.gain;
-        // the leader first, then whoever is not far behind or comes up
-        let goes_on = |trial: &Trial| trial.can_go_on(EVALUATIONS) && trial.gain + COMES_UP * trial.fall >= bar;
-        let next = match trials.first().is_some_and(|leader| leader.can_go_on(LEADER)) {
-            true => trials.first_mut(),
-            false => trials.iter_mut().find(|trial| goes_on(trial)),
-        };
-        if !next.is_some_and(|trial| trial.go_on(problem, base)) {
-            break;
-        }
-    }
-    // of two beginnings of one candidate the better end
-    let mut best: Vec<Trial> = Vec::new();
-    for trial in trials {
-        if best.iter().all(|known| known.cause.about().id != trial.cause.about().id) {
-            best.push(trial);
-        }
-    }
-    best
-}
-
 impl Trial {
     /// The first steps of a candidate, from the present fit and, where that has not arrived, from where free exponentials did.
-    fn begin(problem: &Problem<'_>, base: &JointFit, clean: &(State, Vec<usize>), sign: &Sign) -> Vec<Self> {
+    pub fn begin(contest: &Contest<'_>, sign: &Sign) -> Vec<Self> {
+        let base = contest.base;
         let settled = |lever: &State, starts: &[usize], part: f64| {
             let mut values = sign.values.clone();
             values[0] *= part;
@@ -132,47 +87,67 @@ impl Trial {
             state.hypotheses = base.state.hypotheses.clone();
             state.hypotheses.push(Hypothesis { cause: sign.cause, values });
             let mut starts = starts.to_vec();
-            aligned(problem, &mut state, &mut starts).ok()?;
-            settled(problem, state, starts).ok()
+            aligned(contest.problem, &mut state, &mut starts).ok()?;
+            settled(contest.problem, state, starts).ok()
         };
-        let from = |begun: JointFit| {
-            let fitted = fit_within(problem, begun.state, begun.starts, Hold::Nothing, Search::new(LOOK)).ok()?;
-            let fall = if fitted.cost < NOT_LOST * base.cost { f64::INFINITY } else { 0.0 };
-            let mut trial = Self { cause: sign.cause, score: sign.z, promised: sign.gain, gain: 0.0, fall, fitted };
-            trial.weigh(problem, base);
-            Some(trial)
-        };
-        let first = settled(&base.state, &base.starts, 1.0).and_then(from);
-        // a baseline that did not arrive has bent to the misfit, and its score is that of another strength
-        let again = !base.converged || first.as_ref().is_none_or(|trial| !trial.fitted.converged);
+        let begun = settled(&base.state, &base.starts, 1.0);
+        let to_beat = begun.as_ref().map_or(f64::INFINITY, |begun| begun.cost);
+        let first =
+            begun.and_then(|begun| Self::looked_at(contest, sign.cause, [sign.z, contest.part * sign.gain], begun));
+        // a baseline that left much has bent to the misfit, and its score is that of another strength
+        let samples = (base.state.events.len() * contest.problem.cut.samples) as f64;
+        let bent = base.cost > BENT * samples;
+        let again = bent && (!base.converged || first.as_ref().is_none_or(|trial| !trial.fitted.converged));
         let steps = if sign.graded { GRADES } else { 0..=4 };
         let parts = steps.filter(|_| again).map(|step| GRADE.powi(step));
-        let begun = parts.filter_map(|part| settled(&clean.0, &clean.1, part));
-        let second = begun.min_by(|a, b| a.cost.total_cmp(&b.cost)).and_then(from);
+        let second = parts
+            .filter_map(|part| settled(contest.clean.0, contest.clean.1, part))
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+            .filter(|begun| begun.cost < to_beat)
+            .and_then(|begun| Self::looked_at(contest, sign.cause, [sign.z, contest.part * sign.gain], begun));
         first.into_iter().chain(second).collect()
     }
 
-    fn can_go_on(&self, most: usize) -> bool {
+    /// The first steps from a beginning; `sign` has score and promise.
+    fn looked_at(contest: &Contest<'_>, cause: &'static dyn Cause, sign: [f64; 2], begun: JointFit) -> Option<Self> {
+        let search = Search::new(LOOK);
+        let fitted = fit_within(contest.problem, begun.state, begun.starts, Hold::Nothing, search).ok()?;
+        let fall = if fitted.cost < NOT_LOST * contest.base.cost { f64::INFINITY } else { 0.0 };
+        let mut trial = Self { cause, score: sign[0], promised: sign[1], gain: 0.0, fall, fitted };
+        trial.weigh(contest);
+        Some(trial)
+    }
+
+    /// What was found with `few` events, fitted to all of a contest.
+    pub fn carried(self, contest: &Contest<'_>, few: &Subset<'_>) -> Option<Self> {
+        let (mut state, mut starts) = few.carried(&self.fitted, contest.base);
+        contest.problem.starts(&mut state, &mut starts).ok()?;
+        let begun = settled(contest.problem, state, starts).ok()?;
+        let part = few.count() as f64 / contest.problem.windows.len() as f64;
+        Self::looked_at(contest, self.cause, [self.score, self.promised / part], begun)
+    }
+
+    pub fn can_go_on(&self, most: usize) -> bool {
         !self.fitted.converged && self.fitted.evaluations < most && self.fall > 0.0
     }
 
     /// Some steps more; whether they could be made.
-    fn go_on(&mut self, problem: &Problem<'_>, base: &JointFit) -> bool {
+    pub fn go_on(&mut self, contest: &Contest<'_>) -> bool {
         let (state, starts) = (self.fitted.state.clone(), self.fitted.starts.clone());
         // a search that has reached the largest damping begins anew
         let damping = if self.fitted.damping < 1.0 { self.fitted.damping } else { 1e-3 };
-        let search = Search { most: LOOK, damping };
-        let Ok(further) = fit_within(problem, state, starts, Hold::Nothing, search) else { return false };
+        let search = Search { damping, ..Search::new(LOOK) };
+        let Ok(further) = fit_within(contest.problem, state, starts, Hold::Nothing, search) else { return false };
         let spent = self.fitted.evaluations + further.evaluations.max(1);
         self.fall = self.fitted.cost - further.cost;
         self.fitted = JointFit { evaluations: spent, ..further };
-        self.weigh(problem, base);
+        self.weigh(contest);
         true
     }
 
-    fn weigh(&mut self, problem: &Problem<'_>, base: &JointFit) {
-        let samples = (base.state.events.len() * problem.cut.samples) as f64;
+    fn weigh(&mut self, contest: &Contest<'_>) {
+        let samples = (contest.base.state.events.len() * contest.problem.cut.samples) as f64;
         let parameters = self.fitted.state.hypotheses.last().map_or(0, |h| h.values.len());
-        self.gain = base.cost - self.fitted.cost - PENALTY * samples.ln() * parameters as f64;
+        self.gain = contest.base.cost - self.fitted.cost - PENALTY * samples.ln() * parameters as f64;
     }
 }

@@ -138,6 +138,11 @@ impl Whitener {
 
     /// Whitens up to [`LANES`] signals of one length in place.
     pub fn apply(&self, signals: &mut [&mut [f64]]) {
+        pulp::Arch::new().dispatch(|| self.filter(signals));
+    }
+
+    #[inline(always)]
+    fn filter(&self, signals: &mut [&mut [f64]]) {
         let samples = signals.first().map_or(0, |signal| signal.len());
         let modes = self.rotations.len();
         let mut state = vec![[0.0; LANES]; self.states()];

@@ -3,16 +3,16 @@
 use super::chain::Chain;
 use super::run::Run;
 
-/// Products that are summed side by side.
-const LANES: usize = 4;
+/// Samples that are made side by side.
+const LANES: usize = 8;
 
-/// One sample further: modes turn each for itself, lags follow modes and the lags before them.
+/// Some samples further: modes turn each for itself, lags follow modes and the lags before them.
 pub(super) struct Ringing {
     rotations: Vec<[f64; 4]>,
-    /// Of each lag: weights of positions and velocities, then of the lags.
+    /// Of each lag after [`LANES`] samples: weights of positions and velocities, then of the lags.
     lags: Vec<Vec<f64>>,
-    /// Weights of all in the output.
-    output: Vec<f64>,
+    /// Weights of each part of the state in the next samples' output.
+    output: Vec<[f64; LANES]>,
     /// Positions and velocities in turn, then lags.
     state: Vec<f64>,
 }
@@ -46,41 +46,53 @@ impl Ringing {
             let after = probe.position.iter().zip(&probe.velocity).flat_map(|(q, v)| [*q, *v]).chain(chain.states());
             map.iter_mut().zip(after).for_each(|(row, value)| row[column] = value);
         }
+        // row by row: what each sample to come shows of the state now
+        let mut weights = vec![[0.0; LANES]; count];
+        let mut row = output;
+        for lane in 0..LANES {
+            weights.iter_mut().zip(&row).for_each(|(weights, weight)| weights[lane] = *weight);
+            row = (0..count).map(|j| (0..count).map(|i| row[i] * map[i][j]).sum()).collect();
+        }
+        let mut ahead = map;
+        for _ in 0..LANES.ilog2() {
+            ahead = squared(&ahead);
+        }
         let whole = (0..modes).map(|m| {
             let (p, v) = (2 * m, 2 * m + 1);
-            [map[p][p], map[p][v], map[v][p], map[v][v]]
+            [ahead[p][p], ahead[p][v], ahead[v][p], ahead[v][v]]
         });
         let rotations = whole.collect();
-        let padded = |mut row: Vec<f64>| {
-            row.resize(count.next_multiple_of(LANES), 0.0);
-            row
-        };
-        let lags = map.split_off(2 * modes).into_iter().map(padded).collect();
-        Self { rotations, lags, output: padded(output), state: padded(state) }
+        Self { rotations, lags: ahead.split_off(2 * modes), output: weights, state }
     }
 
     /// The signal from now on.
     pub fn fill(mut self, out: &mut [f64]) {
+        pulp::Arch::new().dispatch(|| self.ring(out));
+    }
+
+    #[inline(always)]
+    fn ring(&mut self, out: &mut [f64]) {
         let modes = 2 * self.rotations.len();
         let mut followed = vec![0.0; self.lags.len()];
-        for value in out {
-            *value = dot(&self.output, &self.state);
-            followed.iter_mut().zip(&self.lags).for_each(|(next, row)| *next = dot(row, &self.state));
+        for values in out.chunks_mut(LANES) {
+            let mut sums = [0.0; LANES];
+            for (weights, part) in self.output.iter().zip(&self.state) {
+                sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * part);
+            }
+            values.copy_from_slice(&sums[..values.len()]);
+            for (next, row) in followed.iter_mut().zip(&self.lags) {
+                *next = row.iter().zip(&self.state).map(|(a, b)| a * b).sum();
+            }
             for (pair, [a, b, c, d]) in self.state[..modes].chunks_exact_mut(2).zip(&self.rotations) {
                 (pair[0], pair[1]) = (a * pair[0] + b * pair[1], c * pair[0] + d * pair[1]);
             }
-            self.state[modes..modes + followed.len()].copy_from_slice(&followed);
+            self.state[modes..].copy_from_slice(&followed);
         }
     }
 }
 
-/// Of rows whose length is a multiple of [`LANES`].
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
-    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
-        for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    sums.iter().sum()
+fn squared(map: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let count = map.len();
+    let entry = |i: usize, j: usize| (0..count).map(|k| map[i][k] * map[k][j]).sum();
+    (0..count).map(|i| (0..count).map(|j| entry(i, j)).collect()).collect()
 }

@@ -9,6 +9,9 @@ use crate::causes::{Effects, Motion};
 const HALVINGS: usize = 13;
 /// Error of the mean load over a step, of the load, beyond which it is halved: difference quotients divide it by a thousandth.
 const EVEN: f64 = 1e-9;
+/// Half samples up to which a load may come and go, and the stride by which later ends are looked for.
+const SHORT: usize = 128;
+const STRIDE: usize = 16;
 /// Share of the load below which none is left: difference quotients divide it by a thousandth.
 const GONE: f64 = 1e-12;
 
@@ -160,8 +163,13 @@ impl<'a> Run<'a> {
             return 0;
         }
         let acts = |half: usize| self.effects.load(self.time_s + 0.5 * half as f64 * interval_s).abs() > GONE;
-        // looked for from the end, at samples and between them: a load that ends acts no more
-        (0..2 * count).rev().find(|&half| acts(half)).map_or(0, |half| (half / 2 + 2).min(count))
+        // looked for from the end, at samples and between them: a load that ends acts no more. Late ones by strides: what is short is early
+        let late = (SHORT..2 * count).rev().step_by(STRIDE).find(|&half| acts(half));
+        let last = match late {
+            Some(found) => (found..(found + STRIDE).min(2 * count)).rev().find(|&half| acts(half)),
+            None => (0..(SHORT + STRIDE).min(2 * count)).rev().find(|&half| acts(half)),
+        };
+        last.map_or(0, |half| (half / 2 + 2).min(count))
     }
 
     /// The same lever at rest, without load.

@@ -1,0 +1,147 @@
+//! Candidates against one another: who leads is fitted, the others as far as they may still win.
+
+use super::joint::{EVALUATIONS, JointFit, Search, fit_within};
+use super::problem::Problem;
+use super::screen::Sign;
+use super::search::same_class;
+use super::state::{Hold, State};
+use super::subset::Subset;
+use super::trials::Trial;
+use crate::causes::Cause;
+
+/// Trial steps of a leader at most: along a bent valley (a rupture against the detector's poles) they are short.
+const LEADER: usize = 3 * EVALUATIONS;
+/// Share of the leader's gain below which a rival is not fitted any further, unless it falls so fast that it may get there: so many times as far as in its
+/// last steps.
+const HOPELESS: f64 = 0.8;
+const COMES_UP: f64 = 3.0;
+
+/// Events that choose who is fitted to all, where they promise such a fall of the cost; whoever is so much behind there may still win.
+const FEW: usize = 4;
+const PLAIN: f64 = 60.0;
+const BEHIND: f64 = 20.0;
+/// Decay times of the slowest mode after which less than a twentieth of its energy is left to be seen, and the fewest samples.
+const DECAYED: f64 = 1.6;
+const LEAST: usize = 1500;
+
+/// Candidates fitted in full.
+pub(super) struct Refits {
+    /// Those that came near the best, best first: fitted to all events.
+    pub finalists: Vec<Trial>,
+    /// The others with the fall of the cost that a few events promise, best first.
+    rest: Vec<(&'static dyn Cause, f64)>,
+}
+
+impl Refits {
+    /// All with their gains, best first.
+    pub fn all(&self) -> impl Iterator<Item = (&'static dyn Cause, f64)> {
+        self.finalists.iter().map(|trial| (trial.cause, trial.gain)).chain(self.rest.iter().copied())
+    }
+
+    /// The best of another class than the best.
+    pub fn rival(&self) -> Option<(&'static dyn Cause, f64)> {
+        let best = self.finalists.first()?;
+        self.all().find(|(cause, _)| !same_class(*cause, best.cause))
+    }
+
+    /// The best was gained in part by the base's own parameters.
+    pub fn lower(&mut self, own: f64) {
+        self.finalists.iter_mut().for_each(|trial| trial.gain -= own);
+        self.rest.iter_mut().for_each(|(_, gain)| *gain -= own);
+    }
+}
+
+/// What candidates are fitted to, and from where.
+pub(super) struct Contest<'a> {
+    pub problem: &'a Problem<'a>,
+    pub base: &'a JointFit,
+    /// Where free exponentials led.
+    pub clean: (&'a State, &'a [usize]),
+    /// Part of the archive's events.
+    pub part: f64,
+}
+
+/// The strongest candidates fitted from the present fit.
+///
+/// # Method
+/// Every candidate has some steps; then the leader goes on until it has arrived, and whoever is not far behind or comes up: candidates that do not fit cost
+/// little. Where the signs are plain, few events decide who is worth a fit to all.
+pub(super) fn refits(
+    problem: &Problem<'_>,
+    base: &JointFit,
+    clean: &(State, Vec<usize>),
+    signs: &[Sign],
+    count: usize,
+) -> Refits {
+    let mut chosen: Vec<&Sign> = Vec::new();
+    for sign in signs.iter().filter(|s| s.gain > 0.0) {
+        // members of one class are one signal
+        if chosen.iter().all(|c| !same_class(c.cause, sign.cause)) {
+            chosen.push(sign);
+        }
+    }
+    chosen.truncate(count);
+    let whole = Contest { problem, base, clean: (&clean.0, &clean.1), part: 1.0 };
+    whole.by_few(&chosen).unwrap_or_else(|| Refits { finalists: whole.decided(whole.begun(&chosen)), rest: Vec::new() })
+}
+
+impl Contest<'_> {
+    fn begun(&self, signs: &[&Sign]) -> Vec<Trial> {
+        signs.iter().flat_map(|sign| Trial::begin(self, sign)).collect()
+    }
+
+    /// Goes on with whoever may win; best first, each cause once.
+    fn decided(&self, mut trials: Vec<Trial>) -> Vec<Trial> {
+        loop {
+            trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+            let Some(leader) = trials.first() else { return trials };
+            let bar = HOPELESS * leader.gain;
+            // the leader first, then whoever is not far behind or comes up
+            let goes_on = |trial: &Trial| trial.can_go_on(EVALUATIONS) && trial.gain + COMES_UP * trial.fall >= bar;
+            let next = match leader.can_go_on(LEADER) {
+                true => trials.first_mut(),
+                false => trials.iter_mut().find(|trial| goes_on(trial)),
+            };
+            if !next.is_some_and(|trial| trial.go_on(self)) {
+                break;
+            }
+        }
+        // of two beginnings of one candidate the better end
+        let mut best: Vec<Trial> = Vec::new();
+        for trial in trials {
+            if best.iter().all(|known| known.cause.about().id != trial.cause.about().id) {
+                best.push(trial);
+            }
+        }
+        best
+    }
+
+    /// The same with few events first; none where the signs are too weak for that.
+    fn by_few(&self, signs: &[&Sign]) -> Option<Refits> {
+        let slowest = self.base.state.lever.modes.iter().map(|mode| -1.0 / mode.pole().re).fold(0.0, f64::max);
+        let samples = self.problem.cut.before + (DECAYED * slowest / self.problem.cut.interval_s).ceil() as usize;
+        let few = Subset::spread(self.problem, FEW, samples.max(LEAST));
+        let part = few.count() as f64 / self.problem.windows.len().max(1) as f64;
+        let promised = signs.first().map_or(0.0, |sign| sign.gain);
+        if part > 0.5 || part * promised < PLAIN {
+            return None;
+        }
+        let problem = few.problem();
+        let (state, starts) = few.state(&self.base.state, &self.base.starts);
+        let base = fit_within(&problem, state, starts, Hold::Shared, Search::new(0)).ok()?;
+        let base = JointFit { converged: self.base.converged, ..base };
+        let (clean, clean_starts) = few.state(self.clean.0, self.clean.1);
+        let small = Contest { problem: &problem, base: &base, clean: (&clean, &clean_starts), part };
+        let mut waiting = small.decided(small.begun(signs));
+        let mut finalists: Vec<Trial> = Vec::new();
+        loop {
+            let best = finalists.iter().map(|trial| trial.gain).fold(f64::NEG_INFINITY, f64::max);
+            let may_win = |trial: &Trial| (trial.gain + BEHIND) / part >= HOPELESS * best;
+            let Some(next) = waiting.iter().position(may_win) else { break };
+            finalists.extend(waiting.remove(next).carried(self, &few));
+        }
+        let finalists = self.decided(finalists);
+        let rest = waiting.iter().map(|trial| (trial.cause, trial.gain / part)).collect();
+        (!finalists.is_empty()).then_some(Refits { finalists, rest })
+    }
+}
