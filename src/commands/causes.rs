@@ -1,7 +1,7 @@
 //! `afmid causes`: what a simulation can get wrong, as the catalogue documents it.
 
 use afmid_pipeline::config::nearest;
-use afmid_stages::causes::{CATALOGUE, as_json, find, page};
+use afmid_stages::causes::{as_json, catalogue, find, page};
 use serde_json::Value;
 
 use crate::failure::Failure;
@@ -10,10 +10,10 @@ use crate::output::print;
 /// Lists all causes, or prints the page of one.
 pub fn run(name: Option<&str>, json: bool) -> Result<(), Failure> {
     let Some(name) = name else {
-        return print(&if json { pretty(&CATALOGUE.iter().map(|cause| as_json(*cause)).collect())? } else { list() });
+        return print(&if json { pretty(&catalogue().into_iter().map(as_json).collect())? } else { list() });
     };
     let Some(cause) = find(name) else {
-        let nearest = nearest(name, CATALOGUE.iter().map(|cause| cause.about().id));
+        let nearest = nearest(name, catalogue().iter().map(|cause| cause.about().id));
         let help =
             nearest.map_or("`afmid causes` lists all".to_owned(), |nearest| format!("did you mean `{nearest}`?"));
         return Err(Failure::usage(format!("there is no cause named `{name}`"), Some(help)));
@@ -22,12 +22,9 @@ pub fn run(name: Option<&str>, json: bool) -> Result<(), Failure> {
 }
 
 fn list() -> String {
-    let width = CATALOGUE.iter().map(|cause| cause.about().id.len()).max().unwrap_or(0);
-    CATALOGUE
-        .iter()
-        .map(|cause| cause.about())
-        .map(|about| format!("{:width$}  {}\n", about.id, about.physics))
-        .collect()
+    let all = catalogue();
+    let width = all.iter().map(|cause| cause.about().id.len()).max().unwrap_or(0);
+    all.iter().map(|cause| cause.about()).map(|about| format!("{:width$}  {}\n", about.id, about.physics)).collect()
 }
 
 fn pretty(value: &Value) -> Result<String, Failure> {

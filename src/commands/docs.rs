@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use afmid_pipeline::Registry;
 use afmid_pipeline::reference::files;
-use afmid_stages::causes::{CATALOGUE, index, page};
+use afmid_stages::causes::{catalogue, index, page};
 
 use super::schema;
 use crate::failure::Failure;
@@ -17,8 +17,9 @@ pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failur
     let pages = files(registry).map_err(|error| Failure::failed(error, None))?;
     let mut wanted: Vec<(PathBuf, String)> = pages.into_iter().map(|(name, text)| (stages.join(name), text)).collect();
     let causes = folder.join("causes");
-    wanted.push((causes.join("README.md"), index(CATALOGUE)));
-    wanted.extend(CATALOGUE.iter().map(|cause| (causes.join(format!("{}.md", cause.about().id)), page(*cause))));
+    let all = catalogue();
+    wanted.push((causes.join("README.md"), index(&all)));
+    wanted.extend(all.iter().map(|cause| (causes.join(format!("{}.md", cause.about().id)), page(*cause))));
     wanted.push((folder.join("pipeline.schema.json"), schema::text(registry)?));
     let mut stale = stale(&stages, &wanted);
     stale.extend(self::stale(&causes, &wanted));

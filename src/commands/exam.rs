@@ -7,7 +7,7 @@ use afmid_pipeline::cache::Cache;
 use afmid_pipeline::runner::{Options, Quiet, run as run_plan};
 use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Artifact, Context, Ports, Registry, Stage};
-use afmid_stages::causes::CATALOGUE;
+use afmid_stages::causes::catalogue;
 use afmid_stages::exam::{Draw, Judged, Kind, Score, draw, judge};
 use serde_json::Value;
 
@@ -43,7 +43,7 @@ fn score(args: &ExamArgs, registry: &Registry) -> Result<Score, Failure> {
     let folder = Scratch::new()?;
     let mut judged = Vec::new();
     for seed in args.first_seed..args.first_seed.saturating_add(args.seeds) {
-        let Some(drawn) = draw(seed, args.only.map(kind), CATALOGUE) else {
+        let Some(drawn) = draw(seed, args.only.map(kind), &catalogue()) else {
             say(&format!("seed {seed}: no cause of the catalogue can be hidden in this lever at its limit\n"));
             continue;
         };

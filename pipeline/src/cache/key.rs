@@ -17,6 +17,8 @@ pub struct KeyParts<'a> {
     pub params: &'a Value,
     /// Names of parameters that say where data lies: left out.
     pub location_params: &'a [&'a str],
+    /// What else the result depends on: plugins of the stage with their versions.
+    pub depends_on: &'a [String],
     /// The seed, if the stage draws random numbers.
     pub seed: Option<u64>,
     /// The files that it reads, in order: names without folders, and hashes, count.
@@ -35,6 +37,12 @@ pub fn key(parts: &KeyParts) -> String {
     text(&mut hasher, parts.stage);
     number(&mut hasher, u64::from(parts.version));
     params(&mut hasher, parts.params, parts.location_params);
+    // most stages depend on nothing more: their keys are those of before
+    if !parts.depends_on.is_empty() {
+        text(&mut hasher, "depends on");
+        number(&mut hasher, parts.depends_on.len() as u64);
+        parts.depends_on.iter().for_each(|other| text(&mut hasher, other));
+    }
     number(&mut hasher, u64::from(parts.seed.is_some()));
     number(&mut hasher, parts.seed.unwrap_or(0));
     number(&mut hasher, parts.sources.len() as u64);

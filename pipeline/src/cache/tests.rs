@@ -20,6 +20,7 @@ fn a_key_depends_on_everything_but_places_and_the_order_of_keys() {
         version: 1,
         params: &params,
         location_params: &["files"],
+        depends_on: &[],
         seed: None,
         sources: &sources,
         upstream: &upstream,
@@ -29,12 +30,15 @@ fn a_key_depends_on_everything_but_places_and_the_order_of_keys() {
     assert_eq!(key(&base), key(&KeyParts { params: &elsewhere, sources: &moved, ..base }));
     let swapped = [file("x/b.h5", "11"), file("x/a.h5", "00")];
     let (other, text) = (json!({"a": 2, "b": [1.5, null]}), json!({"a": "1", "b": [1.5, null]}));
+    let plugins = ["one 1".to_owned(), "two 1".to_owned()];
     let others = [
         KeyParts { stage: "events.other", ..base },
         KeyParts { version: 2, ..base },
         KeyParts { params: &other, ..base },
         KeyParts { params: &text, ..base },
         KeyParts { location_params: &[], ..base },
+        KeyParts { depends_on: &plugins, ..base },
+        KeyParts { depends_on: &plugins[..1], ..base },
         KeyParts { seed: Some(0), ..base },
         KeyParts { sources: &swapped, ..base },
         KeyParts { sources: &sources[..1], ..base },

@@ -54,6 +54,7 @@ pub(super) fn plan_node(
         version: spec.version,
         params: &node.params,
         location_params: node.stage.location_params(),
+        depends_on: &node.stage.depends_on(),
         seed,
         sources: &sources,
         upstream: &wires,

@@ -18,6 +18,8 @@ pub trait DynStage: Send + Sync {
     fn check(&self) -> Result<(), StageError>;
     /// See [`Stage::sources`].
     fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError>;
+    /// See [`Stage::depends_on`].
+    fn depends_on(&self) -> Vec<String>;
     /// See [`Stage::location_params`].
     fn location_params(&self) -> &'static [&'static str];
     /// See [`Stage::run`].
@@ -40,6 +42,10 @@ impl<S: Stage> DynStage for S {
 
     fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
         Stage::sources(self, base)
+    }
+
+    fn depends_on(&self) -> Vec<String> {
+        Stage::depends_on(self)
     }
 
     fn location_params(&self) -> &'static [&'static str] {

@@ -60,6 +60,11 @@ pub trait Stage: Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'stat
         Ok(Vec::new())
     }
 
+    /// What the result depends on beside parameters, files and inputs, such as plugins of the stage's own with their versions: part of the cache key.
+    fn depends_on(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Parameters that say where data lies, not what it is: left out of the cache key.
     fn location_params() -> &'static [&'static str] {
         &[]

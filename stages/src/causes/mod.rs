@@ -3,6 +3,7 @@
 //! A [`Cause`] adds [`Effects`] to a simulation. The simulator integrates them in time to hide them, the diagnosis evaluates them with its own
 //! numerics to find them, and the extended model simulates with them afterwards.
 
+mod catalogue;
 mod cause;
 mod effects;
 mod page;
@@ -50,6 +51,7 @@ mod tether_tail;
 mod tip_sample_force;
 mod two_step_rupture;
 
+pub use catalogue::{CauseError, add, added, catalogue, find};
 pub use cause::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, within_limits};
 pub use effects::{
     Added, Effects, ExtraMode, FrequencyChange, Instant, Intersample, LinearSection, ModalForce, Motion, RemainingLoad,
@@ -57,7 +59,7 @@ pub use effects::{
 };
 pub use page::{as_json, index, page};
 
-/// Every built-in cause.
+/// Every built-in cause; [`catalogue`] has those of others as well.
 pub const CATALOGUE: &[&dyn Cause] = &[
     &ac_coupling::AcCoupling,
     &adc_nonlinearity::AdcNonlinearity,
@@ -102,11 +104,6 @@ pub const CATALOGUE: &[&dyn Cause] = &[
     &tip_sample_force::TipSampleForce,
     &two_step_rupture::TwoStepRupture,
 ];
-
-/// The cause of that id.
-pub fn find(id: &str) -> Option<&'static dyn Cause> {
-    CATALOGUE.iter().copied().find(|cause| cause.about().id == id)
-}
 
 #[cfg(test)]
 mod catalogue_tests;

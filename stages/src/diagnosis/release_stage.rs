@@ -16,7 +16,7 @@ use super::records::{
 use super::release::{Cut, EventWindow, Lever, LeverMode, NamingOptions, Problem, answer, name_causes, start, story};
 use super::release_model::lever_model;
 use super::release_story::{residual_array, tile_table};
-use crate::causes::{CATALOGUE, find};
+use crate::causes::{added, catalogue, find};
 use crate::events::EventKind;
 use crate::model::ModeNumber;
 
@@ -140,6 +140,10 @@ impl Stage for ReleaseDiagnose {
         Ok(())
     }
 
+    fn depends_on(&self) -> Vec<String> {
+        added()
+    }
+
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let (recording, ensemble) = (inputs.get(&RECORDS)?, inputs.get(&ENSEMBLE)?);
         let rate = ensemble.number("sample_rate_hz")?;
@@ -179,7 +183,7 @@ impl Stage for ReleaseDiagnose {
             seed: cx.seed(),
             ..NamingOptions::default()
         };
-        let naming = name_causes(&problem, begin.state, begin.starts, CATALOGUE, &naming_options)
+        let naming = name_causes(&problem, begin.state, begin.starts, &catalogue(), &naming_options)
             .map_err(StageError::from_error)?;
         // only the lever's own: a foreign line may ring with them through every event
         options.resonances = naming.fits.first().map_or_else(Vec::new, |fit| resonances(&fit.state.lever));

@@ -81,6 +81,10 @@ impl Stage for ReleaseReplay {
         check_cut(self.window_samples, self.before_samples)
     }
 
+    fn depends_on(&self) -> Vec<String> {
+        crate::causes::added()
+    }
+
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let (recording, ensemble) = (inputs.get(&RECORDS)?, inputs.get(&ENSEMBLE)?);
         let model = LeverModel::read(inputs.get(&MODEL)?)?;

@@ -120,6 +120,10 @@ impl Stage for SystemDiagnose {
         Ok(())
     }
 
+    fn depends_on(&self) -> Vec<String> {
+        crate::causes::added()
+    }
+
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
         let pair = inputs.get(&PAIR)?;
         let rate = pair.number("sample_rate_hz")?;

@@ -130,6 +130,10 @@ impl Stage for Reconstruction {
         within("guard_s", self.guard_s, 1.0)
     }
 
+    fn depends_on(&self) -> Vec<String> {
+        crate::causes::added()
+    }
+
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let (ensemble, pair) = (inputs.get(&ENSEMBLE)?, inputs.find(&PAIR)?);
         let extension = match inputs.find(&EXTENSION)? {

@@ -199,6 +199,10 @@ impl Stage for Afm {
         self.microscope().check().and_then(|()| self.layout(0).check()).map_err(StageError::from_error)
     }
 
+    fn depends_on(&self) -> Vec<String> {
+        crate::causes::added()
+    }
+
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let folder = cx.base().join(&self.out);
         let names: Vec<String> = (0..self.records).map(|record| format!("record_{record:04}.h5")).collect();

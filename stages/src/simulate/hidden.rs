@@ -7,7 +7,7 @@ use afmid_pipeline::config::nearest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::causes::{About, CATALOGUE, Cause, Domain, Effects, find, within_limits};
+use crate::causes::{About, Cause, Domain, Effects, catalogue, find, within_limits};
 
 /// One value of a hidden cause.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -51,7 +51,7 @@ impl Hidden {
             }
         };
         let Some(cause) = find(id) else {
-            let help = nearest(id, CATALOGUE.iter().map(|cause| cause.about().id))
+            let help = nearest(id, catalogue().iter().map(|cause| cause.about().id))
                 .map_or("`afmid causes` lists all".to_owned(), |nearest| format!("did you mean `{nearest}`?"));
             return Err(StageError::new(format!("`hidden`: there is no cause named `{id}`")).help(help));
         };

@@ -105,6 +105,10 @@ impl Stage for AfmOfModel {
         self.afm(self.records.unwrap_or(1)).check()
     }
 
+    fn depends_on(&self) -> Vec<String> {
+        crate::causes::added()
+    }
+
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let model = LeverModel::read(inputs.get(&MODEL)?)?;
         for cause in model.causes.iter().filter(|cause| !cause.assumed.is_empty()) {

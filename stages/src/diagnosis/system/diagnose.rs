@@ -11,7 +11,7 @@ use super::options::SystemOptions;
 use super::start::baseline;
 use super::story::{SystemStory, story};
 use super::validation::check_part;
-use crate::causes::{CATALOGUE, Cause, Domain};
+use crate::causes::{Cause, Domain, catalogue};
 use crate::diagnosis::Diagnosis;
 
 /// A diagnosis and the model that it ends with.
@@ -110,16 +110,16 @@ fn candidates(options: &SystemOptions, driven: bool) -> Result<Vec<&'static dyn 
         let about = cause.about();
         about.domain != Domain::Release && (driven || about.part != crate::causes::Part::Input)
     };
-    let all = || CATALOGUE.iter().copied().filter(usable);
+    let all = catalogue();
     if let Some(unknown) = options
         .candidates
         .iter()
-        .find(|id| !CATALOGUE.iter().any(|cause| cause.about().id == **id && cause.about().domain != Domain::Release))
+        .find(|id| !all.iter().any(|cause| cause.about().id == **id && cause.about().domain != Domain::Release))
     {
         return Err(SystemError::Cause(unknown.clone()));
     }
     let wanted = |cause: &&'static dyn Cause| {
         options.candidates.is_empty() || options.candidates.iter().any(|id| cause.about().id == id)
     };
-    Ok(all().filter(wanted).collect())
+    Ok(all.into_iter().filter(usable).filter(wanted).collect())
 }

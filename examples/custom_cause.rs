@@ -1,0 +1,69 @@
+//! A cause of one's own, added to the catalogue: `cargo run --example custom_cause -- run examples/custom_cause.toml -o c.h5`,
+//! then `cargo run --example custom_cause -- show c.h5 diagnosis`.
+//!
+//! A liquid neck holds on to the tip and pinches off. The simulator hides it, the diagnosis looks for it and names it, and `causes`, `exam` and
+//! `simulate.model` know it like any built-in one: the program is afmid with one more cause.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use afmid_stages::causes::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene, add};
+
+/// A share of the load falls as the neck's radius does: `u = -F p (1 - t / T)^(2/3)`, and is gone at T.
+struct NeckPinchOff;
+
+const ABOUT: About = About {
+    id: "neck-pinch-off",
+    physics: "a liquid neck between tip and sample holds on after the solids have parted, thins by inertia and pinches off",
+    part: Part::Force,
+    domain: Domain::Release,
+    parameters: &[
+        Parameter {
+            name: "fraction",
+            unit: "1",
+            meaning: "share of the load that the neck holds",
+            low: -0.3,
+            high: 0.3,
+        },
+        Parameter { name: "pinch_off_s", unit: "s", meaning: "when it pinches off", low: 2e-6, high: 5e-4 },
+    ],
+    class: &["neck-pinch-off"],
+    resembles: "two-step-rupture: lets go at once; tether-tail: never quite lets go",
+    next_measurement: "the same in dry nitrogen: the neck is gone",
+    identifiable: Identifiable::Shape,
+    source: "J. Eggers, E. Villermaux, Rep. Prog. Phys. 71 (2008) 036601, section 4: radius as the 2/3 power of the time left",
+};
+
+impl Cause for NeckPinchOff {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn add(&self, values: &[f64], effects: &mut Effects) {
+        let (fraction, end) = (values[0], values[1]);
+        effects.remaining_load.push(Arc::new(move |t| fraction * (1.0 - t / end).max(0.0).powf(2.0 / 3.0)));
+    }
+
+    fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        // every third of a decade, from twenty samples on: the shape is smooth, and a fit follows the duration from there
+        let durations = (0..6).map(|i| 20.0 * scene.interval_s * 10f64.powf(f64::from(i) / 3.0));
+        durations
+            .filter(|end| (ABOUT.parameters[1].low..=ABOUT.parameters[1].high).contains(end))
+            .map(|end| vec![0.01, end])
+            .collect()
+    }
+}
+
+fn main() -> ExitCode {
+    if let Err(error) = add(&NeckPinchOff, 1) {
+        eprintln!("{error}");
+        return ExitCode::from(2);
+    }
+    match afmid::registry() {
+        Ok(registry) => afmid::main(&registry),
+        Err(double) => {
+            eprintln!("{double}");
+            ExitCode::from(2)
+        }
+    }
+}
