@@ -45,12 +45,14 @@ impl Cause for NeckPinchOff {
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        // every third of a decade, from twenty samples on: the shape is smooth, and a fit follows the duration from there
-        let durations = (0..6).map(|i| 20.0 * scene.interval_s * 10f64.powf(f64::from(i) / 3.0));
-        durations
-            .filter(|end| (ABOUT.parameters[1].low..=ABOUT.parameters[1].high).contains(end))
-            .map(|end| vec![0.01, end])
-            .collect()
+        // fifths of a decade from twenty samples to an eighth of the window, no further apart than a third of the first mode's period: the pinch-off rings, and
+        // beyond, one duration's ringing is another's with the opposite sign
+        let (first, last) = (20.0 * scene.interval_s, scene.window_s / 8.0);
+        let period = scene.frequency_hz.iter().copied().fold(f64::INFINITY, f64::min).recip();
+        let further = |end: &f64| Some((end * 10f64.powf(0.2)).min(end + period.max(1e-3 * last) / 3.0));
+        let durations = std::iter::successors(Some(first), further).take_while(|end| *end <= last);
+        let within = ABOUT.parameters[1].low..=ABOUT.parameters[1].high;
+        durations.filter(|end| within.contains(end)).map(|end| vec![0.01, end]).collect()
     }
 }
 
