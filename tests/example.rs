@@ -40,11 +40,9 @@ fn a_cause_of_another_crate_is_hidden_and_named() {
     run(&["run", &config, "--set", &archive, "-o", "c.h5", "--cache", "cache"]);
     let found: serde_json::Value = serde_json::from_str(&run(&["show", "c.h5", "diagnosis", "--json"])).expect("JSON");
     assert_eq!(found["verdict"], "named", "{found:#}");
-    assert_eq!(found["causes"][0]["id"], "neck-pinch-off", "{found:#}");
-    for (name, truth) in [("fraction", 0.02), ("pinch_off_s", 6e-5)] {
-        let of = |what: &str| common::number(&found, &format!("/causes/0/parameters/{name}/{what}"));
-        // four of its own standard errors: by chance once in 16,000
-        assert!((of("value") - truth).abs() < 4.0 * of("std"), "{name}: {} +- {}", of("value"), of("std"));
-    }
-    assert!(run(&["causes", "neck-pinch-off"]).contains("pinches off"));
+    assert_eq!(found["causes"][0]["id"], "unequal-segments", "{found:#}");
+    let of = |what: &str| common::number(&found, &format!("/causes/0/parameters/asymmetry/{what}"));
+    // four of its own standard errors: by chance once in 16,000
+    assert!((of("value") - 0.01).abs() < 4.0 * of("std"), "{} +- {}", of("value"), of("std"));
+    assert!(run(&["causes", "unequal-segments"]).contains("segments"));
 }
