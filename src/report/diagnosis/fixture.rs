@@ -89,7 +89,23 @@ pub(crate) fn release(answer: Value) -> RunResult {
         Axis::new("time", "s", "time after the release", time),
         Axis::new("frequency", "Hz", "frequency", f.clone()),
         Axis::new("event", "1", "event", (0..10).map(f64::from).collect()),
+        Axis::new("level", "V", "level at the converter", (0..20).map(|k| 0.1 * f64::from(k) - 1.0).collect()),
+        Axis::new("position", "m", "position of the piezo", (0..12).map(|k| 2e-8 * f64::from(k)).collect()),
     ])
+    .with(
+        "level_before",
+        "V",
+        "",
+        &["level"],
+        (0..20).map(|k| 1e-5 * f64::from((k - 10) * (k - 10))).collect::<Vec<_>>(),
+    )
+    .with("level_before_std", "V", "", &["level"], vec![5e-5; 20])
+    .with("level_after", "V", "", &["level"], vec![1e-5; 20])
+    .with("level_after_std", "V", "", &["level"], vec![5e-5; 20])
+    .with("free_before", "V", "", &["position"], (0..12).map(|k| 1e-4 * f64::from(k - 6)).collect::<Vec<_>>())
+    .with("free_before_std", "V", "", &["position"], vec![5e-5; 12])
+    .with("free_after", "V", "", &["position"], vec![0.0; 12])
+    .with("free_after_std", "V", "", &["position"], vec![5e-5; 12])
     .with("before", "V", "", t, before)
     .with("after", "V", "", t, after)
     .with("measured", "V", "", t, measured)

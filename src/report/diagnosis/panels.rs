@@ -97,6 +97,34 @@ pub(super) fn detuning(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
     Some(panel.with(Mark::Points(points)).with(Mark::at_y(0.0, "")))
 }
 
+/// The mean residual where the recorded signal stood at one level.
+pub(super) fn by_level(told: &Told<'_>) -> Option<Panel> {
+    course(told, "level", "level", ["Residual by level", "Level at the converter", "Mean residual"])
+}
+
+/// The free level where the piezo stood at one position, nothing assumed of its course.
+pub(super) fn by_position(told: &Told<'_>) -> Option<Panel> {
+    course(told, "position", "free", ["Free level by position", "Position of the piezo", "Free level"])
+}
+
+/// Values before and after with their errors along an axis; title, names of the axes.
+fn course(told: &Told<'_>, axis: &str, name: &str, [title, x, y]: [&str; 3]) -> Option<Panel> {
+    let before = told.curve(axis, &format!("{name}_before"))?;
+    let mut panel = Panel::new(title, Axis::new(x, before.x_unit), Axis::new(y, before.unit));
+    for (when, series, marker, colour) in
+        [("before", LINEAR, Marker::Dot, Colour::Vermillion), ("after", EXTENDED, Marker::Ring, Colour::Blue)]
+    {
+        let std = told.curve(axis, &format!("{name}_{when}_std"));
+        // causes of whole records are taken out without a rung of the ladder
+        let shown = series == LINEAR || told.extended() || !told.answer.causes.is_empty();
+        let rest = told.curve(axis, &format!("{name}_{when}")).filter(|_| shown);
+        let Some((rest, std)) = rest.zip(std) else { continue };
+        let (series, x, y, y_error) = (series.to_owned(), rest.x.to_vec(), rest.y.to_vec(), std.y.to_vec());
+        panel = panel.with(Mark::Points(Points { series, x, y, y_error, titles: Vec::new(), marker, colour }));
+    }
+    Some(panel.with(Mark::at_y(0.0, "")))
+}
+
 /// The rms residual of each event.
 pub(super) fn event_rms(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
     let before = told.curve("event", "event_rms_before")?;

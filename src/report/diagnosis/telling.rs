@@ -14,12 +14,15 @@ pub(super) enum View {
     Time,
     Events,
     Amplitudes,
+    Levels,
+    Positions,
     Sizes,
 }
 
 impl View {
     /// All, in the order in which they stand where nothing calls for another.
-    const ALL: [Self; 5] = [Self::Spectrum, Self::Time, Self::Sizes, Self::Events, Self::Amplitudes];
+    const ALL: [Self; 7] =
+        [Self::Spectrum, Self::Time, Self::Sizes, Self::Events, Self::Amplitudes, Self::Levels, Self::Positions];
 
     fn panel(self, told: &Told<'_>) -> Option<Panel> {
         match self {
@@ -27,6 +30,8 @@ impl View {
             Self::Time => panels::over_time(told),
             Self::Events => panels::detuning(told, false),
             Self::Amplitudes => panels::event_rms(told, true),
+            Self::Levels => panels::by_level(told),
+            Self::Positions => panels::by_position(told),
             Self::Sizes => panels::by_size(told),
         }
     }
@@ -42,6 +47,12 @@ impl View {
                 "the frequency that each event asks for: a course over the archive is a drift, a mere scatter is none; bars are one standard error"
             }
             Self::Amplitudes => "whether large events leave more than small ones",
+            Self::Levels => {
+                "a course over the converter's levels: optics or converter are bent there; bars are one standard error"
+            }
+            Self::Positions => {
+                "a course of the free level over the piezo's position: a straight line is crosstalk, a wave a fringe; bars are one standard error"
+            }
             Self::Sizes => "where the output is large, or of one sign, the linear model errs more",
         }
     }
@@ -57,6 +68,7 @@ pub(super) fn telling(id: &str) -> View {
         ("photodiode-tail" | "ac-coupling" | "feedthrough" | "baseline-drift" | "offset" | "extra-pole", _) => {
             View::Time
         }
+        ("piezo-crosstalk" | "interference-fringe", _) => View::Positions,
         (_, Part::Archive) => View::Events,
         (_, Part::Force) => View::Time,
         (_, Part::Lever | Part::Input) => View::Sizes,
@@ -98,8 +110,10 @@ pub(super) fn figure(told: &Told<'_>) -> Option<Figure> {
     };
     let id = format!("diagnosis-{}-telling", told.slug());
     let mut figure = Figure::new(&id, "The picture that gave it away", &caption).row(Row::one(270.0, large));
-    if !small.is_empty() {
-        figure = figure.row(Row { height: 170.0, panels: small });
+    // rows of equal length, three at most
+    let in_row = small.len().div_ceil(small.len().div_ceil(3).max(1)).max(1);
+    for row in small.chunks(in_row) {
+        figure = figure.row(Row { height: 170.0, panels: row.to_vec() });
     }
     Some(figure)
 }

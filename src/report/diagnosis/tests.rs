@@ -56,7 +56,15 @@ fn a_named_cause_is_told_with_its_numbers_and_figures() {
     // the ladder's bars: the smallest error has the shortest
     assert_eq!(page.matches("class=\"bar\"").count(), 3);
     // the modes, their combinations, and the legend of both models
-    for text in ["2 f₁", "f₂ − f₁", "linear model", "extended model", "noise level"] {
+    for text in [
+        "2 f₁",
+        "f₂ − f₁",
+        "linear model",
+        "extended model",
+        "noise level",
+        "Residual by level",
+        "Free level by position",
+    ] {
         assert!(page.contains(text), "{text}");
     }
     assert!(!whole.contains("id=\"periodograms\""), "spectra of residuals are no power spectra of the run");
@@ -104,6 +112,7 @@ fn the_picture_follows_the_cause() {
         ("quadratic-detector", View::Spectrum),
         ("frequency-drift", View::Events),
         ("tether-tail", View::Time),
+        ("piezo-crosstalk", View::Positions),
         ("photodiode-tail", View::Time),
         ("duffing", View::Sizes),
         ("intersample", View::Spectrum),

@@ -103,7 +103,7 @@ const CHANNEL_SHARE: f64 = 0.5 / CHANNELS as f64;
 impl Stage for ReleaseDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.release",
-        version: 6,
+        version: 7,
         summary: "names what a linear lever and detector get wrong in snap-off events",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
         outputs: &[SUMMARY.spec(), RESIDUALS.spec(), TILES.spec(), MODEL.spec()],
@@ -187,6 +187,7 @@ impl Stage for ReleaseDiagnose {
             .map_err(StageError::from_error)?;
         // only the lever's own: a foreign line may ring with them through every event
         options.resonances = naming.fits.first().map_or_else(Vec::new, |fit| resonances(&fit.state.lever));
+        let course = begun.course().to_vec();
         let signs = begun.finish(&summaries, &options);
         let (signs, left_out): (Vec<RecordSign>, Vec<RecordSign>) =
             signs.into_iter().partition(|sign| self.may_name(sign.id));
@@ -198,7 +199,7 @@ impl Stage for ReleaseDiagnose {
             .ok_or_else(|| StageError::new("the diagnosis ended without any fit"))?;
         Ok(Ports::new()
             .with(&SUMMARY, Document::new(&found)?)
-            .with(&RESIDUALS, residual_array(&story, &cut))
+            .with(&RESIDUALS, residual_array(&story, &cut, &course))
             .with(&TILES, tile_table(&story))
             .with(&MODEL, Document::new(&model)?))
     }

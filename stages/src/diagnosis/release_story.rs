@@ -2,41 +2,75 @@
 
 use afmid_pipeline::{Array, Axis, Table};
 
-use super::release::{Cut, EventStory, Story, Tile};
+use super::records::PositionCourse;
+use super::release::{Cut, EventStory, LevelStory, Story, Tile};
 
 /// Residuals, spectra and numbers of single events.
-pub(super) fn residual_array(story: &Story, cut: &Cut) -> Array {
+pub(super) fn residual_array(story: &Story, cut: &Cut, course: &[PositionCourse]) -> Array {
     let time: Vec<f64> = (0..story.measured.len()).map(|k| (k as f64 - cut.before as f64) * cut.interval_s).collect();
     let events: Vec<f64> = (0..story.events.len()).map(|k| k as f64).collect();
     let of = |pick: fn(&EventStory) -> f64| story.events.iter().map(pick).collect::<Vec<f64>>();
     let records: Vec<i64> = story.events.iter().map(|e| i64::try_from(e.record).unwrap_or(i64::MAX)).collect();
     let spectra = &story.spectra;
-    let (t, f, e) = (&["time"], &["frequency"], &["event"]);
-    Array::over(vec![
+    let levels = |pick: fn(&LevelStory) -> f64| story.levels.iter().map(pick).collect::<Vec<f64>>();
+    let (t, f, e, l) = (&["time"], &["frequency"], &["event"], &["level"]);
+    let mut axes = vec![
         Axis::new("time", "s", "time after the release", time),
         Axis::new("frequency", "Hz", "frequency", spectra.frequency_hz.clone()),
         Axis::new("event", "1", "event", events),
-    ])
-    .with("before", "V", "mean residual of the linear model", t, story.before.clone())
-    .with("after", "V", "mean residual of the extended model", t, story.after.clone())
-    .with("measured", "V", "mean event, weighted by amplitude, less offset and slope", t, story.measured.clone())
-    .with("linear", "V", "the linear model's mean event", t, story.modelled(&story.before))
-    .with("extended", "V", "the extended model's mean event", t, story.modelled(&story.after))
-    .with("spectrum_before", "V^2/Hz", "density of `before`, one-sided", f, spectra.before.clone())
-    .with("spectrum_after", "V^2/Hz", "density of `after`, one-sided", f, spectra.after.clone())
-    .with("spectrum_noise", "V^2/Hz", "what the scatter of the events leaves in a mean", f, spectra.noise.clone())
-    .with("record", "1", "number of the event's record", e, records)
-    .with("amplitude", "V", "the event's amplitude", e, of(|event| event.amplitude_v))
-    .with("event_rms_before", "V", "rms residual of the linear model", e, of(|event| event.rms_before))
-    .with("event_rms_after", "V", "rms residual of the extended model", e, of(|event| event.rms_after))
-    .with(
-        "frequency_shift",
-        "1",
-        "first mode's frequency against the linear model's, relative",
-        e,
-        of(|event| event.frequency_shift),
-    )
-    .with("frequency_shift_std", "1", "its standard error", e, of(|event| event.frequency_shift_std))
+        Axis::new("level", "V", "level at the converter", levels(|level| level.level_v)),
+    ];
+    let places: Vec<f64> = course.iter().map(|place| place.position_m).collect();
+    if !places.is_empty() {
+        axes.push(Axis::new("position", "m", "position of the piezo", places));
+    }
+    let array = Array::over(axes)
+        .with("before", "V", "mean residual of the linear model", t, story.before.clone())
+        .with("after", "V", "mean residual of the extended model", t, story.after.clone())
+        .with("measured", "V", "mean event, weighted by amplitude, less offset and slope", t, story.measured.clone())
+        .with("linear", "V", "the linear model's mean event", t, story.modelled(&story.before))
+        .with("extended", "V", "the extended model's mean event", t, story.modelled(&story.after))
+        .with("spectrum_before", "V^2/Hz", "density of `before`, one-sided", f, spectra.before.clone())
+        .with("spectrum_after", "V^2/Hz", "density of `after`, one-sided", f, spectra.after.clone())
+        .with("spectrum_noise", "V^2/Hz", "what the scatter of the events leaves in a mean", f, spectra.noise.clone())
+        .with("record", "1", "number of the event's record", e, records)
+        .with("amplitude", "V", "the event's amplitude", e, of(|event| event.amplitude_v))
+        .with("event_rms_before", "V", "rms residual of the linear model", e, of(|event| event.rms_before))
+        .with("event_rms_after", "V", "rms residual of the extended model", e, of(|event| event.rms_after))
+        .with(
+            "frequency_shift",
+            "1",
+            "first mode's frequency against the linear model's, relative",
+            e,
+            of(|event| event.frequency_shift),
+        )
+        .with("frequency_shift_std", "1", "its standard error", e, of(|event| event.frequency_shift_std))
+        .with("level_before", "V", "mean residual of the linear model at a level", l, levels(|level| level.before[0]))
+        .with(
+            "level_before_std",
+            "V",
+            "its standard error, from the events' scatter",
+            l,
+            levels(|level| level.before[1]),
+        )
+        .with("level_after", "V", "mean residual of the extended model at a level", l, levels(|level| level.after[0]))
+        .with(
+            "level_after_std",
+            "V",
+            "its standard error, from the events' scatter",
+            l,
+            levels(|level| level.after[1]),
+        );
+    if course.is_empty() {
+        return array;
+    }
+    let p = &["position"];
+    let of = |pick: fn(&PositionCourse) -> f64| course.iter().map(pick).collect::<Vec<f64>>();
+    array
+        .with("free_before", "V", "free level at a position, against its mean", p, of(|place| place.before[0]))
+        .with("free_before_std", "V", "its standard error, from the records' scatter", p, of(|place| place.before[1]))
+        .with("free_after", "V", "the same less what the named causes make", p, of(|place| place.after[0]))
+        .with("free_after_std", "V", "its standard error, from the records' scatter", p, of(|place| place.after[1]))
 }
 
 /// Energy of the residual common to all events over time and frequency, before and after.
@@ -76,6 +110,11 @@ mod tests {
         let ports = stage.run(&(example.inputs)().expect("inputs"), &context).expect("a diagnosis");
         let array = ports.get(&RESIDUALS).expect("residuals");
         let of = |name: &str| array.real(name).expect("a variable");
+        let levels = &array.axis("level").expect("levels").values;
+        assert!(levels.len() > 10 && levels.is_sorted());
+        // what is left by the extended model at a level is noise: of some sixty levels a few exceed three of their errors, as many neighbours share their noise
+        let beyond = of("level_after").iter().zip(of("level_after_std")).filter(|(mean, std)| mean.abs() > 3.0 * **std);
+        assert!(beyond.count() * 5 < levels.len());
         let mean_square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
         for (model, rest, spectrum) in
             [("linear", "before", "spectrum_before"), ("extended", "after", "spectrum_after")]

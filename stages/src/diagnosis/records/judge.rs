@@ -3,6 +3,7 @@
 use super::clipping::judge_clipping;
 use super::lines::judge_lines;
 use super::position::{cannot_judge, judge_position};
+use super::position_course::PositionCourse;
 use super::sign::{Abstention, RecordSign};
 use super::slow_lines::{lowest_line_hz, slow_lines, slow_signs};
 use super::summary::RecordSummary;
@@ -64,6 +65,7 @@ pub struct Begun {
     signs: Vec<RecordSign>,
     slow: Vec<RecordSign>,
     slow_hz: Vec<f64>,
+    course: Vec<PositionCourse>,
 }
 
 impl Begun {
@@ -71,14 +73,20 @@ impl Begun {
     pub fn judge(records: &[RecordSummary], options: &JudgeOptions) -> Self {
         let mut signs: Vec<RecordSign> = judge_clipping(records, options.false_alarm_rate).into_iter().collect();
         let slow = slow_lines(records, options);
-        signs.extend(judge_position(records, &slow, options.false_alarm_rate));
+        let position = judge_position(records, &slow, options.false_alarm_rate);
+        signs.extend(position.signs);
         let slow_hz = slow.iter().map(|line| line.frequency_hz.0).collect();
-        Self { signs, slow: slow_signs(&slow, records.len()), slow_hz }
+        Self { signs, slow: slow_signs(&slow, records.len()), slow_hz, course: position.course }
     }
 
     /// Corner of a coupling capacitor, Hz, if one was found.
     pub fn coupling_hz(&self) -> Option<f64> {
         self.signs.iter().find(|sign| sign.id == "ac-coupling")?.parameters.first()?.1.value
+    }
+
+    /// The free level against the piezo's position, before and after what was found is taken out; nothing where no record has positions.
+    pub fn course(&self) -> &[PositionCourse] {
+        &self.course
     }
 
     /// With the fast lines.

@@ -4,6 +4,7 @@ use super::crosstalk::crosstalk;
 use super::droop::droop;
 use super::free_level::{FEWEST_RECORDS, FreeLevel, FreeRecord, HeldOut};
 use super::fringe::fringe;
+use super::position_course::{PositionCourse, position_course};
 use super::sign::{Abstention, RecordSign};
 use super::slow_lines::SlowLine;
 use super::summary::RecordSummary;
@@ -40,16 +41,24 @@ pub(super) fn cannot_judge(records: &[RecordSummary]) -> Vec<Abstention> {
         .to_vec()
 }
 
+/// What the free level shows.
+pub(super) struct OfPosition {
+    /// Causes, the strongest first.
+    pub signs: Vec<RecordSign>,
+    /// The level against the position, before and after they are taken out.
+    pub course: Vec<PositionCourse>,
+}
+
 /// Causes of the free level, the strongest first.
 ///
 /// # Method
 /// Per record the free level, less an offset for each stretch, the slow lines and (where the lever is free on both ways) a drift in time. Each candidate has a
 /// shape of one size for all records and a t test over them. Among the significant ones that gain on held-out records the one that gains most is named;
 /// its shape, of any size in each record, is a nuisance from then on. At last each name is asked again with the others for nuisances, and dropped if it no longer stands.
-pub(super) fn judge_position(records: &[RecordSummary], slow: &[SlowLine], false_alarm_rate: f64) -> Vec<RecordSign> {
+pub(super) fn judge_position(records: &[RecordSummary], slow: &[SlowLine], false_alarm_rate: f64) -> OfPosition {
     let level = FreeLevel::new(records, slow);
     if !level.can_judge() {
-        return Vec::new();
+        return OfPosition { signs: Vec::new(), course: position_course(&level, &level) };
     }
     let mut named: Vec<(usize, Columns)> = Vec::new();
     let mut left = level.clone();
@@ -64,7 +73,7 @@ pub(super) fn judge_position(records: &[RecordSummary], slow: &[SlowLine], false
         let place = ranked.iter().position(|(look, _)| *look == named[at].0)?;
         significant(&ranked[place].1, false_alarm_rate).then(|| sign(ranked, place))
     };
-    (0..named.len()).filter_map(again).collect()
+    OfPosition { signs: (0..named.len()).filter_map(again).collect(), course: position_course(&level, &left) }
 }
 
 /// The candidates that are asked for, those that gain most on held-out records first.

@@ -7,6 +7,7 @@ use super::problem::Problem;
 use super::residuals::{Tile, common, residuals};
 use super::search::Naming;
 use super::story_events::{EventStory, event_stories};
+use super::story_levels::{LevelStory, level_stories};
 use super::story_spectra::{MeanSpectra, mean_spectra};
 
 /// The mean event, weighted by the amplitudes, and everything beside it that a person looks at.
@@ -22,6 +23,8 @@ pub struct Story {
     pub spectra: MeanSpectra,
     /// Event by event.
     pub events: Vec<EventStory>,
+    /// Level by level of the recorded signal.
+    pub levels: Vec<LevelStory>,
     /// Tiles of time and frequency of the common residual, of the linear and of the extended model, in order of time and frequency.
     pub tiles: Vec<[Tile; 2]>,
 }
@@ -53,6 +56,7 @@ pub fn story(problem: &Problem<'_>, naming: &Naming) -> Option<Story> {
         spectra,
         after: mean(&after),
         before: mean_before,
+        levels: level_stories(problem, last, &before, &after),
         events: event_stories(problem, [first, last], &single),
         tiles: matched(&naming.tiles),
     })
