@@ -31,7 +31,8 @@ pub struct Instant {
     pub piezo_m: f64,
 }
 
-/// Share of the load that still acts `t` seconds after the release (t >= 0); the unhurt release leaves none.
+/// Share of the load that still acts `t` seconds after the release (t >= 0); the unhurt release leaves none. What acts again later than 120 samples after it must
+/// last 8 samples to be seen by the diagnosis.
 pub type RemainingLoad = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
 /// Adds to the acceleration of each mode, V/s^2.
 pub type ModalForce = Arc<dyn Fn(&Motion<'_>, &mut [f64]) + Send + Sync>;

@@ -13,7 +13,9 @@ use super::records::{
     Begun, CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, abstentions,
     summarise, without_droop,
 };
-use super::release::{Cut, EventWindow, Lever, LeverMode, NamingOptions, Problem, answer, name_causes, start, story};
+use super::release::{
+    Cut, EventWindow, Lever, LeverMode, NamingOptions, Prepared, Problem, answer, name_causes, start, story,
+};
 use super::release_model::lever_model;
 use super::release_story::{residual_array, tile_table};
 use crate::causes::{added, catalogue, find};
@@ -103,7 +105,7 @@ const CHANNEL_SHARE: f64 = 0.5 / CHANNELS as f64;
 impl Stage for ReleaseDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.release",
-        version: 7,
+        version: 8,
         summary: "names what a linear lever and detector get wrong in snap-off events",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
         outputs: &[SUMMARY.spec(), RESIDUALS.spec(), TILES.spec(), MODEL.spec()],
@@ -175,6 +177,7 @@ impl Stage for ReleaseDiagnose {
             nominal_poles: poles,
             pole_std: self.detector_pole_std,
             seen: begin.seen,
+            prepared: Prepared::default(),
         };
         let naming_options = NamingOptions {
             false_alarm_rate: SHAPES_SHARE * self.false_alarm_rate,

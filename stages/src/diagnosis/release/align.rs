@@ -22,7 +22,7 @@ pub fn aligned(problem: &Problem<'_>, state: &mut State, starts: &mut [usize]) -
     let mut before = state.clone();
     before.hypotheses.pop();
     let whitener = problem.whitener();
-    let basis = Basis::new(&state.lever, problem.cut, &whitener);
+    let basis = Basis::new(&state.lever, problem);
     let both = changed(problem, &whitener, state, &[before.effects(), state.effects()], Pace::FINE);
     let poles: Vec<c64> = state.lever.modes.iter().map(LeverMode::pole).collect();
     let mut shrunk = vec![0.0; poles.len()];

@@ -1,12 +1,15 @@
 //! The space in which the releases of levers near one lie, and places in it.
 
+use std::sync::Arc;
+
 use faer::{Mat, MatRef, c64};
 
 use super::lever::Lever;
-use super::signals::Signals;
+use super::prepared::Directions;
+use super::problem::Problem;
 use super::window::Cut;
-use crate::model::orthogonal::{Qr, product};
-use crate::model::ringdown::internals::{Whitener, columns, shared, weights};
+use crate::model::orthogonal::product;
+use crate::model::ringdown::internals::{shared, weights};
 use crate::model::ringdown::{EventParameters, Exponential};
 
 /// An orthonormal basis of whitened releases near a lever.
@@ -20,16 +23,15 @@ pub(super) struct Basis {
     kept: Vec<usize>,
     early: usize,
     cut: Cut,
-    r: Mat<f64>,
-    q: Mat<f64>,
+    directions: Arc<Directions>,
 }
 
 /// Most samples that fast poles may take.
-const EARLY: usize = 96;
-/// Decay times after which a fast pole is gone: below rounding.
-const GONE: f64 = 25.0;
+const EARLY: usize = 64;
+/// Decay times after which a fast pole is gone: to a ten-millionth of its amplitude, a thousandth of a converter's step.
+const GONE: f64 = 16.0;
 /// The same with room for a pole that becomes slower.
-const ROOM: f64 = 36.0;
+const ROOM: f64 = 23.0;
 /// Step of a difference quotient.
 const STEP: f64 = 1e-5;
 
@@ -52,35 +54,21 @@ pub(super) struct Place {
 }
 
 impl Basis {
-    pub fn new(lever: &Lever, cut: Cut, whitener: &Whitener) -> Self {
+    pub fn new(lever: &Lever, problem: &Problem<'_>) -> Self {
+        let cut = problem.cut;
         let release = lever.release();
         let is_fast = |e: &Exponential| !e.oscillates() && -e.pole.re * cut.interval_s * EARLY as f64 >= ROOM;
         let kept: Vec<usize> = (0..release.len()).filter(|&i| !is_fast(&release[i])).collect();
         let slowest = release.iter().filter(|e| is_fast(e)).map(|e| -e.pole.re).fold(f64::INFINITY, f64::min);
         let early = ((ROOM / (slowest * cut.interval_s)).ceil() as usize).min(cut.samples - cut.before);
         let reference: Vec<Exponential> = kept.iter().map(|&i| release[i]).collect();
-        let (before, samples) = (cut.before, cut.samples);
-        let mut own = columns(&reference, cut.interval_s, samples - before);
-        let count = own.len();
-        for column in &mut own[..count - 2] {
-            column.splice(0..0, std::iter::repeat_n(0.0, before));
-        }
-        let centre = 0.5 * (samples.max(2) - 1) as f64;
-        own[count - 2] = vec![1.0; samples];
-        own[count - 1] = (0..samples).map(|k| (k as f64 - centre) / centre).collect();
-        own.push((0..samples).map(|k| if k < before { 1.0 } else { 0.0 }).collect());
-        let unit = |at: usize| (0..samples).map(|k| if k == before + at { 1.0 } else { 0.0 }).collect();
-        own.extend((0..early).map(unit));
-        let mut all = Signals::with_capacity(samples, own.len());
-        own.iter().for_each(|column| all.push(column));
-        all.whiten(whitener);
-        let qr = Qr::new(all.matrix().to_owned());
-        Self { reference, kept, early, cut, r: qr.r(), q: qr.q() }
+        let directions = problem.prepared.directions(&reference, early, cut, || problem.whitener());
+        Self { reference, kept, early, cut, directions }
     }
 
     /// Coordinates of whitened signals, one column each.
     pub fn project(&self, signals: MatRef<'_, f64>) -> Mat<f64> {
-        product(self.q.transpose(), signals)
+        product(self.directions.q.transpose(), signals)
     }
 
     /// How far a lever is from the one that the basis was made for: largest change of a pole in decay rates, 1 where the basis no longer holds.
@@ -98,14 +86,15 @@ impl Basis {
 
     /// What whitened signals near the lever multiply the complex residue of each of its modes by: `1 + change / residue`.
     pub fn residue_ratios(&self, change: &[f64], own: &EventParameters, modes: usize) -> Vec<c64> {
-        let width = self.r.ncols();
+        let width = self.directions.r.ncols();
         let mut weights: Vec<f64> = {
             let head = self.project(MatRef::from_column_major_slice(change, change.len(), 1));
             head.col(0).iter().copied().collect()
         };
         for i in (0..width).rev() {
-            let known: f64 = (i + 1..width).map(|k| self.r[(i, k)] * weights[k]).sum();
-            weights[i] = if self.r[(i, i)] == 0.0 { 0.0 } else { (weights[i] - known) / self.r[(i, i)] };
+            let known: f64 = (i + 1..width).map(|k| self.directions.r[(i, k)] * weights[k]).sum();
+            weights[i] =
+                if self.directions.r[(i, i)] == 0.0 { 0.0 } else { (weights[i] - known) / self.directions.r[(i, i)] };
         }
         let one = |(m, e): (usize, &Exponential)| {
             // six columns per mode; Re(rho z) has the weights Re rho and -Im rho
@@ -164,7 +153,7 @@ impl Basis {
     pub fn value(&self, shape: &Shape, own: &EventParameters) -> Vec<f64> {
         let w = weights(&self.reference, &shape.kept, own);
         let [early, _] = self.first(&shape.fast, own);
-        let all = product(self.r.as_ref(), self.coordinates(&w.value, -own.amplitude, &early).as_ref());
+        let all = product(self.directions.r.as_ref(), self.coordinates(&w.value, -own.amplitude, &early).as_ref());
         all.col(0).iter().copied().collect()
     }
 
@@ -172,7 +161,7 @@ impl Basis {
     pub fn place(&self, shape: &Shape, own: &EventParameters) -> Place {
         let w = weights(&self.reference, &shape.kept, own);
         let [early, late] = self.first(&shape.fast, own);
-        let (rows, lever) = (self.r.ncols(), shape.chain.ncols());
+        let (rows, lever) = (self.directions.r.ncols(), shape.chain.ncols());
         let mut slopes = Mat::zeros(rows, lever + 4);
         for (j, [up, down]) in shape.moved.iter().enumerate() {
             for (p, column) in w.shared.iter().enumerate() {
@@ -197,7 +186,10 @@ impl Basis {
         for (k, v) in late.iter().enumerate() {
             slopes[(rows - self.early + k, lever + 1)] = *v;
         }
-        let value = product(self.r.as_ref(), self.coordinates(&w.value, -own.amplitude, &early).as_ref());
-        Place { value: value.col(0).iter().copied().collect(), slopes: product(self.r.as_ref(), slopes.as_ref()) }
+        let value = product(self.directions.r.as_ref(), self.coordinates(&w.value, -own.amplitude, &early).as_ref());
+        Place {
+            value: value.col(0).iter().copied().collect(),
+            slopes: product(self.directions.r.as_ref(), slopes.as_ref()),
+        }
     }
 }

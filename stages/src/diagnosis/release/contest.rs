@@ -1,5 +1,7 @@
 //! Candidates against one another: who leads is fitted, the others as far as they may still win.
 
+use rayon::prelude::*;
+
 use super::joint::{EVALUATIONS, JointFit, Search, fit_within};
 use super::problem::Problem;
 use super::screen::Sign;
@@ -11,9 +13,11 @@ use crate::causes::Cause;
 
 /// Trial steps of a leader at most: along a bent valley (a rupture against the detector's poles) they are short.
 const LEADER: usize = 3 * EVALUATIONS;
-/// Share of the leader's gain below which a rival is not fitted any further, unless it falls so fast that it may get there: so many times as far as in its
-/// last steps.
+/// Share of the leader's gain that a few events must promise for a fit to all.
 const HOPELESS: f64 = 0.8;
+/// A rival so far behind the leader (part of its gain, and at least, in the cost) is not fitted any further, unless it falls so fast that it may get
+/// there: so many times as far as in its last steps.
+const NEAR: (f64, f64) = (0.05, 20.0);
 const COMES_UP: f64 = 3.0;
 
 /// Events that choose who is fitted to all, where they promise such a fall of the cost; whoever is so much behind there may still win.
@@ -87,22 +91,26 @@ pub(super) fn refits(
 
 impl Contest<'_> {
     fn begun(&self, signs: &[&Sign]) -> Vec<Trial> {
-        signs.iter().flat_map(|sign| Trial::begin(self, sign)).collect()
+        signs.par_iter().flat_map_iter(|sign| Trial::begin(self, sign)).collect()
     }
 
-    /// Goes on with whoever may win; best first, each cause once.
+    /// Goes on with whoever may win, the leader and its nearest rival side by side; best first, each cause once.
     fn decided(&self, mut trials: Vec<Trial>) -> Vec<Trial> {
         loop {
             trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
             let Some(leader) = trials.first() else { return trials };
-            let bar = HOPELESS * leader.gain;
-            // the leader first, then whoever is not far behind or comes up
+            let bar = leader.gain - (NEAR.0 * leader.gain).max(NEAR.1);
             let goes_on = |trial: &Trial| trial.can_go_on(EVALUATIONS) && trial.gain + COMES_UP * trial.fall >= bar;
-            let next = match leader.can_go_on(LEADER) {
-                true => trials.first_mut(),
-                false => trials.iter_mut().find(|trial| goes_on(trial)),
-            };
-            if !next.is_some_and(|trial| trial.go_on(self)) {
+            let leads = leader.can_go_on(LEADER);
+            let rival = (1..trials.len()).find(|&i| goes_on(&trials[i]));
+            let going = |i: usize| (i == 0 && leads) || Some(i) == rival;
+            let went: Vec<bool> = trials
+                .par_iter_mut()
+                .enumerate()
+                .filter(|(i, _)| going(*i))
+                .map(|(_, trial)| trial.go_on(self))
+                .collect();
+            if !went.contains(&true) {
                 break;
             }
         }

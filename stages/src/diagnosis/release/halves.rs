@@ -1,5 +1,7 @@
 //! What a model gains on events that did not determine it.
 
+use rayon::prelude::*;
+
 use super::joint::{JointFit, Search, fit, fit_within};
 use super::problem::Problem;
 use super::residuals::{common, residuals};
@@ -60,10 +62,16 @@ impl<'a> Halves<'a> {
         if self.0[1].is_empty() {
             return HeldOut { log_likelihood: f64::NEG_INFINITY, ..out };
         }
-        for half in 0..2 {
-            let (Some(before), Some(after)) = (self.judged(base, half), self.judged(&trial.fitted, half)) else {
-                return HeldOut { log_likelihood: f64::NEG_INFINITY, ..out };
-            };
+        let [linear, extended] = [base, &trial.fitted];
+        let judged: Option<Vec<(f64, Vec<f64>)>> = [(linear, 0), (extended, 0), (linear, 1), (extended, 1)]
+            .into_par_iter()
+            .map(|(fitted, half)| self.judged(fitted, half))
+            .collect();
+        let Some(judged) = judged else {
+            return HeldOut { log_likelihood: f64::NEG_INFINITY, ..out };
+        };
+        for (half, pair) in judged.chunks(2).enumerate() {
+            let [before, after] = pair else { continue };
             out.log_likelihood += 0.5 * (before.0 - after.0);
             // of a sum weighted to unit variance: back to volts of one event
             let scale = (self.0[1 - half].count() as f64).sqrt();

@@ -1,5 +1,7 @@
 //! The joint fit of lever and causes to all events.
 
+use std::sync::Arc;
+
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -41,6 +43,8 @@ const ARRIVED: f64 = 0.05;
 /// Distance from the basis' lever beyond which the basis is made anew, and beyond which a step is not believed.
 const NEAR: f64 = 0.03;
 const FAR: f64 = 1.0;
+/// The first while steps promise so much: the cost is right to one or two then (errors grow with the third power of the distance).
+const ON_THE_WAY: (f64, f64) = (0.1, 50.0);
 /// Damping at first, at least, after a failure at least, and where the search gives up.
 const DAMPING: [f64; 4] = [1e-6, 1e-9, 1e-4, 1e8];
 /// What one sample more and one less may add to the cost of an event that is cut anew: noise does once in a million.
@@ -62,7 +66,7 @@ impl Frame {
         starts: &mut [usize],
     ) -> Result<Self, ModelError> {
         problem.starts(state, starts)?;
-        let basis = Basis::new(&state.lever, problem.cut, whitener);
+        let basis = Basis::new(&state.lever, problem);
         Ok(Self { basis, data: problem.data(whitener, starts), starts: starts.to_vec() })
     }
 }
@@ -118,7 +122,7 @@ impl Point {
 
 /// A finished fit once more with its derivatives, for tests of what it leaves.
 pub(super) struct Linear {
-    pub whitener: Whitener,
+    pub whitener: Arc<Whitener>,
     pub basis: Basis,
     pub slopes: Slopes,
     point: Point,
@@ -215,6 +219,15 @@ pub(super) fn fit_within(
             Normal::assemble(problem, &frame.basis, &point.state, &events, &slopes, hold)
         });
         let step = equations.solve(damping);
+        let near = if step.promised > ON_THE_WAY.1 { ON_THE_WAY.0 } else { NEAR };
+        if frame.basis.distance(&point.state.lever) > near {
+            // from here on small gains count
+            let Point { mut state, .. } = point;
+            frame = Frame::new(problem, &whitener, &mut state, &mut frame.starts.clone())?;
+            point = Point::at(problem, &whitener, &frame, state);
+            normal = None;
+            continue;
+        }
         normal = Some(equations);
         let arrived = ARRIVED.max(search.rough * point.cost);
         if step.promised < arrived {
@@ -225,7 +238,7 @@ pub(super) fn fit_within(
         }
         evaluations += 1;
         let trial = point.state.moved(&step, hold);
-        let Some((next, new_frame)) = advance(problem, &whitener, &frame, &point, trial) else {
+        let Some((next, new_frame)) = advance(problem, &whitener, &frame, &point, trial, near) else {
             if crossing == Crossing::Middle && !point.state.hypotheses.is_empty() {
                 // one event's derivatives have led astray: another instant within the sample, another amplitude
                 crossing = Crossing::Each;
@@ -272,12 +285,13 @@ fn advance(
     frame: &Frame,
     point: &Point,
     trial: State,
+    near: f64,
 ) -> Option<(Point, Option<Frame>)> {
     let distance = frame.basis.distance(&trial.lever);
     if !distance.is_finite() || distance > FAR {
         return None;
     }
-    if distance <= NEAR && !problem.have_passed(&trial) {
+    if distance <= near && !problem.have_passed(&trial) {
         let next = Point::at(problem, whitener, frame, trial);
         return (next.cost <= point.cost).then_some((next, None));
     }

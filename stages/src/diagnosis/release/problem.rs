@@ -1,8 +1,11 @@
 //! The data of a joint fit, and what is known beforehand.
 
+use std::sync::Arc;
+
 use faer::Mat;
 
 use super::lever::{Lever, LeverMode};
+use super::prepared::Prepared;
 use super::signals::Signals;
 use super::state::State;
 use super::stepper::Release;
@@ -25,6 +28,8 @@ pub struct Problem<'a> {
     pub pole_std: f64,
     /// What free exponentials say of the modes; weakly held, so that no weak mode runs off to absorb a misfit of another kind.
     pub seen: Vec<SeenMode>,
+    /// What follows from cut and noise, made when it is asked for; `Prepared::default()`.
+    pub prepared: Prepared,
 }
 
 /// A mode as free exponentials show it, and how weakly the fit is held to it.
@@ -50,6 +55,7 @@ impl Problem<'_> {
             nominal_poles: self.nominal_poles.clone(),
             pole_std: self.pole_std,
             seen: self.seen.clone(),
+            prepared: Prepared::default(),
         }
     }
 
@@ -77,8 +83,8 @@ impl Problem<'_> {
         Ok(())
     }
 
-    pub(super) fn whitener(&self) -> Whitener {
-        Whitener::new(&self.noise, self.cut.interval_s, self.cut.samples, &[])
+    pub(super) fn whitener(&self) -> Arc<Whitener> {
+        self.prepared.whitener(|| Whitener::new(&self.noise, self.cut.interval_s, self.cut.samples, &[]))
     }
 
     /// The events cut at `starts` and whitened.

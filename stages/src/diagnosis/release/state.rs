@@ -123,3 +123,49 @@ impl State {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::causes::find;
+    use crate::diagnosis::release::LeverMode;
+
+    fn state() -> State {
+        let mode = LeverMode { omega: 3e5, quality_factor: 50.0, share: 1.0 };
+        let own = EventParameters { amplitude: 0.8, onset_s: -1e-7, offset: 0.0, slope: 0.0 };
+        State { lever: Lever { modes: vec![mode], poles: vec![8e6, 1.2e7] }, hypotheses: Vec::new(), events: vec![own] }
+    }
+
+    #[test]
+    fn a_step_along_the_ridge_of_onset_and_delay_stays_on_it() {
+        let before = state();
+        let delay = |state: &State| state.lever.poles.iter().map(|p| 1.0 / p).sum::<f64>();
+        // poles a tenth and a quarter slower; the onset earlier by what this delays, to first order
+        let steps = [-0.1, -0.25];
+        let later: f64 = before.lever.poles.iter().zip(steps).map(|(p, step)| -step / p).sum();
+        let step =
+            Step { shared: vec![0.0, 0.0, steps[0], steps[1]], own: vec![[0.0, -later, 0.0, 0.0]], promised: 0.0 };
+        let after = before.moved(&step, Hold::Nothing);
+        let sum = |state: &State| state.events[0].onset_s + delay(state);
+        // rounding of sums of 1e-7 s; without the second order it would be off by 3e-9 s
+        assert!((sum(&after) - sum(&before)).abs() < 1e-20, "{:e}", sum(&after) - sum(&before));
+        // with the lever held, a step of the onset is one
+        let held = before.moved(&step, Hold::Shared);
+        assert_eq!(held.events[0].onset_s, -1e-7 - later);
+    }
+
+    #[test]
+    fn only_linear_hypotheses_stand_beside_a_screen() {
+        let mut state = state();
+        for (id, values) in
+            [("duffing", vec![1e-3]), ("tether-tail", vec![0.01, 5e-5]), ("quadratic-detector", vec![0.01])]
+        {
+            state.hypotheses.push(Hypothesis { cause: find(id).unwrap(), values });
+        }
+        let (all, linear) = (state.effects(), state.linear_effects());
+        assert!(all.bend_the_motion() && !all.optics.is_empty());
+        assert!(!linear.bend_the_motion() && linear.optics.is_empty());
+        assert_eq!(linear.remaining_load.len(), 1);
+        assert_eq!(linear.remaining_load[0](5e-5), all.remaining_load[0](5e-5));
+    }
+}

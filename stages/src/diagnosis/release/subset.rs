@@ -85,3 +85,110 @@ fn median(values: impl Iterator<Item = f64>, without: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(without)
 }
+
+#[cfg(test)]
+mod tests {
+    use faer::Mat;
+
+    use super::*;
+    use crate::causes::Instant;
+    use crate::diagnosis::release::{Lever, LeverMode, Prepared};
+    use crate::model::ringdown::RingdownNoise;
+
+    const INTERVAL_S: f64 = 2e-7;
+
+    fn windows(count: usize) -> Vec<EventWindow> {
+        let first = Instant { record: 0, place: 0.0, time_s: 0.0, piezo_m: 0.0 };
+        vec![EventWindow { values: vec![0.0; 500], onset: 40.0, first }; count]
+    }
+
+    fn problem(windows: &[EventWindow]) -> Problem<'_> {
+        Problem {
+            windows,
+            cut: Cut { before: 16, samples: 400, interval_s: INTERVAL_S },
+            noise: RingdownNoise::white(1e-6),
+            nominal_poles: Vec::new(),
+            pole_std: 0.15,
+            seen: Vec::new(),
+            prepared: Prepared::default(),
+        }
+    }
+
+    fn state(events: usize) -> (State, Vec<usize>) {
+        let mode = LeverMode { omega: 3e5, quality_factor: 50.0, share: 1.0 };
+        let own = |i: usize| EventParameters {
+            amplitude: 0.5 + 0.1 * i as f64,
+            onset_s: -1e-8 * i as f64,
+            offset: 0.01 * i as f64,
+            slope: 0.002,
+        };
+        let lever = Lever { modes: vec![mode], poles: vec![8e6] };
+        (State { lever, hypotheses: Vec::new(), events: (0..events).map(own).collect() }, (10..10 + events).collect())
+    }
+
+    #[test]
+    fn a_subset_spans_the_archive_and_is_no_larger_than_it() {
+        let ten = windows(10);
+        let whole = problem(&ten);
+        assert_eq!(Subset::spread(&whole, 4, 150).chosen, [0, 3, 6, 9]);
+        let two = windows(2);
+        assert_eq!(Subset::spread(&problem(&two), 4, 150).chosen, [0, 1]);
+        // no longer than the windows are
+        assert_eq!(Subset::spread(&whole, 4, 10_000).problem().cut.samples, 400);
+    }
+
+    #[test]
+    fn offset_and_slope_are_one_line_however_long_the_window() {
+        let (ten, (all, starts)) = (windows(10), state(10));
+        let whole = problem(&ten);
+        let few = Subset::spread(&whole, 4, 150);
+        let (part, part_starts) = few.state(&all, &starts);
+        assert_eq!(part_starts, [10, 13, 16, 19]);
+        let line = |own: &EventParameters, samples: usize, k: f64| {
+            let centre = 0.5 * (samples - 1) as f64;
+            own.offset + own.slope * (k - centre) / centre
+        };
+        for (own, &i) in part.events.iter().zip(&few.chosen) {
+            for k in [0.0, 77.0, 149.0] {
+                let (short, long) = (line(own, 150, k), line(&all.events[i], 400, k));
+                assert!((short - long).abs() < 1e-15, "{short} {long}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_few_found_moves_the_others_by_the_median() {
+        let (ten, (all, starts)) = (windows(10), state(10));
+        let whole = problem(&ten);
+        let fit = |state: State, starts: Vec<usize>| JointFit {
+            covariance: Mat::zeros(0, 0),
+            state,
+            starts,
+            costs: Vec::new(),
+            cost: 0.0,
+            converged: true,
+            evaluations: 0,
+            damping: 0.0,
+            at_limit: Vec::new(),
+        };
+        let few = Subset::spread(&whole, 4, 150);
+        let (mut found, mut found_starts) = few.state(&all, &starts);
+        // three quarters of a sample later: of one event in the next window's first quarter
+        found.events.iter_mut().for_each(|own| {
+            own.onset_s += 0.75 * INTERVAL_S;
+            own.amplitude *= 1.5;
+        });
+        found.events[2].onset_s -= INTERVAL_S;
+        found_starts[2] += 1;
+        let base = fit(all.clone(), starts.clone());
+        let (carried, carried_starts) = few.carried(&fit(found.clone(), found_starts.clone()), &base);
+        for (i, (now, old)) in carried.events.iter().zip(&all.events).enumerate() {
+            let instant = |own: &EventParameters, start: usize| own.onset_s + start as f64 * INTERVAL_S;
+            let later = instant(now, carried_starts[i]) - instant(old, starts[i]);
+            assert!((later - 0.75 * INTERVAL_S).abs() < 1e-15, "{i}: {later:e}");
+            assert!((now.amplitude / old.amplitude - 1.5).abs() < 1e-12, "{i}");
+            assert_eq!((now.offset, now.slope), (old.offset, old.slope), "the whole window's");
+        }
+        assert_eq!(carried_starts[6], starts[6] + 1);
+    }
+}

@@ -1,5 +1,7 @@
 //! Candidates fitted in full.
 
+use rayon::prelude::*;
+
 use super::align::aligned;
 use super::contest::Contest;
 use super::joint::{JointFit, Search, fit_within, settled};
@@ -69,8 +71,9 @@ const BETTER: f64 = 2.0;
 const LOOK: usize = 6;
 /// Cost over the base's beyond which the first steps have led nowhere.
 const NOT_LOST: f64 = 1.5;
-/// Cost per sample beyond which a base has left what it may have bent to.
-const BENT: f64 = 1.02;
+/// A base has left what it may have bent to where its cost exceeds the number of samples by what the noise's level is known to, and so many standard deviations
+/// of a chi square.
+const BENT: (f64, f64) = (0.01, 2.0);
 
 /// Parts of the strength that the score suggests from which a candidate may begin anew.
 const GRADE: f64 = 0.8;
@@ -96,12 +99,15 @@ impl Trial {
             begun.and_then(|begun| Self::looked_at(contest, sign.cause, [sign.z, contest.part * sign.gain], begun));
         // a baseline that left much has bent to the misfit, and its score is that of another strength
         let samples = (base.state.events.len() * contest.problem.cut.samples) as f64;
-        let bent = base.cost > BENT * samples;
+        let bent = base.cost - samples > BENT.0 * samples + BENT.1 * (2.0 * samples).sqrt();
         let again = bent && (!base.converged || first.as_ref().is_none_or(|trial| !trial.fitted.converged));
         let steps = if sign.graded { GRADES } else { 0..=4 };
-        let parts = steps.filter(|_| again).map(|step| GRADE.powi(step));
+        let parts: Vec<f64> = steps.filter(|_| again).map(|step| GRADE.powi(step)).collect();
         let second = parts
+            .into_par_iter()
             .filter_map(|part| settled(contest.clean.0, contest.clean.1, part))
+            .collect::<Vec<JointFit>>()
+            .into_iter()
             .min_by(|a, b| a.cost.total_cmp(&b.cost))
             .filter(|begun| begun.cost < to_beat)
             .and_then(|begun| Self::looked_at(contest, sign.cause, [sign.z, contest.part * sign.gain], begun));

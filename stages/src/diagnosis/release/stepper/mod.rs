@@ -215,6 +215,25 @@ mod tests {
     }
 
     #[test]
+    fn a_load_that_comes_back_is_followed_to_its_end() {
+        let (lever, release) = (lever(), release());
+        let sample = release.interval_s;
+        // a push of two samples just after the finer steps, and one of ten far behind
+        for (from, to) in [(90.0, 92.0), (2000.0, 2010.0)] {
+            let mut pushed = Effects::default();
+            let inside = move |t: f64| t >= from * sample && t < to * sample;
+            pushed.remaining_load.push(Arc::new(move |t| if inside(t) { 0.1 } else { 0.0 }));
+            let mut stepped = pushed.clone();
+            stepped.optics.push(Arc::new(|v| v));
+            let (fast, slow) =
+                (run(&lever, &pushed, &release, Pace::FINE), run(&lever, &stepped, &release, Pace::FINE));
+            let plain = run(&lever, &Effects::default(), &release, Pace::FINE);
+            assert!(apart(&slow, &plain) > 1e-3, "the push is felt");
+            assert!(apart(&fast, &slow) < 1e-9, "{from}: {:e}", apart(&fast, &slow));
+        }
+    }
+
+    #[test]
     fn a_coarse_pace_shows_effects_to_some_per_cent() {
         let (lever, release) = (lever(), release());
         for (id, values) in [
