@@ -17,7 +17,7 @@ const ABOUT: About = About {
         low: 0.0,
         high: 1e-5,
     }],
-    class: &["alignment-jitter", "constant-delay"],
+    class: &["alignment-jitter"],
     resembles: "finite-rupture: also blurs, but every single event",
     next_measurement: "none needed: each event's onset is estimated",
     identifiable: Identifiable::No("every event has an onset of its own in the fit: jitter is gone"),

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use faer::c64;
+
 /// Motion of the lever at one instant, in volts of static deflection (deflection times sensitivity).
 #[derive(Debug, Clone, Copy)]
 pub struct Motion<'a> {
@@ -42,6 +44,15 @@ pub type StaticMap = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
 pub type FrequencyChange = Arc<dyn Fn(&Instant) -> f64 + Send + Sync>;
 /// Volts added behind the electronics.
 pub type Added = Arc<dyn Fn(&Instant) -> f64 + Send + Sync>;
+
+/// A load that outlasts the release as `Re(share exp(rate t))` of what it was: as a [`RemainingLoad`], but followed exactly and at no cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DecayingLoad {
+    /// Share of the load, with its phase.
+    pub share: c64,
+    /// Rate, rad/s; its real part below 0.
+    pub rate: c64,
+}
 
 /// A further oscillation that the load drives like the lever's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,6 +95,8 @@ pub enum Intersample {
 pub struct Effects {
     /// Loads that outlast the release.
     pub remaining_load: Vec<RemainingLoad>,
+    /// Loads that decay, in closed form.
+    pub decaying_load: Vec<DecayingLoad>,
     /// Forces on the modes.
     pub modal_force: Vec<ModalForce>,
     /// Further modes.
@@ -120,6 +133,11 @@ impl Effects {
         !self.modal_force.is_empty()
     }
 
+    /// Whether any load is left after the release.
+    pub fn outlast_the_release(&self) -> bool {
+        !self.remaining_load.is_empty() || !self.decaying_load.is_empty()
+    }
+
     /// Whether twice the load makes twice the signal.
     pub fn are_linear(&self) -> bool {
         self.modal_force.is_empty() && self.optics.is_empty()
@@ -128,7 +146,7 @@ impl Effects {
     /// Whether anything but frequencies changes in the signal of one event.
     pub fn change_the_shape(&self) -> bool {
         let parts = [
-            self.remaining_load.is_empty(),
+            !self.outlast_the_release(),
             self.modal_force.is_empty(),
             self.extra_modes.is_empty(),
             self.optics.is_empty(),
@@ -145,7 +163,11 @@ impl Effects {
 
     /// Share of the load that acts `t` seconds after the release, before it for t < 0.
     pub fn load(&self, t: f64) -> f64 {
-        if t < 0.0 { 1.0 } else { self.remaining_load.iter().map(|load| load(t)).sum() }
+        if t < 0.0 {
+            return 1.0;
+        }
+        let decaying = self.decaying_load.iter().map(|load| (load.share * (load.rate * t).exp()).re);
+        self.remaining_load.iter().map(|load| load(t)).chain(decaying).sum()
     }
 
     /// The deflection signal as the optics show it.
@@ -158,6 +180,7 @@ impl fmt::Debug for Effects {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Effects")
             .field("remaining_load", &self.remaining_load.len())
+            .field("decaying_load", &self.decaying_load)
             .field("modal_force", &self.modal_force.len())
             .field("extra_modes", &self.extra_modes)
             .field("optics", &self.optics.len())

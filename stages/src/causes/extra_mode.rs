@@ -15,7 +15,7 @@ const ABOUT: About = About {
         Parameter { name: "frequency_hz", unit: "Hz", meaning: "its frequency", low: 1e2, high: 1e8 },
         Parameter { name: "quality_factor", unit: "1", meaning: "its quality factor", low: 2.0, high: 1e5 },
     ],
-    class: &["extra-mode"],
+    class: &["extra-mode", "piezo-ring"],
     resembles: "every nonlinearity makes lines that a further mode can follow in part: it must beat them by more",
     next_measurement: "thermal spectrum far from the surface: its peak is there without any event; its sign per event tells torsion",
     identifiable: Identifiable::Shape,

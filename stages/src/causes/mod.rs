@@ -54,8 +54,8 @@ mod two_step_rupture;
 pub use catalogue::{CauseError, add, added, catalogue, find};
 pub use cause::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, within_limits};
 pub use effects::{
-    Added, Effects, ExtraMode, FrequencyChange, Instant, Intersample, LinearSection, ModalForce, Motion, RemainingLoad,
-    StaticMap,
+    Added, DecayingLoad, Effects, ExtraMode, FrequencyChange, Instant, Intersample, LinearSection, ModalForce, Motion,
+    RemainingLoad, StaticMap,
 };
 pub use page::{as_json, index, page};
 

@@ -1,8 +1,8 @@
 //! A piezo that rings after the release.
 
-use std::sync::Arc;
+use faer::c64;
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, DecayingLoad, Domain, Effects, Identifiable, Parameter, Part, Scene};
 
 /// Base motion at the piezo's resonance, passed on by the modes.
 pub struct PiezoRing;
@@ -37,7 +37,10 @@ impl Cause for PiezoRing {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (share, omega, quality) = (values[0], std::f64::consts::TAU * values[1], values[2]);
-        effects.remaining_load.push(Arc::new(move |t| share * (-0.5 * omega / quality * t).exp() * (omega * t).sin()));
+        // sin is the real part of -i exp(i ...)
+        effects
+            .decaying_load
+            .push(DecayingLoad { share: c64::new(0.0, -share), rate: c64::new(-0.5 * omega / quality, omega) });
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

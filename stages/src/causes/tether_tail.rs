@@ -1,8 +1,8 @@
 //! A thread of liquid or polymer that lets go slowly.
 
-use std::sync::Arc;
+use faer::c64;
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, DecayingLoad, Domain, Effects, Identifiable, Parameter, Part, Scene};
 
 /// `u = -F p exp(-t / tau)` after the release.
 pub struct TetherTail;
@@ -36,7 +36,7 @@ impl Cause for TetherTail {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (fraction, tau) = (values[0], values[1]);
-        effects.remaining_load.push(Arc::new(move |t| fraction * (-t / tau).exp()));
+        effects.decaying_load.push(DecayingLoad { share: c64::new(fraction, 0.0), rate: c64::new(-1.0 / tau, 0.0) });
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

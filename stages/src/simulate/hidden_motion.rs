@@ -40,7 +40,7 @@ pub fn simulate_hidden(
     effects: &Effects,
     rng: &mut ChaCha8Rng,
 ) -> Motion {
-    let bent = effects.bend_the_motion() || !effects.remaining_load.is_empty();
+    let bent = effects.bend_the_motion() || effects.outlast_the_release();
     if !bent && effects.optics.is_empty() && system.signal_direct_m_per_n == 0.0 {
         return simulate_motion(system, lever, contact, drive, sampling, rng);
     }

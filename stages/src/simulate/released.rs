@@ -59,7 +59,7 @@ impl Microscope {
         let sampling = Sampling { start_s, interval_s, samples };
         let mut run = Run::start(&system, &lever, &contact, &drive, sampling, &mut rng);
         let volts_per_m = self.detector.sensitivity_v_per_m;
-        let bent = effects.bend_the_motion() || !effects.remaining_load.is_empty();
+        let bent = effects.bend_the_motion() || effects.outlast_the_release();
         let mut hidden = bent.then(|| Hidden::new(effects, &lever, volts_per_m, interval_s));
         let mut optics =
             (!effects.optics.is_empty()).then(|| Optics::new(&system, &self.detector, effects, interval_s));

@@ -177,7 +177,7 @@ fn with_the_rest(
     }));
     // a change of frequency is each event's own, and what it moves of these derivatives is small
     let run = |lever: &Lever, release: Release| {
-        differences(lever, std::iter::once((&effects, release, 0.0)), Pace::FINE).swap_remove(0)
+        differences(lever, std::iter::once((&effects, release, 0.0)), Pace::CROSSED).swap_remove(0)
     };
     let per_event = levers.len() + 2;
     let all: Vec<Vec<f64>> = (0..order.len() * per_event)

@@ -8,7 +8,7 @@ use super::screen::Sign;
 use super::search::same_class;
 use super::state::{Hold, State};
 use super::subset::Subset;
-use super::trials::Trial;
+use super::trials::{Trial, refitted};
 use crate::causes::Cause;
 
 /// Trial steps of a leader at most: along a bent valley (a rupture against the detector's poles) they are short.
@@ -28,6 +28,14 @@ const BEHIND: f64 = 20.0;
 const DECAYED: f64 = 1.6;
 const LEAST: usize = 1500;
 
+/// Part of its gain by which a sign may differ from one of the same class and still be the same signal.
+const ALIKE: f64 = 0.01;
+
+/// Times that a base may be fitted anew.
+pub(super) const REDONE: usize = 3;
+/// Share of a candidate's gain that a base fitted anew must bring for all to begin anew.
+const OWN: f64 = 0.3;
+
 /// Candidates fitted in full.
 pub(super) struct Refits {
     /// Those that came near the best, best first: fitted to all events.
@@ -42,16 +50,31 @@ impl Refits {
         self.finalists.iter().map(|trial| (trial.cause, trial.gain)).chain(self.rest.iter().copied())
     }
 
+    /// Those of an earlier round come back, with what they gain on the present base: of two fits of one cause the better stays.
+    pub fn admit(&mut self, earlier: Vec<Trial>) {
+        self.finalists.extend(earlier);
+        self.finalists.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        self.finalists = best_of_each(std::mem::take(&mut self.finalists));
+        let finalists = &self.finalists;
+        self.rest.retain(|(cause, _)| finalists.iter().all(|known| known.cause.about().id != cause.about().id));
+    }
+
     /// The best of another class than the best.
     pub fn rival(&self) -> Option<(&'static dyn Cause, f64)> {
         let best = self.finalists.first()?;
         self.all().find(|(cause, _)| !same_class(*cause, best.cause))
     }
 
-    /// The best was gained in part by the base's own parameters.
-    pub fn lower(&mut self, own: f64) {
+    /// The base fitted from where the best has led it, where that gained more than its sign promised, and whether the base had most of that for itself: then the
+    /// signs are to be sought anew. Otherwise its part is taken off all gains.
+    pub fn renewed(&mut self, problem: &Problem<'_>, base: &JointFit) -> Option<(JointFit, bool)> {
+        let best = self.finalists.first().filter(|best| best.beyond_promise(base))?;
+        let better = refitted(problem, base, best)?;
+        let own = base.cost - better.cost;
+        let most_of_it = own > OWN * (base.cost - best.fitted.cost);
         self.finalists.iter_mut().for_each(|trial| trial.gain -= own);
         self.rest.iter_mut().for_each(|(_, gain)| *gain -= own);
+        Some((better, most_of_it))
     }
 }
 
@@ -79,8 +102,9 @@ pub(super) fn refits(
 ) -> Refits {
     let mut chosen: Vec<&Sign> = Vec::new();
     for sign in signs.iter().filter(|s| s.gain > 0.0) {
-        // members of one class are one signal
-        if chosen.iter().all(|c| !same_class(c.cause, sign.cause)) {
+        // members of one class that show alike are one signal
+        let alike = |c: &&Sign| same_class(c.cause, sign.cause) && (c.gain - sign.gain).abs() < ALIKE * c.gain;
+        if !chosen.iter().any(alike) {
             chosen.push(sign);
         }
     }
@@ -114,14 +138,7 @@ impl Contest<'_> {
                 break;
             }
         }
-        // of two beginnings of one candidate the better end
-        let mut best: Vec<Trial> = Vec::new();
-        for trial in trials {
-            if best.iter().all(|known| known.cause.about().id != trial.cause.about().id) {
-                best.push(trial);
-            }
-        }
-        best
+        best_of_each(trials)
     }
 
     /// The same with few events first; none where the signs are too weak for that.
@@ -152,4 +169,15 @@ impl Contest<'_> {
         let rest = waiting.iter().map(|trial| (trial.cause, trial.gain / part)).collect();
         (!finalists.is_empty()).then_some(Refits { finalists, rest })
     }
+}
+
+/// Of several fits of one cause the first.
+fn best_of_each(trials: Vec<Trial>) -> Vec<Trial> {
+    let mut best: Vec<Trial> = Vec::new();
+    for trial in trials {
+        if best.iter().all(|known| known.cause.about().id != trial.cause.about().id) {
+            best.push(trial);
+        }
+    }
+    best
 }

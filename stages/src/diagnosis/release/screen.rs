@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::basis::Basis;
 use super::change::changed;
+use super::detuning::Detuning;
 use super::joint::{JointFit, Linear};
 use super::normal::{AllCrossed, Crossed, Event, eliminate};
 use super::problem::Problem;
@@ -43,6 +44,8 @@ pub struct Screen {
     pub p_value: f64,
     /// Its probability, alone.
     pub alone: f64,
+    /// What the events' own frequencies would gain.
+    pub detuning: Detuning,
 }
 
 /// Events from which their scatter may widen the scores' standard deviation.
@@ -150,7 +153,9 @@ pub fn screen(
         }
     }
     best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    Ok(Screen { signs: best, p_value, alone: normal_two_sided(strongest.max(strongest_picked).max(0.0).sqrt()) })
+    let alone = normal_two_sided(strongest.max(strongest_picked).max(0.0).sqrt());
+    let detuning = Detuning::of(&events, state.lever.modes.len(), widened);
+    Ok(Screen { signs: best, p_value, alone, detuning })
 }
 
 /// Median scatter of the events' scores over what the noise model says, at least 1: of most trials, since a cause that acts on few events makes
@@ -164,12 +169,12 @@ fn widening(mut scatters: Vec<f64>, events: usize) -> f64 {
 }
 
 /// One event's share of the normal equations of known parameters and trials.
-struct Scores {
-    known: usize,
-    information: Mat<f64>,
-    gradient: Vec<f64>,
+pub(super) struct Scores {
+    pub known: usize,
+    pub information: Mat<f64>,
+    pub gradient: Vec<f64>,
     /// Squared length of each trial before anything is projected out.
-    raw: Vec<f64>,
+    pub raw: Vec<f64>,
 }
 
 impl Scores {

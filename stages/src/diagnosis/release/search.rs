@@ -1,13 +1,13 @@
 //! From signs to names: refits, held-out events, and when to abstain.
 
-use super::contest::refits;
-use super::halves::Halves;
+use super::contest::{REDONE, refits};
+use super::detuning::Detuning;
 use super::joint::{JointFit, fit, settled};
 use super::problem::Problem;
 use super::residuals::{Tile, common, peaks, residuals, tiles, whitened};
+use super::round::{Judged, Round};
 use super::screen::{Screen, screen};
 use super::state::{Hold, State};
-use super::trials::{OWN, REDONE, combination, refitted};
 use crate::causes::{Cause, Domain, Identifiable, Part, Scene};
 use crate::diagnosis::verdict::{Gain, RunnerUp, Verdict};
 use crate::model::ModelError;
@@ -69,8 +69,6 @@ pub struct Naming {
 
 /// Fall of the sum of squares that a parameter must bring, over the logarithm of the number of samples: as the Bayesian information criterion.
 pub(super) const PENALTY: f64 = 1.0;
-/// Difference of penalised gains below which two classes tie, unless held-out events decide.
-const TIE: f64 = 6.0;
 /// Share of the baseline's excess energy that named causes may leave.
 const REMAINDER: f64 = 0.05;
 /// Safety of the omnibus test, whose tiles are counted but whose noise model is an estimate.
@@ -79,8 +77,16 @@ const OMNIBUS: f64 = 0.1;
 /// Probability of a sign beside named causes above which it does not take their names away, and the share of what they have explained below which it does
 /// not either: their own model is not exact.
 const FAINT: [f64; 2] = [1e-6, 0.01];
-/// Gain of the log likelihood on held-out events that one more cause must bring beside others, for the same reason: odds of 20 to 1.
-const ONE_MORE: f64 = 3.0;
+/// What may be named: of members of one class the first stands for all.
+fn candidates(catalogue: &[&'static dyn Cause], without: &[String]) -> Vec<&'static dyn Cause> {
+    let mut out: Vec<&'static dyn Cause> = Vec::new();
+    for cause in catalogue.iter().copied().filter(|cause| is_candidate(*cause, without)) {
+        if out.iter().all(|known| known.about().class != cause.about().class) {
+            out.push(cause);
+        }
+    }
+    out
+}
 
 /// Whether a candidate belongs into a screen of events' shapes.
 fn is_candidate(cause: &dyn Cause, without: &[String]) -> bool {
@@ -132,111 +138,66 @@ pub fn name_causes(
     catalogue: &[&'static dyn Cause],
     options: &NamingOptions,
 ) -> Result<Naming, ModelError> {
-    let mut candidates: Vec<&'static dyn Cause> = Vec::new();
-    for cause in catalogue.iter().copied().filter(|cause| is_candidate(*cause, &options.without)) {
-        // of members of one class the first stands for all
-        if candidates.iter().all(|known| known.about().class != cause.about().class) {
-            candidates.push(cause);
-        }
-    }
+    let mut candidates = candidates(catalogue, &options.without);
     let clean = (state.clone(), starts.clone());
     let begun = settled(problem, state, starts)?;
-    let mut fits = vec![fit(problem, begun.state, begun.starts, Hold::Nothing)?];
-    let mut named: Vec<Named> = Vec::new();
-    let mut nearest = Vec::new();
-    let mut evidence = Vec::new();
+    let mut base = fit(problem, begun.state, begun.starts, Hold::Nothing)?;
+    let first_tiles = tiles_of(problem, &base);
+    let (mut earlier, mut named): (Vec<JointFit>, Vec<Named>) = (Vec::new(), Vec::new());
+    let (mut nearest, mut evidence) = (Vec::new(), Vec::new());
     let mut verdict = Verdict::Clean;
-    let first_tiles = tiles_of(problem, &fits[0]);
-    let mut redone = 0;
+    let (mut redone, mut waiting) = (0, Vec::new());
     let mut last_screen;
     let mut first_p_value = None;
+    let mut first_detuning = None;
     loop {
-        let base = &fits[fits.len() - 1];
-        let common = common_of(problem, base);
-        last_screen = screen(problem, base, &candidates, &scene(problem, base, &common), options.seed)?;
+        let scene = scene(problem, &base, &common_of(problem, &base));
+        last_screen = screen(problem, &base, &candidates, &scene, options.seed)?;
         first_p_value.get_or_insert(last_screen.p_value);
+        first_detuning.get_or_insert(last_screen.detuning);
         if last_screen.p_value >= options.false_alarm_rate || named.len() == options.most {
             break;
         }
-        let mut trials = refits(problem, base, &clean, &last_screen.signs, options.refits);
+        let mut trials = refits(problem, &base, &clean, &last_screen.signs, options.refits);
+        trials.admit(std::mem::take(&mut waiting));
         if redone < REDONE
-            && let Some(best) = trials.finalists.first()
-            && best.beyond_promise(base)
-            && let Some(better) = refitted(problem, base, best)
+            && let Some((better, most_of_it)) = trials.renewed(problem, &base)
         {
-            // the base had not arrived: what a candidate gained was in part its own
             redone += 1;
-            let own = base.cost - better.cost;
-            let most_of_it = own > OWN * (base.cost - best.fitted.cost);
-            trials.lower(own);
-            let last = fits.len() - 1;
-            fits[last] = better;
+            base = better;
             if most_of_it {
+                // the signs are sought anew, but who led once may do so again
+                waiting = trials.finalists;
                 continue;
             }
         }
-        let base = &fits[fits.len() - 1];
-        let Some(best) = trials.finalists.first() else {
-            verdict = Verdict::Unexplained;
-            evidence.push("signs of a cause, but no candidate could be fitted".into());
-            break;
-        };
-        let rival = trials.finalists.iter().find(|t| !same_class(t.cause, best.cause));
-        let beside = |(cause, gain): (&dyn Cause, f64)| RunnerUp {
-            id: cause.about().id.into(),
-            share_of_gain: (best.gain > 0.0).then(|| (gain / best.gain).clamp(0.0, 1.0)),
-        };
-        let runner_up = trials.rival().map(|(cause, gain)| beside((cause, gain)));
-        let halves = Halves::of(problem, base);
-        let held_out = halves.gain(base, best);
-        let refusal = if best.gain <= 0.0 {
-            Some("no candidate pays for its parameters".to_string())
-        } else if let Some(line) = combination(base, best) {
-            Some(format!(
-                "the nearest candidate, {}, would ring at {line}: the sign of a nonlinearity that no candidate accounts for",
-                best.cause.about().id
-            ))
-        } else if !best.fitted.at_limit.is_empty() {
-            Some(format!("the nearest candidate, {}, ends at a limit of its parameters", best.cause.about().id))
-        } else if held_out.log_likelihood <= if named.is_empty() { 0.0 } else { ONE_MORE } {
-            Some(format!("the nearest candidate, {}, gains nothing on held-out events", best.cause.about().id))
-        } else {
-            rival.and_then(|rival| {
-                let close = best.gain - rival.gain < TIE;
-                let held = || halves.gain(base, rival).log_likelihood;
-                (close && held() > held_out.log_likelihood - 0.5 * TIE).then(|| {
-                    format!("{} and {} explain it equally well", best.cause.about().id, rival.cause.about().id)
-                })
-            })
-        };
-        if let Some(reason) = refusal {
-            let strongest = last_screen.signs.first().map_or(0.0, |sign| sign.gain);
-            let explained = fits.first().map_or(0.0, |first| first.cost - base.cost);
-            if !named.is_empty() && (last_screen.p_value > FAINT[0] || strongest < FAINT[1] * explained) {
-                evidence.push(format!("a faint sign is left (p = {:.1e}): {reason}", last_screen.p_value));
+        let round = Round { problem, base: &base, trials: &trials, others: named.len() };
+        match round.judged() {
+            Judged::Wins { gain, runner_up } => {
+                let Some(best) = trials.finalists.into_iter().next() else { break };
+                let (cause, score) = (best.cause, best.score);
+                named.push(Named { cause, p_value: last_screen.p_value, score, gain, runner_up });
+                candidates.retain(|candidate| !same_class(*candidate, cause));
+                verdict = Verdict::Named;
+                earlier.push(std::mem::replace(&mut base, best.fitted));
+            }
+            Judged::Refused { reason, candidates: beside } => {
+                let strongest = last_screen.signs.first().map_or(0.0, |sign| sign.gain);
+                let explained = earlier.first().map_or(0.0, |first| first.cost - base.cost);
+                if !named.is_empty() && (last_screen.p_value > FAINT[0] || strongest < FAINT[1] * explained) {
+                    evidence.push(format!("a faint sign is left (p = {:.1e}): {reason}", last_screen.p_value));
+                } else {
+                    (verdict, nearest) = (Verdict::Unexplained, beside);
+                    evidence.push(reason);
+                }
                 break;
             }
-            verdict = Verdict::Unexplained;
-            nearest = trials.all().take(3).map(|(cause, gain)| beside((cause, gain))).collect();
-            evidence.push(reason);
-            break;
-        }
-        let cause = best.cause;
-        named.push(Named {
-            cause,
-            p_value: last_screen.p_value,
-            score: best.score,
-            gain: held_out.report(),
-            runner_up,
-        });
-        candidates.retain(|candidate| !same_class(*candidate, cause));
-        verdict = Verdict::Named;
-        if let Some(best) = trials.finalists.into_iter().next() {
-            fits.push(best.fitted);
         }
     }
+    let fits: Vec<JointFit> = earlier.into_iter().chain([base]).collect();
     let last_tiles = tiles_of(problem, &fits[fits.len() - 1]);
-    let left = remainder(&first_tiles, &last_tiles, options.false_alarm_rate);
+    let left = remainder(&first_tiles, &last_tiles, options.false_alarm_rate)
+        .or_else(|| restless([first_detuning?, last_screen.detuning], &fits, options.false_alarm_rate));
     if let Some(reason) = left.filter(|_| verdict != Verdict::Unexplained) {
         let found = named.iter().map(|n| n.cause.about().id);
         let signs = last_screen.signs.iter().take(3).map(|s| s.cause.about().id);
@@ -302,6 +263,19 @@ fn remainder(before: &[Tile], after: &[Tile], false_alarm_rate: f64) -> Option<S
             1e6 * strongest.from_s.max(0.0),
             1e6 * strongest.to_s,
             strongest.excess
+        )
+    })
+}
+
+/// What remains of the events' own frequencies, if it is more than noise and more than small shares of what there was and of what was explained.
+fn restless([before, after]: [Detuning; 2], fits: &[JointFit], false_alarm_rate: f64) -> Option<String> {
+    let explained = fits.first().zip(fits.last()).map_or(0.0, |(first, last)| first.cost - last.cost);
+    let out = after.p_value() < OMNIBUS * false_alarm_rate && after.excess() > FAINT[1] * explained;
+    (out && after.excess() > REMAINDER * before.excess()).then(|| {
+        format!(
+            "the events' frequencies differ by {:.3} ppm from one to another, where noise makes {:.3} ppm",
+            1e6 * after.scatter[0],
+            1e6 * after.scatter[1]
         )
     })
 }

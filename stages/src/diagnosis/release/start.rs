@@ -70,13 +70,7 @@ pub fn start(
         Some(modes) => given(&after, free, cut.interval_s, modes, &peaks)?,
         None => found(&after, free, cut.interval_s, nominal_poles, &peaks)?,
     };
-    // modes come first, in the same order
-    let mut kept: Vec<(Exponential, ModeEstimate)> = chosen
-        .iter()
-        .filter_map(|&i| fitted.exponentials.get(i).copied().zip(fitted.modes().get(i).copied()))
-        .collect();
-    kept.sort_by(|a, b| a.0.pole.im.total_cmp(&b.0.pole.im));
-    let (kept, estimates): (Vec<Exponential>, Vec<ModeEstimate>) = kept.into_iter().unzip();
+    let (kept, estimates) = kept(&fitted, &chosen);
     let mut lever = suggested(&kept, nominal_poles);
     let crude = |(window, start): (&EventWindow, &usize)| {
         (window.onset - (start + cut.before + SKIPPED) as f64) * cut.interval_s
@@ -84,44 +78,18 @@ pub fn start(
     let found: Vec<f64> = windows.iter().zip(&starts).map(crude).collect();
     let own: Vec<f64> = fitted.events.iter().map(|event| event.onset_s).collect();
     let late = in_phase(&kept, &mut lever, mean_difference(&found, &own));
-    let events = windows
-        .iter()
-        .zip(&starts)
-        .zip(&own)
-        .map(|((window, start), own)| {
-            let level = |from: usize, to: usize| {
-                let part = &window.values[from.min(to)..to];
-                part.iter().sum::<f64>() / part.len().max(1) as f64
-            };
-            let first = start + cut.before;
-            let held = level(first.saturating_sub(200), first.saturating_sub(4));
-            let settled = level(start + cut.samples * 3 / 4, start + cut.samples);
-            let lead = (window.onset - first as f64).clamp(-1.0, 0.0) * cut.interval_s;
-            let released = own + late + SKIPPED as f64 * cut.interval_s;
-            let fits = window.start(first as f64 + released / cut.interval_s, cut).is_some();
-            let onset_s = if fits { released } else { lead };
-            EventParameters { amplitude: settled - held, onset_s, offset: settled, slope: 0.0 }
-        })
-        .collect();
+    let all = windows.iter().zip(&starts).zip(&own);
+    let events = all.map(|((window, start), own)| begun(window, *start, own + late, cut)).collect();
     let combinations_hz = lines
         .iter()
         .filter_map(|&i| fitted.exponentials.get(i))
         .map(|e| e.pole.norm() / std::f64::consts::TAU)
         .collect();
-    let held = |estimate: &ModeEstimate| {
-        let (f, q) = (&estimate.frequency_hz, &estimate.quality_factor);
-        [(f.std / f.value, HELD_LEAST[0]), (q.std / q.value, HELD_LEAST[1])]
-            .map(|(own, least)| (HELD_ERRORS * own).max(least))
-    };
-    let mut seen: Vec<SeenMode> = lever
-        .modes
-        .iter()
-        .zip(&estimates)
-        .map(|(mode, estimate)| SeenMode { mode: *mode, std: held(estimate) })
-        .collect();
+    let mut seen: Vec<SeenMode> =
+        lever.modes.iter().zip(&estimates).map(|(mode, own)| SeenMode { mode: *mode, std: held(own) }).collect();
     let room = modes.map_or(MOST, |modes| modes.saturating_sub(seen.len()));
     let heard: Vec<f64> = fitted.exponentials.iter().filter(|e| e.oscillates()).map(|e| e.pole.norm()).collect();
-    let mut moving = kept.clone();
+    let mut moving = kept;
     for silent in silent_modes(&peaks, &lever.modes, &heard, cut.interval_s).into_iter().take(room) {
         let place = lever.modes.partition_point(|mode| mode.omega < silent.mode.omega);
         lever.modes.insert(place, silent.mode);
@@ -132,18 +100,47 @@ pub fn start(
     // whatever else rings; not beside a mode, where a misfit would be taken for noise
     let beside = |e: &Exponential| lever.modes.iter().any(|mode| (e.pole.norm() / mode.omega - 1.0).abs() < BESIDE);
     moving.extend(fitted.exponentials.iter().filter(|e| e.oscillates() && !beside(e)));
-    if let Some(noise) = noise_of_stretches(free, cut.samples, cut.interval_s, &moving) {
-        fitted.noise = noise;
-    }
+    let noise = noise_of_stretches(free, cut.samples, cut.interval_s, &moving).unwrap_or(fitted.noise);
     let total: f64 = lever.modes.iter().map(|mode| mode.share).sum();
     lever.modes.iter_mut().for_each(|mode| mode.share /= total);
-    Ok(Start {
-        state: State { lever, hypotheses: Vec::new(), events },
-        starts,
-        noise: fitted.noise,
-        seen,
-        combinations_hz,
-    })
+    Ok(Start { state: State { lever, hypotheses: Vec::new(), events }, starts, noise, seen, combinations_hz })
+}
+
+/// The exponentials that are modes with their errors, by frequency.
+fn kept(fitted: &Ringdown, chosen: &[usize]) -> (Vec<Exponential>, Vec<ModeEstimate>) {
+    // modes come first, in the same order
+    let estimates = fitted.modes();
+    let one = |&i: &usize| fitted.exponentials.get(i).copied().zip(estimates.get(i).copied());
+    let mut kept: Vec<(Exponential, ModeEstimate)> = chosen.iter().filter_map(one).collect();
+    kept.sort_by(|a, b| a.0.pole.im.total_cmp(&b.0.pole.im));
+    kept.into_iter().unzip()
+}
+
+/// An event's own parameters: its levels before and long after, its release `after_s` behind the first sample that the exponentials were fitted to.
+fn begun(window: &EventWindow, start: usize, after_s: f64, cut: &Cut) -> EventParameters {
+    let level = |from: usize, to: usize| {
+        let part = &window.values[from.min(to)..to];
+        part.iter().sum::<f64>() / part.len().max(1) as f64
+    };
+    let first = start + cut.before;
+    let held = level(first.saturating_sub(200), first.saturating_sub(4));
+    let settled = level(start + cut.samples * 3 / 4, start + cut.samples);
+    let lead = (window.onset - first as f64).clamp(-1.0, 0.0) * cut.interval_s;
+    let released = after_s + SKIPPED as f64 * cut.interval_s;
+    let fits = window.start(first as f64 + released / cut.interval_s, cut).is_some();
+    EventParameters {
+        amplitude: settled - held,
+        onset_s: if fits { released } else { lead },
+        offset: settled,
+        slope: 0.0,
+    }
+}
+
+/// Standard deviations that a mode is held with.
+fn held(estimate: &ModeEstimate) -> [f64; 2] {
+    let (f, q) = (&estimate.frequency_hz, &estimate.quality_factor);
+    [(f.std / f.value, HELD_LEAST[0]), (q.std / q.value, HELD_LEAST[1])]
+        .map(|(own, least)| (HELD_ERRORS * own).max(least))
 }
 
 fn mean_difference(a: &[f64], b: &[f64]) -> f64 {

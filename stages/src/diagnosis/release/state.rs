@@ -165,7 +165,7 @@ mod tests {
         let (all, linear) = (state.effects(), state.linear_effects());
         assert!(all.bend_the_motion() && !all.optics.is_empty());
         assert!(!linear.bend_the_motion() && linear.optics.is_empty());
-        assert_eq!(linear.remaining_load.len(), 1);
-        assert_eq!(linear.remaining_load[0](5e-5), all.remaining_load[0](5e-5));
+        assert_eq!(linear.decaying_load, all.decaying_load);
+        assert_eq!(linear.decaying_load.len(), 1);
     }
 }

@@ -43,8 +43,6 @@ pub(super) fn combination(base: &JointFit, trial: &Trial) -> Option<String> {
     lines.into_iter().find(|(_, f)| (found / f - 1.0).abs() < NEAR).map(|(name, _)| name)
 }
 
-/// Times that a base may be fitted anew.
-pub(super) const REDONE: usize = 3;
 /// A refit that gains so much more than its score promised has found what the base missed.
 const BEYOND: (f64, f64) = (2.0, 15.0);
 
@@ -62,8 +60,6 @@ pub(super) fn refitted(problem: &Problem<'_>, base: &JointFit, trial: &Trial) ->
     (better.cost < base.cost - BETTER).then_some(better)
 }
 
-/// Share of a candidate's gain that a base fitted anew must bring for all to begin anew.
-pub(super) const OWN: f64 = 0.3;
 /// Fall of the cost that makes a base a better one.
 const BETTER: f64 = 2.0;
 
@@ -74,6 +70,11 @@ const NOT_LOST: f64 = 1.5;
 /// A base has left what it may have bent to where its cost exceeds the number of samples by what the noise's level is known to, and so many standard deviations
 /// of a chi square.
 const BENT: (f64, f64) = (0.01, 2.0);
+
+/// Whether a fit leaves more than noise.
+fn is_bent(cost: f64, samples: f64) -> bool {
+    cost - samples > BENT.0 * samples + BENT.1 * (2.0 * samples).sqrt()
+}
 
 /// Parts of the strength that the score suggests from which a candidate may begin anew.
 const GRADE: f64 = 0.8;
@@ -99,7 +100,7 @@ impl Trial {
             begun.and_then(|begun| Self::looked_at(contest, sign.cause, [sign.z, contest.part * sign.gain], begun));
         // a baseline that left much has bent to the misfit, and its score is that of another strength
         let samples = (base.state.events.len() * contest.problem.cut.samples) as f64;
-        let bent = base.cost - samples > BENT.0 * samples + BENT.1 * (2.0 * samples).sqrt();
+        let bent = is_bent(base.cost, samples);
         let again = bent && (!base.converged || first.as_ref().is_none_or(|trial| !trial.fitted.converged));
         let steps = if sign.graded { GRADES } else { 0..=4 };
         let parts: Vec<f64> = steps.filter(|_| again).map(|step| GRADE.powi(step)).collect();

@@ -1,5 +1,7 @@
 //! The lever after its release, step by step.
 
+use faer::c64;
+
 use super::super::lever::Lever;
 use super::Release;
 use super::chain::Level;
@@ -36,10 +38,27 @@ pub(super) struct Run<'a> {
     pub position: Vec<f64>,
     pub velocity: Vec<f64>,
     acceleration: Vec<f64>,
+    /// Decaying loads now.
+    pub decaying: Vec<c64>,
     amplitude: f64,
     thermal: f64,
     pub time_s: f64,
     load_now: f64,
+}
+
+/// One step of everything that is linear: each mode round its equilibrium, and of each decaying load its factor and its mean.
+pub(super) struct Turn {
+    modes: Vec<[f64; 4]>,
+    loads: Vec<[c64; 2]>,
+}
+
+impl Turn {
+    /// Two in a row.
+    pub fn doubled(&self) -> Self {
+        let square = |[a, b, c, d]: &[f64; 4]| [a * a + b * c, a * b + b * d, c * a + d * c, c * b + d * d];
+        let further = |[factor, mean]: &[c64; 2]| [factor * factor, mean * (factor + 1.0) * 0.5];
+        Self { modes: self.modes.iter().map(square).collect(), loads: self.loads.iter().map(further).collect() }
+    }
 }
 
 impl<'a> Run<'a> {
@@ -65,19 +84,28 @@ impl<'a> Run<'a> {
             tip,
             omega,
             quality,
+            decaying: effects.decaying_load.iter().map(|load| load.share * -release.amplitude).collect(),
             amplitude: release.amplitude,
             thermal: release.thermal,
             time_s: 0.0,
-            load_now: -release.amplitude * effects.load(0.0),
+            load_now: -release.amplitude * effects.remaining_load.iter().map(|load| load(0.0)).sum::<f64>(),
         }
     }
 
-    pub fn rotations(&self, h: f64) -> Vec<[f64; 4]> {
-        self.omega.iter().zip(&self.quality).map(|(w, q)| rotation(*w, *q, h)).collect()
+    pub fn turns(&self, h: f64) -> Turn {
+        let mean = |rate: c64| {
+            let factor = (rate * h).exp();
+            [factor, (factor - 1.0) / (rate * h)]
+        };
+        Turn {
+            modes: self.omega.iter().zip(&self.quality).map(|(w, q)| rotation(*w, *q, h)).collect(),
+            loads: self.effects.decaying_load.iter().map(|load| mean(load.rate)).collect(),
+        }
     }
 
+    /// What remains of the load, what decays in closed form left out.
     fn load(&self, t: f64) -> f64 {
-        -self.amplitude * self.effects.load(t)
+        -self.amplitude * self.effects.remaining_load.iter().map(|load| load(t)).sum::<f64>()
     }
 
     /// Half a step's force of the causes.
@@ -114,7 +142,7 @@ impl<'a> Run<'a> {
     }
 
     /// A step between two half kicks.
-    pub fn advance(&mut self, rotations: &[[f64; 4]], h: f64) {
+    pub fn advance(&mut self, turn: &Turn, h: f64) {
         let bent = self.effects.bend_the_motion();
         if bent {
             self.kick(0.5 * h);
@@ -126,10 +154,7 @@ impl<'a> Run<'a> {
             u = self.mean_load((self.time_s, self.load_now), (middle, self.load(middle)), (end, next), HALVINGS);
             self.load_now = next;
         }
-        for ((q, v), r) in self.position.iter_mut().zip(&mut self.velocity).zip(rotations) {
-            let x = *q - u;
-            (*q, *v) = (u + r[0] * x + r[1] * *v, r[2] * x + r[3] * *v);
-        }
+        self.turn(turn, u);
         self.time_s += h;
         if bent {
             self.kick(0.5 * h);
@@ -138,7 +163,7 @@ impl<'a> Run<'a> {
 
     pub fn signal(&self) -> Level {
         let mut s = self.ringing();
-        if self.effects.feedthrough != 0.0 {
+        if self.effects.feedthrough != 0.0 && !self.effects.remaining_load.is_empty() {
             s.value += self.effects.feedthrough * self.load(self.time_s);
         }
         if self.effects.optics.is_empty() {
@@ -162,7 +187,8 @@ impl<'a> Run<'a> {
         if self.effects.remaining_load.is_empty() {
             return 0;
         }
-        let acts = |half: usize| self.effects.load(self.time_s + 0.5 * half as f64 * interval_s).abs() > GONE;
+        let threshold = GONE * self.amplitude.abs();
+        let acts = |half: usize| self.load(self.time_s + 0.5 * half as f64 * interval_s).abs() > threshold;
         // looked for from the end, at samples and between them: a load that ends acts no more. Late ones by strides: what is short is early
         let late = (SHORT..2 * count).rev().step_by(STRIDE).find(|&half| acts(half));
         let last = match late {
@@ -183,21 +209,29 @@ impl<'a> Run<'a> {
             position: none.clone(),
             velocity: none.clone(),
             acceleration: none,
+            decaying: vec![c64::new(0.0, 0.0); self.decaying.len()],
             load_now: 0.0,
             ..*self
         }
     }
 
-    /// Turns the modes by a step, nothing driving them.
-    pub fn turn(&mut self, rotations: &[[f64; 4]]) {
-        for ((q, v), r) in self.position.iter_mut().zip(&mut self.velocity).zip(rotations) {
-            (*q, *v) = (r[0] * *q + r[1] * *v, r[2] * *q + r[3] * *v);
+    /// Turns modes and decaying loads by a step under a further load of that mean.
+    pub fn turn(&mut self, turn: &Turn, mean: f64) {
+        let mut u = mean;
+        for (load, [factor, mean]) in self.decaying.iter_mut().zip(&turn.loads) {
+            u += (*load * mean).re;
+            *load *= factor;
+        }
+        for ((q, v), r) in self.position.iter_mut().zip(&mut self.velocity).zip(&turn.modes) {
+            let x = *q - u;
+            (*q, *v) = (u + r[0] * x + r[1] * *v, r[2] * x + r[3] * *v);
         }
     }
 
-    /// The deflection that rings, no load left.
+    /// The signal of modes and decaying loads, no other load left.
     pub fn ringing(&self) -> Level {
         let mix = |values: &[f64]| values.iter().zip(&self.shares).map(|(x, g)| x * g).sum::<f64>();
-        Level { value: mix(&self.position), rate: mix(&self.velocity) }
+        let past = self.effects.feedthrough * self.decaying.iter().map(|load| load.re).sum::<f64>();
+        Level { value: mix(&self.position) + past, rate: mix(&self.velocity) }
     }
 }
