@@ -13,6 +13,8 @@ const BELOW_THE_LAW: f64 = 5.0;
 const LEAST_QUALITY_SHARE: f64 = 0.25;
 /// Part of half the sample rate above which nothing is a mode: there a detector's edge, a few samples long, looks like a ringing.
 const HIGHEST: f64 = 0.8;
+/// Turns within an event below which nothing is a mode: an exponential that slow is a tail's, or the offset's.
+const LEAST_TURNS: f64 = 2.0;
 /// Part of the first mode's decay rate below which no other mode's is: viscous losses and those inside the lever rise with frequency.
 const LEAST_RATE: f64 = 0.25;
 /// Most resonances that are sorted out exhaustively.
@@ -26,19 +28,21 @@ const MOST: usize = 12;
 /// # Method
 /// The largest set that holds the strongest resonance as its lowest and whose shares fall; then, from the third on, while the highest is far below the
 /// power law of the others, or decays much faster than they do, it is taken off; unless its thermal motion is not: a slow rupture weakens the high modes, and
-/// leaves that. Shares as the nominal detector shows them; `thermal` has the variances of the oscillating exponentials, in their order.
+/// leaves that. Shares as the nominal detector shows them; an event has so many `samples`, `interval_s` apart; `thermal` has the variances of the oscillating exponentials, in their order.
 pub(super) fn lever_modes(
     exponentials: &[Exponential],
     thermal: &[f64],
     lines: &[usize],
     nominal_poles: &[f64],
     interval_s: f64,
+    samples: usize,
 ) -> Vec<usize> {
+    let lowest = LEAST_TURNS * std::f64::consts::TAU / (samples as f64 * interval_s);
     let quality = |e: &Exponential| e.pole.norm() / (-2.0 * e.pole.re);
     let highest = highest(interval_s);
     let ringing = |i: &usize| {
         let e = &exponentials[*i];
-        e.oscillates() && !lines.contains(i) && quality(e) >= LEAST_QUALITY && e.pole.im < highest
+        e.oscillates() && !lines.contains(i) && quality(e) >= LEAST_QUALITY && (lowest..highest).contains(&e.pole.im)
     };
     let mut places: Vec<usize> = (0..exponentials.len()).filter(ringing).collect();
     places.sort_by(|&a, &b| exponentials[a].pole.im.total_cmp(&exponentials[b].pole.im));
@@ -129,7 +133,11 @@ fn below_the_law(seen: &[(f64, f64)]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{Seen, in_order};
+    use faer::c64;
+
+    use super::{Seen, in_order, lever_modes};
+    use crate::diagnosis::release::{Lever, LeverMode};
+    use crate::model::ringdown::Exponential;
 
     /// Shares of the paper's lever.
     const PAPER: [(f64, f64); 4] = [(46.0, 0.9), (247.0, 0.075), (580.0, 0.02), (1050.0, 0.008)];
@@ -160,6 +168,18 @@ mod tests {
         // what is in thermal motion is a mode, however damped
         seen[4].motion = 1e-5;
         assert_eq!(in_order(&seen).len(), 5);
+    }
+
+    #[test]
+    fn what_hardly_turns_within_an_event_is_a_tail() {
+        let (tau, poles) = (std::f64::consts::TAU, [1.3e6, 1.9e6, 2.4e6].map(|f| std::f64::consts::TAU * f));
+        let modes = PAPER.map(|(f, share)| LeverMode { omega: tau * 1e3 * f, quality_factor: 100.0, share });
+        let lever = Lever { modes: modes.to_vec(), poles: poles.to_vec() };
+        let mut all = lever.release();
+        // as free exponentials take a tail of 80 us in an event of 1.6 ms: next to no frequency, and the largest of all
+        all.insert(0, Exponential { pole: c64::new(-1e-7, 7.0), residue: c64::new(-2.0, 0.5) });
+        let motion = [0.0, 1e-6, 1e-8, 1e-9, 1e-10];
+        assert_eq!(lever_modes(&all, &motion, &[], &poles, 2e-7, 8000), vec![1, 2, 3, 4]);
     }
 
     fn beside_the_paper(extra: (f64, f64)) -> Vec<f64> {

@@ -267,11 +267,11 @@ fn remainder(before: &[Tile], after: &[Tile], false_alarm_rate: f64) -> Option<S
     })
 }
 
-/// What remains of the events' own frequencies, if it is more than noise and more than small shares of what there was and of what was explained.
+/// What remains of the events' own frequencies, if it is more than noise and more than a small share of what there was, and of what the names have explained.
 fn restless([before, after]: [Detuning; 2], fits: &[JointFit], false_alarm_rate: f64) -> Option<String> {
     let explained = fits.first().zip(fits.last()).map_or(0.0, |(first, last)| first.cost - last.cost);
-    let out = after.p_value() < OMNIBUS * false_alarm_rate && after.excess() > FAINT[1] * explained;
-    (out && after.excess() > REMAINDER * before.excess()).then(|| {
+    let out = after.p_value() < OMNIBUS * false_alarm_rate;
+    (out && after.excess() > REMAINDER * before.excess().max(explained)).then(|| {
         format!(
             "the events' frequencies differ by {:.3} ppm from one to another, where noise makes {:.3} ppm",
             1e6 * after.scatter[0],

@@ -193,7 +193,8 @@ fn found(
     let fitted = fit_all_that_rings(after, free, interval_s, MOST, &RingdownOptions::default())?;
     let lines = combinations(&fitted.exponentials, peaks);
     let thermal: Vec<f64> = fitted.noise.thermal.iter().map(|mode| mode.variance).collect();
-    let chosen = lever_modes(&fitted.exponentials, &thermal, &lines, nominal_poles, interval_s);
+    let samples = after.first().map_or(0, |event| event.len());
+    let chosen = lever_modes(&fitted.exponentials, &thermal, &lines, nominal_poles, interval_s, samples);
     Ok((fitted, chosen, lines))
 }
 
