@@ -31,3 +31,19 @@ fn single_causes_are_named() {
     let (hits, of) = count(&exam(&["--only", "one", "--seeds", "8", "--first-seed", "5"]), "named");
     assert!(of >= 3 && hits == of, "{hits} of {of}");
 }
+
+#[test]
+fn what_may_not_be_named_is_not_explained_away() {
+    // a loss that grows with the amplitude, which one that grows with its square would follow to the noise, but for its strength: that goes down as the amplitude goes up;
+    // and a tail that a second step and a ring of quality factor 1 would add up to
+    for seed in ["221", "212"] {
+        let score = exam(&["--seeds", "1", "--first-seed", seed]);
+        assert_eq!(count(&score, "left_out"), (1, 1), "{score:#}");
+    }
+}
+
+#[test]
+fn a_line_through_all_events_is_no_resonance() {
+    let score = exam(&["--seeds", "1", "--first-seed", "37"]);
+    assert_eq!(score["judged"][0]["said"]["named"], serde_json::json!(["spurious-line"]), "{score:#}");
+}

@@ -124,6 +124,11 @@ pub trait Cause: Sync {
         0
     }
 
+    /// Part of what it explains of events that its model in a fit still gets wrong, where that is known: signs weaker than this are not named beside it.
+    fn inexact(&self) -> f64 {
+        0.0
+    }
+
     /// The parameter that says between which events the effect sets in: it has no slope, its trials are all there is, and its error is the distance of those events.
     fn sets_in(&self) -> Option<usize> {
         None

@@ -13,7 +13,7 @@ const ABOUT: About = About {
     parameters: &[
         Parameter { name: "share", unit: "1", meaning: "its share of the static response", low: -0.2, high: 0.2 },
         Parameter { name: "frequency_hz", unit: "Hz", meaning: "its frequency", low: 1e2, high: 1e8 },
-        Parameter { name: "quality_factor", unit: "1", meaning: "its quality factor", low: 2.0, high: 1e5 },
+        Parameter { name: "quality_factor", unit: "1", meaning: "its quality factor", low: 3.0, high: 1e5 },
     ],
     class: &["extra-mode", "piezo-ring"],
     resembles: "every nonlinearity makes lines that a further mode can follow in part: it must beat them by more",

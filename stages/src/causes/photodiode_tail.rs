@@ -12,7 +12,7 @@ const ABOUT: About = About {
     domain: Domain::Release,
     parameters: &[
         Parameter { name: "fraction", unit: "1", meaning: "share of the late carriers", low: -0.3, high: 0.3 },
-        Parameter { name: "tau_s", unit: "s", meaning: "their time constant", low: 2e-6, high: 1e-2 },
+        Parameter { name: "tau_s", unit: "s", meaning: "their time constant", low: 4e-7, high: 1e-2 },
     ],
     class: &["photodiode-tail", "tether-tail"],
     resembles: "tether-tail: the two commute in a linear chain and are one signal in equal events",

@@ -21,7 +21,7 @@ const ABOUT: About = About {
             high: 0.2,
         },
         Parameter { name: "frequency_hz", unit: "Hz", meaning: "resonance of the piezo", low: 1e2, high: 1e7 },
-        Parameter { name: "quality_factor", unit: "1", meaning: "its quality factor", low: 1.0, high: 1e4 },
+        Parameter { name: "quality_factor", unit: "1", meaning: "its quality factor", low: 3.0, high: 1e4 },
     ],
     class: &["piezo-ring", "extra-mode"],
     resembles: "extra-mode: the same frequency, another phase",

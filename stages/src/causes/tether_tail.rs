@@ -20,7 +20,7 @@ const ABOUT: About = About {
             low: -0.3,
             high: 0.3,
         },
-        Parameter { name: "tau_s", unit: "s", meaning: "its relaxation time", low: 2e-6, high: 1e-2 },
+        Parameter { name: "tau_s", unit: "s", meaning: "its relaxation time", low: 4e-7, high: 1e-2 },
     ],
     class: &["tether-tail", "photodiode-tail"],
     resembles: "photodiode-tail: the two commute in a linear chain and are one signal in equal events",

@@ -217,7 +217,9 @@ fn plant(
             *value = (*value * (0.8 + 0.45 * rng.random::<f64>())).clamp(parameter.low, parameter.high);
         }
         let signed = about.parameters.first().is_some_and(|parameter| parameter.low < 0.0);
-        if signed && rng.random::<bool>() {
+        let turned = signed && rng.random::<bool>();
+        // of a line whose phase is another in every record the sign means nothing, and no one could state it
+        if turned && cause.free_in_each_record() == 0 {
             values[0] = -values[0];
         }
         if cause.free_in_each_record() > 0 && periods(about, &values, afm) < LEAST_PERIODS {

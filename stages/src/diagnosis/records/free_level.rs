@@ -1,10 +1,14 @@
 //! The level of the free lever, record by record: what depends on position, on time, on what went before.
 
+use faer::Mat;
+
 use super::basis::{Basis, dot, norm};
 use super::replicates::Weighted;
 use super::segments::SegmentKind;
 use super::slow_lines::SlowLine;
 use super::summary::RecordSummary;
+use crate::model::orthogonal::product;
+use crate::model::ringdown::internals::symmetric_inverse;
 
 /// Fewest records: replicates for a t test.
 pub(super) const FEWEST_RECORDS: usize = 4;
@@ -76,6 +80,36 @@ impl FreeLevel {
             for column in columns(record) {
                 record.explain(column);
             }
+        }
+        less
+    }
+
+    /// The same less shapes, each of one size for all records by least squares; no nuisances are added.
+    pub fn less(&self, columns: impl Fn(&FreeRecord) -> Vec<Vec<f64>>) -> Self {
+        // of the first record's scale: metres, volts seconds and sines side by side
+        let scales: Vec<f64> = self.records.first().map_or_else(Vec::new, |record| {
+            columns(record).iter().map(|column| norm(column).max(f64::MIN_POSITIVE)).collect()
+        });
+        let shapes: Vec<Mat<f64>> = self
+            .records
+            .iter()
+            .map(|record| {
+                let columns: Vec<Vec<f64>> = columns(record).iter().map(|c| record.nuisance.residual(c)).collect();
+                Mat::from_fn(record.left_v.len(), scales.len(), |k, j| columns[j][k] / scales[j])
+            })
+            .collect();
+        let mut information = Mat::<f64>::zeros(scales.len(), scales.len());
+        let mut score = Mat::<f64>::zeros(scales.len(), 1);
+        for (record, shapes) in self.records.iter().zip(&shapes) {
+            information += product(shapes.transpose(), shapes.as_ref());
+            let left = Mat::from_fn(record.left_v.len(), 1, |k, _| record.left_v[k]);
+            score += product(shapes.transpose(), left.as_ref());
+        }
+        let sizes = product(symmetric_inverse(&information).as_ref(), score.as_ref());
+        let mut less = self.clone();
+        for (record, shapes) in less.records.iter_mut().zip(&shapes) {
+            let fitted = product(shapes.as_ref(), sizes.as_ref());
+            record.left_v.iter_mut().enumerate().for_each(|(k, value)| *value -= fitted[(k, 0)]);
         }
         less
     }

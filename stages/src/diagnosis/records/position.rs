@@ -73,7 +73,10 @@ pub(super) fn judge_position(records: &[RecordSummary], slow: &[SlowLine], false
         let place = ranked.iter().position(|(look, _)| *look == named[at].0)?;
         significant(&ranked[place].1, false_alarm_rate).then(|| sign(ranked, place))
     };
-    OfPosition { signs: (0..named.len()).filter_map(again).collect(), course: position_course(&level, &left) }
+    let signs = (0..named.len()).filter_map(again).collect();
+    // of one size for all records: with a size of each record's own next to nothing of a slope could be seen any more
+    let all = |record: &FreeRecord| named.iter().flat_map(|(_, columns)| columns(record)).collect();
+    OfPosition { signs, course: position_course(&level, &level.less(all)) }
 }
 
 /// The candidates that are asked for, those that gain most on held-out records first.

@@ -107,8 +107,8 @@ mod tests {
         // the free travel is a part of the whole: what lies beyond is not seen and held at zero by the ridge, so that the slope is bounded, not exact
         let (before, after) = (middle(|c| c.before[0]), middle(|c| c.after[0]));
         assert!(before > 0.3 * kappa && before < 1.5 * kappa, "{before:e}");
-        // 3.5e3 V/m, which half of such archives show at 1 % false alarms (calibration_tests), are some three standard errors
-        assert!(after.abs() < 4e3, "{after:e}");
+        // the slope is fitted to some 2 %
+        assert!(after.abs() < 0.05 * kappa, "{after:e}");
         assert!(judged.course.iter().all(|c| c.before[1].is_finite() && c.after[1].is_finite()));
     }
 

@@ -21,6 +21,14 @@ pub struct RecordSign {
     pub tied: bool,
 }
 
+impl RecordSign {
+    /// Frequency of a line that is none of the mains', Hz.
+    pub fn line_hz(&self) -> Option<f64> {
+        let of_line = self.parameters.iter().filter(|_| self.id == "spurious-line");
+        of_line.filter(|(name, _)| *name == "frequency_hz").find_map(|(_, value)| value.value)
+    }
+}
+
 /// A cause that these records can't be asked about.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Abstention {

@@ -87,6 +87,17 @@ pub(super) enum Crossing {
     Middle,
     /// Each event's own.
     Each,
+    /// Those with the steps of a fit: for errors, which they set where a cause and the detector stand for one another.
+    Exact,
+}
+
+impl Crossing {
+    fn pace(self) -> Pace {
+        match self {
+            Self::Middle | Self::Each => Pace::CROSSED,
+            Self::Exact => Pace::FINE,
+        }
+    }
 }
 
 impl Slopes {
@@ -177,7 +188,7 @@ fn with_the_rest(
     }));
     // a change of frequency is each event's own, and what it moves of these derivatives is small
     let run = |lever: &Lever, release: Release| {
-        differences(lever, std::iter::once((&effects, release, 0.0)), Pace::CROSSED).swap_remove(0)
+        differences(lever, std::iter::once((&effects, release, 0.0)), crossing.pace()).swap_remove(0)
     };
     let per_event = levers.len() + 2;
     let all: Vec<Vec<f64>> = (0..order.len() * per_event)

@@ -7,7 +7,6 @@ use super::problem::Problem;
 use super::residuals::{common, residuals};
 use super::state::Hold;
 use super::subset::Subset;
-use super::trials::Trial;
 use crate::diagnosis::verdict::Gain;
 
 /// Trial steps of a half, which begins where the whole ended.
@@ -55,15 +54,14 @@ impl<'a> Halves<'a> {
     }
 
     /// Gain of the log likelihood on held-out events, and the rms of their common residual where the models differ.
-    pub fn gain(&self, base: &JointFit, trial: &Trial) -> HeldOut {
+    pub fn gain(&self, base: &JointFit, extended: &JointFit) -> HeldOut {
         let count = base.state.events.len();
         let mut out = HeldOut { log_likelihood: 0.0, rms: [0.0; 2], events: count };
         let mut weight = 0.0;
         if self.0[1].is_empty() {
             return HeldOut { log_likelihood: f64::NEG_INFINITY, ..out };
         }
-        let [linear, extended] = [base, &trial.fitted];
-        let judged: Option<Vec<(f64, Vec<f64>)>> = [(linear, 0), (extended, 0), (linear, 1), (extended, 1)]
+        let judged: Option<Vec<(f64, Vec<f64>)>> = [(base, 0), (extended, 0), (base, 1), (extended, 1)]
             .into_par_iter()
             .map(|(fitted, half)| self.judged(fitted, half))
             .collect();

@@ -128,12 +128,24 @@ pub(super) struct Linear {
     point: Point,
 }
 
+/// The same fit with errors from every event's own derivatives at the fit's own steps: the search gets along with coarser ones.
+pub(super) fn with_errors(problem: &Problem<'_>, fitted: JointFit) -> Result<JointFit, ModelError> {
+    let linear = Linear::with(problem, &fitted, Crossing::Exact)?;
+    let Linear { basis, slopes, .. } = &linear;
+    let normal = Normal::assemble(problem, basis, linear.state(), &linear.events(), slopes, Hold::Nothing);
+    Ok(JointFit { covariance: symmetric_inverse(&normal.information), ..fitted })
+}
+
 impl Linear {
     pub fn at(problem: &Problem<'_>, fitted: &JointFit) -> Result<Self, ModelError> {
+        Self::with(problem, fitted, Crossing::Middle)
+    }
+
+    fn with(problem: &Problem<'_>, fitted: &JointFit, crossing: Crossing) -> Result<Self, ModelError> {
         let whitener = problem.whitener();
         let (mut state, mut starts) = (fitted.state.clone(), fitted.starts.clone());
         let frame = Frame::new(problem, &whitener, &mut state, &mut starts)?;
-        let slopes = Slopes::of(problem, &whitener, &state, &starts, Hold::Nothing, Crossing::Middle);
+        let slopes = Slopes::of(problem, &whitener, &state, &starts, Hold::Nothing, crossing);
         let point = Point::at(problem, &whitener, &frame, state);
         Ok(Self { whitener, basis: frame.basis, slopes, point })
     }

@@ -77,3 +77,36 @@ impl Directions {
         Self { r: qr.r(), q: qr.q() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use faer::c64;
+
+    use super::*;
+    use crate::model::ringdown::RingdownNoise;
+
+    #[test]
+    fn the_same_basis_is_made_once_and_the_latest_are_kept() {
+        let cut = Cut { before: 16, samples: 600, interval_s: 2e-7 };
+        let filter = || Arc::new(Whitener::new(&RingdownNoise::white(1e-6), cut.interval_s, cut.samples, &[]));
+        let prepared = Prepared::default();
+        let at = |frequency: f64| [Exponential { pole: c64::new(-3e3, frequency), residue: c64::new(1.0, 0.0) }];
+        let basis = |frequency: f64, early: usize| prepared.directions(&at(frequency), early, cut, filter);
+        let first = basis(3e5, 4);
+        assert!(Arc::ptr_eq(&first, &basis(3e5, 4)));
+        // another pole, other early samples: another basis
+        assert!(!Arc::ptr_eq(&first, &basis(3.1e5, 4)) && !Arc::ptr_eq(&first, &basis(3e5, 5)));
+        (0..KEPT).for_each(|i| drop(basis(4e5 + i as f64, 4)));
+        let again = basis(3e5, 4);
+        assert!(!Arc::ptr_eq(&first, &again), "the oldest has made room");
+        assert_eq!((&first.q, &first.r), (&again.q, &again.r), "the same numbers, kept or made anew");
+    }
+
+    #[test]
+    fn the_filter_is_made_once() {
+        let prepared = Prepared::default();
+        let make = || Whitener::new(&RingdownNoise::white(1e-6), 2e-7, 100, &[]);
+        let first = prepared.whitener(make);
+        assert!(Arc::ptr_eq(&first, &prepared.whitener(|| unreachable!("it is there"))));
+    }
+}

@@ -73,6 +73,10 @@ impl Problem<'_> {
     pub(super) fn starts(&self, state: &mut State, starts: &mut [usize]) -> Result<(), ModelError> {
         for ((own, start), window) in state.events.iter_mut().zip(starts.iter_mut()).zip(self.windows) {
             if !self.has_passed(own) {
+                // a start that was carried over from other events may lie beyond this one's samples
+                if *start + self.cut.samples > window.values.len() {
+                    return Err(ModelError::Degenerate("an onset left its window"));
+                }
                 continue;
             }
             let onset = *start as f64 + self.cut.before as f64 + own.onset_s / self.cut.interval_s;

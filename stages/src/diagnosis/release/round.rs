@@ -10,7 +10,7 @@ use crate::causes::Cause;
 use crate::diagnosis::verdict::{Gain, RunnerUp};
 
 /// Difference of penalised gains below which two classes tie, unless held-out events decide.
-const TIE: f64 = 6.0;
+pub(super) const TIE: f64 = 6.0;
 /// Gain of the log likelihood on held-out events that one more cause must bring beside others, for the same reason: odds of 20 to 1.
 const ONE_MORE: f64 = 3.0;
 
@@ -65,13 +65,13 @@ impl Round<'_> {
             return Err(format!("the nearest candidate, {id}, ends at a limit of its parameters"));
         }
         let halves = Halves::of(self.problem, self.base);
-        let held_out = halves.gain(self.base, best);
+        let held_out = halves.gain(self.base, &best.fitted);
         if held_out.log_likelihood <= if self.others == 0 { 0.0 } else { ONE_MORE } {
             return Err(format!("the nearest candidate, {id}, gains nothing on held-out events"));
         }
         let rival = self.trials.finalists.iter().find(|trial| !same_class(trial.cause, best.cause));
         if let Some(rival) = rival.filter(|rival| best.gain - rival.gain < TIE)
-            && halves.gain(self.base, rival).log_likelihood > held_out.log_likelihood - 0.5 * TIE
+            && halves.gain(self.base, &rival.fitted).log_likelihood > held_out.log_likelihood - 0.5 * TIE
         {
             return Err(format!("{id} and {} explain it equally well", rival.cause.about().id));
         }

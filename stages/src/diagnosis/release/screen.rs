@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::basis::Basis;
 use super::change::changed;
 use super::detuning::Detuning;
+use super::exponent::Exponent;
 use super::joint::{JointFit, Linear};
 use super::normal::{AllCrossed, Crossed, Event, eliminate};
 use super::problem::Problem;
@@ -46,6 +47,8 @@ pub struct Screen {
     pub alone: f64,
     /// What the events' own frequencies would gain.
     pub detuning: Detuning,
+    /// How the strengths of what is named already change with the amplitude.
+    pub exponents: Vec<Option<Exponent>>,
 }
 
 /// Events from which their scatter may widen the scores' standard deviation.
@@ -79,34 +82,7 @@ pub fn screen(
     let state = linear.state();
     let trials: Vec<(&'static dyn Cause, Vec<f64>)> =
         candidates.iter().flat_map(|cause| cause.trials(scene).into_iter().map(|values| (*cause, values))).collect();
-    let mut sets: Vec<Effects> = vec![state.linear_effects()];
-    sets.extend(trials.iter().map(|(cause, values)| {
-        let mut effects = state.linear_effects();
-        cause.add(values, &mut effects);
-        effects
-    }));
-    let mut changes = changed(problem, &linear.whitener, state, &sets, Pace::COARSE);
-    let strengths: Vec<f64> = trials.iter().map(|(_, values)| values[0]).collect();
-    changes.par_iter_mut().for_each(|event| event.quotients(&strengths));
-    let crossed = AllCrossed::of(&linear.basis, &linear.slopes);
-    let events: Vec<Scores> = linear
-        .events()
-        .par_iter()
-        .zip(&changes)
-        .enumerate()
-        .map(|(i, (event, changes))| Scores::of(event, &linear.basis, crossed.get(i), changes))
-        .collect();
-    let (known, count) = (events.first().map_or(0, |e| e.known), trials.len());
-    let total = known + count;
-    let mut information = Mat::<f64>::zeros(total, total);
-    let mut raw = vec![0.0; count];
-    for event in &events {
-        information += &event.information;
-        raw.iter_mut().zip(&event.raw).for_each(|(r, e)| *r += e);
-    }
-    let mut prior = vec![0.0; total];
-    problem.add_prior(&state.lever, &mut information, &mut prior);
-    let projection = Projection::of(&information, known);
+    let Sensitivities { events, raw, projection } = Sensitivities::of(problem, &linear, &trials);
     let scores: Vec<Vec<f64>> = events.iter().map(|event| projection.score(&event.gradient)).collect();
     let mut signs: Vec<Sign> = Vec::new();
     // trials at frequencies that were picked where the residual is strongest are the best of many
@@ -155,7 +131,53 @@ pub fn screen(
     best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let alone = normal_two_sided(strongest.max(strongest_picked).max(0.0).sqrt());
     let detuning = Detuning::of(&events, state.lever.modes.len(), widened);
-    Ok(Screen { signs: best, p_value, alone, detuning })
+    let exponents = Exponent::all(problem, state, &events, widened);
+    Ok(Screen { signs: best, p_value, alone, detuning, exponents })
+}
+
+/// What trials change in every event, beside everything that is fitted.
+pub(super) struct Sensitivities {
+    /// Every event's share of the normal equations.
+    pub events: Vec<Scores>,
+    /// Squared length of each trial before anything is projected out.
+    pub raw: Vec<f64>,
+    /// Off what is fitted.
+    pub projection: Projection,
+}
+
+impl Sensitivities {
+    /// Of trials beside a finished fit.
+    pub fn of(problem: &Problem<'_>, linear: &Linear, trials: &[(&'static dyn Cause, Vec<f64>)]) -> Self {
+        let state = linear.state();
+        let mut sets: Vec<Effects> = vec![state.linear_effects()];
+        sets.extend(trials.iter().map(|(cause, values)| {
+            let mut effects = state.linear_effects();
+            cause.add(values, &mut effects);
+            effects
+        }));
+        let mut changes = changed(problem, &linear.whitener, state, &sets, Pace::COARSE);
+        let strengths: Vec<f64> = trials.iter().map(|(_, values)| values[0]).collect();
+        changes.par_iter_mut().for_each(|event| event.quotients(&strengths));
+        let crossed = AllCrossed::of(&linear.basis, &linear.slopes);
+        let events: Vec<Scores> = linear
+            .events()
+            .par_iter()
+            .zip(&changes)
+            .enumerate()
+            .map(|(i, (event, changes))| Scores::of(event, &linear.basis, crossed.get(i), changes))
+            .collect();
+        let (known, count) = (events.first().map_or(0, |e| e.known), trials.len());
+        let total = known + count;
+        let mut information = Mat::<f64>::zeros(total, total);
+        let mut raw = vec![0.0; count];
+        for event in &events {
+            information += &event.information;
+            raw.iter_mut().zip(&event.raw).for_each(|(r, e)| *r += e);
+        }
+        let mut prior = vec![0.0; total];
+        problem.add_prior(&state.lever, &mut information, &mut prior);
+        Self { events, raw, projection: Projection::of(&information, known) }
+    }
 }
 
 /// Median scatter of the events' scores over what the noise model says, at least 1: of most trials, since a cause that acts on few events makes
@@ -187,16 +209,16 @@ impl Scores {
 }
 
 /// Projection off the known parameters.
-struct Projection {
+pub(super) struct Projection {
     known: usize,
     /// `G_CA G_AA^-1`: trials x known.
     weights: Mat<f64>,
     /// Of the trials: trials x trials.
-    information: Mat<f64>,
+    pub information: Mat<f64>,
 }
 
 impl Projection {
-    fn of(information: &Mat<f64>, known: usize) -> Self {
+    pub fn of(information: &Mat<f64>, known: usize) -> Self {
         let trials = information.nrows() - known;
         let inner = symmetric_inverse(&Mat::from_fn(known, known, |i, j| information[(i, j)]));
         let cross = Mat::from_fn(trials, known, |i, j| information[(known + i, j)]);
@@ -206,7 +228,7 @@ impl Projection {
         Self { known, weights, information }
     }
 
-    fn score(&self, gradient: &[f64]) -> Vec<f64> {
+    pub fn score(&self, gradient: &[f64]) -> Vec<f64> {
         (0..self.weights.nrows())
             .map(|c| {
                 gradient[self.known + c] - (0..self.known).map(|a| self.weights[(c, a)] * gradient[a]).sum::<f64>()

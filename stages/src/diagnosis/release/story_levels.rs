@@ -78,3 +78,63 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     let scatter = values.map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0);
     [mean, (scatter / count).sqrt()]
 }
+
+#[cfg(test)]
+mod tests {
+    use faer::Mat;
+
+    use super::*;
+    use crate::causes::Instant;
+    use crate::diagnosis::release::{Cut, EventWindow, Lever, Prepared, State};
+    use crate::model::ringdown::RingdownNoise;
+
+    #[test]
+    fn what_a_curved_output_leaves_is_seen_level_by_level() {
+        let cut = Cut { before: 8, samples: 640, interval_s: 2e-7 };
+        let first = Instant { record: 0, place: 0.0, time_s: 0.0, piezo_m: 0.0 };
+        // five events that climb from -1 to 1 V; one of them only halfway
+        let ramp = |top: f64| (0..640).map(|k| -1.0 + (1.0 + top) * f64::from(k) / 639.0).collect::<Vec<f64>>();
+        let windows: Vec<EventWindow> =
+            [1.0, 1.0, 1.0, 1.0, 0.0].map(|top| EventWindow { values: ramp(top), onset: 8.0, first }).to_vec();
+        let problem = Problem {
+            windows: &windows,
+            cut,
+            noise: RingdownNoise::white(1e-6),
+            nominal_poles: Vec::new(),
+            pole_std: 0.15,
+            seen: Vec::new(),
+            prepared: Prepared::default(),
+        };
+        let lever = Lever { modes: Vec::new(), poles: Vec::new() };
+        let fitted = JointFit {
+            state: State { lever, hypotheses: Vec::new(), events: Vec::new() },
+            starts: vec![0; windows.len()],
+            covariance: Mat::zeros(0, 0),
+            costs: Vec::new(),
+            cost: 0.0,
+            converged: true,
+            evaluations: 0,
+            damping: 0.0,
+            at_limit: Vec::new(),
+        };
+        // a square in the level, a little more of it in each event
+        let rest =
+            |i: usize| -> Vec<f64> { windows[i].values.iter().map(|v| (1.0 + 0.1 * i as f64) * v * v).collect() };
+        let before: Vec<Vec<f64>> = (0..5).map(rest).collect();
+        let after = vec![vec![0.0; 640]; 5];
+        let levels = level_stories(&problem, &fitted, &before, &after);
+        assert_eq!(levels.len(), BINS);
+        for level in &levels {
+            // four events reach the upper half, five the lower
+            let events = if level.level_v > 0.02 { 4 } else { 5 };
+            assert!(level.events == events || level.level_v.abs() < 0.02, "{level:?}");
+            let factor = if level.events == 5 { 1.2 } else { 1.15 };
+            // a bin is 1/32 V wide
+            assert!((level.before[0] - factor * level.level_v.powi(2)).abs() < 0.002 + 0.04 * level.level_v.abs());
+            let scatter =
+                if level.events == 5 { 0.025_f64.sqrt() / 5f64.sqrt() } else { (0.05_f64 / 3.0).sqrt() / 2.0 };
+            assert!((level.before[1] - scatter * level.level_v.powi(2)).abs() < 0.002 + 0.04 * level.level_v.abs());
+            assert_eq!(level.after, [0.0, 0.0]);
+        }
+    }
+}

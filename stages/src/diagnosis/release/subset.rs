@@ -157,6 +157,15 @@ mod tests {
     }
 
     #[test]
+    fn a_start_beyond_an_events_samples_is_an_error() {
+        // few events' windows are shorter, and may lie later than a whole one can
+        let (ten, (mut all, mut starts)) = (windows(10), state(10));
+        assert_eq!(problem(&ten).starts(&mut all, &mut starts), Ok(()));
+        starts[3] = 101;
+        assert!(problem(&ten).starts(&mut all, &mut starts).is_err());
+    }
+
+    #[test]
     fn what_few_found_moves_the_others_by_the_median() {
         let (ten, (all, starts)) = (windows(10), state(10));
         let whole = problem(&ten);

@@ -2,7 +2,7 @@
 
 use super::estimate::Ringdown;
 use super::fit::fit_ringdowns;
-use super::fitted::Fitted;
+use super::fitted::{ARRIVED, Fitted, NEARLY};
 use super::freedom::freedom;
 use super::gaps::Gaps;
 use super::knowledge::{Knowledge, Known};
@@ -75,7 +75,7 @@ pub fn fit_counted_ringdowns(
 ) -> Result<CountedRingdown, ModelError> {
     check(most, options)?;
     let all = Data { events, free, interval_s };
-    let ladder = ladder(&all, most, BEYOND, options)?;
+    let ladder = ladder(&all, most, BEYOND, options, ARRIVED)?;
     let sufficient = all.fitted(&ladder.steps[ladder.best], options)?;
     let judged = RingdownOptions { noise: NoiseSource::Known(sufficient.noise.clone()), ..options.clone() };
     let tries: Vec<Try> = ladder.steps.iter().map(|start| Try::of(&all, start, &judged)).collect();
@@ -108,7 +108,7 @@ pub(crate) fn fit_all_that_rings(
 ) -> Result<Ringdown, ModelError> {
     check(most, options)?;
     let all = Data { events, free, interval_s };
-    let ladder = ladder(&all, most, BEYOND_RINGING, options)?;
+    let ladder = ladder(&all, most, BEYOND_RINGING, options, NEARLY)?;
     all.fitted(&ladder.steps[ladder.best], options)
 }
 
@@ -211,5 +211,5 @@ fn frozen(events: &[&[f64]], interval_s: f64, shape: &[Exponential], options: &R
     let mut point = Point { exponentials: shape.to_vec(), events: own };
     let NoiseSource::Known(noise) = &options.noise else { return None };
     let freedom = Freedom { shared: Vec::new(), ..freedom(shape, options) };
-    Fitted::of(&records, noise, &mut point, &freedom).ok().map(|fitted| fitted.energies())
+    Fitted::of(&records, noise, &mut point, &freedom, ARRIVED).ok().map(|fitted| fitted.energies())
 }

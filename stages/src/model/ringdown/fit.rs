@@ -2,7 +2,7 @@
 
 use super::bootstrap::bootstrap;
 use super::estimate::Ringdown;
-use super::fitted::Fitted;
+use super::fitted::{ARRIVED, Fitted};
 use super::freedom::freedom;
 use super::gap_start::gap_start;
 use super::gaps::Gaps;
@@ -49,6 +49,17 @@ pub fn fit_ringdowns(
     interval_s: f64,
     options: &RingdownOptions,
 ) -> Result<Ringdown, ModelError> {
+    fit_to(events, free, interval_s, options, ARRIVED)
+}
+
+/// The same, at most `arrived` standard errors from the best.
+pub(super) fn fit_to(
+    events: &[&[f64]],
+    free: &[&[f64]],
+    interval_s: f64,
+    options: &RingdownOptions,
+    arrived: f64,
+) -> Result<Ringdown, ModelError> {
     let samples = check(events, free, interval_s, options)?;
     let gaps = Gaps::of(&options.missing, events.len(), samples)?;
     present(events, &gaps, options)?;
@@ -57,7 +68,7 @@ pub fn fit_ringdowns(
     let records = Records { events, gaps: &gaps, free, interval_s };
     let mut point = if gaps.any() { gap_start(&records, options)? } else { first_guess(events, interval_s, options)? };
     let freedom = freedom(&point.exponentials, options);
-    let (fitted, noise) = with_noise(&records, &mut point, &freedom, options)?;
+    let (fitted, noise) = with_noise(&records, &mut point, &freedom, options, arrived)?;
     let draws = bootstrap(&fitted, &point, &freedom, options);
     fitted
         .result(&records, point, noise, &freedom, &options.known)
@@ -70,9 +81,10 @@ fn with_noise(
     point: &mut Point,
     freedom: &Freedom,
     options: &RingdownOptions,
+    arrived: f64,
 ) -> Result<(Fitted, RingdownNoise), ModelError> {
     let mut noise = RingdownNoise::white(white_variance(records));
-    let mut fitted = Fitted::of(records, &noise, point, freedom)?;
+    let mut fitted = Fitted::of(records, &noise, point, freedom, arrived)?;
     match &options.noise {
         NoiseSource::White => {
             let used = fitted.used(freedom);
@@ -81,18 +93,18 @@ fn with_noise(
             fitted.rescale(excess);
             if options.known.iter().any(|known| matches!(known.knowledge, Knowledge::About(..))) {
                 // a prior weighs against the noise: once more under the right one
-                fitted = Fitted::of(records, &noise, point, freedom)?;
+                fitted = Fitted::of(records, &noise, point, freedom, arrived)?;
             }
         }
         NoiseSource::Known(known) => {
             noise = known.clone();
-            fitted = Fitted::of(records, &noise, point, freedom)?;
+            fitted = Fitted::of(records, &noise, point, freedom, arrived)?;
         }
         NoiseSource::Estimated => {
             for round in 0..NOISE_ROUNDS {
                 let absorbed = if round == 0 { None } else { Some(&fitted) };
                 noise = estimated(records, point, &noise, absorbed, freedom);
-                fitted = Fitted::of(records, &noise, point, freedom)?;
+                fitted = Fitted::of(records, &noise, point, freedom, arrived)?;
             }
         }
     }

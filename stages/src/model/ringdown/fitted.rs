@@ -15,7 +15,13 @@ use crate::model::error::ModelError;
 /// Outer rounds: each takes the basis to the present poles.
 const ROUNDS: usize = 12;
 /// Standard errors that count as arrived.
-const ARRIVED: f64 = 1e-3;
+pub(super) const ARRIVED: f64 = 1e-3;
+/// Those where only the size of what is left is asked for: the cost is right to a tenth.
+pub(super) const NEARLY: f64 = 0.3;
+/// Standard errors that a round may go, over those that count as arrived, for the basis to be good to them.
+const BY_ROUND: f64 = 1e3;
+/// At most: a step of ten standard errors is right to the third order.
+const MOST_BY_ROUND: f64 = 10.0;
 
 /// A fit under one noise model.
 pub(super) struct Fitted {
@@ -33,6 +39,7 @@ impl Fitted {
         noise: &RingdownNoise,
         point: &mut Point,
         freedom: &Freedom,
+        arrived: f64,
     ) -> Result<Self, ModelError> {
         let whitened = Whitened::of(records, noise);
         let mut verdict = RingdownVerdict { converged: false, distance: f64::INFINITY, steps: 0 };
@@ -40,7 +47,7 @@ impl Fitted {
             let reference = point.exponentials.clone();
             let data = whitened.projected(&reference);
             let before = freedom.values(&point.exponentials);
-            let found = search(&data, &reference, point, freedom, ARRIVED);
+            let found = search(&data, &reference, point, freedom, arrived);
             verdict.steps += found.steps;
             let parts = blocks(&data, &reference, &point.exponentials, &point.events, freedom, 0.0);
             let values = freedom.values(&point.exponentials);
@@ -53,7 +60,7 @@ impl Fitted {
                 .max(0.0)
                 .sqrt();
             verdict.distance = found.distance;
-            verdict.converged = distance < 1.0 && found.distance < ARRIVED;
+            verdict.converged = distance < (BY_ROUND * arrived).min(MOST_BY_ROUND) && found.distance < arrived;
             if verdict.converged || round + 1 == ROUNDS {
                 // what sits on a bound is not known to be there: the others' errors are those beside it
                 let edges = freedom.edges(&values);

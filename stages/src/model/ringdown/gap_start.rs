@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::fitted::Fitted;
+use super::fitted::{ARRIVED, Fitted};
 use super::freedom::freedom;
 use super::gaps::Gaps;
 use super::guess::{first_guess, white_variance};
@@ -30,7 +30,7 @@ pub(super) fn gap_start(records: &Records<'_>, options: &RingdownOptions) -> Res
         let Ok(point) = &candidate else { continue };
         let mut point = point.clone();
         let freedom = freedom(&point.exponentials, options);
-        let Ok(fitted) = Fitted::of(records, &noise, &mut point, &freedom) else { continue };
+        let Ok(fitted) = Fitted::of(records, &noise, &mut point, &freedom, ARRIVED) else { continue };
         if fitted.chi_square() < least {
             least = fitted.chi_square();
             found = candidate;

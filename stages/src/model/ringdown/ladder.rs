@@ -1,7 +1,7 @@
 //! Fits with one, two and more modes, each from the one before.
 
 use super::choice::Data;
-use super::fit::fit_ringdowns;
+use super::fit::fit_to;
 use super::gap_start::gap_start;
 use super::gaps::Gaps;
 use super::guess::first_guess;
@@ -20,12 +20,13 @@ pub(super) struct Ladder {
 }
 
 /// Fits under white noise with a further pole of the Hankel matrix each, up to `most` modes and `beyond` more than the best: one that is not there may
-/// hide the next. Errors: those of the fit with one.
+/// hide the next. Each fit ends `arrived` standard errors from its best. Errors: those of the fit with one.
 pub(super) fn ladder(
     all: &Data<'_>,
     most: usize,
     beyond: usize,
     options: &RingdownOptions,
+    arrived: f64,
 ) -> Result<Ladder, ModelError> {
     let gaps = Gaps::of(&options.missing, all.events.len(), all.events.first().map_or(0, |event| event.len()))?;
     let (mut pool, real) = pool(all, &gaps, most, options)?;
@@ -40,7 +41,7 @@ pub(super) fn ladder(
         current.insert(at, added);
         let start = Some(current.clone());
         let white = RingdownOptions { noise: NoiseSource::White, bootstrap_draws: 0, start, ..options.clone() };
-        let fit = match fit_ringdowns(all.events, &[], all.interval_s, &white) {
+        let fit = match fit_to(all.events, &[], all.interval_s, &white, arrived) {
             Ok(fit) => fit,
             Err(error) if ladder.steps.is_empty() => return Err(error),
             Err(_) => break,
