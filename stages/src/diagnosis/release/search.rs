@@ -209,7 +209,9 @@ pub fn name_causes(
                     replacements += 1;
                     earlier.push(base);
                     let put = replace_one(problem, &clean, &candidates, options, &mut named, &mut earlier)?;
-                    take_back(problem, &mut named, &mut earlier)?;
+                    if put {
+                        take_back(problem, &mut named, &mut earlier)?;
+                    }
                     base = earlier.pop().ok_or(ModelError::Degenerate("the search has lost its last fit"))?;
                     if put {
                         candidates.retain(|candidate| named.iter().all(|n| !same_class(*candidate, n.cause)));
