@@ -173,11 +173,12 @@ pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> 
             above = above.min(strength);
         }
         if (now / LIMIT_GAIN).ln().abs() < 0.05 * power || (strength == above && above < 1.05 * below) {
-            // more must show more: a level such as that of clipping is no strength
-            let more = gain((1.2 * strength).min(highest))?;
-            // and much less must show much less: a step that a release takes past a sample is no effect
+            // more must show more, a level such as that of clipping is no strength; and much more much more, at least as the root: a step that a release takes
+            // past a sample is no effect, however small the strength that takes it
+            let higher = (4.0 * strength).min(highest);
+            let more = gain(higher)?;
             let less = gain(0.25 * strength)?;
-            return (more >= now && less < 0.5 * now).then_some(strength);
+            return (more >= now * (higher / strength).sqrt() && less < 0.5 * now).then_some(strength);
         }
         if let Some((before, gained)) = last
             && before != strength

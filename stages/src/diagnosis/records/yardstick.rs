@@ -1,7 +1,6 @@
 //! How far the ratio of a power to its neighbours strays where nothing is: taken from all the other frequencies.
 
 use super::replicates::incomplete_beta;
-use crate::calibration::gamma_tail;
 use crate::events::median_and_scale;
 
 /// The law of a ratio of powers: a gamma variable of mean `mean` and shape `shape`, over an independent one of `neighbours` times that shape.
@@ -21,8 +20,7 @@ pub(super) struct Yardstick {
 const FEWEST: usize = 24;
 
 impl Yardstick {
-    /// From the ratios at all frequencies, sought ones among them. `neighbours`: how many times as much power the neighbours average; infinite if they
-    /// are known exactly.
+    /// From the ratios at all frequencies, sought ones among them. `neighbours`: how many times as much power the neighbours average.
     pub fn new(ratios: &[f64], neighbours: f64) -> Option<Self> {
         let mut logarithms: Vec<f64> = ratios.iter().map(|ratio| ratio.ln()).filter(|log| log.is_finite()).collect();
         if logarithms.len() < FEWEST {
@@ -40,9 +38,6 @@ impl Yardstick {
     /// Probability of so large a ratio where nothing is.
     pub fn tail(&self, ratio: f64) -> f64 {
         let (own, x) = (self.shape, self.shape * ratio / self.mean);
-        if self.neighbours.is_infinite() {
-            return gamma_tail(own, x);
-        }
         let others = own * self.neighbours;
         // DLMF 8.17: the tail of Fisher's law
         incomplete_beta(others, own, others / (others + x))

@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use super::joint::JointFit;
+use super::last_tests::stands_out;
 use super::problem::Problem;
 use super::residuals::Tile;
-use super::search::{Named, Naming, stands_out};
+use super::search::{Named, Naming};
+use crate::causes::Cause;
 use crate::diagnosis::records::RecordSign;
 use crate::diagnosis::verdict::{DiagnosedMode, Diagnosis, NamedCause, Rung, RunnerUp, Value, Verdict};
 
@@ -73,6 +75,11 @@ fn between(problem: &Problem<'_>, place: f64) -> Option<f64> {
     Some((after - before) / 12f64.sqrt())
 }
 
+/// What a model that is not exact may add to a strength, the first parameter: what it leaves of its effect, as a share of the energy, it may have along it as well.
+fn bias(cause: &dyn Cause, parameter: usize, value: f64) -> f64 {
+    if parameter == 0 { cause.inexact().sqrt() * value.abs() } else { 0.0 }
+}
+
 fn shapes(problem: &Problem<'_>, naming: &Naming) -> Vec<NamedCause> {
     let Some(last) = naming.fits.last() else { return Vec::new() };
     let counts: Vec<usize> = last.state.hypotheses.iter().map(|h| h.values.len()).collect();
@@ -88,7 +95,7 @@ fn shapes(problem: &Problem<'_>, naming: &Naming) -> Vec<NamedCause> {
             .map(|(p, (parameter, value))| {
                 let std = match named.cause.sets_in() {
                     Some(place) if place == p => between(problem, *value),
-                    _ => finite(last.covariance[(at + p, at + p)].max(0.0).sqrt()),
+                    _ => finite(last.covariance[(at + p, at + p)].max(0.0).sqrt().hypot(bias(named.cause, p, *value))),
                 };
                 (parameter.name.to_string(), Value { value: finite(*value), std, unit: parameter.unit.into() })
             })
