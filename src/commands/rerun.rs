@@ -16,7 +16,7 @@ use crate::failure::{Failure, Message};
 use crate::output::{print, say};
 use crate::provenance::diff::Diff;
 use crate::provenance::files::{Finder, Now};
-use crate::provenance::repeat::{base, config_path, places, unfit, writing_base};
+use crate::provenance::repeat::{Writer, base, config_path, places, unfit, writers};
 use crate::provenance::same::{TOLERANCE, Verdict, distance, judge, results};
 use crate::show::{number, pretty, results_text};
 
@@ -30,14 +30,15 @@ pub fn run(args: &RerunArgs, registry: &Registry) -> Result<(), Failure> {
     require_inputs(&file, &finder)?;
     let scratch = tempfile::tempdir()
         .map_err(|error| Failure::failed(format!("no temporary folder can be made: {error}"), None))?;
-    let kept = args.output.as_ref().map(|output| output.with_extension("files"));
-    let (plan, base) = plan(&file, &finder, kept.as_deref().unwrap_or(scratch.path()), registry)?;
+    let base = base(&file.run().info);
+    let (plan, writers) = plan(&file, &base, &finder, scratch.path(), registry)?;
     let output = args.output.clone().unwrap_or_else(|| scratch.path().join("repeated.h5"));
     prepare(&output, Target::Result, &inputs(args, &file, &finder))?;
     let cache = open_cache(args.cache.as_deref())?;
     let overrides = &file.run().overrides;
-    let repeated =
+    let mut repeated =
         compute(&plan, &Computation { base: &base, cache: &cache, fresh: !args.reuse, jobs: args.jobs, overrides });
+    repeated.iter_mut().for_each(|repeated| writers.iter().for_each(|writer| writer.put_back(repeated)));
     cache.take_notes().iter().for_each(|note| say(&format!("note: {note}\n")));
     let failed = |error: &afmid_pipeline::store::StoreError| Failure::failed(error, error.help.clone());
     write_result(&output, &repeated?).map_err(|error| failed(&error))?;
@@ -63,10 +64,14 @@ fn require_inputs(file: &ResultFile, finder: &Finder) -> Result<(), Failure> {
     Err(Failure::failed(message, Some("nothing was run; `--data FOLDER` looks there by name and hash".to_owned())))
 }
 
-/// The plan of the stored config, reading the files where they are now, and the folder where its paths begin.
-///
-/// Errors, usage: this program cannot run it any more; the folder cannot be made.
-fn plan(file: &ResultFile, finder: &Finder, scratch: &Path, registry: &Registry) -> Result<(Plan, PathBuf), Failure> {
+/// The plan of the stored config, reading the files where they are now, and its stages that write. Errors, usage: this program cannot run it any more.
+fn plan(
+    file: &ResultFile,
+    base: &Path,
+    finder: &Finder,
+    scratch: &Path,
+    registry: &Registry,
+) -> Result<(Plan, Vec<Writer>), Failure> {
     let run = file.run();
     let name = config_path(&run.info).display().to_string();
     let load = |sets: &[String]| {
@@ -74,16 +79,11 @@ fn plan(file: &ResultFile, finder: &Finder, scratch: &Path, registry: &Registry)
             .map_err(|problems| Failure::Usage(Message::Rendered(render(&name, &run.config, &problems))))
     };
     let plan = load(&run.overrides)?;
-    let writing = writing_base(&plan, scratch);
-    if let Some(folder) = &writing {
-        std::fs::create_dir_all(folder).map_err(|error| {
-            Failure::usage(format!("the folder {} cannot be made: {error}", folder.display()), None)
-        })?;
-    }
-    let base = writing.unwrap_or_else(|| base(&run.info));
-    let places = places(&plan, file, &base, finder);
-    let plan = if places.is_empty() { plan } else { load(&[&run.overrides[..], &places].concat())? };
-    Ok((plan, base))
+    let writers = writers(&plan, base, scratch);
+    let mut sets = places(&plan, file, base, finder);
+    sets.extend(writers.iter().map(Writer::set));
+    let plan = if sets.is_empty() { plan } else { load(&[&run.overrides[..], &sets].concat())? };
+    Ok((plan, writers))
 }
 
 /// What the repetition must not write over.
@@ -142,7 +142,10 @@ impl Told<'_> {
                 rows.len(),
                 number(self.largest())
             ),
-            Verdict::Differs => format!("{path}: differs in {} datasets of {outputs} outputs\n", rows.len()),
+            Verdict::Differs => {
+                let many = if rows.len() == 1 { "" } else { "s" };
+                format!("{path}: differs in {} dataset{many} of {outputs} outputs\n", rows.len())
+            }
         });
         for stage in &self.diff.stages {
             let of: Vec<_> = rows.iter().filter(|(id, _)| *id == stage.id).map(|(_, result)| *result).collect();

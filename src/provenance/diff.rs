@@ -198,10 +198,11 @@ fn sorted(found: Vec<Difference>, a: &ResultFile, b: &ResultFile) -> (Vec<Vec<Re
         let twin = stage.and_then(|stage| b.stage(&stage.record.id)).filter(|twin| twin.group == group);
         match (index, stage, twin) {
             // told by name, from what the file says of itself
-            _ if group == "pipeline" || rest == "version" || rest.starts_with("provenance") => {}
+            _ if ["pipeline", "title"].contains(&group) || ["version", "sequence_index"].contains(&rest) => {}
+            _ if rest.starts_with("provenance") => {}
             // a stage of one file only
             _ if rest.is_empty() && difference.numbers.is_none() && one_sided(group, a, b) => {}
-            (Some(index), Some(stage), Some(_)) if !rest.is_empty() && rest != "sequence_index" => {
+            (Some(index), Some(stage), Some(_)) if !rest.is_empty() => {
                 if let Some(list) = results.get_mut(index) {
                     list.push(result_diff(stage, rest, difference));
                 }

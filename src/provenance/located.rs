@@ -72,9 +72,11 @@ pub fn locate(file: &ResultFile, stage: &StageSummary, steps: &[Step]) -> Result
     if let Some(port) = summary {
         let artifact = file.artifact(id, SUMMARY)?;
         let json = artifact_json(&artifact);
-        let other_port = first.and_then(named).filter(|_| first.is_some_and(|key| json.get(key).is_none()));
-        if other_port.is_none() || json.get(id).is_some() && walk(&json, id, &implied(id, &json, steps)).is_ok() {
-            let steps = implied(id, &json, steps);
+        let steps = implied(id, &json, steps);
+        // a key of the summary and an output may have one name
+        let other_port = first.and_then(named).filter(|_| walk(&json, id, &steps).is_err());
+        if other_port.is_none() {
+            known(id, &json, stage, &steps)?;
             return in_artifact(file, stage, port, &artifact, &steps, id.clone());
         }
     }
@@ -95,6 +97,17 @@ pub fn locate(file: &ResultFile, stage: &StageSummary, steps: &[Step]) -> Result
     };
     let artifact = file.artifact(id, &port.name)?;
     in_artifact(file, stage, port, &artifact, steps, format!("{id}.{}", port.name))
+}
+
+/// Errors: the first step is neither a key of the summary nor an output.
+fn known(id: &str, summary: &Value, stage: &StageSummary, steps: &[Step]) -> Result<(), (String, String)> {
+    let (Some(Step::Key(key)), Some(entries)) = (steps.first(), summary.as_object()) else { return Ok(()) };
+    let outputs = stage.ports.iter().map(|port| port.name.as_str());
+    let names = || entries.keys().map(String::as_str).chain(outputs.clone());
+    if names().any(|name| name == key) {
+        return Ok(());
+    }
+    Err((format!("`{id}` has no `{key}`"), suggestion(key, names())))
 }
 
 /// The steps with the key of the stage's own name, where only that makes them lead anywhere.

@@ -1,10 +1,10 @@
 //! What a run needs to be repeated: its inputs, where they are now, and its config with their places.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::hash_file;
 use afmid_pipeline::store::ResultFile;
-use afmid_pipeline::{Node, Plan, RunInfo, SourceFile, StageRecord};
+use afmid_pipeline::{Artifact, Node, Plan, Ports, RunInfo, RunResult, SourceFile, StageRecord};
 use serde_json::Value;
 
 use super::diff::file_name;
@@ -50,17 +50,83 @@ pub fn places(plan: &Plan, file: &ResultFile, base: &Path, finder: &Finder) -> V
     plan.nodes.iter().filter_map(set).collect()
 }
 
-/// The folder where a repetition begins if stages of it write files: a stage that reads no file and has a place writes there, and by now others
-/// may use what lies there. As deep in `scratch` as the stages' paths climb, so that what they write stays in it. None if no stage writes.
-pub fn writing_base(plan: &Plan, scratch: &Path) -> Option<PathBuf> {
-    let climbs = |node: &Node| {
-        let (_, place) = location(node)?;
-        let reads = node.stage.sources(Path::new(".")).map_or(true, |sources| !sources.is_empty());
-        let place = place.as_str().filter(|_| !reads)?;
-        Some(Path::new(place).components().filter(|part| *part == Component::ParentDir).count())
+/// A stage that writes files, and where it does so in a repetition: not over what others may use by now.
+#[derive(Debug)]
+pub struct Writer {
+    id: String,
+    parameter: &'static str,
+    /// The parameter's value in the run.
+    place: String,
+    /// The folder that it means.
+    folder: PathBuf,
+    /// The folder of the repetition.
+    scratch: PathBuf,
+}
+
+/// The stages that write: those that read no file and have a place.
+pub fn writers(plan: &Plan, base: &Path, scratch: &Path) -> Vec<Writer> {
+    let writer = |node: &Node| {
+        let (parameter, place) = location(node)?;
+        let reads = node.stage.sources(base).map_or(true, |sources| !sources.is_empty());
+        let place = place.as_str().filter(|_| !reads)?.to_owned();
+        let (folder, scratch) = (base.join(&place), scratch.join(&node.id));
+        Some(Writer { id: node.id.clone(), parameter, place, folder, scratch })
     };
-    let depth = plan.nodes.iter().filter_map(climbs).max()?;
-    Some((0..=depth).fold(scratch.to_owned(), |folder, _| folder.join("config")))
+    plan.nodes.iter().filter_map(writer).collect()
+}
+
+impl Writer {
+    /// The `--set` argument that makes it write there.
+    pub fn set(&self) -> String {
+        format!("{}.{}={}", self.id, self.parameter, quoted(&self.scratch))
+    }
+
+    /// Puts the run's own places back into what a repetition says: the folder of the repetition is gone afterwards.
+    pub fn put_back(&self, run: &mut RunResult) {
+        for stage in run.stages.iter_mut().filter(|stage| stage.id == self.id) {
+            self.in_json(&mut stage.params);
+            let outputs: Vec<(String, Artifact)> = stage
+                .result
+                .outputs
+                .iter()
+                .map(|(name, artifact)| (name.to_owned(), self.in_artifact(artifact)))
+                .collect();
+            stage.result.outputs = Ports::new();
+            outputs.into_iter().for_each(|(name, artifact)| stage.result.outputs.insert(&name, artifact));
+            stage.result.warnings.iter_mut().for_each(|warning| {
+                *warning = warning.replace(&*self.scratch.to_string_lossy(), &self.place);
+            });
+        }
+    }
+
+    fn in_artifact(&self, artifact: &Artifact) -> Artifact {
+        match artifact {
+            Artifact::Document(document) => {
+                let mut document = document.as_ref().clone();
+                self.in_json(&mut document.0);
+                Artifact::Document(document.into())
+            }
+            Artifact::Recording(recording) => {
+                let mut recording = recording.as_ref().clone();
+                for record in &mut recording.records {
+                    if let Ok(inside) = record.path.strip_prefix(&self.scratch) {
+                        record.path = self.folder.join(inside);
+                    }
+                }
+                Artifact::Recording(recording.into())
+            }
+            other => other.clone(),
+        }
+    }
+
+    fn in_json(&self, json: &mut Value) {
+        match json {
+            Value::String(text) => *text = text.replace(&*self.scratch.to_string_lossy(), &self.place),
+            Value::Array(values) => values.iter_mut().for_each(|value| self.in_json(value)),
+            Value::Object(entries) => entries.values_mut().for_each(|value| self.in_json(value)),
+            _ => {}
+        }
+    }
 }
 
 fn reads_the_same(node: &Node, record: &StageRecord, base: &Path) -> bool {
