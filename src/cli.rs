@@ -5,6 +5,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+mod provenance;
+
+pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
+
 /// Identifies dynamic systems from archived transients, such as snap-off events in force curves of an atomic force microscope.
 #[derive(Debug, Parser)]
 #[command(name = "afmid", version, about, propagate_version = true)]
@@ -46,6 +50,16 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Say what differs between two result files: inputs, parameters, versions, results.
+    Diff(DiffArgs),
+    /// Go back from a number to the stages, parameters and files that it comes from.
+    Trace(TraceArgs),
+    /// Repeat a run from its own result file and compare.
+    Rerun(RerunArgs),
+    /// Write a run as a Process Run RO-Crate, which other archives and tools read.
+    ExportCrate(CrateArgs),
+    /// Free the cache: what has not been used for longest goes first.
+    Gc(GcArgs),
     /// Write a run's page with its figures: one HTML file that needs no network.
     Report(ReportArgs),
     /// List the stages, or document one.
@@ -170,6 +184,9 @@ pub struct ExplainArgs {
     /// Where stage results are kept, as for `run`.
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
+    /// As JSON, alone on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// How to draw a graph.

@@ -9,6 +9,7 @@ mod diagnostic;
 mod failure;
 mod output;
 mod progress;
+mod provenance;
 mod report;
 mod show;
 

@@ -2,18 +2,23 @@
 
 mod causes;
 mod check;
+mod diff;
 mod docs;
 mod exam;
 mod explain;
+mod export_crate;
+mod gc;
 mod graph;
 mod load;
 mod open;
 mod report;
+mod rerun;
 mod run;
 mod schema;
 mod show;
 mod stages;
 mod target;
+mod trace;
 
 use afmid_pipeline::Registry;
 
@@ -26,6 +31,11 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::Run(args) => run::run(&args, registry),
         Command::Explain(args) => explain::run(&args, registry),
         Command::Show { result, id, json } => show::run(&result, id.as_deref(), json),
+        Command::Diff(args) => diff::run(&args),
+        Command::Trace(args) => trace::run(&args),
+        Command::Rerun(args) => rerun::run(&args, registry),
+        Command::ExportCrate(args) => export_crate::run(&args),
+        Command::Gc(args) => gc::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Check { configs } => check::run(&configs, registry),
         Command::Graph { config, format } => graph::run(&config, format, registry),

@@ -1,5 +1,6 @@
 //! `afmid run`: from a config to a result file.
 
+use std::num::NonZeroU16;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::Registry;
@@ -14,13 +15,25 @@ use crate::failure::{Failure, Message};
 use crate::output::{print, say};
 use crate::progress::observer;
 
+/// The program and its version, as results state it.
+pub const PROGRAM: &str = concat!("afmid ", env!("CARGO_PKG_VERSION"));
+
 /// Runs a config and writes its result file.
 pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
     let plan = load(&args.config.config, &args.config.set, registry)?;
     let output = args.output.clone().unwrap_or_else(|| default_output(plan.name()));
     prepare(&output, Target::Result, &inputs(&plan, &args.config.config))?;
     let cache = open_cache(args.cache.as_deref())?;
-    let result = compute(&plan, args, &cache);
+    let result = compute(
+        &plan,
+        &Computation {
+            base: plan.config.base(),
+            cache: &cache,
+            fresh: args.fresh,
+            jobs: args.jobs,
+            overrides: &plan.config.overrides,
+        },
+    );
     for note in cache.take_notes() {
         say(&format!("note: {note}\n"));
     }
@@ -31,22 +44,41 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
 
 /// The cache that was asked for, or the user's.
 pub fn open_cache(folder: Option<&Path>) -> Result<Cache, Failure> {
-    let folder = folder.map_or_else(default_cache, Path::to_owned);
-    Cache::open(&folder).map_err(|error| Failure::usage(&error, error.help.clone()))
+    Cache::open(&cache_folder(folder)).map_err(|error| Failure::usage(&error, error.help.clone()))
 }
 
-fn compute(plan: &Plan, args: &RunArgs, cache: &Cache) -> Result<RunResult, Failure> {
+/// The folder of the cache that was asked for, or the user's.
+pub fn cache_folder(folder: Option<&Path>) -> PathBuf {
+    folder.map_or_else(default_cache, Path::to_owned)
+}
+
+/// How a plan is computed.
+pub struct Computation<'a> {
+    /// The folder where relative paths begin.
+    pub base: &'a Path,
+    /// Where stage results are kept.
+    pub cache: &'a Cache,
+    /// Reuse nothing.
+    pub fresh: bool,
+    /// Threads; none: one per processor.
+    pub jobs: Option<NonZeroU16>,
+    /// The `--set` arguments that the result states.
+    pub overrides: &'a [String],
+}
+
+/// Computes a plan with progress on stderr. Errors: those of its stages.
+pub fn compute(plan: &Plan, how: &Computation) -> Result<RunResult, Failure> {
     let observer = observer();
     let options = Options {
-        base: plan.config.base().to_owned(),
-        cache,
-        fresh: args.fresh,
-        program: concat!("afmid ", env!("CARGO_PKG_VERSION")).to_owned(),
-        overrides: plan.config.overrides.clone(),
+        base: how.base.to_owned(),
+        cache: how.cache,
+        fresh: how.fresh,
+        program: PROGRAM.to_owned(),
+        overrides: how.overrides.to_vec(),
         observer: observer.as_ref(),
     };
     // 0: as many as there are processors
-    let threads = args.jobs.map_or(0, |jobs| usize::from(jobs.get()));
+    let threads = how.jobs.map_or(0, |jobs| usize::from(jobs.get()));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| Failure::failed(format!("no threads can be started: {error}"), None))?;
     pool.install(|| run_plan(plan, &options)).map_err(|errors| Failure::Failed(Message::Rendered(rendered(&errors))))

@@ -5,15 +5,11 @@ use std::path::Path;
 use afmid_pipeline::Artifact;
 use afmid_pipeline::config::nearest;
 use afmid_pipeline::store::{ResultFile, StageSummary};
-use serde_json::{Map, Value};
 
 use super::open::require_result;
 use crate::failure::Failure;
 use crate::output::print;
-use crate::show::{artifact_json, artifact_text, overview_json, overview_text, stage_head};
-
-/// The port whose document stands for a stage.
-const SUMMARY: &str = "summary";
+use crate::show::{artifact_text, overview_json, overview_text, pretty, stage_head, stage_json};
 
 /// Shows a result file, or one of its stages, as text or as JSON.
 pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
@@ -30,7 +26,8 @@ pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
     print(&text)
 }
 
-fn find<'a>(file: &'a ResultFile, id: &str) -> Result<&'a StageSummary, Failure> {
+/// The stage with this id. Errors, usage: there is none.
+pub fn find<'a>(file: &'a ResultFile, id: &str) -> Result<&'a StageSummary, Failure> {
     file.stage(id).ok_or_else(|| {
         let ids: Vec<&str> = file.stages().iter().map(|stage| stage.record.id.as_str()).collect();
         let help = match nearest(id, ids.iter().copied()) {
@@ -45,19 +42,6 @@ fn artifact(file: &ResultFile, id: &str, port: &str) -> Result<Artifact, Failure
     file.artifact(id, port).map_err(|error| Failure::failed(&error, error.help.clone()))
 }
 
-/// The stage's summary, or else all its artifacts by port.
-fn stage_json(file: &ResultFile, stage: &StageSummary) -> Result<Value, Failure> {
-    let id = &stage.record.id;
-    let mut ports = Map::new();
-    for port in &stage.ports {
-        match artifact(file, id, &port.name)? {
-            Artifact::Document(document) if port.name == SUMMARY => return Ok(document.0.clone()),
-            artifact => ports.insert(port.name.clone(), artifact_json(&artifact)),
-        };
-    }
-    Ok(Value::Object(ports))
-}
-
 fn stage_text(file: &ResultFile, stage: &StageSummary) -> Result<String, Failure> {
     let mut text = stage_head(&stage.record);
     for port in &stage.ports {
@@ -65,8 +49,4 @@ fn stage_text(file: &ResultFile, stage: &StageSummary) -> Result<String, Failure
         text.push_str(&format!("\n{} ({})\n{}", port.name, port.shape.name(), artifact_text(&artifact)));
     }
     Ok(text)
-}
-
-fn pretty(value: &Value) -> Result<String, Failure> {
-    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(|error| Failure::failed(error, None))
 }

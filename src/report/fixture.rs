@@ -385,6 +385,8 @@ pub(crate) fn paper() -> RunResult {
             seconds: 12.3,
             host: "bench".to_owned(),
             threads: 2,
+            folder: "/home/somebody".to_owned(),
+            config_file: "configs/free-lever.toml".to_owned(),
             stages: timings,
         },
     }

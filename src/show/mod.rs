@@ -1,13 +1,24 @@
 //! Results for people and for scripts.
 
 mod artifact;
+mod change;
+mod differences;
 mod document;
 mod grid;
 mod json;
 mod number;
 mod overview;
+mod pretty;
+mod size;
+mod stage;
 
 pub use artifact::artifact_text;
+pub use change::{change_json, change_text};
+pub use differences::{diff_text, results_text};
 pub use grid::grid;
 pub use json::artifact_json;
+pub use number::{number, with_std};
 pub use overview::{overview_json, overview_text, stage_head};
+pub use pretty::pretty;
+pub use size::size;
+pub use stage::{SUMMARY, stage_json};

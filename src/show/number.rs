@@ -1,5 +1,7 @@
 //! Numbers for people.
 
+pub use afmid_pipeline::artifact::std_name;
+
 /// A number with six significant digits; what is unknown (NaN) is `-`.
 pub fn number(value: f64) -> String {
     if value.is_nan() {
@@ -43,19 +45,6 @@ pub fn with_std(value: f64, std: f64) -> String {
     if power == 0 { text } else { format!("{text}e{power}") }
 }
 
-/// The name that holds the standard deviation of `name`: `frequency_std_hz` for `frequency_hz`, `quality_factor_std` for
-/// `quality_factor`.
-pub fn std_name<'a>(name: &str, mut names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    names.find(|other| {
-        let mut parts: Vec<&str> = other.split('_').collect();
-        let std = parts.iter().position(|part| *part == "std");
-        std.is_some_and(|std| {
-            parts.remove(std);
-            parts.join("_") == name
-        })
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,13 +80,5 @@ mod tests {
         for (value, std, text) in cases {
             assert_eq!(with_std(value, std), text);
         }
-    }
-
-    #[test]
-    fn standard_deviations_are_found_by_name() {
-        let names = ["frequency_std_hz", "quality_factor_std"];
-        assert_eq!(std_name("frequency_hz", names.into_iter()), Some("frequency_std_hz"));
-        assert_eq!(std_name("quality_factor", names.into_iter()), Some("quality_factor_std"));
-        assert_eq!(std_name("delay_s", names.into_iter()), None);
     }
 }

@@ -3,6 +3,7 @@
 mod array;
 mod attribute;
 mod document;
+mod standard_error;
 mod state_space;
 mod table;
 
@@ -11,6 +12,7 @@ use std::sync::Arc;
 pub use array::{Array, Axis, Values, Variable};
 pub use attribute::Attribute;
 pub use document::Document;
+pub use standard_error::std_name;
 pub use state_space::{Matrix, StateSpace};
 pub use table::{Column, ColumnValues, Table};
 

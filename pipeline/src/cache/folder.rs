@@ -1,9 +1,12 @@
 //! The cache's folder.
 
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
 
+use super::names::{Kind, kind_of};
+use super::origin::Origin;
 use super::replace::{replace_file, sweep};
 use crate::runner::StageResult;
 use crate::store::{StoreError, read_stage, write_stage};
@@ -18,11 +21,16 @@ pub struct Cache {
 impl Cache {
     /// Opens the cache in `folder`, makes the folder if it is missing, and sweeps what killed runs left. Errors: it cannot be made.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
-        fs::create_dir_all(folder).map_err(|error| {
-            StoreError::io("the cache folder cannot be made", folder, &error).help("choose another with --cache")
-        })?;
+        let cache = Self { folder: folder.to_owned(), notes: Mutex::default() };
+        cache.make_folder()?;
         sweep(folder, ".");
-        Ok(Self { folder: folder.to_owned(), notes: Mutex::default() })
+        Ok(cache)
+    }
+
+    fn make_folder(&self) -> Result<(), StoreError> {
+        fs::create_dir_all(&self.folder).map_err(|error| {
+            StoreError::io("the cache folder cannot be made", &self.folder, &error).help("choose another with --cache")
+        })
     }
 
     /// The folder.
@@ -35,39 +43,88 @@ impl Cache {
         self.folder.join(format!("{key}.h5"))
     }
 
-    /// Whether there is a result with this key, without reading it.
+    /// Where the origin of the result with this key lies, or would lie.
+    pub fn origin_path(&self, key: &str) -> PathBuf {
+        self.folder.join(format!("{key}.json"))
+    }
+
+    /// Whether there is a result with this key, without reading it. It may be gone a moment later: another process may free the cache.
     pub fn contains(&self, key: &str) -> bool {
         self.path(key).is_file()
     }
 
-    /// The result with this key. A damaged file counts as absent: it is removed, and [`Cache::take_notes`] says so.
+    /// The result with this key, marked as used. A damaged file counts as absent: it is removed, and [`Cache::take_notes`] says so.
+    ///
+    /// What comes back is whole in memory: removing the file afterwards takes nothing from a run.
     pub fn get(&self, key: &str) -> Option<StageResult> {
         let path = self.path(key);
         if !path.is_file() {
             return None;
         }
-        match read_stage(&path) {
-            Ok(result) => Some(result),
+        // twice: another process may remove the file and put it again between looking and reading
+        match read_stage(&path).or_else(|_| read_stage(&path)) {
+            Ok(result) => {
+                mark_used(&path);
+                Some(result)
+            }
             // another process removed it in between
             Err(_) if !path.exists() => None,
             Err(error) => {
                 let removed = if fs::remove_file(&path).is_ok() { "removed" } else { "ignored" };
-                self.notes
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .push(format!("a damaged file in the cache was {removed}: {error}"));
+                self.note(format!("a damaged file in the cache was {removed}: {error}"));
                 None
             }
         }
     }
 
-    /// Keeps a result. Errors: the folder cannot be written; an artifact is not valid.
+    /// Keeps a result; makes the folder again if somebody removed it. Errors: the folder cannot be written; an artifact is not valid.
     pub fn put(&self, key: &str, result: &StageResult) -> Result<(), StoreError> {
+        self.make_folder()?;
         replace_file(&self.path(key), |temporary| write_stage(temporary, result))
+    }
+
+    /// Keeps a result with its origin. Errors: as [`Cache::put`].
+    pub fn put_with_origin(&self, origin: &Origin, result: &StageResult) -> Result<(), StoreError> {
+        self.make_folder()?;
+        // only explanations need it: a run does not fail for it
+        if let Err(error) = origin.write(&self.origin_path(&origin.key)) {
+            self.note(format!("where a result comes from was not kept: {error}"));
+        }
+        self.put(&origin.key, result)
+    }
+
+    /// The origin of the result with this key, whether the result is still there or not.
+    pub fn origin(&self, key: &str) -> Option<Origin> {
+        Origin::read(&self.origin_path(key)).filter(|origin| origin.key == key)
+    }
+
+    /// The origins of all results that are there, with the times of their last use; by key. Unreadable ones are left out.
+    pub fn origins(&self) -> Vec<(Origin, SystemTime)> {
+        let Ok(entries) = fs::read_dir(&self.folder) else { return Vec::new() };
+        let mut names: Vec<String> =
+            entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        names.sort_unstable();
+        names.iter().filter_map(|name| self.origin_of(name)).collect()
+    }
+
+    fn origin_of(&self, name: &str) -> Option<(Origin, SystemTime)> {
+        let Some(Kind::Origin(key)) = kind_of(name) else { return None };
+        let used = fs::metadata(self.path(key)).and_then(|metadata| metadata.modified()).ok()?;
+        Some((self.origin(key)?, used))
+    }
+
+    fn note(&self, note: String) {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note);
     }
 
     /// Notes about damaged files since the last call.
     pub fn take_notes(&self) -> Vec<String> {
         std::mem::take(&mut self.notes.lock().unwrap_or_else(PoisonError::into_inner))
     }
+}
+
+/// A result's time of modification is that of its last use: times of access are switched off on many machines. Where a file may only be
+/// read the time stays: the cache works all the same, it only forgets in another order.
+fn mark_used(path: &Path) {
+    let _ = File::open(path).and_then(|file| file.set_modified(SystemTime::now()));
 }

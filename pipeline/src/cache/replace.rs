@@ -39,6 +39,21 @@ pub fn replace_file(path: &Path, write: impl FnOnce(&Path) -> Result<(), StoreEr
     File::open(folder).and_then(|folder| folder.sync_all()).map_err(|error| io("its folder cannot be synced", &error))
 }
 
+/// As [`replace_file`], for files that are none of the store's. Errors: those of `fill`, and as there.
+pub fn replace_with(path: &Path, fill: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<(), StoreError> {
+    replace_file(path, |temporary| fill(temporary).map_err(|error| StoreError::io("cannot be written", path, &error)))
+}
+
+/// As [`replace_file`] with these bytes, without waiting for the disk: after a power cut the file may be empty. For what is only convenient.
+pub(super) fn replace_unsynced(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    let temporary = folder_of(path).join(temporary_name(path));
+    fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path)).map_err(|error| {
+        // as above: the next sweep takes it
+        let _ = fs::remove_file(&temporary);
+        StoreError::io("cannot be written", path, &error)
+    })
+}
+
 /// Finds out whether [`replace_file`] could write `path`, by making a temporary file beside it and removing it. Errors: why not, in the
 /// system's words.
 pub fn probe(path: &Path) -> std::io::Result<()> {
@@ -92,7 +107,8 @@ pub fn sweep(folder: &Path, prefix: &str) {
     }
 }
 
-fn stale(path: &Path, name: &str) -> bool {
+/// Whether nobody writes a temporary file any more.
+pub(super) fn stale(path: &Path, name: &str) -> bool {
     let modified = fs::metadata(path).and_then(|metadata| metadata.modified());
     let age = modified.ok().and_then(|modified| SystemTime::now().duration_since(modified).ok());
     if age.is_some_and(|age| age > STALE) {

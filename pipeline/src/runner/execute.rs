@@ -7,7 +7,7 @@ use super::error::RunError;
 use super::keys::plan_node;
 use super::result::{RunInfo, RunResult, StageRecord, StageResult};
 use super::schedule::{Board, Outcome, run_graph};
-use crate::cache::Cache;
+use crate::cache::{Cache, Origin};
 use crate::error::StageError;
 use crate::graph::{Node, Plan};
 use crate::stage::{Caching, Context, Ports, Progress};
@@ -50,6 +50,7 @@ pub struct Options<'a> {
 
 struct Finished {
     record: StageRecord,
+    origin: Origin,
     seconds: f64,
     cached: bool,
 }
@@ -97,6 +98,8 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
         seconds: clock.elapsed().as_secs_f64(),
         host: host_name(),
         threads: rayon::current_num_threads(),
+        folder: std::env::current_dir().map(|folder| folder.display().to_string()).unwrap_or_default(),
+        config_file: plan.config.file.clone(),
         stages: times,
     };
     Ok(RunResult {
@@ -117,8 +120,8 @@ fn step(
     board: &Board<Finished, RunError>,
 ) -> Result<Finished, StageError> {
     let clock = Instant::now();
-    let upstream = |index: usize| board.done(index).map(|finished| finished.record.key.clone());
-    let planned = plan_node(plan, node, &options.base, &upstream)?;
+    let upstream = |index: usize| board.done(index).map(|finished| &finished.origin);
+    let planned = plan_node(plan, node, &options.base, &options.program, &upstream)?;
     let stored = node.stage.spec().caching == Caching::Stored;
     let hit = if stored && !options.fresh { options.cache.get(&planned.key) } else { None };
     let cached = hit.is_some();
@@ -127,7 +130,7 @@ fn step(
         None => {
             let result = execute(node, options, board, planned.seed.unwrap_or_default())?;
             if stored {
-                options.cache.put(&planned.key, &result)?;
+                options.cache.put_with_origin(&planned.origin, &result)?;
             }
             result
         }
@@ -150,7 +153,7 @@ fn step(
         sources: planned.sources,
         result,
     };
-    Ok(Finished { record, seconds: took.as_secs_f64(), cached })
+    Ok(Finished { record, origin: planned.origin, seconds: took.as_secs_f64(), cached })
 }
 
 /// Runs the stage itself and checks what it made: the ports it declares, with the shapes that it declares.

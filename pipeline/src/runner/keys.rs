@@ -5,11 +5,12 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::result::SourceFile;
-use crate::cache::{Cache, KeyParts, key};
+use crate::cache::{KeyParts, Origin, OriginFile, OriginInput, key};
 use crate::error::StageError;
 use crate::graph::{Node, Plan};
 use crate::recording::hash_file;
 use crate::stage::Caching;
+use crate::store::FORMAT_VERSION;
 
 /// The seed of a stage: the pipeline's seed and the stage's id, mixed by BLAKE3, so that stages draw independent numbers and
 /// adding a stage changes no other's.
@@ -30,36 +31,77 @@ pub struct StagePlan {
     pub seed: Option<u64>,
     /// The files that it reads.
     pub sources: Vec<SourceFile>,
+    /// The same in words, for the cache.
+    pub origin: Origin,
 }
 
-/// Works out a node's key from its parameters, its files and the keys of what it needs.
-pub(super) fn plan_node(
+/// Works out a node's key from its parameters, its files and the keys of what it needs. `upstream` gives the origin of a node's result.
+pub(super) fn plan_node<'a>(
     plan: &Plan,
     node: &Node,
     base: &Path,
-    upstream: &dyn Fn(usize) -> Option<String>,
+    program: &str,
+    upstream: &dyn Fn(usize) -> Option<&'a Origin>,
 ) -> Result<StagePlan, StageError> {
     let spec = node.stage.spec();
     let sources = node.stage.sources(base)?.par_iter().map(|path| source_file(path)).collect::<Result<Vec<_>, _>>();
     let sources = sources?;
     let seed = spec.seeded.then(|| stage_seed(plan.seed(), &node.id));
-    let mut wires = Vec::new();
-    for wire in &node.inputs {
-        let missing = || StageError::new(format!("port `{}`: its source has no key yet", wire.port));
-        wires.push((wire.port.to_owned(), upstream(wire.node).ok_or_else(missing)?, wire.output.to_owned()));
-    }
+    let (inputs, depends_on) = (inputs(plan, node, upstream)?, node.stage.depends_on());
+    let mut wires: Vec<(String, String, String)> =
+        inputs.iter().map(|input| (input.port.clone(), input.key.clone(), input.output.clone())).collect();
     wires.sort();
     let key = key(&KeyParts {
         stage: spec.name,
         version: spec.version,
         params: &node.params,
         location_params: node.stage.location_params(),
-        depends_on: &node.stage.depends_on(),
+        depends_on: &depends_on,
         seed,
         sources: &sources,
         upstream: &wires,
     });
-    Ok(StagePlan { key, seed, sources })
+    let origin = Origin {
+        key: key.clone(),
+        format: FORMAT_VERSION,
+        uses: spec.name.to_owned(),
+        version: spec.version,
+        params: node.params.clone(),
+        location_params: node.stage.location_params().iter().map(|&name| name.to_owned()).collect(),
+        depends_on,
+        seed,
+        files: sources.iter().map(origin_file).collect(),
+        inputs,
+        pipeline: plan.name().to_owned(),
+        id: node.id.clone(),
+        program: program.to_owned(),
+    };
+    Ok(StagePlan { key, seed, sources, origin })
+}
+
+fn inputs<'a>(
+    plan: &Plan,
+    node: &Node,
+    upstream: &dyn Fn(usize) -> Option<&'a Origin>,
+) -> Result<Vec<OriginInput>, StageError> {
+    let input = |wire: &crate::graph::Wire| {
+        let missing = || StageError::new(format!("port `{}`: its source has no key yet", wire.port));
+        let origin = upstream(wire.node).ok_or_else(missing)?;
+        let kept = plan.nodes[wire.node].stage.spec().caching == Caching::Stored;
+        Ok(OriginInput {
+            port: wire.port.to_owned(),
+            stage: origin.id.clone(),
+            output: wire.output.to_owned(),
+            key: origin.key.clone(),
+            origin: (!kept).then(|| Box::new(origin.clone())),
+        })
+    };
+    node.inputs.iter().map(input).collect()
+}
+
+fn origin_file(file: &SourceFile) -> OriginFile {
+    let name = file.path.rsplit(['/', '\\']).next().unwrap_or_default().to_owned();
+    OriginFile { name, size: file.size, blake3: file.blake3.clone() }
 }
 
 fn source_file(path: &Path) -> Result<SourceFile, StageError> {
@@ -67,35 +109,4 @@ fn source_file(path: &Path) -> Result<SourceFile, StageError> {
         .map_err(|error| StageError::new(format!("the file cannot be looked at: {error}")).at(path))?
         .len();
     Ok(SourceFile { path: path.display().to_string(), size, blake3: hash_file(path)? })
-}
-
-/// What a run would do with a stage, and why.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Decision {
-    /// Its result is in the cache.
-    Reuse,
-    /// It would run: no result lies under its key.
-    Run,
-    /// It runs every time: it lists or writes files.
-    Always,
-    /// Its files or its inputs are not there to be looked at.
-    Unknown(String),
-}
-
-/// Says for each stage of a plan whether it would run, in order, without running anything.
-pub fn explain(plan: &Plan, base: &Path, cache: &Cache) -> Vec<(String, Option<String>, Decision)> {
-    let mut keys: Vec<Option<String>> = Vec::new();
-    let mut rows = Vec::new();
-    for node in &plan.nodes {
-        let planned = plan_node(plan, node, base, &|index| keys.get(index).cloned().flatten());
-        let (key, decision) = match planned {
-            Err(error) => (None, Decision::Unknown(error.to_string())),
-            Ok(planned) if node.stage.spec().caching == Caching::Always => (Some(planned.key), Decision::Always),
-            Ok(planned) if cache.contains(&planned.key) => (Some(planned.key), Decision::Reuse),
-            Ok(planned) => (Some(planned.key), Decision::Run),
-        };
-        keys.push(key.clone());
-        rows.push((node.id.clone(), key, decision));
-    }
-    rows
 }

@@ -1,14 +1,18 @@
 //! The runner: independent stages in parallel, results from the cache where they are still valid.
 
+mod changes;
 mod error;
 mod execute;
+mod explain;
 mod keys;
 mod result;
 mod schedule;
 #[cfg(test)]
 mod tests;
 
+pub use changes::{Change, changes};
 pub use error::RunError;
 pub use execute::{Observer, Options, Quiet, run};
-pub use keys::{Decision, StagePlan, explain, stage_seed};
+pub use explain::{Decision, Explanation, Nearest, explain};
+pub use keys::{StagePlan, stage_seed};
 pub use result::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};

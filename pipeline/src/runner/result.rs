@@ -58,6 +58,10 @@ pub struct RunInfo {
     pub host: String,
     /// Threads.
     pub threads: usize,
+    /// The working directory: paths as found begin there. Empty if unknown.
+    pub folder: String,
+    /// The config file, as it was named. Empty if unknown.
+    pub config_file: String,
     /// Per stage id: seconds, and whether the result came from the cache.
     pub stages: Vec<(String, f64, bool)>,
 }

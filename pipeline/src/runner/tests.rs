@@ -131,7 +131,8 @@ fn a_result_is_computed_once_and_again_only_when_something_changed() {
     let other_limit = execute(&plan(4, 11.0), &cache, false).expect("runs");
     assert_eq!(cached(&other_limit), [true, false]);
     let other_count = plan(5, 10.0);
-    let decisions: Vec<Decision> = explain(&other_count, Path::new("."), &cache).into_iter().map(|row| row.2).collect();
+    let decisions: Vec<Decision> =
+        explain(&other_count, Path::new("."), "test", &cache).into_iter().map(|row| row.decision).collect();
     assert_eq!(decisions, [Decision::Run, Decision::Run]);
     assert_eq!(cached(&execute(&plan(4, 10.0), &cache, true).expect("runs")), [false, false], "--fresh");
 
@@ -139,6 +140,6 @@ fn a_result_is_computed_once_and_again_only_when_something_changed() {
     assert_eq!(errors.len(), 1);
     assert_eq!(errors[0].to_string(), "stage `square` (test.square), port `in`: found 4, wanted at most 3");
     let decisions: Vec<Decision> =
-        explain(&plan(5, 3.0), Path::new("."), &cache).into_iter().map(|row| row.2).collect();
+        explain(&plan(5, 3.0), Path::new("."), "test", &cache).into_iter().map(|row| row.decision).collect();
     assert_eq!(decisions, [Decision::Reuse, Decision::Run], "what was finished before the failure is kept");
 }

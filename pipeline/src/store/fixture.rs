@@ -182,6 +182,8 @@ pub(crate) fn run_result() -> RunResult {
             seconds: 1.5,
             host: "host".to_owned(),
             threads: 2,
+            folder: "/home/somebody".to_owned(),
+            config_file: "configs/free-lever.toml".to_owned(),
             stages: vec![("records".to_owned(), 0.5, false), ("events".to_owned(), 1.0, true)],
         },
     }

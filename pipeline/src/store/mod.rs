@@ -40,7 +40,7 @@ pub(crate) mod fixture;
 #[cfg(test)]
 mod tests;
 
-pub use compare::{Difference, compare};
+pub use compare::{Difference, Numbers, compare};
 pub use error::StoreError;
 pub use file_kind::{FileKind, file_kind, is_own};
 pub use format::FORMAT_VERSION;

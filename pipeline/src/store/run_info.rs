@@ -6,6 +6,9 @@ use super::error::{Result, StoreError};
 use super::{read, write};
 use crate::runner::RunInfo;
 
+const FOLDER: &str = "folder";
+const CONFIG_FILE: &str = "config_file";
+
 pub(super) fn write_run_info(parent: &Group, name: &str, info: &RunInfo) -> Result<()> {
     let group = write::nexus_group(parent, name, "NXcollection")?;
     write::text(&group, "started_at", &info.started_at)?;
@@ -13,6 +16,8 @@ pub(super) fn write_run_info(parent: &Group, name: &str, info: &RunInfo) -> Resu
     write::text_attribute(&seconds, "units", "s")?;
     write::text(&group, "host", &info.host)?;
     write::scalar(&group, "threads", info.threads as u64)?;
+    write::text(&group, FOLDER, &info.folder)?;
+    write::text(&group, CONFIG_FILE, &info.config_file)?;
     let stages = &info.stages;
     write::texts(&group, "stage", &stages.iter().map(|stage| stage.0.as_str()).collect::<Vec<_>>())?;
     let seconds: Vec<f64> = stages.iter().map(|stage| stage.1).collect();
@@ -31,7 +36,11 @@ pub(super) fn read_run_info(parent: &Group, name: &str) -> Result<RunInfo> {
     if names.len() != seconds.len() || names.len() != cached.len() {
         return Err(StoreError::new("the lists of stages differ in length").at(group.name()));
     }
+    // files of earlier versions have neither
+    let optional = |name: &str| if group.link_exists(name) { read::text(&group, name) } else { Ok(String::new()) };
     Ok(RunInfo {
+        folder: optional(FOLDER)?,
+        config_file: optional(CONFIG_FILE)?,
         started_at: read::text(&group, "started_at")?,
         seconds: read::number(&group, "seconds")?,
         host: read::text(&group, "host")?,

@@ -1,13 +1,20 @@
 //! Comparison of two result files, object by object, bit by bit.
 
+mod document;
+mod numbers;
+mod values;
+
 use std::path::Path;
 
-use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
-use hdf5::{Container, Group, H5Type, Location};
+use hdf5::{Container, Group, Location};
 
+pub use numbers::Numbers;
+
+use self::values::{Found, Values, differing, read_numbers};
 use super::error::{Result, StoreError};
 use super::read;
 use super::seal::check_seal;
+use crate::artifact::std_name;
 
 /// Left out: when and where a run took place.
 const LEFT_OUT: &str = "/entry/run";
@@ -16,12 +23,14 @@ const LEFT_OUT: &str = "/entry/run";
 const REFERENCES: [&str; 2] = ["DIMENSION_LIST", "REFERENCE_LIST"];
 
 /// One difference between two files.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Difference {
     /// The object, or `object@attribute`.
     pub place: String,
     /// What differs.
     pub what: String,
+    /// How far apart, if all that differs is numbers.
+    pub numbers: Option<Numbers>,
 }
 
 /// All differences between two result files (or two stage files) except under `/entry/run`, by place. Numbers are compared bit by bit.
@@ -37,7 +46,7 @@ pub fn compare(a: &Path, b: &Path) -> std::result::Result<Vec<Difference>, Store
 }
 
 fn push(found: &mut Vec<Difference>, place: &str, what: impl Into<String>) {
-    found.push(Difference { place: place.to_owned(), what: what.into() });
+    found.push(Difference { place: place.to_owned(), what: what.into(), numbers: None });
 }
 
 fn compare_groups(a: &Group, b: &Group, found: &mut Vec<Difference>) -> Result<()> {
@@ -58,7 +67,9 @@ fn compare_groups(a: &Group, b: &Group, found: &mut Vec<Difference>) -> Result<(
             compare_groups(&x, &y, found)?;
         } else if let (Ok(x), Ok(y)) = (a.dataset(name), b.dataset(name)) {
             compare_attributes(&x, &y, &place, found)?;
-            compare_values(&x, &y, &place, found)?;
+            // the first file's errors; the second's where the first has none
+            let errors = || standard_errors(a, name, &left).or_else(|| standard_errors(b, name, &right));
+            compare_values(&x, &y, &place, &errors, found)?;
         } else {
             push(found, &place, "a group in one file, a dataset in the other");
         }
@@ -91,59 +102,36 @@ fn compare_attributes(a: &Location, b: &Location, place: &str, found: &mut Vec<D
         push(found, &format!("{place}@{name}"), "only in the second file");
     }
     for name in left.iter().filter(|name| right.contains(name)) {
-        compare_values(&*a.attr(name)?, &*b.attr(name)?, &format!("{place}@{name}"), found)?;
+        compare_values(&*a.attr(name)?, &*b.attr(name)?, &format!("{place}@{name}"), &|| None, found)?;
     }
     Ok(())
 }
 
-fn compare_values(a: &Container, b: &Container, place: &str, found: &mut Vec<Difference>) -> Result<()> {
+/// Compares two datasets or attributes; `errors` gives the standard errors of the values, where there are any.
+fn compare_values(
+    a: &Container,
+    b: &Container,
+    place: &str,
+    errors: &dyn Fn() -> Option<Vec<f64>>,
+    found: &mut Vec<Difference>,
+) -> Result<()> {
     let (kind, other) = (read::descriptor(a)?, read::descriptor(b)?);
     let (shape, other_shape) = (a.get_shape()?, b.get_shape()?);
     if kind != other {
         push(found, place, format!("type {kind} in the first file, {other} in the second"));
     } else if shape != other_shape {
         push(found, place, format!("shape {shape:?} in the first file, {other_shape:?} in the second"));
-    } else if let Some(what) = differing(a, b, &kind).map_err(|error| error.at(place))? {
-        push(found, place, what);
+    } else if let Some(Found { what, numbers }) = differing(a, b, &kind, errors).map_err(|error| error.at(place))? {
+        found.push(Difference { place: place.to_owned(), what, numbers });
     }
     Ok(())
 }
 
-fn differing(a: &Container, b: &Container, kind: &TypeDescriptor) -> Result<Option<String>> {
-    use TypeDescriptor as T;
-    match kind {
-        T::Float(FloatSize::U8) => bitwise::<f64>(a, b, |value| value.to_bits()),
-        T::Float(FloatSize::U4) => bitwise::<f32>(a, b, |value| u64::from(value.to_bits())),
-        T::Integer(IntSize::U1) => bitwise::<i8>(a, b, |value| i64::from(value) as u64),
-        T::Integer(IntSize::U2) => bitwise::<i16>(a, b, |value| i64::from(value) as u64),
-        T::Integer(IntSize::U4) => bitwise::<i32>(a, b, |value| i64::from(value) as u64),
-        T::Integer(IntSize::U8) => bitwise::<i64>(a, b, |value| value as u64),
-        T::Unsigned(IntSize::U1) => bitwise::<u8>(a, b, u64::from),
-        T::Unsigned(IntSize::U2) => bitwise::<u16>(a, b, u64::from),
-        T::Unsigned(IntSize::U4) => bitwise::<u32>(a, b, u64::from),
-        T::Unsigned(IntSize::U8) => bitwise::<u64>(a, b, |value| value),
-        T::VarLenAscii | T::VarLenUnicode | T::FixedAscii(_) | T::FixedUnicode(_) => {
-            let (left, right) = (read::read_texts(a)?, read::read_texts(b)?);
-            Ok(summary(&left, &right, |x, y| x == y))
-        }
-        other => Err(StoreError::new(format!("values of type {other} cannot be compared"))),
+/// The standard errors of dataset `name`, if its group holds them under the name that says so.
+fn standard_errors(group: &Group, name: &str, names: &[String]) -> Option<Vec<f64>> {
+    let errors = group.dataset(std_name(name, names.iter().map(String::as_str))?).ok()?;
+    match read_numbers(&errors).ok()? {
+        Some(Values { numbers, .. }) => Some(numbers),
+        None => None,
     }
-}
-
-fn bitwise<T>(a: &Container, b: &Container, bits: fn(T) -> u64) -> Result<Option<String>>
-where
-    T: H5Type + Copy + std::fmt::Debug,
-{
-    read::check_size(a, size_of::<T>())?;
-    read::check_size(b, size_of::<T>())?;
-    let (left, right) = (a.read_raw::<T>()?, b.read_raw::<T>()?);
-    Ok(summary(&left, &right, |&x, &y| bits(x) == bits(y)))
-}
-
-/// How many values differ, and the first of them.
-fn summary<T: std::fmt::Debug>(left: &[T], right: &[T], same: impl Fn(&T, &T) -> bool) -> Option<String> {
-    let mut differing = left.iter().zip(right).enumerate().filter(|(_, (x, y))| !same(x, y));
-    let (index, (x, y)) = differing.next()?;
-    let count = 1 + differing.count();
-    Some(format!("{count} of {} values differ, first at {index}: {x:?} and {y:?}", left.len()))
 }

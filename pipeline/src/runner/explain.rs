@@ -1,0 +1,97 @@
+//! What a run would do with each stage, and why.
+
+use std::path::Path;
+use std::time::SystemTime;
+
+use super::changes::{Change, changes};
+use super::keys::plan_node;
+use crate::cache::{Cache, Origin};
+use crate::graph::{Node, Plan};
+use crate::stage::Caching;
+
+/// What a run would do with a stage, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Decision {
+    /// Its result is in the cache.
+    Reuse,
+    /// It would run: no result lies under its key.
+    Run,
+    /// It runs every time: it lists or writes files.
+    Always,
+    /// Its files or its inputs are not there to be looked at.
+    Unknown(String),
+}
+
+/// A stage of a plan, what a run would do with it, and why.
+#[derive(Debug, Clone)]
+pub struct Explanation {
+    /// The stage's id.
+    pub id: String,
+    /// Its name in the registry.
+    pub uses: String,
+    /// Content address of its result, if it is known.
+    pub key: Option<String>,
+    /// What a run would do.
+    pub decision: Decision,
+    /// The nearest earlier result of the same stage, if it would run and there is one.
+    pub nearest: Option<Nearest>,
+}
+
+/// An earlier result of the same stage.
+#[derive(Debug, Clone)]
+pub struct Nearest {
+    /// Where it comes from.
+    pub origin: Origin,
+    /// What has changed since. None: only the result is gone.
+    pub changes: Vec<Change>,
+}
+
+/// Says for each stage of a plan whether it would run, and what has changed since its nearest earlier result, without running anything.
+pub fn explain(plan: &Plan, base: &Path, program: &str, cache: &Cache) -> Vec<Explanation> {
+    let mut origins: Vec<Option<Origin>> = Vec::new();
+    let mut rows = Vec::new();
+    let mut earlier: Option<Vec<(Origin, SystemTime)>> = None;
+    for node in &plan.nodes {
+        let planned = plan_node(plan, node, base, program, &|index| origins.get(index).and_then(Option::as_ref));
+        let (origin, decision) = match planned {
+            Err(error) => (None, Decision::Unknown(error.to_string())),
+            Ok(planned) => {
+                let decision = decide(node, &planned.key, cache);
+                (Some(planned.origin), decision)
+            }
+        };
+        // listed once, and only if something would run
+        let nearest = origin
+            .as_ref()
+            .filter(|_| decision == Decision::Run)
+            .and_then(|origin| nearest(origin, earlier.get_or_insert_with(|| cache.origins()), cache));
+        let key = origin.as_ref().map(|origin| origin.key.clone());
+        rows.push(Explanation { id: node.id.clone(), uses: node.uses.clone(), key, decision, nearest });
+        origins.push(origin);
+    }
+    rows
+}
+
+fn decide(node: &Node, key: &str, cache: &Cache) -> Decision {
+    match node.stage.spec().caching {
+        Caching::Always => Decision::Always,
+        Caching::Stored if cache.contains(key) => Decision::Reuse,
+        Caching::Stored => Decision::Run,
+    }
+}
+
+/// The earlier result of the same stage that is most like it: of the same id and pipeline if there is one, with the fewest changes, last used.
+fn nearest(origin: &Origin, earlier: &[(Origin, SystemTime)], cache: &Cache) -> Option<Nearest> {
+    if let Some(gone) = cache.origin(&origin.key) {
+        return Some(Nearest { origin: gone, changes: Vec::new() });
+    }
+    let same_stage = earlier.iter().filter(|(other, _)| other.uses == origin.uses);
+    same_stage
+        .map(|(other, used)| {
+            let changes = changes(other, origin);
+            let elsewhere = (&other.pipeline, &other.id) != (&origin.pipeline, &origin.id);
+            ((elsewhere, changes.len(), std::cmp::Reverse(*used)), other, changes)
+        })
+        .min_by(|a, b| (&a.0, &a.1.key).cmp(&(&b.0, &b.1.key)))
+        .map(|(_, other, changes)| Nearest { origin: other.clone(), changes })
+}

@@ -1,0 +1,28 @@
+//! `afmid diff`: what differs between two result files.
+
+use std::path::Path;
+
+use afmid_pipeline::store::ResultFile;
+
+use super::open::require_result;
+use crate::cli::DiffArgs;
+use crate::failure::{Failure, Message};
+use crate::output::print;
+use crate::provenance::diff::Diff;
+use crate::show::{diff_text, pretty};
+
+/// Compares two result files.
+pub fn run(args: &DiffArgs) -> Result<(), Failure> {
+    let (a, b) = (open(&args.a)?, open(&args.b)?);
+    let diff = Diff::of(&a, &b).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    let json = || serde_json::to_value(&diff).map_err(|error| Failure::failed(error, None));
+    print(&if args.json { pretty(&json()?)? } else { diff_text(&diff) })?;
+    // what was printed says all
+    if args.exit_code && !diff.equal { Err(Failure::Failed(Message::Rendered(String::new()))) } else { Ok(()) }
+}
+
+/// Opens a result file. Errors: usage if it is none; it is damaged.
+pub fn open(path: &Path) -> Result<ResultFile, Failure> {
+    require_result(path)?;
+    ResultFile::open(path).map_err(|error| Failure::failed(&error, error.help.clone()))
+}

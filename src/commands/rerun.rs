@@ -1,0 +1,180 @@
+//! `afmid rerun`: repeats a run from its own result file and compares.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::cache::write_result;
+use afmid_pipeline::store::ResultFile;
+use afmid_pipeline::{Plan, Registry, SourceFile, graph};
+use serde_json::{Value, json};
+
+use super::diff::open;
+use super::run::{Computation, PROGRAM, compute, open_cache};
+use super::target::{Input, Target, prepare};
+use crate::cli::RerunArgs;
+use crate::diagnostic::render;
+use crate::failure::{Failure, Message};
+use crate::output::{print, say};
+use crate::provenance::diff::Diff;
+use crate::provenance::files::{Finder, Now};
+use crate::provenance::repeat::{Writer, base, config_path, places, unfit, writers};
+use crate::provenance::same::{TOLERANCE, Verdict, distance, judge, results};
+use crate::show::{number, pretty, results_text};
+
+/// Files that are told of where some are missing.
+const MOST: usize = 20;
+
+/// Repeats a run and compares.
+pub fn run(args: &RerunArgs, registry: &Registry) -> Result<(), Failure> {
+    let file = open(&args.result)?;
+    let finder = Finder::new(&file.run().info, &args.data);
+    require_inputs(&file, &finder)?;
+    let scratch = tempfile::tempdir()
+        .map_err(|error| Failure::failed(format!("no temporary folder can be made: {error}"), None))?;
+    let base = base(&file.run().info);
+    let (plan, writers) = plan(&file, &base, &finder, scratch.path(), registry)?;
+    let output = args.output.clone().unwrap_or_else(|| scratch.path().join("repeated.h5"));
+    prepare(&output, Target::Result, &inputs(args, &file, &finder))?;
+    let cache = open_cache(args.cache.as_deref())?;
+    let overrides = &file.run().overrides;
+    let mut repeated =
+        compute(&plan, &Computation { base: &base, cache: &cache, fresh: !args.reuse, jobs: args.jobs, overrides });
+    repeated.iter_mut().for_each(|repeated| writers.iter().for_each(|writer| writer.put_back(repeated)));
+    cache.take_notes().iter().for_each(|note| say(&format!("note: {note}\n")));
+    let failed = |error: &afmid_pipeline::store::StoreError| Failure::failed(error, error.help.clone());
+    write_result(&output, &repeated?).map_err(|error| failed(&error))?;
+    let diff = Diff::of(&file, &open(&output)?).map_err(|error| failed(&error))?;
+    let verdict = judge(&diff);
+    let told = Told { args, file: &file, plan: &plan, diff: &diff, verdict };
+    print(&if args.json { pretty(&told.json()?)? } else { told.text() })?;
+    // what was printed says all
+    if verdict == Verdict::Differs { Err(Failure::Failed(Message::Rendered(String::new()))) } else { Ok(()) }
+}
+
+/// Errors: files are missing or have other bytes, all of them told.
+fn require_inputs(file: &ResultFile, finder: &Finder) -> Result<(), Failure> {
+    let unfit = unfit(file, finder);
+    let Some(total) = Some(unfit.len()).filter(|&total| total > 0) else { return Ok(()) };
+    let line = |(source, now): &(SourceFile, Now)| format!("  {}: {}\n", source.path, now.text());
+    let mut list: String = unfit.iter().take(MOST).map(line).collect();
+    if total > MOST {
+        list.push_str(&format!("  ... and {} more\n", total - MOST));
+    }
+    let what = if total == 1 { "1 file that it read is" } else { &format!("{total} files that it read are") };
+    let message = format!("{}: {what} not there with the same bytes:\n{}", file.path().display(), list.trim_end());
+    Err(Failure::failed(message, Some("nothing was run; `--data FOLDER` looks there by name and hash".to_owned())))
+}
+
+/// The plan of the stored config, reading the files where they are now, and its stages that write. Errors, usage: this program cannot run it any more.
+fn plan(
+    file: &ResultFile,
+    base: &Path,
+    finder: &Finder,
+    scratch: &Path,
+    registry: &Registry,
+) -> Result<(Plan, Vec<Writer>), Failure> {
+    let run = file.run();
+    let name = config_path(&run.info).display().to_string();
+    let load = |sets: &[String]| {
+        graph::load(&name, &run.config, sets, registry)
+            .map_err(|problems| Failure::Usage(Message::Rendered(render(&name, &run.config, &problems))))
+    };
+    let plan = load(&run.overrides)?;
+    let writers = writers(&plan, base, scratch);
+    let mut sets = places(&plan, file, base, finder);
+    sets.extend(writers.iter().map(Writer::set));
+    let plan = if sets.is_empty() { plan } else { load(&[&run.overrides[..], &sets].concat())? };
+    Ok((plan, writers))
+}
+
+/// What the repetition must not write over.
+fn inputs(args: &RerunArgs, file: &ResultFile, finder: &Finder) -> Vec<Input> {
+    let mut inputs: Vec<Input> = vec![("the result file", args.result.clone())];
+    for source in file.stages().iter().flat_map(|stage| &stage.record.sources) {
+        if let Now::Same(path) = finder.find(source) {
+            inputs.push(("a record", path));
+        }
+    }
+    inputs
+}
+
+struct Told<'a> {
+    args: &'a RerunArgs,
+    file: &'a ResultFile,
+    plan: &'a Plan,
+    diff: &'a Diff,
+    verdict: Verdict,
+}
+
+impl Told<'_> {
+    fn outputs(&self) -> usize {
+        self.file.stages().iter().map(|stage| stage.ports.len()).sum()
+    }
+
+    /// Stages of which this program has another version, as (id, then, now).
+    fn versions(&self) -> Vec<(&str, u32, u32)> {
+        let of = |node: &afmid_pipeline::Node| self.file.stage(&node.id).map(|stage| stage.record.version);
+        let nodes = self.plan.nodes.iter();
+        nodes
+            .filter_map(|node| Some((node.id.as_str(), of(node)?, node.stage.spec().version)))
+            .filter(|(_, then, now)| then != now)
+            .collect()
+    }
+
+    fn largest(&self) -> f64 {
+        results(self.diff).iter().map(|(_, result)| distance(result)).fold(0.0, f64::max)
+    }
+
+    fn text(&self) -> String {
+        let (path, outputs) = (self.file.path().display(), self.outputs());
+        let mut text = String::new();
+        if self.file.run().program != PROGRAM {
+            text.push_str(&format!("made by {}, repeated by {PROGRAM}\n", self.file.run().program));
+        }
+        for (id, then, now) in self.versions() {
+            text.push_str(&format!("stage {id}: version {now} here, it was {then}\n"));
+        }
+        let rows = results(self.diff);
+        let stages = self.plan.nodes.len();
+        text.push_str(&match self.verdict {
+            Verdict::Identical => format!("{path}: identical, all {outputs} outputs of {stages} stages bit for bit\n"),
+            Verdict::Within => format!(
+                "{path}: within {TOLERANCE:e}, {} of the datasets of {outputs} outputs differ, by {} at most\n",
+                rows.len(),
+                number(self.largest())
+            ),
+            Verdict::Differs => {
+                let many = if rows.len() == 1 { "" } else { "s" };
+                format!("{path}: differs in {} dataset{many} of {outputs} outputs\n", rows.len())
+            }
+        });
+        for stage in &self.diff.stages {
+            let of: Vec<_> = rows.iter().filter(|(id, _)| *id == stage.id).map(|(_, result)| *result).collect();
+            if !of.is_empty() {
+                text.push_str(&format!("stage {}\n{}", stage.id, results_text(&of)));
+            }
+        }
+        text
+    }
+
+    fn json(&self) -> Result<Value, Failure> {
+        let output: Option<&PathBuf> = self.args.output.as_ref();
+        let differences = results(self.diff).into_iter().map(|(id, result)| {
+            let mut row = serde_json::to_value(result).map_err(|error| Failure::failed(error, None))?;
+            row["stage"] = json!(id);
+            row["distance"] = json!(Some(distance(result)).filter(|distance| distance.is_finite()));
+            Ok(row)
+        });
+        let version = |(id, then, now): (&str, u32, u32)| json!({ "stage": id, "then": then, "now": now });
+        Ok(json!({
+            "file": self.file.path().display().to_string(),
+            "output": output.map(|output| output.display().to_string()),
+            "verdict": self.verdict.name(),
+            "tolerance": TOLERANCE,
+            "largest": Some(self.largest()).filter(|largest| largest.is_finite()),
+            "outputs": self.outputs(),
+            "program": { "then": self.file.run().program, "now": PROGRAM },
+            "versions": self.versions().into_iter().map(version).collect::<Vec<_>>(),
+            "differences": differences.collect::<Result<Vec<Value>, Failure>>()?,
+        }))
+    }
+}

@@ -1,0 +1,106 @@
+//! Differences between two result files as text.
+
+use serde_json::Value;
+
+use super::grid::grid;
+use super::number::number;
+use crate::provenance::diff::{Diff, Files, Lines, Pair, ResultDiff, StageDiff};
+
+/// Datasets that are told of one stage; `--json` has all.
+const MOST: usize = 40;
+
+/// Differences as text, the first file on the left.
+pub fn diff_text(diff: &Diff) -> String {
+    let (a, b) = (&diff.a, &diff.b);
+    if diff.equal {
+        return format!("{a} and {b} are equal\n");
+    }
+    let results = if diff.results_equal { ", their results are equal" } else { "" };
+    let mut text = format!("{a} and {b} differ{results}\n");
+    pairs(&diff.run, "", &mut text);
+    lines("config", &diff.config, &mut text);
+    diff.stages_only_in_a.iter().for_each(|id| text.push_str(&format!("stage {id}: only in {a}\n")));
+    diff.stages_only_in_b.iter().for_each(|id| text.push_str(&format!("stage {id}: only in {b}\n")));
+    diff.stages.iter().for_each(|stage| stage_text(stage, &mut text));
+    for other in &diff.other {
+        text.push_str(&format!("{}: {}\n", other.place, other.what));
+    }
+    text
+}
+
+fn stage_text(stage: &StageDiff, text: &mut String) {
+    text.push_str(&format!("stage {}\n", stage.id));
+    pairs(&stage.stage, "  ", text);
+    pairs(&stage.parameters, "  parameter ", text);
+    pairs(&stage.inputs, "  input ", text);
+    files(&stage.files, text);
+    lines("  warnings", &stage.warnings, text);
+    let results: Vec<&ResultDiff> = stage.results.iter().filter(|result| !result.place_only).collect();
+    if !results.is_empty() {
+        for line in results_text(&results).lines() {
+            text.push_str(&format!("  {line}\n"));
+        }
+    }
+    if results.len() > MOST {
+        text.push_str(&format!("  ... {} more: see --json\n", results.len() - MOST));
+    }
+}
+
+fn pairs(pairs: &[Pair], head: &str, text: &mut String) {
+    let side = |value: &Value| if value.is_null() { "none".to_owned() } else { value.to_string() };
+    for pair in pairs {
+        text.push_str(&format!("{head}{}: {} | {}\n", pair.name, side(&pair.a), side(&pair.b)));
+    }
+}
+
+fn lines(head: &str, lines: &Lines, text: &mut String) {
+    if !lines.differs {
+        return;
+    }
+    text.push_str(&format!("{head}:\n"));
+    let indent = " ".repeat(head.len() - head.trim_start().len());
+    lines.lines_only_in_a.iter().for_each(|line| text.push_str(&format!("{indent}  - {line}\n")));
+    lines.lines_only_in_b.iter().for_each(|line| text.push_str(&format!("{indent}  + {line}\n")));
+    if lines.lines_only_in_a.is_empty() && lines.lines_only_in_b.is_empty() {
+        text.push_str(&format!("{indent}  the same lines in another order\n"));
+    }
+}
+
+fn files(files: &Files, text: &mut String) {
+    files.only_in_a.iter().for_each(|name| text.push_str(&format!("  - file {name}\n")));
+    files.only_in_b.iter().for_each(|name| text.push_str(&format!("  + file {name}\n")));
+    for pair in &files.other_bytes {
+        let short = |value: &Value| value.as_str().unwrap_or_default().chars().take(16).collect::<String>();
+        text.push_str(&format!("  file {}: other bytes, {} | {}\n", pair.name, short(&pair.a), short(&pair.b)));
+    }
+    match files.moved {
+        0 => {}
+        1 => text.push_str("  1 file with the same bytes was found elsewhere\n"),
+        many => text.push_str(&format!("  {many} files with the same bytes were found elsewhere\n")),
+    }
+    if files.reordered {
+        text.push_str("  the same files in another order\n");
+    }
+}
+
+/// Results that differ as a table.
+pub fn results_text(results: &[&ResultDiff]) -> String {
+    let head = ["output", "dataset", "differ", "largest", "relative", "in errors", "at"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let shown = |value: Option<f64>| value.map_or("-".to_owned(), number);
+    for result in results.iter().take(MOST) {
+        let dataset = if result.dataset.is_empty() { "-" } else { &result.dataset };
+        let mut row = vec![result.output.clone(), dataset.to_owned()];
+        match (result.differing, result.of) {
+            (Some(differing), Some(of)) => {
+                let numbers = [result.largest, result.relative, result.in_errors].map(shown);
+                row.push(format!("{differing} of {of}"));
+                row.extend(numbers);
+                row.push(result.at.clone().unwrap_or_default());
+            }
+            _ => row.push(result.what.clone()),
+        }
+        rows.push(row);
+    }
+    grid(&rows)
+}
