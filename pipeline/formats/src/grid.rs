@@ -6,6 +6,7 @@ use crate::packed::Packed;
 use crate::pinned::{Pinned, read_at, stretch_end};
 use crate::{FormatError, Raw, Source};
 use std::fs::File;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Bytes read at once where samples of other channels lie between.
@@ -38,6 +39,26 @@ pub(crate) struct Grid {
     pub(crate) number: Number,
     /// Their byte order.
     pub(crate) big_endian: bool,
+}
+
+/// A source of numbers at equal spacing in a file: the first at byte `first`, each `step` bytes behind the one before.
+///
+/// Errors: no such file; the numbers would lie outside of it.
+pub fn numbers_in_file(
+    path: &Path,
+    (first, step): (u64, u64),
+    samples: usize,
+    number: Number,
+    big_endian: bool,
+) -> Result<Arc<dyn Source>, FormatError> {
+    let (pinned, _) = Pinned::open(path).map_err(|error| error.in_file(path))?;
+    let length =
+        (samples as u64).saturating_sub(1).checked_mul(step).and_then(|bytes| bytes.checked_add(number.bytes()));
+    let end = length.and_then(|length| first.checked_add(length)).unwrap_or(u64::MAX);
+    if samples > 0 && (end > pinned.bytes() || step < number.bytes()) {
+        return Err(fail::truncated("samples", first, end.saturating_sub(first), pinned.bytes()).in_file(path));
+    }
+    Ok(Arc::new(Grid { store: Store::File(pinned), first, step, samples, number, big_endian }))
 }
 
 impl Source for Grid {

@@ -5,13 +5,13 @@ const FEW: usize = 16;
 
 /// How an array falls into channels. All distances count elements.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Lanes {
+pub struct Lanes {
     /// Samples of each channel.
-    pub(crate) samples: usize,
+    pub samples: usize,
     /// From one sample to the next.
-    pub(crate) step: u64,
+    pub step: u64,
     /// Whether the last axis of a wide two-dimensional array was taken for time.
-    pub(crate) wide: bool,
+    pub wide: bool,
     others: Vec<(usize, u64)>,
 }
 
@@ -21,7 +21,7 @@ impl Lanes {
     /// most 16 rows and at least 16 times as many columns, because 16 samples are no recording.
     ///
     /// None if a size is 0 or the number of elements overflows.
-    pub(crate) fn of(shape: &[usize], first_axis_fastest: bool) -> Option<Self> {
+    pub fn of(shape: &[usize], first_axis_fastest: bool) -> Option<Self> {
         let axes = strided(shape, first_axis_fastest)?;
         let (&(rows, down), others) = axes.split_first().unwrap_or((&(1, 1), &[]));
         match others {
@@ -33,13 +33,13 @@ impl Lanes {
     }
 
     /// Number of channels.
-    pub(crate) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.others.iter().map(|&(size, _)| size).product()
     }
 
     /// Index (`[2]`, `[2,3]`, empty for the only one), counted from `base`, and first element of each channel; the first index
     /// changes fastest.
-    pub(crate) fn each(&self, base: usize) -> impl Iterator<Item = (String, u64)> {
+    pub fn each(&self, base: usize) -> impl Iterator<Item = (String, u64)> {
         (0..self.count()).map(move |number| {
             let (mut left, mut first, mut index) = (number, 0, Vec::new());
             for &(size, step) in &self.others {

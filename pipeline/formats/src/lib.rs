@@ -30,7 +30,10 @@ pub mod uff;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use rate::{Clue, agreed_rate};
+pub use grid::numbers_in_file;
+pub use lanes::Lanes;
+pub use number::Number;
+pub use rate::{Clue, agreed_rate, rate_in};
 pub use raw::Raw;
 pub use raw_binary::{RawBinary, SampleType};
 pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};

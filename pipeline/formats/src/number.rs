@@ -29,22 +29,32 @@ impl Order {
 
 /// Type of a stored number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Number {
+pub enum Number {
+    /// Signed byte.
     I8,
+    /// Unsigned byte.
     U8,
+    /// Signed, 16 bits.
     I16,
+    /// Unsigned, 16 bits.
     U16,
+    /// Signed, 32 bits.
     I32,
+    /// Unsigned, 32 bits.
     U32,
+    /// Signed, 64 bits.
     I64,
+    /// Unsigned, 64 bits.
     U64,
+    /// IEEE single precision.
     F32,
+    /// IEEE double precision.
     F64,
 }
 
 impl Number {
     /// Bytes of one.
-    pub(crate) fn bytes(self) -> u64 {
+    pub const fn bytes(self) -> u64 {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -54,7 +64,7 @@ impl Number {
     }
 
     /// Name for people.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::I8 => "int8",
             Self::U8 => "uint8",
@@ -70,7 +80,7 @@ impl Number {
     }
 
     /// Whether codes beyond 2^53 are rounded, because they are given as `f64`.
-    pub(crate) fn may_be_rounded(self) -> bool {
+    pub fn may_be_rounded(self) -> bool {
         matches!(self, Self::I64 | Self::U64)
     }
 
@@ -80,7 +90,7 @@ impl Number {
     }
 
     /// Decodes numbers that lie side by side; an incomplete last one is left out.
-    pub(crate) fn decode(self, bytes: &[u8], big_endian: bool) -> Raw {
+    pub fn decode(self, bytes: &[u8], big_endian: bool) -> Raw {
         let big = big_endian;
         match self {
             Self::I8 => Raw::Int16(each(bytes, big, |b| i16::from(i8::from_le_bytes(b)))),

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-/// Names whose value is a rate in hertz.
-const RATES: [&str; 18] = [
+/// Names whose value is a rate in hertz. `IO_rate_[Hz]` and `IO_samp_rate_[Hz]` are those of general-mode AFM files.
+const RATES: [&str; 19] = [
     "fs",
     "Fs",
     "f_s",
@@ -21,7 +21,8 @@ const RATES: [&str; 18] = [
     "SamplingFrequency",
     "sampling_rate_hz",
     "samplerate_hz",
-    "SampleRate_Hz",
+    "IO_samp_rate_[Hz]",
+    "IO_rate_[Hz]",
 ];
 
 /// Names whose value is the time between two samples in seconds. `Tinterval` is PicoScope's.
@@ -64,7 +65,7 @@ impl Clue {
 }
 
 /// What the clues of each scope (a struct, or the file: empty) say about the arrays of one. The nearest scope with a clue decides.
-pub(crate) fn rate_in(scope: &str, clues: &HashMap<String, Vec<Clue>>) -> (Option<f64>, Option<String>) {
+pub fn rate_in(scope: &str, clues: &HashMap<String, Vec<Clue>>) -> (Option<f64>, Option<String>) {
     let mut scope = scope;
     loop {
         if let Some(here) = clues.get(scope) {

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use serde_json::json;
 
 use crate::artifact::{Array, Artifact, Attribute, Axis, Document, Matrix, StateSpace, Table};
-use crate::recording::{Channel, DeferredSource, Record, Recording};
+use crate::recording::{Channel, DeferredSource, Reading, Record, Recording};
 use crate::runner::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};
 use crate::stage::Ports;
 
@@ -110,6 +110,8 @@ pub(crate) fn recording() -> Recording {
         blake3: "ab".repeat(32),
         sample_rate_hz: 5e6,
         started_at: "2005-03-01T10:00:00Z".to_owned(),
+        first_sample: 0,
+        reading: Reading::default(),
         channels: vec![channel(&path(index), "deflection", Some(-32768.0)), channel(&path(index), "piezo", None)],
     };
     Recording { records: (0..3).map(record).collect() }
