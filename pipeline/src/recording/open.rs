@@ -57,7 +57,12 @@ pub fn open_records(path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened,
     let contents = kept::contents(path, size, &reading)?;
     let file = File { path, size, reading, contents: &contents };
     let records = file.records(wanted, how).map_err(|error| error.at(path))?;
-    Ok(Opened { format, records, remarks: contents.remarks.clone() })
+    let mut remarks = contents.remarks.clone();
+    if records.len() > 1 {
+        remarks
+            .insert(0, format!("the recording was interrupted {} times: {} records", records.len() - 1, records.len()));
+    }
+    Ok(Opened { format, records, remarks })
 }
 
 /// A file that is open.
