@@ -6,6 +6,7 @@ mod docs;
 mod exam;
 mod explain;
 mod graph;
+mod inspect;
 mod load;
 mod open;
 mod report;
@@ -25,6 +26,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
     match command {
         Command::Run(args) => run::run(&args, registry),
         Command::Explain(args) => explain::run(&args, registry),
+        Command::Inspect { files, json } => inspect::run(&files, json),
         Command::Show { result, id, json } => show::run(&result, id.as_deref(), json),
         Command::Report(args) => report::run(&args),
         Command::Check { configs } => check::run(&configs, registry),

@@ -20,6 +20,8 @@ mod write;
 #[cfg(test)]
 mod foreign_tests;
 #[cfg(test)]
+mod open_tests;
+#[cfg(test)]
 mod tests;
 
 use std::path::PathBuf;
