@@ -4,6 +4,7 @@
 //! any stretch of these. Nothing here knows physics, HDF5 or the rest of afmid.
 
 mod archive;
+mod calendar;
 mod fail;
 mod grid;
 pub mod igor;

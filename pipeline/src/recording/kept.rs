@@ -39,6 +39,9 @@ pub(super) fn contents(path: &Path, size: u64, reading: &Reading) -> Result<Arc<
     }
     let key = Key { path: path.to_owned(), size, modified: metadata.modified().ok(), reading: reading.clone() };
     let slot = slot_of(&key);
+    if let Some(opened) = slot.get() {
+        return opened.clone();
+    }
     // opened outside the lock: another thread may want another file meanwhile, the same file is opened once
     let opened = slot.get_or_init(|| Ok(Arc::new(open_contents(path, reading)?.1))).clone();
     trim(&key, opened.is_err());

@@ -94,6 +94,17 @@ pub struct Channel {
     pub source: Arc<dyn Source>,
 }
 
+impl Recording {
+    /// Bytes of all its files, each counted once however many stretches it has.
+    pub fn file_bytes(&self) -> u64 {
+        let mut files: Vec<(&std::path::Path, u64)> =
+            self.records.iter().map(|record| (record.path.as_path(), record.size)).collect();
+        files.sort_unstable();
+        files.dedup();
+        files.into_iter().map(|(_, size)| size).sum()
+    }
+}
+
 impl Record {
     /// The channel with this role. Errors: the record has none.
     pub fn channel(&self, role: &str) -> Result<&Channel, StageError> {

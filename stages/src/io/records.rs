@@ -149,8 +149,9 @@ impl Stage for Records {
             return Err(too_slow(&records, consistency.sample_rate_hz, self.min_sample_rate_hz));
         }
         consistency.remarks.iter().for_each(|remark| cx.warn(remark));
-        let summary = Document::new(&Summary::new(&records, &consistency))?;
-        Ok(Ports::new().with(&RECORDS, Recording { records }).with(&SUMMARY, summary))
+        let recording = Recording { records };
+        let summary = Document::new(&Summary::new(&recording.records, recording.file_bytes(), &consistency))?;
+        Ok(Ports::new().with(&RECORDS, recording).with(&SUMMARY, summary))
     }
 
     fn examples() -> Vec<Example> {
@@ -279,7 +280,7 @@ struct Summary {
 }
 
 impl Summary {
-    fn new(records: &[Record], consistency: &Consistency) -> Self {
+    fn new(records: &[Record], bytes: u64, consistency: &Consistency) -> Self {
         let name = |record: Option<&Record>| record.map_or(String::new(), |record| record.name.clone());
         Self {
             records: records.len(),
@@ -290,8 +291,7 @@ impl Summary {
             shortest_samples: consistency.shortest_samples,
             longest_samples: consistency.longest_samples,
             with_piezo: records.iter().filter(|record| record.channel("piezo").is_ok()).count(),
-            // stretches of one file lie in that file once
-            bytes: records.iter().filter(|record| record.first_sample == 0).map(|record| record.size).sum(),
+            bytes,
             first: name(records.first()),
             last: name(records.last()),
             started_at: records.first().map(|record| record.started_at.clone()).filter(|text| !text.is_empty()),

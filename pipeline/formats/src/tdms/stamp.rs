@@ -1,5 +1,7 @@
 //! Time stamps: seconds since the beginning of 1904, UTC, and a fraction in 2^-64 s.
 
+use crate::calendar::{DAYS_1904_TO_1970, date_of};
+
 /// A time stamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Stamp {
@@ -7,8 +9,6 @@ pub(super) struct Stamp {
     pub(super) fraction: u64,
 }
 
-/// Days from 1904-01-01 to 1970-01-01: 66 years, 17 of them leap years.
-const DAYS_1904_TO_1970: i64 = 66 * 365 + 17;
 const NANO: u128 = 1_000_000_000;
 
 impl Stamp {
@@ -21,7 +21,7 @@ impl Stamp {
     pub(super) fn seconds_since(self, other: Self) -> f64 {
         const FRACTIONS_PER_SECOND: f64 = 18_446_744_073_709_551_616.0;
         // In whole fractions, so that two times of this century keep their nanoseconds.
-        (self.fractions() - other.fractions()) as f64 / FRACTIONS_PER_SECOND
+        self.fractions().saturating_sub(other.fractions()) as f64 / FRACTIONS_PER_SECOND
     }
 
     fn fractions(self) -> i128 {
@@ -44,7 +44,7 @@ impl Stamp {
     pub(super) fn iso(self) -> Option<String> {
         let nano = ((u128::from(self.fraction) * NANO + (1 << 63)) >> 64).min(NANO - 1);
         let (days, second) = (self.seconds.div_euclid(86_400), self.seconds.rem_euclid(86_400));
-        let (year, month, day) = civil(days.checked_sub(DAYS_1904_TO_1970)?)?;
+        let (year, month, day) = date_of(days.checked_sub(DAYS_1904_TO_1970)?)?;
         let fraction = match nano {
             0 => String::new(),
             nano => format!(".{nano:09}").trim_end_matches('0').to_owned(),
@@ -52,20 +52,6 @@ impl Stamp {
         let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
         Some(format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}{fraction}Z"))
     }
-}
-
-/// Year, month and day of a day counted from 1970-01-01 (proleptic Gregorian, years begin in March while counting so that the leap day is the last).
-fn civil(days: i64) -> Option<(i64, i64, i64)> {
-    let days = days.checked_add(719_468)?;
-    let era = days.div_euclid(146_097);
-    let day_of_era = days.rem_euclid(146_097);
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let month_from_march = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
-    let year = era * 400 + year_of_era + i64::from(month <= 2);
-    (1..=9999).contains(&year).then_some((year, month, day))
 }
 
 #[cfg(test)]
@@ -93,6 +79,9 @@ mod tests {
         assert_eq!(noon.later_by(0.5), Stamp { seconds: 11, fraction: 1 << 62 });
         assert_eq!(noon.later_by(-0.5), Stamp { seconds: 10, fraction: 1 << 62 });
         assert_eq!(noon.later_by(f64::NAN), noon);
+        // Further apart than the range: no overflow.
+        let (first, last) = (Stamp { seconds: i64::MIN, fraction: 0 }, Stamp { seconds: i64::MAX, fraction: u64::MAX });
+        assert!(last.seconds_since(first) > 9e18 && first.seconds_since(last) < -9e18);
         // 0.5 s is a power of two: exact.
         assert_eq!(noon.later_by(0.5).seconds_since(noon), 0.5);
     }

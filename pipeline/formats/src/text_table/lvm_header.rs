@@ -3,6 +3,7 @@
 use super::lines::{Line, Lines};
 use super::number;
 use crate::FormatError;
+use crate::calendar::days_to;
 use crate::fail;
 use std::collections::HashMap;
 
@@ -128,14 +129,7 @@ pub(super) fn moment(date: &str, time: &str) -> Option<(String, i64, f64)> {
     let dot = if digits.is_empty() { "" } else { "." };
     let iso = format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}{dot}{digits}");
     let rest = format!("0.{fraction}").parse().unwrap_or(0.0);
-    Some((iso, days(year, month, day) * 86_400 + hour * 3600 + minute * 60 + second, rest))
-}
-
-/// Days since 1970-01-01 (years begin in March while counting so that the leap day is the last).
-fn days(year: i64, month: i64, day: i64) -> i64 {
-    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
-    365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400) + (153 * month + 2) / 5 + day
-        - 719_469
+    Some((iso, days_to(year, month, day) * 86_400 + hour * 3600 + minute * 60 + second, rest))
 }
 
 #[cfg(test)]

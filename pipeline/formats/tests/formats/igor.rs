@@ -315,8 +315,8 @@ fn what_is_no_channel_is_remarked_or_refused() {
     assert!(refusal(b"").problem.contains("empty file"));
     let packed = open_bytes::<IgorWave>("all.pxp", &[8, 0, 0, 0, 1, 2, 3, 4]).1.unwrap_err();
     assert!(packed.problem.contains("packed experiment") && packed.help.unwrap().contains("Save Waves"));
-    assert!(IgorWave::open(Path::new("/nowhere/x.ibw")).unwrap_err().problem.contains("cannot open"));
-    assert!(IgorWave::open(Path::new("/")).unwrap_err().problem.contains("no regular file"));
+    assert!(IgorWave::open(Path::new("/nowhere/x.ibw")).unwrap_err().problem.contains("cannot be opened"));
+    assert!(IgorWave::open(Path::new("/")).unwrap_err().problem.contains("a file was wanted"));
 }
 
 #[test]
