@@ -59,8 +59,7 @@ pub fn open_records(path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened,
     let records = file.records(wanted, how).map_err(|error| error.at(path))?;
     let mut remarks = contents.remarks.clone();
     if records.len() > 1 {
-        remarks
-            .insert(0, format!("the recording was interrupted {} times: {} records", records.len() - 1, records.len()));
+        remarks.insert(0, format!("the recording has gaps: {} uninterrupted stretches, a record each", records.len()));
     }
     Ok(Opened { format, records, remarks })
 }

@@ -65,7 +65,8 @@ fn an_interrupted_recording_is_one_record_per_stretch() {
              ***End_of_Header***\t\t\nX_Value\tdeflection\tComment\n{values}\n"
         )
     };
-    let head = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\tNo\nTime_Pref\tAbsolute\n***End_of_Header***\t\n\n";
+    let head = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\nMulti_Headings\tYes\nX_Columns\tNo\n\
+                ***End_of_Header***\t\n\n";
     let text = [
         head.to_owned(),
         section("00:00:00.0", "\t1\n\t2\n"),
@@ -86,7 +87,7 @@ fn an_interrupted_recording_is_one_record_per_stretch() {
     assert_eq!(second.channels[0].read(1, 2).unwrap(), [6.0, 7.0]);
     assert!(second.channels[0].read(1, 3).is_err(), "beyond the stretch");
     assert!(!first.started_at.is_empty() && second.started_at.is_empty());
-    assert!(opened.remarks[0].contains("interrupted 1 times"), "{:?}", opened.remarks);
+    assert!(opened.remarks[0].contains("2 uninterrupted stretches"), "{:?}", opened.remarks);
 
     // as a stored recording is reopened
     let again = DeferredSource::new(&path, second.size, "deflection", 3).of_stretch(4, &second.reading);
