@@ -40,6 +40,15 @@ pub enum Command {
     },
     /// Say which stages would run, and why.
     Explain(ExplainArgs),
+    /// Say what recorded files hold, and whether they can carry a ringdown.
+    Inspect {
+        /// The files; a folder means all files in it, one line each.
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+        /// As JSON, alone on stdout.
+        #[arg(long)]
+        json: bool,
+    },
     /// Show what a run found.
     Show {
         /// The result file.

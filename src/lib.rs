@@ -7,6 +7,7 @@ mod cli;
 mod commands;
 mod diagnostic;
 mod failure;
+mod inspect;
 mod output;
 mod progress;
 mod provenance;

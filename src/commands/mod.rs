@@ -9,6 +9,7 @@ mod explain;
 mod export_crate;
 mod gc;
 mod graph;
+mod inspect;
 mod load;
 mod open;
 mod report;
@@ -30,6 +31,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
     match command {
         Command::Run(args) => run::run(&args, registry),
         Command::Explain(args) => explain::run(&args, registry),
+        Command::Inspect { files, json } => inspect::run(&files, json),
         Command::Show { result, id, json } => show::run(&result, id.as_deref(), json),
         Command::Diff(args) => diff::run(&args),
         Command::Trace(args) => trace::run(&args),

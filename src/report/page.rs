@@ -146,7 +146,7 @@ fn tiles(run: &RunResult) -> Vec<Tile> {
     let mut tiles = diagnosis::verdict_tiles(run);
     let tile = |label: &str, value: String, note: String| Tile { label: label.to_owned(), value, note };
     for found in all::<Recording>(run) {
-        let size: u64 = found.value.records.iter().map(|record| record.size).sum();
+        let size = found.value.file_bytes();
         tiles.push(tile("records", found.value.records.len().to_string(), bytes(size)));
     }
     for found in all::<Document>(run) {

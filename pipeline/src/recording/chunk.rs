@@ -1,62 +1,6 @@
-//! Storage chunks of HDF5 datasets: undo the filters and turn bytes into samples, outside HDF5's global lock.
+//! Storage chunks of HDF5 datasets: undo the filters outside HDF5's global lock.
 
 use flate2::{Decompress, FlushDecompress, Status};
-
-use super::Raw;
-
-/// The type of stored samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum SampleType {
-    Int8,
-    UInt8,
-    Int16,
-    UInt16,
-    Int32,
-    UInt32,
-    Float32,
-    Float64,
-}
-
-impl SampleType {
-    pub(super) const fn bytes(self) -> usize {
-        match self {
-            Self::Int8 | Self::UInt8 => 1,
-            Self::Int16 | Self::UInt16 => 2,
-            Self::Int32 | Self::UInt32 | Self::Float32 => 4,
-            Self::Float64 => 8,
-        }
-    }
-
-    /// Samples from bytes; a rest shorter than a sample is left out. Types that [`Raw`] lacks take the next wider one.
-    pub(super) fn decode(self, bytes: &[u8], big_endian: bool) -> Raw {
-        macro_rules! decode {
-            ($from:ty as $to:ty) => {
-                bytes
-                    .as_chunks()
-                    .0
-                    .iter()
-                    .map(|&sample| {
-                        <$to>::from(if big_endian {
-                            <$from>::from_be_bytes(sample)
-                        } else {
-                            <$from>::from_le_bytes(sample)
-                        })
-                    })
-                    .collect()
-            };
-        }
-        match self {
-            Self::Int8 => Raw::Int16(decode!(i8 as i16)),
-            Self::UInt8 => Raw::Int16(decode!(u8 as i16)),
-            Self::Int16 => Raw::Int16(decode!(i16 as i16)),
-            Self::UInt16 => Raw::Int32(decode!(u16 as i32)),
-            Self::Int32 => Raw::Int32(decode!(i32 as i32)),
-            Self::UInt32 => Raw::Float64(decode!(u32 as f64)),
-            Self::Float32 => Raw::Float32(decode!(f32 as f32)),
-            Self::Float64 => Raw::Float64(decode!(f64 as f64)),
-        }
-    }
-}
 
 /// A filter that can be undone here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

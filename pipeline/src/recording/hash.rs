@@ -32,6 +32,15 @@ pub fn hash_file(path: &Path) -> Result<String, StageError> {
     inspect_file(path).map(|found| found.blake3)
 }
 
+/// The same for a file that the HDF5 library is to open. Errors: as [`hash_file`]; damage that it does not survive.
+pub(super) fn inspect_hdf5(path: &Path) -> Result<Inspected, StageError> {
+    let inspected = inspect_file(path)?;
+    if inspected.endless {
+        return Err(StageError::new("damaged: a heap collection of the HDF5 file never ends").at(path));
+    }
+    Ok(inspected)
+}
+
 /// What one pass through a file tells.
 #[derive(Debug, Clone)]
 pub(super) struct Inspected {
@@ -41,7 +50,7 @@ pub(super) struct Inspected {
 }
 
 /// Hashes a file and looks for damage that the HDF5 library does not survive. Errors: the file cannot be read.
-pub(super) fn inspect_file(path: &Path) -> Result<Inspected, StageError> {
+fn inspect_file(path: &Path) -> Result<Inspected, StageError> {
     let fail = |error: std::io::Error| StageError::new(format!("the file cannot be read: {error}")).at(path);
     let mut file = File::open(path).map_err(fail)?;
     let metadata = file.metadata().map_err(fail)?;

@@ -1,28 +1,43 @@
 //! Recordings: lazy, re-readable record files. They are streamed, never held whole.
 
 mod chunk;
+mod contents;
+mod deferred;
+mod errors;
+mod foreign_hdf5;
 mod global_heap;
 mod hash;
+mod how;
+mod kept;
 mod native;
+mod open;
 mod recent;
 mod series;
 mod source;
+mod stretches;
 mod write;
 
 #[cfg(test)]
 mod foreign_tests;
+#[cfg(test)]
+mod open_tests;
 #[cfg(test)]
 mod tests;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
+pub(crate) use deferred::DeferredSource;
 pub use hash::hash_file;
 pub(crate) use native::is_native;
 pub use native::{Wanted, open_native};
 pub use series::{read_number_attribute, read_series};
-pub(crate) use source::DeferredSource;
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
+
+pub use afmid_formats::{Contents, FormatError, FoundChannel, Raw, RawBinary, Source, formats};
+pub use contents::open_contents;
+pub use how::{How, Reading};
+pub use open::{Opened, open_records, recognised};
 
 use crate::error::StageError;
 
@@ -33,10 +48,10 @@ pub struct Recording {
     pub records: Vec<Record>,
 }
 
-/// One acquisition file with all its channels.
+/// One uninterrupted acquisition with all its channels: a file, or a stretch of one.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// The file's name without its folder: what tables and messages show.
+    /// The file's name without its folder, and the number of the stretch if there are several (`file.tdms[2]`): what tables and messages show.
     pub name: String,
     /// Where it lies.
     pub path: PathBuf,
@@ -48,6 +63,10 @@ pub struct Record {
     pub sample_rate_hz: f64,
     /// When the acquisition began, ISO 8601; empty if unknown.
     pub started_at: String,
+    /// Sample of the file's channels that is the record's first: a file whose recording was interrupted is one record per uninterrupted stretch.
+    pub first_sample: usize,
+    /// Which reader opens the file.
+    pub reading: Reading,
     /// The channels that were asked for, by role.
     pub channels: Vec<Channel>,
 }
@@ -75,54 +94,14 @@ pub struct Channel {
     pub source: Arc<dyn Source>,
 }
 
-/// Raw samples of one chunk, as stored.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Raw {
-    /// 16-bit codes, as from an analog-to-digital converter.
-    Int16(Vec<i16>),
-    /// 32-bit codes.
-    Int32(Vec<i32>),
-    /// Single precision.
-    Float32(Vec<f32>),
-    /// Double precision.
-    Float64(Vec<f64>),
-}
-
-impl Raw {
-    /// How many samples.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Int16(codes) => codes.len(),
-            Self::Int32(codes) => codes.len(),
-            Self::Float32(codes) => codes.len(),
-            Self::Float64(codes) => codes.len(),
-        }
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Appends `stored * scale + offset` for every sample.
-    pub fn scale_into(&self, scale: f64, offset: f64, out: &mut Vec<f64>) {
-        match self {
-            Self::Int16(codes) => out.extend(codes.iter().map(|&code| f64::from(code) * scale + offset)),
-            Self::Int32(codes) => out.extend(codes.iter().map(|&code| f64::from(code) * scale + offset)),
-            Self::Float32(codes) => out.extend(codes.iter().map(|&code| f64::from(code) * scale + offset)),
-            Self::Float64(codes) => out.extend(codes.iter().map(|&code| code * scale + offset)),
-        }
-    }
-}
-
-/// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
-pub trait Source: std::fmt::Debug + Send + Sync {
-    /// Reads `count` raw samples from sample `start`. Errors: beyond the end; the file cannot be read or is damaged.
-    fn read(&self, start: usize, count: usize) -> Result<Raw, StageError>;
-
-    /// The stretch that is cheapest to read at once (a storage chunk).
-    fn preferred_samples(&self) -> usize {
-        1 << 16
+impl Recording {
+    /// Bytes of all its files, each counted once however many stretches it has.
+    pub fn file_bytes(&self) -> u64 {
+        let mut files: Vec<(&std::path::Path, u64)> =
+            self.records.iter().map(|record| (record.path.as_path(), record.size)).collect();
+        files.sort_unstable();
+        files.dedup();
+        files.into_iter().map(|(_, size)| size).sum()
     }
 }
 
@@ -139,7 +118,7 @@ impl Record {
 impl Channel {
     /// Raw samples from `start`. Errors: as [`Source::read`].
     pub fn read_raw(&self, start: usize, count: usize) -> Result<Raw, StageError> {
-        self.source.read(start, count)
+        Ok(self.source.read(start, count)?)
     }
 
     /// Values in the channel's unit from `start`. Errors: as [`Source::read`].

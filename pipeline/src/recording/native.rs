@@ -3,17 +3,18 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use afmid_formats::Number;
 use hdf5::dataset::Layout;
 use hdf5::datatype::ByteOrder;
 use hdf5::filters::Filter;
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5::{Dataset, File, Group, Location};
 
-use super::chunk::{ChunkFilter, SampleType};
-use super::hash::inspect_file;
+use super::chunk::ChunkFilter;
+use super::hash::inspect_hdf5;
 use super::recent::source_number;
 use super::source::{ChunkPlace, Hdf5Source, Place};
-use super::{Channel, Record};
+use super::{Channel, Reading, Record};
 use crate::error::StageError;
 use crate::store::read::{check_size, open_file, read_texts};
 
@@ -37,10 +38,7 @@ pub struct Wanted<'a> {
 /// Errors: no file, not HDF5, cut short, damaged; an attribute or a required channel is missing or of another type.
 pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
     let size = size_of_file(path)?;
-    let inspected = inspect_file(path)?;
-    if inspected.endless {
-        return Err(StageError::new("damaged: a heap collection of the HDF5 file never ends").at(path));
-    }
+    let inspected = inspect_hdf5(path)?;
     let file = open_file(path)?;
     let sample_rate_hz = number_attribute(&file, "/", "sample_rate_hz").map_err(|error| {
         error
@@ -63,6 +61,8 @@ pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError>
         blake3: inspected.blake3,
         sample_rate_hz,
         started_at: text_attribute(&file, "started_at").unwrap_or_default(),
+        first_sample: 0,
+        reading: Reading::default(),
         channels,
     })
 }
@@ -70,11 +70,10 @@ pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError>
 /// Whether a file is HDF5 that states a sample rate: a native record, whatever its channels.
 pub(crate) fn is_native(path: &Path) -> bool {
     // damage that keeps the library busy for ever is looked for first
-    let safe = inspect_file(path).is_ok_and(|inspected| !inspected.endless);
-    safe && open_file(path).is_ok_and(|file| has_attribute(&file, "sample_rate_hz"))
+    inspect_hdf5(path).is_ok() && open_file(path).is_ok_and(|file| has_attribute(&file, "sample_rate_hz"))
 }
 
-fn size_of_file(path: &Path) -> Result<u64, StageError> {
+pub(super) fn size_of_file(path: &Path) -> Result<u64, StageError> {
     std::fs::metadata(path)
         .map(|metadata| metadata.len())
         .map_err(|error| StageError::new(format!("the file cannot be read: {error}")).at(path))
@@ -164,13 +163,10 @@ fn describe(dataset: &Dataset, path: &Path, location: &str) -> Result<Hdf5Source
         fail(format!("the samples are {found}, wanted int8 to int32, uint8 to uint32, float32 or float64"))
             .help("store the converter's codes as int16 with scale_factor and add_offset")
     })?;
-    check_size(dataset, kind.bytes()).map_err(|error| fail(error.problem))?;
+    check_size(dataset, kind.bytes() as usize).map_err(|error| fail(error.problem))?;
     let big_endian = matches!(dtype.byte_order(), ByteOrder::BigEndian);
     let file_size = size_of_file(path)?;
-    if let Some(filter) = dataset.filters().iter().find(|filter| !filter.decode_enabled()) {
-        return Err(fail(format!("stored with the HDF5 filter {}, which is not built in", filter_name(filter)))
-            .help("store it with gzip, or not compressed: h5repack -f GZIP=4 OLD.h5 NEW.h5"));
-    }
+    check_filters(dataset).map_err(|error| fail(error.problem).help(error.help.unwrap_or_default()))?;
     let place = locate(dataset, kind, samples, file_size).map_err(fail)?;
     Ok(Hdf5Source {
         path: path.to_owned(),
@@ -182,6 +178,17 @@ fn describe(dataset: &Dataset, path: &Path, location: &str) -> Result<Hdf5Source
         place,
         number: source_number(),
     })
+}
+
+/// Errors: a filter of the dataset is not built in.
+pub(super) fn check_filters(dataset: &Dataset) -> Result<(), StageError> {
+    match dataset.filters().iter().find(|filter| !filter.decode_enabled()) {
+        Some(filter) => {
+            Err(StageError::new(format!("stored with the HDF5 filter {}, which is not built in", filter_name(filter)))
+                .help("store it with gzip, or not compressed: h5repack -f GZIP=4 OLD.h5 NEW.h5"))
+        }
+        None => Ok(()),
+    }
 }
 
 fn filter_name(filter: &Filter) -> String {
@@ -198,23 +205,23 @@ fn filter_name(filter: &Filter) -> String {
     name.to_owned()
 }
 
-fn sample_type(descriptor: &TypeDescriptor) -> Option<SampleType> {
+pub(super) fn sample_type(descriptor: &TypeDescriptor) -> Option<Number> {
     use TypeDescriptor as T;
     Some(match descriptor {
-        T::Integer(IntSize::U1) => SampleType::Int8,
-        T::Unsigned(IntSize::U1) => SampleType::UInt8,
-        T::Integer(IntSize::U2) => SampleType::Int16,
-        T::Unsigned(IntSize::U2) => SampleType::UInt16,
-        T::Integer(IntSize::U4) => SampleType::Int32,
-        T::Unsigned(IntSize::U4) => SampleType::UInt32,
-        T::Float(FloatSize::U4) => SampleType::Float32,
-        T::Float(FloatSize::U8) => SampleType::Float64,
+        T::Integer(IntSize::U1) => Number::I8,
+        T::Unsigned(IntSize::U1) => Number::U8,
+        T::Integer(IntSize::U2) => Number::I16,
+        T::Unsigned(IntSize::U2) => Number::U16,
+        T::Integer(IntSize::U4) => Number::I32,
+        T::Unsigned(IntSize::U4) => Number::U32,
+        T::Float(FloatSize::U4) => Number::F32,
+        T::Float(FloatSize::U8) => Number::F64,
         _ => return None,
     })
 }
 
 /// Asks HDF5 where the samples lie. Errors: a place outside the file.
-fn locate(dataset: &Dataset, kind: SampleType, samples: usize, file_size: u64) -> Result<Place, String> {
+fn locate(dataset: &Dataset, kind: Number, samples: usize, file_size: u64) -> Result<Place, String> {
     let creation = dataset.dcpl().map_err(|error| format!("damaged: {error}"))?;
     let inside = |offset: u64, bytes: u64| match offset.checked_add(bytes) {
         Some(end) if end <= file_size => Ok(()),
@@ -223,7 +230,7 @@ fn locate(dataset: &Dataset, kind: SampleType, samples: usize, file_size: u64) -
     match creation.layout() {
         Layout::Contiguous => match dataset.offset() {
             Some(offset) => {
-                inside(offset, samples as u64 * kind.bytes() as u64)?;
+                inside(offset, samples as u64 * kind.bytes())?;
                 Ok(Place::Contiguous { offset })
             }
             None => Ok(Place::Library),
@@ -237,7 +244,7 @@ fn locate(dataset: &Dataset, kind: SampleType, samples: usize, file_size: u64) -
             for chunk in &chunks {
                 inside(chunk.offset, chunk.bytes as u64)?;
                 // deflate shrinks by at most 1032 to 1
-                if (length as u64).saturating_mul(kind.bytes() as u64) > (chunk.bytes as u64 + 1).saturating_mul(1100) {
+                if (length as u64).saturating_mul(kind.bytes()) > (chunk.bytes as u64 + 1).saturating_mul(1100) {
                     return Err(format!("damaged: a chunk of {length} samples in {} bytes", chunk.bytes));
                 }
             }
@@ -283,7 +290,7 @@ pub(super) fn has_attribute(owner: &Location, name: &str) -> bool {
 }
 
 /// A text attribute of any kind; none if it is missing or not text.
-fn text_attribute(owner: &Location, name: &str) -> Option<String> {
+pub(super) fn text_attribute(owner: &Location, name: &str) -> Option<String> {
     let attribute = owner.attr(name).ok()?;
     read_texts(&attribute).ok()?.into_iter().next()
 }

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use super::Raw;
-use super::hash::inspect_file;
+use super::hash::inspect_hdf5;
 use super::native::{Wanted, find, has_attribute, number_attribute, open_source};
 use super::source::Hdf5Source;
 use crate::error::StageError;
@@ -17,9 +16,7 @@ const LONGEST: usize = 1 << 26;
 /// Errors: no file, not HDF5, damaged; no such dataset, not one-dimensional, not numbers, longer than 2^26 values.
 pub fn read_series(path: &Path, location: &str) -> Result<Vec<f64>, StageError> {
     use super::Source;
-    if inspect_file(path)?.endless {
-        return Err(StageError::new("damaged: a heap collection of the HDF5 file never ends").at(path));
-    }
+    inspect_hdf5(path)?;
     let optional = |name: &str, otherwise: f64| -> Result<f64, StageError> {
         Ok(read_number_attribute(path, location, name)?.unwrap_or(otherwise))
     };
@@ -29,12 +26,7 @@ pub fn read_series(path: &Path, location: &str) -> Result<Vec<f64>, StageError> 
         let problem = format!("{location} has {} values, wanted at most {LONGEST}", source.samples);
         return Err(StageError::new(problem).at(path));
     }
-    let values: Vec<f64> = match source.read(0, source.samples)? {
-        Raw::Int16(codes) => codes.into_iter().map(f64::from).collect(),
-        Raw::Int32(codes) => codes.into_iter().map(f64::from).collect(),
-        Raw::Float32(values) => values.into_iter().map(f64::from).collect(),
-        Raw::Float64(values) => values,
-    };
+    let values = source.read(0, source.samples)?.widened();
     Ok(values.into_iter().map(|value| value * scale + offset).collect())
 }
 

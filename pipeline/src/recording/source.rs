@@ -2,14 +2,14 @@
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::path::PathBuf;
 
-use super::chunk::{ChunkFilter, SampleType, undo_filters};
+use super::chunk::{ChunkFilter, undo_filters};
 use super::recent;
-use super::{Raw, Source};
+use super::{FormatError, Raw, Source};
 use crate::error::StageError;
 use crate::store::read::open_file;
+use afmid_formats::Number;
 
 /// Samples read at once through the library, under its global lock: short enough to let others in between.
 const LIBRARY_SLICE: usize = 1 << 16;
@@ -49,34 +49,15 @@ pub(super) struct Hdf5Source {
     pub(super) file_size: u64,
     pub(super) location: String,
     pub(super) samples: usize,
-    pub(super) kind: SampleType,
+    pub(super) kind: Number,
     pub(super) big_endian: bool,
     pub(super) place: Place,
     pub(super) number: u64,
 }
 
 impl Source for Hdf5Source {
-    fn read(&self, start: usize, count: usize) -> Result<Raw, StageError> {
-        let end = start.checked_add(count).filter(|&end| end <= self.samples).ok_or_else(|| {
-            self.error(format!("samples {start} to {start} + {count} asked for, there are {}", self.samples))
-        })?;
-        if count == 0 {
-            return Ok(self.kind.decode(&[], self.big_endian));
-        }
-        if self.place == Place::Library {
-            return self.read_by_library(start, end);
-        }
-        let file = self.open()?;
-        let bytes = match &self.place {
-            Place::Contiguous { offset } => {
-                self.read_bytes(&file, offset + (start * self.kind.bytes()) as u64, count * self.kind.bytes())?
-            }
-            Place::Chunked { length, chunks, filters } => {
-                self.read_chunks(&file, start, end, *length, chunks, filters)?
-            }
-            Place::Library => Vec::new(),
-        };
-        Ok(self.kind.decode(&bytes, self.big_endian))
+    fn read(&self, start: usize, count: usize) -> Result<Raw, FormatError> {
+        Ok(self.stretch(start, count)?)
     }
 
     fn preferred_samples(&self) -> usize {
@@ -88,6 +69,30 @@ impl Source for Hdf5Source {
 }
 
 impl Hdf5Source {
+    fn stretch(&self, start: usize, count: usize) -> Result<Raw, StageError> {
+        let end = start.checked_add(count).filter(|&end| end <= self.samples).ok_or_else(|| {
+            self.error(format!("samples {start} to {start} + {count} asked for, there are {}", self.samples))
+        })?;
+        if count == 0 {
+            return Ok(self.kind.decode(&[], self.big_endian));
+        }
+        if self.place == Place::Library {
+            return self.read_by_library(start, end);
+        }
+        let file = self.open()?;
+        let sample = self.kind.bytes() as usize;
+        let bytes = match &self.place {
+            Place::Contiguous { offset } => {
+                self.read_bytes(&file, offset + start as u64 * self.kind.bytes(), count * sample)?
+            }
+            Place::Chunked { length, chunks, filters } => {
+                self.read_chunks(&file, start, end, *length, chunks, filters)?
+            }
+            Place::Library => Vec::new(),
+        };
+        Ok(self.kind.decode(&bytes, self.big_endian))
+    }
+
     fn error(&self, problem: impl std::fmt::Display) -> StageError {
         StageError::new(format!("{}: {problem}", self.location)).at(&self.path)
     }
@@ -120,7 +125,7 @@ impl Hdf5Source {
         chunks: &[ChunkPlace],
         filters: &[ChunkFilter],
     ) -> Result<Vec<u8>, StageError> {
-        let sample = self.kind.bytes();
+        let sample = self.kind.bytes() as usize;
         let mut bytes = Vec::with_capacity((end - start) * sample);
         for index in start / length..=(end - 1) / length {
             let place = chunks.get(index).ok_or_else(|| self.error(format!("chunk {index} is missing")))?;
@@ -149,10 +154,10 @@ impl Hdf5Source {
             }};
         }
         Ok(match self.kind {
-            SampleType::Int8 | SampleType::UInt8 | SampleType::Int16 => slices!(i16, Int16),
-            SampleType::UInt16 | SampleType::Int32 => slices!(i32, Int32),
-            SampleType::Float32 => slices!(f32, Float32),
-            SampleType::UInt32 | SampleType::Float64 => slices!(f64, Float64),
+            Number::I8 | Number::U8 | Number::I16 => slices!(i16, Int16),
+            Number::U16 | Number::I32 => slices!(i32, Int32),
+            Number::F32 => slices!(f32, Float32),
+            Number::U32 | Number::I64 | Number::U64 | Number::F64 => slices!(f64, Float64),
         })
     }
 
@@ -161,34 +166,5 @@ impl Hdf5Source {
         let fail = |error: hdf5::Error| self.error(format!("samples {from} to {to} cannot be read: {error}"));
         let dataset = file.dataset(&self.location).map_err(fail)?;
         Ok(dataset.read_slice_1d::<T, _>(from..to).map_err(fail)?.into_raw_vec_and_offset().0)
-    }
-}
-
-/// A channel of a stored recording: its file is opened when samples are asked for.
-#[derive(Debug)]
-pub(crate) struct DeferredSource {
-    path: PathBuf,
-    file_size: u64,
-    location: String,
-    samples: usize,
-    source: OnceLock<Hdf5Source>,
-}
-
-impl DeferredSource {
-    pub(crate) fn new(path: &Path, file_size: u64, location: &str, samples: usize) -> Self {
-        Self { path: path.to_owned(), file_size, location: location.to_owned(), samples, source: OnceLock::new() }
-    }
-}
-
-impl Source for DeferredSource {
-    fn read(&self, start: usize, count: usize) -> Result<Raw, StageError> {
-        if let Some(source) = self.source.get() {
-            return source.read(start, count);
-        }
-        let source = super::native::open_source(&self.path, &self.location)?;
-        if source.file_size != self.file_size || source.samples != self.samples {
-            return Err(source.error("the file is not the one that was recorded: its size differs"));
-        }
-        self.source.get_or_init(|| source).read(start, count)
     }
 }

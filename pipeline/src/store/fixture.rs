@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use serde_json::json;
 
 use crate::artifact::{Array, Artifact, Attribute, Axis, Document, Matrix, StateSpace, Table};
-use crate::recording::{Channel, DeferredSource, Record, Recording};
+use crate::recording::{Channel, DeferredSource, RawBinary, Reading, Record, Recording};
 use crate::runner::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};
 use crate::stage::Ports;
 
@@ -91,7 +91,10 @@ pub(crate) fn model() -> StateSpace {
 }
 
 pub(crate) fn recording() -> Recording {
-    let channel = |path: &Path, role: &str, fill_code| Channel {
+    let raw = Reading::of("auto", Some(RawBinary { channels: 2, scale_factor: 0.1 + 0.2, ..RawBinary::default() }));
+    // the last record is a stretch of a file without a header
+    let part = |index: usize| if index == 2 { (70_000, raw.clone()) } else { (0, Reading::default()) };
+    let channel = |index: usize, path: &Path, role: &str, fill_code| Channel {
         role: role.to_owned(),
         location: format!("/{role}"),
         samples: 900_000,
@@ -100,7 +103,9 @@ pub(crate) fn recording() -> Recording {
         scale_factor: 0.000977,
         add_offset: 0.0,
         fill_code,
-        source: Arc::new(DeferredSource::new(path, 600_000, &format!("/{role}"), 900_000)),
+        source: Arc::new(
+            DeferredSource::new(path, 600_000, &format!("/{role}"), 900_000).of_stretch(part(index).0, &part(index).1),
+        ),
     };
     let path = |index: usize| PathBuf::from(format!("archive/record_{index:04}.h5"));
     let record = |index: usize| Record {
@@ -110,7 +115,12 @@ pub(crate) fn recording() -> Recording {
         blake3: "ab".repeat(32),
         sample_rate_hz: 5e6,
         started_at: "2005-03-01T10:00:00Z".to_owned(),
-        channels: vec![channel(&path(index), "deflection", Some(-32768.0)), channel(&path(index), "piezo", None)],
+        first_sample: part(index).0,
+        reading: part(index).1,
+        channels: vec![
+            channel(index, &path(index), "deflection", Some(-32768.0)),
+            channel(index, &path(index), "piezo", None),
+        ],
     };
     Recording { records: (0..3).map(record).collect() }
 }

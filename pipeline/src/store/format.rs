@@ -6,7 +6,7 @@ use super::error::{Result, StoreError};
 use super::{read, write};
 
 /// Version of the layout of stage and result files; part of every cache key.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// The attribute of the root group that names the kind of file.
 pub(super) const FORMAT: &str = "afmid_format";

@@ -9,7 +9,7 @@ use super::error::{Result, StoreError};
 use super::table::{read_table, write_table};
 use super::write;
 use crate::artifact::Table;
-use crate::recording::{Channel, DeferredSource, Record, Recording};
+use crate::recording::{Channel, DeferredSource, Reading, Record, Recording};
 
 /// Writes a recording as the group `name` with the tables `records` and `channels`.
 pub(super) fn write_recording(parent: &Group, name: &str, recording: &Recording) -> Result<Group> {
@@ -27,7 +27,14 @@ pub(super) fn write_recording(parent: &Group, name: &str, recording: &Recording)
             "sample rate",
             records.iter().map(|record| record.sample_rate_hz).collect::<Vec<_>>(),
         )
-        .with("started_at", "", "start of the acquisition", each(|record| record.started_at.clone()));
+        .with("started_at", "", "start of the acquisition", each(|record| record.started_at.clone()))
+        .with(
+            "first_sample",
+            "1",
+            "sample of the file's channels that is the record's first",
+            records.iter().map(|record| record.first_sample as i64).collect::<Vec<_>>(),
+        )
+        .with("reading", "", "which reader opens the file, JSON", readings(records)?);
     write_table(&group, "records", &files)?;
     let rows: Vec<(i64, &Channel)> = (0..)
         .zip(records)
@@ -60,6 +67,20 @@ pub(super) fn write_recording(parent: &Group, name: &str, recording: &Recording)
     Ok(group)
 }
 
+/// Which reader opens each file, in JSON.
+fn readings(records: &[Record]) -> Result<Vec<String>> {
+    let text = |record: &Record| serde_json::to_string(&record.reading);
+    records
+        .iter()
+        .map(text)
+        .collect::<std::result::Result<_, _>>()
+        .map_err(|error| StoreError::new(format!("how a record is read cannot be written as JSON: {error}")))
+}
+
+fn reading(json: &str) -> std::result::Result<Reading, crate::StageError> {
+    serde_json::from_str(json).map_err(|error| crate::StageError::new(format!("found {json} as `reading`: {error}")))
+}
+
 /// Reads what [`write_recording`] wrote; the samples are looked for in the record files when they are asked for.
 pub(super) fn read_recording(group: &Group) -> Result<Recording> {
     let files = read_table(&super::read::group(group, "records")?)?;
@@ -79,8 +100,16 @@ pub(super) fn read_recording(group: &Group) -> Result<Recording> {
             blake3: blake3.clone(),
             sample_rate_hz,
             started_at: started_at.clone(),
+            first_sample: 0,
+            reading: Reading::default(),
             channels: Vec::new(),
         });
+    }
+    let (firsts, readings) = (files.integer("first_sample").map_err(wrap)?, files.text("reading").map_err(wrap)?);
+    for (record, (&first, json)) in records.iter_mut().zip(firsts.iter().zip(readings)) {
+        let negative = |_| StoreError::new(format!("found {first} as `first_sample`")).at(group.name());
+        record.first_sample = usize::try_from(first).map_err(negative)?;
+        record.reading = reading(json).map_err(wrap)?;
     }
     for row in 0..channels.rows() {
         let (index, channel) = read_channel(&channels, row, &records).map_err(wrap)?;
@@ -108,6 +137,7 @@ fn read_channel(
         .ok_or_else(|| crate::StageError::new(format!("channel {row} belongs to record {index}, which is missing")))?;
     let (role, location, samples) = (text("role")?, text("location")?, whole("samples")?);
     let source = DeferredSource::new(&record.path, record.size, &location, samples);
+    let source = source.of_stretch(record.first_sample, &record.reading);
     let has_fill_code = table.flag("has_fill_code")?.get(row) == Some(&true);
     let channel = Channel {
         role,

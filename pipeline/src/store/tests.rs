@@ -231,7 +231,7 @@ fn another_version_and_another_kind_are_refused() {
     assert!(error.contains("changed by another program"), "{error}");
     super::seal::seal(&path).unwrap();
     let error = read_result(&path).unwrap_err();
-    assert!(error.to_string().contains("found format version 99, wanted 1") && error.help.is_some(), "{error}");
+    assert!(error.to_string().contains("found format version 99, wanted 2") && error.help.is_some(), "{error}");
     let stage = folder.file("stage.h5");
     write_stage(&stage, &stage_result()).unwrap();
     let error = read_result(&stage).unwrap_err().to_string();

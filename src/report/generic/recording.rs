@@ -32,7 +32,7 @@ pub(super) fn recording_view(recording: &Recording) -> ArtifactView {
             bytes(record.size),
         ]);
     }
-    let total: u64 = recording.records.iter().map(|record| record.size).sum();
+    let total = recording.file_bytes();
     ArtifactView {
         facts: vec![Fact::new("records", recording.records.len().to_string()), Fact::new("size", bytes(total))],
         tables: vec![table.truncated(ROWS, recording.records.len())],

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::StageError;
+use afmid_pipeline::recording::recognised;
 use glob::{MatchOptions, Pattern, glob_with};
 
 use super::natural_order::natural_order;
@@ -11,7 +12,7 @@ use super::natural_order::natural_order;
 ///
 /// # Method
 /// `*`, `?`, `[...]` and `**` as in a shell, names that begin with a dot not matched by them; a pattern that names a folder
-/// means its `*.h5`.
+/// means its `*.h5` or, if there are none, its files of any format that is recognised.
 /// # Errors
 /// A pattern that is none, a folder that cannot be read, or one without a match: with the pattern, the folder that was looked
 /// at, and what is there.
@@ -38,16 +39,26 @@ fn matches_of(pattern: &str, base: &Path) -> Result<Vec<PathBuf>, StageError> {
         return Ok(vec![whole]);
     }
     // special characters in the folder of the config are no pattern; an absolute pattern replaces the folder
-    let mut text = match Path::new(pattern).is_absolute() {
+    let text = match Path::new(pattern).is_absolute() {
         true => pattern.to_owned(),
         false => format!("{}/{pattern}", Pattern::escape(&base.to_string_lossy())),
     };
     if whole.is_dir() {
-        text = format!("{}/*.h5", Pattern::escape(&whole.to_string_lossy()));
+        let folder = Pattern::escape(&whole.to_string_lossy());
+        let native = files_of(&format!("{folder}/*.h5"), pattern)?;
+        if !native.is_empty() {
+            return Ok(native);
+        }
+        return Ok(files_of(&format!("{folder}/*"), pattern)?.into_iter().filter(|file| recognised(file)).collect());
     }
+    files_of(&text, pattern)
+}
+
+/// The files that a whole pattern matches; `pattern` is what the user wrote.
+fn files_of(text: &str, pattern: &str) -> Result<Vec<PathBuf>, StageError> {
     let options =
         MatchOptions { require_literal_leading_dot: true, require_literal_separator: true, ..MatchOptions::new() };
-    let paths = glob_with(&text, options)
+    let paths = glob_with(text, options)
         .map_err(|error| StageError::new(format!("`{pattern}` is no file pattern: {}", error.msg)).caused_by(error))?;
     let mut files = Vec::new();
     for path in paths {
@@ -115,6 +126,17 @@ mod tests {
         assert_eq!(names(&["sub/../r9.h5"], &base), ["r9.h5"]);
         let absolute = base.join("sub").join("*.h5").to_string_lossy().replace("[odd]", "?odd?");
         assert_eq!(names(&[&absolute], Path::new("/")), ["s1.h5"]);
+        std::fs::remove_dir_all(base).unwrap();
+    }
+
+    #[test]
+    fn a_folder_means_native_records_or_else_whatever_is_recognised() {
+        let base = folder("formats", &["a.h5", "notes.md"]);
+        std::fs::write(base.join("b.csv"), "1.5,2\n2.5,3\n3.5,4\n").unwrap();
+        std::fs::write(base.join("c.npy"), b"\x93NUMPY\x01\0").unwrap();
+        assert_eq!(names(&["."], &base), ["a.h5"]);
+        std::fs::remove_file(base.join("a.h5")).unwrap();
+        assert_eq!(names(&["."], &base), ["b.csv", "c.npy"]);
         std::fs::remove_dir_all(base).unwrap();
     }
 

@@ -3,17 +3,18 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use afmid_pipeline::recording::Raw;
-use afmid_pipeline::{Channel, Record, Source, StageError};
+use afmid_pipeline::recording::{FormatError, Raw, Reading};
+use afmid_pipeline::{Channel, Record, Source};
 
 /// Samples in memory as a source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MemorySource(pub Raw);
 
 impl Source for MemorySource {
-    fn read(&self, start: usize, count: usize) -> Result<Raw, StageError> {
+    fn read(&self, start: usize, count: usize) -> Result<Raw, FormatError> {
         let end = start.checked_add(count).filter(|&end| end <= self.0.len()).ok_or_else(|| {
-            StageError::new(format!("samples {start} to {start} + {count} asked for, there are {}", self.0.len()))
+            let there = self.0.len();
+            FormatError::new(format!("samples {start} to {start} + {count} asked for, there are {there}"), "")
         })?;
         Ok(match &self.0 {
             Raw::Int16(codes) => Raw::Int16(codes[start..end].to_vec()),
@@ -48,6 +49,8 @@ pub fn memory_record(name: &str, sample_rate_hz: f64, channels: Vec<Channel>) ->
         blake3: String::new(),
         sample_rate_hz,
         started_at: String::new(),
+        first_sample: 0,
+        reading: Reading::default(),
         channels,
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{Wanted, open_native};
+use afmid_pipeline::recording::{How, Opened, RawBinary, Reading, Wanted, open_records};
 use afmid_pipeline::store::is_own;
 use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
 use rayon::prelude::*;
@@ -13,40 +13,52 @@ use super::consistency::{Consistency, check_consistency};
 use super::file_patterns::matching_files;
 use super::shared_data::moved;
 
-/// Opens native HDF5 records by pattern.
+/// Opens records of any format by pattern.
 ///
 /// # Model
-/// File attributes `sample_rate_hz`, `started_at`; one dataset per channel; value = stored * scale_factor + add_offset.
+/// value = stored * scale_factor + add_offset. Native records are HDF5 with the file attributes `sample_rate_hz`, `started_at` and one dataset per
+/// channel; other formats are recognised by their first bytes and their name (`afmid inspect FILE`, docs/archives.md).
 /// # Method
-/// Files in natural order; nothing but attributes is read here, samples are streamed by the stages that need them. Sample rate
-/// and unit must agree over all files; other lengths are reported. Results of afmid's own that a pattern matches are left out and counted in
-/// a warning.
+/// Files in natural order; nothing but headers is read here (tables of text are parsed), samples are streamed by the stages that need
+/// them. Sample rate and unit must agree over all files; other lengths are reported. What a file does not state is given as a parameter; what
+/// it states is not overruled. Results of afmid's own that a pattern matches are left out and counted in a warning, as are remarks of readers.
 /// # Shapes
-/// One record per file, with the roles `deflection` and, where the file has it, `piezo`.
+/// One record per file, with the roles `deflection` and, where the file has it, `piezo`; where a recording was interrupted (restarts, lost
+/// buffers), one per uninterrupted stretch, `file.tdms[1]`, `file.tdms[2]`.
 /// # Units
 /// The channels' own.
 /// # Accuracy
-/// Codes stay codes: nothing is rounded.
+/// Codes stay codes; 64-bit integers are rounded beyond 2^53.
 /// # Errors
-/// A pattern without a match; files that are no HDF5, cut short or damaged; a missing channel or attribute; rates or units that
-/// differ; a rate too low for a ringdown.
+/// A pattern without a match; files that are of no format, cut short or damaged; a missing channel; a rate or unit that neither the file
+/// nor a parameter states, or that differ; a rate too low for a ringdown.
 /// # Source
-/// The CF conventions for scale_factor and add_offset.
+/// The CF conventions for scale_factor and add_offset; docs/archives.md for the formats.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Records {
-    /// Files, as patterns relative to the config file (`archive/*.h5`); a folder means its `*.h5`. Patterns that begin with `../../shared/data/`
+    /// Files, as patterns relative to the config file (`archive/*.h5`); a folder means its `*.h5` or, if there are none, its files of
+    /// any recognised format. Patterns that begin with `../../shared/data/`
     /// begin at the variable `AFMID_DATA` where that is set. Required.
     pub files: Vec<String>,
-    /// Dataset of the deflection signal. Default: `/deflection`.
+    /// The deflection signal, as the file names it: a dataset, channel, column or variable. Default: `/deflection`.
     pub channel: String,
-    /// Dataset of the piezo monitor, used where a file has it; empty: not looked for. Default: `/piezo`.
+    /// The piezo monitor, used where a file has it; empty: not looked for. Default: `/piezo`.
     pub piezo_channel: String,
     /// Least sample rate, in Hz, 0 or more. Default: 200000: twenty samples in a period of a 10 kHz lever, the softest in use;
     /// slower archives are force curves, low-pass filtered, without a ringdown.
     pub min_sample_rate_hz: f64,
     /// Leave out files that cannot be opened, with a warning, instead of stopping. Default: false.
     pub skip_unreadable: bool,
+    /// The files' format: `auto` for what their bytes and names say, `native`, `hdf5` (any layout), `tdms`, `npy`, `npz`, `jpk`, `nanoscope`,
+    /// `uff`, `mat`, `ibw`, `text` (LVM, CSV), `raw`. Default: `auto`.
+    pub format: String,
+    /// Samples per second in Hz, above 0, of files that state none. Default: none; an error where a file states another.
+    pub sample_rate_hz: Option<f64>,
+    /// Unit of the deflection in files that state none. Default: none; an error where a file states another.
+    pub unit: Option<String>,
+    /// What is in files without a header; their channels are `/channel[0]`, `/channel[1]`, ... Default: none.
+    pub raw: Option<RawBinary>,
 }
 
 impl Default for Records {
@@ -57,6 +69,10 @@ impl Default for Records {
             piezo_channel: "/piezo".to_owned(),
             min_sample_rate_hz: 200e3,
             skip_unreadable: false,
+            format: "auto".to_owned(),
+            sample_rate_hz: None,
+            unit: None,
+            raw: None,
         }
     }
 }
@@ -67,8 +83,8 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many record
 impl Stage for Records {
     const SPEC: Spec = Spec {
         name: "io.records",
-        version: 1,
-        summary: "opens native HDF5 records by pattern and checks that they belong together",
+        version: 2,
+        summary: "opens records of any format by pattern and checks that they belong together",
         inputs: &[],
         outputs: &[RECORDS.spec(), SUMMARY.spec()],
         caching: Caching::Always,
@@ -81,7 +97,7 @@ impl Stage for Records {
             return Err(StageError::new("`files` is empty, wanted at least one pattern such as \"archive/*.h5\""));
         }
         if self.channel.is_empty() {
-            return Err(StageError::new("`channel` is empty, wanted a dataset such as \"/deflection\""));
+            return Err(StageError::new("`channel` is empty, wanted a channel such as \"/deflection\""));
         }
         if !(self.min_sample_rate_hz >= 0.0 && self.min_sample_rate_hz.is_finite()) {
             return Err(StageError::new(format!(
@@ -89,7 +105,13 @@ impl Stage for Records {
                 self.min_sample_rate_hz
             )));
         }
-        Ok(())
+        if let Some(rate) = self.sample_rate_hz.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+            return Err(StageError::new(format!("`sample_rate_hz` is {rate}, wanted a number above 0")));
+        }
+        if self.unit.as_deref().is_some_and(|unit| unit.trim().is_empty()) {
+            return Err(StageError::new("`unit` is empty, wanted a unit such as \"V\""));
+        }
+        self.how().reading.check()
     }
 
     fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
@@ -111,7 +133,7 @@ impl Stage for Records {
             cx.warn(format!("{count} of those that match {are} of afmid's, no record: left out ({})", first.display()));
         }
         cx.expect(paths.len());
-        let opened: Vec<Result<Record, StageError>> = paths
+        let opened: Vec<Result<Opened, StageError>> = paths
             .par_iter()
             .map(|path| {
                 let record = self.open(path);
@@ -119,14 +141,17 @@ impl Stage for Records {
                 record
             })
             .collect();
-        let records = self.readable(opened, cx)?;
+        let opened = self.readable(opened, cx)?;
+        said_once(&opened).into_iter().for_each(|remark| cx.warn(remark));
+        let records: Vec<Record> = opened.into_iter().flat_map(|opened| opened.records).collect();
         let consistency = check_consistency(&records)?;
         if consistency.sample_rate_hz < self.min_sample_rate_hz {
             return Err(too_slow(&records, consistency.sample_rate_hz, self.min_sample_rate_hz));
         }
         consistency.remarks.iter().for_each(|remark| cx.warn(remark));
-        let summary = Document::new(&Summary::new(&records, &consistency))?;
-        Ok(Ports::new().with(&RECORDS, Recording { records }).with(&SUMMARY, summary))
+        let recording = Recording { records };
+        let summary = Document::new(&Summary::new(&recording.records, recording.file_bytes(), &consistency))?;
+        Ok(Ports::new().with(&RECORDS, recording).with(&SUMMARY, summary))
     }
 
     fn examples() -> Vec<Example> {
@@ -156,21 +181,26 @@ impl Records {
         }
     }
 
-    fn open(&self, path: &Path) -> Result<Record, StageError> {
+    fn how(&self) -> How {
+        let reading = Reading::of(&self.format, self.raw.clone());
+        How { reading, sample_rate_hz: self.sample_rate_hz, unit: self.unit.clone() }
+    }
+
+    fn open(&self, path: &Path) -> Result<Opened, StageError> {
         let mut wanted = vec![Wanted { role: "deflection", location: &self.channel, required: true }];
         if !self.piezo_channel.is_empty() {
             wanted.push(Wanted { role: "piezo", location: &self.piezo_channel, required: false });
         }
-        open_native(path, &wanted)
+        open_records(path, &wanted, &self.how())
     }
 
-    /// The records that could be opened. Errors: some could not, and these are not to be skipped; or none could.
-    fn readable(&self, opened: Vec<Result<Record, StageError>>, cx: &Context) -> Result<Vec<Record>, StageError> {
+    /// The files that could be opened. Errors: some could not, and these are not to be skipped; or none could.
+    fn readable(&self, opened: Vec<Result<Opened, StageError>>, cx: &Context) -> Result<Vec<Opened>, StageError> {
         let total = opened.len();
         let (mut records, mut failures) = (Vec::new(), Vec::new());
         for result in opened {
             match result {
-                Ok(record) => records.push(record),
+                Ok(file) => records.push(file),
                 Err(error) => failures.push(error),
             }
         }
@@ -188,6 +218,37 @@ impl Records {
         }
         Err(first)
     }
+}
+
+/// Kinds of remarks that are said; more are counted.
+const MOST_REMARKS: usize = 20;
+
+/// What the readers remark, each kind once: the first of it, and in how many files. Remarks that differ in numbers alone are of one kind.
+fn said_once(opened: &[Opened]) -> Vec<String> {
+    let mut kinds: Vec<(String, String, usize)> = Vec::new();
+    for file in opened {
+        let name = file.records.first().map_or("", |record| &record.name);
+        let mut seen: Vec<String> = Vec::new();
+        for remark in &file.remarks {
+            let kind = remark.replace(|letter: char| letter.is_ascii_digit(), "#");
+            if seen.contains(&kind) {
+                continue;
+            }
+            seen.push(kind.clone());
+            match kinds.iter_mut().find(|(have, ..)| *have == kind) {
+                Some((.., files)) => *files += 1,
+                None => kinds.push((kind, format!("{name}: {remark}"), 1)),
+            }
+        }
+    }
+    let unsaid = kinds.len().saturating_sub(MOST_REMARKS);
+    let told = |(_, first, files): (String, String, usize)| match files {
+        1 => first,
+        _ => format!("{first} (the like in {files} files)"),
+    };
+    let mut said: Vec<String> = kinds.into_iter().take(MOST_REMARKS).map(told).collect();
+    said.extend((unsaid > 0).then(|| format!("{unsaid} more kinds of remarks: `afmid inspect` shows those of a file")));
+    said
 }
 
 fn too_slow(records: &[Record], found_hz: f64, wanted_hz: f64) -> StageError {
@@ -219,7 +280,7 @@ struct Summary {
 }
 
 impl Summary {
-    fn new(records: &[Record], consistency: &Consistency) -> Self {
+    fn new(records: &[Record], bytes: u64, consistency: &Consistency) -> Self {
         let name = |record: Option<&Record>| record.map_or(String::new(), |record| record.name.clone());
         Self {
             records: records.len(),
@@ -230,7 +291,7 @@ impl Summary {
             shortest_samples: consistency.shortest_samples,
             longest_samples: consistency.longest_samples,
             with_piezo: records.iter().filter(|record| record.channel("piezo").is_ok()).count(),
-            bytes: records.iter().map(|record| record.size).sum(),
+            bytes,
             first: name(records.first()),
             last: name(records.last()),
             started_at: records.first().map(|record| record.started_at.clone()).filter(|text| !text.is_empty()),

@@ -1,0 +1,49 @@
+//! Words and texts at fixed places of a header.
+
+use crate::FormatError;
+
+use crate::fail;
+use crate::number::Order;
+use crate::text;
+
+/// Fields at fixed places; absent ones read as 0, for the length was checked before.
+pub(super) struct Fields<'a> {
+    pub(super) bytes: &'a [u8],
+    pub(super) order: Order,
+}
+
+impl Fields<'_> {
+    fn word<const N: usize>(&self, at: u64) -> [u8; N] {
+        let at = at as usize;
+        let word = self.bytes.get(at..).and_then(|b| b.first_chunk::<N>()).copied().unwrap_or([0; N]);
+        self.order.little(word)
+    }
+
+    pub(super) fn u16(&self, at: u64) -> u16 {
+        u16::from_le_bytes(self.word(at))
+    }
+
+    pub(super) fn u32(&self, at: u64) -> u32 {
+        u32::from_le_bytes(self.word(at))
+    }
+
+    pub(super) fn f64(&self, at: u64) -> f64 {
+        f64::from_le_bytes(self.word(at))
+    }
+
+    pub(super) fn text(&self, at: u64, bytes: usize) -> String {
+        text::field(self.bytes.get(at as usize..).and_then(|b| b.get(..bytes)).unwrap_or_default())
+    }
+
+    /// A count or size, which the format keeps signed. Errors: it is negative.
+    pub(super) fn size(&self, what: &str, at: u64) -> Result<u64, FormatError> {
+        let value = self.u32(at) as i32;
+        u64::try_from(value).map_err(|_| {
+            fail::at(
+                at,
+                format!("found {what} of {value}, wanted 0 or more"),
+                "the header is damaged: copy or export the wave again",
+            )
+        })
+    }
+}

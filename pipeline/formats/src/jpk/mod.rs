@@ -1,0 +1,121 @@
+//! JPK (Bruker) NanoWizard force curves: `.jpk-force`.
+//!
+//! Source: the layout and the property names as the readers afmformats (`fmt_jpk`, with an example header,
+//! <https://github.com/AFM-analysis/afmformats>), Gwyddion (`jpkscan.c`) and Hooke use them; no public specification was found,
+//! and no real file was at hand.
+//!
+//! - A zip archive: `header.properties`; per segment (extend, pause, retract) `segments/N/segment-header.properties` and big-endian
+//!   samples in `segments/N/channels/*.dat`; in files of version 2 what segments share is in `shared-data/header.properties`.
+//! - One channel per segment and quantity: `/segments/0/vDeflection`, in the base unit (V), which the encoder's multiplier and
+//!   offset give. Each calibration that is defined is a channel as well, from the same samples: `/segments/0/vDeflection/force`.
+//!   The chain of conversions is put together into one straight line.
+//! - The sample rate is the segment's number of points by its duration.
+//! - Maps (`.jpk-force-map`, `.jpk-qi-data`) are refused: thousands of curves with an index of their own.
+
+mod archive;
+mod channel;
+mod conversions;
+mod properties;
+mod segment;
+
+use std::path::Path;
+
+use crate::{Contents, Format, FormatError};
+
+use crate::archive::{Archive, MAGIC};
+use crate::fail;
+use crate::text;
+use properties::{Properties, Table};
+
+/// JPK force curves.
+pub struct JpkForce;
+
+impl Format for JpkForce {
+    fn recognises(head: &[u8], path: &Path) -> bool {
+        let holds = |name: &[u8]| head.windows(name.len()).any(|w| w == name);
+        head.starts_with(MAGIC)
+            && (text::extension(path).starts_with("jpk") || holds(b"segments/0/") || holds(b"header.properties"))
+    }
+
+    fn open(path: &Path) -> Result<Contents, FormatError> {
+        let mut archive = Archive::open(path)?;
+        let names = archive::names(&archive);
+        let segments = segment::numbers(names.iter().map(String::as_str));
+        if segments.is_empty() {
+            return Err(refuse(&names, path));
+        }
+        let general = archive::table(&mut archive, "header.properties")?.unwrap_or_default();
+        let shared = archive::table(&mut archive, "shared-data/header.properties")?.unwrap_or_default();
+        let mut remarks = Vec::new();
+        let mut channels = Vec::new();
+        let mut started_at = String::new();
+        for number in segments {
+            let table = archive::table(&mut archive, &segment::header_name(number))?.unwrap_or_default();
+            let properties = Properties::new(table, &shared);
+            if started_at.is_empty() {
+                started_at = properties.get("force-segment-header.time-stamp").and_then(iso).unwrap_or_default();
+            }
+            segment::channels(&mut archive, number, &properties, &mut channels, &mut remarks)?;
+        }
+        let version = general.get("file-format-version").or_else(|| shared.get("file-format-version"));
+        Ok(Contents { format: format_name(version, &shared), started_at, channels, remarks })
+    }
+}
+
+fn format_name(version: Option<&String>, shared: &Table) -> String {
+    let layout = if shared.is_empty() { "" } else { ", shared headers" };
+    format!(
+        "JPK force curve {}{layout}, big-endian",
+        version.map_or("of unknown version".to_owned(), |v| text::brief(v, 20))
+    )
+}
+
+/// Why an archive without segments is not read.
+fn refuse(names: &[String], path: &Path) -> FormatError {
+    let curves = names.iter().filter(|n| n.starts_with("index/") && n.ends_with("/header.properties")).count();
+    if curves > 0 || matches!(text::extension(path).as_str(), "jpk-force-map" | "jpk-qi-data") {
+        return fail::plain(
+            format!("found a map of {curves} force curves, wanted a single force curve"),
+            "in JPK Data Processing, export the curves of interest as .jpk-force files",
+        );
+    }
+    fail::plain(
+        format!(
+            "found an archive of {} entries without `segments/0/segment-header.properties`, wanted a JPK force curve",
+            names.len()
+        ),
+        "name a .jpk-force file",
+    )
+}
+
+/// `2016-02-05 13:27:32 +0100` as ISO 8601; none if it is written otherwise.
+fn iso(stamp: &str) -> Option<String> {
+    let words: Vec<&str> = stamp.split_whitespace().collect();
+    let [date, clock, zone @ ..] = words.as_slice() else { return None };
+    let shape = |text: &str, pattern: &str| {
+        text.len() >= pattern.len()
+            && text.bytes().zip(pattern.bytes()).all(|(t, p)| if p == b'0' { t.is_ascii_digit() } else { t == p })
+    };
+    if !(shape(date, "0000-00-00") && date.len() == 10 && shape(clock, "00:00:00") && clock.len() <= 20) {
+        return None;
+    }
+    // a zone by name is left out: names are ambiguous
+    let zone = zone
+        .first()
+        .filter(|z| z.len() == 5 && z.starts_with(['+', '-']) && z.bytes().skip(1).all(|b| b.is_ascii_digit()));
+    let zone = zone.and_then(|z| Some(format!("{}:{}", z.get(..3)?, z.get(3..)?))).unwrap_or_default();
+    Some(format!("{date}T{clock}{zone}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::iso;
+
+    #[test]
+    fn time_stamps_become_iso_8601() {
+        assert_eq!(iso("2016-02-05 13:27:32 +0100").as_deref(), Some("2016-02-05T13:27:32+01:00"));
+        assert_eq!(iso("2016-02-05 13:27:32.125 UTC").as_deref(), Some("2016-02-05T13:27:32.125"));
+        assert_eq!(iso("Fri Feb 05 2016"), None);
+        assert_eq!(iso(""), None);
+    }
+}

@@ -1,0 +1,136 @@
+//! Readers of recorded files that are not afmid's own: what data acquisition programs, microscopes and numerical programs write.
+//!
+//! [`recognise`] finds the format of a file, [`Known::open`] reads everything of it but the samples, and each channel's [`Source`] reads
+//! any stretch of these. Nothing here knows physics, HDF5 or the rest of afmid.
+
+mod archive;
+mod calendar;
+mod fail;
+mod grid;
+pub mod igor;
+mod inflating;
+pub mod jpk;
+mod lanes;
+mod listing;
+pub mod matlab;
+pub mod nanoscope;
+mod number;
+pub mod numpy;
+mod opened;
+mod packed;
+mod pinned;
+mod rate;
+mod raw;
+pub mod raw_binary;
+mod registry;
+pub mod tdms;
+mod text;
+pub mod text_table;
+pub mod uff;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+pub use grid::numbers_in_file;
+pub use lanes::Lanes;
+pub use number::Number;
+pub use rate::{Clue, agreed_rate, rate_in};
+pub use raw::Raw;
+pub use raw_binary::{RawBinary, SampleType};
+pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};
+
+/// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
+///
+/// Holds no open file between reads; reads no more than it is asked for (plus, for compressed data, what that takes).
+pub trait Source: std::fmt::Debug + Send + Sync {
+    /// Reads `count` raw samples from sample `start`. Errors: beyond the end; the file cannot be read, is damaged, or has changed its
+    /// size since it was opened.
+    fn read(&self, start: usize, count: usize) -> Result<Raw, FormatError>;
+
+    /// The stretch that is cheapest to read at once (a storage chunk).
+    fn preferred_samples(&self) -> usize {
+        1 << 16
+    }
+
+    /// Bytes that it keeps in memory, or will once it has been read: parsed text, inflated data.
+    fn kept_bytes(&self) -> u64 {
+        0
+    }
+}
+
+/// A channel of a file.
+#[derive(Debug, Clone)]
+pub struct FoundChannel {
+    /// How it is asked for: `/Group/Channel`, a variable's name, a column's.
+    pub location: String,
+    /// Number of samples.
+    pub samples: usize,
+    /// Unit of the values; empty if the file states none.
+    pub unit: String,
+    /// What it is, for people.
+    pub long_name: String,
+    /// Samples per second; none if the file does not say.
+    pub sample_rate_hz: Option<f64>,
+    /// value = stored * scale_factor + add_offset. Scalings that are no straight line are applied by the source, which then gives
+    /// `Float64`, and these are 1 and 0.
+    pub scale_factor: f64,
+    /// See `scale_factor`.
+    pub add_offset: f64,
+    /// The stored code that marks a missing sample, if the file declares one.
+    pub fill_code: Option<f64>,
+    /// Samples before which the recording was interrupted: a restart, a lost buffer. Ascending.
+    pub gaps: Vec<usize>,
+    /// Type of the stored samples, for people: `int16`, `float64`.
+    pub stored_as: &'static str,
+    /// Where the samples come from.
+    pub source: Arc<dyn Source>,
+}
+
+/// What a file holds.
+#[derive(Debug, Clone)]
+pub struct Contents {
+    /// The format with its version, for people: `NI TDMS 2.0 (4713), little-endian`.
+    pub format: String,
+    /// When the acquisition began, ISO 8601; empty if unknown.
+    pub started_at: String,
+    /// Its channels of numbers, in the file's order.
+    pub channels: Vec<FoundChannel>,
+    /// Whatever a user should know: parts that are no channel of numbers and why, missing metadata, a truncated end.
+    pub remarks: Vec<String>,
+}
+
+/// Why a file, or a part of it, cannot be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{problem}{}{}", at_byte.map(|byte| format!(", at byte {byte}")).unwrap_or_default(), file.as_ref().map(|file| format!(" ({})", file.display())).unwrap_or_default())]
+pub struct FormatError {
+    /// The file, as far as whoever failed knew it.
+    pub file: Option<PathBuf>,
+    /// Byte in the file where it was seen, if that is known.
+    pub at_byte: Option<u64>,
+    /// What was found and what was wanted, in one sentence, without a full stop.
+    pub problem: String,
+    /// What to do about it, if there is something to do.
+    pub help: Option<String>,
+}
+
+impl FormatError {
+    /// An error that belongs to no byte.
+    pub fn new(problem: impl Into<String>, help: impl Into<String>) -> Self {
+        fail::plain(problem, help)
+    }
+
+    /// Names the file that it is about, unless one is named already.
+    #[must_use]
+    pub fn in_file(mut self, file: &Path) -> Self {
+        self.file.get_or_insert_with(|| file.to_owned());
+        self
+    }
+}
+
+/// What every format's module offers.
+pub trait Format {
+    /// Whether a file's first bytes (up to [`HEAD_BYTES`]) and its name say that it is of this format.
+    fn recognises(head: &[u8], path: &Path) -> bool;
+    /// Opens it: everything but the samples. Errors: no such file, not of this format, damaged.
+    fn open(path: &Path) -> Result<Contents, FormatError>;
+}

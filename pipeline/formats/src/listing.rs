@@ -1,0 +1,181 @@
+//! Collecting what a file holds.
+
+use crate::grid::{Grid, Store};
+use crate::lanes::Lanes;
+use crate::number::Number;
+use crate::rate::{Clue, rate_in};
+use crate::{Contents, FoundChannel};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::Arc;
+
+/// Memory for the descriptions of channels: enough for a force volume of 256 by 256 curves, where a small damaged file could
+/// declare millions.
+const MOST_BYTES: usize = 32 << 20;
+
+/// About what one description takes, besides its location that is kept about four times.
+const DESCRIPTION_BYTES: usize = 400;
+
+/// More statements of a sampling rate than this are ignored, for the same reason.
+const MOST_CLUES: usize = 4096;
+
+/// More remarks are only counted: nobody reads them.
+const MOST_REMARKS: usize = 200;
+
+/// An array of numbers.
+#[derive(Debug)]
+pub(crate) struct Array {
+    /// Location without an index.
+    pub(crate) location: String,
+    /// Location of what it is part of; empty for the file.
+    pub(crate) scope: String,
+    /// What it is, for people.
+    pub(crate) long_name: String,
+    /// Its sizes.
+    pub(crate) shape: Vec<usize>,
+    /// Whether neighbours along the first axis are neighbours in the file (else along the last).
+    pub(crate) first_axis_fastest: bool,
+    /// Number of the first column.
+    pub(crate) base: usize,
+    /// Where its bytes are.
+    pub(crate) store: Store,
+    /// Byte of its first element.
+    pub(crate) first: u64,
+    /// Bytes from one element to the next.
+    pub(crate) item_bytes: u64,
+    /// Type of its numbers.
+    pub(crate) number: Number,
+    /// Their byte order.
+    pub(crate) big_endian: bool,
+}
+
+/// The channels, remarks and clues found so far.
+#[derive(Debug, Default)]
+pub(crate) struct Listing {
+    channels: Vec<(String, FoundChannel)>,
+    /// Each location with the number of times it was wanted.
+    locations: HashMap<String, usize>,
+    clues: HashMap<String, Vec<Clue>>,
+    remarks: Vec<String>,
+    unsaid: usize,
+    bytes: usize,
+    clue_count: usize,
+}
+
+impl Listing {
+    /// Says something to the user.
+    pub(crate) fn remark(&mut self, text: impl Into<String>) {
+        if self.remarks.len() < MOST_REMARKS {
+            self.remarks.push(text.into());
+        } else {
+            self.unsaid += 1;
+        }
+    }
+
+    /// A single number: no channel, but it may be the sampling rate.
+    pub(crate) fn scalar(&mut self, scope: &str, name: &str, location: &str, value: f64) {
+        if let Some(clue) = Clue::of(name, location, value).filter(|_| self.clue_count < MOST_CLUES) {
+            self.clue_count += 1;
+            self.clues.entry(scope.to_owned()).or_default().push(clue);
+        }
+        self.remark(format!("{location} is the single number {value}, no channel"));
+    }
+
+    /// An array of at least two numbers. Its bytes must have been found to lie within the file.
+    pub(crate) fn array(&mut self, array: &Array) {
+        let location = &array.location;
+        let Some(lanes) = Lanes::of(&array.shape, array.first_axis_fastest) else {
+            return self.remark(format!("{location} is an empty array, no channel"));
+        };
+        let bytes = lanes.count().saturating_mul(DESCRIPTION_BYTES + 4 * location.len());
+        if bytes > MOST_BYTES.saturating_sub(self.bytes) {
+            let (count, samples) = (lanes.count(), lanes.samples);
+            return self.remark(format!(
+                "{location} is left out: its {count} channels of {samples} samples are too many to list"
+            ));
+        }
+        self.bytes += bytes;
+        if lanes.wide {
+            self.remark(format!(
+                "{location}: its {} rows, not its {} columns, are the channels",
+                lanes.count(),
+                lanes.samples
+            ));
+        }
+        if array.number.may_be_rounded() {
+            self.remark(format!("{location}: 64-bit integers beyond 2^53 are rounded to float64"));
+        }
+        for (index, first) in lanes.each(array.base) {
+            let grid = Grid {
+                store: array.store.clone(),
+                first: array.first + first * array.item_bytes,
+                step: lanes.step * array.item_bytes,
+                samples: lanes.samples,
+                number: array.number,
+                big_endian: array.big_endian,
+            };
+            self.channel(array, &index, grid);
+        }
+    }
+
+    fn channel(&mut self, array: &Array, index: &str, grid: Grid) {
+        let asked = format!("{}{index}", array.location);
+        let location = self.unique(&asked);
+        if location != asked {
+            self.remark(format!("{asked} occurs again, the later one is called {location}"));
+        }
+        let channel = FoundChannel {
+            location,
+            samples: grid.samples,
+            unit: String::new(),
+            long_name: array.long_name.clone(),
+            sample_rate_hz: None,
+            scale_factor: 1.0,
+            add_offset: 0.0,
+            fill_code: None,
+            gaps: Vec::new(),
+            stored_as: grid.number.name(),
+            source: Arc::new(grid),
+        };
+        self.channels.push((array.scope.clone(), channel));
+    }
+
+    /// The location itself, or with a number if it is taken.
+    fn unique(&mut self, asked: &str) -> String {
+        let mut location = asked.to_owned();
+        loop {
+            let wanted = self.locations.entry(location.clone()).or_default();
+            *wanted += 1;
+            if *wanted == 1 {
+                return location;
+            }
+            location = format!("{asked}#{wanted}");
+        }
+    }
+
+    /// Number of channels so far.
+    pub(crate) fn channels(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// Everything, with the sampling rates that follow from the clues.
+    pub(crate) fn finish(mut self, format: String) -> Contents {
+        let mut rates = BTreeMap::new();
+        for (scope, channel) in &mut self.channels {
+            if !rates.contains_key(scope) {
+                rates.insert(scope.clone(), rate_in(scope, &self.clues));
+            }
+            channel.sample_rate_hz = rates.get(scope).and_then(|(rate, _)| *rate);
+        }
+        let mut said = HashSet::new();
+        let mut about_rates: Vec<String> = rates.into_values().filter_map(|(_, remark)| remark).collect();
+        about_rates.retain(|text| said.insert(text.clone()));
+        self.unsaid += about_rates.len().saturating_sub(MOST_REMARKS);
+        about_rates.truncate(MOST_REMARKS);
+        self.remarks.splice(0..0, about_rates);
+        if self.unsaid > 0 {
+            self.remarks.push(format!("{} more remarks of this kind", self.unsaid));
+        }
+        let channels = self.channels.into_iter().map(|(_, channel)| channel).collect();
+        Contents { format, started_at: String::new(), channels, remarks: self.remarks }
+    }
+}

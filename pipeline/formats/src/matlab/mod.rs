@@ -1,0 +1,56 @@
+//! MATLAB's MAT-files of versions 4, 5, 6 and 7.
+//!
+//! Source: "MAT-File Format", The MathWorks (matfile_format.pdf, <https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf>):
+//! level 4 in its appendix, level 5 (that versions 6 and 7 extend by Unicode text and compressed variables) in its body. What it
+//! leaves out (functions, opaque objects, the unnamed workspace at the end) follows the notes in scipy's `scipy.io.matlab`.
+//!
+//! A vector is one channel. Of a matrix every column is one (time runs downwards, as for `plot` and `filter`) except if it has at
+//! most 16 rows and at least 16 times as many columns: then every row. Of arrays of more dimensions the first axis that is longer
+//! than 1 is time. Locations are as MATLAB counts, from 1: `/x`, column 2 `/x[2]`, `/x[2,3]`, field `/s.f`, `/s(2).f` of an array of
+//! structs, `/c{2}` of a cell array. Single numbers are remarks, as are texts; the sampling rate comes from a single number with
+//! a usual name (`fs`, `dt`, `Tinterval`, ...) in the same struct or, failing that, around it.
+//!
+//! A compressed variable is inflated to its end when the file is opened, so that damage shows (if it takes more than 16 MiB in the
+//! file: when it is first read), and inflated once more and kept when one of its channels is read.
+//!
+//! Version 7.3 is HDF5: it is recognised here so that it can be said, so ask an HDF5 reader before this one.
+
+mod class;
+mod element;
+mod level4;
+mod level5;
+mod matrix;
+mod nested;
+mod stream;
+mod text;
+
+use crate::fail;
+use crate::pinned::{Pinned, read_at};
+use crate::{Contents, Format, FormatError};
+use std::path::Path;
+
+/// MAT-files of versions 4 to 7.
+pub struct Mat;
+
+impl Format for Mat {
+    fn recognises(head: &[u8], _path: &Path) -> bool {
+        level5::recognises(head) || level4::recognises(head)
+    }
+
+    fn open(path: &Path) -> Result<Contents, FormatError> {
+        let (pinned, file) = Pinned::open(path)?;
+        let mut head = vec![0; pinned.bytes().min(520) as usize];
+        read_at(&file, 0, &mut head)?;
+        if level5::recognises(&head) {
+            level5::open(&pinned, &head)
+        } else if level4::recognises(&head) {
+            level4::open(&pinned, file)
+        } else {
+            Err(fail::at(
+                0,
+                "neither the 128 bytes that MATLAB 5 to 7 begin a file with nor a variable of MATLAB 4",
+                "this is no MAT-file, or a damaged one",
+            ))
+        }
+    }
+}

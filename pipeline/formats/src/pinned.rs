@@ -1,0 +1,63 @@
+//! A file that must stay as it was when it was opened.
+
+use crate::fail;
+use crate::{FormatError, Raw};
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+
+/// A file's path and the size it had when it was opened. Holds no open file.
+#[derive(Debug, Clone)]
+pub(crate) struct Pinned {
+    path: PathBuf,
+    bytes: u64,
+}
+
+impl Pinned {
+    /// Opens a file for the first time.
+    pub(crate) fn open(path: &Path) -> Result<(Self, File), FormatError> {
+        let cannot = |e| fail::plain(format!("the file cannot be opened: {e}"), "check its path and permissions");
+        let file = File::open(path).map_err(cannot)?;
+        let about = file.metadata().map_err(cannot)?;
+        if !about.is_file() {
+            return Err(fail::plain("this is a folder or device, a file was wanted", "name the file itself"));
+        }
+        Ok((Self { path: path.to_owned(), bytes: about.len() }, file))
+    }
+
+    /// Size in bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Opens it once more. Errors: gone, or of another size by now.
+    pub(crate) fn reopen(&self) -> Result<File, FormatError> {
+        let (now, file) = Self::open(&self.path)?;
+        if now.bytes != self.bytes {
+            let problem = format!("the file had {} bytes when it was opened and has {} now", self.bytes, now.bytes);
+            return Err(fail::plain(problem, "wait until the recording has ended, then open it again"));
+        }
+        Ok(file)
+    }
+}
+
+/// Fills `into` with the bytes from `at`.
+pub(crate) fn read_at(file: &File, at: u64, into: &mut [u8]) -> Result<(), FormatError> {
+    let wanted = into.len();
+    file.read_exact_at(into, at)
+        .map_err(|e| fail::at(at, format!("{wanted} bytes cannot be read: {e}"), fail::COPY_AGAIN))
+}
+
+/// Whether `count` samples from `start` lie within a channel of `samples`; gives the sample behind the last.
+pub(crate) fn stretch_end(start: usize, count: usize, samples: usize) -> Result<usize, FormatError> {
+    start.checked_add(count).filter(|&end| end <= samples).ok_or_else(|| {
+        let problem = format!("{count} samples from sample {start} were wanted, the channel has {samples}");
+        fail::plain(problem, "ask for a stretch that ends with the channel")
+    })
+}
+
+/// A stretch of samples kept in memory.
+pub(crate) fn stretch_of(kept: &[f64], start: usize, count: usize) -> Result<Raw, FormatError> {
+    let end = stretch_end(start, count, kept.len())?;
+    Ok(Raw::Float64(kept.get(start..end).unwrap_or_default().to_vec()))
+}

@@ -1,0 +1,94 @@
+//! The sampling rate, from numbers that are named like one.
+
+use std::collections::HashMap;
+
+/// Names whose value is a rate in hertz. `IO_rate_[Hz]` and `IO_samp_rate_[Hz]` are those of general-mode AFM files.
+const RATES: [&str; 19] = [
+    "fs",
+    "Fs",
+    "f_s",
+    "fs_hz",
+    "Fs_Hz",
+    "samplerate",
+    "sample_rate",
+    "sampleRate",
+    "SampleRate",
+    "sample_rate_hz",
+    "sampling_rate",
+    "samplingRate",
+    "SamplingRate",
+    "sampling_frequency",
+    "SamplingFrequency",
+    "sampling_rate_hz",
+    "samplerate_hz",
+    "IO_samp_rate_[Hz]",
+    "IO_rate_[Hz]",
+];
+
+/// Names whose value is the time between two samples in seconds. `Tinterval` is PicoScope's.
+const INTERVALS: [&str; 10] = [
+    "dt",
+    "dt_s",
+    "Ts",
+    "delta_t",
+    "Tinterval",
+    "sample_interval",
+    "sampleInterval",
+    "SampleInterval",
+    "sampling_interval",
+    "SamplingInterval",
+];
+
+/// Two statements of a rate agree if they differ by less: rates are often written with six digits.
+const AGREE: f64 = 1e-5;
+
+/// A number that is named like a sampling rate or interval.
+#[derive(Debug, Clone)]
+pub struct Clue {
+    location: String,
+    value: f64,
+    interval: bool,
+}
+
+impl Clue {
+    /// Whether a number called `name` (at `location`, for messages) is one.
+    pub fn of(name: &str, location: &str, value: f64) -> Option<Self> {
+        let interval = INTERVALS.contains(&name);
+        let wanted = interval || RATES.contains(&name);
+        wanted.then(|| Self { location: location.to_owned(), value, interval })
+    }
+
+    fn rate_hz(&self) -> Option<f64> {
+        let rate = if self.interval { 1.0 / self.value } else { self.value };
+        (self.value.is_finite() && rate.is_finite() && rate > 0.0).then_some(rate)
+    }
+}
+
+/// What the clues of each scope (a struct, or the file: empty) say about the arrays of one. The nearest scope with a clue decides.
+pub fn rate_in(scope: &str, clues: &HashMap<String, Vec<Clue>>) -> (Option<f64>, Option<String>) {
+    let mut scope = scope;
+    loop {
+        if let Some(here) = clues.get(scope) {
+            return agreed_rate(here);
+        }
+        match scope.rfind(['.', '{', '(', '/']) {
+            Some(cut) => scope = scope.get(..cut).unwrap_or_default(),
+            None => return (None, None),
+        }
+    }
+}
+
+/// The rate that clues give, and what to say of it; none if they disagree or give none.
+pub fn agreed_rate(clues: &[Clue]) -> (Option<f64>, Option<String>) {
+    let named: Vec<String> = clues.iter().map(|clue| format!("{} = {}", clue.location, clue.value)).collect();
+    let named = named.join(", ");
+    let Some(rates) = clues.iter().map(Clue::rate_hz).collect::<Option<Vec<f64>>>() else {
+        return (None, Some(format!("the sampling rate is left unknown: no rate follows from {named}")));
+    };
+    let first = rates.first().copied().unwrap_or_default();
+    if rates.iter().all(|rate| (rate - first).abs() <= AGREE * first) {
+        (Some(first), Some(format!("the sampling rate is taken from {named}: {first} samples per second")))
+    } else {
+        (None, Some(format!("the sampling rate is left unknown because these disagree: {named}")))
+    }
+}

@@ -1,0 +1,128 @@
+//! From the objects of a file to its channels.
+
+use super::object::{Object, Stream, group_and_channel};
+use super::scale::{self, Scaling};
+use super::source::Samples;
+use super::timing;
+use super::walk::Recorded;
+use crate::number::Order;
+use crate::pinned::Pinned;
+use crate::{Contents, FoundChannel};
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+/// What a file of these objects holds.
+pub(super) fn contents(recorded: Recorded, pinned: &Pinned) -> Contents {
+    let Recorded { version, order, mut objects, mut remarks } = recorded;
+    for object in objects.iter_mut().filter(|o| !o.streams.is_empty()) {
+        object.timing.finish(&object.properties);
+    }
+    let began = objects.iter().filter_map(|o| o.timing.began).min();
+    let stated = objects.iter().find(|o| o.path == "/").and_then(|root| root.properties.time("DateTime"));
+    let started_at = began.or(stated).and_then(|stamp| stamp.iso()).unwrap_or_default();
+    let scalings = scalings(&objects);
+    let locations = locations(&objects);
+    let mut channels = Vec::new();
+    for ((object, scaling), location) in objects.iter_mut().zip(scalings).zip(locations) {
+        if object.streams.is_empty() {
+            if object.index.is_some() {
+                remarks.push(format!("{location} has no samples: it is left out"));
+            }
+            continue;
+        }
+        match scaling.and_then(|scaling| channel(object, scaling, &location, pinned, &mut remarks)) {
+            Ok(channel) => channels.push(channel),
+            Err(why) => remarks.push(format!("{location} is left out: {why}")),
+        }
+        if let (Some(own), Some(first)) = (object.timing.began, began)
+            && own != first
+        {
+            remarks.push(format!("{location} begins {} s after the first channel", own.seconds_since(first)));
+        }
+    }
+    let lengths: HashSet<usize> = channels.iter().map(|c| c.samples).collect();
+    if lengths.len() > 1 {
+        remarks.push("the channels have different numbers of samples".to_owned());
+    }
+    let number = if version == 4712 { "1.0" } else { "2.0" };
+    let order = if order == Order::Little { "little-endian" } else { "big-endian" };
+    Contents { format: format!("NI TDMS {number} ({version}), {order}"), started_at, channels, remarks }
+}
+
+fn channel(
+    object: &mut Object,
+    scaling: Scaling,
+    location: &str,
+    pinned: &Pinned,
+    remarks: &mut Vec<String>,
+) -> Result<FoundChannel, String> {
+    let Stream { extents, .. } = take_stream(object, scaling.scaler)?;
+    let (kind, digital) = extents.kind().ok_or("its type changes from segment to segment")?;
+    if !kind.is_number() {
+        return Err(format!("{} values are {}, no channel of numbers", extents.samples(), kind.name()));
+    }
+    if kind.is_long() && !digital {
+        remarks.push(format!("{location} holds {}: given as float64, exact to 2^53", kind.name()));
+    }
+    if object.timing.uneven {
+        remarks.push(format!("{location}: wf_increment changes on the way, so that it has no one sample rate"));
+    }
+    let rate = timing::increment_s(&object.properties).map(f64::recip).filter(|_| !object.timing.uneven);
+    let (scale_factor, add_offset) = scaling.line().unwrap_or((1.0, 0.0));
+    let curve = scaling.line().is_none().then_some(scaling);
+    let text = |name| object.properties.text(name);
+    let unit = text("unit_string").or_else(|| text("NI_UnitDescription")).unwrap_or_default().to_owned();
+    let name = group_and_channel(&object.path).map_or_else(|| object.path.clone(), |(_, channel)| channel);
+    let long_name = text("description").or_else(|| text("NI_ChannelName")).unwrap_or(&name).to_owned();
+    let samples = extents.samples();
+    Ok(FoundChannel {
+        location: location.to_owned(),
+        samples,
+        unit,
+        long_name,
+        sample_rate_hz: rate,
+        scale_factor,
+        add_offset,
+        fill_code: None,
+        gaps: std::mem::take(&mut object.gaps),
+        stored_as: kind.name(),
+        source: Arc::new(Samples { pinned: pinned.clone(), extents, kind, digital, curve }),
+    })
+}
+
+/// The samples that go into the scaling: those of the scaler it names, else the first ones.
+fn take_stream(object: &mut Object, scaler: Option<u32>) -> Result<Stream, String> {
+    let daqmx = object.streams.iter().any(|s| s.scaler.is_some());
+    let at = match scaler.filter(|_| daqmx) {
+        Some(id) => object.streams.iter().position(|s| s.scaler == Some(id)),
+        None => Some(0),
+    };
+    let at = at.filter(|&at| at < object.streams.len());
+    let at = at.ok_or_else(|| format!("its scales build on DAQmx scaler {}, which it lacks", scaler.unwrap_or(0)))?;
+    // Segments without the scaler would otherwise be missing unseen.
+    if object.streams.iter().any(|s| s.extents.samples() != object.samples()) {
+        return Err("its DAQmx scalers change from segment to segment".to_owned());
+    }
+    Ok(object.streams.swap_remove(at))
+}
+
+/// Each object's scaling, with what it inherits from group and file.
+fn scalings(objects: &[Object]) -> Vec<Result<Scaling, String>> {
+    let by_path: HashMap<&str, &Object> = objects.iter().map(|o| (o.path.as_str(), o)).collect();
+    let root = by_path.get("/").map(|o| &o.properties);
+    let of = |object: &Object| {
+        let group = group_and_channel(&object.path).map(|(group, _)| format!("/'{}'", group.replace('\'', "''")));
+        let group = group.and_then(|path| by_path.get(path.as_str()).map(|o| &o.properties));
+        scale::scaling([Some(&object.properties), group, root])
+    };
+    objects.iter().map(of).collect()
+}
+
+/// Each object's location: `/Group/Channel`, or the path with its quotes where that could mean two channels.
+fn locations(objects: &[Object]) -> Vec<String> {
+    let of = |object: &Object| match group_and_channel(&object.path) {
+        Some((group, channel)) if !group.contains('/') && !channel.contains('/') => format!("/{group}/{channel}"),
+        _ => object.path.clone(),
+    };
+    objects.iter().map(of).collect()
+}

@@ -1,0 +1,88 @@
+//! When samples were taken, and whether a later segment goes on where the one before ended.
+
+use super::property::Properties;
+use super::stamp::Stamp;
+
+/// What the latest segments said about a channel's time axis.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Timing {
+    anchor: Option<Anchor>,
+    /// Whether the increment changed on the way: then there is no one rate.
+    pub(super) uneven: bool,
+    /// When the first sample was taken.
+    pub(super) began: Option<Stamp>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Anchor {
+    /// The sample `start` and `offset_s` belong to.
+    sample: usize,
+    start: Option<Stamp>,
+    offset_s: f64,
+    increment_s: Option<f64>,
+}
+
+impl Timing {
+    /// Takes in what the properties say before `sample` is added. True if the samples from there on do not continue those before.
+    pub(super) fn breaks_at(&mut self, sample: usize, properties: &Properties) -> bool {
+        let now = Anchor {
+            sample,
+            start: start(properties),
+            offset_s: properties.number("wf_start_offset").unwrap_or(0.0),
+            increment_s: increment_s(properties),
+        };
+        let Some(before) = self.anchor.filter(|_| sample > 0) else {
+            self.began = now.start.map(|s| s.later_by(now.offset_s));
+            self.anchor = Some(now);
+            return false;
+        };
+        // What was not known before and is now holds for the samples before, too: some writers state it late.
+        let before =
+            Anchor { start: before.start.or(now.start), increment_s: before.increment_s.or(now.increment_s), ..before };
+        let another_rate = now.increment_s != before.increment_s;
+        self.uneven |= another_rate;
+        let broken = another_rate || now.leaves_a_hole_behind(&before);
+        if broken || now.start != before.start || now.offset_s != before.offset_s {
+            self.anchor = Some(now);
+        } else {
+            self.anchor = Some(before);
+        }
+        broken
+    }
+
+    /// Takes in a start that was stated behind the last samples.
+    pub(super) fn finish(&mut self, properties: &Properties) {
+        let offset_s = properties.number("wf_start_offset").unwrap_or(0.0);
+        self.began = self.began.or_else(|| start(properties).map(|s| s.later_by(offset_s)));
+    }
+}
+
+impl Anchor {
+    fn leaves_a_hole_behind(&self, before: &Self) -> bool {
+        let later_s = match (self.start, before.start) {
+            (Some(now), Some(then)) => now.seconds_since(then),
+            (None, None) => 0.0,
+            // One of the two is not known: the axis begins anew.
+            _ => return true,
+        } + (self.offset_s - before.offset_s);
+        if later_s == 0.0 {
+            // Stated once more, unchanged: writers repeat properties.
+            return false;
+        }
+        let Some(increment_s) = self.increment_s else { return true };
+        let lasted_s = (self.sample - before.sample) as f64 * increment_s;
+        // Half a sample: less cannot be a sample lost or taken twice, and clocks' stamps are rounded.
+        let goes_on = (later_s - lasted_s).abs() <= 0.5 * increment_s.abs();
+        !goes_on
+    }
+}
+
+/// Seconds between samples, if stated.
+pub(super) fn increment_s(properties: &Properties) -> Option<f64> {
+    properties.number("wf_increment").filter(|i| i.is_finite() && *i > 0.0)
+}
+
+/// The waveform's start; where that is relative, when the Express VI wrote it.
+fn start(properties: &Properties) -> Option<Stamp> {
+    ["wf_start_time", "NI_ExpStartTimeStamp", "NI_ExpTimeStamp"].iter().find_map(|name| properties.time(name))
+}

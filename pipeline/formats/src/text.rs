@@ -1,0 +1,41 @@
+//! Text in headers: fixed fields and encodings that are not stated.
+
+/// UTF-8 if it is that, else Latin-1 (whose letters that matter here, µ and °, older instruments write).
+pub(crate) fn decode(bytes: &[u8]) -> String {
+    std::str::from_utf8(bytes).map_or_else(|_| latin(bytes), str::to_owned)
+}
+
+/// The same for bytes of one's own, which are not copied.
+pub(crate) fn decoded(bytes: Vec<u8>) -> String {
+    String::from_utf8(bytes).unwrap_or_else(|error| latin(error.as_bytes()))
+}
+
+/// One byte for one character.
+pub(crate) fn latin(bytes: &[u8]) -> String {
+    bytes.iter().map(|&byte| char::from(byte)).collect()
+}
+
+/// A field of fixed size: up to its first zero byte, without blanks around it.
+pub(crate) fn field(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
+    decode(bytes.get(..end).unwrap_or_default()).trim().to_owned()
+}
+
+/// A number that is finite.
+pub(crate) fn number(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+/// At most `most` characters of a text that goes into a message.
+pub(crate) fn brief(text: &str, most: usize) -> String {
+    let mut out: String = text.chars().take(most).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if text.chars().nth(most).is_some() {
+        out.push('…');
+    }
+    out
+}
+
+/// The file's extension in lower case.
+pub(crate) fn extension(path: &std::path::Path) -> String {
+    path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()
+}

@@ -1,0 +1,210 @@
+//! Joins the sections of an LVM file to channels.
+
+use super::axis;
+use super::column::Column;
+use super::lvm::{Section, X};
+use super::lvm_header::{FileHeader, moment};
+use super::{Parsed, titles};
+use crate::FoundChannel;
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+/// Sections may be thousands; so many remarks of them are read.
+const REMARKS: usize = 40;
+
+/// What columns of several sections must share to be one channel: title, its number among those of that title in the section, unit and step.
+///
+/// The step is given to seven digits: one that is estimated from an X column differs a little from section to section.
+type Key = (String, usize, String, Option<String>);
+
+/// The channels so far.
+#[derive(Debug, Default)]
+pub(super) struct Joined {
+    channels: Vec<Channel>,
+    numbers: HashMap<Key, usize>,
+}
+
+#[derive(Debug)]
+struct Channel {
+    title: String,
+    unit: String,
+    step: Option<f64>,
+    values: Vec<f64>,
+    gaps: Vec<usize>,
+    end: Option<Instant>,
+}
+
+/// Whole seconds since 1970 (0 if the file has no date) and the rest.
+#[derive(Debug, Clone, Copy)]
+struct Instant(i64, f64);
+
+impl Joined {
+    /// Adds a section's columns.
+    pub(super) fn add(&mut self, section: Section, file: &FileHeader, remarks: &mut Vec<String>) {
+        let mut remark = |text: String| {
+            if remarks.len() < REMARKS && !remarks.contains(&text) {
+                remarks.push(text);
+            }
+        };
+        let mut seen: HashMap<&str, usize> = HashMap::new();
+        let mut x: Option<usize> = None;
+        let mut given: HashSet<usize> = HashSet::new();
+        for (at, (column, title)) in section.columns.iter().zip(&section.titles).enumerate() {
+            let is_x = title == X;
+            if is_x {
+                x = Some(at).filter(|_| file.has_x && !column.values.is_empty());
+                continue;
+            }
+            if column.values.is_empty() {
+                remark(format!("{title} has no samples in the section of line {}", section.line));
+                continue;
+            }
+            if let Some(text) = column.remark(&format!("{title} (section of line {})", section.line)) {
+                remark(text);
+            }
+            let axis_column = x.and_then(|x| section.columns.get(x));
+            let step = step(&section, at, axis_column, file, &mut remark);
+            let number = seen.entry(title).and_modify(|n| *n += 1).or_insert(1);
+            let unit = section.tags.field("Y_Unit_Label", at).map(str::to_owned);
+            let unit = unit.unwrap_or_else(|| titles::split_unit(title).unit);
+            let start = start(&section, at, axis_column, file);
+            let key = (title.clone(), *number, unit, step.map(|s| format!("{s:.6e}")));
+            self.append(key, step, column, start, section.continued);
+            // Channels share an X column: it is given once.
+            let uneven = x.zip(axis_column).filter(|(x, _)| step.is_none() && given.insert(*x));
+            if let Some((x, times)) = uneven {
+                let unit = if is_time(&section, at) { "s" } else { "" };
+                let key = (X.to_owned(), x, unit.to_owned(), None);
+                self.append(key, None, times, None, section.continued);
+            }
+            samples_remark(&section, at, column, file, &mut remark);
+        }
+    }
+
+    fn append(&mut self, key: Key, step: Option<f64>, column: &Column, start: Option<Instant>, continued: bool) {
+        let next = self.channels.len();
+        let number = *self.numbers.entry(key.clone()).or_insert(next);
+        if number == next {
+            let (title, _, unit, _) = key;
+            self.channels.push(Channel { title, unit, step, values: Vec::new(), gaps: Vec::new(), end: None });
+        }
+        let Some(channel) = self.channels.get_mut(number) else { return };
+        let goes_on = match (channel.end, start, channel.step) {
+            // Half a step: less is no sample, and stamps are rounded.
+            (Some(end), Some(start), Some(step)) => start.since(end).abs() <= 0.5 * step,
+            // A row behind a blank line, of which nothing tells when it was taken.
+            _ => continued,
+        };
+        if !goes_on && !channel.values.is_empty() {
+            channel.gaps.push(channel.values.len());
+        }
+        channel.values.extend_from_slice(&column.values);
+        let lasted = channel.step.map(|step| step * column.values.len() as f64);
+        channel.end = start.zip(lasted).map(|(start, lasted)| Instant(start.0, start.1 + lasted));
+    }
+
+    /// The channels, done.
+    pub(super) fn channels(self, remarks: &mut Vec<String>) -> Vec<FoundChannel> {
+        if remarks.len() == REMARKS {
+            remarks.push("there is more to say of further sections".to_owned());
+        }
+        let names: Vec<&str> = self.channels.iter().map(|c| c.title.as_str()).collect();
+        let locations = titles::locations(&names);
+        let found = |(channel, location): (Channel, String)| FoundChannel {
+            location,
+            samples: channel.values.len(),
+            unit: channel.unit,
+            long_name: channel.title,
+            sample_rate_hz: channel.step.map(axis::rate_hz),
+            scale_factor: 1.0,
+            add_offset: 0.0,
+            fill_code: None,
+            gaps: channel.gaps,
+            stored_as: "text",
+            source: Arc::new(Parsed(channel.values)),
+        };
+        self.channels.into_iter().zip(locations).map(found).collect()
+    }
+}
+
+impl Instant {
+    fn since(self, other: Self) -> f64 {
+        (self.0 - other.0) as f64 + (self.1 - other.1)
+    }
+}
+
+/// When the first sample was taken: date, time and X0, or the first X value.
+fn start(section: &Section, at: usize, x: Option<&Column>, file: &FileHeader) -> Option<Instant> {
+    let first_x = x.and_then(|x| x.values.first().copied());
+    if section.continued && first_x.is_none() {
+        return None;
+    }
+    let offset = first_x.or_else(|| section.tags.number("X0", at, file.decimal)).unwrap_or(0.0);
+    let stamp = section.tags.field("Date", at).zip(section.tags.field("Time", at));
+    let stamp = stamp.and_then(|(date, time)| moment(date, time));
+    // Without a stamp the X values alone tell, if there are any.
+    let (seconds, rest) =
+        stamp.map_or_else(|| first_x.map(|_| (0, 0.0)), |(_, seconds, rest)| Some((seconds, rest)))?;
+    Some(Instant(seconds, rest + offset))
+}
+
+fn is_time(section: &Section, at: usize) -> bool {
+    section.tags.field("X_Dimension", at).is_none_or(|dimension| dimension == "Time")
+}
+
+/// Seconds between samples: `Delta_X` as far as the X column agrees, otherwise that of the X column; none if it is no time or not even.
+fn step(
+    section: &Section,
+    at: usize,
+    x: Option<&Column>,
+    file: &FileHeader,
+    remark: &mut impl FnMut(String),
+) -> Option<f64> {
+    let title = section.titles.get(at).map_or("", String::as_str);
+    if !is_time(section, at) {
+        let dimension = section.tags.field("X_Dimension", at).unwrap_or_default();
+        remark(format!("{title} runs over {dimension}, not over time: no sample rate"));
+        return None;
+    }
+    let stated = section.tags.number("Delta_X", at, file.decimal).filter(|step| *step > 0.0);
+    let Some(x) = x else { return stated };
+    let coarse = |step: f64| x.values.last().is_some_and(|last| x.printed.unit_of(*last) > 0.25 * step);
+    if let Some(step) = stated {
+        if axis::even(x, stated).is_ok() {
+            return stated;
+        }
+        if coarse(step) {
+            remark(format!("{title}: its X column is printed too coarsely to check Delta_X = {step} s, which is used"));
+            return stated;
+        }
+    }
+    let line = section.line;
+    match (axis::even(x, None), stated) {
+        (Ok(even), None) => Some(even.step),
+        (Ok(even), Some(stated)) => {
+            remark(format!(
+                "{title}: Delta_X is {stated} s, its X column has steps of {} s, which are used",
+                even.step
+            ));
+            Some(even.step)
+        }
+        (Err(why), _) => {
+            remark(format!("{title} has no sample rate: its X column (from line {line}) is not even, {why}"));
+            None
+        }
+    }
+}
+
+fn samples_remark(section: &Section, at: usize, column: &Column, file: &FileHeader, remark: &mut impl FnMut(String)) {
+    let title = section.titles.get(at).map_or("", String::as_str);
+    let found = column.values.len();
+    if let Some(stated) = section.tags.number("Samples", at, file.decimal)
+        && !section.continued
+        && stated != found as f64
+    {
+        remark(format!(
+            "{title}: the header in front of line {} says {stated} samples, there are {found}",
+            section.line
+        ));
+    }
+}

@@ -1,0 +1,170 @@
+//! From datasets to channels.
+
+use super::header::Header;
+use super::samples::{Picked, Text};
+use super::scan::{Data, Dataset, Scanned};
+use crate::grid::{Grid, Store};
+use crate::number::Number;
+use crate::pinned::Pinned;
+use crate::{Contents, FoundChannel, Source};
+use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
+
+/// What a file of these datasets holds.
+pub(super) fn contents(scanned: Scanned, pinned: &Pinned) -> Contents {
+    let Scanned { datasets, others, mut remarks } = scanned;
+    let started_at = datasets.iter().find_map(|d| d.header.started_at.clone()).unwrap_or_default();
+    let (mut text, mut binary) = (false, false);
+    let mut channels = Vec::new();
+    let mut seen: HashMap<String, usize> = HashMap::new();
+    for (number, dataset) in datasets.iter().enumerate() {
+        match dataset.data {
+            Data::Text => text = true,
+            _ => binary = true,
+        }
+        let name = dataset.header.response.clone();
+        let times = seen.entry(name.clone()).and_modify(|n| *n += 1).or_insert(1);
+        let location = if *times == 1 { name } else { format!("{name}[{times}]") };
+        match function(dataset, &location, pinned, &mut remarks) {
+            Ok(found) => channels.extend(found),
+            Err(why) => {
+                let what = dataset.header.function_name();
+                remarks.push(format!("dataset 58 number {}, {location} ({what}), is left out: {why}", number + 1));
+            }
+        }
+    }
+    for (dataset, count) in others {
+        remarks.push(format!("{count} datasets {dataset} are left out: only 58 and 58b hold samples"));
+    }
+    let kinds = match (text, binary) {
+        (true, true) => "datasets 58 and 58b",
+        (false, true) => "dataset 58b",
+        _ => "dataset 58",
+    };
+    Contents { format: format!("Universal File Format, {kinds}"), started_at, channels, remarks }
+}
+
+/// The channels of a dataset: its ordinate and, if uneven, its abscissa. Errors: why there is none.
+fn function(
+    dataset: &Dataset,
+    location: &str,
+    pinned: &Pinned,
+    remarks: &mut Vec<String>,
+) -> Result<Vec<FoundChannel>, String> {
+    let header = &dataset.header;
+    if header.complex {
+        return Err(format!("its {} values are complex", header.points));
+    }
+    if header.points == 0 {
+        return Err("it has no values".to_owned());
+    }
+    let (ordinate, abscissa) = sources(dataset, pinned)?;
+    let rate = rate(header, location, remarks);
+    let mut long_name = header.identification.join(", ");
+    if long_name.is_empty() {
+        header.ordinate.label.clone_into(&mut long_name);
+    }
+    let channel = |location: String, unit: &str, long_name: String, rate, stored_as, source| FoundChannel {
+        location,
+        samples: header.points as usize,
+        unit: unit.to_owned(),
+        long_name,
+        sample_rate_hz: rate,
+        scale_factor: 1.0,
+        add_offset: 0.0,
+        fill_code: None,
+        gaps: Vec::new(),
+        stored_as,
+        source,
+    };
+    let stored_as = match (dataset.data, header.double) {
+        (Data::Text, _) => "text",
+        (_, true) => "float64",
+        (_, false) => "float32",
+    };
+    let name = format!("{long_name} ({})", header.function_name());
+    let mut channels = vec![channel(location.to_owned(), &header.ordinate.unit, name, rate, stored_as, ordinate)];
+    if let Some((source, stored_as)) = abscissa {
+        let label = format!("abscissa of {location}: {}", header.abscissa.label);
+        channels.push(channel(format!("{location}/abscissa"), &header.abscissa.unit, label, None, stored_as, source));
+    }
+    Ok(channels)
+}
+
+fn rate(header: &Header, location: &str, remarks: &mut Vec<String>) -> Option<f64> {
+    let what = if header.abscissa.label.is_empty() { "its abscissa" } else { &header.abscissa.label };
+    let (start, step, unit) = (header.abscissa_start, header.abscissa_step, &header.abscissa.unit);
+    if !header.even {
+        remarks.push(format!("{location} has no sample rate: {what} is stored point by point, in {location}/abscissa"));
+        return None;
+    }
+    let Some(seconds) = header.seconds() else {
+        remarks.push(format!(
+            "{location} has no sample rate: {what} is not time; it runs from {start} in steps of {step} {unit}"
+        ));
+        return None;
+    };
+    if !(step.is_finite() && step > 0.0) {
+        remarks.push(format!("{location} has no sample rate: its step is {step} {unit}"));
+        return None;
+    }
+    if start != 0.0 {
+        remarks.push(format!("{location} begins at {start} {unit}"));
+    }
+    Some((step * seconds).recip())
+}
+
+type Abscissa = Option<(Arc<dyn Source>, &'static str)>;
+
+/// Where ordinate and, if uneven, abscissa come from. Errors: the data are not as many as the points.
+fn sources(dataset: &Dataset, pinned: &Pinned) -> Result<(Arc<dyn Source>, Abscissa), String> {
+    let header = &dataset.header;
+    let bytes = dataset.to.saturating_sub(dataset.from);
+    let per_point = if header.even { 1 } else { 2 };
+    let points = header.points;
+    let pinned = pinned.clone();
+    if dataset.data == Data::Text {
+        // A number has a digit and a blank at least.
+        if points.saturating_mul(2 * per_point) > bytes.saturating_add(1) {
+            return Err(format!("{points} points are stated, its {bytes} bytes cannot hold them"));
+        }
+        let widths: &'static [usize] = match (header.double, header.even) {
+            (false, _) => &[13],
+            (true, true) => &[20],
+            (true, false) => &[13, 20],
+        };
+        let (points, every) = (points as usize, per_point as usize);
+        let numbers = points * every;
+        let text = Text { pinned, from: dataset.from, to: dataset.to, widths, numbers, parsed: OnceLock::new() };
+        let text = Arc::new(text);
+        let pick = |first| Arc::new(Picked { text: Arc::clone(&text), first, every, samples: points });
+        let abscissa: Abscissa = if header.even { None } else { Some((pick(0), "text")) };
+        return Ok((pick(every - 1), abscissa));
+    }
+    let width = if header.double { 8 } else { 4 };
+    // The abscissa is single precision by the standard; some writers make it as wide as the ordinate.
+    let abscissa_widths: &[u64] = if header.even { &[0] } else { &[4, 8] };
+    let fits = |x: &&u64| points.checked_mul(width + **x) == Some(bytes);
+    let padded = |x: &&u64| points.checked_mul(width + **x).is_some_and(|wanted| wanted <= bytes);
+    let Some(&abscissa_width) =
+        abscissa_widths.iter().find(fits).or_else(|| abscissa_widths.iter().find(padded).filter(|_| header.even))
+    else {
+        return Err(format!("{points} points are stated, which its {bytes} bytes of data do not match"));
+    };
+    let step = width + abscissa_width;
+    let big_endian = dataset.data == Data::BigEndian;
+    let samples = points as usize;
+    let source = |first, double| Grid {
+        store: Store::File(pinned.clone()),
+        first,
+        step,
+        samples,
+        number: if double { Number::F64 } else { Number::F32 },
+        big_endian,
+    };
+    let ordinate = source(dataset.from + abscissa_width, header.double);
+    let wide = abscissa_width == 8;
+    let stored_as = if wide { "float64" } else { "float32" };
+    let abscissa: Abscissa = if header.even { None } else { Some((Arc::new(source(dataset.from, wide)), stored_as)) };
+    Ok((Arc::new(ordinate), abscissa))
+}

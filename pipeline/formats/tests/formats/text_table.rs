@@ -1,0 +1,257 @@
+//! LVM files and plain tables: built ones, and real ones against lvm_read 1.26.
+
+use crate::support::{assert_sum, channel, locations, open, real, remarked, values};
+use afmid_formats::text_table::TextTable;
+use afmid_formats::{Contents, Format, FormatError};
+
+fn table(name: &str, text: &str) -> Contents {
+    open::<TextTable>(name, text.as_bytes()).unwrap()
+}
+
+fn error(name: &str, bytes: &[u8]) -> FormatError {
+    open::<TextTable>(name, bytes).unwrap_err()
+}
+
+type Expected<'a> = (&'a str, &'a str, Option<f64>, usize, f64, f64);
+
+/// Location, unit, rate, samples, sum and first value. The reference: `lvm_read.read(path, read_from_pickle=False, dump_file=False)[0]`, of it `np.nansum(s['data'], axis=0)` and the header.
+fn real_lvm(name: &str, started_at: &str, channels: &[Expected]) -> Option<Contents> {
+    let found = TextTable::open(&real(&format!("lvm/{name}"))?).unwrap();
+    assert_eq!(found.started_at, started_at);
+    assert_eq!(locations(&found), channels.iter().map(|c| c.0).collect::<Vec<_>>());
+    for (location, unit, rate, samples, sum, first) in channels {
+        let c = channel(&found, location);
+        let found = values(c);
+        assert_eq!(
+            (c.unit.as_str(), c.sample_rate_hz, found.len(), found[0]),
+            (*unit, *rate, *samples, *first),
+            "{location}"
+        );
+        assert_sum(&found, *sum);
+        assert!(c.gaps.is_empty());
+    }
+    Some(found)
+}
+
+#[test]
+fn lvm_with_x_for_every_channel() {
+    let channels = [
+        ("Voltage", "Volts", Some(51200.0), 3, -0.104302, -0.035229),
+        ("Acceleration", "g", Some(51200.0), 3, 1.50314, 0.532608),
+    ];
+    if let Some(found) = real_lvm("multi_time_column.lvm", "2016-08-23T10:45:47.035255731", &channels) {
+        // The file was shortened by hand.
+        assert!(remarked(&found, "says 51200 samples, there are 3"));
+        assert_eq!(found.format, "LabVIEW measurement (LVM 2)");
+    }
+}
+
+#[test]
+fn lvm_without_a_decimal_separator() {
+    let channels = [
+        ("ax", "g", Some(4000.0), 4, 0.012475000000000007, -0.008807),
+        ("ay", "g", Some(4000.0), 4, -0.093938, -0.028189),
+        ("az", "g", Some(4000.0), 4, 0.014253000000000002, 0.021503),
+    ];
+    real_lvm("no_decimal_separator.lvm", "2016-12-12T09:54:07.483999", &channels);
+}
+
+#[test]
+fn lvm_with_decimal_commas_and_no_x() {
+    let channels = [
+        ("Excitation (Trigger)", "Newtons", Some(25600.0), 10, 6.917138, 0.914018),
+        ("Response (Trigger)", "m/s^2", Some(25600.0), 10, 12.138708000000001, 1.204792),
+    ];
+    real_lvm("short.lvm", "2013-02-19T09:51:40.727189064", &channels);
+}
+
+#[test]
+fn lvm_with_comments_and_uneven_x() {
+    let channels = [
+        ("Pressão ABS. (MPa)", "MPa", None, 9, 15.257150000000001, 1.833787),
+        ("X_Value", "s", None, 9, 29.362344999999998, 0.0),
+        ("Temperatura (°C)", "°C", None, 9, 48.866488000000004, 5.479238),
+        ("Volume (ml)", "ml", None, 9, 718.5731000000001, 0.0),
+    ];
+    if let Some(found) = real_lvm("with_comments.lvm", "2020-08-07T09:47:02.101084232", &channels) {
+        assert!(remarked(&found, "9 rows have comments"));
+        assert!(remarked(&found, "no sample rate"));
+    }
+}
+
+#[test]
+fn lvm_with_empty_fields() {
+    let channels = [
+        ("Dev0/Ai0", "", Some(1000.0), 7, -0.09976299999999999, -0.011923),
+        ("Dev0/Ai2", "", Some(1000.0), 7, 50.767824999999995, 7.254639),
+        ("Dev0/Ai0 1", "", Some(1000.0), 7, -0.09976299999999999, -0.011923),
+    ];
+    if let Some(found) = real_lvm("with_empty_fields.lvm", "2016-08-11T15:37:48.375", &channels) {
+        assert!(remarked(&found, "Untitled 3 has no samples"));
+    }
+}
+
+const LVM_HEAD: &str = "LabVIEW Measurement\t\r\nWriter_Version\t2\r\nSeparator\tTab\r\nDecimal_Separator\t.\r\nMulti_Headings\tYes\r\nX_Columns\tNo\r\n***End_of_Header***\t\r\n\r\n";
+
+fn section(time: &str, x0: &str, rows: &str) -> String {
+    let head = format!("Channels\t2\t\t\nSamples\t2\t2\t\nDate\t2020/01/01\t2020/01/01\t\nTime\t{time}\t{time}\t\n");
+    let units = "Y_Unit_Label\tV\tnm\t\nX_Dimension\tTime\tTime\t\n";
+    format!(
+        "{head}{units}X0\t{x0}\t{x0}\t\nDelta_X\t0.5\t0.5\t\n***End_of_Header***\t\t\t\nX_Value\ta\tb\tComment\n{rows}"
+    )
+}
+
+#[test]
+fn lvm_sections_join_and_gaps_show() {
+    let rows = "\t1\t2\n\t3\t4\n";
+    // The second goes on (by its time), the third as well (by X0), the fourth begins 10 s later.
+    let text = [
+        LVM_HEAD.to_owned(),
+        section("00:00:00.0", "0", rows),
+        "\r\n".to_owned(),
+        section("00:00:01.0", "0", rows),
+        section("00:00:01.0", "1.0", rows),
+        "\t\n".to_owned(),
+        section("00:00:13.0", "0", rows),
+    ]
+    .concat();
+    let found = table("sections.lvm", &text);
+    let a = channel(&found, "a");
+    assert_eq!(values(a), [1.0, 3.0, 1.0, 3.0, 1.0, 3.0, 1.0, 3.0]);
+    assert_eq!((a.gaps.as_slice(), a.sample_rate_hz, a.unit.as_str()), (&[6][..], Some(2.0), "V"));
+    assert_eq!(found.started_at, "2020-01-01T00:00:00");
+    assert!(found.remarks.is_empty(), "{:?}", found.remarks);
+}
+
+#[test]
+fn lvm_rows_behind_a_blank_line_go_on_and_holes_are_nan() {
+    let special = "***Start_Special***\nanything\t1\n***End_Special***\n";
+    let text =
+        [LVM_HEAD, special, &section("00:00:00.0", "0", "\t1\t2\tok\n\t\t4\n\t5\tx\n\t7\t8\n\n\t9\t10\n")].concat();
+    let found = table("holes.lvm", &text);
+    let a = values(channel(&found, "a"));
+    assert!(a[1].is_nan() && a[0] == 1.0 && a[2..] == [5.0, 7.0, 9.0]);
+    assert!(channel(&found, "a").gaps.is_empty());
+    for words in ["1 samples are missing", "1 fields are text", "1 rows have comments", "special block"] {
+        assert!(remarked(&found, words), "{words}: {:?}", found.remarks);
+    }
+}
+
+#[test]
+fn lvm_damage_is_refused() {
+    let cases = [
+        ("no-end", "LabVIEW Measurement\nSeparator\tTab\n".to_owned(), "***End_of_Header*** was wanted"),
+        ("nothing", LVM_HEAD.to_owned(), "rows were wanted"),
+        ("no-titles", format!("{LVM_HEAD}Channels\t1\n***End_of_Header***\n1\t2\n"), "row of titles"),
+        ("no-section-end", format!("{LVM_HEAD}Channels\t1\n"), "***End_of_Header*** was wanted"),
+        ("no-special-end", format!("{LVM_HEAD}***Start_Special***\n"), "***End_Special***"),
+        ("decimal", LVM_HEAD.replace("Decimal_Separator\t.", "Decimal_Separator\t;"), "«.» or «,»"),
+    ];
+    for (name, text, words) in cases {
+        let error = error(&format!("{name}.lvm"), text.as_bytes());
+        assert!(error.problem.contains(words) && error.at_byte.is_some(), "{name}: {error:?}");
+    }
+}
+
+#[test]
+fn plain_tables_are_understood_whatever_their_delimiter() {
+    let cases = [
+        ("tab.txt", "Time (s)\tDeflection (V)\n0.0\t1.5\n0.1\t-2.5\n0.2\t3e-3\n"),
+        ("comma.csv", "Time [s],Deflection [V]\n0.0,1.5\n0.1,-2.5\n0.2,3e-3\n"),
+        ("semicolon.csv", "\u{feff}\"Time (s)\";\"Deflection (V)\"\r\n0,0;1,5\r\n0,1;-2,5\r\n0,2;3e-3\r\n"),
+        ("blanks.dat", "# recorded today\n# Time (s)  Deflection (V)\n  0.0   1.5\n  0.1  -2.5\n  0.2  3e-3\n"),
+        ("units.dat", "% a comment\nTime\tDeflection\ns\tV\n0,0\t1,5\n0,1\t-2,5\n0,2\t3e-3\n"),
+        ("bracket-units.tsv", "Time\tDeflection\n[s]\t[V]\n0.0\t1.5\n\n# in between\n0.1\t-2.5\n0.2\t3e-3"),
+    ];
+    for (name, text) in cases {
+        let found = table(name, text);
+        assert_eq!(locations(&found), ["Deflection"], "{name}: {found:?}");
+        let c = channel(&found, "Deflection");
+        assert_eq!(values(c), [1.5, -2.5, 3e-3], "{name}");
+        assert_eq!((c.unit.as_str(), c.sample_rate_hz), ("V", Some(10.0)), "{name}");
+        assert!(remarked(&found, "given as the sample rate"));
+    }
+}
+
+#[test]
+fn times_that_are_not_even_or_in_another_unit() {
+    let lost = table("lost.csv", "Time (s),a\n0.000,1\n0.100,2\n0.200,3\n0.400,4\n");
+    assert_eq!(locations(&lost), ["Time", "a"]);
+    assert_eq!(channel(&lost, "a").sample_rate_hz, None);
+    assert!(remarked(&lost, "gives no sample rate: row 2 is"), "{:?}", lost.remarks);
+    let micro = table("micro.csv", "time (us),a\n0,1\n2,2\n4,3\n6,4\n");
+    assert_eq!(channel(&micro, "a").sample_rate_hz, Some(500_000.0));
+    let odd = table("odd.csv", "t (weeks),a\n0,1\n2,2\n4,3\n");
+    assert!(remarked(&odd, "no unit of time") && channel(&odd, "a").sample_rate_hz.is_none());
+    let rounded = table("rounded.csv", "t (s),a\n0.000000,1\n0.000020,2\n0.000039,3\n0.000059,4\n0.000078,5\n");
+    assert!(remarked(&rounded, "is rounded") && channel(&rounded, "a").sample_rate_hz.is_some());
+    let unnamed = table("unnamed.txt", "0 5\n1 6\n2 7\n");
+    assert_eq!(locations(&unnamed), ["column_1", "column_2"]);
+    assert!(remarked(&unnamed, "rises evenly") && unnamed.channels[1].sample_rate_hz.is_none());
+}
+
+#[test]
+fn holes_text_columns_and_one_column() {
+    let found = table("holes.csv", "n,a,when,b\n1,1.5,12:00:01,\n2,,12:00:02,\n3,oops,12:00:03,\n4,4.5,12:00:04,\n");
+    assert_eq!(locations(&found), ["n", "a"]);
+    let a = values(channel(&found, "a"));
+    assert!(a[0] == 1.5 && a[1].is_nan() && a[2].is_nan() && a[3] == 4.5);
+    for words in [
+        "a: 2 samples are missing and given as NaN, 1 fields are text (the first in line 4)",
+        "when is text",
+        "b is empty",
+    ] {
+        assert!(remarked(&found, words), "{words}: {:?}", found.remarks);
+    }
+    let one = table("one.txt", "Deflection (V)\n1.5\n2.5\n3.5\n");
+    assert_eq!((locations(&one), values(&one.channels[0])), (vec!["Deflection"], vec![1.5, 2.5, 3.5]));
+    let comma = table("decimal.txt", "0,05\n1,10\n");
+    assert_eq!(values(&comma.channels[0]), [0.05, 1.1]);
+    let pairs = table("pairs.csv", "1,2\n3,4\n");
+    assert!(pairs.channels.len() == 2 && remarked(&pairs, "decimal comma"));
+    let cut = table("cut.csv", "a,b\n1,2\n3,4\n5");
+    assert!(values(&cut.channels[0]) == [1.0, 3.0] && remarked(&cut, "cut off"));
+    for (name, text) in [
+        ("end.csv", "a;b\n1;2.5;\n3;4.5;\n"),
+        ("ends.csv", "a;b;\n1;2.5;\n3;4.5;\n"),
+        ("head.csv", "a;b;\n1;2.5\n3;4.5\n"),
+    ] {
+        let end = table(name, text);
+        assert_eq!((locations(&end), values(&end.channels[1])), (vec!["a", "b"], vec![2.5, 4.5]), "{name}");
+        assert!(!remarked(&end, "empty"), "{name}: {:?}", end.remarks);
+    }
+    let same = table("same.csv", "a,a\n1,2.5\n3,4.5\n");
+    assert_eq!(locations(&same), ["a", "a[2]"]);
+}
+
+#[test]
+fn what_is_no_table_is_refused() {
+    let cases: [(&str, Vec<u8>, &str); 6] = [
+        ("words.txt", b"no numbers\nhere\n".to_vec(), "row of numbers"),
+        ("empty.csv", Vec::new(), "row of numbers"),
+        ("utf16.csv", b"\xFF\xFE1\0,\0".to_vec(), "UTF-16"),
+        ("zero.dat", b"1,2\n3,4\n\0\n".to_vec(), "byte 0"),
+        ("wide.csv", b"1,2\n3,4\n5,6,7\n8,9\n".to_vec(), "line 3 has 3 fields, 2 were wanted"),
+        ("long.txt", vec![b'1'; 3 << 20], "longer than"),
+    ];
+    for (name, bytes, words) in cases {
+        let error = error(name, &bytes);
+        assert!(error.problem.contains(words) && error.help.is_some() && error.at_byte.is_some(), "{name}: {error:?}");
+    }
+    // Rows that lack nearly all of 4000 fields, but for the last one: 64 MB of NaN from 50 kB.
+    let names: Vec<String> = (0..4000).map(|n| n.to_string()).collect();
+    let short = "1\n".repeat(2000);
+    let bomb = format!("{LVM_HEAD}X_Value\t{}\n{short}{}\n", names.join("\t"), names.join("\t"));
+    assert!(error("bomb.lvm", bomb.as_bytes()).problem.contains("more empty fields than the file has bytes"));
+}
+
+#[test]
+fn tables_are_recognised_by_name_and_looks() {
+    let is = |name: &str, head: &[u8]| TextTable::recognises(head, std::path::Path::new(name));
+    assert!(is("x", b"LabVIEW Measurement\t\r\n") && is("x", b"\xEF\xBB\xBFLabVIEW Measurement"));
+    assert!(is("a.CSV", b"t,a\n1,2\n") && is("a.dat", b"1 2\n3 4\n"));
+    assert!(
+        !is("a.bin", b"1 2\n") && !is("a", b"1 2\n") && !is("a.dat", b"1 2\n\0") && !is("a.txt", b"Dear reader,\n")
+    );
+    assert!(!is("a.txt", b"    -1\n    58\n1 2 3\n") && !is("a.csv", b""));
+}

@@ -1,0 +1,243 @@
+//! Universal files: built ones, and real ones against pyuff 2.5.8.
+
+use crate::support::{assert_sum, locations, open, real, remarked, values};
+use afmid_formats::uff::Uff;
+use afmid_formats::{Contents, Format, FormatError, Raw};
+
+/// What a test varies in a dataset 58.
+#[derive(Clone)]
+struct Dataset {
+    id: String,
+    function: u32,
+    response: &'static str,
+    node: u32,
+    direction: i32,
+    kind: u32,
+    points: usize,
+    even: bool,
+    start: f64,
+    step: f64,
+    abscissa: (u32, &'static str, &'static str),
+    data: Vec<u8>,
+}
+
+fn time(data: &[u8], kind: u32, points: usize) -> Dataset {
+    Dataset {
+        id: "    58".to_owned(),
+        function: 1,
+        response: "NONE",
+        node: 12,
+        direction: -2,
+        kind,
+        points,
+        even: true,
+        start: 0.0,
+        step: 0.5,
+        abscissa: (17, "time", "s"),
+        data: data.to_vec(),
+    }
+}
+
+/// A dataset with its delimiters.
+fn bytes(d: &Dataset) -> Vec<u8> {
+    let mut text = format!("    -1\n{}\nfirst line\nNONE\n18-Apr-16 13:49:58\nNONE\nNONE\n", d.id);
+    text += &format!(
+        "{:5}{:10}{:5}{:10} {:10}{:10}{:4} {:10}{:10}{:4}\n",
+        d.function, 0, 0, 0, d.response, d.node, d.direction, "NONE", 0, 0
+    );
+    text += &format!(
+        "{:10}{:10}{:10}{:>13}{:>13}{:>13}\n",
+        d.kind,
+        d.points,
+        u8::from(d.even),
+        format!("{:.5E}", d.start),
+        format!("{:.5E}", d.step),
+        "0.00000E+00"
+    );
+    let axis =
+        |quantity: u32, label: &str, unit: &str| format!("{quantity:10}{:5}{:5}{:5} {label:20} {unit:20}\n", 0, 0, 0);
+    text += &axis(d.abscissa.0, d.abscissa.1, d.abscissa.2);
+    text += &[axis(8, "Displacement", "m"), axis(0, "NONE", "NONE"), axis(0, "NONE", "NONE")].concat();
+    let mut bytes = text.into_bytes();
+    bytes.extend(&d.data);
+    bytes.extend(b"    -1\n");
+    bytes
+}
+
+fn contents(name: &str, bytes: &[u8]) -> Contents {
+    open::<Uff>(&format!("{name}.uff"), bytes).unwrap()
+}
+
+fn error(name: &str, bytes: &[u8]) -> FormatError {
+    open::<Uff>(&format!("{name}.uff"), bytes).unwrap_err()
+}
+
+fn binary_id(order: u8, bytes: usize) -> String {
+    format!("    58b{order:6}{:6}{:12}{bytes:12}{:6}{:6}{:12}{:12}", 2, 11, 0, 0, 0, 0)
+}
+
+#[test]
+fn a_sound_recorded_as_58b() {
+    let Some(path) = real("uff/Sample_UFF58b_bin.uff") else { return };
+    let found = Uff::open(&path).unwrap();
+    // pyuff.UFF(path).read_sets(): id3, rsp_ent_name, abscissa_inc, ordinate_axis_units_lab; data.sum(), data[0], [1], [39646], [-1].
+    assert_eq!(
+        (found.format.as_str(), found.started_at.as_str()),
+        ("Universal File Format, dataset 58b", "2016-04-18T13:49:58")
+    );
+    assert_eq!(locations(&found), ["Mic 01"]);
+    let c = &found.channels[0];
+    assert_eq!((c.unit.as_str(), c.sample_rate_hz, c.stored_as), ("Pa", Some(1.52588e-05_f64.recip()), "float32"));
+    assert!(c.long_name.contains("Mic 01.0Scalar") && found.remarks.is_empty());
+    let all = values(c);
+    assert_eq!(all.len(), 79_292);
+    assert_sum(&all, 5.715040058740556);
+    let at = [-0.014755260199308395, -0.017295705154538155, -0.010216998867690563, -0.004314688965678215];
+    assert_eq!([all[0], all[1], all[39_646], all[79_291]], at);
+}
+
+#[test]
+fn a_complex_spectrum_is_a_remark() {
+    let Some(path) = real("uff/sample_dataset58_psd.uff") else { return };
+    let found = Uff::open(&path).unwrap();
+    // pyuff: ord_data_type 5, 3201 points, id3 13-Apr-23 09:57:51.
+    assert_eq!(found.started_at, "2023-04-13T09:57:51");
+    assert!(
+        found.channels.is_empty()
+            && remarked(&found, "Pilot 1 (power spectral density), is left out: its 3201 values are complex")
+    );
+}
+
+#[test]
+fn text_in_every_real_form() {
+    // Fields that touch; a D for an exponent; fewer in the last line.
+    let single = b" 1.000000E+00-2.000000E+00 3.000000E+00 4.000000E+00 5.000000E+00 6.000000E+00\n 7.000000D+00\n";
+    let found = contents("single", &bytes(&time(single, 2, 7)));
+    assert_eq!(locations(&found), ["12-Y"]);
+    let c = &found.channels[0];
+    assert_eq!(values(c), [1.0, -2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    assert_eq!((c.unit.as_str(), c.sample_rate_hz, c.stored_as), ("m", Some(2.0), "text"));
+    let double =
+        b"  1.000000000001E+00 -2.000000000000E+00  3.000000000000E+00  4.000000000000E+00\n  5.000000000000E+00\n";
+    assert_eq!(
+        values(&contents("double", &bytes(&time(double, 4, 5))).channels[0]),
+        [1.000_000_000_001, -2.0, 3.0, 4.0, 5.0]
+    );
+    // Not at the standard's columns.
+    assert_eq!(values(&contents("free", &bytes(&time(b"1.0 2.0 3.0\n4.0\n", 2, 4))).channels[0]), [1.0, 2.0, 3.0, 4.0]);
+}
+
+#[test]
+fn uneven_abscissas_are_channels_of_their_own() {
+    let pairs = Dataset {
+        even: false,
+        ..time(b"  0.00000E+00  1.00000E+00  0.50000E+00  2.00000E+00  2.00000E+00  3.00000E+00\n", 2, 3)
+    };
+    let found = contents("uneven", &bytes(&pairs));
+    assert_eq!(locations(&found), ["12-Y", "12-Y/abscissa"]);
+    assert_eq!(values(&found.channels[0]), [1.0, 2.0, 3.0]);
+    assert_eq!(values(&found.channels[1]), [0.0, 0.5, 2.0]);
+    assert!(found.channels.iter().all(|c| c.sample_rate_hz.is_none()) && remarked(&found, "point by point"));
+    let double = b"  0.00000E+00  1.000000000000E+00  0.50000E+00  2.000000000001E+00\n";
+    let found = contents("uneven-double", &bytes(&Dataset { even: false, ..time(double, 4, 2) }));
+    assert_eq!(values(&found.channels[0]), [1.0, 2.000_000_000_001]);
+    // 58b: single precision abscissa, double precision ordinate.
+    let mut data = Vec::new();
+    for (x, y) in [(0.0_f32, 1.5_f64), (0.5, 2.5)] {
+        data.extend(x.to_le_bytes());
+        data.extend(y.to_le_bytes());
+    }
+    let found =
+        contents("uneven-58b", &bytes(&Dataset { even: false, id: binary_id(1, data.len()), ..time(&data, 4, 2) }));
+    assert_eq!((values(&found.channels[0]), values(&found.channels[1])), (vec![1.5, 2.5], vec![0.0, 0.5]));
+    // As pyuff writes and reads it: both double.
+    let data: Vec<u8> = [0.0_f64, 1.5, 0.5, 2.5].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let found = contents(
+        "uneven-58b-wide",
+        &bytes(&Dataset { even: false, id: binary_id(1, data.len()), ..time(&data, 4, 2) }),
+    );
+    assert_eq!((values(&found.channels[0]), values(&found.channels[1])), (vec![1.5, 2.5], vec![0.0, 0.5]));
+}
+
+#[test]
+fn binary_in_both_byte_orders_and_precisions() {
+    // 10 (a line feed) is among the bytes, and a line that looks like a delimiter.
+    let single = [1.5_f32, -2.5, f32::from_le_bytes(*b"\n\n\n\n")];
+    let double = [1.5_f64, -2.5, f64::from_le_bytes(*b"\n    -1\n")];
+    let wide: Vec<f64> = single.iter().map(|&v| f64::from(v)).collect();
+    let cases: [(u8, u32, Vec<u8>, &[f64]); 4] = [
+        (1, 2, single.iter().flat_map(|v| v.to_le_bytes()).collect(), &wide),
+        (2, 2, single.iter().flat_map(|v| v.to_be_bytes()).collect(), &wide),
+        (1, 4, double.iter().flat_map(|v| v.to_le_bytes()).collect(), &double),
+        (2, 4, double.iter().flat_map(|v| v.to_be_bytes()).collect(), &double),
+    ];
+    for (order, kind, data, expected) in cases {
+        let dataset = Dataset { id: binary_id(order, data.len()), ..time(&data, kind, 3) };
+        let found = contents(&format!("binary-{order}-{kind}"), &bytes(&dataset));
+        assert_eq!(values(&found.channels[0]), expected);
+        assert_eq!(matches!(found.channels[0].source.read(0, 1), Ok(Raw::Float32(_))), kind == 2);
+    }
+}
+
+#[test]
+fn spectra_other_datasets_and_second_responses() {
+    let one = b" 1.00000E+00\n";
+    let spectrum = Dataset { function: 12, abscissa: (18, "Frequency", "Hz"), response: "Mic", ..time(one, 2, 1) };
+    let later = Dataset { start: 2.0, abscissa: (0, "NONE", "ms"), response: "Mic", ..time(one, 2, 1) };
+    let complex = Dataset { kind: 5, ..time(b" 1.00000E+00 0.00000E+00\n", 5, 1) };
+    let other = b"    -1\n   151\nmodel\n    -1\n\n".to_vec();
+    let file = [other.clone(), bytes(&spectrum), other, bytes(&later), bytes(&complex)].concat();
+    let found = contents("several", &file);
+    assert_eq!(locations(&found), ["Mic", "Mic[2]"]);
+    assert_eq!(found.channels[0].sample_rate_hz, None);
+    // 0.5 ms.
+    assert_eq!(found.channels[1].sample_rate_hz, Some(2000.0));
+    for words in [
+        "Frequency is not time; it runs from 0 in steps of 0.5 Hz",
+        "begins at 2 ms",
+        "2 datasets 151",
+        "12-Y (time response), is left out",
+    ] {
+        assert!(remarked(&found, words), "{words}: {:?}", found.remarks);
+    }
+}
+
+#[test]
+fn damage_is_refused_with_its_byte() {
+    let good = time(b" 1.00000E+00\n", 2, 1);
+    let whole = bytes(&good);
+    let f32s = |n: usize| vec![0; 4 * n];
+    let binary = |id: String, points| bytes(&Dataset { id, ..time(&f32s(3), 2, points) });
+    let cases: [(&str, Vec<u8>, &str); 11] = [
+        ("empty", Vec::new(), "no dataset"),
+        ("no-delimiter", b"hello\n".to_vec(), "«hello» was found"),
+        ("cut-header", whole[..100].to_vec(), "within its 11 header records"),
+        ("cut-data", whole[..whole.len() - 7].to_vec(), "the file ends within this dataset"),
+        ("cut-other", b"    -1\n   151\nmodel\n".to_vec(), "the file ends within this dataset"),
+        ("type", bytes(&Dataset { kind: 3, ..good.clone() }), "2, 4, 5 or 6 was wanted"),
+        ("beyond", binary(binary_id(1, 4000), 3), "4000 bytes of data are stated"),
+        ("wrong-size", binary(binary_id(1, 8), 3), "a line «    -1» was wanted"),
+        ("order", binary(binary_id(3, 12), 3), "byte order «3»"),
+        ("vax", binary(binary_id(1, 12).replace("     2   ", "     1   "), 3), "2 (IEEE 754) was wanted"),
+        ("records", binary(binary_id(1, 12).replace("          11", "          10"), 3), "header lines"),
+    ];
+    for (name, bytes, words) in cases {
+        let error = error(name, &bytes);
+        assert!(error.problem.contains(words) && error.at_byte.is_some(), "{name}: {error:?}");
+    }
+    // Lengths that do not fit leave the function out; what is no number shows when it is read.
+    assert!(remarked(&contents("points", &binary(binary_id(1, 12), 4)), "do not match"));
+    assert!(remarked(&contents("many", &bytes(&Dataset { points: 900_000_000, ..good.clone() })), "cannot hold them"));
+    assert!(remarked(&contents("none", &bytes(&Dataset { points: 0, ..good.clone() })), "no values"));
+    let words = contents("words", &bytes(&time(b" one\n", 2, 1)));
+    assert!(words.channels[0].source.read(0, 1).unwrap_err().problem.contains("«one» was found"));
+    let few = contents("few", &bytes(&time(b" 1.00000E+00\n", 2, 3)));
+    assert!(few.channels[0].source.read(0, 1).unwrap_err().problem.contains("3 were wanted"));
+}
+
+#[test]
+fn universal_files_are_recognised() {
+    let is = |head: &[u8]| Uff::recognises(head, std::path::Path::new("x"));
+    assert!(is(b"    -1\n    58\n") && is(b"\r\n    -1\r\n    58b     1\r\n") && is(b"    -1\n   151\n"));
+    assert!(!is(b"") && !is(b"-1\nhello\n") && !is(b"1\n2\n") && !is(b"    -1\n"));
+}

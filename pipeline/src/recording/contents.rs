@@ -1,0 +1,69 @@
+//! What a file of any format holds.
+
+use std::path::Path;
+
+use afmid_formats::{Contents, formats, head_of, recognise};
+
+use super::foreign_hdf5;
+use super::how::{AUTO, HDF5, NATIVE, RAW, Reading};
+use super::native::is_native;
+use crate::error::StageError;
+
+const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+
+/// Opens a file: everything but the samples, and the name of the format that opened it. Native records are listed like any HDF5 file.
+///
+/// Errors: it cannot be read; nobody recognises it; it is damaged.
+pub fn open_contents(path: &Path, reading: &Reading) -> Result<(&'static str, Contents), StageError> {
+    reading.check()?;
+    let name = format_of(path, reading)?;
+    let contents = match (name, &reading.raw) {
+        (NATIVE | HDF5, _) => foreign_hdf5::open(path)?,
+        (RAW, Some(raw)) => raw.open(path).map_err(|error| error.in_file(path))?,
+        _ => match formats().iter().find(|known| known.name == name) {
+            Some(known) => known.open(path)?,
+            None => return Err(StageError::new(format!("there is no format `{name}`")).at(path)),
+        },
+    };
+    Ok((name, contents))
+}
+
+/// The name of the format that opens a file. Errors: it cannot be read; nobody recognises it.
+pub(super) fn format_of(path: &Path, reading: &Reading) -> Result<&'static str, StageError> {
+    if reading.format != AUTO {
+        let names = Reading::names();
+        let found = names.into_iter().find(|name| *name == reading.format);
+        return found.ok_or_else(|| StageError::new(format!("there is no format `{}`", reading.format)).at(path));
+    }
+    let head = head_of(path)?;
+    if is_hdf5(&head) {
+        return Ok(if is_native(path) { NATIVE } else { HDF5 });
+    }
+    recognise(&head, path).map(|known| known.name).ok_or_else(|| unknown(path, &head))
+}
+
+/// Whether a file is of a format that somebody recognises.
+pub(super) fn is_recognised(path: &Path) -> bool {
+    head_of(path).is_ok_and(|head| is_hdf5(&head) || recognise(&head, path).is_some())
+}
+
+/// HDF5 begins at byte 0, or behind a user block of 512, 1024, ... bytes; MATLAB 7.3 has one of 512.
+fn is_hdf5(head: &[u8]) -> bool {
+    [0, 512, 1024, 2048].iter().any(|&at| head.get(at..).is_some_and(|rest| rest.starts_with(SIGNATURE)))
+}
+
+fn unknown(path: &Path, head: &[u8]) -> StageError {
+    if head.is_empty() {
+        return StageError::new("the file is empty").at(path);
+    }
+    let begins = head.get(..8.min(head.len())).unwrap_or_default().escape_ascii();
+    let known: Vec<&str> = formats().iter().map(|known| known.title).collect();
+    StageError::new(format!(
+        "not a readable HDF5 file, and of no other format that is known; it begins with «{begins}»"
+    ))
+    .at(path)
+    .help(format!(
+        "known are: HDF5, {}. Name the format with `format`, or describe a file without a header with `raw`",
+        known.join(", ")
+    ))
+}

@@ -1,0 +1,77 @@
+//! Channels whose file is opened when samples are asked for: those of foreign formats, and those of stored recordings.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use super::how::Reading;
+use super::source::Hdf5Source;
+use super::{FormatError, Raw, Source, kept};
+
+/// A stretch of a channel of a file.
+#[derive(Debug)]
+pub(crate) struct DeferredSource {
+    path: PathBuf,
+    file_size: u64,
+    location: String,
+    /// Sample of the file's channel that is the stretch's first.
+    first: usize,
+    samples: usize,
+    reading: Reading,
+    native: OnceLock<Hdf5Source>,
+}
+
+impl DeferredSource {
+    /// A whole channel of a native record.
+    pub(crate) fn new(path: &Path, file_size: u64, location: &str, samples: usize) -> Self {
+        Self {
+            path: path.to_owned(),
+            file_size,
+            location: location.to_owned(),
+            first: 0,
+            samples,
+            reading: Reading::default(),
+            native: OnceLock::new(),
+        }
+    }
+
+    /// The same of a file of another format, from sample `first` on.
+    pub(crate) fn of_stretch(self, first: usize, reading: &Reading) -> Self {
+        Self { first, reading: reading.clone(), ..self }
+    }
+
+    /// Native records keep where their samples lie.
+    fn native(&self) -> Result<&Hdf5Source, FormatError> {
+        if let Some(source) = self.native.get() {
+            return Ok(source);
+        }
+        let source = super::native::open_source(&self.path, &self.location)?;
+        if source.file_size != self.file_size || source.samples != self.samples {
+            return Err(self.error("the file is not the one that was recorded: its size differs"));
+        }
+        Ok(self.native.get_or_init(|| source))
+    }
+
+    fn error(&self, problem: &str) -> FormatError {
+        FormatError::new(format!("{}: {problem}", self.location), "run again, so that it is opened anew")
+            .in_file(&self.path)
+    }
+}
+
+impl Source for DeferredSource {
+    fn read(&self, start: usize, count: usize) -> Result<Raw, FormatError> {
+        if self.reading.is_native() {
+            return self.native()?.read(start, count);
+        }
+        if start.checked_add(count).is_none_or(|end| end > self.samples) {
+            let problem = format!("samples {start} to {start} + {count} asked for, there are {}", self.samples);
+            return Err(self.error(&problem));
+        }
+        let contents = kept::contents(&self.path, self.file_size, &self.reading)?;
+        let channel = contents.channels.iter().find(|channel| channel.location == self.location);
+        let end = self.first.saturating_add(self.samples);
+        let channel = channel.filter(|channel| channel.samples >= end).ok_or_else(|| {
+            self.error("the file is not the one that was recorded: it lacks the channel, or it is shorter")
+        })?;
+        channel.source.read(self.first + start, count).map_err(|error| error.in_file(&self.path))
+    }
+}

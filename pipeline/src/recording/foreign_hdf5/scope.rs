@@ -1,0 +1,60 @@
+//! Numbers that are named like a sample rate, and what they are about.
+
+use std::collections::HashMap;
+
+use afmid_formats::{Clue, agreed_rate, rate_in};
+use hdf5::Location;
+
+use super::walk::Found;
+use crate::recording::native::number_attribute;
+
+/// More statements of a rate are ignored: a damaged file could make millions.
+const MOST_CLUES: usize = 4096;
+
+/// Clues by the path of the group that they are about; empty for the file.
+#[derive(Debug, Default)]
+pub(super) struct Scopes {
+    clues: HashMap<String, Vec<Clue>>,
+    count: usize,
+}
+
+impl Scopes {
+    /// Takes the attributes of a group.
+    pub(super) fn attributes(&mut self, group: &Location, path: &str) {
+        for clue in clues(group, path) {
+            self.add(path, clue);
+        }
+    }
+
+    /// Takes a dataset of one number.
+    pub(super) fn number(&mut self, group: &str, name: &str, location: &str, value: f64) {
+        if let Some(clue) = Clue::of(name, location, value) {
+            self.add(group, clue);
+        }
+    }
+
+    fn add(&mut self, scope: &str, clue: Clue) {
+        if self.count < MOST_CLUES {
+            self.count += 1;
+            self.clues.entry(scope.to_owned()).or_default().push(clue);
+        }
+    }
+
+    /// The rate of a dataset, and what to say of it.
+    pub(super) fn rate_of(&self, found: &Found) -> (Option<f64>, Option<String>) {
+        let own: Vec<Clue> = clues(&found.dataset, &found.location);
+        if own.is_empty() { rate_in(&found.group, &self.clues) } else { agreed_rate(&own) }
+    }
+}
+
+/// What the attributes of an object say of a rate.
+fn clues(object: &Location, path: &str) -> Vec<Clue> {
+    let names = object.attr_names().unwrap_or_default();
+    let clue = |name: &String| {
+        // only attributes that are named like a rate are read
+        Clue::of(name, "", 0.0)?;
+        let value = number_attribute(object, path, name).ok()?;
+        Clue::of(name, &format!("{path}@{name}"), value)
+    };
+    names.iter().filter_map(clue).collect()
+}

@@ -1,0 +1,93 @@
+//! All datasets of a file.
+
+use hdf5::{Dataset, Group, LinkType, LocationType};
+
+use super::scope::Scopes;
+
+/// Deeper groups are a loop of hard links.
+const DEEPEST: usize = 32;
+
+/// More objects are no recording; a loop of hard links would give them, too.
+const MOST_OBJECTS: usize = 20_000;
+
+/// A dataset and where it lies.
+#[derive(Debug)]
+pub(super) struct Found {
+    pub(super) dataset: Dataset,
+    /// Path: `/group/name`.
+    pub(super) location: String,
+    /// Path of its group; empty for the file.
+    pub(super) group: String,
+    pub(super) name: String,
+}
+
+/// Datasets of a file, in the order of their names, group by group; attributes of groups go to `scopes`.
+pub(super) fn datasets(file: &Group, scopes: &mut Scopes, remarks: &mut Vec<String>) -> Vec<Found> {
+    let mut walk = Walk { scopes, remarks, found: Vec::new(), objects: 0, links: 0 };
+    walk.group(file, "", 0);
+    if walk.links > 0 {
+        let links = walk.links;
+        walk.remarks.push(format!("{links} soft or external links are not followed"));
+    }
+    if walk.objects >= MOST_OBJECTS {
+        walk.remarks.push(format!("only the first {MOST_OBJECTS} objects are listed"));
+    }
+    walk.found
+}
+
+struct Walk<'a> {
+    scopes: &'a mut Scopes,
+    remarks: &'a mut Vec<String>,
+    found: Vec<Found>,
+    objects: usize,
+    links: usize,
+}
+
+impl Walk<'_> {
+    fn group(&mut self, group: &Group, path: &str, depth: usize) {
+        let mut names = Vec::new();
+        let most = MOST_OBJECTS.saturating_sub(self.objects);
+        let listed = group.iter_visit_default(|name, link| {
+            match link.link_type {
+                LinkType::Hard if names.len() < most => names.push(name.to_owned()),
+                LinkType::Hard => {}
+                LinkType::Soft | LinkType::External => self.links += 1,
+            }
+            Ok(())
+        });
+        if let Err(error) = listed {
+            self.remarks.push(format!("the members of {path}/ cannot all be listed: {error}"));
+        }
+        for name in names {
+            if self.objects >= MOST_OBJECTS {
+                return;
+            }
+            self.objects += 1;
+            self.member(group, path, name, depth);
+        }
+    }
+
+    fn member(&mut self, group: &Group, path: &str, name: String, depth: usize) {
+        let location = format!("{path}/{name}");
+        // where MATLAB keeps what its cells and objects refer to
+        if path.is_empty() && matches!(name.as_str(), "#refs#" | "#subsystem#") {
+            return self.remarks.push(format!("{location} holds parts of MATLAB's cells and objects, no channel"));
+        }
+        match group.loc_type_by_name(&name) {
+            Ok(LocationType::Dataset) => match group.dataset(&name) {
+                Ok(dataset) => self.found.push(Found { dataset, location, group: path.to_owned(), name }),
+                Err(error) => self.remarks.push(format!("{location} cannot be opened: {error}")),
+            },
+            Ok(LocationType::Group) if depth < DEEPEST => match group.group(&name) {
+                Ok(inner) => {
+                    self.scopes.attributes(&inner, &location);
+                    self.group(&inner, &location, depth + 1);
+                }
+                Err(error) => self.remarks.push(format!("{location} cannot be opened: {error}")),
+            },
+            Ok(LocationType::Group) => self.remarks.push(format!("{location} lies too deep: it is not looked into")),
+            Ok(_) => {}
+            Err(error) => self.remarks.push(format!("{location} cannot be opened: {error}")),
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! Opening a file as records, whatever its format.
+
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::contents::{format_of, is_recognised};
+use super::deferred::DeferredSource;
+use super::hash::hash_file;
+use super::how::{How, NATIVE, Reading};
+use super::native::{Wanted, open_native, size_of_file};
+use super::stretches::uninterrupted;
+use super::{Channel, Contents, FoundChannel, Record, kept};
+use crate::error::StageError;
+
+/// Channels named in a message.
+const MOST_NAMED: usize = 20;
+
+/// What two statements of a rate may differ by, relative: what is printed to seven digits.
+const SAME_RATE: f64 = 1e-6;
+
+/// A file's records, and what its reader says about it.
+#[derive(Debug, Clone)]
+pub struct Opened {
+    /// The name of the format that opened it.
+    pub format: &'static str,
+    /// One record, or one per uninterrupted stretch.
+    pub records: Vec<Record>,
+    /// What a user should know: parts that are no channel, a truncated end, guesses.
+    pub remarks: Vec<String>,
+}
+
+/// Whether a file is of a format that can be opened without being told which.
+pub fn recognised(path: &Path) -> bool {
+    is_recognised(path)
+}
+
+/// Opens a file's channels as records.
+///
+/// Errors: as [`super::open_contents`]; a required channel is missing; no sample rate or unit, neither in the file nor in `how`, or two
+/// that differ.
+pub fn open_records(path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened, StageError> {
+    how.reading.check()?;
+    let format = format_of(path, &how.reading)?;
+    if format == NATIVE {
+        let record = open_native(path, wanted)?;
+        agreed_rate(Some(record.sample_rate_hz), how, "the file").map_err(|error| error.at(path))?;
+        for wanted in wanted {
+            if let Ok(channel) = record.channel(wanted.role) {
+                agreed_unit(&channel.unit, how, wanted).map_err(|error| error.at(path))?;
+            }
+        }
+        return Ok(Opened { format, records: vec![record], remarks: Vec::new() });
+    }
+    let reading = Reading { format: format.to_owned(), raw: how.reading.raw.clone() };
+    let size = size_of_file(path)?;
+    let contents = kept::contents(path, size, &reading)?;
+    let file = File { path, size, reading, contents: &contents };
+    let records = file.records(wanted, how).map_err(|error| error.at(path))?;
+    let mut remarks = contents.remarks.clone();
+    if records.len() > 1 {
+        remarks.insert(0, format!("the recording has gaps: {} uninterrupted stretches, a record each", records.len()));
+    }
+    Ok(Opened { format, records, remarks })
+}
+
+/// A file that is open.
+struct File<'a> {
+    path: &'a Path,
+    size: u64,
+    reading: Reading,
+    contents: &'a Contents,
+}
+
+impl File<'_> {
+    fn records(&self, wanted: &[Wanted], how: &How) -> Result<Vec<Record>, StageError> {
+        let mut found: Vec<(&Wanted, &FoundChannel)> = Vec::new();
+        for wanted in wanted {
+            if let Some(channel) = self.find(wanted)? {
+                found.push((wanted, channel));
+            }
+        }
+        let mut rate = None;
+        for (_, channel) in &found {
+            let own = agreed_rate(channel.sample_rate_hz, how, &channel.location)?;
+            if let Some((first, other)) = rate.filter(|(_, rate)| differ(*rate, own)) {
+                return Err(StageError::new(format!(
+                    "{} has {own} samples per second, {first} has {other}: one record wants one rate",
+                    channel.location
+                ))
+                .help("leave the second channel out: piezo_channel = \"\""));
+            }
+            rate.get_or_insert((&channel.location, own));
+        }
+        let sample_rate_hz = rate.map(|(_, rate)| rate).or(how.sample_rate_hz).unwrap_or(f64::NAN);
+        let samples = found.iter().map(|(_, channel)| channel.samples).max().unwrap_or(0);
+        let stretches = uninterrupted(samples, found.iter().map(|(_, channel)| channel.gaps.as_slice()));
+        let blake3 = hash_file(self.path)?;
+        let several = stretches.len() > 1;
+        let record = |(number, stretch): (usize, &Range<usize>)| {
+            let name = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            let channels = found
+                .iter()
+                .map(|(wanted, channel)| self.channel(wanted, channel, stretch, how))
+                .collect::<Result<_, _>>()?;
+            Ok(Record {
+                name: if several { format!("{name}[{}]", number + 1) } else { name },
+                path: self.path.to_owned(),
+                size: self.size,
+                blake3: blake3.clone(),
+                sample_rate_hz,
+                // how long an interruption lasted is not known
+                started_at: if number == 0 { self.contents.started_at.clone() } else { String::new() },
+                first_sample: stretch.start,
+                reading: self.reading.clone(),
+                channels,
+            })
+        };
+        stretches.iter().enumerate().map(record).collect()
+    }
+
+    /// A channel by its location, with or without the slash before it.
+    fn find(&self, wanted: &Wanted) -> Result<Option<&FoundChannel>, StageError> {
+        let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
+        let channels = &self.contents.channels;
+        let exact = channels.iter().find(|channel| channel.location == wanted.location);
+        let found = exact.or_else(|| channels.iter().find(|channel| bare(&channel.location) == bare(wanted.location)));
+        if found.is_some() || !wanted.required {
+            return Ok(found);
+        }
+        let named: Vec<&str> = channels.iter().take(MOST_NAMED).map(|channel| channel.location.as_str()).collect();
+        let more = channels.len().saturating_sub(MOST_NAMED);
+        let listed = match (named.is_empty(), more) {
+            (true, _) => "no channel at all".to_owned(),
+            (_, 0) => named.join(", "),
+            _ => format!("{} and {more} more", named.join(", ")),
+        };
+        let problem = format!(
+            "there is no channel `{}` in this {}; the file has: {listed}",
+            wanted.location, self.contents.format
+        );
+        Err(StageError::new(problem).help("set `channel` to one of them; `afmid inspect` tells more of each"))
+    }
+
+    fn channel(
+        &self,
+        wanted: &Wanted,
+        found: &FoundChannel,
+        stretch: &Range<usize>,
+        how: &How,
+    ) -> Result<Channel, StageError> {
+        let end = stretch.end.min(found.samples);
+        let samples = end.saturating_sub(stretch.start);
+        let source = DeferredSource::new(self.path, self.size, &found.location, samples);
+        Ok(Channel {
+            role: wanted.role.to_owned(),
+            location: found.location.clone(),
+            samples,
+            unit: agreed_unit(&found.unit, how, wanted)?,
+            long_name: found.long_name.clone(),
+            scale_factor: found.scale_factor,
+            add_offset: found.add_offset,
+            fill_code: found.fill_code,
+            source: Arc::new(source.of_stretch(stretch.start, &self.reading)),
+        })
+    }
+}
+
+fn differ(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() > SAME_RATE
+}
+
+/// The rate that is stated or given. Errors: neither, or both and they differ.
+fn agreed_rate(stated: Option<f64>, how: &How, what: &str) -> Result<f64, StageError> {
+    match (stated, how.sample_rate_hz) {
+        (Some(stated), Some(given)) if differ(stated, given) => {
+            Err(StageError::new(format!("`sample_rate_hz` is given as {given}, {what} states {stated}"))
+                .help("leave `sample_rate_hz` out: it is for files that state no rate"))
+        }
+        (Some(rate), _) | (None, Some(rate)) => Ok(rate),
+        (None, None) => Err(StageError::new(format!("{what}: the file states no sample rate"))
+            .help("give it, in Hz: sample_rate_hz = 5e6")),
+    }
+}
+
+/// The unit that is stated or given; `unit` is that of the required channels, others may go without. Errors: neither, or both and they differ.
+fn agreed_unit(stated: &str, how: &How, wanted: &Wanted) -> Result<String, StageError> {
+    let given = how.unit.as_deref().filter(|_| wanted.required);
+    match (stated, given) {
+        ("", None) if wanted.required => {
+            Err(StageError::new(format!("{}: the file states no unit", wanted.location)).help("give it: unit = \"V\""))
+        }
+        ("", given) => Ok(given.unwrap_or_default().to_owned()),
+        (stated, Some(given)) if stated != given => {
+            Err(StageError::new(format!("`unit` is given as {given}, {} is in {stated}", wanted.location))
+                .help("leave `unit` out: it is for files that state no unit"))
+        }
+        _ => Ok(stated.to_owned()),
+    }
+}

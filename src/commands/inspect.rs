@@ -1,0 +1,55 @@
+//! `afmid inspect`: what recorded files hold, and whether they can carry a ringdown.
+
+use std::path::{Path, PathBuf};
+
+use afmid_stages::io::natural_order;
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use crate::failure::Failure;
+use crate::inspect::{Inspected, Outcome, file_text, folder_text, inspect, inspected_json};
+use crate::output::print;
+
+/// Looks at files, and at the files of folders. Errors: some could not be read; all are told before.
+pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
+    let mut looked = Vec::new();
+    for path in paths {
+        let files = if path.is_dir() { files_of(path)? } else { vec![path.clone()] };
+        // in parallel, told in their order
+        let inspected: Vec<Inspected> = files.par_iter().map(|file| inspect(file)).collect();
+        if !as_json {
+            print(&text(path, &inspected))?;
+        }
+        looked.extend(inspected);
+    }
+    if as_json {
+        let files: Vec<Value> = looked.iter().map(inspected_json).collect();
+        let text = serde_json::to_string_pretty(&json!({ "files": files }));
+        print(&(text.map_err(|error| Failure::failed(error, None))? + "\n"))?;
+    }
+    let refused = looked.iter().filter(|inspected| matches!(inspected.outcome, Outcome::Refused { .. })).count();
+    match refused {
+        0 => Ok(()),
+        _ => Err(Failure::failed(format!("{refused} of {} files could not be read", looked.len()), None)),
+    }
+}
+
+fn text(path: &Path, inspected: &[Inspected]) -> String {
+    if path.is_dir() { folder_text(path, inspected) } else { inspected.iter().map(file_text).collect() }
+}
+
+/// The files of a folder, in natural order; hidden ones and folders in it are passed over. Errors: it cannot be listed.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let cannot =
+        |error: std::io::Error| Failure::failed(format!("{} cannot be listed: {error}", folder.display()), None);
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(cannot)? {
+        let entry = entry.map_err(cannot)?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if !name.starts_with('.') && entry.path().is_file() {
+            names.push((name, entry.path()));
+        }
+    }
+    names.sort_by(|a, b| natural_order(&a.0, &b.0));
+    Ok(names.into_iter().map(|(_, path)| path).collect())
+}

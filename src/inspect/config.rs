@@ -1,0 +1,33 @@
+//! The stage of a config that reads a file.
+
+use std::path::Path;
+
+use afmid_pipeline::toml::Value;
+
+use super::channel::Channel;
+use super::verdict::LEAST_RATE_HZ;
+
+/// The `io.records` stage that reads a channel of a file, with what it must be told; what only the user knows is left to fill in.
+pub fn stage(path: &Path, channel: &Channel) -> String {
+    let text = |text: &str| Value::String(text.to_owned()).to_string();
+    // a config's paths begin at its folder, which is not known here
+    let file = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let mut lines = vec![
+        "[[stage]]".to_owned(),
+        "id = \"records\"".to_owned(),
+        "uses = \"io.records\"".to_owned(),
+        String::new(),
+        "[stage.params]".to_owned(),
+        format!("files = [{}]", text(&file.to_string_lossy())),
+        format!("channel = {}", text(&channel.location)),
+    ];
+    match channel.sample_rate_hz {
+        None => lines.push("# sample_rate_hz = ...  # the file states none: fill it in".to_owned()),
+        Some(rate) if rate < LEAST_RATE_HZ => lines.push(format!("min_sample_rate_hz = {rate:?}  # below the default")),
+        Some(_) => {}
+    }
+    if channel.unit.is_empty() {
+        lines.push("# unit = \"...\"  # the file states none: fill it in".to_owned());
+    }
+    lines.join("\n") + "\n"
+}

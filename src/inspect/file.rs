@@ -1,0 +1,82 @@
+//! A file that was looked at.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::StageError;
+use afmid_pipeline::recording::{Reading, open_contents};
+use afmid_pipeline::store::is_own;
+
+use super::channel::Channel;
+use super::config::stage;
+use super::verdict::{Verdict, of_file};
+
+/// Channels that are read through; more are listed.
+const MOST_READ: usize = 256;
+
+/// A file and what became of it.
+#[derive(Debug)]
+pub struct Inspected {
+    pub file: PathBuf,
+    pub size_bytes: Option<u64>,
+    pub outcome: Outcome,
+}
+
+/// What a file holds.
+#[derive(Debug)]
+pub struct Holdings {
+    /// For people, with its version.
+    pub format: String,
+    pub started_at: String,
+    pub channels: Vec<Channel>,
+    pub remarks: Vec<String>,
+    pub ringdown: Verdict,
+    /// The `io.records` stage that would read it, in TOML; none without a channel.
+    pub stage: Option<String>,
+}
+
+/// What became of a file.
+#[derive(Debug)]
+pub enum Outcome {
+    /// It was read.
+    Read(Box<Holdings>),
+    /// It is a result or stage file of afmid's, no recording.
+    Own,
+    /// It could not be read.
+    Refused {
+        /// Why.
+        problem: String,
+        /// What to do.
+        help: Option<String>,
+    },
+}
+
+/// Looks at a file: what it holds, and every sample of it once.
+pub fn inspect(path: &Path) -> Inspected {
+    let size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
+    let outcome = match is_own(path) {
+        Ok(true) => Outcome::Own,
+        _ => read(path).map_or_else(refused, |holdings| Outcome::Read(Box::new(holdings))),
+    };
+    Inspected { file: path.to_owned(), size_bytes, outcome }
+}
+
+fn refused(error: StageError) -> Outcome {
+    Outcome::Refused { problem: error.problem, help: error.help }
+}
+
+fn read(path: &Path) -> Result<Holdings, StageError> {
+    let (name, contents) = open_contents(path, &Reading::of("auto", None))?;
+    let channels = contents.channels.iter().enumerate();
+    let channels: Vec<Channel> =
+        channels.map(|(index, found)| Channel::of(found, index < MOST_READ)).collect::<Result<_, _>>()?;
+    let ringdown = of_file(&channels);
+    let best = ringdown.channel.and_then(|index| channels.get(index));
+    Ok(Holdings {
+        format: if name == "native" { format!("native record ({})", contents.format) } else { contents.format },
+        started_at: contents.started_at,
+        stage: best.map(|channel| stage(path, channel)),
+        channels,
+        remarks: contents.remarks,
+        ringdown,
+    })
+}
