@@ -7,6 +7,7 @@ mod native;
 mod recent;
 mod series;
 mod source;
+mod stamps;
 mod write;
 
 #[cfg(test)]
@@ -22,6 +23,7 @@ pub(crate) use native::is_native;
 pub use native::{Wanted, open_native};
 pub use series::{read_number_attribute, read_series};
 pub(crate) use source::DeferredSource;
+pub(crate) use stamps::keep_in as keep_stamps_in;
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
 
 use crate::error::StageError;
