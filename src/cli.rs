@@ -5,8 +5,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+mod batch;
 mod provenance;
 
+pub use batch::BatchArgs;
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
 
 /// Identifies dynamic systems from archived transients, such as snap-off events in force curves of an atomic force microscope.
@@ -23,6 +25,8 @@ pub struct Cli {
 pub enum Command {
     /// Run a config, reusing what is still valid, and write a result file.
     Run(RunArgs),
+    /// Run a config on many data sets, each with its own result file, and write one table of them all.
+    Batch(BatchArgs),
     /// Check configs: everything that can be wrong without opening data, all errors at once.
     Check {
         /// The configs.

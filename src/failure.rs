@@ -12,6 +12,8 @@ pub enum Failure {
     Usage(Message),
     /// Something failed: exit code 1.
     Failed(Message),
+    /// Some data sets of a batch failed, the others did not: exit code 3.
+    Partly(Message),
     /// Whoever read stdout has seen enough (`afmid schema | head`): the quiet end, exit code 0.
     Closed,
 }
@@ -41,6 +43,7 @@ impl Failure {
         let (message, code) = match self {
             Self::Usage(message) => (message, 2),
             Self::Failed(message) => (message, 1),
+            Self::Partly(message) => (message, 3),
             Self::Closed => return ExitCode::SUCCESS,
         };
         match message {

@@ -3,6 +3,7 @@
 // the macros panic where a pipe is closed or a disk full: `output` is the one place that prints
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+mod batch;
 mod cli;
 mod commands;
 mod diagnostic;

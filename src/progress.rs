@@ -3,6 +3,7 @@
 use std::io::IsTerminal;
 use std::time::Duration;
 
+use crate::batch::work::Done;
 use crate::output::say;
 use afmid_pipeline::runner::Observer;
 use afmid_pipeline::stage::{NoProgress, Progress};
@@ -11,6 +12,47 @@ use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 /// Who watches a run: bars if stderr is a terminal, lines elsewhere.
 pub fn observer() -> Box<dyn Observer> {
     if std::io::stderr().is_terminal() { Box::new(Bars { bars: MultiProgress::new() }) } else { Box::new(Lines) }
+}
+
+/// Progress of a batch: a bar with rate and time left if stderr is a terminal, a line per run elsewhere.
+pub struct Sets {
+    bar: Option<ProgressBar>,
+}
+
+impl Sets {
+    /// Of so many data sets.
+    pub fn new(count: usize) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let style = ProgressStyle::with_template("data sets {wide_bar} {pos}/{len} {per_sec} {eta} left");
+            let bar = ProgressBar::new(count as u64);
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar
+        });
+        Self { bar }
+    }
+
+    /// One has ended; those that were as they should be are not worth a line.
+    pub fn ended(&self, done: &Done) {
+        let entry = &done.entry;
+        let line = done.took.map(|took| {
+            let what = if entry.is_done() { "done" } else { "failed" };
+            format!("{}: {what}, {:.2} s\n", entry.name, took.as_secs_f64())
+        });
+        match (&self.bar, line) {
+            (Some(bar), line) => {
+                bar.inc(1);
+                line.filter(|_| !entry.is_done()).into_iter().for_each(|line| bar.suspend(|| say(&line)));
+            }
+            (None, Some(line)) => say(&line),
+            (None, None) => {}
+        }
+    }
+}
+
+impl Drop for Sets {
+    fn drop(&mut self) {
+        self.bar.iter().for_each(ProgressBar::finish_and_clear);
+    }
 }
 
 struct Lines;

@@ -1,5 +1,6 @@
 //! One file per command: each turns arguments into a call of the engine, and its answer into text.
 
+mod batch;
 mod causes;
 mod check;
 mod diff;
@@ -30,6 +31,7 @@ use crate::failure::Failure;
 pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
     match command {
         Command::Run(args) => run::run(&args, registry),
+        Command::Batch(args) => batch::run(&args, registry),
         Command::Explain(args) => explain::run(&args, registry),
         Command::Inspect { files, json } => inspect::run(&files, json),
         Command::Show { result, id, json } => show::run(&result, id.as_deref(), json),

@@ -106,7 +106,7 @@ fn told(result: &RunResult) -> String {
 }
 
 /// `NAME.h5` in the working directory.
-fn default_output(name: &str) -> PathBuf {
+pub fn default_output(name: &str) -> PathBuf {
     let keep = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '-' };
     let name: String = name.chars().map(keep).collect();
     PathBuf::from(format!("{}.h5", name.trim_start_matches('.')))

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
-use super::names::{Kind, kind_of};
+use super::names::{Kind, STAMPS, kind_of};
 use super::origin::Origin;
 use super::replace::{replace_file, sweep};
+use crate::recording::keep_stamps_in;
 use crate::runner::StageResult;
 use crate::store::{StoreError, read_stage, write_stage};
 
@@ -19,11 +20,12 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// Opens the cache in `folder`, makes the folder if it is missing, and sweeps what killed runs left. Errors: it cannot be made.
+    /// Opens the cache in `folder`, makes the folder if it is missing, and sweeps what killed runs left. Hashes of input files are kept there from now on. Errors: it cannot be made.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
         let cache = Self { folder: folder.to_owned(), notes: Mutex::default() };
         cache.make_folder()?;
         sweep(folder, ".");
+        keep_stamps_in(folder.join(STAMPS));
         Ok(cache)
     }
 

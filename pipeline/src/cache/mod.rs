@@ -21,5 +21,6 @@ pub use folder::Cache;
 pub use free::{Freed, Gone, Limits, Why, free};
 pub use key::{KeyParts, key};
 pub use origin::{Origin, OriginFile, OriginInput};
+pub(crate) use replace::replace_unsynced;
 pub use replace::{probe, replace_file, replace_with, sweep, write_result};
 pub use stock::{Sort, Stock, Stored};

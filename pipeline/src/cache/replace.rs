@@ -45,7 +45,7 @@ pub fn replace_with(path: &Path, fill: impl FnOnce(&Path) -> std::io::Result<()>
 }
 
 /// As [`replace_file`] with these bytes, without waiting for the disk: after a power cut the file may be empty. For what is only convenient.
-pub(super) fn replace_unsynced(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+pub(crate) fn replace_unsynced(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let temporary = folder_of(path).join(temporary_name(path));
     fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path)).map_err(|error| {
         // as above: the next sweep takes it

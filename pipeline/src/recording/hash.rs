@@ -1,4 +1,4 @@
-//! BLAKE3 hashes of whole files, streamed; remembered within a process while a file does not change.
+//! BLAKE3 hashes of whole files, streamed; remembered while a file does not change.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -9,15 +9,22 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use super::global_heap::HeapGuard;
+use super::stamps;
 use crate::error::StageError;
 
 /// What tells two states of a file apart without reading it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Stamp {
-    size: u64,
-    modified_ns: i128,
-    inode: u64,
-    device: u64,
+pub(super) struct Stamp {
+    pub(super) size: u64,
+    pub(super) modified_ns: i128,
+    pub(super) inode: u64,
+    pub(super) device: u64,
+}
+
+impl std::fmt::Display for Stamp {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {} {} {}", self.size, self.modified_ns, self.inode, self.device)
+    }
 }
 
 static KNOWN: LazyLock<Mutex<HashMap<PathBuf, (Stamp, Inspected)>>> = LazyLock::new(Mutex::default);
@@ -67,6 +74,13 @@ fn inspect_file(path: &Path) -> Result<Inspected, StageError> {
     if let Some(found) = known(&KNOWN.lock().unwrap_or_else(PoisonError::into_inner)) {
         return Ok(found);
     }
+    let remember = |found: &Inspected| {
+        KNOWN.lock().unwrap_or_else(PoisonError::into_inner).insert(key.clone(), (stamp.clone(), found.clone()));
+    };
+    if let Some(found) = stamps::known(&key, &stamp) {
+        remember(&found);
+        return Ok(found);
+    }
     let found = inspect(&mut file).map_err(fail)?;
     let settled = metadata
         .modified()
@@ -74,7 +88,8 @@ fn inspect_file(path: &Path) -> Result<Inspected, StageError> {
         .and_then(|modified| SystemTime::now().duration_since(modified).ok())
         .is_some_and(|age| age > SETTLED);
     if settled {
-        KNOWN.lock().unwrap_or_else(PoisonError::into_inner).insert(key, (stamp, found.clone()));
+        remember(&found);
+        stamps::keep(&key, &stamp, &found);
     }
     Ok(found)
 }

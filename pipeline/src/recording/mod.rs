@@ -14,6 +14,7 @@ mod open;
 mod recent;
 mod series;
 mod source;
+mod stamps;
 mod stretches;
 mod write;
 
@@ -32,6 +33,7 @@ pub use hash::hash_file;
 pub(crate) use native::is_native;
 pub use native::{Wanted, open_native};
 pub use series::{read_number_attribute, read_series};
+pub(crate) use stamps::keep_in as keep_stamps_in;
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
 
 pub use afmid_formats::{Contents, FormatError, FoundChannel, Raw, RawBinary, Source, formats};

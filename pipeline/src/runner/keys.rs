@@ -4,6 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::error::RunError;
 use super::result::SourceFile;
 use crate::cache::{KeyParts, Origin, OriginFile, OriginInput, key};
 use crate::error::StageError;
@@ -77,6 +78,25 @@ pub(super) fn plan_node<'a>(
         program: program.to_owned(),
     };
     Ok(StagePlan { key, seed, sources, origin })
+}
+
+/// One hash of the content addresses of all stages: whether a run would give the same results again, without running anything.
+///
+/// Errors: a stage whose files cannot be listed or read.
+pub fn run_key(plan: &Plan, base: &Path, program: &str) -> Result<String, RunError> {
+    let mut origins: Vec<Origin> = Vec::with_capacity(plan.nodes.len());
+    for node in &plan.nodes {
+        let planned = plan_node(plan, node, base, program, &|index| origins.get(index));
+        let failed = |error| RunError { id: node.id.clone(), uses: node.uses.clone(), error: Box::new(error) };
+        origins.push(planned.map_err(failed)?.origin);
+    }
+    let mut hasher = blake3::Hasher::new();
+    let mut all: Vec<String> = origins.iter().map(|origin| format!("{}={}\n", origin.id, origin.key)).collect();
+    all.sort_unstable();
+    all.iter().for_each(|one| {
+        hasher.update(one.as_bytes());
+    });
+    Ok(hasher.finalize().to_hex().to_string())
 }
 
 fn inputs<'a>(

@@ -14,5 +14,5 @@ pub use changes::{Change, changes};
 pub use error::RunError;
 pub use execute::{Observer, Options, Quiet, run};
 pub use explain::{Decision, Explanation, Nearest, explain};
-pub use keys::{StagePlan, stage_seed};
+pub use keys::{StagePlan, run_key, stage_seed};
 pub use result::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};

@@ -1,0 +1,120 @@
+//! Data sets: what one run of a batch reads.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::toml;
+
+/// What one run of a batch reads.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DataSet {
+    /// Its logical name: that of its result file.
+    pub name: String,
+    /// What replaces `records.files`: absolute.
+    pub files: Vec<String>,
+    /// Further `--set` arguments.
+    pub set: Vec<String>,
+}
+
+/// Names of the batch's own files.
+const RESERVED: [&str; 2] = ["summary", "ledger"];
+/// Longest name in bytes: file systems take 255, temporary names add to it.
+const LONGEST: usize = 180;
+
+impl DataSet {
+    /// A folder of records. Errors: it is none; its name cannot be a file's.
+    pub fn of_folder(folder: &Path) -> Result<Self, String> {
+        if !folder.is_dir() {
+            let what = if folder.exists() { "a file" } else { "not there" };
+            return Err(format!("{} is {what}, wanted a folder of records", folder.display()));
+        }
+        // `.` and `..` have no last part of their own
+        let whole = folder.canonicalize().map_err(|error| format!("{}: {error}", folder.display()))?;
+        let name = whole.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        check_name(&name).map_err(|problem| format!("{}: {problem}", folder.display()))?;
+        Ok(Self { name, files: vec![absolute(&folder.to_string_lossy())?], set: Vec::new() })
+    }
+
+    /// The `--set` arguments of its run, after those of the whole batch.
+    pub fn arguments(&self) -> Vec<String> {
+        let files = self.files.iter().map(|file| toml::Value::String(file.clone())).collect();
+        let mut arguments = vec![format!("records.files={}", toml::Value::Array(files))];
+        arguments.extend(self.set.iter().cloned());
+        arguments
+    }
+}
+
+/// Errors: why a name cannot be that of a result file.
+pub fn check_name(name: &str) -> Result<(), String> {
+    let plain = |c: char| !c.is_control() && c != '/' && c != '\\';
+    if name.is_empty() || name.len() > LONGEST {
+        return Err(format!("the name of a data set has {} bytes, wanted 1 to {LONGEST}", name.len()));
+    }
+    if name.starts_with('.') || !name.chars().all(plain) {
+        return Err(format!("`{name}` cannot be the name of a data set: wanted no `/`, no `.` in front"));
+    }
+    if RESERVED.contains(&name) {
+        return Err(format!("`{name}` is the name of a file of the batch itself, wanted another for the data set"));
+    }
+    Ok(())
+}
+
+/// A path or pattern that begins in the working directory, absolute. Errors: there is no working directory.
+pub fn absolute(pattern: &str) -> Result<String, String> {
+    if Path::new(pattern).is_absolute() {
+        return Ok(pattern.to_owned());
+    }
+    let here = std::env::current_dir().map_err(|error| format!("the working directory cannot be found: {error}"))?;
+    let whole: PathBuf = here.join(pattern);
+    if whole.exists() {
+        return Ok(whole.to_string_lossy().into_owned());
+    }
+    // special characters above the pattern are none of the pattern's
+    let escape = |c: char| if matches!(c, '*' | '?' | '[' | ']') { format!("[{c}]") } else { c.to_string() };
+    let above: String = here.to_string_lossy().chars().map(escape).collect();
+    Ok(format!("{above}/{pattern}"))
+}
+
+/// Sets in the order of their names. Errors: names that occur twice.
+pub fn sorted(mut sets: Vec<DataSet>) -> Result<Vec<DataSet>, Vec<String>> {
+    sets.sort_by(|a, b| a.name.cmp(&b.name));
+    let twice = sets.windows(2).filter(|pair| pair[0].name == pair[1].name);
+    let problems: Vec<String> = twice
+        .map(|pair| {
+            let [one, other] = [&pair[0], &pair[1]].map(|set| set.files.join(", "));
+            format!("two data sets have the name `{}`: {one} and {other}; wanted one", pair[0].name)
+        })
+        .collect();
+    if problems.is_empty() { Ok(sets) } else { Err(problems) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(name: &str) -> DataSet {
+        DataSet { name: name.to_owned(), files: vec!["/a \"b\"/*.h5".to_owned()], set: vec!["fit.order=9".to_owned()] }
+    }
+
+    #[test]
+    fn names_are_those_of_files() {
+        for good in ["a", "lever 1, 2005-03-01", "µ"] {
+            assert_eq!(check_name(good), Ok(()));
+        }
+        for bad in ["", ".", "..", ".a", "a/b", "a\\b", "a\nb", "summary", &"x".repeat(181)] {
+            assert!(check_name(bad).is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn files_are_quoted_as_toml() {
+        assert_eq!(set("a").arguments(), ["records.files=['/a \"b\"/*.h5']", "fit.order=9"]);
+    }
+
+    #[test]
+    fn sets_are_sorted_and_names_are_unique() {
+        let names = |sets: Vec<DataSet>| sets.into_iter().map(|set| set.name).collect::<Vec<_>>();
+        assert_eq!(names(sorted(vec![set("b"), set("a")]).unwrap()), ["a", "b"]);
+        let problems = sorted(vec![set("b"), set("a"), set("b")]).unwrap_err();
+        assert!(problems.len() == 1 && problems[0].contains("`b`"), "{problems:?}");
+    }
+}

@@ -1,0 +1,93 @@
+//! What a batch's table takes from a run: by the names that stages' summaries use, whatever the stages.
+
+use afmid_pipeline::{Artifact, RunResult, StageRecord};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::show::SUMMARY;
+
+/// What a run found.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Harvest {
+    /// Start of the first record, ISO 8601.
+    pub started_at: Option<String>,
+    /// Verdict of a diagnosis.
+    pub verdict: Option<String>,
+    /// Names that a diagnosis gave, one after the other.
+    pub causes: Option<String>,
+    /// Fits in per cent.
+    pub fit_identification_percent: Option<f64>,
+    /// See there.
+    pub fit_held_out_percent: Option<f64>,
+    /// Spring constant, N/m, and its standard error.
+    pub stiffness_n_per_m: Option<f64>,
+    /// See there.
+    pub stiffness_std_n_per_m: Option<f64>,
+    /// Mechanical modes, ascending.
+    pub modes: Vec<ModeFound>,
+}
+
+/// A mode in a summary's list `modes`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModeFound {
+    /// Frequency and its standard error.
+    pub frequency_hz: Option<f64>,
+    /// See there.
+    pub frequency_std_hz: Option<f64>,
+    /// Quality factor and its standard error.
+    pub quality_factor: Option<f64>,
+    /// See there.
+    pub quality_factor_std: Option<f64>,
+    /// Part of the static gain and its standard error.
+    pub static_share: Option<f64>,
+    /// See there.
+    pub static_share_std: Option<f64>,
+}
+
+/// Collects from the summaries of all stages; of several that list modes the one called `modes` counts, or else the last.
+pub fn harvest(run: &RunResult) -> Harvest {
+    let summaries: Vec<(&StageRecord, &Value)> =
+        run.stages.iter().filter_map(|stage| Some((stage, summary(stage)?))).collect();
+    let last = |key: &str| summaries.iter().rev().find_map(|(_, summary)| summary.get(key).filter(|v| !v.is_null()));
+    let text = |value: Option<&Value>| value.and_then(Value::as_str).map(str::to_owned);
+    let named = |id: &str| summaries.iter().find(|(stage, _)| stage.id == id).map(|(_, summary)| *summary);
+    let own = named("modes").and_then(|summary| summary.get("modes"));
+    let modes = own.or_else(|| last("modes")).and_then(Value::as_array);
+    let fit = |which: &str| last("fit_percent").and_then(|fit| fit.get(which)).and_then(Value::as_f64);
+    let stiffness = |which: &str| last("stiffness_n_per_m").and_then(|k| k.get(which)).and_then(Value::as_f64);
+    let causes = last("causes").and_then(Value::as_array).map(|causes| {
+        let ids: Vec<&str> = causes.iter().filter_map(|cause| cause.get("id").and_then(Value::as_str)).collect();
+        ids.join(", ")
+    });
+    Harvest {
+        started_at: text(last("started_at")),
+        verdict: text(last("verdict")),
+        causes: causes.filter(|causes| !causes.is_empty()),
+        fit_identification_percent: fit("identification"),
+        fit_held_out_percent: fit("held_out"),
+        stiffness_n_per_m: stiffness("value"),
+        stiffness_std_n_per_m: stiffness("std"),
+        modes: modes.into_iter().flatten().map(mode).collect(),
+    }
+}
+
+fn summary(stage: &StageRecord) -> Option<&Value> {
+    match stage.result.outputs.artifact(SUMMARY)? {
+        Artifact::Document(document) => Some(&document.0),
+        _ => None,
+    }
+}
+
+fn mode(value: &Value) -> ModeFound {
+    let number = |key: &str| value.get(key).and_then(Value::as_f64);
+    ModeFound {
+        frequency_hz: number("frequency_hz"),
+        frequency_std_hz: number("frequency_std_hz"),
+        quality_factor: number("quality_factor"),
+        quality_factor_std: number("quality_factor_std"),
+        static_share: number("static_share"),
+        static_share_std: number("static_share_std"),
+    }
+}

@@ -1,0 +1,116 @@
+//! The ledger: what became of each data set, a small file each, so that processes share neither lock nor database.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::cache::replace_with;
+use serde::{Deserialize, Serialize};
+
+use super::harvest::Harvest;
+
+/// What became of a data set.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// Layout of these files.
+    pub version: u32,
+    /// The data set.
+    pub name: String,
+    /// One hash of all stages' content addresses; none if the files could not be read.
+    pub key: Option<String>,
+    /// Bytes of the result file; none if the run failed.
+    pub result_bytes: Option<u64>,
+    /// Why it failed; none if it did not.
+    pub error: Option<String>,
+    /// What the run found.
+    pub found: Harvest,
+}
+
+/// The layout that this version writes.
+const VERSION: u32 = 1;
+
+impl Entry {
+    /// A run that failed.
+    pub fn failed(name: &str, key: Option<String>, error: String) -> Self {
+        let (version, name) = (VERSION, name.to_owned());
+        Self { version, name, key, result_bytes: None, error: Some(error), found: Harvest::default() }
+    }
+
+    /// A run that went through.
+    pub fn done(name: &str, key: String, result_bytes: u64, found: Harvest) -> Self {
+        let (version, name) = (VERSION, name.to_owned());
+        Self { version, name, key: Some(key), result_bytes: Some(result_bytes), error: None, found }
+    }
+
+    /// Whether it went through.
+    pub fn is_done(&self) -> bool {
+        self.error.is_none()
+    }
+}
+
+/// A batch's folder.
+#[derive(Debug, Clone)]
+pub struct Ledger {
+    folder: PathBuf,
+}
+
+impl Ledger {
+    /// In the folder of results. Errors: its own folder cannot be made.
+    pub fn open(folder: &Path) -> std::io::Result<Self> {
+        std::fs::create_dir_all(folder.join("ledger"))?;
+        Ok(Self { folder: folder.to_owned() })
+    }
+
+    /// Where the result of a data set lies.
+    pub fn result(&self, name: &str) -> PathBuf {
+        self.folder.join(format!("{name}.h5"))
+    }
+
+    fn place(&self, name: &str) -> PathBuf {
+        self.folder.join("ledger").join(format!("{name}.json"))
+    }
+
+    /// What became of a data set; none if nothing is known, or what is there is damaged or of another layout: then it is run again.
+    pub fn read(&self, name: &str) -> Option<Entry> {
+        let entry: Entry = serde_json::from_slice(&std::fs::read(self.place(name)).ok()?).ok()?;
+        (entry.version == VERSION && entry.name == name).then_some(entry)
+    }
+
+    /// Keeps what became of a data set, whole or not at all. Errors: the folder cannot be written.
+    pub fn write(&self, entry: &Entry) -> Result<(), String> {
+        let text = serde_json::to_vec_pretty(entry).map_err(|error| error.to_string())?;
+        replace_with(&self.place(&entry.name), |temporary| std::fs::write(temporary, &text))
+            .map_err(|error| error.to_string())
+    }
+
+    /// Whether the result file of a finished data set is there, as long as it was.
+    pub fn holds(&self, entry: &Entry) -> bool {
+        let there = std::fs::metadata(self.result(&entry.name)).map(|metadata| metadata.len()).ok();
+        entry.is_done() && there.is_some() && there == entry.result_bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_entry_comes_back_and_a_damaged_one_is_unknown() {
+        let folder = tempfile::tempdir().unwrap();
+        let ledger = Ledger::open(folder.path()).unwrap();
+        assert!(ledger.read("a").is_none());
+        let done = Entry::done("a", "k".into(), 3, Harvest { verdict: Some("clean".into()), ..Harvest::default() });
+        ledger.write(&done).unwrap();
+        assert_eq!(ledger.read("a"), Some(done.clone()));
+        assert!(!ledger.holds(&done), "there is no result file");
+        std::fs::write(ledger.result("a"), "abc").unwrap();
+        assert!(ledger.holds(&done));
+        std::fs::write(ledger.result("a"), "ab").unwrap();
+        assert!(!ledger.holds(&done), "it is cut short");
+        let place = folder.path().join("ledger/a.json");
+        let whole = std::fs::read(&place).unwrap();
+        std::fs::write(&place, &whole[..whole.len() / 2]).unwrap();
+        assert!(ledger.read("a").is_none());
+        ledger.write(&Entry::failed("b", None, "no".into())).unwrap();
+        assert!(!ledger.read("b").unwrap().is_done());
+    }
+}

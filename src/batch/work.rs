@@ -1,0 +1,125 @@
+//! The runs of a batch.
+
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use afmid_pipeline::Plan;
+use afmid_pipeline::cache::{Cache, write_result};
+use afmid_pipeline::runner::{Options, Quiet, RunError, run, run_key};
+use afmid_pipeline::store::is_own;
+
+use super::harvest::harvest;
+use super::ledger::{Entry, Ledger};
+
+/// What all runs of a batch have in common.
+pub struct Work<'a> {
+    /// Where stage results are kept.
+    pub cache: &'a Cache,
+    /// Where results and ledger lie.
+    pub ledger: &'a Ledger,
+    /// The program and its version.
+    pub program: &'a str,
+    /// Reuse nothing.
+    pub fresh: bool,
+    /// Run what failed once more.
+    pub retry_failed: bool,
+}
+
+/// What became of a data set in this batch.
+#[derive(Debug)]
+pub struct Done {
+    /// As the ledger has it.
+    pub entry: Entry,
+    /// How long its run took; none if nothing was to be done.
+    pub took: Option<Duration>,
+}
+
+impl Work<'_> {
+    /// One data set: what the ledger has, if that is still valid, else its run. Whatever goes wrong is in the entry.
+    pub fn one(&self, name: &str, plan: &Plan) -> Done {
+        let clock = Instant::now();
+        let base = plan.config.base();
+        let key = match run_key(plan, base, self.program) {
+            Ok(key) => key,
+            Err(error) => return self.kept(Entry::failed(name, None, told(&[error])), clock),
+        };
+        if let Some(entry) = self.ledger.read(name).filter(|entry| entry.key.as_deref() == Some(&key) && !self.fresh)
+            && (self.ledger.holds(&entry) || !entry.is_done() && !self.retry_failed)
+        {
+            return Done { entry, took: None };
+        }
+        let entry = match self.ran(name, plan, base, &key) {
+            Ok(entry) => entry,
+            Err(error) => Entry::failed(name, Some(key), error),
+        };
+        self.kept(entry, clock)
+    }
+
+    fn ran(&self, name: &str, plan: &Plan, base: &Path, key: &str) -> Result<Entry, String> {
+        let path = self.ledger.result(name);
+        // an empty file holds nothing that could be lost
+        if std::fs::metadata(&path).is_ok_and(|there| there.len() > 0) && !is_own(&path).unwrap_or(false) {
+            return Err(format!("{} exists and is no result of afmid's: it is not replaced\n", path.display()));
+        }
+        let options = Options {
+            base: base.to_owned(),
+            cache: self.cache,
+            fresh: self.fresh,
+            program: self.program.to_owned(),
+            overrides: plan.config.overrides.clone(),
+            observer: &Quiet,
+        };
+        let result = run(plan, &options).map_err(|errors| told(&errors))?;
+        write_result(&path, &result).map_err(|error| error.to_string())?;
+        let bytes = std::fs::metadata(&path).map_err(|error| format!("{}: {error}", path.display()))?.len();
+        Ok(Entry::done(name, key.to_owned(), bytes, harvest(&result)))
+    }
+
+    /// A run whose end cannot be written down counts as failed: the next batch would not know of it.
+    fn kept(&self, entry: Entry, clock: Instant) -> Done {
+        let entry = match self.ledger.write(&entry) {
+            Ok(()) => entry,
+            Err(error) => Entry::failed(&entry.name, None, format!("the ledger cannot be written: {error}")),
+        };
+        Done { entry, took: Some(clock.elapsed()) }
+    }
+}
+
+/// Does all of them, at most `threads` at once whatever their number, each on the present rayon pool; `watch` is told of every end.
+/// The order of what comes back is that of `sets`.
+pub fn all<T: Sync>(
+    sets: &[T],
+    threads: usize,
+    one: impl Fn(&T) -> Done + Sync,
+    watch: impl Fn(&Done) + Sync,
+) -> Vec<Done> {
+    let next = AtomicUsize::new(0);
+    let finished: Mutex<Vec<(usize, Done)>> = Mutex::new(Vec::with_capacity(sets.len()));
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(sets.len()).max(1) {
+            scope.spawn(|| {
+                while let Some((index, set)) =
+                    Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|i| Some((i, sets.get(i)?)))
+                {
+                    let done = one(set);
+                    watch(&done);
+                    finished.lock().unwrap_or_else(PoisonError::into_inner).push((index, done));
+                }
+            });
+        }
+    });
+    let mut finished = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
+    finished.sort_by_key(|(index, _)| *index);
+    finished.into_iter().map(|(_, done)| done).collect()
+}
+
+fn told(errors: &[RunError]) -> String {
+    let one = |error: &RunError| match &error.error.help {
+        Some(help) => format!("{error} (help: {help})"),
+        None => error.to_string(),
+    };
+    errors.iter().map(one).collect::<Vec<_>>().join("; ")
+}

@@ -1,0 +1,47 @@
+//! The arguments of `afmid batch`.
+
+use std::num::NonZeroU16;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{ConfigArgs, threads};
+use crate::batch::shard::Shard;
+
+/// What to run a config on, and how.
+#[derive(Debug, Args)]
+pub struct BatchArgs {
+    /// The config, with a stage `records`, and what changes it.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+    /// Data sets: folders of records, each a run of its own.
+    #[arg(value_name = "DATASET")]
+    pub sets: Vec<PathBuf>,
+    /// More data sets, one a line: {"name": "a", "files": ["a/*.h5"], "set": {"stage.param": 1}}.
+    #[arg(long, value_name = "M.jsonl")]
+    pub manifest: Vec<PathBuf>,
+    /// Folder of the results, the ledger and the summary [default: the pipeline's name, in the working directory].
+    #[arg(short, long, value_name = "FOLDER")]
+    pub output: Option<PathBuf>,
+    /// Data sets at once, and threads [default: one per processor]; results don't depend on it.
+    #[arg(short, long, value_name = "N", value_parser = threads)]
+    pub jobs: Option<NonZeroU16>,
+    /// Reuse nothing.
+    #[arg(long)]
+    pub fresh: bool,
+    /// Where stage results are kept, as for `run`.
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+    /// Only part I of N of the data sets; no summary.
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Run data sets again that failed, though nothing has changed.
+    #[arg(long)]
+    pub retry_failed: bool,
+    /// Run nothing: make the summary from what the ledger holds of these data sets.
+    #[arg(long, conflicts_with_all = ["shard", "fresh", "retry_failed"])]
+    pub collect: bool,
+    /// As JSON, alone on stdout.
+    #[arg(long)]
+    pub json: bool,
+}

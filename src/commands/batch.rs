@@ -1,0 +1,153 @@
+//! `afmid batch`: one run per data set, a ledger of them, one table.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use afmid_pipeline::{Plan, Registry};
+use serde_json::json;
+
+use super::load::load;
+use super::run::{PROGRAM, default_output, open_cache};
+use crate::batch::dataset::{DataSet, sorted};
+use crate::batch::ledger::{Entry, Ledger};
+use crate::batch::summary::Title;
+use crate::batch::work::{Done, Work, all};
+use crate::batch::{manifest, summary};
+use crate::cli::BatchArgs;
+use crate::failure::{Failure, Message};
+use crate::output::print;
+use crate::progress::Sets;
+use crate::show::pretty;
+
+/// Runs a config on every data set. One that fails stops no other; then the exit code is 3.
+pub fn run(args: &BatchArgs, registry: &Registry) -> Result<(), Failure> {
+    let clock = Instant::now();
+    let sets = data_sets(args)?;
+    let whole = load(&args.config.config, &args.config.set, registry)?;
+    if whole.node("records").is_none() {
+        let help = "a batch replaces `records.files`: give the stage that reads the recordings the id `records`";
+        return Err(Failure::usage("the config has no stage `records`", Some(help.to_owned())));
+    }
+    let folder = args.output.clone().unwrap_or_else(|| default_output(whole.name()).with_extension(""));
+    let ledger = ledger(&folder)?;
+    let done = match args.collect {
+        true => collected(&sets, &ledger),
+        false => {
+            let own = |set: &&DataSet| args.shard.is_none_or(|shard| shard.holds(&set.name));
+            computed(args, &planned(args, sets.iter().filter(own), registry)?, &ledger)?
+        }
+    };
+    let entries: Vec<Entry> = done.iter().map(|done| done.entry.clone()).collect();
+    let table = match args.shard {
+        Some(_) => None,
+        None => {
+            let title = Title { name: whole.name(), seed: whole.seed(), config: whole.config_text(), program: PROGRAM };
+            Some(summary::write(&folder, &title, &entries)?)
+        }
+    };
+    print(&told(args.json, &folder, &done, table.as_deref(), clock)?)?;
+    match entries.iter().filter(|entry| !entry.is_done()).count() {
+        0 => Ok(()),
+        failed => Err(Failure::Partly(Message::Line(
+            format!("{failed} of {} data sets failed", entries.len()),
+            Some("what is wrong with each stands above and in `ledger`; those that changed are run by the next batch, the others with --retry-failed".to_owned()),
+        ))),
+    }
+}
+
+/// All that were named. Errors, usage: everything that is wrong with them.
+fn data_sets(args: &BatchArgs) -> Result<Vec<DataSet>, Failure> {
+    let (mut sets, mut problems) = (Vec::new(), Vec::new());
+    for folder in &args.sets {
+        DataSet::of_folder(folder).map_or_else(|problem| problems.push(problem), |set| sets.push(set));
+    }
+    for file in &args.manifest {
+        let shown = file.display().to_string();
+        match std::fs::read_to_string(file) {
+            Err(error) => problems.push(format!("the manifest {shown} cannot be read: {error}")),
+            Ok(text) => match manifest::read(&shown, &text) {
+                Ok(more) => sets.extend(more),
+                Err(more) => problems.extend(more),
+            },
+        }
+    }
+    if problems.is_empty() && sets.is_empty() {
+        problems.push("no data sets are named, wanted folders or a manifest".to_owned());
+    }
+    match sorted(sets) {
+        Ok(sets) if problems.is_empty() => return Ok(sets),
+        Ok(_) => {}
+        Err(more) => problems.extend(more),
+    }
+    let lines: String = problems.iter().map(|problem| format!("error: {problem}\n")).collect();
+    Err(Failure::Usage(Message::Rendered(lines)))
+}
+
+/// The plan of each. Errors, usage: what is wrong with the arguments of the first that has something wrong.
+fn planned<'a>(
+    args: &BatchArgs,
+    sets: impl Iterator<Item = &'a DataSet>,
+    registry: &Registry,
+) -> Result<Vec<(&'a DataSet, Plan)>, Failure> {
+    sets.map(|set| {
+        let arguments: Vec<String> = args.config.set.iter().cloned().chain(set.arguments()).collect();
+        Ok((set, load(&args.config.config, &arguments, registry)?))
+    })
+    .collect()
+}
+
+fn ledger(folder: &Path) -> Result<Ledger, Failure> {
+    Ledger::open(folder).map_err(|error| {
+        let help = "give another folder with -o".to_owned();
+        Failure::usage(format!("the folder {} cannot be made: {error}", folder.display()), Some(help))
+    })
+}
+
+fn computed(args: &BatchArgs, sets: &[(&DataSet, Plan)], ledger: &Ledger) -> Result<Vec<Done>, Failure> {
+    let cache = open_cache(args.cache.as_deref())?;
+    // 0: as many as there are processors
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.map_or(0, |jobs| usize::from(jobs.get()))).build();
+    let pool = pool.map_err(|error| Failure::failed(format!("no threads can be started: {error}"), None))?;
+    let work = Work { cache: &cache, ledger, program: PROGRAM, fresh: args.fresh, retry_failed: args.retry_failed };
+    let progress = Sets::new(sets.len());
+    let one = |(set, plan): &(&DataSet, Plan)| pool.install(|| work.one(&set.name, plan));
+    Ok(all(sets, pool.current_num_threads(), one, |done| progress.ended(done)))
+}
+
+/// What the ledger holds of each; what it does not hold has failed.
+fn collected(sets: &[DataSet], ledger: &Ledger) -> Vec<Done> {
+    let missing = |set: &DataSet| Entry::failed(&set.name, None, "no run of it has ended".to_owned());
+    sets.iter().map(|set| Done { entry: ledger.read(&set.name).unwrap_or_else(|| missing(set)), took: None }).collect()
+}
+
+fn told(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock: Instant) -> Result<String, Failure> {
+    let failed: Vec<&Entry> = done.iter().map(|done| &done.entry).filter(|entry| !entry.is_done()).collect();
+    let ran = done.iter().filter(|done| done.took.is_some()).count();
+    if json {
+        let failures = failed.iter().map(|entry| json!({ "name": entry.name, "error": entry.error }));
+        return pretty(&json!({
+            "folder": folder.display().to_string(),
+            "data_sets": done.len(),
+            "ran": ran,
+            "failed": failed.len(),
+            "failures": failures.collect::<Vec<_>>(),
+            "summary": table.map(|table| table.display().to_string()),
+        }));
+    }
+    let mut text: String = failed
+        .iter()
+        .map(|entry| format!("{} failed: {}\n", entry.name, entry.error.as_deref().unwrap_or_default().trim_end()))
+        .collect();
+    let (count, seconds) = (done.len(), clock.elapsed().as_secs_f64());
+    let sets = if count == 1 { "data set" } else { "data sets" };
+    text.push_str(&format!(
+        "{}: {count} {sets} in {seconds:.2} s, {ran} run, {} as they were, {} failed\n",
+        folder.display(),
+        count - ran,
+        failed.len()
+    ));
+    if let Some(table) = table {
+        text.push_str(&format!("summary: {} (.csv, .parquet), trends.csv\n", PathBuf::from(table).display()));
+    }
+    Ok(text)
+}
