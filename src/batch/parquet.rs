@@ -61,3 +61,42 @@ fn fill(writer: &mut SerializedColumnWriter<'_>, values: &ColumnValues) -> Resul
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::{Field, RowAccessor};
+
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_and_unknown_numbers_are_null() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.parquet");
+        let table = Table::new()
+            .with("name", "", "a name", vec!["a".to_owned(), "µ, \"b\"".to_owned()])
+            .with("mode", "1", "a number", vec![1_i64, -2])
+            .with("f", "Hz", "a frequency", vec![f64::NAN, 46300.25])
+            .with("kept", "", "a flag", vec![true, false]);
+        write(&path, &table).unwrap();
+        let reader = SerializedFileReader::new(std::fs::File::open(&path).unwrap()).unwrap();
+        let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
+        assert_eq!(rows.len(), 2);
+        assert_eq!(rows[0].get_column_iter().nth(2).unwrap().1, &Field::Null);
+        assert_eq!(rows[1].get_string(0).unwrap(), "µ, \"b\"");
+        assert_eq!((rows[1].get_long(1).unwrap(), rows[1].get_double(2).unwrap()), (-2, 46300.25));
+        assert!(!rows[1].get_bool(3).unwrap());
+        let again = folder.path().join("b.parquet");
+        write(&again, &table).unwrap();
+        assert_eq!(std::fs::read(path).unwrap(), std::fs::read(again).unwrap());
+    }
+
+    #[test]
+    fn a_table_without_rows_is_a_file_without_rows() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.parquet");
+        write(&path, &Table::new().with("name", "", "a name", Vec::<String>::new())).unwrap();
+        let reader = SerializedFileReader::new(std::fs::File::open(&path).unwrap()).unwrap();
+        assert_eq!(reader.get_row_iter(None).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,250 @@
+//! Batches: one bad data set stops no other, nothing is done twice, a kill loses nothing, shards add up.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
+use afmid_pipeline::store::compare;
+use serde_json::Value;
+
+const CONFIG: &str = r#"
+[pipeline]
+name = "census"
+
+[[stage]]
+id = "records"
+uses = "io.records"
+params = { files = ["nowhere/*.h5"] }
+
+[[stage]]
+id = "census"
+uses = "io.census"
+inputs = { records = "records" }
+"#;
+
+struct Here(tempfile::TempDir);
+
+impl Here {
+    fn new() -> Self {
+        let here = Self(tempfile::tempdir().expect("a folder"));
+        std::fs::write(here.path("census.toml"), CONFIG).expect("a config");
+        here
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// A data set of two records; its numbers depend on `seed`.
+    fn set(&self, name: &str, seed: usize, samples: usize) {
+        std::fs::create_dir_all(self.path(name)).expect("a folder");
+        for record in 0..2 {
+            let code = |k: usize| ((k * 7919 + seed * 104_729 + record * 31) % 4096) as i16 - 2048;
+            let channel = NativeChannel {
+                location: "/deflection".to_owned(),
+                codes: Codes::Int16((0..samples).map(code).collect()),
+                unit: "V".to_owned(),
+                scale_factor: 0.001,
+                add_offset: 0.0,
+                long_name: "deflection".to_owned(),
+            };
+            let started_at = format!("{}-03-01T10:00:00Z", 2001 + seed);
+            let record_of = NativeRecord { sample_rate_hz: 5e6, started_at, channels: vec![channel] };
+            let path = self.path(name).join(format!("record_{record}.h5"));
+            write_native(&path, &record_of, RecordStorage::Raw).expect("a record");
+        }
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
+        command.current_dir(self.0.path()).arg("batch").args(arguments);
+        command
+    }
+
+    fn batch(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().expect("afmid starts")
+    }
+
+    /// Exit code and what `--json` says.
+    fn told(&self, arguments: &[&str]) -> (i32, Value) {
+        let output = self.batch(&[arguments, &["--json"]].concat());
+        let value = serde_json::from_slice(&output.stdout);
+        let value = value.unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)));
+        (output.status.code().expect("it ended by itself"), value)
+    }
+
+    /// All files below a folder with their bytes.
+    fn bytes(&self, folder: &str) -> BTreeMap<PathBuf, Vec<u8>> {
+        let mut all = BTreeMap::new();
+        for part in [self.path(folder), self.path(folder).join("ledger")] {
+            for entry in std::fs::read_dir(part).expect("a folder") {
+                let path = entry.expect("an entry").path();
+                if path.is_file() {
+                    all.insert(path.clone(), std::fs::read(&path).expect("a file"));
+                }
+            }
+        }
+        all
+    }
+}
+
+fn results_in(folder: &Path) -> usize {
+    let entries = std::fs::read_dir(folder).expect("the cache");
+    entries.filter(|entry| entry.as_ref().is_ok_and(|e| e.path().extension().is_some_and(|x| x == "h5"))).count()
+}
+
+#[test]
+fn one_bad_set_stops_no_other_and_nothing_is_done_twice() {
+    let here = Here::new();
+    for (seed, name) in ["a", "b", "c"].into_iter().enumerate() {
+        here.set(name, seed, 5000);
+    }
+    let bad = here.path("c/record_1.h5");
+    let whole = std::fs::read(&bad).expect("a record");
+    std::fs::write(&bad, &whole[..whole.len() / 2]).expect("a record cut short");
+    let sets = ["census.toml", "c", "a", "b", "-o", "out", "--cache", "cache"];
+    let (code, told) = here.told(&sets);
+    assert_eq!((code, &told["data_sets"], &told["ran"], &told["failed"]), (3, &3.into(), &3.into(), &1.into()));
+    assert_eq!(told["failures"][0]["name"], "c");
+    assert!(told["failures"][0]["error"].as_str().is_some_and(|error| error.contains("record_1.h5")), "{told}");
+    assert!(here.path("out/a.h5").exists() && here.path("out/b.h5").exists() && !here.path("out/c.h5").exists());
+    let table = std::fs::read_to_string(here.path("out/summary.csv")).expect("a table");
+    let rows: Vec<&str> = table.lines().skip(1).collect();
+    assert!(rows[0].starts_with("a,2001-03-01T10:00:00Z,done,0,"), "{table}");
+    assert!(rows[2].starts_with("c,,failed,"), "{table}");
+
+    let before = here.bytes("out");
+    let (code, told) = here.told(&sets);
+    assert_eq!((code, &told["ran"], &told["failed"]), (3, &0.into(), &1.into()), "what failed is told, not run again");
+    assert_eq!(here.bytes("out"), before, "the second batch changed a file");
+    let (code, told) = here.told(&[&sets[..], &["--retry-failed"]].concat());
+    assert_eq!((code, &told["ran"], &told["failed"]), (3, &1.into(), &1.into()));
+
+    std::fs::write(&bad, &whole).expect("a whole record");
+    let (code, told) = here.told(&sets);
+    assert_eq!((code, &told["ran"], &told["failed"]), (0, &1.into(), &0.into()), "it has changed: it is run again");
+    std::fs::remove_file(here.path("out/a.h5")).expect("a result");
+    let (_, told) = here.told(&sets);
+    assert_eq!(told["ran"], 1, "a result that is gone is made again");
+}
+
+#[test]
+fn a_changed_parameter_of_the_last_stage_costs_that_stage_alone() {
+    let here = Here::new();
+    for seed in 0..4 {
+        here.set(&format!("set{seed}"), seed, 3000);
+    }
+    let sets = ["census.toml", "set0", "set1", "set2", "set3", "-o", "out", "--cache", "cache"];
+    here.told(&sets);
+    let one = results_in(&here.path("cache"));
+    let (code, told) = here.told(&[&sets[..], &["--set", "census.min_bandwidth_share=0.05"]].concat());
+    assert_eq!((code, &told["ran"]), (0, &4.into()));
+    // one stage per set is kept in the cache
+    assert_eq!((one, results_in(&here.path("cache"))), (4, 8));
+}
+
+#[test]
+fn shards_add_up_to_the_same_table_byte_for_byte() {
+    let here = Here::new();
+    let names: Vec<String> = (0..9).map(|seed| format!("set{seed}")).collect();
+    names.iter().enumerate().for_each(|(seed, name)| here.set(name, seed, 2000));
+    let lines = names.iter().map(|name| format!("{{\"name\": \"{name}\", \"files\": [\"{name}/*.h5\"]}}\n"));
+    std::fs::write(here.path("m.jsonl"), lines.collect::<String>()).expect("a manifest");
+    let whole = ["census.toml", "--manifest", "m.jsonl", "-o", "whole", "--cache", "cache"];
+    assert_eq!(here.told(&whole).0, 0);
+    let parts = ["census.toml", "--manifest", "m.jsonl", "-o", "parts", "--cache", "other", "-j", "1"];
+    let (code, told) = here.told(&[&parts[..], &["--collect"]].concat());
+    assert_eq!((code, &told["failed"]), (3, &9.into()), "nothing has been run yet");
+    let mut ran = 0;
+    // a shard twice: two machines may do the same one
+    for shard in ["3/3", "1/3", "2/3", "1/3"] {
+        let (code, told) = here.told(&[&parts[..], &["--shard", shard]].concat());
+        assert_eq!(code, 0);
+        ran += told["ran"].as_u64().expect("a number");
+    }
+    assert_eq!(ran, 9);
+    assert_eq!(here.told(&[&parts[..], &["--collect"]].concat()).0, 0);
+    for file in ["summary.csv", "summary.parquet", "summary.h5", "trends.csv"] {
+        let [one, other] = ["whole", "parts"].map(|folder| std::fs::read(here.path(folder).join(file)).expect(file));
+        assert!(one == other, "{file} differs");
+        assert!(!one.is_empty(), "{file} is empty");
+    }
+    let shown = Command::new(env!("CARGO_BIN_EXE_afmid")).args(["show", "parts/summary.h5", "summary"]);
+    let shown = { shown }.current_dir(here.0.path()).output().expect("afmid starts");
+    assert!(shown.status.success() && String::from_utf8_lossy(&shown.stdout).contains("set8"), "{shown:?}");
+}
+
+#[test]
+fn what_is_wrong_is_told_before_anything_runs() {
+    let here = Here::new();
+    here.set("a", 0, 2000);
+    std::fs::create_dir_all(here.path("deep")).expect("a folder");
+    here.set("deep/a", 1, 2000);
+    std::fs::write(here.path("m.jsonl"), "{\"name\": \"x\", \"fils\": []}\n[]\n").expect("a manifest");
+    for (arguments, words) in [
+        (&["census.toml"][..], &["no data sets"][..]),
+        (&["census.toml", "a", "deep/a"], &["two data sets", "`a`"]),
+        (&["census.toml", "nowhere", "census.toml"], &["nowhere is not there", "census.toml is a file"]),
+        (&["census.toml", "--manifest", "m.jsonl"], &["m.jsonl:1", "did you mean `files`", "m.jsonl:2"]),
+        (&["census.toml", "a", "--shard", "4/3"], &["4/3"]),
+        (&["census.toml", "a", "--set", "census.nonsense=1"], &["nonsense"]),
+        (&["missing.toml", "a"], &["missing.toml"]),
+    ] {
+        let output = here.batch(&[arguments, &["-o", "out", "--cache", "cache"]].concat());
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+        for word in words {
+            assert!(told.contains(word), "{word:?} in {told}");
+        }
+        assert!(!here.path("out/a.h5").exists());
+    }
+}
+
+/// Kills: a few here, `AFMID_KILLS=20` of them for the whole demonstration.
+#[test]
+fn a_killed_batch_goes_on_where_it_stopped() {
+    let kills: u32 = std::env::var("AFMID_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
+    let here = Here::new();
+    let names: Vec<String> = (0..12).map(|seed| format!("set{seed:02}")).collect();
+    names.iter().enumerate().for_each(|(seed, name)| here.set(name, seed, 60_000));
+    let arguments = |out: &'static str, cache: &'static str| -> Vec<&str> {
+        let sets = names.iter().map(String::as_str);
+        ["census.toml"].into_iter().chain(sets).chain(["-o", out, "--cache", cache, "-j", "2"]).collect()
+    };
+    let clock = Instant::now();
+    assert_eq!(here.told(&arguments("whole", "whole-cache")).0, 0);
+    let whole = clock.elapsed();
+    let (mut random, mut interrupted) = (0x2545_f491_4f6c_dd1d_u64, 0);
+    for round in 0..kills {
+        for folder in ["out", "cache"] {
+            let _ = std::fs::remove_dir_all(here.path(folder));
+        }
+        let mut child = here.command(&arguments("out", "cache"));
+        let mut child = child.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("afmid starts");
+        // xorshift: moments within an undisturbed batch
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        std::thread::sleep(whole.mul_f64((random >> 11) as f64 / (1u64 << 53) as f64).max(Duration::from_millis(2)));
+        let _ = child.kill();
+        child.wait().expect("it is gone");
+        let ended = |name: &String| here.path("out/ledger").join(format!("{name}.json")).exists();
+        let finished = names.iter().filter(|name| ended(name)).count();
+        interrupted += usize::from(finished < names.len());
+        let (code, told) = here.told(&arguments("out", "cache"));
+        assert_eq!((code, &told["ran"]), (0, &(names.len() - finished).into()), "round {round}");
+        for name in &names {
+            let [one, other] = ["whole", "out"].map(|folder| here.path(folder).join(format!("{name}.h5")));
+            assert_eq!(compare(&one, &other).expect("two results"), [], "round {round}, {name}");
+        }
+        for table in ["summary.csv", "summary.parquet", "summary.h5"] {
+            let [one, other] =
+                ["whole", "out"].map(|folder| std::fs::read(here.path(folder).join(table)).expect(table));
+            assert!(one == other, "round {round}: {table} differs");
+        }
+    }
+    assert!(interrupted > 0, "no kill came before the end: the test showed nothing");
+}
