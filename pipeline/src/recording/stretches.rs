@@ -19,10 +19,12 @@ mod tests {
 
     #[test]
     fn gaps_of_all_channels_cut() {
-        let of = |samples, gaps: &[&[usize]]| uninterrupted(samples, gaps.iter().copied());
-        assert_eq!(of(10, &[]), [0..10]);
-        assert_eq!(of(10, &[&[4], &[4, 7]]), [0..4, 4..7, 7..10]);
-        assert_eq!(of(10, &[&[0, 10, 12]]), [0..10]);
-        assert_eq!(of(0, &[&[3]]), [0..0]);
+        let of = |samples, gaps: &[&[usize]]| -> Vec<(usize, usize)> {
+            uninterrupted(samples, gaps.iter().copied()).into_iter().map(|range| (range.start, range.end)).collect()
+        };
+        assert_eq!(of(10, &[]), [(0, 10)]);
+        assert_eq!(of(10, &[&[4], &[4, 7]]), [(0, 4), (4, 7), (7, 10)]);
+        assert_eq!(of(10, &[&[0, 10, 12]]), [(0, 10)]);
+        assert_eq!(of(0, &[&[3]]), [(0, 0)]);
     }
 }

@@ -150,5 +150,5 @@ fn refusal(grid: &Grid, declared: Look, other: Look) -> FormatError {
         shown(declared),
         shown(other)
     );
-    fail::at(grid.first, problem, &format!("set big_endian to {}", !grid.big_endian))
+    fail::at(grid.first, problem, format!("set big_endian to {}", !grid.big_endian))
 }

@@ -77,7 +77,7 @@ pub(super) fn open(path: &Path) -> Result<Contents, StageError> {
     Ok(Contents { format: format.to_owned(), started_at: started_at.unwrap_or_default(), channels, remarks })
 }
 
-/// MATLAB's 7.3 files have a text in a user block before HDF5 begins.
+/// MATLAB's files have a text in a user block before HDF5 begins.
 fn starts_like_matlab(path: &Path) -> bool {
-    afmid_formats::head_of(path).is_ok_and(|head| head.starts_with(b"MATLAB 7.3"))
+    afmid_formats::head_of(path).is_ok_and(|head| head.starts_with(b"MATLAB "))
 }

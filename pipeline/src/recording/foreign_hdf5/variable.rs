@@ -21,6 +21,9 @@ pub(super) enum Variable {
     Series(Series),
 }
 
+/// The index of a channel of a dataset (`[2]`, empty for the only one), and its samples.
+type Indexed = (String, Arc<dyn Source>);
+
 /// A dataset of series.
 #[derive(Debug)]
 pub(super) struct Series {
@@ -116,7 +119,7 @@ impl Series {
         }
         let fill_code = optional("_FillValue")?.map_or_else(|| optional("missing_value"), |code| Ok(Some(code)))?;
         let sources = self.sources(found, path, base)?;
-        let channel = |(index, source): (String, Arc<dyn Source>)| FoundChannel {
+        let channel = |(index, source): Indexed| FoundChannel {
             location: format!("{location}{index}"),
             samples: self.lanes.samples,
             unit: text(&["units", "unit"]),
@@ -133,7 +136,7 @@ impl Series {
     }
 
     /// A source for each lane: the fast reader of native records for one dimension of its types.
-    fn sources(&self, found: &Found, path: &Path, base: usize) -> Result<Vec<(String, Arc<dyn Source>)>, StageError> {
+    fn sources(&self, found: &Found, path: &Path, base: usize) -> Result<Vec<Indexed>, StageError> {
         if self.shape.len() == 1 && !self.number.may_be_rounded() {
             return Ok(vec![(String::new(), Arc::new(open_source(path, &found.location)?))]);
         }

@@ -58,6 +58,8 @@ impl Walk<'_> {
         if let Err(error) = listed {
             self.remarks.push(format!("the members of {path}/ cannot all be listed: {error}"));
         }
+        // the library's own order is that of its index, not of the names
+        names.sort_unstable();
         for name in names {
             if self.objects >= MOST_OBJECTS {
                 return;
