@@ -171,8 +171,9 @@ fn shards_add_up_to_the_same_table_byte_for_byte() {
         assert!(one == other, "{file} differs");
         assert!(!one.is_empty(), "{file} is empty");
     }
-    let shown = Command::new(env!("CARGO_BIN_EXE_afmid")).args(["show", "parts/summary.h5", "summary"]);
-    let shown = { shown }.current_dir(here.0.path()).output().expect("afmid starts");
+    let mut shown = Command::new(env!("CARGO_BIN_EXE_afmid"));
+    let shown = shown.current_dir(here.0.path()).args(["show", "parts/summary.h5", "summary"]).output();
+    let shown = shown.expect("afmid starts");
     assert!(shown.status.success() && String::from_utf8_lossy(&shown.stdout).contains("set8"), "{shown:?}");
 }
 
