@@ -130,8 +130,5 @@ fn compare_values(
 /// The standard errors of dataset `name`, if its group holds them under the name that says so.
 fn standard_errors(group: &Group, name: &str, names: &[String]) -> Option<Vec<f64>> {
     let errors = group.dataset(std_name(name, names.iter().map(String::as_str))?).ok()?;
-    match read_numbers(&errors).ok()? {
-        Some(Values { numbers, .. }) => Some(numbers),
-        None => None,
-    }
+    read_numbers(&errors).ok()?.map(|Values { numbers, .. }| numbers)
 }

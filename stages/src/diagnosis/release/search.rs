@@ -123,7 +123,7 @@ pub fn scene(problem: &Problem<'_>, fitted: &JointFit, common: &[f64]) -> Scene 
 /// sign is stronger than the false-alarm rate allows, or than what the named causes' models leave. At last three tests ask what is left: tiles of the residual common to all events, the events' own
 /// frequencies, and whether a named strength follows the amplitude; each makes the verdict `unexplained`.
 /// # Errors
-/// Those of [`fit`] on the baseline.
+/// Those of [`super::fit`] on the baseline.
 pub fn name_causes(
     problem: &Problem<'_>,
     state: State,
