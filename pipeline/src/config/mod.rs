@@ -13,6 +13,7 @@ mod problem;
 mod read;
 mod stage;
 mod suggest;
+mod sweep;
 mod value;
 
 pub(crate) use name::RESERVED_ID;
@@ -24,3 +25,5 @@ pub use read::Config;
 pub use stage::{Input, StageDecl};
 pub use suggest::nearest;
 pub(crate) use suggest::{did_you_mean, list};
+pub use sweep::Swept;
+pub(crate) use sweep::point;

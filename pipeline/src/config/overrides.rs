@@ -16,8 +16,10 @@ use super::{pipeline, stage};
 /// A `--set` argument: a parameter's path and its new value.
 #[derive(Debug, Clone)]
 pub struct Override {
-    /// As it was typed.
+    /// As it was typed, or would be.
     pub(super) text: String,
+    /// The text that its places refer to.
+    origin: Origin,
     /// Stage id, then the path within `params`; with the bytes of each step.
     path: Vec<(String, Range<usize>)>,
     /// The value.
@@ -54,8 +56,49 @@ impl Override {
                 let span = wrong.span.start + offset + pad..wrong.span.end + offset + pad;
                 Err(wrong.at((Origin::Argument(text.to_owned()), span)))
             }
-            None => Ok(Self { text: text.to_owned(), path, value: plain, place }),
+            None => {
+                Ok(Self { text: text.to_owned(), origin: Origin::Argument(text.to_owned()), path, value: plain, place })
+            }
         }
+    }
+
+    /// A value of a sweep: as a `--set` argument, with its places in the config.
+    pub(super) fn swept(
+        path: &[(String, Range<usize>)],
+        value: &Spanned<DeValue<'_>>,
+        problems: &mut Vec<Problem>,
+    ) -> Self {
+        let (plain, place) = (plain(value, problems), Place::of(value, 0));
+        let text = format!("{}={plain}", dotted(path));
+        Self { text, origin: Origin::Config, path: path.to_vec(), value: plain, place }
+    }
+
+    /// As it would be typed: `ID.PARAM=VALUE`.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The id of the stage that it changes.
+    pub(crate) fn stage(&self) -> Option<&str> {
+        self.path.first().map(|(id, _)| id.as_str())
+    }
+
+    /// The value as JSON.
+    pub(crate) fn json(&self) -> serde_json::Value {
+        match &self.value {
+            toml::Value::Datetime(time) => time.to_string().into(),
+            value => serde_json::to_value(value).unwrap_or_default(),
+        }
+    }
+
+    /// Whether one of two sets what the other sets, or a part of it.
+    pub(super) fn overlaps(&self, other: &Self) -> bool {
+        self.path.iter().zip(&other.path).all(|((own, _), (other, _))| own == other)
+    }
+
+    /// Whether it was typed as an argument.
+    pub(super) fn is_argument(&self) -> bool {
+        self.origin != Origin::Config
     }
 
     /// Where this argument set the parameter at `path`, if it did.
@@ -72,7 +115,11 @@ impl Override {
         } else {
             self.place.value.clone()
         };
-        Some((Origin::Argument(self.text.clone()), span))
+        Some((self.origin.clone(), span))
+    }
+
+    fn wrong(&self, message: &str, span: Range<usize>, label: &str, help: &str) -> Problem {
+        Problem::new(message, span.clone(), label).at((self.origin.clone(), span)).help(help)
     }
 }
 
@@ -83,9 +130,9 @@ pub(super) fn apply(set: Override, config: &mut Config) -> Result<(), Problem> {
         return apply_to_pipeline(&set, config);
     }
     let stage = stage::find(&mut config.stages, &id)
-        .map_err(|help| problem(&set.text, &format!("there is no stage `{id}`"), id_span, "unknown stage", &help))?;
+        .map_err(|help| set.wrong(&format!("there is no stage `{id}`"), id_span, "unknown stage", &help))?;
     let [_, steps @ .., (last, _)] = set.path.as_slice() else {
-        return Err(problem(&set.text, "the argument names no parameter", 0..id.len(), "wanted ID.PARAM", FORM));
+        return Err(set.wrong("the argument names no parameter", 0..id.len(), "wanted ID.PARAM", FORM));
     };
     let mut table = &mut stage.params;
     for (step, span) in steps {
@@ -94,7 +141,7 @@ pub(super) fn apply(set: Override, config: &mut Config) -> Result<(), Problem> {
             toml::Value::Table(inner) => inner,
             other => {
                 let message = format!("`{step}` of stage `{id}`: found {}, wanted a table", other.type_str());
-                return Err(problem(&set.text, &message, span.clone(), "not a table", "set it as a whole"));
+                return Err(set.wrong(&message, span.clone(), "not a table", "set it as a whole"));
             }
         };
     }
@@ -125,6 +172,21 @@ fn apply_to_pipeline(set: &Override, config: &mut Config) -> Result<(), Problem>
         }
     }
     Ok(())
+}
+
+/// The steps of a dotted key such as `fit.order`, as TOML reads it.
+pub(super) fn steps(key: &str) -> Option<Vec<String>> {
+    let line = format!("{key}=");
+    let path = path(&line, key.len()).ok()?;
+    Some(path.into_iter().map(|(step, _)| step).collect())
+}
+
+/// A path as a dotted key.
+pub(super) fn dotted(path: &[(String, Range<usize>)]) -> String {
+    let bare =
+        |step: &str| !step.is_empty() && step.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-'));
+    let step = |(step, _): &(String, _)| if bare(step) { step.clone() } else { format!("{step:?}") };
+    path.iter().map(step).collect::<Vec<String>>().join(".")
 }
 
 /// Where the first `=` outside quotes lies.

@@ -144,8 +144,8 @@ fn lacks(decl: &StageDecl, entry: &Entry, path: &[String], field: &str) -> Probl
 fn unchecked(decl: &StageDecl, error: &crate::StageError) -> Problem {
     let message = error.to_string();
     let named = message.starts_with('`').then(|| quoted(&message).next().map(steps)).flatten().unwrap_or_default();
-    let arguments: Vec<&str> = decl.arguments().collect();
-    let note = (named.is_empty() && !arguments.is_empty()).then(|| format!("with --set {}", arguments.join(" --set ")));
+    let changes = decl.changes();
+    let note = (named.is_empty() && !changes.is_empty()).then(|| format!("with {}", changes.join(" ")));
     let help = match (&error.help, note) {
         (Some(help), Some(note)) => Some(format!("{help} ({note})")),
         (help, note) => help.clone().or(note),

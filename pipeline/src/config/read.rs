@@ -10,6 +10,7 @@ use super::pipeline::{self, Pipeline};
 use super::problem::Problem;
 use super::stage::{self, StageDecl};
 use super::suggest::did_you_mean;
+use super::sweep::{self, Swept};
 use super::{name, value};
 
 /// A config: what the text says, before any stage is looked up.
@@ -27,6 +28,8 @@ pub struct Config {
     pub file: String,
     /// The `--set` arguments, in order.
     pub overrides: Vec<String>,
+    /// `[sweep]`, in the order of the text, without what an argument sets. `stages` has the first point's values.
+    pub sweep: Vec<Swept>,
 }
 
 const TABLES: [&str; 4] = ["pipeline", "stage", "sweep", "plugins"];
@@ -52,11 +55,27 @@ impl Config {
         config.fill(&document.root, &mut problems);
         name::check(&config.stages, &mut problems);
         for argument in arguments {
-            if let Err(problem) = Override::parse(argument).and_then(|set| overrides::apply(set, &mut config)) {
-                problems.push(problem);
+            match Override::parse(argument) {
+                Ok(set) => {
+                    config.sweep.retain(|axis| !axis.is_set_by(&set));
+                    problems.extend(config.set(set).err());
+                }
+                Err(problem) => problems.push(problem),
             }
         }
+        config.begin_sweep(&mut problems);
         (config, problems, true)
+    }
+
+    /// Applies an argument or a value of a sweep. Errors: an unknown stage; a path through something that is not a table.
+    pub(crate) fn set(&mut self, set: Override) -> Result<(), Problem> {
+        overrides::apply(set, self)
+    }
+
+    /// Gives the stages the first point's values: commands that know of no sweep take that point.
+    fn begin_sweep(&mut self, problems: &mut Vec<Problem>) {
+        let first: Vec<Override> = self.sweep.iter().filter_map(|axis| axis.values.first().cloned()).collect();
+        problems.extend(first.into_iter().filter_map(|set| self.set(set).err()));
     }
 
     /// The folder of the config: relative paths in parameters start there.
@@ -81,9 +100,10 @@ impl Config {
         for (key, value) in root {
             match key.get_ref().as_ref() {
                 "pipeline" | "stage" => {}
-                table @ ("sweep" | "plugins") => {
-                    let message = format!("[{table}] is not supported yet");
-                    let help = format!("this version runs one set of built-in stages: remove the table `{table}`");
+                "sweep" => self.sweep = sweep::read(value, problems),
+                "plugins" => {
+                    let message = "[plugins] is not supported yet";
+                    let help = "this version runs built-in stages: remove the table `plugins`";
                     problems.push(Problem::new(message, value.span(), "not supported yet").help(help));
                 }
                 other => {

@@ -68,9 +68,13 @@ impl StageDecl {
         (Origin::Config, span)
     }
 
-    /// The `--set` arguments that changed it.
-    pub(crate) fn arguments(&self) -> impl Iterator<Item = &str> {
-        self.overrides.iter().map(|set| set.text.as_str())
+    /// What changed it, for messages: `--set` arguments, values of a sweep.
+    pub(crate) fn changes(&self) -> Vec<String> {
+        let told = |set: &Override| match set.is_argument() {
+            true => format!("--set {}", set.text),
+            false => format!("{} of [sweep]", set.text),
+        };
+        self.overrides.iter().map(told).collect()
     }
 }
 

@@ -3,6 +3,7 @@
 mod order;
 mod plan;
 mod render;
+mod sweep;
 mod wiring;
 
 pub use plan::{Node, Plan, Wire, load, plan};

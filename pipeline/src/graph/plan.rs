@@ -1,12 +1,15 @@
 //! From a config and a registry to a checked, ordered graph.
 
+use std::sync::Arc;
+
 use serde_json::Value;
 
-use super::{order, wiring};
+use super::{order, sweep, wiring};
 use crate::config::{Config, Problem, StageDecl, instantiate, nearest};
 use crate::stage::{DynStage, Entry, Registry};
 
-/// A checked graph: what the runner runs.
+/// A checked graph: what the runner runs. Cloning is cheap: stages are shared.
+#[derive(Clone)]
 pub struct Plan {
     /// The stages in topological order; among those that are ready, in the order of the config.
     pub nodes: Vec<Node>,
@@ -15,6 +18,7 @@ pub struct Plan {
 }
 
 /// A stage of a graph.
+#[derive(Clone)]
 pub struct Node {
     /// Its id.
     pub id: String,
@@ -23,7 +27,7 @@ pub struct Node {
     /// Its row of the registry.
     pub entry: Entry,
     /// The stage.
-    pub stage: Box<dyn DynStage>,
+    pub stage: Arc<dyn DynStage>,
     /// All its parameters, defaults filled in.
     pub params: Value,
     /// Its wires, in the order of its input ports.
@@ -119,6 +123,7 @@ fn try_plan(config: Config, registry: &Registry, problems: &mut Vec<Problem>) ->
             }
         })
         .collect();
+    sweep::check(&config, &entries, problems);
     let wires = wiring::connect(&config.stages, &entries, problems);
     let order = order::topological(&config.stages, &wires, problems)?;
     let place = |index: usize| order.iter().position(|&other| other == index);
@@ -129,7 +134,7 @@ fn try_plan(config: Config, registry: &Registry, problems: &mut Vec<Problem>) ->
         let (stage, params) = stage?;
         let (decl, entry) = (&config.stages[index], entries[index]?);
         let inputs = wires.iter().filter_map(|wire| Some(Wire { node: place(wire.node)?, ..wire.wire() })).collect();
-        nodes.push(Node { id: decl.id.clone(), uses: decl.uses.clone(), entry, stage, params, inputs });
+        nodes.push(Node { id: decl.id.clone(), uses: decl.uses.clone(), entry, stage: stage.into(), params, inputs });
     }
     Some(Plan { nodes, config })
 }

@@ -41,11 +41,21 @@ impl Plan {
             text.push_str(line.trim_end());
             text.push('\n');
         }
+        self.sweep(&mut text, "");
         text
+    }
+
+    /// A line on the sweep, if there is one: its points differ in parameters, not in the graph.
+    fn sweep(&self, text: &mut String, mark: &str) {
+        let Some(points) = self.points() else { return };
+        let swept = self.config.sweep.iter().map(|swept| format!("{} ({})", swept.name, swept.values.len()));
+        let (many, swept) = (if points == 1 { "" } else { "s" }, swept.collect::<Vec<_>>().join(", "));
+        let _ = writeln!(text, "{mark}sweep: {points} point{many}, the same graph in each: {swept}");
     }
 
     fn mermaid(&self) -> String {
         let mut text = "flowchart TD\n".to_owned();
+        self.sweep(&mut text, "    %% ");
         self.draw(
             &mut text,
             |index, node| format!("    n{index}[\"{}<br/>{}\"]", node.id, node.uses),
@@ -57,6 +67,7 @@ impl Plan {
     fn dot(&self) -> String {
         let name = self.config.name.replace(['"', '\\'], "_");
         let mut text = format!("digraph \"{name}\" {{\n    node [shape=box];\n");
+        self.sweep(&mut text, "    // ");
         self.draw(
             &mut text,
             |index, node| format!("    n{index} [label=\"{}\\n{}\"];", node.id, node.uses),

@@ -44,6 +44,13 @@ pub fn config_schema(registry: &Registry) -> Value {
                 "type": "array",
                 "minItems": 1,
                 "items": any_stage(registry)
+            },
+            "sweep": {
+                "description": "Parameters to run through, as STAGE.PARAM = [values]; several: their grid, the last one fastest.",
+                "type": "object",
+                "additionalProperties": {
+                    "anyOf": [{ "type": "array", "minItems": 1 }, { "type": "object" }]
+                }
             }
         },
         "definitions": definitions

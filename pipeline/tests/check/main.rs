@@ -5,6 +5,7 @@ mod graph;
 mod reference;
 mod robustness;
 mod stages;
+mod sweep;
 
 use afmid_pipeline::Problem;
 use afmid_pipeline::config::Origin;

@@ -9,7 +9,7 @@ use crate::stages;
 const SEED: &str = "#:schema x\n[pipeline]\nname = \"test\"\nseed = 7\n\n[[stage]]\nid = \"sine\"\nuses = \"test.sine\"\n\
     params = { samples = 3, start = \"at-peak\", noise = { std_v = 0.5 }, spikes_v = [1.0, 2] }\n\n[[stage]]\nid = \"split\"\n\
     uses = \"test.split\"\ninputs = { signal = \"sine.signal\" }\n\n[[stage]]\nid = \"peaks\"\nuses = \"test.peaks\"\n\
-    inputs.signal = \"split.clean\"\n";
+    inputs.signal = \"split.clean\"\n\n[sweep]\nsine.samples = [3, 4]\n\"sine.spikes_v\" = [[], [1.0]]\n";
 
 fn survives(text: &str, arguments: &[String]) -> Result<(), TestCaseError> {
     if let Err(problems) = load("x.toml", text, arguments, &stages::registry()) {
