@@ -23,7 +23,7 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run a config, reusing what is still valid, and write a result file.
+    /// Run a config, reusing what is still valid, and write a result file; with [sweep], one per point and one table of them all.
     Run(RunArgs),
     /// Run a config on many data sets, each with its own result file, and write one table of them all.
     Batch(BatchArgs),
@@ -156,7 +156,7 @@ pub struct RunArgs {
     /// The config and what changes it.
     #[command(flatten)]
     pub config: ConfigArgs,
-    /// The result file [default: the pipeline's name, in the working directory].
+    /// The result file; of a config with [sweep], the folder of the results [default: the pipeline's name, in the working directory].
     #[arg(short, long, value_name = "OUT.h5")]
     pub output: Option<PathBuf>,
     /// Threads [default: one per processor]; results don't depend on it.
@@ -168,6 +168,9 @@ pub struct RunArgs {
     /// Where stage results are kept [default: $AFMID_CACHE, or `afmid` in the user's cache folder].
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
+    /// As JSON, alone on stdout; of a config with [sweep], all points.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// A number of threads.

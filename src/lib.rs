@@ -14,6 +14,7 @@ mod progress;
 mod provenance;
 mod report;
 mod show;
+mod sweep;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

@@ -14,18 +14,19 @@ pub fn observer() -> Box<dyn Observer> {
     if std::io::stderr().is_terminal() { Box::new(Bars { bars: MultiProgress::new() }) } else { Box::new(Lines) }
 }
 
-/// Progress of a batch: a bar with rate and time left if stderr is a terminal, a line per run elsewhere.
+/// Progress of a batch or a sweep: a bar with rate and time left if stderr is a terminal, a line per run elsewhere.
 pub struct Sets {
     bar: Option<ProgressBar>,
 }
 
 impl Sets {
-    /// Of so many data sets.
-    pub fn new(count: usize) -> Self {
+    /// Of so many data sets, or of what they are called here.
+    pub fn new(what: &str, count: usize) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("data sets {wide_bar} {pos}/{len} {per_sec} {eta} left");
+            let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {per_sec} {eta} left");
             let bar = ProgressBar::new(count as u64);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar.set_prefix(what.to_owned());
             bar
         });
         Self { bar }

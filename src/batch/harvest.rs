@@ -1,5 +1,7 @@
 //! What a batch's table takes from a run: by the names that stages' summaries use, whatever the stages.
 
+use std::collections::BTreeMap;
+
 use afmid_pipeline::{Artifact, RunResult, StageRecord};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -26,6 +28,9 @@ pub struct Harvest {
     pub stiffness_std_n_per_m: Option<f64>,
     /// Mechanical modes, ascending.
     pub modes: Vec<ModeFound>,
+    /// Every number of the summaries that is in no list, as `stage.key.key`: of a point of a sweep, not of a data set.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub numbers: BTreeMap<String, f64>,
 }
 
 /// A mode in a summary's list `modes`.
@@ -70,6 +75,27 @@ pub fn harvest(run: &RunResult) -> Harvest {
         stiffness_n_per_m: stiffness("value"),
         stiffness_std_n_per_m: stiffness("std"),
         modes: modes.into_iter().flatten().map(mode).collect(),
+        numbers: BTreeMap::new(),
+    }
+}
+
+/// Every number of the summaries that is in no list, as `stage.key.key`.
+pub fn numbers(run: &RunResult) -> BTreeMap<String, f64> {
+    let mut found = BTreeMap::new();
+    for stage in &run.stages {
+        summary(stage).into_iter().for_each(|summary| walk(&stage.id, summary, &mut found));
+    }
+    found
+}
+
+fn walk(path: &str, value: &Value, found: &mut BTreeMap<String, f64>) {
+    match value {
+        Value::Number(number) => found.extend(number.as_f64().map(|number| (path.to_owned(), number))),
+        // a `/` would lead into groups of HDF5
+        Value::Object(entries) => {
+            entries.iter().for_each(|(key, value)| walk(&format!("{path}.{}", key.replace('/', "_")), value, found));
+        }
+        _ => {}
     }
 }
 
@@ -89,5 +115,27 @@ fn mode(value: &Value) -> ModeFound {
         quality_factor_std: number("quality_factor_std"),
         static_share: number("static_share"),
         static_share_std: number("static_share_std"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn numbers_are_those_outside_lists_under_their_keys() {
+        let mut found = BTreeMap::new();
+        let summary = json!({ "a": 1, "b": { "c/d": -2.5, "e": null }, "f": [3], "g": "4", "h": true });
+        walk("fit", &summary, &mut found);
+        assert_eq!(found, [("fit.a".to_owned(), 1.0), ("fit.b.c_d".to_owned(), -2.5)].into());
+    }
+
+    #[test]
+    fn what_a_batch_wrote_without_numbers_is_read() {
+        let text = serde_json::to_string(&Harvest::default()).unwrap();
+        assert!(!text.contains("numbers"), "{text}");
+        assert_eq!(serde_json::from_str::<Harvest>(&text).unwrap(), Harvest::default());
     }
 }

@@ -83,18 +83,33 @@ pub fn write(folder: &Path, title: &Title<'_>, entries: &[Entry]) -> Result<Path
     }
     replace_with(&folder.join("summary.parquet"), |path| parquet::write(path, &table)).map_err(failed)?;
     let path = folder.join("summary.h5");
-    write_result(&path, &result(title, table, trends)).map_err(failed)?;
+    let mut outputs = Ports::new();
+    outputs.insert("modes", table.wrap());
+    outputs.insert("trends", trends.wrap());
+    write_result(&path, &result(title, "batch.summary", outputs)).map_err(failed)?;
+    Ok(path)
+}
+
+/// What the summary of a sweep uses.
+pub const SWEEP: &str = "sweep.summary";
+
+/// Writes `summary.h5`, `summary.parquet` and `summary.csv` of a sweep, each whole or not at all. The first of them says whose the others are.
+pub fn write_sweep(folder: &Path, title: &Title<'_>, table: Table) -> Result<PathBuf, Failure> {
+    let failed = |error: afmid_pipeline::store::StoreError| Failure::failed(&error, error.help.clone());
+    let path = folder.join("summary.h5");
+    let mut outputs = Ports::new();
+    outputs.insert("points", table.clone().wrap());
+    write_result(&path, &result(title, SWEEP, outputs)).map_err(failed)?;
+    replace_with(&folder.join("summary.parquet"), |path| parquet::write(path, &table)).map_err(failed)?;
+    replace_with(&folder.join("summary.csv"), |path| csv(path, &table)).map_err(failed)?;
     Ok(path)
 }
 
 /// The tables as the result of a stage, so that `afmid show`, `report` and HDF5 viewers open them.
-fn result(title: &Title<'_>, table: Table, trends: Table) -> RunResult {
-    let mut outputs = Ports::new();
-    outputs.insert("modes", table.wrap());
-    outputs.insert("trends", trends.wrap());
+fn result(title: &Title<'_>, uses: &str, outputs: Ports) -> RunResult {
     let stage = StageRecord {
         id: "summary".to_owned(),
-        uses: "batch.summary".to_owned(),
+        uses: uses.to_owned(),
         version: 1,
         params: json!({}),
         wires: Vec::new(),

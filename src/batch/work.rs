@@ -11,8 +11,9 @@ use afmid_pipeline::cache::{Cache, write_result};
 use afmid_pipeline::runner::{Options, Quiet, RunError, run, run_key};
 use afmid_pipeline::store::is_own;
 
-use super::harvest::harvest;
+use super::harvest::{harvest, numbers};
 use super::ledger::{Entry, Ledger};
+use crate::provenance::repeat::writers;
 
 /// What all runs of a batch have in common.
 pub struct Work<'a> {
@@ -26,6 +27,8 @@ pub struct Work<'a> {
     pub fresh: bool,
     /// Run what failed once more.
     pub retry_failed: bool,
+    /// As `afmid run` would: a result states the config and the arguments as they are now, and stages that write files have written them.
+    pub as_run: bool,
 }
 
 /// What became of a data set in this batch.
@@ -35,6 +38,8 @@ pub struct Done {
     pub entry: Entry,
     /// How long its run took; none if nothing was to be done.
     pub took: Option<Duration>,
+    /// Stages of its run, and how many of them were reused.
+    pub stages: (usize, usize),
 }
 
 impl Work<'_> {
@@ -43,22 +48,23 @@ impl Work<'_> {
         let clock = Instant::now();
         let base = plan.config.base();
         let key = match run_key(plan, base, self.program) {
+            Ok(key) if self.as_run => stated(&key, plan),
             Ok(key) => key,
-            Err(error) => return self.kept(Entry::failed(name, None, told(&[error])), clock),
+            Err(error) => return self.kept(Entry::failed(name, None, told(&[error])), clock, (0, 0)),
         };
-        if let Some(entry) = self.ledger.read(name).filter(|entry| entry.key.as_deref() == Some(&key) && !self.fresh)
+        let again = self.fresh || self.as_run && !writers(plan, base, Path::new("")).is_empty();
+        if let Some(entry) = self.ledger.read(name).filter(|entry| entry.key.as_deref() == Some(&key) && !again)
             && (self.ledger.holds(&entry) || !entry.is_done() && !self.retry_failed)
         {
-            return Done { entry, took: None };
+            return Done { entry, took: None, stages: (0, 0) };
         }
-        let entry = match self.ran(name, plan, base, &key) {
-            Ok(entry) => entry,
-            Err(error) => Entry::failed(name, Some(key), error),
-        };
-        self.kept(entry, clock)
+        match self.ran(name, plan, base, &key) {
+            Ok((entry, stages)) => self.kept(entry, clock, stages),
+            Err(error) => self.kept(Entry::failed(name, Some(key), error), clock, (0, 0)),
+        }
     }
 
-    fn ran(&self, name: &str, plan: &Plan, base: &Path, key: &str) -> Result<Entry, String> {
+    fn ran(&self, name: &str, plan: &Plan, base: &Path, key: &str) -> Result<(Entry, (usize, usize)), String> {
         let path = self.ledger.result(name);
         // an empty file holds nothing that could be lost
         if std::fs::metadata(&path).is_ok_and(|there| there.len() > 0) && !is_own(&path).unwrap_or(false) {
@@ -75,16 +81,21 @@ impl Work<'_> {
         let result = run(plan, &options).map_err(|errors| told(&errors))?;
         write_result(&path, &result).map_err(|error| error.to_string())?;
         let bytes = std::fs::metadata(&path).map_err(|error| format!("{}: {error}", path.display()))?.len();
-        Ok(Entry::done(name, key.to_owned(), bytes, harvest(&result)))
+        let mut found = harvest(&result);
+        if self.as_run {
+            found.numbers = numbers(&result);
+        }
+        let reused = result.info.stages.iter().filter(|(_, _, cached)| *cached).count();
+        Ok((Entry::done(name, key.to_owned(), bytes, found), (result.stages.len(), reused)))
     }
 
     /// A run whose end cannot be written down counts as failed: the next batch would not know of it.
-    fn kept(&self, entry: Entry, clock: Instant) -> Done {
+    fn kept(&self, entry: Entry, clock: Instant, stages: (usize, usize)) -> Done {
         let entry = match self.ledger.write(&entry) {
             Ok(()) => entry,
             Err(error) => Entry::failed(&entry.name, None, format!("the ledger cannot be written: {error}")),
         };
-        Done { entry, took: Some(clock.elapsed()) }
+        Done { entry, took: Some(clock.elapsed()), stages }
     }
 }
 
@@ -114,6 +125,16 @@ pub fn all<T: Sync>(
     let mut finished = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
     finished.sort_by_key(|(index, _)| *index);
     finished.into_iter().map(|(_, done)| done).collect()
+}
+
+/// A run's key with all that its result states beside its stages.
+fn stated(key: &str, plan: &Plan) -> String {
+    let mut hasher = blake3::Hasher::new();
+    let overrides = plan.config.overrides.iter().map(String::as_str);
+    for part in [key, plan.config_text()].into_iter().chain(overrides) {
+        hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
+    }
+    hasher.finalize().to_hex().to_string()
 }
 
 fn told(errors: &[RunError]) -> String {

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::load::load;
 use super::run::{PROGRAM, default_output, open_cache};
+use super::sweep::refuse;
 use crate::batch::dataset::{DataSet, sorted};
 use crate::batch::ledger::{Entry, Ledger};
 use crate::batch::summary::Title;
@@ -91,7 +92,9 @@ fn planned<'a>(
 ) -> Result<Vec<(&'a DataSet, Plan)>, Failure> {
     sets.map(|set| {
         let arguments: Vec<String> = args.config.set.iter().cloned().chain(set.arguments()).collect();
-        Ok((set, load(&args.config.config, &arguments, registry)?))
+        let plan = load(&args.config.config, &arguments, registry)?;
+        refuse(&plan, "a batch runs one set of parameters on each data set")?;
+        Ok((set, plan))
     })
     .collect()
 }
@@ -108,8 +111,15 @@ fn computed(args: &BatchArgs, sets: &[(&DataSet, Plan)], ledger: &Ledger) -> Res
     // 0: as many as there are processors
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.map_or(0, |jobs| usize::from(jobs.get()))).build();
     let pool = pool.map_err(|error| Failure::failed(format!("no threads can be started: {error}"), None))?;
-    let work = Work { cache: &cache, ledger, program: PROGRAM, fresh: args.fresh, retry_failed: args.retry_failed };
-    let progress = Sets::new(sets.len());
+    let work = Work {
+        cache: &cache,
+        ledger,
+        program: PROGRAM,
+        fresh: args.fresh,
+        retry_failed: args.retry_failed,
+        as_run: false,
+    };
+    let progress = Sets::new("data sets", sets.len());
     let one = |(set, plan): &(&DataSet, Plan)| pool.install(|| work.one(&set.name, plan));
     Ok(all(sets, pool.current_num_threads(), one, |done| progress.ended(done)))
 }
@@ -117,7 +127,9 @@ fn computed(args: &BatchArgs, sets: &[(&DataSet, Plan)], ledger: &Ledger) -> Res
 /// What the ledger holds of each; what it does not hold has failed.
 fn collected(sets: &[DataSet], ledger: &Ledger) -> Vec<Done> {
     let missing = |set: &DataSet| Entry::failed(&set.name, None, "no run of it has ended".to_owned());
-    sets.iter().map(|set| Done { entry: ledger.read(&set.name).unwrap_or_else(|| missing(set)), took: None }).collect()
+    sets.iter()
+        .map(|set| Done { entry: ledger.read(&set.name).unwrap_or_else(|| missing(set)), took: None, stages: (0, 0) })
+        .collect()
 }
 
 fn told(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock: Instant) -> Result<String, Failure> {

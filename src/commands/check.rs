@@ -14,7 +14,9 @@ pub fn run(configs: &[PathBuf], registry: &Registry) -> Result<(), Failure> {
         match load(config, &[], registry) {
             // the verdict counts, whether anybody reads on or not
             Ok(plan) if printed.is_ok() => {
-                printed = print(&format!("{}: right, {} stages\n", config.display(), plan.nodes.len()));
+                let points =
+                    plan.points().map(|count| format!(", every point of a sweep of {count}")).unwrap_or_default();
+                printed = print(&format!("{}: right, {} stages{points}\n", config.display(), plan.nodes.len()));
             }
             Ok(_) => {}
             Err(failure) => {

@@ -12,6 +12,7 @@ use afmid_stages::exam::{Draw, Judged, Kind, Score, draw, judge};
 use serde_json::Value;
 
 use super::load::load;
+use super::sweep::refuse;
 use crate::cli::{ExamArgs, ExamKind};
 use crate::failure::Failure;
 use crate::output::{print, say};
@@ -33,6 +34,7 @@ pub fn run(args: &ExamArgs, registry: &Registry) -> Result<(), Failure> {
 
 fn score(args: &ExamArgs, registry: &Registry) -> Result<Score, Failure> {
     let plan = load(&args.config.config, &args.config.set, registry)?;
+    refuse(&plan, "an exam judges one set of parameters")?;
     for id in ["records", STAGE] {
         if plan.node(id).is_none() {
             let help =

@@ -1,7 +1,8 @@
 //! `afmid explain`: which stages would run, and why.
 
-use afmid_pipeline::Registry;
+use afmid_pipeline::cache::Cache;
 use afmid_pipeline::runner::{Decision, Explanation, explain};
+use afmid_pipeline::{Plan, Registry};
 use serde_json::{Value, json};
 
 use super::load::load;
@@ -10,6 +11,7 @@ use crate::cli::ExplainArgs;
 use crate::failure::Failure;
 use crate::output::print;
 use crate::show::{change_json, change_text, grid, pretty};
+use crate::sweep::point;
 
 /// Changes that are told of one stage; `--json` has all.
 const MOST: usize = 8;
@@ -18,6 +20,9 @@ const MOST: usize = 8;
 pub fn run(args: &ExplainArgs, registry: &Registry) -> Result<(), Failure> {
     let plan = load(&args.config.config, &args.config.set, registry)?;
     let cache = open_cache(args.cache.as_deref())?;
+    if let Some(count) = plan.points() {
+        return points(&plan, count, &cache, args.json);
+    }
     let rows = explain(&plan, plan.config.base(), PROGRAM, &cache);
     if args.json {
         return print(&pretty(&json!({ "stages": rows.iter().map(as_json).collect::<Vec<_>>() }))?);
@@ -25,6 +30,69 @@ pub fn run(args: &ExplainArgs, registry: &Registry) -> Result<(), Failure> {
     let mut table = vec![["stage", "would", "because", "key"].map(str::to_owned).to_vec()];
     rows.iter().for_each(|row| table.extend(as_text(row)));
     print(&grid(&table))
+}
+
+/// What a run of a sweep would do: a stage has a row per group of points that share its result.
+fn points(plan: &Plan, count: usize, cache: &Cache, json: bool) -> Result<(), Failure> {
+    let mut groups: Vec<Vec<Group>> = plan.nodes.iter().map(|_| Vec::new()).collect();
+    for index in 0..count {
+        let point = plan.point(index).map_err(|problems| {
+            Failure::failed(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "), None)
+        })?;
+        for (row, groups) in explain(&point, point.config.base(), PROGRAM, cache).into_iter().zip(&mut groups) {
+            match groups.iter_mut().find(|group| group.row.key == row.key && group.row.decision == row.decision) {
+                Some(group) => group.points.push(index),
+                None => groups.push(Group { row, points: vec![index] }),
+            }
+        }
+    }
+    if json {
+        let points = (0..count).map(|index| {
+            let values: serde_json::Map<String, Value> = plan.values(index).into_iter().collect();
+            json!({ "point": point::name(index), "values": values })
+        });
+        let stages = groups.iter().flatten().map(|group| {
+            let mut row = as_json(&group.row);
+            row["points"] = group.points.iter().map(|&index| point::name(index)).collect();
+            row
+        });
+        let (points, stages): (Vec<Value>, Vec<Value>) = (points.collect(), stages.collect());
+        return print(&pretty(&json!({ "points": points, "stages": stages }))?);
+    }
+    let mut table = vec![["stage", "points", "would", "because", "key"].map(str::to_owned).to_vec()];
+    for group in groups.iter().flatten() {
+        for (number, mut row) in as_text(&group.row).into_iter().enumerate() {
+            row.insert(1, if number == 0 { ranges(&group.points, count) } else { String::new() });
+            table.push(row);
+        }
+    }
+    print(&grid(&table))
+}
+
+/// Points that share a stage's result.
+struct Group {
+    row: Explanation,
+    /// From 0, ascending.
+    points: Vec<usize>,
+}
+
+/// `all`, or numbers from 1 such as `1-3, 7`.
+fn ranges(points: &[usize], count: usize) -> String {
+    if points.len() == count {
+        return "all".to_owned();
+    }
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for &point in points {
+        match runs.last_mut().filter(|(_, last)| last + 1 == point) {
+            Some((_, last)) => *last = point,
+            None => runs.push((point, point)),
+        }
+    }
+    let told = |(first, last): &(usize, usize)| match first == last {
+        true => format!("{}", first + 1),
+        false => format!("{}-{}", first + 1, last + 1),
+    };
+    runs.iter().map(told).collect::<Vec<_>>().join(", ")
 }
 
 /// A row per reason.
@@ -78,4 +146,15 @@ fn as_json(row: &Explanation) -> Value {
         "compared_with": nearest,
         "changes": changes.collect::<Vec<_>>(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ranges;
+
+    #[test]
+    fn points_are_told_as_ranges_from_one() {
+        assert_eq!(ranges(&[0, 1, 2], 3), "all");
+        assert_eq!(ranges(&[0, 1, 4, 6, 7], 9), "1-2, 5, 7-8");
+    }
 }

@@ -19,6 +19,7 @@ mod run;
 mod schema;
 mod show;
 mod stages;
+mod sweep;
 mod target;
 mod trace;
 

@@ -7,13 +7,16 @@ use afmid_pipeline::Registry;
 use afmid_pipeline::cache::{Cache, write_result};
 use afmid_pipeline::runner::{Options, RunError, run as run_plan};
 use afmid_pipeline::{Plan, RunResult};
+use serde_json::{Value, json};
 
 use super::load::load;
+use super::sweep;
 use super::target::{Input, Target, prepare};
 use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
 use crate::output::{print, say};
 use crate::progress::observer;
+use crate::show::pretty;
 
 /// The program and its version, as results state it.
 pub const PROGRAM: &str = concat!("afmid ", env!("CARGO_PKG_VERSION"));
@@ -21,6 +24,9 @@ pub const PROGRAM: &str = concat!("afmid ", env!("CARGO_PKG_VERSION"));
 /// Runs a config and writes its result file.
 pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
     let plan = load(&args.config.config, &args.config.set, registry)?;
+    if let Some(count) = plan.points() {
+        return sweep::run(&plan, count, args);
+    }
     let output = args.output.clone().unwrap_or_else(|| default_output(plan.name()));
     prepare(&output, Target::Result, &inputs(&plan, &args.config.config))?;
     let cache = open_cache(args.cache.as_deref())?;
@@ -39,6 +45,9 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
     }
     let result = result?;
     write_result(&output, &result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    if args.json {
+        return print(&pretty(&as_json(&output, &result))?);
+    }
     print(&format!("{}: {}\n", output.display(), told(&result)))
 }
 
@@ -89,10 +98,28 @@ fn rendered(errors: &[RunError]) -> String {
     errors.iter().map(|error| format!("error: {error}\n{}", help(error))).collect()
 }
 
+/// How many stages were reused.
+fn reused(result: &RunResult) -> usize {
+    result.info.stages.iter().filter(|(_, _, cached)| *cached).count()
+}
+
+fn warnings(result: &RunResult) -> usize {
+    result.stages.iter().map(|stage| stage.result.warnings.len()).sum()
+}
+
+fn as_json(output: &Path, result: &RunResult) -> Value {
+    json!({
+        "file": output.display().to_string(),
+        "stages": result.stages.len(),
+        "reused": reused(result),
+        "warnings": warnings(result),
+        "seconds": result.info.seconds,
+    })
+}
+
 fn told(result: &RunResult) -> String {
     let (count, seconds) = (result.stages.len(), result.info.seconds);
-    let reused = result.info.stages.iter().filter(|(_, _, cached)| *cached).count();
-    let warnings: usize = result.stages.iter().map(|stage| stage.result.warnings.len()).sum();
+    let (reused, warnings) = (reused(result), warnings(result));
     let mut text = format!("{count} stages in {seconds:.2} s");
     if reused > 0 {
         text.push_str(&format!(", {reused} reused"));

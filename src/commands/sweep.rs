@@ -1,0 +1,171 @@
+//! `afmid run` of a config with `[sweep]`: a run per point, one table of them all.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use afmid_pipeline::store::ResultFile;
+use afmid_pipeline::{Artifact, Plan};
+use serde_json::{Value, json};
+
+use super::run::{PROGRAM, default_output, open_cache};
+use crate::batch::ledger::{Entry, Ledger};
+use crate::batch::summary::{SWEEP, Title, write_sweep};
+use crate::batch::work::{Done, Work, all};
+use crate::cli::RunArgs;
+use crate::failure::{Failure, Message};
+use crate::output::{print, say};
+use crate::progress::Sets;
+use crate::show::{artifact_text, pretty};
+use crate::sweep::point::{self, Point};
+use crate::sweep::table::{shown, table};
+
+/// The tables of a sweep, in its folder.
+const TABLES: [&str; 3] = ["summary.h5", "summary.parquet", "summary.csv"];
+
+/// Runs all points, one after the other: each finds in the cache what those before it have computed. One that fails stops no other; then the exit code is 3.
+pub fn run(plan: &Plan, count: usize, args: &RunArgs) -> Result<(), Failure> {
+    let clock = Instant::now();
+    let folder = folder(plan, args)?;
+    require_own(&folder)?;
+    let ledger = Ledger::open(&folder).map_err(|error| {
+        let help = "give another folder with -o".to_owned();
+        Failure::usage(format!("the folder {} cannot be made: {error}", folder.display()), Some(help))
+    })?;
+    let points = computed(plan, count, args, &ledger)?;
+    let title = Title { name: plan.name(), seed: plan.seed(), config: plan.config_text(), program: PROGRAM };
+    let summary = write_sweep(&folder, &title, table(&points))?;
+    let told = Told { folder: &folder, points: &points, summary: &summary, ledger: &ledger };
+    print(&if args.json { pretty(&told.json())? } else { told.text(clock) })?;
+    match points.iter().filter(|point| !point.done.entry.is_done()).count() {
+        0 => Ok(()),
+        failed => Err(Failure::Partly(Message::Line(
+            format!("{failed} of {count} points failed"),
+            Some("what is wrong with each stands above and in `ledger`; the next run tries them again".to_owned()),
+        ))),
+    }
+}
+
+/// Errors, usage: the plan has a sweep, and the command is for one set of parameters, as `why` says.
+pub fn refuse(plan: &Plan, why: &str) -> Result<(), Failure> {
+    if plan.points().is_none() {
+        return Ok(());
+    }
+    let swept: Vec<&str> = plan.config.sweep.iter().map(|swept| swept.name.as_str()).collect();
+    let help = format!("set {} with --set, or remove [sweep]; `afmid run` runs every point", swept.join(" and "));
+    Err(Failure::usage(format!("the config {} has a [sweep]: {why}", plan.config.file), Some(help)))
+}
+
+/// The folder of the results. Errors, usage: `-o` names a result file.
+fn folder(plan: &Plan, args: &RunArgs) -> Result<PathBuf, Failure> {
+    let Some(output) = &args.output else { return Ok(default_output(plan.name()).with_extension("")) };
+    if output.extension().is_some_and(|extension| extension == "h5") {
+        let message = format!("{} is one file, and the config has a [sweep]: wanted a folder", output.display());
+        let help = format!("every point has a result file in it: `-o {}`", output.with_extension("").display());
+        return Err(Failure::usage(message, Some(help)));
+    }
+    Ok(output.clone())
+}
+
+/// Errors, usage: the folder has tables of others, of a batch for instance, which would be replaced.
+fn require_own(folder: &Path) -> Result<(), Failure> {
+    let holds = |name: &&&str| std::fs::metadata(folder.join(name)).is_ok_and(|there| there.len() > 0);
+    let Some(there) = TABLES.iter().find(holds) else { return Ok(()) };
+    let summary = ResultFile::open(&folder.join(TABLES[0]));
+    if summary.is_ok_and(|file| file.stages().iter().any(|stage| stage.record.uses == SWEEP)) {
+        return Ok(());
+    }
+    let message = format!("{} exists and is no table of a sweep: it is not replaced", folder.join(there).display());
+    Err(Failure::usage(message, Some("give another folder with -o".to_owned())))
+}
+
+fn computed(plan: &Plan, count: usize, args: &RunArgs, ledger: &Ledger) -> Result<Vec<Point>, Failure> {
+    let cache = open_cache(args.cache.as_deref())?;
+    // 0: as many as there are processors
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.map_or(0, |jobs| usize::from(jobs.get()))).build();
+    let pool = pool.map_err(|error| Failure::failed(format!("no threads can be started: {error}"), None))?;
+    let work = Work { cache: &cache, ledger, program: PROGRAM, fresh: args.fresh, retry_failed: true, as_run: true };
+    let progress = Sets::new("points", count);
+    let one = |&index: &usize| match plan.point(index) {
+        Ok(point) => pool.install(|| work.one(&point::name(index), &point)),
+        Err(problems) => {
+            let error = problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+            Done { entry: Entry::failed(&point::name(index), None, error), took: None, stages: (0, 0) }
+        }
+    };
+    let indices: Vec<usize> = (0..count).collect();
+    // one at a time: two at once would both compute what they share
+    let done = all(&indices, 1, one, |done| progress.ended(done));
+    cache.take_notes().iter().for_each(|note| say(&format!("note: {note}\n")));
+    Ok((0..).zip(done).map(|(index, done)| Point { values: plan.values(index), done }).collect())
+}
+
+struct Told<'a> {
+    folder: &'a Path,
+    points: &'a [Point],
+    summary: &'a Path,
+    ledger: &'a Ledger,
+}
+
+impl Told<'_> {
+    fn failed(&self) -> impl Iterator<Item = &Point> {
+        self.points.iter().filter(|point| !point.done.entry.is_done())
+    }
+
+    fn ran(&self) -> usize {
+        self.points.iter().filter(|point| point.done.took.is_some()).count()
+    }
+
+    /// Stages of all runs, and how many of them were reused.
+    fn stages(&self) -> (usize, usize) {
+        let sum = |of: fn(&Point) -> usize| self.points.iter().map(of).sum();
+        (sum(|point| point.done.stages.0), sum(|point| point.done.stages.1))
+    }
+
+    fn text(&self, clock: Instant) -> String {
+        let mut text = artifact_text(&Artifact::Table(shown(self.points).into()));
+        for point in self.failed() {
+            let (entry, values) = (&point.done.entry, point.told());
+            let error = entry.error.as_deref().unwrap_or_default().trim_end();
+            text.push_str(&format!("{} ({values}) failed: {error}\n", entry.name));
+        }
+        let (count, ran, (stages, reused)) = (self.points.len(), self.ran(), self.stages());
+        text.push_str(&format!(
+            "{}: {count} point{} in {:.2} s, {ran} run ({stages} stages, {reused} reused), {} as they were, {} failed\n",
+            self.folder.display(),
+            if count == 1 { "" } else { "s" },
+            clock.elapsed().as_secs_f64(),
+            count - ran,
+            self.failed().count(),
+        ));
+        text.push_str(&format!("summary: {} (.csv, .parquet)\n", self.summary.display()));
+        text
+    }
+
+    fn json(&self) -> Value {
+        let (stages, reused) = self.stages();
+        json!({
+            "folder": self.folder.display().to_string(),
+            "points": self.points.iter().map(|point| self.point(point)).collect::<Vec<_>>(),
+            "ran": self.ran(),
+            "failed": self.failed().count(),
+            "stages": stages,
+            "reused": reused,
+            "summary": self.summary.display().to_string(),
+        })
+    }
+
+    fn point(&self, point: &Point) -> Value {
+        let entry = &point.done.entry;
+        let values: serde_json::Map<String, Value> = point.values.iter().cloned().collect();
+        json!({
+            "point": entry.name,
+            "values": values,
+            "file": entry.is_done().then(|| self.ledger.result(&entry.name).display().to_string()),
+            "ran": point.done.took.is_some(),
+            "stages": point.done.stages.0,
+            "reused": point.done.stages.1,
+            "error": entry.error,
+            "found": entry.found,
+        })
+    }
+}
