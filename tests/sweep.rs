@@ -152,6 +152,7 @@ fn one_bad_point_stops_no_other() {
     let error = |point: usize| all["points"][point]["error"].as_str().unwrap_or_default().to_owned();
     assert!(error(0).contains("record_1.h5") && error(1).contains("record_1.h5"), "{all}");
     assert!(error(2).contains("point_00003.h5") && error(3).contains("point_00004.h5"), "{all}");
+    assert!(all["points"][0]["found"]["numbers"].is_object(), "keys are never missing: {all}");
     let kept = std::fs::read_to_string(here.join("out/point_00003.h5")).expect("the notes");
     assert_eq!(kept, "notes of somebody");
     std::fs::remove_file(here.join("out/point_00003.h5")).expect("the notes");

@@ -157,7 +157,7 @@ impl Told<'_> {
     fn point(&self, point: &Point) -> Value {
         let entry = &point.done.entry;
         let values: serde_json::Map<String, Value> = point.values.iter().cloned().collect();
-        json!({
+        let mut told = json!({
             "point": entry.name,
             "values": values,
             "file": entry.is_done().then(|| self.ledger.result(&entry.name).display().to_string()),
@@ -166,6 +166,9 @@ impl Told<'_> {
             "reused": point.done.stages.1,
             "error": entry.error,
             "found": entry.found,
-        })
+        });
+        // the ledger leaves it out where there are none
+        told["found"]["numbers"] = json!(entry.found.numbers);
+        told
     }
 }
