@@ -1,5 +1,5 @@
 # The two commands: `make demo` runs the main job, `make test` passes the tests.
-.PHONY: deps test-deps demo test lint
+.PHONY: deps test-deps demo test test-interop lint
 
 CMAKE_VERSION = 3.31.6
 
@@ -20,6 +20,13 @@ demo: deps
 test: test-deps
 	cargo test --workspace --locked
 
+# afmid with other programs, which `make test` does without: a real Slurm of two emulated nodes (root; installs slurm-wlm and munge with apt where
+# they are missing) and Snakemake. The first line builds the program as `make test` does.
+test-interop: deps .tools/snakemake/installed
+	cargo test --workspace --locked --test submit
+	tests/cluster/workflow.sh target/debug/afmid .tools/snakemake/bin/snakemake
+	tests/cluster/slurm.sh target/debug/afmid .tools/snakemake/bin/snakemake
+
 lint: deps
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
@@ -33,3 +40,9 @@ lint: deps
 .tools/readers: tests/requirements.txt | .tools/bin/cmake
 	.tools/bin/python -m pip install --quiet --disable-pip-version-check -r tests/requirements.txt
 	touch .tools/readers
+
+# Apart from the readers: its dependencies are many.
+.tools/snakemake/installed: tests/interop.txt
+	python3 -m venv .tools/snakemake
+	.tools/snakemake/bin/python -m pip install --quiet --disable-pip-version-check -r tests/interop.txt
+	touch $@

@@ -7,9 +7,11 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 mod batch;
 mod provenance;
+mod submit;
 
-pub use batch::BatchArgs;
+pub use batch::{BatchArgs, SetsArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
+pub use submit::{SlurmArgs, SubmitTo};
 
 /// Identifies dynamic systems from archived transients, such as snap-off events in force curves of an atomic force microscope.
 #[derive(Debug, Parser)]
@@ -27,6 +29,12 @@ pub enum Command {
     Run(RunArgs),
     /// Run a config on many data sets, each with its own result file, and write one table of them all.
     Batch(BatchArgs),
+    /// Hand a batch to a cluster: its data sets in shards, any number of machines.
+    Submit {
+        /// Which kind of cluster.
+        #[command(subcommand)]
+        to: SubmitTo,
+    },
     /// Check configs: everything that can be wrong without opening data, all errors at once.
     Check {
         /// The configs.

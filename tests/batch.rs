@@ -1,94 +1,13 @@
 //! Batches: one bad data set stops no other, nothing is done twice, a kill loses nothing, shards add up.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+mod common;
+
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
 use afmid_pipeline::store::compare;
-use serde_json::Value;
-
-const CONFIG: &str = r#"
-[pipeline]
-name = "census"
-
-[[stage]]
-id = "records"
-uses = "io.records"
-params = { files = ["nowhere/*.h5"] }
-
-[[stage]]
-id = "census"
-uses = "io.census"
-inputs = { records = "records" }
-"#;
-
-struct Here(tempfile::TempDir);
-
-impl Here {
-    fn new() -> Self {
-        let here = Self(tempfile::tempdir().expect("a folder"));
-        std::fs::write(here.path("census.toml"), CONFIG).expect("a config");
-        here
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// A data set of two records; its numbers depend on `seed`.
-    fn set(&self, name: &str, seed: usize, samples: usize) {
-        std::fs::create_dir_all(self.path(name)).expect("a folder");
-        for record in 0..2 {
-            let code = |k: usize| ((k * 7919 + seed * 104_729 + record * 31) % 4096) as i16 - 2048;
-            let channel = NativeChannel {
-                location: "/deflection".to_owned(),
-                codes: Codes::Int16((0..samples).map(code).collect()),
-                unit: "V".to_owned(),
-                scale_factor: 0.001,
-                add_offset: 0.0,
-                long_name: "deflection".to_owned(),
-            };
-            let started_at = format!("{}-03-01T10:00:00Z", 2001 + seed);
-            let record_of = NativeRecord { sample_rate_hz: 5e6, started_at, channels: vec![channel] };
-            let path = self.path(name).join(format!("record_{record}.h5"));
-            write_native(&path, &record_of, RecordStorage::Raw).expect("a record");
-        }
-    }
-
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
-        command.current_dir(self.0.path()).arg("batch").args(arguments);
-        command
-    }
-
-    fn batch(&self, arguments: &[&str]) -> Output {
-        self.command(arguments).output().expect("afmid starts")
-    }
-
-    /// Exit code and what `--json` says.
-    fn told(&self, arguments: &[&str]) -> (i32, Value) {
-        let output = self.batch(&[arguments, &["--json"]].concat());
-        let value = serde_json::from_slice(&output.stdout);
-        let value = value.unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)));
-        (output.status.code().expect("it ended by itself"), value)
-    }
-
-    /// All files below a folder with their bytes.
-    fn bytes(&self, folder: &str) -> BTreeMap<PathBuf, Vec<u8>> {
-        let mut all = BTreeMap::new();
-        for part in [self.path(folder), self.path(folder).join("ledger")] {
-            for entry in std::fs::read_dir(part).expect("a folder") {
-                let path = entry.expect("an entry").path();
-                if path.is_file() {
-                    all.insert(path.clone(), std::fs::read(&path).expect("a file"));
-                }
-            }
-        }
-        all
-    }
-}
+use common::sets::Here;
 
 fn results_in(folder: &Path) -> usize {
     let entries = std::fs::read_dir(folder).expect("the cache");
@@ -172,7 +91,7 @@ fn shards_add_up_to_the_same_table_byte_for_byte() {
         assert!(!one.is_empty(), "{file} is empty");
     }
     let mut shown = Command::new(env!("CARGO_BIN_EXE_afmid"));
-    let shown = shown.current_dir(here.0.path()).args(["show", "parts/summary.h5", "summary"]).output();
+    let shown = shown.current_dir(here.folder()).args(["show", "parts/summary.h5", "summary"]).output();
     let shown = shown.expect("afmid starts");
     assert!(shown.status.success() && String::from_utf8_lossy(&shown.stdout).contains("set8"), "{shown:?}");
 }
@@ -201,6 +120,49 @@ fn what_is_wrong_is_told_before_anything_runs() {
             assert!(told.contains(word), "{word:?} in {told}");
         }
         assert!(!here.path("out/a.h5").exists());
+    }
+}
+
+#[test]
+fn the_same_shard_twice_at_once_leaves_whole_results_and_a_whole_ledger() {
+    let here = Here::new();
+    let names: Vec<String> = (0..10).map(|seed| format!("set{seed}")).collect();
+    names.iter().enumerate().for_each(|(seed, name)| here.set(name, seed, 20_000));
+    std::fs::write(here.path("set3/record_0.h5"), "no record").expect("a file");
+    let arguments = |out: &'static str, cache: &'static str| -> Vec<&str> {
+        let sets = names.iter().map(String::as_str);
+        ["census.toml"].into_iter().chain(sets).chain(["-o", out, "--cache", cache, "-j", "2"]).collect()
+    };
+    assert_eq!(here.told(&arguments("whole", "whole-cache")).0, 3);
+    // with one cache for both, and with one each, as on two nodes
+    for caches in [["cache", "cache"], ["cache-1", "cache-2"]] {
+        for folder in ["out", "cache"] {
+            let _ = std::fs::remove_dir_all(here.path(folder));
+        }
+        let both = caches.map(|cache| {
+            let mut command = here.command(&[&arguments("out", cache)[..], &["--shard", "1/1"]].concat());
+            command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("afmid starts")
+        });
+        for mut one in both {
+            assert_eq!(one.wait().expect("it ends").code(), Some(3));
+        }
+        let left = here.bytes("out").into_keys().filter(|path| path.extension().is_some_and(|end| end == "tmp"));
+        assert_eq!(left.count(), 0, "temporary files are left");
+        let (code, told) = here.told(&arguments("out", caches[0]));
+        assert_eq!(
+            (code, &told["ran"], &told["failed"]),
+            (3, &0.into(), &1.into()),
+            "{caches:?}: the ledger does not fit"
+        );
+        for name in names.iter().filter(|name| *name != "set3") {
+            let [one, other] = ["whole", "out"].map(|folder| here.path(folder).join(format!("{name}.h5")));
+            assert_eq!(compare(&one, &other).expect("two results"), [], "{caches:?}, {name}");
+        }
+        for table in ["summary.csv", "summary.parquet", "summary.h5", "trends.csv"] {
+            let [one, other] =
+                ["whole", "out"].map(|folder| std::fs::read(here.path(folder).join(table)).expect(table));
+            assert!(one == other, "{caches:?}: {table} differs");
+        }
     }
 }
 

@@ -17,7 +17,7 @@ pub struct Entry {
     pub name: String,
     /// One hash of all stages' content addresses; none if the files could not be read.
     pub key: Option<String>,
-    /// Bytes of the result file; none if the run failed.
+    /// Bytes of the result file, from [`Ledger::finish`]; none if the run failed.
     pub result_bytes: Option<u64>,
     /// Why it failed; none if it did not.
     pub error: Option<String>,
@@ -36,9 +36,9 @@ impl Entry {
     }
 
     /// A run that went through.
-    pub fn done(name: &str, key: String, result_bytes: u64, found: Harvest) -> Self {
+    pub fn done(name: &str, key: String, found: Harvest) -> Self {
         let (version, name) = (VERSION, name.to_owned());
-        Self { version, name, key: Some(key), result_bytes: Some(result_bytes), error: None, found }
+        Self { version, name, key: Some(key), result_bytes: None, error: None, found }
     }
 
     /// Whether it went through.
@@ -82,6 +82,27 @@ impl Ledger {
             .map_err(|error| error.to_string())
     }
 
+    /// Keeps that a run went through, with the length of the result file as it lies there now. Errors: as [`Self::write`]; there is no result file.
+    ///
+    /// The same data set may have been run twice at once, and results of one content differ in length by what `/entry/run` says of the run: whoever
+    /// writes last here looks at the file after that, and one that replaces the file still later writes after it.
+    pub fn finish(&self, mut entry: Entry) -> Result<Entry, String> {
+        let path = self.result(&entry.name);
+        let length = || match std::fs::metadata(&path) {
+            Ok(there) => Ok(Some(there.len())),
+            Err(error) => Err(format!("{}: {error}", path.display())),
+        };
+        entry.result_bytes = length()?;
+        loop {
+            self.write(&entry)?;
+            let there = length()?;
+            if there == entry.result_bytes {
+                return Ok(entry);
+            }
+            entry.result_bytes = there;
+        }
+    }
+
     /// Whether the result file of a finished data set is there, as long as it was.
     pub fn holds(&self, entry: &Entry) -> bool {
         let there = std::fs::metadata(self.result(&entry.name)).map(|metadata| metadata.len()).ok();
@@ -98,12 +119,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let ledger = Ledger::open(folder.path()).unwrap();
         assert!(ledger.read("a").is_none());
-        let done = Entry::done("a", "k".into(), 3, Harvest { verdict: Some("clean".into()), ..Harvest::default() });
-        ledger.write(&done).unwrap();
-        assert_eq!(ledger.read("a"), Some(done.clone()));
-        assert!(!ledger.holds(&done), "there is no result file");
+        let done = Entry::done("a", "k".into(), Harvest { verdict: Some("clean".into()), ..Harvest::default() });
+        assert!(ledger.finish(done.clone()).is_err(), "there is no result file");
         std::fs::write(ledger.result("a"), "abc").unwrap();
-        assert!(ledger.holds(&done));
+        let done = ledger.finish(done).unwrap();
+        assert_eq!(ledger.read("a"), Some(done.clone()));
+        assert!(ledger.holds(&done) && done.result_bytes == Some(3));
         std::fs::write(ledger.result("a"), "ab").unwrap();
         assert!(!ledger.holds(&done), "it is cut short");
         let place = folder.path().join("ledger/a.json");

@@ -2,7 +2,7 @@
 
 use afmid_pipeline::config::nearest;
 use afmid_pipeline::toml;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::dataset::{DataSet, absolute, check_name};
 
@@ -20,6 +20,24 @@ pub fn read(file: &str, text: &str) -> Result<Vec<DataSet>, Vec<String>> {
         }
     }
     if problems.is_empty() { Ok(sets) } else { Err(problems) }
+}
+
+/// A manifest of these data sets, whose paths are absolute: [`read`] gives them back.
+pub fn write(sets: &[DataSet]) -> Result<String, String> {
+    let line = |set: &DataSet| -> Result<String, String> {
+        let changes: Map<String, Value> = set.set.iter().map(|argument| change(argument)).collect::<Result<_, _>>()?;
+        Ok(format!("{}\n", json!({ "name": set.name, "files": set.files, "set": changes })))
+    };
+    sets.iter().map(line).collect()
+}
+
+/// A `--set` argument as key and value.
+fn change(argument: &str) -> Result<(String, Value), String> {
+    let value = argument.split_once('=').and_then(|(key, value)| {
+        let table: toml::Table = format!("value = {value}").parse().ok()?;
+        Some((key.to_owned(), serde_json::to_value(table.get("value")?).ok()?))
+    });
+    value.ok_or_else(|| format!("`{argument}` cannot be written as JSON"))
 }
 
 fn data_set(line: &str) -> Result<DataSet, String> {
@@ -74,6 +92,16 @@ mod tests {
         let sets = read("m.jsonl", text).unwrap();
         assert_eq!(sets[0], DataSet { name: "a".into(), files: vec!["/x/*.h5".into()], set: vec![] });
         assert_eq!(sets[1].set, ["fit.order=9", "r.f=\"x\""]);
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let text = r#"{"name": "a 'b' \"c\"", "files": ["/x y/[*]/*.h5"], "set": {"f.order": 9, "f.name": "it's \n\t\u00e9", "f.x": 1e-300, "f.y": 0.1,
+            "f.list": [[1.0, 2], [true]], "f.table": {"k l": [{"m": 1.5}]}}}"#;
+        let sets = read("m", &text.replace('\n', " ")).unwrap();
+        let written = write(&sets).unwrap();
+        assert_eq!(written.lines().count(), 1);
+        assert_eq!(read("w", &written).unwrap(), sets);
     }
 
     #[test]

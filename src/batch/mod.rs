@@ -6,6 +6,8 @@ pub mod ledger;
 pub mod manifest;
 pub mod parquet;
 pub mod shard;
+pub mod shell;
+pub mod slurm;
 pub mod summary;
 pub mod trends;
 pub mod work;

@@ -1,20 +1,31 @@
 //! Shards: which machine does which data sets.
 
+use std::num::NonZeroU64;
 use std::str::FromStr;
 
 /// Part `index` of `count`, from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     index: u64,
-    count: u64,
+    count: NonZeroU64,
 }
 
 impl Shard {
-    /// Whether a data set belongs here: by the hash of its name, so that further sets move no other.
-    pub fn holds(self, name: &str) -> bool {
+    /// The part that a data set belongs to: by the hash of its name, so that further sets move no other.
+    pub fn of(name: &str, count: NonZeroU64) -> Self {
         let mut bytes = [0; 8];
         bytes.copy_from_slice(&blake3::hash(name.as_bytes()).as_bytes()[..8]);
-        u64::from_le_bytes(bytes) % self.count == self.index - 1
+        Self { index: u64::from_le_bytes(bytes) % count + 1, count }
+    }
+
+    /// Its number, from 1.
+    pub fn index(self) -> u64 {
+        self.index
+    }
+
+    /// Whether a data set belongs here.
+    pub fn holds(self, name: &str) -> bool {
+        Self::of(name, self.count) == self
     }
 }
 
@@ -22,9 +33,9 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse::<NonZeroU64>().ok()?)));
         match parts {
-            Some((index, count)) if index >= 1 && index <= count => Ok(Self { index, count }),
+            Some((index, count)) if index >= 1 && index <= count.get() => Ok(Self { index, count }),
             _ => Err(format!("found `{text}`, wanted i/n with i from 1 to n, such as 2/8")),
         }
     }

@@ -136,7 +136,7 @@ mod tests {
             let mode =
                 |&f: &f64| ModeFound { frequency_hz: Some(f), frequency_std_hz: Some(1.0), ..ModeFound::default() };
             let modes = frequencies.iter().map(mode).collect();
-            Entry::done(name, "k".into(), 1, Harvest { started_at: Some(year.into()), modes, ..Harvest::default() })
+            Entry::done(name, "k".into(), Harvest { started_at: Some(year.into()), modes, ..Harvest::default() })
         };
         let entries = [
             entry("a", "2005-01-01T00:00:00Z", &[46000.0, 290000.0]),

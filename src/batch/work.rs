@@ -60,8 +60,18 @@ impl Work<'_> {
         }
         match self.ran(name, plan, base, &key) {
             Ok((entry, stages)) => self.kept(entry, clock, stages),
-            Err(error) => self.kept(Entry::failed(name, Some(key), error), clock, (0, 0)),
+            Err(error) => match self.elsewhere(name, &key) {
+                Some(entry) => Done { entry, took: Some(clock.elapsed()), stages: (0, 0) },
+                None => self.kept(Entry::failed(name, Some(key), error), clock, (0, 0)),
+            },
         }
+    }
+
+    /// The same run, if it went through meanwhile in another process: one that failed here, for want of memory or disk, takes nothing back.
+    fn elsewhere(&self, name: &str, key: &str) -> Option<Entry> {
+        self.ledger
+            .read(name)
+            .filter(|entry| entry.key.as_deref() == Some(key) && self.ledger.holds(entry) && !self.fresh)
     }
 
     fn ran(&self, name: &str, plan: &Plan, base: &Path, key: &str) -> Result<(Entry, (usize, usize)), String> {
@@ -80,21 +90,20 @@ impl Work<'_> {
         };
         let result = run(plan, &options).map_err(|errors| told(&errors))?;
         write_result(&path, &result).map_err(|error| error.to_string())?;
-        let bytes = std::fs::metadata(&path).map_err(|error| format!("{}: {error}", path.display()))?.len();
         let mut found = harvest(&result);
         if self.as_run {
             found.numbers = numbers(&result);
         }
         let reused = result.info.stages.iter().filter(|(_, _, cached)| *cached).count();
-        Ok((Entry::done(name, key.to_owned(), bytes, found), (result.stages.len(), reused)))
+        Ok((Entry::done(name, key.to_owned(), found), (result.stages.len(), reused)))
     }
 
     /// A run whose end cannot be written down counts as failed: the next batch would not know of it.
     fn kept(&self, entry: Entry, clock: Instant, stages: (usize, usize)) -> Done {
-        let entry = match self.ledger.write(&entry) {
-            Ok(()) => entry,
-            Err(error) => Entry::failed(&entry.name, None, format!("the ledger cannot be written: {error}")),
-        };
+        let name = entry.name.clone();
+        let kept = if entry.is_done() { self.ledger.finish(entry) } else { self.ledger.write(&entry).map(|()| entry) };
+        let entry =
+            kept.unwrap_or_else(|error| Entry::failed(&name, None, format!("the ledger cannot be written: {error}")));
         Done { entry, took: Some(clock.elapsed()), stages }
     }
 }

@@ -8,18 +8,26 @@ use clap::Args;
 use super::{ConfigArgs, threads};
 use crate::batch::shard::Shard;
 
+/// Data sets.
+#[derive(Debug, Args)]
+pub struct SetsArgs {
+    /// Data sets: folders of records, each a run of its own.
+    #[arg(value_name = "DATASET")]
+    pub folders: Vec<PathBuf>,
+    /// More data sets, one a line: {"name": "a", "files": ["a/*.h5"], "set": {"stage.param": 1}}.
+    #[arg(long, value_name = "M.jsonl")]
+    pub manifest: Vec<PathBuf>,
+}
+
 /// What to run a config on, and how.
 #[derive(Debug, Args)]
 pub struct BatchArgs {
     /// The config, with a stage `records`, and what changes it.
     #[command(flatten)]
     pub config: ConfigArgs,
-    /// Data sets: folders of records, each a run of its own.
-    #[arg(value_name = "DATASET")]
-    pub sets: Vec<PathBuf>,
-    /// More data sets, one a line: {"name": "a", "files": ["a/*.h5"], "set": {"stage.param": 1}}.
-    #[arg(long, value_name = "M.jsonl")]
-    pub manifest: Vec<PathBuf>,
+    /// What to run it on.
+    #[command(flatten)]
+    pub sets: SetsArgs,
     /// Folder of the results, the ledger and the summary [default: the pipeline's name, in the working directory].
     #[arg(short, long, value_name = "FOLDER")]
     pub output: Option<PathBuf>,

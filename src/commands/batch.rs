@@ -14,7 +14,7 @@ use crate::batch::ledger::{Entry, Ledger};
 use crate::batch::summary::Title;
 use crate::batch::work::{Done, Work, all};
 use crate::batch::{manifest, summary};
-use crate::cli::BatchArgs;
+use crate::cli::{BatchArgs, ConfigArgs, SetsArgs};
 use crate::failure::{Failure, Message};
 use crate::output::print;
 use crate::progress::Sets;
@@ -23,19 +23,15 @@ use crate::show::pretty;
 /// Runs a config on every data set. One that fails stops no other; then the exit code is 3.
 pub fn run(args: &BatchArgs, registry: &Registry) -> Result<(), Failure> {
     let clock = Instant::now();
-    let sets = data_sets(args)?;
-    let whole = load(&args.config.config, &args.config.set, registry)?;
-    if whole.node("records").is_none() {
-        let help = "a batch replaces `records.files`: give the stage that reads the recordings the id `records`";
-        return Err(Failure::usage("the config has no stage `records`", Some(help.to_owned())));
-    }
+    let sets = data_sets(&args.sets)?;
+    let whole = whole(&args.config, registry)?;
     let folder = args.output.clone().unwrap_or_else(|| default_output(whole.name()).with_extension(""));
     let ledger = ledger(&folder)?;
     let done = match args.collect {
         true => collected(&sets, &ledger),
         false => {
             let own = |set: &&DataSet| args.shard.is_none_or(|shard| shard.holds(&set.name));
-            computed(args, &planned(args, sets.iter().filter(own), registry)?, &ledger)?
+            computed(args, &planned(&args.config, sets.iter().filter(own), registry)?, &ledger)?
         }
     };
     let entries: Vec<Entry> = done.iter().map(|done| done.entry.clone()).collect();
@@ -56,10 +52,20 @@ pub fn run(args: &BatchArgs, registry: &Registry) -> Result<(), Failure> {
     }
 }
 
+/// The plan of the config alone. Errors, usage: what is wrong with it; it has no stage whose files a batch can replace.
+pub fn whole(config: &ConfigArgs, registry: &Registry) -> Result<Plan, Failure> {
+    let whole = load(&config.config, &config.set, registry)?;
+    if whole.node("records").is_none() {
+        let help = "a batch replaces `records.files`: give the stage that reads the recordings the id `records`";
+        return Err(Failure::usage("the config has no stage `records`", Some(help.to_owned())));
+    }
+    Ok(whole)
+}
+
 /// All that were named. Errors, usage: everything that is wrong with them.
-fn data_sets(args: &BatchArgs) -> Result<Vec<DataSet>, Failure> {
+pub fn data_sets(args: &SetsArgs) -> Result<Vec<DataSet>, Failure> {
     let (mut sets, mut problems) = (Vec::new(), Vec::new());
-    for folder in &args.sets {
+    for folder in &args.folders {
         DataSet::of_folder(folder).map_or_else(|problem| problems.push(problem), |set| sets.push(set));
     }
     for file in &args.manifest {
@@ -85,21 +91,22 @@ fn data_sets(args: &BatchArgs) -> Result<Vec<DataSet>, Failure> {
 }
 
 /// The plan of each. Errors, usage: what is wrong with the arguments of the first that has something wrong.
-fn planned<'a>(
-    args: &BatchArgs,
+pub fn planned<'a>(
+    config: &ConfigArgs,
     sets: impl Iterator<Item = &'a DataSet>,
     registry: &Registry,
 ) -> Result<Vec<(&'a DataSet, Plan)>, Failure> {
     sets.map(|set| {
-        let arguments: Vec<String> = args.config.set.iter().cloned().chain(set.arguments()).collect();
-        let plan = load(&args.config.config, &arguments, registry)?;
+        let arguments: Vec<String> = config.set.iter().cloned().chain(set.arguments()).collect();
+        let plan = load(&config.config, &arguments, registry)?;
         refuse(&plan, "a batch runs one set of parameters on each data set")?;
         Ok((set, plan))
     })
     .collect()
 }
 
-fn ledger(folder: &Path) -> Result<Ledger, Failure> {
+/// The ledger of a folder of results. Errors, usage: it cannot be made.
+pub fn ledger(folder: &Path) -> Result<Ledger, Failure> {
     Ledger::open(folder).map_err(|error| {
         let help = "give another folder with -o".to_owned();
         Failure::usage(format!("the folder {} cannot be made: {error}", folder.display()), Some(help))

@@ -19,6 +19,7 @@ mod run;
 mod schema;
 mod show;
 mod stages;
+mod submit;
 mod sweep;
 mod target;
 mod trace;
@@ -33,6 +34,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
     match command {
         Command::Run(args) => run::run(&args, registry),
         Command::Batch(args) => batch::run(&args, registry),
+        Command::Submit { to } => submit::run(&to, registry),
         Command::Explain(args) => explain::run(&args, registry),
         Command::Inspect { files, json } => inspect::run(&files, json),
         Command::Show { result, id, json } => show::run(&result, id.as_deref(), json),

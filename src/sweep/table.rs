@@ -150,7 +150,7 @@ mod tests {
     use crate::sweep::point;
 
     fn done(index: usize, order: i64, kind: Value, found: Harvest) -> Point {
-        let entry = Entry::done(&point::name(index), "k".into(), 1, found);
+        let entry = Entry::done(&point::name(index), "k".into(), found);
         let values = vec![("model.order".to_owned(), json!(order)), ("model.kind".to_owned(), kind)];
         Point { values, done: Done { entry, took: None, stages: (0, 0) } }
     }

@@ -79,20 +79,28 @@ fn file_name(path: &Path) -> String {
     path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// `.NAME.HOST.PID.COUNT.tmp`: no other attempt has it, on this machine or on another that shares the folder.
+/// `.NAME.HOST.PID.COUNT.tmp`: no other attempt has it, on this machine, in another container on it, or on another machine that shares the folder.
 fn temporary_name(path: &Path) -> String {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
-    format!(".{}.{}.{}.{count}.tmp", file_name(path), *HOST, std::process::id())
+    format!(".{}.{}.{}.{count}.tmp", file_name(path), host(), std::process::id())
 }
 
-/// The host's name without dots.
-static HOST: LazyLock<String> = LazyLock::new(|| {
-    let name = fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| fs::read_to_string("/etc/hostname"));
-    let name: String =
-        name.unwrap_or_default().trim().chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').collect();
-    if name.is_empty() { "host".to_owned() } else { name }
-});
+/// Where this process's number means this process: twelve digits for the machine since its start, its name and the namespace of process numbers.
+/// Names alone are not enough: cloned machines share them, and containers of one machine share the name but not the numbers.
+pub(super) fn host() -> &'static str {
+    static HOST: LazyLock<String> = LazyLock::new(|| {
+        let mut hasher = blake3::Hasher::new();
+        for file in ["/proc/sys/kernel/random/boot_id", "/proc/sys/kernel/hostname", "/etc/hostname"] {
+            // what a system does not have tells nothing apart
+            hasher.update(&fs::read(file).unwrap_or_default());
+        }
+        let namespace = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
+        hasher.update(namespace.to_string_lossy().as_bytes());
+        hasher.finalize().to_hex()[..12].to_owned()
+    });
+    &HOST
+}
 
 /// Removes temporary files whose names begin with `prefix` and whose owner is dead, or that are older than a day.
 ///
@@ -116,7 +124,7 @@ pub(super) fn stale(path: &Path, name: &str) -> bool {
     }
     let mut parts = name.trim_end_matches(".tmp").rsplit('.');
     match (parts.next(), parts.next().and_then(|pid| pid.parse::<u32>().ok()), parts.next()) {
-        (Some(_), Some(pid), Some(host)) if host == *HOST => dead(pid),
+        (Some(_), Some(pid), Some(host)) if host == self::host() => dead(pid),
         _ => false,
     }
 }

@@ -116,8 +116,7 @@ fn a_failed_write_leaves_the_old_file_and_no_temporary_one() {
 #[test]
 fn temporary_files_of_the_dead_are_swept_those_of_the_living_stay() {
     let folder = Folder::new("sweep");
-    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
-    let host: String = host.trim().chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').collect();
+    let host = super::replace::host();
     // pid_max is at most 2^22
     let dead = folder.file(&format!(".k.h5.{host}.4194999.0.tmp"));
     let living = folder.file(&format!(".k.h5.{host}.{}.0.tmp", std::process::id()));
