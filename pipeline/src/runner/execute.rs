@@ -1,6 +1,8 @@
 //! One run of a plan.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use super::error::RunError;
@@ -57,8 +59,9 @@ struct Finished {
 
 /// Runs a plan: each stage as soon as its inputs are there, in parallel on the current rayon pool.
 ///
-/// Each result is in the cache, synced, before a stage that needs it begins: a kill loses nothing that was finished.
-/// Errors: all stages that failed, in the plan's order; independent stages are finished first.
+/// A stage that needs a result begins at once, while a thread of its own puts the result into the cache, one after the other: a kill loses what
+/// was computed in the last moments, and the run ends when all is kept and synced.
+/// Errors: all stages that failed or whose results cannot be kept, in the plan's order; independent stages are finished first.
 pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError>> {
     let (started, clock) = (jiff::Timestamp::now(), Instant::now());
     let needs: Vec<Vec<usize>> = plan
@@ -71,16 +74,31 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
             sources
         })
         .collect();
-    let outcomes = run_graph(&needs, |index, board| {
+    let failed = |index: usize, error: StageError| {
         let node = &plan.nodes[index];
-        step(plan, node, options, board).map_err(|error| RunError {
-            id: node.id.clone(),
-            uses: node.uses.clone(),
-            error: Box::new(error),
-        })
+        RunError { id: node.id.clone(), uses: node.uses.clone(), error: Box::new(error) }
+    };
+    let (outcomes, unkept) = std::thread::scope(|scope| {
+        let (made, keep) = mpsc::channel::<Made>();
+        let keeper = scope.spawn(move || {
+            let kept = |made: &Made| options.cache.put_with_origin(&made.origin, &made.result);
+            keep.iter()
+                .filter_map(|made| kept(&made).err().map(|error| (made.index, error)))
+                .collect::<BTreeMap<_, _>>()
+        });
+        let outcomes = run_graph(&needs, |index, board| {
+            step(plan, index, options, board, &made).map_err(|error| failed(index, error))
+        });
+        drop(made);
+        (outcomes, keeper.join())
     });
+    // a panic there is a bug like any other: it goes on here
+    let mut unkept = unkept.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     let (mut stages, mut times, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-    for outcome in outcomes {
+    for (index, outcome) in outcomes.into_iter().enumerate() {
+        if let Some(error) = unkept.remove(&index) {
+            errors.push(failed(index, error.into()));
+        }
         match outcome {
             Outcome::Done(finished) => {
                 times.push((finished.record.id.clone(), finished.seconds, finished.cached));
@@ -113,13 +131,21 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
     })
 }
 
+/// A new result, to be kept.
+struct Made {
+    index: usize,
+    origin: Origin,
+    result: StageResult,
+}
+
 fn step(
     plan: &Plan,
-    node: &Node,
+    index: usize,
     options: &Options<'_>,
     board: &Board<Finished, RunError>,
+    made: &mpsc::Sender<Made>,
 ) -> Result<Finished, StageError> {
-    let clock = Instant::now();
+    let (clock, node) = (Instant::now(), &plan.nodes[index]);
     let upstream = |index: usize| board.done(index).map(|finished| &finished.origin);
     let planned = plan_node(plan, node, &options.base, &options.program, &upstream)?;
     let stored = node.stage.spec().caching == Caching::Stored;
@@ -130,7 +156,8 @@ fn step(
         None => {
             let result = execute(node, options, board, planned.seed.unwrap_or_default())?;
             if stored {
-                options.cache.put_with_origin(&planned.origin, &result)?;
+                // the other end lives as long as the run
+                let _ = made.send(Made { index, origin: planned.origin.clone(), result: result.clone() });
             }
             result
         }
