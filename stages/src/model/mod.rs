@@ -32,6 +32,7 @@ mod stabilisation_stage;
 mod start_tests;
 mod subspace;
 mod subspace_stage;
+mod tall;
 mod transmission;
 pub mod vector_fitting;
 mod vector_fitting_stage;

@@ -118,6 +118,37 @@ impl Svd {
     }
 }
 
+/// Eigenvalues and orthonormal eigenvectors of a symmetric matrix.
+pub(crate) struct Symmetric {
+    pub values: Vec<f64>,
+    /// A column each.
+    pub vectors: Mat<f64>,
+}
+
+impl Symmetric {
+    /// Decomposes `matrix`, of which the lower triangle is read. Errors: no convergence (a value that is not finite).
+    pub fn new(matrix: &Mat<f64>) -> Result<Self, ModelError> {
+        let n = matrix.nrows();
+        let (mut values, mut vectors) = (Diag::zeros(n), Mat::zeros(n, n));
+        let yes = evd::ComputeEigenvectors::Yes;
+        let scratch = evd::self_adjoint_evd_scratch::<f64>(n, yes, Par::Seq, default());
+        evd::self_adjoint_evd(
+            matrix.as_ref(),
+            values.as_mut(),
+            Some(vectors.as_mut()),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+            default(),
+        )
+        .map_err(|_| ModelError::Decomposition("eigenvalue decomposition"))?;
+        let values: Vec<f64> = values.column_vector().iter().copied().collect();
+        if values.iter().any(|value| !value.is_finite()) {
+            return Err(ModelError::Decomposition("eigenvalue decomposition"));
+        }
+        Ok(Self { values, vectors })
+    }
+}
+
 /// Eigenvalues of a square real matrix. Errors: no convergence.
 pub(crate) fn eigenvalues(matrix: &Mat<f64>) -> Result<Vec<c64>, ModelError> {
     let n = matrix.nrows();

@@ -3,7 +3,8 @@
 use faer::{Mat, c64};
 
 use super::error::{ModelError, finite};
-use super::orthogonal::{Qr, Svd, eigenvalues, least_squares, product};
+use super::orthogonal::{Svd, eigenvalues, least_squares, product};
+use super::tall::TallQr;
 
 /// The dominant column space of the output's Hankel matrix, the input's row space removed.
 ///
@@ -54,7 +55,7 @@ impl Subspace {
         for j in 0..block_rows {
             stacked.col_mut(removed + j).iter_mut().zip(&y[j..]).for_each(|(h, y)| *h = *y);
         }
-        let r = Qr::new(stacked).r();
+        let r = TallQr::triangle(stacked.as_ref());
         let size = r.nrows().min(removed + block_rows);
         let remaining = r.as_ref().get(removed..size, removed..).transpose().to_owned();
         let svd = Svd::new(&remaining)?;

@@ -89,7 +89,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "order, pairs, f
 impl Stage for VectorFittingEstimate {
     const SPEC: Spec = Spec {
         name: "model.vector_fitting",
-        version: 1,
+        version: 2,
         summary: "fits a rational transfer function to a frequency response: relaxed vector fitting in z",
         inputs: &[TRANSFER.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],

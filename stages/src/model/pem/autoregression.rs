@@ -107,6 +107,7 @@ mod tests {
                 slope: false,
                 missing: Vec::new(),
                 priors: 0,
+                whitened: std::cell::RefCell::default(),
             };
             let found = levinson(&autocovariance(&problem, &y, 12), 4000);
             // standard error sqrt((1 - 0.8^2) / 4000) = 0.0095: four of them; BIC errs upwards in one of hundreds

@@ -1,5 +1,7 @@
 //! Records made ready: checked, with priors, without gaps.
 
+use std::cell::RefCell;
+
 use super::options::{Experiment, NoiseModel, PemOptions};
 use super::predictor::Problem;
 use crate::model::error::{ModelError, finite};
@@ -112,5 +114,6 @@ pub(super) fn checked<'a>(
         slope: options.slope,
         missing,
         priors: 0,
+        whitened: RefCell::default(),
     })
 }

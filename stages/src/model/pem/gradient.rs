@@ -138,12 +138,12 @@ pub(crate) fn to_coordinates(jacobian: &mut Mat<f64>, point: &Point) {
     for coordinates in [point.poles.as_slice(), point.free()] {
         for p in coordinates.chunks(2) {
             let [d11, d12, d22] = slopes(p);
-            for row in 0..jacobian.nrows() {
-                let first = jacobian[(row, column)];
-                jacobian[(row, column)] = d11 * first;
-                if p.len() == 2 {
-                    jacobian[(row, column + 1)] = d12 * first + d22 * jacobian[(row, column + 1)];
-                }
+            let (first, second) = jacobian.as_mut().get_mut(.., column..column + p.len()).split_at_col_mut(1);
+            let first = first.col_mut(0).iter_mut();
+            if p.len() == 2 {
+                first.zip(second.col_mut(0).iter_mut()).for_each(|(x, y)| (*x, *y) = (d11 * *x, d12 * *x + d22 * *y));
+            } else {
+                first.for_each(|x| *x *= d11);
             }
             column += p.len();
         }

@@ -44,6 +44,8 @@ pub fn identify(
     let prior = prior_records(experiments, problem.inputs, options)?;
     problem.experiments.extend(prior.iter().map(|(input, output)| (input.as_slice(), output.as_slice())));
     problem.priors = prior.len();
+    let lively = problem.lively();
+    let short = lively.as_ref().unwrap_or(&problem);
     let longest =
         experiments.iter().max_by_key(|experiment| experiment.output.len()).ok_or(ModelError::NoExperiment)?;
     let (input, output) = complete(longest, options)?;
@@ -53,16 +55,19 @@ pub fn identify(
     if options.starts > PemOptions::default().starts {
         poles.extend(instrumental(&input, output, options.order, options.block_rows));
     }
-    let starts = ranked(&problem, &poles, options.starts)?;
+    let starts = ranked(short, &poles, options.starts)?;
     let many = options.starts > PemOptions::default().starts;
     let prediction = |starts: Vec<State>| match options.noise {
-        NoiseModel::White => minimise(&problem, refined(&problem, starts, limits)?, limits),
+        NoiseModel::White => {
+            let state = refined(short, starts, limits)?;
+            minimise(&problem, State::carried(&problem, state.point.clone(), &state)?, limits)
+        }
         NoiseModel::Free if many => lowest(&problem, predictors(&problem, &poles, &starts), options.starts, limits),
         NoiseModel::Coloured => {
             let points = starts.into_iter().map(|state| state.point).collect();
             whitened(&problem, lowest(&problem, points, options.starts, limits)?, limits)
         }
-        noise => thermal_or_free(&problem, starts, limits, noise),
+        noise => thermal_or_free(&problem, short, starts, limits, noise),
     };
     let state = match options.focus {
         Focus::Prediction => prediction(starts)?,

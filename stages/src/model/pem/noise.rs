@@ -39,41 +39,52 @@ pub(crate) fn intensities(
     all: &[(Spectra, usize)],
 ) -> Intensities {
     let count = a.len() + 1;
-    // per bin: weight, unwhitened power, basis spectra
-    let mut bins: Vec<(f64, f64, Vec<f64>)> = Vec::new();
+    // bin after bin: weight and unwhitened power; the same of each basis spectrum
+    let (mut weights, mut powers, mut basis) = (Vec::new(), Vec::new(), vec![Vec::new(); count]);
     for (spectra, length) in all {
         for (i, (power, remaining)) in spectra.periodogram.iter().zip(&spectra.remaining).enumerate().skip(1) {
             if *remaining > 0.05 {
                 let w = std::f64::consts::TAU * i as f64 / *length as f64;
                 let colour: f64 = whitening.0.iter().map(|&a| through(a, w)).product::<f64>()
                     / whitening.1.iter().map(|&c| through(c, w)).product::<f64>();
-                let basis = std::iter::once(1.0).chain(a.iter().map(|&a| through(a, w))).collect();
-                bins.push((*remaining, power / remaining * colour, basis));
+                weights.push(*remaining);
+                powers.push(power / remaining * colour);
+                basis[0].push(1.0);
+                basis[1..].iter_mut().zip(a).for_each(|(basis, &a)| basis.push(through(a, w)));
             }
         }
     }
-    let total: f64 = bins.iter().map(|bin| bin.1).sum();
-    let mean = total / bins.len().max(1) as f64;
-    let mut values: Vec<f64> = (0..count)
-        .map(|i| {
-            let peak = bins.iter().map(|bin| bin.2[i]).fold(f64::MIN_POSITIVE, f64::max);
-            mean / peak
-        })
-        .collect();
+    let mean = powers.iter().sum::<f64>() / powers.len().max(1) as f64;
+    let peak = |basis: &Vec<f64>| basis.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let mut values: Vec<f64> = basis.iter().map(|basis| mean / peak(basis)).collect();
+    let (mut first, mut second) = (vec![0.0; powers.len()], vec![0.0; powers.len()]);
     for _ in 0..UPDATES {
-        let (mut up, mut down) = (vec![0.0; count], vec![0.0; count]);
-        for (weight, power, basis) in &bins {
-            let level: f64 = basis.iter().zip(&values).map(|(b, v)| b * v).sum();
-            let (first, second) = (weight * power / (level * level), weight / level);
-            for ((up, down), b) in up.iter_mut().zip(&mut down).zip(basis) {
-                *up += first * b;
-                *down += second * b;
-            }
+        first.fill(0.0);
+        for (basis, value) in basis.iter().zip(&values) {
+            first.iter_mut().zip(basis).for_each(|(level, b)| *level += b * value);
         }
-        values.iter_mut().zip(up.iter().zip(&down)).for_each(|(v, (u, d))| *v *= if *d > 0.0 { u / d } else { 0.0 });
+        for (((first, second), weight), power) in first.iter_mut().zip(&mut second).zip(&weights).zip(&powers) {
+            *second = weight / *first;
+            *first = *second * power / *first;
+        }
+        for (value, basis) in values.iter_mut().zip(&basis) {
+            let (up, down) = (dot(basis, &first), dot(basis, &second));
+            *value *= if down > 0.0 { up / down } else { 0.0 };
+        }
     }
     let white = values[0].max(f64::MIN_POSITIVE);
     Intensities { white, forces: values.split_off(1) }
+}
+
+/// Inner product in partial sums, for the processor's vector units.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (a, a_rest) = a.as_chunks::<8>();
+    let (b, b_rest) = b.as_chunks::<8>();
+    let mut lanes = [0.0; 8];
+    for (a, b) in a.iter().zip(b) {
+        (0..8).for_each(|l| lanes[l] += a[l] * b[l]);
+    }
+    lanes.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// Attempts at the Riccati equation, each with a hundred times more white noise.

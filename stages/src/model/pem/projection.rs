@@ -7,14 +7,15 @@ use faer::{Mat, MatMut};
 
 use super::predictor::Problem;
 use crate::model::error::ModelError;
-use crate::model::orthogonal::{Qr, Svd, product};
+use crate::model::orthogonal::{Svd, product};
+use crate::model::tall::TallQr;
 
 /// Singular values of the column-scaled regressors below this share of the largest count as zero: some 100 roundings.
 const RANK_TOLERANCE: f64 = 1e-13;
 
 /// The least-squares solution at fixed poles and predictor poles.
 pub(crate) struct Projection {
-    qr: Qr,
+    qr: TallQr,
     /// Basis of the fitted space within the rotated regressors: columns x rank.
     fitted: Mat<f64>,
     /// Solution, unscaled.
@@ -28,23 +29,29 @@ pub(crate) struct Projection {
 impl Projection {
     /// Solves for all linear parameters; the last column of `regressors` is the filtered output. Errors: no finite solution.
     pub fn new(problem: &Problem, regressors: &Mat<f64>) -> Result<Self, ModelError> {
-        let mut matrix = regressors.clone();
-        problem.mask(&mut matrix);
-        let p = matrix.ncols() - 1;
+        let p = regressors.ncols() - 1;
+        let qr = if problem.missing.is_empty() {
+            TallQr::new(regressors.as_ref())
+        } else {
+            let mut matrix = regressors.clone();
+            problem.mask(&mut matrix);
+            TallQr::new(matrix.as_ref())
+        };
+        let r = qr.r();
+        // columns of the triangle are as long as those of the matrix
         let mut scale = vec![1.0; p];
+        let mut scaled = Mat::zeros(p, p);
         for (j, scale) in scale.iter_mut().enumerate() {
-            let norm = matrix.col(j).norm_l2();
+            let norm = r.col(j).norm_l2();
             if !norm.is_finite() {
                 return Err(ModelError::Degenerate("a filtered regressor overflows"));
             }
             if norm > 0.0 {
-                matrix.col_mut(j).iter_mut().for_each(|value| *value /= norm);
                 *scale = norm;
             }
+            (0..=j).for_each(|i| scaled[(i, j)] = r[(i, j)] / *scale);
         }
-        let qr = Qr::new(matrix);
-        let r = qr.r();
-        let svd = Svd::new(&r.as_ref().get(..p, ..p).to_owned())?;
+        let svd = Svd::new(&scaled)?;
         let rank = svd.rank(RANK_TOLERANCE);
         let fitted = svd.u.as_ref().get(.., ..rank).to_owned();
         let top: Vec<f64> = (0..p).map(|i| r[(i, p)]).collect();
@@ -63,17 +70,17 @@ impl Projection {
     }
 
     /// Rotates `jacobian` as the residual is and removes the directions that the linear parameters reach.
-    pub fn project(&self, mut jacobian: MatMut<'_, f64>) {
-        self.qr.apply_transpose(jacobian.as_mut());
+    ///
+    /// Returns the rows where the residual has entries; the others stay in `jacobian`.
+    pub fn project(&self, jacobian: MatMut<'_, f64>) -> Mat<f64> {
+        let mut head = self.qr.apply_transpose(jacobian);
         let p = self.fitted.nrows();
-        let top = jacobian.as_ref().get(..p, ..).to_owned();
-        let along = product(self.fitted.transpose(), top.as_ref());
+        let along = product(self.fitted.transpose(), head.as_ref().get(..p, ..));
         let removed = product(self.fitted.as_ref(), along.as_ref());
         for j in 0..removed.ncols() {
-            for i in 0..p {
-                jacobian[(i, j)] -= removed[(i, j)];
-            }
+            (0..p).for_each(|i| head[(i, j)] -= removed[(i, j)]);
         }
+        head
     }
 
     /// Entry `row` of the residual in rotated coordinates.

@@ -16,8 +16,16 @@ use crate::model::subspace::Subspace;
 
 /// Real poles that fill up a start, fast and slow in turn.
 const FILL: [f64; 6] = [0.15, 0.5, 0.3, 0.7, 0.05, 0.85];
-/// Iterations for each: enough to tell basins apart.
+/// Iterations for each, at most: enough to tell basins apart.
 const TRIAL_ITERATIONS: usize = 8;
+/// Twice the log-likelihood that the rest of the way to the minimum may still be worth: less than any choice between starts turns on.
+const TRIAL_REST: f64 = 0.5;
+
+/// How far a start is followed before it is compared with the others.
+fn trial(problem: &Problem, limits: Limits) -> Limits {
+    let gradient = limits.gradient.max((TRIAL_REST / problem.rows() as f64).sqrt());
+    Limits { iterations: limits.iterations.min(TRIAL_ITERATIONS), gradient }
+}
 
 /// The poles of all starts.
 pub(crate) fn candidates(subspace: &Subspace, order: usize) -> Result<Vec<Vec<c64>>, ModelError> {
@@ -109,7 +117,7 @@ pub(crate) fn lowest(problem: &Problem, points: Vec<Point>, count: usize, limits
         states.truncate(count.max(1));
         states
     };
-    let trial = Limits { iterations: limits.iterations.min(TRIAL_ITERATIONS), ..limits };
+    let trial = trial(problem, limits);
     let states = kept(points.into_iter().map(|point| State::new(problem, point)).collect(), count);
     let states = kept(states.into_iter().map(|state| minimise(problem, state, trial)).collect(), FOLLOWED);
     let states = kept(states.into_iter().map(|state| minimise(problem, state, limits)).collect(), 1);
@@ -140,7 +148,7 @@ fn arx(u: &[f64], y: &[f64], order: usize) -> Result<Vec<c64>, ModelError> {
 ///
 /// A resonance may lie at any of N frequencies: it must gain more than the best of so many by chance. Errors: no state can be refined.
 pub(crate) fn refined(problem: &Problem, states: Vec<State>, limits: Limits) -> Result<State, ModelError> {
-    let trial = Limits { iterations: limits.iterations.min(TRIAL_ITERATIONS), ..limits };
+    let trial = trial(problem, limits);
     let mut failure = ModelError::Degenerate("no start could be refined");
     let mut refined = Vec::new();
     for state in states {

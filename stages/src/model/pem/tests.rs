@@ -169,6 +169,7 @@ fn sensitivities_agree_with_differences() {
         slope: true,
         missing: Vec::new(),
         priors: 0,
+        whitened: std::cell::RefCell::default(),
     };
     let z = |re, im| faer::c64::new(re, im);
     let a = coordinates(&[z(0.99, 0.06), z(0.99, -0.06), z(0.9, 0.3), z(0.9, -0.3), z(0.4, 0.0)]);
@@ -269,4 +270,26 @@ fn modes_of_free_decay(fit: &Identified) -> f64 {
 fn sections_fill_the_order() {
     let orders: Vec<usize> = (0..6).map(|i| section_order(11, i)).collect();
     assert_eq!(orders, [2, 2, 2, 2, 2, 1]);
+}
+
+#[test]
+fn a_release_is_cut_where_it_has_died_away_and_noise_is_not() {
+    let problem = |u, y| Problem {
+        experiments: vec![(u, y)],
+        inputs: 1,
+        order: 11,
+        offset: true,
+        slope: true,
+        missing: Vec::new(),
+        priors: 0,
+        whitened: std::cell::RefCell::default(),
+    };
+    let (u, y, noise) = (force(), averaged(1), white_noise(N, 1.0, 1));
+    let whole = problem(&u, &y);
+    let cut = whole.lively().unwrap();
+    // the first mode's energy falls by a hundred in 2.3 Q / (pi f) = 600 us, 3000 samples; it has nearly all of the changes
+    let kept = cut.rows() - T0;
+    assert!((2000..4000).contains(&kept), "{kept}");
+    assert_eq!(cut.experiments[0].1, &y[..cut.rows()]);
+    assert!(problem(&u, &noise).lively().is_none());
 }

@@ -14,14 +14,15 @@ use super::starts::{lowest, refined};
 use super::tangent::Tangent;
 use crate::model::error::ModelError;
 
-/// Prediction errors with a noise filter, from the output error's starts.
+/// Prediction errors with a noise filter, from the output error's starts, which compete on the shortened problem.
 pub(super) fn thermal_or_free(
     problem: &Problem,
+    short: &Problem,
     starts: Vec<State>,
     limits: Limits,
     noise: NoiseModel,
 ) -> Result<State, ModelError> {
-    let state = thermal(problem, starts, limits)?;
+    let state = thermal(problem, short, starts, limits)?;
     if noise == NoiseModel::Thermal {
         return Ok(state);
     }
@@ -49,31 +50,27 @@ pub(super) fn simulation(
     lowest(problem, points, count + 1, limits)
 }
 
-/// Rounds of noise, then poles: the second changes either by a fraction of its error, the third by less than a hundredth.
-const THERMAL_ROUNDS: usize = 3;
+/// Rounds of noise, then poles, after the starts' competition: the first changes either by a fraction of its error, the second by less than a hundredth.
+const THERMAL_ROUNDS: usize = 2;
 
 /// Poles and noise intensities in turn.
 ///
 /// The noise comes first from the best start alone; under its whitening all starts compete: unwhitened, a spare pole would rather fit the
 /// thermal noise of a strong mode than the detector.
-fn thermal(problem: &Problem, starts: Vec<State>, limits: Limits) -> Result<State, ModelError> {
+fn thermal(problem: &Problem, short: &Problem, starts: Vec<State>, limits: Limits) -> Result<State, ModelError> {
     let mut poles: Vec<Vec<f64>> = starts.iter().map(|state| state.point.poles.clone()).collect();
-    let first = refined(problem, starts.into_iter().take(1).collect(), limits)?;
+    let first = refined(short, starts.into_iter().take(1).collect(), limits)?;
     if first.ending == Ending::Exact {
-        return minimise(problem, first, limits);
+        return minimise(problem, State::carried(problem, first.point.clone(), &first)?, limits);
     }
-    let noise = thermal_noise(problem, &first)?;
+    let noise = thermal_noise(short, &first)?;
     poles.push(first.point.poles);
-    let whitened = poles.into_iter().map(|poles| State::new(problem, Point { poles, noise: noise.clone() }));
-    let mut state = refined(problem, whitened.filter_map(Result::ok).collect(), limits)?;
-    for round in 0..THERMAL_ROUNDS {
-        if round > 0 {
-            let next = State::new(
-                problem,
-                Point { poles: state.point.poles.clone(), noise: thermal_noise(problem, &state)? },
-            )?;
-            state = State { iterations: state.iterations, ..next };
-        }
+    let whitened = poles.into_iter().map(|poles| State::new(short, Point { poles, noise: noise.clone() }));
+    let best = refined(short, whitened.filter_map(Result::ok).collect(), limits)?;
+    let mut state = State::carried(problem, best.point.clone(), &best)?;
+    for _ in 0..THERMAL_ROUNDS {
+        let noise = thermal_noise(problem, &state)?;
+        state = State::carried(problem, Point { poles: state.point.poles.clone(), noise }, &state)?;
         state = minimise(problem, state, limits)?;
     }
     state = without_drift(problem, state, limits)?;
@@ -81,8 +78,8 @@ fn thermal(problem: &Problem, starts: Vec<State>, limits: Limits) -> Result<Stat
     if let Noise::Frozen(_, c) = &state.point.noise {
         let noise = Noise::Frozen(state.point.a(), c.clone());
         let point = Point { poles: state.point.poles.clone(), noise };
-        let State { iterations, ending, gradient, .. } = state;
-        state = State { iterations, ending, gradient, ..State::new(problem, point)? };
+        let State { ending, gradient, .. } = state;
+        state = State { ending, gradient, ..State::carried(problem, point, &state)? };
     }
     Ok(state)
 }
@@ -112,6 +109,7 @@ const EXCHANGE: f64 = 0.4;
 
 /// Whitening by the noise that the residual shows.
 fn thermal_noise(problem: &Problem, state: &State) -> Result<Noise, ModelError> {
+    let _t = super::optimiser::Tm::n(2);
     let tangent = Tangent::new(&full_jacobian(problem, state))?;
     let e = state.residual();
     let mut planner = RealFftPlanner::<f64>::new();
