@@ -2,7 +2,7 @@
 
 use rustfft::num_complex::Complex64;
 
-use super::least_squares::Factored;
+use super::least_squares::{Columns, Factored};
 
 /// Orders of the local model `(B(r) + turn(r) T(r)) / A(r)`, `A(0) = 1`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +43,8 @@ pub(super) struct Fraction {
 const ONE: Complex64 = Complex64::new(1.0, 0.0);
 /// Reweighted linear steps: peaks two bins wide settle within four.
 const LINEAR_STEPS: usize = 6;
+/// Change of the squares, as a share, after which further steps would move the value by less than a thousandth of its standard error.
+const SETTLED: f64 = 1e-6;
 /// Gauss-Newton steps at most: they end the bias that reweighting leaves in noise.
 const NEWTON_STEPS: usize = 8;
 
@@ -51,6 +53,7 @@ pub(super) fn fit_fraction(points: &Points, orders: Orders) -> Fraction {
     let mut best = vec![Complex64::new(0.0, 0.0); orders.count()];
     let mut squares = residual(points, orders, &best).1;
     let mut previous = vec![ONE; points.offset.len()];
+    let mut last = f64::INFINITY;
     for _ in 0..if orders.denominator == 0 { 1 } else { LINEAR_STEPS } {
         let theta = linear_step(points, orders, &previous);
         previous = points.offset.iter().map(|&r| denominator(orders, &theta, r)).collect();
@@ -58,9 +61,10 @@ pub(super) fn fit_fraction(points: &Points, orders: Orders) -> Fraction {
         if now < squares {
             (best, squares) = (theta, now);
         }
-        if previous.iter().any(|a| a.norm_sqr() == 0.0) {
+        if previous.iter().any(|a| a.norm_sqr() == 0.0) || (last - now).abs() <= SETTLED * now {
             break;
         }
+        last = now;
     }
     if orders.denominator > 0 {
         for _ in 0..NEWTON_STEPS {
@@ -68,8 +72,7 @@ pub(super) fn fit_fraction(points: &Points, orders: Orders) -> Fraction {
             let Some((theta, now)) = shorten(points, orders, &best, &step, squares) else { break };
             let gain = squares - now;
             (best, squares) = (theta, now);
-            // further steps would move the value by less than a thousandth of its standard error
-            if gain <= 1e-6 * squares {
+            if gain <= SETTLED * squares {
                 break;
             }
         }
@@ -81,16 +84,20 @@ pub(super) fn fit_fraction(points: &Points, orders: Orders) -> Fraction {
 }
 
 /// Rows of one column per coefficient: numerator, transient, denominator (as a factor of `value`).
-fn columns(points: &Points, orders: Orders, scale: &[Complex64], value: &[Complex64]) -> Vec<Vec<Complex64>> {
-    let rows = 0..points.offset.len();
-    let column = |power: usize, factor: &dyn Fn(usize) -> Complex64| -> Vec<Complex64> {
-        rows.clone().map(|i| factor(i) * scale[i] * points.offset[i].powi(power as i32)).collect()
+fn columns(points: &Points, orders: Orders, scale: &[Complex64], value: &[Complex64]) -> Columns {
+    let mut all = Columns::new(points.offset.len(), orders.count());
+    let mut powers = |first: &mut dyn Iterator<Item = Complex64>, count: usize| {
+        all.push(first);
+        (1..count).for_each(|_| all.push_last_times(&points.offset));
     };
-    let mut all: Vec<Vec<Complex64>> = (0..=orders.numerator).map(|j| column(j, &|_| ONE)).collect();
+    powers(&mut scale.iter().copied(), orders.numerator + 1);
     if let Some(t) = orders.transient {
-        all.extend((0..=t).map(|j| column(j, &|i| points.turn[i])));
+        powers(&mut scale.iter().zip(&points.turn).map(|(s, turn)| s * turn), t + 1);
     }
-    all.extend((1..=orders.denominator).map(|j| column(j, &|i| -value[i])));
+    if orders.denominator > 0 {
+        let of_value = scale.iter().zip(value).zip(&points.offset).map(|((s, g), r)| -(s * g) * r);
+        powers(&mut of_value.into_iter(), orders.denominator);
+    }
     all
 }
 

@@ -2,11 +2,61 @@
 
 use rustfft::num_complex::Complex64;
 
+/// Complex columns, real and imaginary parts apart, each column filled up with zeros to whole [`LANES`].
+pub(super) struct Columns {
+    rows: usize,
+    padded: usize,
+    re: Vec<f64>,
+    im: Vec<f64>,
+}
+
+/// Rows taken side by side, for the processor's vector units.
+const LANES: usize = 4;
+
+impl Columns {
+    /// None yet, of `rows` rows.
+    pub fn new(rows: usize, expected: usize) -> Self {
+        let padded = rows.next_multiple_of(LANES);
+        Self { rows, padded, re: Vec::with_capacity(expected * padded), im: Vec::with_capacity(expected * padded) }
+    }
+
+    /// Adds a column.
+    pub fn push(&mut self, column: impl Iterator<Item = Complex64>) {
+        for value in column.take(self.rows) {
+            self.re.push(value.re);
+            self.im.push(value.im);
+        }
+        let end = self.re.len().next_multiple_of(self.padded.max(1));
+        self.re.resize(end, 0.0);
+        self.im.resize(end, 0.0);
+    }
+
+    /// Adds the last column with each row times its factor.
+    pub fn push_last_times(&mut self, factors: &[f64]) {
+        let first = self.re.len().saturating_sub(self.padded);
+        for (i, factor) in factors.iter().enumerate().take(self.rows) {
+            self.re.push(self.re[first + i] * factor);
+            self.im.push(self.im[first + i] * factor);
+        }
+        self.re.resize(first + 2 * self.padded, 0.0);
+        self.im.resize(first + 2 * self.padded, 0.0);
+    }
+
+    fn len(&self) -> usize {
+        self.re.len() / self.padded.max(1)
+    }
+
+    fn column(&self, j: usize) -> (&[f64], &[f64]) {
+        let range = j * self.padded..(j + 1) * self.padded;
+        (&self.re[range.clone()], &self.im[range])
+    }
+}
+
 /// Factored columns `C = Q R`; dependent columns are left out.
 pub(super) struct Factored {
     /// Orthonormal columns, one per kept column.
-    q: Vec<Vec<Complex64>>,
-    /// Coefficients of column `j` on the kept columns before it, its norm last.
+    q: Columns,
+    /// Coefficients of a kept column on those before it, its norm last.
     r: Vec<Vec<Complex64>>,
     /// For each kept column its number.
     kept: Vec<usize>,
@@ -16,36 +66,22 @@ pub(super) struct Factored {
 /// A column counts as dependent when less than this share of it lies outside the columns before.
 const DEPENDENT: f64 = 1e-9;
 
+/// A column that keeps more than this share of its length outside the columns before is orthogonal to them within ten roundings; shorter ones
+/// are made so once more.
+const CLOSE: f64 = 0.1;
+
 impl Factored {
-    /// Gram-Schmidt, twice per column, in the order given: the columns that matter most come first.
-    pub fn new(columns: &[Vec<Complex64>]) -> Self {
-        let mut f = Self { q: Vec::new(), r: Vec::new(), kept: Vec::new(), columns: columns.len() };
-        for (number, column) in columns.iter().enumerate() {
-            let size = norm(column);
-            let mut v = column.clone();
-            let mut above = vec![Complex64::new(0.0, 0.0); f.q.len()];
-            for _ in 0..2 {
-                for (q, c) in f.q.iter().zip(&mut above) {
-                    let share = inner(q, &v);
-                    *c += share;
-                    v.iter_mut().zip(q).for_each(|(v, q)| *v -= share * q);
-                }
-            }
-            let rest = norm(&v);
-            if rest > DEPENDENT * size {
-                v.iter_mut().for_each(|v| *v /= rest);
-                above.push(Complex64::new(rest, 0.0));
-                f.q.push(v);
-                f.r.push(above);
-                f.kept.push(number);
-            }
-        }
-        f
+    /// Gram-Schmidt, twice where a column is close to those before, in the order given: the columns that matter most come first.
+    pub fn new(columns: &Columns) -> Self {
+        pulp::Arch::new().dispatch(Orthogonalise(columns))
     }
 
     /// Coefficients that minimise `|C x - b|`; zero for columns that were left out.
     pub fn solve(&self, b: &[Complex64]) -> Vec<Complex64> {
-        let mut right: Vec<Complex64> = self.q.iter().map(|q| inner(q, b)).collect();
+        let mut target = Columns::new(self.q.rows, 1);
+        target.push(b.iter().copied());
+        let mut right: Vec<Complex64> =
+            (0..self.kept.len()).map(|j| inner(self.q.column(j), target.column(0))).collect();
         let mut x = vec![Complex64::new(0.0, 0.0); self.columns];
         for j in (0..self.kept.len()).rev() {
             let value = right[j] / self.r[j][j];
@@ -74,12 +110,78 @@ impl Factored {
     }
 }
 
-fn inner(a: &[Complex64], b: &[Complex64]) -> Complex64 {
-    a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
+/// Carries Gram and Schmidt's steps to the vector units.
+struct Orthogonalise<'a>(&'a Columns);
+
+impl pulp::NullaryFnOnce for Orthogonalise<'_> {
+    type Output = Factored;
+
+    #[inline(always)]
+    fn call(self) -> Factored {
+        let Self(columns) = self;
+        let count = columns.len();
+        let q = Columns::new(columns.rows, count);
+        let mut f = Factored { q, r: Vec::with_capacity(count), kept: Vec::with_capacity(count), columns: count };
+        let (mut re, mut im) = (Vec::new(), Vec::new());
+        for number in 0..count {
+            let column = columns.column(number);
+            re.clear();
+            im.clear();
+            re.extend_from_slice(column.0);
+            im.extend_from_slice(column.1);
+            let size = norm(&re, &im);
+            let mut rest = size;
+            let mut above = vec![Complex64::new(0.0, 0.0); f.kept.len()];
+            for _ in 0..2 {
+                for (j, above) in above.iter_mut().enumerate() {
+                    let q = f.q.column(j);
+                    let share = inner(q, (&re, &im));
+                    *above += share;
+                    subtract(share, q, (&mut re, &mut im));
+                }
+                rest = norm(&re, &im);
+                if rest > CLOSE * size {
+                    break;
+                }
+            }
+            if rest > DEPENDENT * size {
+                f.q.re.extend(re.iter().map(|v| v / rest));
+                f.q.im.extend(im.iter().map(|v| v / rest));
+                above.push(Complex64::new(rest, 0.0));
+                f.r.push(above);
+                f.kept.push(number);
+            }
+        }
+        f
+    }
 }
 
-fn norm(a: &[Complex64]) -> f64 {
-    a.iter().map(|a| a.norm_sqr()).sum::<f64>().sqrt()
+/// `sum conj(a) b`.
+#[inline(always)]
+fn inner((a_re, a_im): (&[f64], &[f64]), (b_re, b_im): (&[f64], &[f64])) -> Complex64 {
+    let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+    let [a_re, a_im, b_re, b_im] = [a_re, a_im, b_re, b_im].map(|values| values.as_chunks::<LANES>().0);
+    for ((a_re, a_im), (b_re, b_im)) in a_re.iter().zip(a_im).zip(b_re.iter().zip(b_im)) {
+        for l in 0..LANES {
+            re[l] += a_re[l] * b_re[l] + a_im[l] * b_im[l];
+            im[l] += a_re[l] * b_im[l] - a_im[l] * b_re[l];
+        }
+    }
+    Complex64::new(re.iter().sum(), im.iter().sum())
+}
+
+/// `v - share q`, in place.
+#[inline(always)]
+fn subtract(share: Complex64, (q_re, q_im): (&[f64], &[f64]), (v_re, v_im): (&mut [f64], &mut [f64])) {
+    for ((v_re, v_im), (q_re, q_im)) in v_re.iter_mut().zip(v_im).zip(q_re.iter().zip(q_im)) {
+        *v_re -= share.re * q_re - share.im * q_im;
+        *v_im -= share.re * q_im + share.im * q_re;
+    }
+}
+
+#[inline(always)]
+fn norm(re: &[f64], im: &[f64]) -> f64 {
+    inner((re, im), (re, im)).re.sqrt()
 }
 
 #[cfg(test)]
@@ -91,16 +193,22 @@ mod tests {
         white_noise(2 * n, 1.0, seed).chunks(2).map(|c| Complex64::new(c[0], c[1])).collect()
     }
 
+    fn factored(columns: &[Vec<Complex64>]) -> Factored {
+        let mut all = Columns::new(columns[0].len(), columns.len());
+        columns.iter().for_each(|column| all.push(column.iter().copied()));
+        Factored::new(&all)
+    }
+
     #[test]
     fn coefficients_are_recovered_and_dependent_columns_dropped() {
         let mut columns = vec![random(20, 1), random(20, 2), random(20, 3)];
         let truth = [Complex64::new(1.0, 2.0), Complex64::new(-0.5, 0.0), Complex64::new(0.0, 3.0)];
         let b: Vec<Complex64> = (0..20).map(|i| (0..3).map(|j| columns[j][i] * truth[j]).sum()).collect();
-        for (x, t) in Factored::new(&columns).solve(&b).iter().zip(&truth) {
+        for (x, t) in factored(&columns).solve(&b).iter().zip(&truth) {
             assert!((x - t).norm() < 1e-13); // rounding
         }
         columns.push(columns[0].iter().zip(&columns[1]).map(|(a, b)| a + b).collect());
-        let with_copy = Factored::new(&columns);
+        let with_copy = factored(&columns);
         assert_eq!(with_copy.rank(), 3);
         assert_eq!(with_copy.solve(&b)[3], Complex64::new(0.0, 0.0));
     }
@@ -108,7 +216,7 @@ mod tests {
     #[test]
     fn variance_matches_the_spread_of_the_solutions() {
         let columns = vec![random(15, 4), random(15, 5)];
-        let f = Factored::new(&columns);
+        let f = factored(&columns);
         let gradient = [Complex64::new(1.0, 0.5), Complex64::new(0.0, -2.0)];
         let trials = 3000;
         let spread = (0..trials)

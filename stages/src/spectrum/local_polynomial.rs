@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-use super::least_squares::Factored;
+use super::least_squares::{Columns, Factored};
 use super::neighbours::Usable;
 use super::{Bins, Smoothed, SpectrumError, SuppressedLine};
 
@@ -112,17 +112,20 @@ fn fit(usable: &Usable<'_>, k: usize, degree: usize, half_width: usize) -> Fit {
     let near = usable.nearest(k, (2 * half_width + 1).max(degree + 1));
     let reach = near.iter().map(|&i| i.abs_diff(k)).max().unwrap_or(1).max(1) as f64;
     let weight: Vec<f64> = near.iter().map(|&i| 1.0 / usable.variance(i).sqrt()).collect();
-    let power = |i: usize, j: usize| ((i as f64 - k as f64) / reach).powi(j as i32);
-    let columns: Vec<Vec<Complex64>> = (0..=degree)
-        .map(|j| near.iter().zip(&weight).map(|(&i, w)| Complex64::new(w * power(i, j), 0.0)).collect())
-        .collect();
+    let offset: Vec<f64> = near.iter().map(|&i| (i as f64 - k as f64) / reach).collect();
+    let mut columns = Columns::new(near.len(), degree + 1);
+    columns.push(weight.iter().map(|&w| Complex64::new(w, 0.0)));
+    (0..degree).for_each(|_| columns.push_last_times(&offset));
     let values: Vec<Complex64> = near.iter().zip(&weight).map(|(&i, w)| usable.bins.transfer[i] * w).collect();
     let factored = Factored::new(&columns);
     let b = factored.solve(&values);
     let mut gradient = vec![Complex64::new(0.0, 0.0); degree + 1];
     gradient[0] = Complex64::new(1.0, 0.0);
     let squares: f64 = (0..near.len())
-        .map(|row| (values[row] - columns.iter().zip(&b).map(|(c, b)| c[row] * b).sum::<Complex64>()).norm_sqr())
+        .map(|row| {
+            let model = b.iter().rev().fold(Complex64::new(0.0, 0.0), |sum, b| sum * offset[row] + b);
+            (values[row] - model * weight[row]).norm_sqr()
+        })
         .sum();
     let freedom = near.len() - factored.rank();
     let misfit = if freedom > 0 { squares / freedom as f64 } else { f64::NAN };
