@@ -202,8 +202,8 @@ fn fold(block: &mut [f64], triangle: &mut [f64], products: &mut [Product], colum
             let (before, own) = panel[..(k + 1) * BLOCK].split_at(k * BLOCK);
             let mut inner = [0.0; PANEL];
             inner.iter_mut().zip(before.chunks_exact(BLOCK)).for_each(|(z, v)| *z = -product[k][k] * dot(v, own));
-            for i in 0..k {
-                product[i][k] = (i..k).map(|m| product[i][m] * inner[m]).sum();
+            for (i, row) in product.iter_mut().enumerate().take(k) {
+                row[k] = (i..k).map(|m| row[m] * inner[m]).sum();
             }
         }
         let Ok(panel) = <&[Column; PANEL]>::try_from(columns_of(panel)) else { continue };

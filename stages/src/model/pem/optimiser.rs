@@ -228,7 +228,8 @@ impl Secant {
         let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
         let wanted: Vec<f64> = change.iter().zip(normal).map(|(y, n)| y - n).collect();
         let along = dot(&change, step);
-        if !(along > 1e-12 * (dot(&change, &change) * dot(step, step)).sqrt()) {
+        let upwards = along > 1e-12 * (dot(&change, &change) * dot(step, step)).sqrt();
+        if !upwards {
             return;
         }
         let held: Vec<f64> = (0..q).map(|i| (0..q).map(|j| self.curvature[(i, j)] * step[j]).sum()).collect();
