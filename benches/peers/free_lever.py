@@ -1,228 +1,299 @@
 """The lean main job as a careful numpy/scipy script, timed beside afmid.
 
-    python3 benches/peers/free_lever.py [--afmid target/release/afmid] [--runs 5]      # needs numpy, scipy, h5py
+    python3 -m venv /tmp/venv-peers && /tmp/venv-peers/bin/pip install numpy scipy h5py
+    cargo build --release && /tmp/venv-peers/bin/python benches/peers/free_lever.py [--afmid target/release/afmid] [--runs 5]
 
-Decompresses lever-a into a temporary folder, warms the page cache, then lets both do the job in turn: whole processes, from start to synced result.
-The script does what configs/free-lever.toml does: load, find and align the snap-offs, average (all, and one half), force by extrapolation, ETFE, smoothing (a
-Gaussian window, cheaper than the local rational), two fits of order 11, modes, all of it written and synced. Its fit is an output error by variable projection with an analytic Jacobian: one start, no noise model,
-no error estimates, so less work than `model.pem` does.
+Decompresses lever-a into a temporary folder, which warms the page cache; then both do the job in turn: whole processes, from start to synced result, afmid
+with an empty cache each time, the script on one thread.
+The script does what configs/free-lever.toml does, intermediates stored. It does less: no keys or hashes; a local parabola (seven bins) where afmid smooths
+by a local rational; output error (no noise model) from one start, with four modes and three real poles given; no zeros, no held-out fit. scipy.signal is left
+out: its import would nearly double the time.
 """
 
 import argparse
-import glob
 import os
 import resource
-import shutil
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from functools import lru_cache
+from pathlib import Path
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-ROOT = os.path.dirname(os.path.dirname(HERE))
-ARCHIVE = os.path.join(ROOT, "..", "shared", "data", "afm", "lever-a")
-LENGTH, BEFORE, ORDER = 8192, 1024, 11
+CLOCK, LAST = {}, [time.perf_counter()]
+
+
+def lap(name):
+    now = time.perf_counter()
+    CLOCK[name], LAST[0] = CLOCK.get(name, 0.0) + now - LAST[0], now
+
+
+import h5py  # after the clock's start
+import numpy as np
+
+lap("import numpy, h5py")
+from scipy.optimize import least_squares
+
+lap("import scipy")
+
+ROOT = Path(__file__).resolve().parents[2]
+LENGTH, BEFORE, MARGIN, GUARD = 8192, 1024, 8, 50
+MODES, REAL, ORDER = 4, 3, 11
+HEAD = 128  # samples after t0 in which real poles may show
+REAL_START, REAL_LEAST, REAL_MOST = [0.33, 0.1, 0.017], 1e-4, 0.82  # z of real poles: start and bounds
+SCALE = 1e-3  # of the sample number, for columns of similar size
+
+
+def onsets(codes, block=64, level=16):
+    """Samples where the level jumps up: block means first, then the first one above half of the jump."""
+    samples = codes.astype(np.float32)
+    means = samples[: len(codes) // block * block].reshape(-1, block) @ np.full(block, 1.0 / block, np.float32)
+    step = means[2:] - means[:-2]
+    sigma = 1.4826 * np.median(np.abs(step - np.median(step)))
+    found, end = [], level
+    for i in np.flatnonzero(step > 8.0 * sigma):
+        low, high = means[i - level : i].mean(), means[i + 2 : i + 2 + level].mean()
+        if end <= i <= len(means) - 2 - level and high - low > 8.0 * sigma:
+            found.append(i * block + int(np.argmax(samples[i * block :] > 0.5 * (low + high))))
+            end = i + LENGTH // block
+    return found
+
+
+def cut(folder):
+    """Windows of `LENGTH` samples and a margin on either side, in volts."""
+    windows, buffer = [], None
+    for path in sorted(Path(folder).glob("*.h5")):
+        with h5py.File(path) as file:
+            data = file["deflection"]
+            buffer = buffer if buffer is not None and len(buffer) == len(data) else np.empty(data.shape, data.dtype)
+            data.read_direct(buffer)  # one buffer for all records stays in the processor's cache
+            scale, rate = data.attrs["scale_factor"], float(file.attrs["sample_rate_hz"])
+        lap("load")
+        for first in (onset - BEFORE - MARGIN for onset in onsets(buffer)):
+            if 0 <= first <= len(buffer) - LENGTH - 2 * MARGIN:
+                windows.append(buffer[first : first + LENGTH + 2 * MARGIN] * scale)
+        lap("events")
+    return np.array(windows), rate
+
+
+def shifted(windows, shift):
+    """Each window `shift` samples later in its record, by band-limited interpolation of what a line through its ends leaves."""
+    n, slope = windows.shape[1], (windows[:, -1:] - windows[:, :1]) / (windows.shape[1] - 1)
+    line = windows[:, :1] + slope * np.arange(n)
+    turn = np.exp(2j * np.pi / n * np.arange(n // 2 + 1) * shift[:, None])
+    return np.fft.irfft(np.fft.rfft(windows - line) * turn, n) + line + slope * shift[:, None]
+
+
+def regress(windows, mean):
+    """Each window on the mean, its slope, a constant and a ramp on either side: coefficients and remainders."""
+    t, before = np.linspace(-1.0, 1.0, LENGTH), np.arange(LENGTH) < BEFORE
+    q, r = np.linalg.qr(np.column_stack([mean, np.gradient(mean), np.ones(LENGTH), t * before, t * ~before]))
+    return np.linalg.solve(r, q.T @ windows.T).T, windows - windows @ q @ q.T
+
+
+def align(windows):
+    """Aligned windows without their margins; events unlike the others are left out."""
+    part, shift = windows[:, BEFORE - 64 : BEFORE + 256 + 2 * MARGIN], np.zeros(len(windows))
+    for _ in range(20):  # Gauss-Newton on the mean; four are usual
+        moved = shifted(part, shift)[:, MARGIN:-MARGIN]
+        mean = moved.mean(axis=0)
+        c = np.linalg.lstsq(np.column_stack([mean, np.gradient(mean), np.ones(len(mean))]), moved.T, rcond=None)[0]
+        step = np.clip(c[1] / c[0], -2.0, 2.0)
+        shift -= (step := step - step.mean())
+        if np.abs(step).max() < 1e-3:
+            break
+    keep = np.array([np.corrcoef(event, mean * len(moved) - event)[0, 1] > 0.8 for event in moved])  # with the others
+    return shifted(windows[keep], shift[keep])[:, MARGIN:-MARGIN], shift[keep]
+
+
+def drift(remainders, rng, permutations=999):
+    """p-value of no slow change: trends over the event index against those of random orders."""
+    n, gram = len(remainders), remainders @ remainders.T
+    trends = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, n), 4, increasing=True))[0][:, 1:]
+    power = lambda p: np.einsum("...ik,...ij,...jk->...", p, gram, p, optimize=True)
+    return (1 + np.sum(power(np.array([trends[rng.permutation(n)] for _ in range(permutations)])) >= power(trends))) / (1 + permutations)
+
+
+def release(mean, error):
+    """The last sample that still lies on the line before."""
+    t = np.arange(BEFORE + GUARD)
+    off = np.abs(mean[: len(t)] - np.polyval(np.polyfit(t[: BEFORE - GUARD], mean[: BEFORE - GUARD], 1), t))
+    sure = np.argmax(off > 0.1 * abs(mean[: BEFORE - GUARD].mean() - mean[BEFORE:].mean()))
+    return int(np.flatnonzero(off[:sure] <= 4.0 * error)[-1])
+
+
+def force(y, t0):
+    """Line before t0 less the line without force, as (slope, value at t0), and the force: that difference before t0, zero from t0 on."""
+    t, before = np.arange(LENGTH) - t0, slice(BEFORE - GUARD)
+    line = np.polyfit(t[before], y[before], 1) - np.polyfit(t[t0:], y[t0:], 1, w=np.sqrt(np.hanning(LENGTH - t0)))
+    return line, np.where(t < 0, np.polyval(line, t), 0.0)
+
+
+def transfer(windowed, rate, half_width=3):
+    """ETFE of first differences, half a sample's hold taken out, up to 1.2 MHz; smoothed by a parabola through seven bins."""
+    f, (u, y) = np.fft.rfftfreq(LENGTH, 1.0 / rate), np.fft.rfft(windowed, LENGTH)
+    etfe = np.where(f > 1.2e6, np.nan, y / u * np.exp(1j * np.pi * f / rate) / np.sinc(f / rate))
+    parabola = np.vander(np.arange(-half_width, half_width + 1), 3, increasing=True)
+    return f, etfe, np.convolve(etfe, np.linalg.pinv(parabola)[0], "same")
+
+
+def powers(z, samples):
+    """z^k for k < samples, one column per z, from short tables."""
+    coarse = (z**HEAD) ** np.arange(-(-samples // HEAD))[:, None]
+    return (coarse[:, None] * (z ** np.arange(HEAD)[:, None])[None]).reshape(-1, len(z))[:samples]
+
+
+def pairs(e):
+    """Columns of Re(g e) for g = a + i b: those of a, then those of b."""
+    return np.hstack([e.real, -e.imag])
+
+
+def start(y, rows=64):
+    """ln z of the modes, by shift invariance of the Hankel matrix's dominant left singular vectors."""
+    y = y - y[-LENGTH // 8 :].mean()
+    hankel = np.lib.stride_tricks.sliding_window_view(y, len(y) - rows + 1)
+    left = np.linalg.eigh(hankel @ hankel.T)[1][:, -2 * MODES :]
+    s = np.log(np.linalg.eigvals(np.linalg.lstsq(left[:-1], left[1:], rcond=None)[0]))
+    s = s[s.imag > 0.0]
+    return np.concatenate([np.log(np.maximum(-s.real, 1e-6)), s.imag, REAL_START])
+
+
+def fit(y, t0, line, u):
+    """Output error by variable projection: y = D u + sum of first-order sections, free initial state, offset and drift; all that is linear solved for.
+
+    The force is a line before t0 and zero after. A section with pole z then answers with c P(k) + x z^k before, P a line itself, and with g z^(k - t0) after,
+    g = c P(t0) + x z^t0: nothing is to be filtered. Linear parameters: g and x of every pole, D, offset, drift. Least squares gets the triangle of [J r]
+    (Kaufman's J): from a QR of the samples before t0 + `HEAD` on top of the Cholesky factor of the rest, where only modes are left.
+    """
+    m, g, d, k = MODES, 2 * MODES + REAL, 2 * ORDER + 3, np.arange(LENGTH) - t0
+    logarithms = lambda x: (-np.exp(x[:m]) + 1j * x[m : 2 * m], np.log(x[2 * m :]))  # ln z of modes and of real poles
+    late = np.column_stack([np.ones(LENGTH), SCALE * k, y])[t0 + HEAD :]
+
+    def basis(s, real_s, samples):
+        """Columns of all linear parameters, then derivatives by ln z of what rings after t0, then y, for the first `samples`."""
+        a, z = np.zeros((samples, d + g + 1), order="F"), np.exp(s)
+        # P(k) / P(t0); before t0 next to nothing depends on z
+        ratio = 1.0 + k[:t0, None] * (line[0] / (line[1] - line[0] / (1.0 - np.exp(np.append(s, real_s)))))
+        tail, real = powers(z, samples - t0), np.exp(real_s * np.arange(HEAD)[:, None])
+        a[:t0, : 2 * m], a[t0:, : 2 * m] = pairs(ratio[:, :m]), pairs(tail)
+        a[:t0, 2 * m : g], a[t0 : t0 + HEAD, 2 * m : g] = ratio[:, m:].real, real
+        a[:t0, g : g + 2 * m], a[:HEAD, g + 2 * m : 2 * g] = pairs(powers(z, t0) - z**t0 * ratio[:, :m]), real
+        a[:, d - 3], a[:, d - 2], a[:, d - 1], a[:, -1] = u[:samples], 1.0, SCALE * k[:samples], y[:samples]
+        a[t0:, d : d + 2 * m] = pairs(SCALE * k[t0:samples, None] * tail)
+        a[t0 : t0 + HEAD, d + 2 * m : d + g] = SCALE * np.arange(HEAD)[:, None] * real
+        return a
+
+    @lru_cache(1)
+    def evaluate(x):
+        """Residual, Jacobian, linear parameters."""
+        s, real_s = logarithms(np.frombuffer(x))
+        near, e = basis(s, real_s, t0 + HEAD), np.exp(HEAD * s) * powers(np.exp(s), len(late))
+        far = np.hstack([pairs(e), pairs(late[:, 1:2] * e), late])
+        rest = np.zeros((far.shape[1], near.shape[1]))
+        rest[:, np.r_[: 2 * m, d : d + 2 * m, d - 2, d - 1, -1]] = np.linalg.cholesky(far.T @ far).T
+        t = np.linalg.qr(np.vstack([near, rest]), mode="r")
+        theta = np.linalg.lstsq(t[:d, :d], t[:d, -1], rcond=1e-12)[0]
+        (re, im, real), (a, b, c) = np.split(t[d:, d:-1] / SCALE, [m, 2 * m], axis=1), np.split(theta[:g], [m, 2 * m])
+        j = -np.hstack([(re * a + im * b) * s.real, im * a - re * b, real * c / np.exp(real_s)])  # d Re(g e) = Re(g k e ds)
+        return t[d:, -1], j, theta
+
+    bounds = [-np.inf] * 2 * m + [REAL_LEAST] * REAL, [np.inf] * 2 * m + [REAL_MOST] * REAL
+    # ends when the sum of squares falls by less than 0.08 of the noise variance
+    found = least_squares(lambda x: evaluate(x.tobytes())[0], start(y[t0 + 16 :]), lambda x: evaluate(x.tobytes())[1], bounds, x_scale="jac", ftol=1e-5)
+    assert found.success, found.message
+    (s, real_s), (_, j, theta) = logarithms(found.x), evaluate(found.x.tobytes())
+    prediction = basis(s, real_s, LENGTH)[:, :d] @ theta
+    covariance = np.linalg.pinv(j.T @ j) * np.sum((y - prediction) ** 2) / (LENGTH - d - g)
+    return dict(s=s, real_s=real_s, theta=theta, covariance=covariance, prediction=prediction, residual=y - prediction, evaluations=found.nfev)
+
+
+def modes(model, rate):
+    """Rows of f, its standard error, Q, its standard error, ascending in frequency."""
+    s, re, im = model["s"], model["s"].real, model["s"].imag
+    size, own = np.abs(s), np.arange(MODES)[:, None] + [0, MODES]
+    slope = np.array([[re**2 / size, im / size], [0.5 * im**2 / (re * size), -0.5 * im / (re * size)]])  # of |s| and Q, by ln(-re) and im
+    error = np.sqrt(np.einsum("aik,kij,ajk->ak", slope, model["covariance"][own[:, :, None], own[:, None, :]], slope))
+    return np.column_stack([size * rate / (2.0 * np.pi), error[0] * rate / (2.0 * np.pi), -0.5 * size / re, error[1]])[np.argsort(size)]
 
 
 def job(folder, out):
-    """The script itself."""
-    start = time.perf_counter()
-    import h5py
-    import numpy as np
-    from scipy import linalg, optimize, signal
-
-    clock, last = {}, [start]
-
-    def lap(name):
-        now = time.perf_counter()
-        clock[name], last[0] = now - last[0], now
-
-    lap("imports")
-    records = []
-    for path in sorted(glob.glob(os.path.join(folder, "*.h5"))):
-        with h5py.File(path) as file:
-            data = file["deflection"]
-            records.append(data[:])
-            scale, rate = float(data.attrs["scale_factor"]), float(file.attrs["sample_rate_hz"])
-    lap("load")
-
-    # events: the largest rise of block means over four blocks, then the steepest sample
-    windows = []
-    for codes in records:
-        means = codes[: len(codes) // 64 * 64].reshape(-1, 64).mean(axis=1, dtype=np.float32)
-        block = int(np.argmax(means[4:] - means[:-4]))
-        near = codes[block * 64 : (block + 6) * 64].astype(np.float32)
-        edge = block * 64 + int(np.argmax(near[4:] - near[:-4])) + 2
-        if BEFORE + 8 <= edge <= len(codes) - LENGTH:
-            windows.append(codes[edge - BEFORE - 8 : edge - BEFORE + LENGTH + 8] * scale)
-    windows = np.array(windows)
-    # alignment on the mean: whole samples by correlation, then the phase of the cross-spectrum
-    spectra = np.fft.rfft(np.diff(windows[:, BEFORE - 64 : BEFORE + 959], axis=1))
-    w = 2 * np.pi * np.arange(spectra.shape[1]) / (2 * (spectra.shape[1] - 1))
-    shift = np.zeros(len(windows))
-    for whole in (True, True, False, False):
-        turned = spectra * np.exp(1j * w * shift[:, None])
-        cross = turned * turned.mean(axis=0).conj()
-        if whole:
-            lag = np.argmax(np.fft.irfft(cross), axis=1)
-            shift += np.where(lag > 500, lag - 1022, lag)
-            continue
-        weight = np.abs(cross) * w
-        shift -= (weight * np.angle(cross)).sum(axis=1) / (weight * w).sum(axis=1)
-    full = np.fft.rfft(windows - windows[:, :1] - (windows[:, -1:] - windows[:, :1]) * np.linspace(0, 1, windows.shape[1]))
-    turn = np.exp(2j * np.pi * np.arange(full.shape[1]) / windows.shape[1] * (shift - shift.mean())[:, None])
-    line = windows[:, :1] + (windows[:, -1:] - windows[:, :1]) * np.linspace(0, 1, windows.shape[1])
-    aligned = (np.fft.irfft(full * turn, windows.shape[1]) + line)[:, 8:-8]
+    windows, rate = cut(folder)
+    aligned, shift = align(windows)
     lap("events")
-
-    mean, half = aligned.mean(axis=0), aligned[::2].mean(axis=0)
-    spread = aligned.std(axis=0, ddof=1) / np.sqrt(len(aligned))
-
-    # the release: where the mean leaves the ramp for good, some samples before it is steepest
-    quiet, t = BEFORE - 200, np.arange(LENGTH)
-    away = np.abs(mean - np.polyval(np.polyfit(t[:quiet], mean[:quiet], 1), t)) > 6 * spread[:quiet].mean()
-    onset = int(np.flatnonzero(~away[:BEFORE])[-1]) - 2
-
-    def force_of(y):
-        ramp = np.polyval(np.polyfit(t[:quiet], y[:quiet] - y[-1024:].mean(), 1), t)
-        return np.where(t < onset, ramp, 0.0)
-
-    pairs = [(force_of(y), y) for y in (half, mean)]
-    u, y = pairs[1]
-    etfe = np.fft.rfft(np.diff(y)) / np.fft.rfft(np.diff(u))
-    kernel = np.exp(-0.5 * np.linspace(-3, 3, 25) ** 2)
-    smoothed = signal.fftconvolve(etfe, kernel / kernel.sum(), mode="same")
-    lap("spectra")
-
-    models = [fit(u, y, np, linalg, optimize, signal) for u, y in pairs]
-    lap("fits")
-    poles = models[1][0]
-    s = np.log(poles[poles.imag > 0]) * rate
-    frequency, quality = np.abs(s) / 2 / np.pi, -np.abs(s) / 2 / s.real
-    order = np.argsort(frequency)
+    order = (rng := np.random.default_rng(1)).permutation(len(aligned))
+    sets = {"identification": order[::2], "verification": order[1::2], "all": np.arange(len(aligned))}
+    store = {"window": windows, "ensemble": aligned, "shift": shift}
+    for name, rows in sets.items():
+        mean = aligned[rows].mean(axis=0)
+        coefficients, noise = regress(aligned[rows], mean)
+        error = np.sqrt((noise**2).sum(axis=0) / (len(rows) - 1) / len(rows))
+        store |= {f"mean_{name}": mean, f"variance_{name}": aligned[rows].var(axis=0, ddof=1), f"standard_error_{name}": error}
+        store |= {f"regression_{name}": coefficients, f"rows_{name}": rows}
+    p = drift(noise, rng)
+    lap("average, drift")
+    t0, lines, models = release(mean, error.mean()), {}, {}
+    for name in sets:
+        lines[name], store[f"force_{name}"] = force(store[f"mean_{name}"], t0)
+        store[f"windowed_{name}"] = np.diff([store[f"force_{name}"], store[f"mean_{name}"]])
+        f, store[f"etfe_{name}"], store[f"smoothed_{name}"] = transfer(store[f"windowed_{name}"], rate)
+    lap("force, spectra")
+    for name in ("identification", "all"):
+        models[name] = fit(store[f"mean_{name}"], t0, lines[name], store[f"force_{name}"])
+        store |= {f"{key}_{name}": value for key, value in models[name].items()}
+    lap("two fits")
+    store |= {"frequency": f, "modes": (table := modes(models["all"], rate))}
     with h5py.File(out, "w") as file:
-        store = {"windows": windows, "aligned": aligned, "mean": mean, "half": half, "spread": spread, "force": u, "force_half": pairs[0][0], "etfe": etfe,
-                 "smoothed": smoothed, "frequency_hz": frequency[order], "quality_factor": quality[order]}
-        for i, (poles, theta, residual) in enumerate(models):
-            store |= {f"poles_{i}": poles, f"theta_{i}": theta, f"residual_{i}": residual}
         for name, value in store.items():
             file[name] = value
-    descriptor = os.open(out, os.O_RDONLY)
-    os.fsync(descriptor)
-    os.close(descriptor)
-    lap("write")
-    for f, q in zip(frequency[order], quality[order]):
-        print(f"{f:12.1f} Hz  Q {q:8.2f}")
-    print(len(windows), "events;", "  ".join(f"{name} {seconds:.3f}" for name, seconds in clock.items()))
+        file.attrs.update(sample_rate_hz=rate, t0_sample=t0, drift_p_value=p, mode_columns=["f_hz", "f_std_hz", "Q", "Q_std"])
+    with open(out, "rb") as file:
+        os.fsync(file.fileno())
+    lap("write, sync")
+    print(*("{:12.2f} +- {:5.2f} Hz   Q {:7.3f} +- {:.3f}".format(*row) for row in table), sep="\n")
+    print(f"{len(aligned)} events, t0 at {t0}, drift p = {p:.2f}, evaluations {[m['evaluations'] for m in models.values()]}")
+    print("seconds:", ", ".join(f"{name} {seconds:.3f}" for name, seconds in CLOCK.items()), f"(CPU in all {time.process_time():.3f})")
 
 
-def fit(u, y, np, linalg, optimize, signal):
-    """Output error of order 11: five sections of second order and one of first; everything linear eliminated by QR."""
-    n = len(y)
-    free = y[BEFORE + 16 :] - y[-1024:].mean()
-    rows = 60
-    hankel = np.lib.stride_tricks.sliding_window_view(free, len(free) - rows + 1)
-    left = linalg.eigh(hankel @ hankel.T, subset_by_index=[rows - 8, rows - 1])[1]
-    modes = np.linalg.eigvals(np.linalg.lstsq(left[:-1], left[1:], rcond=None)[0])
-    modes = modes[modes.imag > 0]
-    modes = modes[np.argsort(np.abs(modes))[::-1]][:4]
-    modes = np.where(np.abs(modes) < 1, modes, 0.999 * modes / np.abs(modes))
-    start = np.array([[-2 * z.real, abs(z) ** 2] for z in modes]).ravel()
-    start = np.concatenate([start, [-0.65, 0.075], [-0.7]])
-    one, ramp, impulse = np.ones(n), np.linspace(-1, 1, n), np.zeros(n)
-    impulse[0] = 1.0
-    sections = [(2 * i, 2) for i in range(5)] + [(10, 1)]
-    memory = {}
-
-    def solve(p):
-        key = p.tobytes()
-        if key not in memory:
-            memory.clear()
-            stable = all(abs(b) < 1 and abs(a) < 1 + b for a, b in p[:10].reshape(-1, 2)) and abs(p[10]) < 1
-            if not stable:
-                memory[key] = (None, None, None, np.full(n, 1e3), None)
-                return memory[key]
-            columns, owners = [], []
-            for first, size in sections:
-                a = np.concatenate([[1.0], p[first : first + size]])
-                forced, own = signal.lfilter([1.0], a, u), signal.lfilter([1.0], a, impulse)
-                for j in range(size):
-                    columns += [np.concatenate([np.zeros(j + 1), forced[: n - j - 1]]), np.concatenate([np.zeros(j), own[: n - j]])]
-                    owners += [first, first]
-            columns += [u, one, ramp]
-            phi = np.array(columns).T
-            q, r = linalg.qr(phi, mode="economic", check_finite=False, overwrite_a=False)
-            theta = np.linalg.lstsq(r, q.T @ y, rcond=1e-13)[0]
-            memory[key] = (phi, q, theta, y - phi @ theta, np.array(owners))
-        return memory[key]
-
-    def jacobian(p):
-        phi, q, theta, _, owners = solve(p)
-        j = np.zeros((n, len(p)))
-        for first, size in sections:
-            own = np.flatnonzero(owners == first)
-            sensitivity = signal.lfilter([1.0], np.concatenate([[1.0], p[first : first + size]]), phi[:, own] @ theta[own])
-            for k in range(size):
-                j[k + 1 :, first + k] = sensitivity[: n - k - 1]
-        return j - q @ (q.T @ j)
-
-    found = optimize.least_squares(lambda p: solve(p)[3], start, jacobian, method="lm", x_scale="jac", xtol=1e-15, ftol=1e-8, max_nfev=40)
-    _, _, theta, residual, _ = solve(found.x)
-    poles = np.concatenate([np.roots(np.concatenate([[1.0], found.x[a : a + size]])) for a, size in sections])
-    modal = poles[(poles.imag == 0) | (np.abs(poles.imag) > 0)]
-    return modal, theta, residual
-
-
-def timed(command):
-    """Wall and user + system seconds of a process, and what it printed."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    start = time.perf_counter()
-    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
-    wall = time.perf_counter() - start
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+def timed(command, threads):
+    """Wall and CPU seconds of a process, and what it printed."""
+    usage = lambda: np.array([time.perf_counter(), sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])])
+    before = usage()
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | threads)
     if done.returncode:
-        sys.exit(f"{' '.join(command)}\n{done.stderr}")
-    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout
+        sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
+    return *(usage() - before), done.stdout
 
 
 def main():
-    arguments = argparse.ArgumentParser()
-    arguments.add_argument("--job", nargs=2)
-    arguments.add_argument("--afmid", default=os.path.join(ROOT, "target", "release", "afmid"))
-    arguments.add_argument("--runs", type=int, default=5)
-    given = arguments.parse_args()
-    if given.job:
-        return job(*given.job)
-    import h5py
-
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--job", nargs=2, metavar=("DIR", "OUT.h5"), help="the script itself, once")
+    parser.add_argument("--afmid", default=ROOT / "target/release/afmid", type=Path)
+    parser.add_argument("--runs", default=5, type=int)
+    options = parser.parse_args()
+    if options.job:
+        return job(*options.job)
     with tempfile.TemporaryDirectory() as folder:
-        raw = os.path.join(folder, "raw")
-        os.mkdir(raw)
-        for path in sorted(glob.glob(os.path.join(ARCHIVE, "*.h5"))):
-            with h5py.File(path) as source, h5py.File(os.path.join(raw, os.path.basename(path)), "w") as target:
+        (raw := Path(folder, "raw")).mkdir()
+        for path in sorted((ROOT.parent / "shared/data/afm/lever-a").glob("*.h5")):
+            with h5py.File(path) as source, h5py.File(raw / path.name, "w") as target:
                 target.attrs.update(source.attrs)
                 for name in source:
                     target.create_dataset(name, data=source[name][()]).attrs.update(source[name].attrs)
-        config = os.path.join(ROOT, "configs", "free-lever.toml")
-        files = f'records.files=["{raw}/*.h5"]'
+        os.sync()  # nothing left to write back while the clock runs
+        script = [sys.executable, __file__, "--job", raw, Path(folder, "script.h5")]
+        ours = [options.afmid, "run", ROOT / "configs/free-lever.toml", "--set", f'records.files=["{raw}/*.h5"]']
         times = {"script": [], "afmid": []}
-        for _ in range(given.runs):
-            times["script"].append(timed([sys.executable, os.path.abspath(__file__), "--job", raw, os.path.join(folder, "script.h5")]))
-            cache = os.path.join(folder, "cache")
-            shutil.rmtree(cache, ignore_errors=True)
-            times["afmid"].append(timed([given.afmid, "run", config, "--set", files, "--cache", cache, "-o", os.path.join(folder, "afmid.h5")]))
-        print(times["script"][-1][2])
-        for name, runs in times.items():
-            walls, cpus = [run[0] for run in runs], [run[1] for run in runs]
-            print(f"{name:8} wall: least {min(walls):.3f} s, median {statistics.median(walls):.3f} s; CPU: median {statistics.median(cpus):.3f} s")
-        least, median = (times_of(times, pick) for pick in (min, statistics.median))
-        print(f"script over afmid: {least:.1f} (least), {median:.1f} (median)")
-
-
-def times_of(times, pick):
-    return pick([run[0] for run in times["script"]]) / pick([run[0] for run in times["afmid"]])
+        for i in range(options.runs):
+            times["script"].append(timed(script, {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}))
+            times["afmid"].append(timed([*ours, "--cache", Path(folder, f"cache-{i}"), "-o", Path(folder, "afmid.h5")], {}))
+    print(min(times["script"])[2])  # of the fastest run
+    print("| seconds | least | median | CPU, least | CPU, median |\n|---|---|---|---|---|")
+    figures = {name: [pick([run[i] for run in runs]) for i in (0, 1) for pick in (min, np.median)] for name, runs in times.items()}
+    for name in figures:
+        print(f"| {name} |", " | ".join(f"{seconds:.3f}" for seconds in figures[name]), "|")
+    print("| ratio |", " | ".join(f"{a / b:.1f}" for a, b in zip(*figures.values())), "|")
+    print(f"load over a minute: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
