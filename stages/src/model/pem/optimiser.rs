@@ -250,7 +250,7 @@ impl Secant {
 const DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-14;
 const FALL: f64 = 0.1;
-/// Damping grows by this after a step that failed, and by this more after every further one: a run of failures crosses twelve decades.
+/// Damping grows by this after a step that failed, and by this more after every further one: eight failures in a row cross twenty decades.
 const RISE: f64 = 4.0;
 const TRIALS: usize = 8;
 
