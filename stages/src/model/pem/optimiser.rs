@@ -35,19 +35,6 @@ pub(crate) struct Limits {
 }
 
 /// A point with everything known of it.
-pub static NEW: [std::sync::atomic::AtomicU64; 6] = [const { std::sync::atomic::AtomicU64::new(0) }; 6];
-pub struct Tm(usize, std::time::Instant);
-impl Tm {
-    pub fn n(i: usize) -> Self {
-        Tm(i, std::time::Instant::now())
-    }
-}
-impl Drop for Tm {
-    fn drop(&mut self) {
-        NEW[2 * self.0].fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        NEW[2 * self.0 + 1].fetch_add(self.1.elapsed().as_nanos() as u64, std::sync::atomic::Ordering::Relaxed);
-    }
-}
 pub(crate) struct State {
     pub point: Point,
     pub regressors: Mat<f64>,
@@ -75,7 +62,6 @@ impl State {
 
     /// Evaluates a point. Errors: no finite prediction errors there.
     pub fn new(problem: &Problem, point: Point) -> Result<Self, ModelError> {
-        let _t = Tm::n(0);
         let regressors = problem.regressors(&point.a(), &point.whitening());
         let projection = Projection::new(problem, &regressors)?;
         let memory = Memory { damping: DAMPING, secant: Secant::new(point.len()) };

@@ -109,7 +109,6 @@ const EXCHANGE: f64 = 0.4;
 
 /// Whitening by the noise that the residual shows.
 fn thermal_noise(problem: &Problem, state: &State) -> Result<Noise, ModelError> {
-    let _t = super::optimiser::Tm::n(2);
     let tangent = Tangent::new(&full_jacobian(problem, state))?;
     let e = state.residual();
     let mut planner = RealFftPlanner::<f64>::new();
