@@ -16,6 +16,7 @@ pub mod error;
 pub mod graph;
 pub mod recording;
 pub mod reference;
+pub mod rows;
 pub mod runner;
 pub mod stage;
 pub mod store;

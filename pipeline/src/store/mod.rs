@@ -28,6 +28,7 @@ pub(crate) mod read;
 mod recording;
 mod result_file;
 mod result_reader;
+mod rows;
 mod run_info;
 mod seal;
 mod stage_file;
