@@ -3,8 +3,10 @@
 mod batch;
 mod causes;
 mod check;
+mod completions;
 mod diff;
 mod docs;
+mod doctor;
 mod exam;
 mod explain;
 mod export_crate;
@@ -12,6 +14,8 @@ mod gc;
 mod graph;
 mod inspect;
 mod load;
+mod man;
+mod new;
 mod open;
 mod report;
 mod rerun;
@@ -44,12 +48,16 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::ExportCrate(args) => export_crate::run(&args),
         Command::Gc(args) => gc::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::New { what } => new::run(&what, registry),
         Command::Check { configs } => check::run(&configs, registry),
         Command::Graph { config, format } => graph::run(&config, format, registry),
         Command::Stages { name } => stages::run(name.as_deref(), registry),
         Command::Causes { name, json } => causes::run(name.as_deref(), json),
         Command::Exam(args) => exam::run(&args, registry),
         Command::Schema => schema::run(registry),
+        Command::Doctor(args) => doctor::run(&args, registry),
+        Command::Completions { shell } => completions::run(shell),
+        Command::Man { folder } => man::run(folder.as_deref()),
         Command::Docs { folder, check } => docs::run(&folder, check, registry),
     }
 }

@@ -45,6 +45,7 @@ pub use compare::{Difference, Numbers, compare};
 pub use error::StoreError;
 pub use file_kind::{FileKind, file_kind, is_own};
 pub use format::FORMAT_VERSION;
+pub use hdf5::library_version;
 pub use names::RESERVED_STAGE_IDS;
 pub use ports::PortSummary;
 pub use result_file::write_result;
