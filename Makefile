@@ -1,7 +1,8 @@
 # The two commands: `make demo` runs the main job, `make test` passes the tests.
-.PHONY: deps test-deps demo test test-interop lint
+.PHONY: deps test-deps demo test test-interop lint book
 
 CMAKE_VERSION = 3.31.6
+MDBOOK_VERSION = 0.5.4
 
 # What a plain `cargo build --release` needs beside cargo and a C compiler.
 deps: .tools/bin/cmake
@@ -31,6 +32,13 @@ lint: deps
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+
+# The documentation as a book of pages, in book/.
+book: .tools/mdbook/bin/mdbook
+	.tools/mdbook/bin/mdbook build
+
+.tools/mdbook/bin/mdbook:
+	cargo install --quiet --locked --root .tools/mdbook --no-default-features --features search --version $(MDBOOK_VERSION) mdbook
 
 # HDF5 is built from source and wants CMake >= 3.26; PyPI's is newer than many systems'.
 .tools/bin/cmake:
