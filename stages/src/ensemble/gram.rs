@@ -1,17 +1,23 @@
 //! Inner products of all pairs of events' remainders.
 
+use std::ops::Range;
+
 use afmid_pipeline::rows::{RowSource, in_blocks};
 use rayon::prelude::*;
 
 use super::EnsembleError;
 use super::rows::all;
-use super::scatter::{Remainders, dot};
+use super::scatter::Remainders;
 
 /// Bytes of remainders that are held while all later ones pass by: twice as many, half as many passes.
 const HELD_BYTES: usize = 8 << 20;
 
 /// Sums that run side by side: enough to hide the latency of an addition.
 const LANES: usize = 8;
+
+/// Held rows of one task, and samples of a piece: 32 kB of held rows, 256 kB of 64 others.
+const TOGETHER: usize = 8;
+const PIECE: usize = 512;
 
 /// Inner products of all pairs of remainders, `[event][event]`.
 ///
@@ -27,7 +33,8 @@ pub(super) fn gram(rows: &dyn RowSource, remainders: &Remainders<'_>) -> Result<
     let count = rows.rows();
     let events = all(rows);
     let held_rows = (HELD_BYTES / size_of::<f64>() / rows.row_length().max(1)).max(1);
-    let mut products = vec![vec![0.0; count]; count];
+    // what an empty sum of f64 is: the first addition keeps the sign of a zero
+    let mut products = vec![vec![-0.0; count]; count];
     for (number, part) in events.chunks(held_rows).enumerate() {
         let from = number * held_rows;
         let mut held: Vec<Vec<f64>> = Vec::with_capacity(part.len());
@@ -53,36 +60,47 @@ pub(super) fn gram(rows: &dyn RowSource, remainders: &Remainders<'_>) -> Result<
 }
 
 /// Products of each of `a` with all of `b`, into columns from `column` on; of rows with themselves (`same`), each pair once.
+///
+/// Piece of time after piece of time, so that pieces of all rows are near the processor: sums go on where they were.
 fn fill(products: &mut [Vec<f64>], column: usize, a: &[Vec<f64>], b: &[Vec<f64>], same: bool) {
-    products.par_iter_mut().zip(a).enumerate().for_each(|(row, (products, a))| {
-        let skip = if same { row } else { 0 };
-        for (into, b) in products[column + skip..].chunks_mut(LANES).zip(b[skip..].chunks(LANES)) {
-            match <&[Vec<f64>; LANES]>::try_from(b) {
-                Ok(b) => into.copy_from_slice(&dots(a, b)),
-                // the last ones: there may be more room than rows
-                Err(_) => into.iter_mut().zip(b).for_each(|(into, b)| *into = dot(a, b)),
+    let samples = a.first().map_or(0, Vec::len);
+    products.par_chunks_mut(TOGETHER).zip(a.par_chunks(TOGETHER)).enumerate().for_each(|(part, (products, a))| {
+        for from in (0..samples).step_by(PIECE) {
+            let piece = from..(from + PIECE).min(samples);
+            for (row, (products, a)) in products.iter_mut().zip(a).enumerate() {
+                let skip = if same { part * TOGETHER + row } else { 0 };
+                for (sums, b) in products[column + skip..].chunks_mut(LANES).zip(b[skip..].chunks(LANES)) {
+                    add_products(sums, &a[piece.clone()], b, piece.clone());
+                }
             }
         }
     });
 }
 
-/// As many inner products side by side, each a sum in the order of the samples: the same bits as one after the other.
-fn dots(a: &[f64], b: &[Vec<f64>; LANES]) -> [f64; LANES] {
-    let count = b.iter().fold(a.len(), |count, b| count.min(b.len()));
-    let (a, b) = (&a[..count], b.each_ref().map(|b| &b[..count]));
-    // what an empty sum of f64 is: the first addition keeps the sign of a zero
-    let mut sums = [-0.0; LANES];
-    for (k, a) in a.iter().enumerate() {
-        for (sum, b) in sums.iter_mut().zip(&b) {
-            *sum += a * b[k];
+/// Adds the products of `a` with this piece of each `b`, sample after sample: the same bits as one sum after the other.
+fn add_products(sums: &mut [f64], a: &[f64], b: &[Vec<f64>], piece: Range<usize>) {
+    match (<&mut [f64; LANES]>::try_from(&mut *sums), <&[Vec<f64>; LANES]>::try_from(b)) {
+        (Ok(sums), Ok(b)) => {
+            let b = b.each_ref().map(|b| &b[piece.clone()][..a.len()]);
+            let mut running = *sums;
+            for (k, a) in a.iter().enumerate() {
+                for (sum, b) in running.iter_mut().zip(&b) {
+                    *sum += a * b[k];
+                }
+            }
+            *sums = running;
+        }
+        // the last ones: there may be more room than rows
+        _ => {
+            sums.iter_mut().zip(b).for_each(|(sum, b)| a.iter().zip(&b[piece.clone()]).for_each(|(a, b)| *sum += a * b))
         }
     }
-    sums
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ensemble::scatter::dot;
     use crate::ensemble::{Rows, moments};
     use crate::fixture::white_noise;
 
@@ -106,9 +124,10 @@ mod tests {
 
     #[test]
     fn zeros_keep_their_sign() {
-        let a = vec![-0.0; 5];
-        let b: [Vec<f64>; LANES] = std::array::from_fn(|_| vec![1.0; 5]);
-        assert_eq!(dots(&a, &b).map(f64::to_bits), [dot(&a, &b[0]).to_bits(); LANES]);
-        assert_eq!(dots(&[], &b).map(f64::to_bits), [dot(&[], &b[0]).to_bits(); LANES]);
+        let (zeros, ones) = (vec![vec![-0.0; 600]], vec![vec![1.0; 600]; LANES + 1]);
+        let mut products = vec![vec![-0.0; LANES + 1]];
+        fill(&mut products, 0, &zeros, &ones, false);
+        assert_eq!(dot(&zeros[0], &ones[0]).to_bits(), (-0.0f64).to_bits());
+        assert!(products[0].iter().all(|sum| sum.to_bits() == (-0.0f64).to_bits()));
     }
 }
