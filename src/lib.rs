@@ -7,6 +7,7 @@ mod batch;
 mod cli;
 mod commands;
 mod diagnostic;
+mod export;
 mod failure;
 mod inspect;
 mod output;
