@@ -65,7 +65,7 @@ fn a_matlab_file_is_a_header_and_whole_elements() {
         count += 1;
     }
     assert_eq!((at, count), (bytes.len(), 21));
-    assert_eq!(bytes, model_mat(&self::exported()).unwrap());
+    assert_eq!(bytes, model_mat(&exported()).unwrap());
 }
 
 #[test]

@@ -17,7 +17,7 @@ pub struct Units {
 
 /// The units of `force` and `response` in the first array that goes into a stage and has both.
 pub fn units(file: &ResultFile, stage: &StageSummary) -> Units {
-    let arrays = stage.record.wires.iter().filter_map(|(_, from, port)| {
+    let mut arrays = stage.record.wires.iter().filter_map(|(_, from, port)| {
         let have = file.stage(from)?.ports.iter().find(|have| have.name == *port)?;
         if have.shape != Shape::Array {
             return None;
@@ -29,7 +29,7 @@ pub fn units(file: &ResultFile, stage: &StageSummary) -> Units {
         }
     });
     let unit = |array: &afmid_pipeline::Array, name: &str| array.variable(name).ok().map(|found| found.unit.clone());
-    let found = arrays.filter_map(|array| Some((unit(&array, "force")?, unit(&array, "response")?))).next();
+    let found = arrays.find_map(|array| Some((unit(&array, "force")?, unit(&array, "response")?)));
     let (input, output) = found.unzip();
     Units { time: "s", input, output }
 }
