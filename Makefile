@@ -22,11 +22,14 @@ test: test-deps
 	cargo test --workspace --locked
 
 # afmid with other programs, which `make test` does without: a real Slurm of two emulated nodes (root; installs slurm-wlm and munge with apt where
-# they are missing) and Snakemake. The first line builds the program as `make test` does.
-test-interop: deps .tools/snakemake/installed
+# they are missing), Snakemake, a model under Octave, a result in H5Web (octave, chromium, nodejs and npm with apt where they are missing; H5Web from
+# registry.npmjs.org). The first line builds the program as `make test` does.
+test-interop: test-deps .tools/snakemake/installed
 	cargo test --workspace --locked --test submit
 	tests/cluster/workflow.sh target/debug/afmid .tools/snakemake/bin/snakemake
 	tests/cluster/slurm.sh target/debug/afmid .tools/snakemake/bin/snakemake
+	tests/interop/octave.sh target/debug/afmid .tools/bin/python
+	tests/interop/h5web.sh target/debug/afmid
 
 lint: deps
 	cargo fmt --all --check

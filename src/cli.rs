@@ -8,12 +8,14 @@ use clap_complete::Shell;
 
 mod batch;
 mod examples;
+mod export;
 mod new;
 mod provenance;
 mod submit;
 
 pub use batch::{BatchArgs, SetsArgs};
 pub use examples::command;
+pub use export::{ExportArgs, ModelFormat};
 pub use new::{Goal, New, NewPipelineArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
 pub use submit::{SlurmArgs, SubmitTo};
@@ -88,6 +90,8 @@ pub enum Command {
     Trace(TraceArgs),
     /// Repeat a run from its own result file and compare.
     Rerun(RerunArgs),
+    /// Write a model for MATLAB, Octave, Julia or any other program: A, B, C, D, K, covariance, sample time.
+    Export(ExportArgs),
     /// Write a run as a Process Run RO-Crate, which other archives and tools read.
     ExportCrate(CrateArgs),
     /// Free the cache: what has not been used for longest goes first.

@@ -8,6 +8,7 @@ mod cli;
 mod commands;
 mod diagnostic;
 mod doctor;
+mod export;
 mod failure;
 mod inspect;
 mod output;

@@ -12,10 +12,11 @@ use crate::failure::Failure;
 use crate::output::print;
 
 /// Pages of the book that are written by hand: title and file.
-const CHAPTERS: [(&str, &str); 10] = [
+const CHAPTERS: [(&str, &str); 11] = [
     ("The paper, figure by figure", "paper.md"),
     ("Diagnosis", "diagnosis.md"),
     ("Archives", "archives.md"),
+    ("Models for other programs", "export.md"),
     ("Accuracy", "accuracy.md"),
     ("Performance", "performance.md"),
     ("Conventions", "conventions.md"),

@@ -9,6 +9,7 @@ mod docs;
 mod doctor;
 mod exam;
 mod explain;
+mod export;
 mod export_crate;
 mod gc;
 mod graph;
@@ -45,6 +46,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::Diff(args) => diff::run(&args),
         Command::Trace(args) => trace::run(&args),
         Command::Rerun(args) => rerun::run(&args, registry),
+        Command::Export(args) => export::run(&args),
         Command::ExportCrate(args) => export_crate::run(&args),
         Command::Gc(args) => gc::run(&args),
         Command::Report(args) => report::run(&args),
