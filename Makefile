@@ -1,5 +1,5 @@
 # The two commands: `make demo` runs the main job, `make test` passes the tests.
-.PHONY: deps test-deps demo test test-interop lint book
+.PHONY: deps test-deps demo test test-interop test-slurm lint book
 
 CMAKE_VERSION = 3.31.6
 MDBOOK_VERSION = 0.5.4
@@ -24,12 +24,15 @@ test: test-deps
 # afmid with other programs, which `make test` does without: a real Slurm of two emulated nodes (root; installs slurm-wlm and munge with apt where
 # they are missing), Snakemake, a model under Octave, a result in H5Web (octave, chromium, nodejs and npm with apt where they are missing; H5Web from
 # registry.npmjs.org). The first line builds the program as `make test` does.
-test-interop: test-deps .tools/snakemake/installed
+test-interop: test-slurm test-deps
+	tests/interop/octave.sh target/debug/afmid .tools/bin/python
+	tests/interop/h5web.sh target/debug/afmid
+
+# The part of it that .ci/run calls where Slurm can be had.
+test-slurm: deps .tools/snakemake/installed
 	cargo test --workspace --locked --test submit
 	tests/cluster/workflow.sh target/debug/afmid .tools/snakemake/bin/snakemake
 	tests/cluster/slurm.sh target/debug/afmid .tools/snakemake/bin/snakemake
-	tests/interop/octave.sh target/debug/afmid .tools/bin/python
-	tests/interop/h5web.sh target/debug/afmid
 
 lint: deps
 	cargo fmt --all --check

@@ -19,14 +19,6 @@ pub struct Trend {
     pub middle_years: f64,
 }
 
-impl Trend {
-    /// How far a value lies from the line, in standard deviations of the values about it.
-    fn off(&self, years: f64, value: f64, std: f64) -> f64 {
-        let expected = self.value.0 + self.per_year.0 * (years - self.middle_years);
-        (value - expected) / (std * self.reduced_chi_square.max(1.0).sqrt())
-    }
-}
-
 /// Largest ratio of frequencies of one mode: the modes of a lever are further apart.
 const SAME_MODE: f64 = 1.25;
 /// Seconds of a Julian year.
@@ -60,12 +52,29 @@ pub fn trend(points: &[(f64, f64, f64)]) -> Option<Trend> {
     })
 }
 
+/// How far a value lies from the line through all others, in standard deviations of such a distance, which widen as the others scatter; NaN where they are too few for
+/// a line. An outlier does not widen its own.
+///
+/// Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, 1982, section 2.2 (externally studentised residuals).
+fn off(points: &[(f64, f64, f64)], index: usize) -> f64 {
+    let Some(&(years, value, std)) = points.get(index) else { return f64::NAN };
+    let others = [&points[..index], &points[index + 1..]].concat();
+    trend(&others).map_or(f64::NAN, |line| {
+        let after = years - line.middle_years;
+        let expected = line.value.0 + line.per_year.0 * after;
+        let variance = std.powi(2) + line.value.1.powi(2) + (line.per_year.1 * after).powi(2);
+        (value - expected) / (variance * line.reduced_chi_square.max(1.0)).sqrt()
+    })
+}
+
 /// One value of one data set, over time.
 struct Seen<'a> {
     data_set: &'a str,
     years: f64,
     value: f64,
     std: f64,
+    /// See [`off`].
+    off: f64,
 }
 
 /// A quantity with all its values, and the line through them if there is one.
@@ -83,15 +92,17 @@ struct Quantity<'a> {
 fn quantities<'a>(entries: &'a [Entry]) -> Vec<Quantity<'a>> {
     let timed: Vec<(f64, &'a Entry)> = entries.iter().filter_map(|entry| Some((years(entry)?, entry))).collect();
     let quantity = |name: String, unit: &'static str, of: &dyn Fn(&Entry) -> Option<(f64, f64)>| {
-        let seen: Vec<Seen<'_>> = timed
-            .iter()
-            .filter_map(|&(years, entry)| {
-                let (value, std) = of(entry)?;
-                Some(Seen { data_set: &entry.name, years, value, std })
-            })
-            .collect();
-        let trend = trend(&seen.iter().map(|seen| (seen.years, seen.value, seen.std)).collect::<Vec<_>>());
-        Quantity { name, unit, seen, trend }
+        let known = timed.iter().filter_map(|&(years, entry)| Some((entry, years, of(entry)?)));
+        let known: Vec<(&'a Entry, f64, (f64, f64))> = known.collect();
+        let points: Vec<(f64, f64, f64)> = known.iter().map(|&(_, years, (value, std))| (years, value, std)).collect();
+        let one = |(index, &(entry, years, (value, std))): (usize, &(&'a Entry, f64, (f64, f64)))| Seen {
+            data_set: &entry.name,
+            years,
+            value,
+            std,
+            off: off(&points, index),
+        };
+        Quantity { name, unit, seen: known.iter().enumerate().map(one).collect(), trend: trend(&points) }
     };
     let mut all = Vec::new();
     for (number, reference) in (1..).zip(reference(entries)) {
@@ -129,15 +140,11 @@ pub fn table(entries: &[Entry]) -> Table {
         .with("reduced_chi_square", "1", "scatter over what the errors say", real(|t| t.reduced_chi_square))
 }
 
-/// Every value of every quantity over time, with its distance from the line through all of them in standard deviations: those of its own error, widened as the
-/// values scatter; NaN without a line.
+/// Every value of every quantity over time, with its distance from the line through the others (see [`off`]).
 pub fn values(entries: &[Entry]) -> Table {
     let quantities = quantities(entries);
     let rows: Vec<(&Quantity<'_>, &Seen<'_>)> =
         quantities.iter().flat_map(|q| q.seen.iter().map(move |s| (q, s))).collect();
-    let off = |(quantity, seen): &(&Quantity<'_>, &Seen<'_>)| {
-        quantity.trend.map_or(f64::NAN, |trend| trend.off(seen.years, seen.value, seen.std))
-    };
     let real = |of: fn(&Seen<'_>) -> f64| rows.iter().map(|(_, seen)| of(seen)).collect::<Vec<f64>>();
     Table::new()
         .with(
@@ -151,7 +158,7 @@ pub fn values(entries: &[Entry]) -> Table {
         .with("year", "1", "when, in years of 365.25 days, 1970 the first", real(|seen| 1970.0 + seen.years))
         .with("value", "", "the value", real(|seen| seen.value))
         .with("std", "", "its standard error", real(|seen| seen.std))
-        .with("off", "1", "distance from the line in standard deviations", rows.iter().map(off).collect::<Vec<f64>>())
+        .with("off", "1", "distance from the line of the others in standard deviations", real(|seen| seen.off))
 }
 
 /// Years since 1970.
@@ -220,7 +227,7 @@ mod tests {
         // two of mode 1, three of mode 2; the last set says not when
         assert_eq!(values.text("data_set").unwrap(), ["a", "c", "a", "b", "c"]);
         let (off, years) = (values.real("off").unwrap(), values.real("year").unwrap());
-        assert!(off[0].is_nan() && off[2].abs() < 0.1, "{off:?}");
+        assert!(off.iter().all(|off| off.is_nan()), "two others make no line: {off:?}");
         assert!((years[0] - 2005.0).abs() < 0.01, "{years:?}");
     }
 
@@ -228,9 +235,12 @@ mod tests {
     fn an_outlier_is_far_off_the_line_that_the_others_make() {
         let line = |i: u32| (f64::from(i), 100.0 + f64::from(i), 1.0);
         let mut points: Vec<(f64, f64, f64)> = (0..40).map(line).collect();
-        points[20].1 += 30.0;
-        let trend = trend(&points).unwrap();
-        let off: Vec<f64> = points.iter().map(|p| trend.off(p.0, p.1, p.2)).collect();
-        assert!(off[20] > 5.0 && off.iter().filter(|off| off.abs() > 1.0).count() == 1, "{off:?}");
+        for wrong in [20, 39] {
+            points[wrong].1 += 30.0;
+            let off: Vec<f64> = (0..40).map(|index| off(&points, index)).collect();
+            // 30 errors, less what the line itself is uncertain by at its end
+            assert!(off[wrong] > 25.0 && off.iter().filter(|off| off.abs() > 1.5).count() == 1, "{off:?}");
+            points[wrong].1 -= 30.0;
+        }
     }
 }
