@@ -3,6 +3,7 @@
 //! A third of the operations of a QR, at the full rate of the vector units, for half the digits: for columns whose condition is checked.
 
 use faer::{Mat, MatRef};
+use pulp::Simd;
 
 use super::orthogonal::product;
 
@@ -10,12 +11,6 @@ use super::orthogonal::product;
 const BLOCK: usize = 96;
 /// Columns by columns whose products are summed at once: nine sums and six operands fill the vector registers.
 const TILE: usize = 3;
-/// Numbers added side by side, for the processor's vector units.
-const LANES: usize = 4;
-
-/// Sums of one tile.
-type Sums = [[[f64; LANES]; TILE]; TILE];
-
 /// `matrix^T matrix`, columns x columns; about `rows columns^2` operations, always on the calling thread.
 pub(crate) fn gram(matrix: MatRef<'_, f64>) -> Mat<f64> {
     match slices(matrix) {
@@ -47,29 +42,29 @@ struct Products<'a> {
     symmetric: bool,
 }
 
-impl pulp::NullaryFnOnce for Products<'_> {
+impl pulp::WithSimd for Products<'_> {
     type Output = Mat<f64>;
 
     #[inline(always)]
-    fn call(self) -> Mat<f64> {
+    fn with_simd<S: Simd>(self, simd: S) -> Mat<f64> {
         let Self { left, right, symmetric } = self;
         let rows = left.first().or(right.first()).map_or(0, |column| column.len());
         let across = right.len().div_ceil(TILE);
-        let mut sums: Vec<Sums> = vec![[[[0.0; LANES]; TILE]; TILE]; left.len().div_ceil(TILE) * across];
+        let none = simd.splat_f64s(0.0);
+        let mut sums = vec![[[none; TILE]; TILE]; left.len().div_ceil(TILE) * across];
         for top in (0..rows).step_by(BLOCK) {
             let block = top..rows.min(top + BLOCK);
             for (i, sums) in sums.chunks_exact_mut(across.max(1)).enumerate() {
                 let own = tile(left, i, &block);
                 let first = if symmetric { i } else { 0 };
                 for (j, sums) in sums.iter_mut().enumerate().skip(first) {
-                    add(own, tile(right, j, &block), sums);
+                    *sums = added(simd, own, tile(right, j, &block), *sums);
                 }
             }
         }
         Mat::from_fn(left.len(), right.len(), |i, j| {
             let (i, j) = if symmetric { (i.min(j), i.max(j)) } else { (i, j) };
-            let [a, b, c, d] = sums[i / TILE * across + j / TILE][i % TILE][j % TILE];
-            (a + b) + (c + d)
+            simd.reduce_sum_f64s(sums[i / TILE * across + j / TILE][i % TILE][j % TILE])
         })
     }
 }
@@ -80,28 +75,39 @@ fn tile<'a>(columns: &[&'a [f64]], index: usize, rows: &std::ops::Range<usize>) 
     std::array::from_fn(|l| &columns[(index * TILE + l).min(columns.len() - 1)][rows.start..rows.end])
 }
 
-/// Adds the products of a block's rows.
+/// The sums with the products of a block's rows.
 #[inline(always)]
-fn add(left: [&[f64]; TILE], right: [&[f64]; TILE], sums: &mut Sums) {
-    let (a, b) = (left.map(|column| column.as_chunks::<LANES>()), right.map(|column| column.as_chunks::<LANES>()));
-    let rounds = a[0].0.len();
-    let (full_a, full_b) = (a.map(|(full, _)| &full[..rounds]), b.map(|(full, _)| &full[..rounds]));
-    let mut own = *sums;
-    for r in 0..rounds {
-        for i in 0..TILE {
-            for j in 0..TILE {
-                for l in 0..LANES {
-                    own[i][j][l] = full_a[i][r][l].mul_add(full_b[j][r][l], own[i][j][l]);
-                }
-            }
-        }
+fn added<S: Simd>(
+    simd: S,
+    left: [&[f64]; TILE],
+    right: [&[f64]; TILE],
+    mut sums: [[S::f64s; TILE]; TILE],
+) -> [[S::f64s; TILE]; TILE] {
+    let ([a0, a1, a2], [b0, b1, b2]) = (left.map(S::as_simd_f64s), right.map(S::as_simd_f64s));
+    let full = a0.0.iter().zip(a1.0).zip(a2.0).zip(b0.0.iter().zip(b1.0).zip(b2.0));
+    for (((a0, a1), a2), ((b0, b1), b2)) in full {
+        sums = outer(simd, [*a0, *a1, *a2], [*b0, *b1, *b2], sums);
     }
-    for i in 0..TILE {
-        for j in 0..TILE {
-            a[i].1.iter().zip(b[j].1).for_each(|(x, y)| own[i][j][0] = x.mul_add(*y, own[i][j][0]));
-        }
+    if !a0.1.is_empty() {
+        let rest = |(_, rest): (&[S::f64s], &[f64])| simd.partial_load_f64s(rest);
+        sums = outer(simd, [a0, a1, a2].map(rest), [b0, b1, b2].map(rest), sums);
     }
-    *sums = own;
+    sums
+}
+
+/// The sums with every product of one row's numbers.
+#[inline(always)]
+fn outer<S: Simd>(
+    simd: S,
+    a: [S::f64s; TILE],
+    b: [S::f64s; TILE],
+    sums: [[S::f64s; TILE]; TILE],
+) -> [[S::f64s; TILE]; TILE] {
+    let [s0, s1, s2] = sums;
+    let row = |a: S::f64s, [s0, s1, s2]: [S::f64s; TILE]| {
+        [simd.mul_add_e_f64s(a, b[0], s0), simd.mul_add_e_f64s(a, b[1], s1), simd.mul_add_e_f64s(a, b[2], s2)]
+    };
+    [row(a[0], s0), row(a[1], s1), row(a[2], s2)]
 }
 
 #[cfg(test)]

@@ -104,26 +104,34 @@ pub(crate) fn coefficient_jacobian(
         let own = problem.nuisance_column(index);
         let place = Place { top, column: 0, width: n, delay: 1 };
         for (group, sections) in a.chunks(SIDE_BY_SIDE).enumerate() {
-            // each section's deterministic output
-            let mut x: Vec<[f64; SIDE_BY_SIDE]> = match c {
-                Some(_) => e.iter().map(|e| [*e; SIDE_BY_SIDE]).collect(),
-                None => vec![[0.0; SIDE_BY_SIDE]; y.len()],
-            };
-            for i in 0..sections.len() {
-                let section = group * SIDE_BY_SIDE + i;
+            let first = group * SIDE_BY_SIDE;
+            // the columns of each section's deterministic output, with their weights
+            let mut parts: Vec<(usize, f64, &[f64])> = Vec::new();
+            for section in first..first + sections.len() {
                 for j in 0..section_order(n, section) {
                     let inputs = (0..problem.inputs).map(|input| problem.input_column(input) + 2 * section + j);
                     for column in inputs.chain([own + 2 * section + j]) {
-                        let filtered = regressors.col(column).subrows(top, y.len()).iter();
-                        x.iter_mut().zip(filtered).for_each(|(x, r)| x[i] += theta[column] * r);
+                        if let Some(filtered) = regressors.col(column).try_as_col_major() {
+                            parts.push((section - first, theta[column], &filtered.as_slice()[top..top + y.len()]));
+                        }
                     }
                 }
             }
-            respond(&mut jacobian, place.group(group), sections, &x, |x| *x);
+            respond(&mut jacobian, place.group(group), sections, y.len(), |start, chunk| {
+                match c {
+                    Some(_) => chunk.iter_mut().zip(&e[start..]).for_each(|(x, e)| *x = [*e; SIDE_BY_SIDE]),
+                    None => chunk.fill([0.0; SIDE_BY_SIDE]),
+                }
+                for (i, weight, filtered) in &parts {
+                    chunk.iter_mut().zip(&filtered[start..]).for_each(|(x, r)| x[*i] += weight * r);
+                }
+            });
         }
         for (group, sections) in c.as_deref().unwrap_or_default().chunks(SIDE_BY_SIDE).enumerate() {
             let place = Place { column: n, ..place }.group(group);
-            respond(&mut jacobian, place, sections, e, |e| [-e; SIDE_BY_SIDE]);
+            respond(&mut jacobian, place, sections, e.len(), |start, chunk| {
+                chunk.iter_mut().zip(&e[start..]).for_each(|(x, e)| *x = [-e; SIDE_BY_SIDE]);
+            });
         }
         top += y.len();
     }

@@ -172,40 +172,42 @@ fn fill_sections<T>(
     pick: impl Fn(&T) -> f64 + Copy,
 ) {
     for (index, sections) in a.chunks(SIDE_BY_SIDE).enumerate() {
-        respond(matrix, place.group(index), sections, signals, |s| [pick(s); SIDE_BY_SIDE]);
+        respond(matrix, place.group(index), sections, signals.len(), |start, chunk| {
+            chunk.iter_mut().zip(&signals[start..]).for_each(|(x, s)| *x = [pick(s); SIDE_BY_SIDE]);
+        });
     }
 }
 
-/// A signal for each of up to [`SIDE_BY_SIDE`] sections, through `1 / a`.
-pub(super) fn respond<T>(
+/// A signal for each of up to [`SIDE_BY_SIDE`] sections, through `1 / a`: `signals` writes those from a row on.
+pub(super) fn respond(
     matrix: &mut Mat<f64>,
     place: Place,
     sections: &[Coefficients],
-    signals: &[T],
-    pick: impl Fn(&T) -> [f64; SIDE_BY_SIDE],
+    length: usize,
+    mut signals: impl FnMut(usize, &mut [[f64; SIDE_BY_SIDE]]),
 ) {
     let Place { top, column, width, delay } = place;
-    let length = signals.len();
     let mut bank = Bank::new(sections);
-    let mut start = 0;
-    for signals in signals.chunks(CHUNK) {
-        let filtered = bank.run(signals, &pick);
+    let mut chunk = [[0.0; SIDE_BY_SIDE]; CHUNK];
+    for start in (0..length).step_by(CHUNK) {
+        let chunk = &mut chunk[..CHUNK.min(length - start)];
+        signals(start, chunk);
+        bank.run(chunk);
         let first = top + start + delay;
-        let kept = signals.len().min((length - start).saturating_sub(delay));
+        let kept = chunk.len().min((length - start).saturating_sub(delay));
         for i in 0..sections.len() {
             if let Some(target) = column_slice(matrix, column + 2 * i) {
-                target[first..first + kept].iter_mut().zip(&filtered).for_each(|(t, y)| *t = y[i]);
+                target[first..first + kept].iter_mut().zip(&*chunk).for_each(|(t, y)| *t = y[i]);
             }
         }
-        start += signals.len();
     }
     (0..width / 2).for_each(|i| once_more(matrix, top, length, column + 2 * i, column + 2 * i + 1));
 }
 
 /// Sections filtered side by side, for the processor's vector units.
 pub(super) const SIDE_BY_SIDE: usize = 8;
-/// Samples at a time: what they give stays in the first-level cache.
-const CHUNK: usize = 128;
+/// Samples at a time: they stay in the first-level cache.
+pub(super) const CHUNK: usize = 128;
 
 /// `1 / a` of several sections.
 struct Bank {
@@ -220,19 +222,18 @@ impl Bank {
         Self { a, past: [[0.0; SIDE_BY_SIDE]; 2] }
     }
 
-    /// The next samples, at most [`CHUNK`], of each section's own signal.
-    fn run<T>(&mut self, signals: &[T], pick: impl Fn(&T) -> [f64; SIDE_BY_SIDE]) -> [[f64; SIDE_BY_SIDE]; CHUNK] {
-        let mut out = [[0.0; SIDE_BY_SIDE]; CHUNK];
+    /// Filters the next samples of each section's own signal in place.
+    fn run(&mut self, signals: &mut [[f64; SIDE_BY_SIDE]]) {
         let [mut y1, mut y2] = self.past;
-        for (out, signal) in out.iter_mut().zip(signals) {
-            let x = pick(signal);
+        for signal in signals {
+            let mut y = [0.0; SIDE_BY_SIDE];
             for i in 0..SIDE_BY_SIDE {
-                out[i] = (x[i] - self.a[1][i] * y2[i]) - self.a[0][i] * y1[i];
+                y[i] = (signal[i] - self.a[1][i] * y2[i]) - self.a[0][i] * y1[i];
             }
-            (y2, y1) = (y1, *out);
+            (y2, y1) = (y1, y);
+            *signal = y;
         }
         self.past = [y1, y2];
-        out
     }
 }
 

@@ -71,18 +71,26 @@ impl Tangent {
     pub fn spectra(&self, e: &[f64], top: usize, length: usize, planner: &mut RealFftPlanner<f64>) -> Spectra {
         let forward = planner.plan_fft_forward(length);
         let scale = 1.0 / (length as f64).sqrt();
-        let transform = |values: &mut dyn Iterator<Item = f64>| {
-            let mut time = forward.make_input_vec();
-            time.iter_mut().zip(values).for_each(|(t, v)| *t = v * scale);
+        let mut time = forward.make_input_vec();
+        let mut scratch = forward.make_scratch_vec();
+        let mut transform = |fill: &mut dyn FnMut(&mut [f64])| {
+            fill(&mut time);
+            time.iter_mut().for_each(|t| *t *= scale);
             let mut spectrum = forward.make_output_vec();
             // lengths are the plan's own: no error is possible
-            let _ = forward.process(&mut time, &mut spectrum);
+            let _ = forward.process_with_scratch(&mut time, &mut spectrum, &mut scratch);
             spectrum
         };
         let basis: Vec<Vec<Complex64>> = (0..self.basis.ncols())
-            .map(|k| transform(&mut self.basis.col(k).iter().skip(top).take(length).copied()))
+            .map(|k| {
+                let column = self.basis.col(k).subrows(top, length);
+                transform(&mut |time| match column.try_as_col_major() {
+                    Some(column) => time.copy_from_slice(column.as_slice()),
+                    None => time.iter_mut().zip(column.iter()).for_each(|(t, v)| *t = *v),
+                })
+            })
             .collect();
-        let residual = transform(&mut e[top..top + length].iter().copied());
+        let residual = transform(&mut |time| time.copy_from_slice(&e[top..top + length]));
         let mut remaining = vec![1.0; residual.len()];
         for direction in &basis {
             remaining.iter_mut().zip(direction).for_each(|(left, value)| *left -= value.norm_sqr());
