@@ -9,7 +9,7 @@ use super::gradient::{Noise, Point};
 use super::linearised::{Linearised, Quadratic, unscaled};
 use super::parametrisation::{LIMIT, coordinates, roots, section_order};
 use super::predictor::Problem;
-use super::secant::{Secant, Taken};
+use super::secant::Taken;
 use super::state::{Memory, State};
 use crate::model::error::ModelError;
 
