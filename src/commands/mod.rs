@@ -13,6 +13,7 @@ mod graph;
 mod inspect;
 mod load;
 mod open;
+mod plugin;
 mod report;
 mod rerun;
 mod run;
@@ -49,6 +50,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::Stages { name } => stages::run(name.as_deref(), registry),
         Command::Causes { name, json } => causes::run(name.as_deref(), json),
         Command::Exam(args) => exam::run(&args, registry),
+        Command::Plugin { what } => plugin::run(&what),
         Command::Schema => schema::run(registry),
         Command::Docs { folder, check } => docs::run(&folder, check, registry),
     }

@@ -8,6 +8,7 @@ pub struct Context<'a> {
     base: PathBuf,
     seed: u64,
     warnings: Mutex<Vec<String>>,
+    log: Mutex<String>,
     progress: &'a dyn Progress,
 }
 
@@ -31,7 +32,7 @@ impl Progress for NoProgress {
 impl<'a> Context<'a> {
     /// A context for one run of one stage.
     pub fn new(base: &Path, seed: u64, progress: &'a dyn Progress) -> Self {
-        Self { base: base.to_owned(), seed, warnings: Mutex::new(Vec::new()), progress }
+        Self { base: base.to_owned(), seed, warnings: Mutex::new(Vec::new()), log: Mutex::default(), progress }
     }
 
     /// The folder of the config file: relative paths in parameters start there.
@@ -49,6 +50,16 @@ impl<'a> Context<'a> {
     /// Call it in a fixed order (not from parallel work): warnings are part of the result.
     pub fn warn(&self, text: impl Into<String>) {
         self.warnings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text.into());
+    }
+
+    /// Keeps what a process of another program said, beside the times of the run: a record for people, no part of the result.
+    pub fn log(&self, text: &str) {
+        self.log.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push_str(text);
+    }
+
+    /// What was kept so far.
+    pub fn take_log(&self) -> String {
+        std::mem::take(&mut self.log.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
 
     /// Announces items of work; call [`Context::tick`] for each, from any thread.
