@@ -1,7 +1,8 @@
 # The two commands: `make demo` runs the main job, `make test` passes the tests.
-.PHONY: deps test-deps demo test test-interop lint
+.PHONY: deps test-deps demo test test-interop test-slurm lint book
 
 CMAKE_VERSION = 3.31.6
+MDBOOK_VERSION = 0.5.4
 
 # What a plain `cargo build --release` needs beside cargo and a C compiler.
 deps: .tools/bin/cmake
@@ -21,8 +22,14 @@ test: test-deps
 	cargo test --workspace --locked
 
 # afmid with other programs, which `make test` does without: a real Slurm of two emulated nodes (root; installs slurm-wlm and munge with apt where
-# they are missing) and Snakemake. The first line builds the program as `make test` does.
-test-interop: deps .tools/snakemake/installed
+# they are missing), Snakemake, a model under Octave, a result in H5Web (octave, chromium, nodejs and npm with apt where they are missing; H5Web from
+# registry.npmjs.org). The first line builds the program as `make test` does.
+test-interop: test-slurm test-deps
+	tests/interop/octave.sh target/debug/afmid .tools/bin/python
+	tests/interop/h5web.sh target/debug/afmid
+
+# The part of it that .ci/run calls where Slurm can be had.
+test-slurm: deps .tools/snakemake/installed
 	cargo test --workspace --locked --test submit
 	tests/cluster/workflow.sh target/debug/afmid .tools/snakemake/bin/snakemake
 	tests/cluster/slurm.sh target/debug/afmid .tools/snakemake/bin/snakemake
@@ -31,6 +38,13 @@ lint: deps
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+
+# The documentation as a book of pages, in book/.
+book: .tools/mdbook/bin/mdbook
+	.tools/mdbook/bin/mdbook build
+
+.tools/mdbook/bin/mdbook:
+	cargo install --quiet --locked --root .tools/mdbook --no-default-features --features search --version $(MDBOOK_VERSION) mdbook
 
 # HDF5 is built from source and wants CMake >= 3.26; PyPI's is newer than many systems'.
 .tools/bin/cmake:

@@ -4,12 +4,19 @@ use std::num::NonZeroU16;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 
 mod batch;
+mod examples;
+mod export;
+mod new;
 mod provenance;
 mod submit;
 
 pub use batch::{BatchArgs, SetsArgs};
+pub use examples::command;
+pub use export::{ExportArgs, ModelFormat};
+pub use new::{Goal, New, NewPipelineArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
 pub use submit::{SlurmArgs, SubmitTo};
 
@@ -34,6 +41,12 @@ pub enum Command {
         /// Which kind of cluster.
         #[command(subcommand)]
         to: SubmitTo,
+    },
+    /// Begin something of your own.
+    New {
+        /// What.
+        #[command(subcommand)]
+        what: New,
     },
     /// Check configs: everything that can be wrong without opening data, all errors at once.
     Check {
@@ -77,6 +90,8 @@ pub enum Command {
     Trace(TraceArgs),
     /// Repeat a run from its own result file and compare.
     Rerun(RerunArgs),
+    /// Write a model for MATLAB, Octave, Julia or any other program: A, B, C, D, K, covariance, sample time.
+    Export(ExportArgs),
     /// Write a run as a Process Run RO-Crate, which other archives and tools read.
     ExportCrate(CrateArgs),
     /// Free the cache: what has not been used for longest goes first.
@@ -106,6 +121,19 @@ pub enum Command {
     },
     /// Print the JSON Schema of a config.
     Schema,
+    /// Look at everything that a run needs of this machine: library, cache, disk, arithmetic; say what to do where something is missing.
+    Doctor(DoctorArgs),
+    /// Print the completions of a shell.
+    Completions {
+        /// The shell.
+        #[arg(value_enum)]
+        shell: Shell,
+    },
+    /// Print the manual page, or write those of all commands into a folder.
+    Man {
+        /// The folder, such as ~/.local/share/man/man1.
+        folder: Option<PathBuf>,
+    },
     /// Write the generated documentation: the stages' pages and the schema of configs.
     #[command(hide = true)]
     Docs {
@@ -234,6 +262,17 @@ pub struct ExplainArgs {
     /// The config and what changes it.
     #[command(flatten)]
     pub config: ConfigArgs,
+    /// Where stage results are kept, as for `run`.
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+    /// As JSON, alone on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Where to look.
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
     /// Where stage results are kept, as for `run`.
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,

@@ -7,12 +7,16 @@ mod batch;
 mod cli;
 mod commands;
 mod diagnostic;
+mod doctor;
+mod export;
 mod failure;
 mod inspect;
 mod output;
 mod progress;
 mod provenance;
+mod relative;
 mod report;
+mod scaffold;
 mod show;
 mod sweep;
 
@@ -21,7 +25,7 @@ use std::process::ExitCode;
 
 use afmid_pipeline::Registry;
 use afmid_pipeline::stage::DoubleName;
-use clap::Parser;
+use clap::FromArgMatches;
 
 use failure::{Failure, Message};
 
@@ -32,7 +36,8 @@ pub fn registry() -> Result<Registry, DoubleName> {
 
 /// The command line of a program with these stages: parses the arguments, runs the command, reports.
 pub fn main(registry: &Registry) -> ExitCode {
-    let done = match cli::Cli::try_parse() {
+    let parsed = cli::command().try_get_matches().and_then(|matches| cli::Cli::from_arg_matches(&matches));
+    let done = match parsed {
         Ok(cli) => commands::dispatch(cli.command, registry),
         Err(error) => told(&error),
     };

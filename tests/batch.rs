@@ -94,6 +94,15 @@ fn shards_add_up_to_the_same_table_byte_for_byte() {
     let shown = shown.current_dir(here.folder()).args(["show", "parts/summary.h5", "summary"]).output();
     let shown = shown.expect("afmid starts");
     assert!(shown.status.success() && String::from_utf8_lossy(&shown.stdout).contains("set8"), "{shown:?}");
+    // what has changed since its run is not passed off as its result
+    here.set("set4", 77, 2000);
+    let (code, told) = here.told(&[&parts[..], &["--collect"]].concat());
+    assert_eq!((code, &told["failed"], &told["failures"][0]["name"]), (3, &1.into(), &"set4".into()));
+    assert!(told["failures"][0]["error"].as_str().expect("a reason").contains("have changed"), "{told}");
+    assert_eq!(here.told(&parts).0, 0);
+    std::fs::remove_file(here.path("parts/set2.h5")).expect("a result");
+    let (code, told) = here.told(&[&parts[..], &["--collect"]].concat());
+    assert_eq!((code, &told["failures"][0]["name"]), (3, &"set2".into()), "{told}");
 }
 
 #[test]

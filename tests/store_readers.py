@@ -1,16 +1,19 @@
-"""Opens an afmid result file with other people's readers: h5py, xarray (h5netcdf) and nxcheck.
+"""Opens an afmid result file with other people's readers: h5py, silx, xarray (h5netcdf) and nxcheck.
 
 Prints one line per check; exits with 1 if any fails. Usage: store_readers.py RESULT.h5
 """
 
 import re
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import h5py
 import numpy as np
 import xarray as xr
+from silx.io.nxdata import get_default
 
 # attributes of dimension scales: the only references that readers can live with
 SCALE_ATTRIBUTES = {"DIMENSION_LIST", "REFERENCE_LIST"}
@@ -92,6 +95,27 @@ def check_default_plot(path):
         print(f"default plot: {group.name}, {plots} groups with signal and axes")
 
 
+def check_silx(path):
+    """What `silx view` plots of the file, and of every stage that has a default plot."""
+    with h5py.File(path) as file:
+        shown = get_default(file)
+        check(shown is not None and shown.is_valid, "silx: no default plot")
+        if shown is None:
+            return
+        signal = decoded(shown.group.attrs["signal"])
+        check(shown.signal_dataset_name == signal, f"silx: {shown.signal_dataset_name} is not {signal}")
+        check(all(axis is not None for axis in shown.axes), f"silx: {shown.group.name}: an axis is missing")
+        check(shown.is_curve or shown.is_image, f"silx: {shown.group.name} is neither a curve nor an image")
+        print(f"silx: default plot {shown.group.name}, {shown.signal_dataset_name} over {', '.join(shown.axes_dataset_names)}")
+        plots = 0
+        for name, stage in file["entry"].items():
+            if "default" in stage.attrs:
+                data = get_default(stage)
+                check(data is not None and data.is_valid, f"silx: {name}: no default plot")
+                plots += 1
+        print(f"silx: default plots of {plots} stages")
+
+
 def check_xarray(path):
     """Opens every artifact; coordinates are the stored ones; complex variables are joined again."""
     with h5py.File(path) as file:
@@ -126,9 +150,14 @@ def check_xarray(path):
 
 
 def check_nexus(path):
-    """Runs nxcheck. Its exit code is always 0, so the totals are read from its last lines."""
-    command = [sys.executable, str(Path(sys.executable).with_name("nxcheck")), path]
-    output = subprocess.run(command, capture_output=True, text=True, check=False)
+    """Runs nxcheck. Its exit code is always 0, so the totals are read from its last lines.
+
+    On a copy: it opens files for writing, and HDF5 then cuts off the seal that lies behind its end.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        copy = shutil.copy(path, folder)
+        command = [sys.executable, str(Path(sys.executable).with_name("nxcheck")), copy]
+        output = subprocess.run(command, capture_output=True, text=True, check=False)
     text = re.sub(r"\x1b\[[0-9;]*m", "", output.stdout)
     totals = {kind: re.search(rf"Total number of {kind}: (\d+)", text) for kind in ("warnings", "errors")}
     if totals["errors"] is None:
@@ -142,7 +171,7 @@ def check_nexus(path):
 def main():
     if len(sys.argv) != 2:
         sys.exit("usage: store_readers.py RESULT.h5")
-    for run in (check_h5py, check_default_plot, check_xarray, check_nexus):
+    for run in (check_h5py, check_default_plot, check_silx, check_xarray, check_nexus):
         try:
             run(sys.argv[1])
         except Exception as error:  # a reader that gives up is what this script looks for

@@ -4,8 +4,8 @@ mod common;
 
 use std::path::Path;
 
-use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
 use afmid_pipeline::store::compare;
+use common::sets::{CENSUS, write_set};
 use common::{afmid, command, config, files, number, simulated};
 use serde_json::Value;
 
@@ -94,47 +94,15 @@ fn only_the_changed_branch_is_computed_and_points_are_runs_like_others() {
     }
 }
 
-const CENSUS: &str = r#"
-[pipeline]
-name = "census"
-
-[[stage]]
-id = "records"
-uses = "io.records"
-params = { files = ["a/*.h5"] }
-
-[[stage]]
-id = "census"
-uses = "io.census"
-inputs = { records = "records" }
-
-[sweep]
-"#;
-
 /// Two records in `a`; in `b` one of them is cut short.
 fn census(here: &Path, sweep: &str) {
-    for folder in ["a", "b"] {
-        std::fs::create_dir_all(here.join(folder)).expect("a folder");
-        for record in 0..2 {
-            let code = |k: i16| k.wrapping_mul(7919).wrapping_add(record) % 1000;
-            let channel = NativeChannel {
-                location: "/deflection".to_owned(),
-                codes: Codes::Int16((0..3000).map(code).collect()),
-                unit: "V".to_owned(),
-                scale_factor: 0.001,
-                add_offset: 0.0,
-                long_name: "deflection".to_owned(),
-            };
-            let started_at = "2005-03-01T10:00:00Z".to_owned();
-            let native = NativeRecord { sample_rate_hz: 5e6, started_at, channels: vec![channel] };
-            let path = here.join(folder).join(format!("record_{record}.h5"));
-            write_native(&path, &native, RecordStorage::Raw).expect("a record");
-        }
-    }
+    write_set(&here.join("a"), 0, 3000);
+    write_set(&here.join("b"), 1, 3000);
     let cut = here.join("b/record_1.h5");
     let whole = std::fs::read(&cut).expect("a record");
     std::fs::write(&cut, &whole[..whole.len() / 2]).expect("a record cut short");
-    std::fs::write(here.join("census.toml"), format!("{CENSUS}{sweep}")).expect("a config");
+    std::fs::write(here.join("census.toml"), format!("{}[sweep]\n{sweep}", CENSUS.replace("nowhere/*", "a/*")))
+        .expect("a config");
 }
 
 const RUN: [&str; 6] = ["run", "census.toml", "-o", "out", "--cache", "cache"];

@@ -17,6 +17,7 @@ pub mod graph;
 pub mod plugin;
 pub mod recording;
 pub mod reference;
+pub mod rows;
 pub mod runner;
 pub mod stage;
 pub mod store;

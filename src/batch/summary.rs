@@ -83,12 +83,21 @@ pub fn write(folder: &Path, title: &Title<'_>, entries: &[Entry]) -> Result<Path
     }
     replace_with(&folder.join("summary.parquet"), |path| parquet::write(path, &table)).map_err(failed)?;
     let path = folder.join("summary.h5");
-    let mut outputs = Ports::new();
-    outputs.insert("modes", table.wrap());
-    outputs.insert("trends", trends.wrap());
-    write_result(&path, &result(title, "batch.summary", outputs)).map_err(failed)?;
+    write_result(&path, &summary(title, entries)).map_err(failed)?;
     Ok(path)
 }
+
+/// What `summary.h5` holds.
+pub fn summary(title: &Title<'_>, entries: &[Entry]) -> RunResult {
+    let mut outputs = Ports::new();
+    outputs.insert("modes", table(entries).wrap());
+    outputs.insert("trends", trends::table(entries).wrap());
+    outputs.insert("values", trends::values(entries).wrap());
+    result(title, BATCH, outputs)
+}
+
+/// What the summary of a batch uses.
+pub const BATCH: &str = "batch.summary";
 
 /// What the summary of a sweep uses.
 pub const SWEEP: &str = "sweep.summary";

@@ -15,6 +15,8 @@ pub struct Trend {
     pub per_year: (f64, f64),
     /// Chi square over its degrees of freedom: far above 1, the values scatter more than their errors say.
     pub reduced_chi_square: f64,
+    /// The middle of the times, years.
+    pub middle_years: f64,
 }
 
 /// Largest ratio of frequencies of one mode: the modes of a lever are further apart.
@@ -46,45 +48,117 @@ pub fn trend(points: &[(f64, f64, f64)]) -> Option<Trend> {
         value: (y, total.recip().sqrt()),
         per_year: (slope, spread.recip().sqrt()),
         reduced_chi_square: chi / (points.len() - 2) as f64,
+        middle_years: t,
     })
 }
 
-/// The trends of a batch as a table, a row per quantity.
+/// How far a value lies from the line through all others, in standard deviations of such a distance, which widen as the others scatter; NaN where they are too few for
+/// a line. An outlier does not widen its own.
+///
+/// Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, 1982, section 2.2 (externally studentised residuals).
+fn off(points: &[(f64, f64, f64)], index: usize) -> f64 {
+    let Some(&(years, value, std)) = points.get(index) else { return f64::NAN };
+    let others = [&points[..index], &points[index + 1..]].concat();
+    trend(&others).map_or(f64::NAN, |line| {
+        let after = years - line.middle_years;
+        let expected = line.value.0 + line.per_year.0 * after;
+        let variance = std.powi(2) + line.value.1.powi(2) + (line.per_year.1 * after).powi(2);
+        (value - expected) / (variance * line.reduced_chi_square.max(1.0)).sqrt()
+    })
+}
+
+/// One value of one data set, over time.
+struct Seen<'a> {
+    data_set: &'a str,
+    years: f64,
+    value: f64,
+    std: f64,
+    /// See [`off`].
+    off: f64,
+}
+
+/// A quantity with all its values, and the line through them if there is one.
+struct Quantity<'a> {
+    name: String,
+    unit: &'static str,
+    seen: Vec<Seen<'a>>,
+    trend: Option<Trend>,
+}
+
+/// Frequencies, quality factors and spring constants of all data sets that say when they were recorded.
 ///
 /// Modes are matched by frequency: those of the set with most modes (the first of them by name) are the reference, and a mode of another set is the reference's nearest,
 /// if it is within a quarter of it and no nearer one is.
-pub fn table(entries: &[Entry]) -> Table {
-    let mut rows: Vec<(String, &str, Trend)> = Vec::new();
-    let mut add = |name: String, unit: &'static str, points: Vec<(f64, f64, f64)>| {
-        rows.extend(trend(&points).map(|trend| (name, unit, trend)));
-    };
-    let timed: Vec<(f64, &Entry)> = entries.iter().filter_map(|entry| Some((years(entry)?, entry))).collect();
-    for (number, reference) in (1..).zip(reference(entries)) {
-        let seen = |value: fn(&super::harvest::ModeFound) -> Option<(f64, f64)>| {
-            let own = |(years, entry): &(f64, &Entry)| {
-                let mode = nearest_mode(entry, reference)?;
-                value(mode).map(|(value, std)| (*years, value, std))
-            };
-            timed.iter().filter_map(own).collect::<Vec<_>>()
+fn quantities<'a>(entries: &'a [Entry]) -> Vec<Quantity<'a>> {
+    let timed: Vec<(f64, &'a Entry)> = entries.iter().filter_map(|entry| Some((years(entry)?, entry))).collect();
+    let quantity = |name: String, unit: &'static str, of: &dyn Fn(&Entry) -> Option<(f64, f64)>| {
+        let known = timed.iter().filter_map(|&(years, entry)| Some((entry, years, of(entry)?)));
+        let known: Vec<(&'a Entry, f64, (f64, f64))> = known.collect();
+        let points: Vec<(f64, f64, f64)> = known.iter().map(|&(_, years, (value, std))| (years, value, std)).collect();
+        let one = |(index, &(entry, years, (value, std))): (usize, &(&'a Entry, f64, (f64, f64)))| Seen {
+            data_set: &entry.name,
+            years,
+            value,
+            std,
+            off: off(&points, index),
         };
-        add(format!("frequency {number}"), "Hz", seen(|mode| mode.frequency_hz.zip(mode.frequency_std_hz)));
-        add(format!("quality factor {number}"), "1", seen(|mode| mode.quality_factor.zip(mode.quality_factor_std)));
-    }
-    let stiffness = |(years, entry): &(f64, &Entry)| {
-        let (k, std) = entry.found.stiffness_n_per_m.zip(entry.found.stiffness_std_n_per_m)?;
-        Some((*years, k, std))
+        Quantity { name, unit, seen: known.iter().enumerate().map(one).collect(), trend: trend(&points) }
     };
-    add("stiffness".to_owned(), "N/m", timed.iter().filter_map(stiffness).collect());
-    let real = |of: fn(&Trend) -> f64| rows.iter().map(|(_, _, trend)| of(trend)).collect::<Vec<f64>>();
+    let mut all = Vec::new();
+    for (number, reference) in (1..).zip(reference(entries)) {
+        let mode = |entry: &Entry, value: fn(&super::harvest::ModeFound) -> Option<(f64, f64)>| {
+            nearest_mode(entry, reference).and_then(value)
+        };
+        let frequency = |entry: &Entry| mode(entry, |mode| mode.frequency_hz.zip(mode.frequency_std_hz));
+        let quality = |entry: &Entry| mode(entry, |mode| mode.quality_factor.zip(mode.quality_factor_std));
+        all.push(quantity(format!("frequency {number}"), "Hz", &frequency));
+        all.push(quantity(format!("quality factor {number}"), "1", &quality));
+    }
+    let stiffness = |entry: &Entry| entry.found.stiffness_n_per_m.zip(entry.found.stiffness_std_n_per_m);
+    all.push(quantity("stiffness".to_owned(), "N/m", &stiffness));
+    all
+}
+
+/// The trends of a batch as a table, a row per quantity.
+pub fn table(entries: &[Entry]) -> Table {
+    let quantities = quantities(entries);
+    let rows: Vec<(&Quantity<'_>, Trend)> = quantities.iter().filter_map(|q| Some((q, q.trend?))).collect();
+    let real = |of: fn(&Trend) -> f64| rows.iter().map(|(_, trend)| of(trend)).collect::<Vec<f64>>();
     Table::new()
-        .with("quantity", "", "what, with the mode's number", rows.iter().map(|row| row.0.clone()).collect::<Vec<_>>())
-        .with("unit", "", "its unit", rows.iter().map(|row| row.1.to_owned()).collect::<Vec<_>>())
-        .with("sets", "1", "data sets", rows.iter().map(|row| row.2.count as i64).collect::<Vec<_>>())
+        .with(
+            "quantity",
+            "",
+            "what, with the mode's number",
+            rows.iter().map(|row| row.0.name.clone()).collect::<Vec<_>>(),
+        )
+        .with("unit", "", "its unit", rows.iter().map(|row| row.0.unit.to_owned()).collect::<Vec<_>>())
+        .with("sets", "1", "data sets", rows.iter().map(|row| row.1.count as i64).collect::<Vec<_>>())
         .with("value", "", "at the middle of the times", real(|t| t.value.0))
         .with("value_std", "", "its standard error", real(|t| t.value.1))
         .with("per_year", "", "change per year", real(|t| t.per_year.0))
         .with("per_year_std", "", "its standard error", real(|t| t.per_year.1))
         .with("reduced_chi_square", "1", "scatter over what the errors say", real(|t| t.reduced_chi_square))
+}
+
+/// Every value of every quantity over time, with its distance from the line through the others (see [`off`]).
+pub fn values(entries: &[Entry]) -> Table {
+    let quantities = quantities(entries);
+    let rows: Vec<(&Quantity<'_>, &Seen<'_>)> =
+        quantities.iter().flat_map(|q| q.seen.iter().map(move |s| (q, s))).collect();
+    let real = |of: fn(&Seen<'_>) -> f64| rows.iter().map(|(_, seen)| of(seen)).collect::<Vec<f64>>();
+    Table::new()
+        .with(
+            "quantity",
+            "",
+            "what, with the mode's number",
+            rows.iter().map(|row| row.0.name.clone()).collect::<Vec<_>>(),
+        )
+        .with("unit", "", "its unit", rows.iter().map(|row| row.0.unit.to_owned()).collect::<Vec<_>>())
+        .with("data_set", "", "its name", rows.iter().map(|row| row.1.data_set.to_owned()).collect::<Vec<_>>())
+        .with("year", "1", "when, in years of 365.25 days, 1970 the first", real(|seen| 1970.0 + seen.years))
+        .with("value", "", "the value", real(|seen| seen.value))
+        .with("std", "", "its standard error", real(|seen| seen.std))
+        .with("off", "1", "distance from the line of the others in standard deviations", real(|seen| seen.off))
 }
 
 /// Years since 1970.
@@ -149,5 +223,24 @@ mod tests {
         assert_eq!(table.integer("sets").unwrap(), [3]);
         // 20 Hz in two years of 365 days
         assert!((table.real("per_year").unwrap()[0] - 10.0).abs() < 0.02);
+        let values = values(&entries);
+        // two of mode 1, three of mode 2; the last set says not when
+        assert_eq!(values.text("data_set").unwrap(), ["a", "c", "a", "b", "c"]);
+        let (off, years) = (values.real("off").unwrap(), values.real("year").unwrap());
+        assert!(off.iter().all(|off| off.is_nan()), "two others make no line: {off:?}");
+        assert!((years[0] - 2005.0).abs() < 0.01, "{years:?}");
+    }
+
+    #[test]
+    fn an_outlier_is_far_off_the_line_that_the_others_make() {
+        let line = |i: u32| (f64::from(i), 100.0 + f64::from(i), 1.0);
+        let mut points: Vec<(f64, f64, f64)> = (0..40).map(line).collect();
+        for wrong in [20, 39] {
+            points[wrong].1 += 30.0;
+            let off: Vec<f64> = (0..40).map(|index| off(&points, index)).collect();
+            // 30 errors, less what the line itself is uncertain by at its end
+            assert!(off[wrong] > 25.0 && off.iter().filter(|off| off.abs() > 1.5).count() == 1, "{off:?}");
+            points[wrong].1 -= 30.0;
+        }
     }
 }

@@ -67,6 +67,23 @@ impl Work<'_> {
         }
     }
 
+    /// What the ledger has of a data set, without running anything: what is no longer what would be run counts as failed, as does what was never run.
+    pub fn found(&self, name: &str, plan: &Plan) -> Done {
+        let failed = |why: &str| Entry::failed(name, None, why.to_owned());
+        let entry = match (run_key(plan, plan.config.base(), self.program), self.ledger.read(name)) {
+            (_, None) => failed("no run of it has ended"),
+            (Err(error), Some(_)) => Entry::failed(name, None, told(&[error])),
+            (Ok(key), Some(entry)) if entry.key.as_ref().is_some_and(|own| *own != key) => {
+                failed("its records, the config or the program have changed since its last run: run the batch again")
+            }
+            (Ok(_), Some(entry)) if entry.is_done() && !self.ledger.holds(&entry) => {
+                failed("its result file is gone or cut short: run the batch again")
+            }
+            (Ok(_), Some(entry)) => entry,
+        };
+        Done { entry, took: None, stages: (0, 0) }
+    }
+
     /// The same run, if it went through meanwhile in another process: one that failed here, for want of memory or disk, takes nothing back.
     fn elsewhere(&self, name: &str, key: &str) -> Option<Entry> {
         self.ledger

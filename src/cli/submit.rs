@@ -15,19 +15,8 @@ pub enum SubmitTo {
     Slurm(Box<SlurmArgs>),
 }
 
-const EXAMPLES: &str = "\
-Examples:
-  afmid submit slurm ringdown.toml --manifest levers.jsonl --shards 8 -o results
-  afmid submit slurm ringdown.toml lever-1 lever-2 --shards 2 -o results --partition main --time 2:00:00 --memory 4G --send
-  afmid submit slurm ringdown.toml --manifest levers.jsonl --shards 8 -o results --cpus 4 --sbatch=--nice=100 --send --json
-
-Written are FOLDER/slurm/array.sbatch (a task per shard; a lost node's tasks are queued again), collect.sbatch (the table, after the last task, however it ended)
-and submit.sh, which sends both. A task succeeds when all its data sets were tried; the collecting job ends with 3 if some of them failed. To go on after time limits or
-faults, submit again: what is finished is not run again.";
-
 /// What to submit to Slurm, and how.
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
 pub struct SlurmArgs {
     /// The config, with a stage `records`, and what changes it.
     #[command(flatten)]

@@ -27,13 +27,8 @@ pub fn run(args: &BatchArgs, registry: &Registry) -> Result<(), Failure> {
     let whole = whole(&args.config, registry)?;
     let folder = args.output.clone().unwrap_or_else(|| default_output(whole.name()).with_extension(""));
     let ledger = ledger(&folder)?;
-    let done = match args.collect {
-        true => collected(&sets, &ledger),
-        false => {
-            let own = |set: &&DataSet| args.shard.is_none_or(|shard| shard.holds(&set.name));
-            computed(args, &planned(&args.config, sets.iter().filter(own), registry)?, &ledger)?
-        }
-    };
+    let own = |set: &&DataSet| args.shard.is_none_or(|shard| shard.holds(&set.name));
+    let done = computed(args, &planned(&args.config, sets.iter().filter(own), registry)?, &ledger)?;
     let entries: Vec<Entry> = done.iter().map(|done| done.entry.clone()).collect();
     let table = match args.shard {
         Some(_) => None,
@@ -127,16 +122,11 @@ fn computed(args: &BatchArgs, sets: &[(&DataSet, Plan)], ledger: &Ledger) -> Res
         as_run: false,
     };
     let progress = Sets::new("data sets", sets.len());
-    let one = |(set, plan): &(&DataSet, Plan)| pool.install(|| work.one(&set.name, plan));
+    let one = |(set, plan): &(&DataSet, Plan)| match args.collect {
+        true => work.found(&set.name, plan),
+        false => pool.install(|| work.one(&set.name, plan)),
+    };
     Ok(all(sets, pool.current_num_threads(), one, |done| progress.ended(done)))
-}
-
-/// What the ledger holds of each; what it does not hold has failed.
-fn collected(sets: &[DataSet], ledger: &Ledger) -> Vec<Done> {
-    let missing = |set: &DataSet| Entry::failed(&set.name, None, "no run of it has ended".to_owned());
-    sets.iter()
-        .map(|set| Done { entry: ledger.read(&set.name).unwrap_or_else(|| missing(set)), took: None, stages: (0, 0) })
-        .collect()
 }
 
 fn told(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock: Instant) -> Result<String, Failure> {

@@ -11,7 +11,49 @@ use super::schema;
 use crate::failure::Failure;
 use crate::output::print;
 
-/// Writes `FOLDER/stages/*.md`, `FOLDER/causes/*.md` and `FOLDER/pipeline.schema.json`, or says what would change. Pages of what is gone are removed.
+/// Pages of the book that are written by hand: title and file.
+const CHAPTERS: [(&str, &str); 11] = [
+    ("The paper, figure by figure", "paper.md"),
+    ("Diagnosis", "diagnosis.md"),
+    ("Archives", "archives.md"),
+    ("Models for other programs", "export.md"),
+    ("Accuracy", "accuracy.md"),
+    ("Performance", "performance.md"),
+    ("Conventions", "conventions.md"),
+    ("Glossary", "glossary.md"),
+    ("Architecture", "architecture.md"),
+    ("What a stage must keep", "stage-spec.md"),
+    ("Decisions", "decisions/README.md"),
+];
+
+/// The book's table of contents, in mdBook's form.
+fn contents(registry: &Registry) -> String {
+    let mut text = "# Contents\n\n- [Tutorials](tutorials/README.md)\n".to_owned();
+    for (title, file) in TUTORIALS {
+        text.push_str(&format!("  - [{title}](tutorials/{file})\n"));
+    }
+    for (title, file) in CHAPTERS {
+        text.push_str(&format!("- [{title}]({file})\n"));
+    }
+    text.push_str("- [Stages](stages/README.md)\n");
+    for entry in registry.entries() {
+        text.push_str(&format!("  - [{0}](stages/{0}.md)\n", entry.spec.name));
+    }
+    text.push_str("- [Causes](causes/README.md)\n");
+    for cause in catalogue() {
+        text.push_str(&format!("  - [{0}](causes/{0}.md)\n", cause.about().id));
+    }
+    text
+}
+
+/// The tutorials, in reading order.
+const TUTORIALS: [(&str, &str); 3] = [
+    ("The paper in ten minutes", "paper.md"),
+    ("My own recordings", "recordings.md"),
+    ("Find what my model misses", "diagnosis.md"),
+];
+
+/// Writes `FOLDER/stages/*.md`, `FOLDER/causes/*.md`, `FOLDER/SUMMARY.md` and `FOLDER/pipeline.schema.json`, or says what would change. Pages of what is gone are removed.
 pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failure> {
     let stages = folder.join("stages");
     let pages = files(registry).map_err(|error| Failure::failed(error, None))?;
@@ -20,6 +62,7 @@ pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failur
     let all = catalogue();
     wanted.push((causes.join("README.md"), index(&all)));
     wanted.extend(all.iter().map(|cause| (causes.join(format!("{}.md", cause.about().id)), page(*cause))));
+    wanted.push((folder.join("SUMMARY.md"), contents(registry)));
     wanted.push((folder.join("pipeline.schema.json"), schema::text(registry)?));
     let mut stale = stale(&stages, &wanted);
     stale.extend(self::stale(&causes, &wanted));

@@ -11,8 +11,13 @@ use crate::failure::{Failure, Message};
 pub fn load(path: &Path, set: &[String], registry: &Registry) -> Result<Plan, Failure> {
     let file = path.display().to_string();
     let text = read(path)?;
-    graph::load(&file, &text, set, registry)
-        .map_err(|problems| Failure::Usage(Message::Rendered(render(&file, &text, &problems))))
+    plan_text(&file, &text, set, registry)
+}
+
+/// Plans a config from its text; `file` is what messages call it. Errors: everything that is wrong with it.
+pub fn plan_text(file: &str, text: &str, set: &[String], registry: &Registry) -> Result<Plan, Failure> {
+    graph::load(file, text, set, registry)
+        .map_err(|problems| Failure::Usage(Message::Rendered(render(file, text, &problems))))
 }
 
 fn read(path: &Path) -> Result<String, Failure> {

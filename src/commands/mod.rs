@@ -3,15 +3,20 @@
 mod batch;
 mod causes;
 mod check;
+mod completions;
 mod diff;
 mod docs;
+mod doctor;
 mod exam;
 mod explain;
+mod export;
 mod export_crate;
 mod gc;
 mod graph;
 mod inspect;
 mod load;
+mod man;
+mod new;
 mod open;
 mod plugin;
 mod report;
@@ -42,9 +47,11 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::Diff(args) => diff::run(&args),
         Command::Trace(args) => trace::run(&args),
         Command::Rerun(args) => rerun::run(&args, registry),
+        Command::Export(args) => export::run(&args),
         Command::ExportCrate(args) => export_crate::run(&args),
         Command::Gc(args) => gc::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::New { what } => new::run(&what, registry),
         Command::Check { configs } => check::run(&configs, registry),
         Command::Graph { config, format } => graph::run(&config, format, registry),
         Command::Stages { name } => stages::run(name.as_deref(), registry),
@@ -52,6 +59,9 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::Exam(args) => exam::run(&args, registry),
         Command::Plugin { what } => plugin::run(&what),
         Command::Schema => schema::run(registry),
+        Command::Doctor(args) => doctor::run(&args, registry),
+        Command::Completions { shell } => completions::run(shell),
+        Command::Man { folder } => man::run(folder.as_deref()),
         Command::Docs { folder, check } => docs::run(&folder, check, registry),
     }
 }

@@ -10,6 +10,7 @@ use super::target::{Target, prepare};
 use crate::cli::ReportArgs;
 use crate::failure::Failure;
 use crate::output::print;
+use crate::relative::{address, folder_of, relative};
 use crate::report::{figures, report};
 
 /// Writes the page, and the figures if asked for, and says where.
@@ -18,7 +19,8 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.result));
     prepare(&output, Target::Page, &[("the result file", args.result.clone())])?;
     let run = read_result(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
-    let page = report(&run).map_err(|error| Failure::failed(error, None))?;
+    let (results, page) = (folder_of(&args.result), folder_of(&output));
+    let page = report(&run, &|name| beside(results, page, name)).map_err(|error| Failure::failed(error, None))?;
     write(&output, &page)?;
     let mut written = format!("{}\n", output.display());
     if let Some(folder) = &args.figures {
@@ -32,6 +34,13 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
         }
     }
     print(&written)
+}
+
+/// The address of a data set's page, if it has one, or else of its result.
+fn beside(results: &Path, page: &Path, name: &str) -> String {
+    let found =
+        ["html", "h5"].map(|ending| results.join(format!("{name}.{ending}"))).into_iter().find(|file| file.is_file());
+    found.map(|file| address(&relative(&file, page))).unwrap_or_default()
 }
 
 fn default_output(result: &Path) -> PathBuf {

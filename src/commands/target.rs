@@ -1,13 +1,14 @@
 //! Where a command may write: never over its own inputs, and over nothing that afmid did not write.
 
 use std::fs::{self, Metadata};
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::cache::probe;
 use afmid_pipeline::store::{FileKind, file_kind};
 
+use crate::export::is_exported;
 use crate::failure::Failure;
 
 /// What is to be written.
@@ -17,15 +18,18 @@ pub enum Target {
     Result,
     /// A report's page.
     Page,
+    /// A model for other programs.
+    Model,
 }
 
 impl Target {
     /// An empty file holds nothing that could be lost: a script may have made it to reserve the name.
-    fn may_replace(self, kind: FileKind) -> bool {
+    fn may_replace(self, path: &Path, kind: FileKind) -> bool {
         kind == FileKind::Empty
             || match self {
                 Self::Result => kind == FileKind::Own,
                 Self::Page => kind == FileKind::Html,
+                Self::Model => head(path).is_ok_and(|head| is_exported(&head)),
             }
     }
 
@@ -33,6 +37,7 @@ impl Target {
         match self {
             Self::Result => "a result of afmid's",
             Self::Page => "an HTML page",
+            Self::Model => "a model that `afmid export` wrote",
         }
     }
 }
@@ -98,13 +103,20 @@ fn existing(path: &Path, metadata: &Metadata, target: Target, inputs: &[Input]) 
         ));
     }
     let kind = file_kind(path).map_err(|error| usage(format!("{shown} cannot be looked at: {error}"), ANOTHER))?;
-    if target.may_replace(kind) {
+    if target.may_replace(path, kind) {
         return Ok(());
     }
     Err(usage(
         format!("{shown} exists and is {kind}: only {} is replaced", target.wanted()),
         "give another name with -o, or remove the file first if it is no longer needed",
     ))
+}
+
+/// As much of a file as tells an exported model.
+fn head(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    fs::File::open(path)?.take(128).read_to_end(&mut head)?;
+    Ok(head)
 }
 
 fn odd(metadata: &Metadata) -> &'static str {

@@ -7,6 +7,8 @@ mod json;
 mod text;
 mod verdict;
 
+pub use channel::Channel;
 pub use file::{Inspected, Outcome, inspect};
 pub use json::inspected_json;
 pub use text::{file_text, folder_text};
+pub use verdict::LEAST_RATE_HZ;

@@ -174,7 +174,7 @@ fn variable(artifact: &Artifact, steps: &[Step]) -> Option<(Value, Option<f64>, 
     let names = array.variables.iter().map(|variable| variable.name.as_str());
     let error = std_name(name, names).and_then(|std| array.real(std).ok()?.get(flat).copied());
     let (value, dataset) = match &variable.values {
-        Values::Real(values) => (json!(values.get(flat)?), name.clone()),
+        Values::Real(_) | Values::Stored(_) => (json!(variable.values.real()?.ok()?.get(flat)?), name.clone()),
         Values::Integer(values) => (json!(values.get(flat)?), name.clone()),
         Values::Complex(values) => {
             let value = values.get(flat)?;

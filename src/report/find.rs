@@ -1,6 +1,6 @@
 //! Finding artifacts by what they are: shapes, variables and the stages that they came from.
 
-use afmid_pipeline::{Array, Attribute, Axis, RunResult, Shaped, StageRecord, Values};
+use afmid_pipeline::{Array, Attribute, Axis, RunResult, Shaped, StageRecord};
 use serde_json::Value;
 
 /// An artifact with the stage and port that it came from.
@@ -112,12 +112,8 @@ pub(crate) fn time_axis(array: &Array) -> Option<&Axis> {
 /// The values of a real variable over exactly this axis.
 pub(crate) fn real_over<'a>(array: &'a Array, name: &str, axis: &Axis) -> Option<&'a [f64]> {
     let variable = array.variables.iter().find(|variable| variable.name == name)?;
-    match &variable.values {
-        Values::Real(values) if variable.dims == [axis.name.as_str()] && values.len() == axis.values.len() => {
-            Some(values)
-        }
-        _ => None,
-    }
+    let values = variable.values.real().filter(|_| variable.dims == [axis.name.as_str()])?.ok()?;
+    (values.len() == axis.values.len()).then_some(values)
 }
 
 /// The unit of a variable; `1` if there is no such variable.

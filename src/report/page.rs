@@ -6,6 +6,7 @@ use minijinja::value::Serde;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::batch::{self, Link};
 use super::diagnosis;
 use super::figure::Figure;
 use super::find::all;
@@ -49,9 +50,11 @@ struct Page<'a> {
 }
 
 /// One self-contained HTML page about a run.
-pub(crate) fn report(run: &RunResult) -> Result<String, ReportError> {
+///
+/// `link` gives the addresses of the results of a batch's data sets.
+pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportError> {
     let mut room = SECTION_FIGURES;
-    let sections: Vec<Section> = sections(run).map(|drawn| section(drawn, &mut room)).collect();
+    let sections: Vec<Section> = sections(run, link).map(|drawn| section(drawn, &mut room)).collect();
     let (shown, skipped): (Vec<Section>, Vec<Section>) =
         sections.into_iter().partition(|section| section.missing.is_empty());
     let warnings: Vec<(String, Vec<String>)> = run
@@ -83,15 +86,17 @@ pub(crate) fn report(run: &RunResult) -> Result<String, ReportError> {
     Ok(environment.get_template("report.html")?.render(Serde(page))?)
 }
 
-/// The diagnosis first, where there is one: it is what the run was for.
-fn sections(run: &RunResult) -> impl Iterator<Item = Drawn> {
-    diagnosis::section(run).into_iter().chain(paper::sections(run))
+/// A batch's own; or the diagnosis first, where there is one: it is what the run was for.
+fn sections(run: &RunResult, link: &Link<'_>) -> impl Iterator<Item = Drawn> {
+    let batch = batch::sections(run, link);
+    let of_run = if batch.is_empty() { paper::sections(run) } else { Vec::new() };
+    batch.into_iter().chain(diagnosis::section(run)).chain(of_run)
 }
 
 /// Every figure of a run as (file name, SVG file).
 pub(crate) fn figures(run: &RunResult) -> Vec<(String, String)> {
     let style = palette::in_light(include_str!("figure.css"));
-    let of_sections = sections(run).flat_map(|drawn| drawn.figures);
+    let of_sections = sections(run, &|_| String::new()).flat_map(|drawn| drawn.figures);
     let of_stages = run.stages.iter().flat_map(|stage| stage_view(run, stage).1.into_iter().flatten());
     of_sections.chain(of_stages).map(|figure| (format!("{}.svg", figure.id), figure.standalone(&style))).collect()
 }

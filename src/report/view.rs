@@ -12,6 +12,8 @@ pub(crate) struct TableView {
     pub bars: Vec<Vec<f64>>,
     /// What was left out; empty: nothing.
     pub more: String,
+    /// Addresses of the rows' first cells, empty ones among them; empty: none at all.
+    pub links: Vec<String>,
 }
 
 /// The head of a column.

@@ -66,6 +66,11 @@ fn array_text(array: &Array) -> String {
     grid(&rows) + &attributes_text(&array.attributes)
 }
 
+/// Real values; none where they cannot be read.
+fn reals(values: &Values) -> &[f64] {
+    values.real().and_then(Result::ok).unwrap_or(&[])
+}
+
 /// The smallest and the largest value; of complex ones, by magnitude.
 fn range(values: &Values) -> (String, String) {
     let ends = |values: &mut dyn Iterator<Item = f64>| {
@@ -73,8 +78,8 @@ fn range(values: &Values) -> (String, String) {
         values.fold((f64::NAN, f64::NAN), |(low, high), value| (low.min(value), high.max(value)))
     };
     match values {
-        Values::Real(values) => {
-            let (low, high) = ends(&mut values.iter().copied());
+        Values::Real(_) | Values::Stored(_) => {
+            let (low, high) = ends(&mut reals(values).iter().copied());
             (number(low), number(high))
         }
         Values::Complex(values) => {

@@ -8,7 +8,7 @@ use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorag
 use serde_json::Value;
 
 /// Two stages that take milliseconds.
-const CONFIG: &str = r#"
+pub const CENSUS: &str = r#"
 [pipeline]
 name = "census"
 
@@ -23,6 +23,30 @@ uses = "io.census"
 inputs = { records = "records" }
 "#;
 
+/// A data set of two records; its numbers depend on `seed`.
+pub fn write_set(folder: &Path, seed: usize, samples: usize) {
+    std::fs::create_dir_all(folder).expect("a folder");
+    for record in 0..2 {
+        write_record(&folder.join(format!("record_{record}.h5")), 2 * seed + record, samples);
+    }
+}
+
+/// A record without an event; its numbers depend on `seed`.
+pub fn write_record(path: &Path, seed: usize, samples: usize) {
+    let code = |k: usize| ((k * 7919 + seed * 104_729) % 4096) as i16 - 2048;
+    let channel = NativeChannel {
+        location: "/deflection".to_owned(),
+        codes: Codes::Int16((0..samples).map(code).collect()),
+        unit: "V".to_owned(),
+        scale_factor: 0.001,
+        add_offset: 0.0,
+        long_name: "deflection".to_owned(),
+    };
+    let started_at = format!("{}-03-01T10:00:00Z", 2001 + seed / 2);
+    let record = NativeRecord { sample_rate_hz: 5e6, started_at, channels: vec![channel] };
+    write_native(path, &record, RecordStorage::Raw).expect("a record");
+}
+
 /// A folder with a config and data sets.
 pub struct Here(tempfile::TempDir);
 
@@ -30,7 +54,7 @@ impl Here {
     /// One with the config.
     pub fn new() -> Self {
         let here = Self(tempfile::tempdir().expect("a folder"));
-        std::fs::write(here.path("census.toml"), CONFIG).expect("a config");
+        std::fs::write(here.path("census.toml"), CENSUS).expect("a config");
         here
     }
 
@@ -44,24 +68,9 @@ impl Here {
         self.0.path().join(name)
     }
 
-    /// A data set of two records; its numbers depend on `seed`.
+    /// [`write_set`] in it.
     pub fn set(&self, name: &str, seed: usize, samples: usize) {
-        std::fs::create_dir_all(self.path(name)).expect("a folder");
-        for record in 0..2 {
-            let code = |k: usize| ((k * 7919 + seed * 104_729 + record * 31) % 4096) as i16 - 2048;
-            let channel = NativeChannel {
-                location: "/deflection".to_owned(),
-                codes: Codes::Int16((0..samples).map(code).collect()),
-                unit: "V".to_owned(),
-                scale_factor: 0.001,
-                add_offset: 0.0,
-                long_name: "deflection".to_owned(),
-            };
-            let started_at = format!("{}-03-01T10:00:00Z", 2001 + seed);
-            let record_of = NativeRecord { sample_rate_hz: 5e6, started_at, channels: vec![channel] };
-            let path = self.path(name).join(format!("record_{record}.h5"));
-            write_native(&path, &record_of, RecordStorage::Raw).expect("a record");
-        }
+        write_set(&self.path(name), seed, samples);
     }
 
     /// `afmid batch` in it.

@@ -6,6 +6,7 @@ use num_complex::Complex64;
 
 use super::Attribute;
 use crate::error::StageError;
+use crate::rows::{RowSource, RowView, StoredRows};
 
 /// Variables over shared, named axes. The first variable is the signal that viewers plot by default.
 ///
@@ -58,6 +59,8 @@ pub enum Values {
     Complex(Vec<Complex64>),
     /// Whole numbers.
     Integer(Vec<i64>),
+    /// Real numbers over two axes that are too many for memory: rows in a file.
+    Stored(StoredRows),
 }
 
 impl Values {
@@ -67,6 +70,27 @@ impl Values {
             Self::Real(values) => values.len(),
             Self::Complex(values) => values.len(),
             Self::Integer(values) => values.len(),
+            Self::Stored(rows) => rows.len(),
+        }
+    }
+
+    /// The real numbers, all of them in memory; none if they are of another kind. Errors: they lie in a file and cannot be read.
+    pub fn real(&self) -> Option<Result<&[f64], StageError>> {
+        match self {
+            Self::Real(values) => Some(Ok(values)),
+            Self::Stored(rows) => Some(rows.whole()),
+            Self::Complex(_) | Self::Integer(_) => None,
+        }
+    }
+
+    /// The real numbers as rows of this length, wherever they lie; none if they are of another kind or no whole number of such rows.
+    pub fn rows(&self, row_length: usize) -> Option<RowView<'_>> {
+        match self {
+            Self::Real(values) if row_length > 0 && values.len().is_multiple_of(row_length) => {
+                Some(RowView::Memory(values, row_length))
+            }
+            Self::Stored(rows) if rows.row_length() == row_length => Some(RowView::Stored(rows)),
+            _ => None,
         }
     }
 
@@ -136,12 +160,20 @@ impl Array {
             .ok_or_else(|| missing("variable", name, self.variables.iter().map(|variable| variable.name.as_str())))
     }
 
-    /// The values of the real variable `name`. Errors: there is none, or it is not real.
+    /// The values of the real variable `name`, all of them: from a file they are read once, and stay in memory. Errors: there is none, it is
+    /// not real, or it cannot be read.
     pub fn real(&self, name: &str) -> Result<&[f64], StageError> {
-        match &self.variable(name)?.values {
-            Values::Real(values) => Ok(values),
-            _ => Err(StageError::new(format!("variable `{name}`: found complex or whole numbers, wanted real ones"))),
-        }
+        self.variable(name)?.values.real().unwrap_or_else(|| Err(not_real(name)))
+    }
+
+    /// The rows of the real variable `name` over two axes, for [`in_blocks`](crate::rows::in_blocks): nothing is read yet. Errors: there is none,
+    /// it is not real, or not over two axes.
+    pub fn rows(&self, name: &str) -> Result<RowView<'_>, StageError> {
+        let variable = self.variable(name)?;
+        let [_, last] = &variable.dims[..] else {
+            return Err(StageError::new(format!("variable `{name}` has {} axes, wanted 2", variable.dims.len())));
+        };
+        variable.values.rows(self.axis(last)?.values.len()).ok_or_else(|| not_real(name))
     }
 
     /// The values of the complex variable `name`. Errors: there is none, or it is not complex.
@@ -194,6 +226,10 @@ impl Axis {
     pub fn new(name: &str, unit: &str, long_name: &str, values: Vec<f64>) -> Self {
         Self { name: name.to_owned(), unit: unit.to_owned(), long_name: long_name.to_owned(), values }
     }
+}
+
+fn not_real(name: &str) -> StageError {
+    StageError::new(format!("variable `{name}`: found complex or whole numbers, wanted real ones"))
 }
 
 pub(super) fn missing<'a>(what: &str, name: &str, have: impl Iterator<Item = &'a str>) -> StageError {

@@ -57,7 +57,7 @@ impl Cache {
 
     /// The result with this key, marked as used. A damaged file counts as absent: it is removed, and [`Cache::take_notes`] says so.
     ///
-    /// What comes back is whole in memory: removing the file afterwards takes nothing from a run.
+    /// What comes back is in memory, or in the file, held open: removing it afterwards takes nothing from a run.
     pub fn get(&self, key: &str) -> Option<StageResult> {
         let path = self.path(key);
         if !path.is_file() {

@@ -2,7 +2,7 @@
 //!
 //! A stage's result lies in `DIR/KEY.h5`; the key is a hash of everything that the result depends on. Several processes may use one
 //! folder at once: every file is written under a name of its own, synced and renamed. Beside it lies `DIR/KEY.json`: what the key was made
-//! of, in words ([`Origin`]). Any file may go at any moment ([`free`]): a run has what it needs in memory, the next one computes it again.
+//! of, in words ([`Origin`]). Any file may go at any moment ([`free`]): a run has what it needs in memory or open, the next one computes it again.
 
 mod folder;
 mod free;
@@ -21,6 +21,6 @@ pub use folder::Cache;
 pub use free::{Freed, Gone, Limits, Why, free};
 pub use key::{KeyParts, key};
 pub use origin::{Origin, OriginFile, OriginInput};
-pub(crate) use replace::replace_unsynced;
 pub use replace::{probe, replace_file, replace_with, sweep, write_result};
+pub(crate) use replace::{replace_unsynced, temporary_path};
 pub use stock::{Sort, Stock, Stored};

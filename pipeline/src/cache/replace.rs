@@ -18,7 +18,7 @@ const STALE: Duration = Duration::from_secs(24 * 3600);
 /// Errors: those of `write`; the folder is missing or cannot be written.
 pub fn replace_file(path: &Path, write: impl FnOnce(&Path) -> Result<(), StoreError>) -> Result<(), StoreError> {
     let folder = folder_of(path);
-    let temporary = folder.join(temporary_name(path));
+    let temporary = temporary_path(path);
     let io = |doing: &str, error: &std::io::Error| StoreError::io(doing, path, error);
     if !folder.is_dir() {
         return Err(StoreError::new("its folder does not exist").file(path).help("make the folder first"));
@@ -46,7 +46,7 @@ pub fn replace_with(path: &Path, fill: impl FnOnce(&Path) -> std::io::Result<()>
 
 /// As [`replace_file`] with these bytes, without waiting for the disk: after a power cut the file may be empty. For what is only convenient.
 pub(crate) fn replace_unsynced(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    let temporary = folder_of(path).join(temporary_name(path));
+    let temporary = temporary_path(path);
     fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path)).map_err(|error| {
         // as above: the next sweep takes it
         let _ = fs::remove_file(&temporary);
@@ -57,7 +57,7 @@ pub(crate) fn replace_unsynced(path: &Path, bytes: &[u8]) -> Result<(), StoreErr
 /// Finds out whether [`replace_file`] could write `path`, by making a temporary file beside it and removing it. Errors: why not, in the
 /// system's words.
 pub fn probe(path: &Path) -> std::io::Result<()> {
-    let temporary = folder_of(path).join(temporary_name(path));
+    let temporary = temporary_path(path);
     File::create_new(&temporary)?;
     fs::remove_file(&temporary)
 }
@@ -77,6 +77,11 @@ fn folder_of(path: &Path) -> &Path {
 
 fn file_name(path: &Path) -> String {
     path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// A path beside `path` that nobody else uses; [`sweep`] removes what a dead process left there.
+pub(crate) fn temporary_path(path: &Path) -> PathBuf {
+    folder_of(path).join(temporary_name(path))
 }
 
 /// `.NAME.HOST.PID.COUNT.tmp`: no other attempt has it, on this machine, in another container on it, or on another machine that shares the folder.

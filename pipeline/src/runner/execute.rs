@@ -12,6 +12,7 @@ use super::schedule::{Board, Outcome, run_graph};
 use crate::cache::{Cache, Origin};
 use crate::error::StageError;
 use crate::graph::{Node, Plan};
+use crate::rows::Scratch;
 use crate::stage::{Caching, Context, Ports, Progress};
 
 /// Who watches a run. Called from several threads.
@@ -160,8 +161,9 @@ fn step(
     let result = match hit {
         Some(result) => result,
         None => {
+            let scratch = Scratch::beside(&options.cache.path(&planned.key));
             let result;
-            (result, log) = execute(node, options, board, planned.seed.unwrap_or_default())?;
+            (result, log) = execute(node, options, board, planned.seed.unwrap_or_default(), scratch)?;
             if stored {
                 // the other end lives as long as the run
                 let _ = made.send(Made { index, origin: planned.origin.clone(), result: result.clone() });
@@ -196,6 +198,7 @@ fn execute(
     options: &Options<'_>,
     board: &Board<Finished, RunError>,
     seed: u64,
+    scratch: Scratch,
 ) -> Result<(StageResult, String), StageError> {
     let mut inputs = Ports::new();
     for wire in &node.inputs {
@@ -204,7 +207,7 @@ fn execute(
         inputs.insert(wire.port, artifact.ok_or_else(missing)?.clone());
     }
     let progress = options.observer.begin(&node.id);
-    let context = Context::new(&options.base, seed, progress.as_ref());
+    let context = Context::new(&options.base, seed, progress.as_ref()).with_scratch(scratch);
     let outputs = node.stage.run(&inputs, &context)?;
     check_outputs(node, &outputs)?;
     let log = context.take_log();

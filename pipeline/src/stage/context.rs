@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use crate::rows::{RowWriter, Scratch};
+
 /// What a stage may ask of the runner: its seed, its folder, a place for warnings and progress.
 pub struct Context<'a> {
     base: PathBuf,
@@ -10,6 +12,7 @@ pub struct Context<'a> {
     warnings: Mutex<Vec<String>>,
     log: Mutex<String>,
     progress: &'a dyn Progress,
+    scratch: Scratch,
 }
 
 /// Where progress goes. Implementations are called from several threads.
@@ -32,7 +35,18 @@ impl Progress for NoProgress {
 impl<'a> Context<'a> {
     /// A context for one run of one stage.
     pub fn new(base: &Path, seed: u64, progress: &'a dyn Progress) -> Self {
-        Self { base: base.to_owned(), seed, warnings: Mutex::new(Vec::new()), log: Mutex::default(), progress }
+        Self { base: base.to_owned(), seed, warnings: Mutex::new(Vec::new()), log: Mutex::default(), progress, scratch: Scratch::default() }
+    }
+
+    /// The same with another place for rows that are too many for memory; the runner's is the cache's folder.
+    #[must_use]
+    pub fn with_scratch(self, scratch: Scratch) -> Self {
+        Self { scratch, ..self }
+    }
+
+    /// A writer of rows, say the windows of events: in memory up to some megabytes, in a file without a name beyond.
+    pub fn row_writer(&self, row_length: usize) -> RowWriter {
+        RowWriter::new(self.scratch.clone(), row_length)
     }
 
     /// The folder of the config file: relative paths in parameters start there.

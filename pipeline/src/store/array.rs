@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::dimension_scale::{attach_scale, make_scale};
 use super::error::{Result, StoreError};
 use super::layout::{StoredAttribute, read_attributes, read_layout, write_attributes, write_layout};
+use super::rows::{Backing, read_rows, write_rows};
 use super::{read, write};
 use crate::artifact::{Array, Axis, Values, Variable};
 
@@ -87,6 +88,10 @@ fn write_variable(group: &Group, variable: &Variable, scales: &[(&Axis, Dataset)
             finish(write::dataset(group, name, &shape, values)?, long_name)?;
             Ok(Kind::Real)
         }
+        Values::Stored(rows) => {
+            finish(write_rows(group, name, &shape, rows)?, long_name)?;
+            Ok(Kind::Real)
+        }
         Values::Integer(values) => {
             finish(write::dataset(group, name, &shape, values)?, long_name)?;
             Ok(Kind::Integer)
@@ -138,8 +143,8 @@ fn write_signal(group: &Group, array: &Array) -> Result<()> {
     Ok(())
 }
 
-/// Reads what [`write_array`] wrote. Errors: damaged, or of another layout.
-pub(super) fn read_array(group: &Group) -> Result<Array> {
+/// Reads what [`write_array`] wrote; with a `backing`, large variables over two axes stay in the file. Errors: damaged, or of another layout.
+pub(super) fn read_array(group: &Group, backing: Option<&Backing>) -> Result<Array> {
     let layout: Layout = read_layout(group)?;
     let mut array = Array { attributes: read_attributes(group, &layout.attributes)?, ..Array::default() };
     for name in &layout.axes {
@@ -149,7 +154,10 @@ pub(super) fn read_array(group: &Group) -> Result<Array> {
     for stored in layout.variables {
         let name = &stored.name;
         let (described, values) = match stored.kind {
-            Kind::Real => (name.clone(), Values::Real(read::numbers(group, name)?)),
+            Kind::Real => match backing.map_or(Ok(None), |backing| read_rows(group, &stored.name, backing))? {
+                Some(rows) => (name.clone(), Values::Stored(rows)),
+                None => (name.clone(), Values::Real(read::numbers(group, name)?)),
+            },
             Kind::Integer => (name.clone(), Values::Integer(read::numbers(group, name)?)),
             Kind::Complex => {
                 let (real_name, imaginary_name) = (format!("{name}{REAL}"), format!("{name}{IMAGINARY}"));

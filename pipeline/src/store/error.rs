@@ -64,3 +64,10 @@ impl From<StoreError> for StageError {
         Self { help: error.help, ..Self::new(problem).at(error.file) }
     }
 }
+
+impl From<StageError> for StoreError {
+    fn from(error: StageError) -> Self {
+        let file = error.place.unwrap_or_default();
+        Self { file, place: String::new(), problem: error.problem, help: error.help }
+    }
+}

@@ -9,6 +9,7 @@ use super::document::{read_document, write_document};
 use super::error::{Result, StoreError};
 use super::names::{TAKEN_BY_STAGE, group_names};
 use super::recording::{read_recording, write_recording};
+use super::rows::Backing;
 use super::state_space::{read_state_space, write_state_space};
 use super::table::{read_table, write_table};
 use super::{read, write};
@@ -76,11 +77,11 @@ fn shape(parent: &Group, name: &str) -> Result<Shape> {
         .ok_or_else(|| StoreError::new(format!("an artifact of unknown shape `{name}`")).at(parent.name()))
 }
 
-/// Reads one artifact. Errors: it is missing or damaged.
-pub(super) fn read_port(parent: &Group, port: &PortSummary) -> Result<Artifact> {
+/// Reads one artifact; with a `backing`, large arrays stay in the file. Errors: it is missing or damaged.
+pub(super) fn read_port(parent: &Group, port: &PortSummary, backing: Option<&Backing>) -> Result<Artifact> {
     let group = read::group(parent, &port.group)?;
     Ok(match port.shape {
-        Shape::Array => Artifact::Array(Arc::new(read_array(&group)?)),
+        Shape::Array => Artifact::Array(Arc::new(read_array(&group, backing)?)),
         Shape::Table => Artifact::Table(Arc::new(read_table(&group)?)),
         Shape::StateSpace => Artifact::StateSpace(Arc::new(read_state_space(&group)?)),
         Shape::Document => Artifact::Document(Arc::new(read_document(&group)?)),
@@ -88,11 +89,11 @@ pub(super) fn read_port(parent: &Group, port: &PortSummary) -> Result<Artifact> 
     })
 }
 
-/// Reads all artifacts, in order. Errors: one is missing or damaged.
-pub(super) fn read_ports(parent: &Group) -> Result<Ports> {
+/// Reads all artifacts, in order, as [`read_port`]. Errors: one is missing or damaged.
+pub(super) fn read_ports(parent: &Group, backing: Option<&Backing>) -> Result<Ports> {
     let mut ports = Ports::new();
     for port in list_ports(parent)? {
-        ports.insert(&port.name, read_port(parent, &port)?);
+        ports.insert(&port.name, read_port(parent, &port, backing)?);
     }
     Ok(ports)
 }

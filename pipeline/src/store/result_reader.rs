@@ -85,7 +85,7 @@ impl ResultFile {
             let have: Vec<&str> = stage.ports.iter().map(|port| port.name.as_str()).collect();
             fail(format!("stage `{id}` has no output `{port}`; it has: {}", have.join(", ")))
         })?;
-        self.process(stage).and_then(|process| read_port(&process, found)).map_err(|error| error.file(&self.path))
+        self.process(stage).and_then(|process| read_port(&process, found, None)).map_err(|error| error.file(&self.path))
     }
 
     fn process(&self, stage: &StageSummary) -> Result<Group> {
@@ -97,7 +97,7 @@ impl ResultFile {
         let mut run = self.run.clone();
         for summary in &self.stages {
             let mut record = summary.record.clone();
-            let outputs = self.process(summary).and_then(|process| read_ports(&process));
+            let outputs = self.process(summary).and_then(|process| read_ports(&process, None));
             record.result.outputs = outputs.map_err(|error| error.file(&self.path))?;
             run.stages.push(record);
         }

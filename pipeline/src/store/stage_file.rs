@@ -7,6 +7,7 @@ use hdf5::File;
 use super::error::{Result, StoreError};
 use super::format::{check_format, write_format};
 use super::ports::{read_ports, write_ports};
+use super::rows::Backing;
 use super::seal::{check_seal, seal};
 use super::{read, write};
 use crate::runner::StageResult;
@@ -33,15 +34,16 @@ fn write_contents(file: &File, result: &StageResult) -> Result<()> {
     write_ports(&write::group(file, GROUP)?, &result.outputs)
 }
 
-/// Reads a stage's result. Errors: there is no file, it is damaged, or of another version.
+/// Reads a stage's result. Large arrays over two axes stay in the file, which is held open for them. Errors: there is no file, it is damaged, or of another version.
 pub fn read_stage(path: &Path) -> std::result::Result<StageResult, StoreError> {
     check_seal(path)?;
     read_hdf5(path).map_err(|error| error.file(path))
 }
 
 fn read_hdf5(path: &Path) -> Result<StageResult> {
+    let backing = Backing::open(path)?;
     let file = read::open_file(path)?;
     check_format(&file, KIND)?;
     let warnings = read::texts(&file, WARNINGS)?;
-    Ok(StageResult { outputs: read_ports(&read::group(&file, GROUP)?)?, warnings })
+    Ok(StageResult { outputs: read_ports(&read::group(&file, GROUP)?, Some(&backing))?, warnings })
 }

@@ -41,15 +41,21 @@ pub(super) fn nexus_group(parent: &Group, name: &str, class: &str) -> Result<Gro
 ///
 /// Contiguous and raw: gzip takes a tenth off aligned ensembles and means (noise does not compress) at a tenth of the speed.
 pub(crate) fn dataset<T: H5Type>(parent: &Group, name: &str, shape: &[usize], values: &[T]) -> Result<Dataset> {
-    check_name(name).map_err(|error| error.at(parent.name()))?;
     let wrap = |error: hdf5::Error| StoreError::from(error).at(path_of(parent, name));
     let view = ArrayView::from_shape(shape, values)
         .map_err(|error| StoreError::new(format!("{} values do not fill {shape:?}: {error}", values.len())))?;
-    let dataset = parent.new_dataset::<T>().obj_track_times(false).shape(shape).create(name).map_err(wrap)?;
+    let dataset = empty::<T>(parent, name, shape)?;
     if !values.is_empty() {
         dataset.write(view).map_err(wrap)?;
     }
     Ok(dataset)
+}
+
+/// Such a dataset before anything is written to it.
+pub(super) fn empty<T: H5Type>(parent: &Group, name: &str, shape: &[usize]) -> Result<Dataset> {
+    check_name(name).map_err(|error| error.at(parent.name()))?;
+    let dataset = parent.new_dataset::<T>().obj_track_times(false).shape(shape).create(name);
+    dataset.map_err(|error| StoreError::from(error).at(path_of(parent, name)))
 }
 
 pub(super) fn scalar<T: H5Type>(parent: &Group, name: &str, value: T) -> Result<Dataset> {

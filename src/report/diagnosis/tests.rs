@@ -5,11 +5,11 @@ use serde_json::{Value, json};
 use super::fixture::{clean, named, of_system, release, system, unexplained};
 use super::telling::{View, main_cause, telling};
 use crate::report::figure::tests::assert_well_formed;
-use crate::report::tests::assert_page;
-use crate::report::{figures, report};
+use crate::report::figures;
+use crate::report::tests::{alone, assert_page};
 
 fn page(run: &afmid_pipeline::RunResult) -> String {
-    let page = report(run).expect("a page");
+    let page = alone(run).expect("a page");
     assert_page(&page);
     figures(run).iter().for_each(|(_, text)| assert_well_formed(text));
     page

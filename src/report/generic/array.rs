@@ -41,6 +41,11 @@ pub(super) fn array_view(id: &str, array: &Array) -> (ArtifactView, Option<Figur
     (view, default_plot(id, array))
 }
 
+/// Real values; none where they cannot be read.
+fn reals(values: &Values) -> &[f64] {
+    values.real().and_then(Result::ok).unwrap_or(&[])
+}
+
 /// The least and the largest finite value (of the magnitude, if complex).
 fn range(values: &Values) -> (f64, f64) {
     let fold = |values: &mut dyn Iterator<Item = f64>| {
@@ -49,7 +54,7 @@ fn range(values: &Values) -> (f64, f64) {
             .fold((f64::NAN, f64::NAN), |(low, high), value| (value.min(low), value.max(high)))
     };
     match values {
-        Values::Real(values) => fold(&mut values.iter().copied()),
+        Values::Real(_) | Values::Stored(_) => fold(&mut reals(values).iter().copied()),
         Values::Complex(values) => fold(&mut values.iter().map(|value| value.norm())),
         Values::Integer(values) => fold(&mut values.iter().map(|value| *value as f64)),
     }
@@ -64,7 +69,7 @@ fn default_plot(id: &str, array: &Array) -> Option<Figure> {
         return None;
     }
     let values: Vec<f64> = match &signal.values {
-        Values::Real(values) => values.clone(),
+        Values::Real(_) | Values::Stored(_) => reals(&signal.values).to_vec(),
         Values::Complex(values) => values.iter().map(|value| value.norm()).collect(),
         Values::Integer(values) => values.iter().map(|value| *value as f64).collect(),
     };

@@ -1,6 +1,6 @@
 //! What the paper checks beside its figures: alignment, drift, periodograms, residuals, calibration.
 
-use afmid_pipeline::{Array, Axis as Coordinates, Document, RunResult, Table, Values};
+use afmid_pipeline::{Array, Axis as Coordinates, Document, RunResult, Table};
 
 use super::force_curve::is_ensemble;
 use super::sections::Drawn;
@@ -26,7 +26,7 @@ const MOST_EVENTS: usize = 12;
 
 fn aligned(run: &RunResult, found: &Found<'_, Array>) -> Option<Figure> {
     let time = time_axis(found.value)?;
-    let Values::Real(signal) = &found.value.variable("signal").ok()?.values else { return None };
+    let signal = found.value.real("signal").ok()?;
     let count = time.values.len();
     let onset = time.values.iter().position(|t| *t >= 0.0)?;
     // an eighth of the window: where a wrong alignment would show
@@ -174,7 +174,7 @@ fn several_spectra(found: &Found<'_, Array>, axis: &Coordinates) -> Option<Figur
         .variables
         .iter()
         .find(|variable| variable.unit.ends_with("/Hz") && variable.dims.last() == Some(&axis.name))?;
-    let Values::Real(values) = &variable.values else { return None };
+    let values = variable.values.real()?.ok()?;
     let rows: Vec<&[f64]> = values.chunks_exact(axis.values.len().max(1)).collect();
     let (low, high) = envelope(&rows, axis.values.len());
     let mean = (0..axis.values.len())

@@ -108,7 +108,7 @@ const CHANNEL_SHARE: f64 = 0.5 / CHANNELS as f64;
 impl Stage for ReleaseDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.release",
-        version: 11,
+        version: 12,
         summary: "names what a linear lever and detector get wrong in snap-off events",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
         outputs: &[SUMMARY.spec(), RESIDUALS.spec(), TILES.spec(), MODEL.spec()],

@@ -59,7 +59,7 @@ const EVENTS: Port<Table> = Port::new("events", "replayed-events", "load, instan
 impl Stage for ReleaseReplay {
     const SPEC: Spec = Spec {
         name: "diagnosis.replay",
-        version: 1,
+        version: 2,
         summary: "simulates measured snap-offs again, before and after the extension, and shows what is left",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec(), MODEL.spec()],
         outputs: &[SUMMARY.spec(), RESIDUALS.spec(), EVENTS.spec()],

@@ -89,7 +89,7 @@ const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over
 impl Stage for SystemDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.system",
-        version: 2,
+        version: 3,
         summary: "names what a linear oscillator gets wrong in a measured input and output",
         inputs: &[PAIR.spec()],
         outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec()],

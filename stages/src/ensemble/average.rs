@@ -1,11 +1,13 @@
 //! The stage `ensemble.average`.
 
+use afmid_pipeline::rows::{RowSource, RowView};
 use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{Moments, Rows, Scatter, Split, moments, scatter, split_halves};
+use super::rows::{all, check_rows};
+use super::{Moments, Scatter, Split, moments, scatter, split_halves};
 
 /// Averages aligned events: all of them, and two halves drawn at random.
 ///
@@ -59,8 +61,8 @@ impl Stage for Average {
         let (rows, unit) = signal_rows(ensemble)?;
         let onset = onset_sample(ensemble)?;
         let rate = ensemble.number("sample_rate_hz")?;
-        let whole = Averaged::new(rows, &rows.all(), onset)?;
-        let split = match split_halves(rows.count(), cx.seed()) {
+        let whole = Averaged::new(rows, &all(&rows), onset)?;
+        let split = match split_halves(rows.rows(), cx.seed()) {
             Ok(split) if self.split => Some(split),
             Ok(_) => None,
             Err(error) => {
@@ -98,7 +100,7 @@ impl Stage for Average {
             }
         }
         let summary = Document::new(&json!({
-            "events": rows.count(),
+            "events": rows.rows(),
             "identification": split.as_ref().map(|s| &s.identification),
             "verification": split.as_ref().map(|s| &s.verification),
             "amplitude_spread": spread(&whole.scatter.amplitude),
@@ -130,9 +132,9 @@ impl Stage for Average {
 }
 
 /// The signal of an ensemble as checked rows, and its unit.
-pub(super) fn signal_rows(ensemble: &Array) -> Result<(Rows<'_>, &str), StageError> {
-    let samples = ensemble.axis("time")?.values.len();
-    let rows = Rows::new(ensemble.real("signal")?, samples).map_err(StageError::from_error)?;
+pub(super) fn signal_rows(ensemble: &Array) -> Result<(RowView<'_>, &str), StageError> {
+    let rows = ensemble.rows("signal")?;
+    check_rows(&rows).map_err(StageError::from_error)?;
     Ok((rows, &ensemble.variable("signal")?.unit))
 }
 
@@ -152,7 +154,7 @@ struct Averaged {
 }
 
 impl Averaged {
-    fn new(rows: Rows<'_>, chosen: &[usize], onset: usize) -> Result<Self, StageError> {
+    fn new(rows: RowView<'_>, chosen: &[usize], onset: usize) -> Result<Self, StageError> {
         let moments = moments(rows, chosen).map_err(StageError::from_error)?;
         let scatter = scatter(rows, chosen, &moments.mean, onset).map_err(StageError::from_error)?;
         Ok(Self { moments, scatter })

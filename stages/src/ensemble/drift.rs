@@ -1,5 +1,6 @@
 //! The stage `ensemble.drift`.
 
+use afmid_pipeline::rows::RowSource;
 use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -76,7 +77,7 @@ impl Stage for Drift {
             Err(error @ EnsembleError::TooFewEvents { .. }) => {
                 cx.warn(format!("{error}: whether the events drift is unknown"));
                 let unknown = ShapeDrift { groups: Vec::new(), p_value: f64::NAN, z_score: f64::NAN };
-                let summary = summary(&unknown, rows.count(), 0)?;
+                let summary = summary(&unknown, rows.rows(), 0)?;
                 return Ok(Ports::new().with(&GROUPS, table(&[])).with(&SUMMARY, summary));
             }
             Err(error) => return Err(StageError::from_error(error)),
@@ -87,7 +88,7 @@ impl Stage for Drift {
                 found.p_value, found.z_score
             ));
         }
-        let summary = summary(&found, rows.count(), self.permutations)?;
+        let summary = summary(&found, rows.rows(), self.permutations)?;
         Ok(Ports::new().with(&GROUPS, table(&found.groups)).with(&SUMMARY, summary))
     }
 

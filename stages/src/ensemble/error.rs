@@ -1,5 +1,6 @@
 //! What an ensemble can be refused for.
 
+use afmid_pipeline::StageError;
 use thiserror::Error;
 
 /// Why an ensemble cannot be averaged or compared.
@@ -62,4 +63,16 @@ pub enum EnsembleError {
     /// All events are equal or constant: nothing to correlate.
     #[error("the mean of the events is constant: it carries no shape to compare with")]
     NoShape,
+    /// The events lie in a file that cannot be read.
+    #[error("{reason}")]
+    Unreadable {
+        /// Why, with the file.
+        reason: String,
+    },
+}
+
+impl From<StageError> for EnsembleError {
+    fn from(error: StageError) -> Self {
+        Self::Unreadable { reason: error.to_string() }
+    }
 }

@@ -11,6 +11,7 @@ mod average;
 mod drift;
 mod error;
 pub(crate) mod example;
+mod gram;
 mod moments;
 mod rows;
 mod scatter;
@@ -29,6 +30,9 @@ pub use split::{LEAST_EVENTS, Split, split_halves};
 
 /// The stages of this domain.
 pub const STAGES: &[Entry] = &[Entry::of::<Average>(), Entry::of::<Drift>()];
+
+#[cfg(test)]
+mod streaming_tests;
 
 #[cfg(test)]
 #[test]

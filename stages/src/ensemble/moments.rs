@@ -1,8 +1,10 @@
 //! Mean and variance per sample.
 
+use afmid_pipeline::rows::{RowSource, in_blocks};
 use rayon::prelude::*;
 
-use super::{EnsembleError, Rows};
+use super::EnsembleError;
+use super::rows::check_chosen;
 
 /// Samples per parallel piece: large enough to stream, small enough to balance.
 const PIECE: usize = 1024;
@@ -25,7 +27,8 @@ pub struct Moments {
 ///
 /// # Method
 /// Corrected two-pass: the mean, improved by the mean of the deviations from it, then the squared deviations less the
-/// square of their sum. Sums run over the events in the order given, so the result does not depend on threads.
+/// square of their sum. Sums run over the events in the order given, so the result depends neither on threads nor on where
+/// the rows lie. Two passes over the rows.
 ///
 /// # Shapes
 /// `rows` `[event, time]`; results `[time]`.
@@ -41,54 +44,53 @@ pub struct Moments {
 ///
 /// # Source
 /// Chan, Golub, LeVeque, The American Statistician 37 (1983) 242, Eq. 1.7.
-pub fn moments(rows: Rows<'_>, chosen: &[usize]) -> Result<Moments, EnsembleError> {
-    rows.check(chosen)?;
+pub fn moments(rows: impl RowSource, chosen: &[usize]) -> Result<Moments, EnsembleError> {
+    check_chosen(&rows, chosen)?;
     if chosen.is_empty() {
         return Err(EnsembleError::TooFewEvents { got: 0, wanted: 1, purpose: "an average" });
     }
-    let pieces: Vec<(Vec<f64>, Vec<f64>)> = (0..rows.samples().div_ceil(PIECE))
-        .into_par_iter()
-        .map(|piece| {
-            let from = piece * PIECE;
-            piece_moments(rows, chosen, from, (from + PIECE).min(rows.samples()))
-        })
-        .collect();
-    let (mut mean, mut variance) = (Vec::with_capacity(rows.samples()), Vec::with_capacity(rows.samples()));
-    for (m, v) in pieces {
-        mean.extend(m);
-        variance.extend(v);
-    }
-    Ok(Moments { mean, variance, count: chosen.len() })
-}
-
-fn piece_moments(rows: Rows<'_>, chosen: &[usize], from: usize, to: usize) -> (Vec<f64>, Vec<f64>) {
-    let n = chosen.len() as f64;
-    let mut mean = vec![0.0; to - from];
-    for &event in chosen {
-        for (m, y) in mean.iter_mut().zip(&rows.row(event)[from..to]) {
-            *m += y;
-        }
-    }
+    let (samples, n) = (rows.row_length(), chosen.len() as f64);
+    let mut mean = vec![0.0; samples];
+    in_blocks(&rows, chosen, |_, block| -> Result<(), EnsembleError> {
+        mean.par_chunks_mut(PIECE).enumerate().for_each(|(piece, mean)| {
+            for row in block {
+                mean.iter_mut().zip(&row[piece * PIECE..]).for_each(|(m, y)| *m += y);
+            }
+        });
+        Ok(())
+    })?;
     mean.iter_mut().for_each(|m| *m /= n);
-    let (mut drift, mut square) = (vec![0.0; to - from], vec![0.0; to - from]);
-    for &event in chosen {
-        for (((m, y), d), s) in mean.iter().zip(&rows.row(event)[from..to]).zip(&mut drift).zip(&mut square) {
-            let e = y - m;
-            *d += e;
-            *s += e * e;
-        }
-    }
+    let (mut drift, mut square) = (vec![0.0; samples], vec![0.0; samples]);
+    in_blocks(&rows, chosen, |_, block| -> Result<(), EnsembleError> {
+        let pieces = drift.par_chunks_mut(PIECE).zip(square.par_chunks_mut(PIECE)).zip(mean.par_chunks(PIECE));
+        pieces.enumerate().for_each(|(piece, ((drift, square), mean))| {
+            for row in block {
+                deviations(mean, &row[piece * PIECE..], drift, square);
+            }
+        });
+        Ok(())
+    })?;
     let freedom = (n - 1.0).max(1.0);
     let variance = square.iter().zip(&drift).map(|(s, d)| ((s - d * d / n) / freedom).max(0.0)).collect();
     for (m, d) in mean.iter_mut().zip(&drift) {
         *m += d / n;
     }
-    (mean, variance)
+    Ok(Moments { mean, variance, count: chosen.len() })
+}
+
+/// Adds a row's deviations from the mean, and their squares.
+fn deviations(mean: &[f64], row: &[f64], drift: &mut [f64], square: &mut [f64]) {
+    for (((m, y), d), s) in mean.iter().zip(row).zip(drift).zip(square) {
+        let e = y - m;
+        *d += e;
+        *s += e * e;
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ensemble::Rows;
     use crate::fixture::white_noise;
 
     #[test]

@@ -1,8 +1,11 @@
 //! A borrowed, checked view of an ensemble.
 
+use afmid_pipeline::StageError;
+use afmid_pipeline::rows::{RowSource, RowView, in_blocks};
+
 use super::EnsembleError;
 
-/// Aligned events, row-major `[event, time]`; every value is finite.
+/// Aligned events in memory, row-major `[event, time]`; every value is finite.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows<'a> {
     values: &'a [f64],
@@ -43,12 +46,54 @@ impl<'a> Rows<'a> {
     pub fn all(&self) -> Vec<usize> {
         (0..self.count()).collect()
     }
+}
 
-    /// Refuses indices that point outside.
-    pub(super) fn check(&self, chosen: &[usize]) -> Result<(), EnsembleError> {
-        match chosen.iter().find(|&&i| i >= self.count()) {
-            Some(&index) => Err(EnsembleError::NoSuchEvent { index, count: self.count() }),
-            None => Ok(()),
+impl RowSource for Rows<'_> {
+    fn rows(&self) -> usize {
+        self.count()
+    }
+
+    fn row_length(&self) -> usize {
+        self.samples
+    }
+
+    fn lent(&self, row: usize) -> Option<&[f64]> {
+        (row < self.count()).then(|| self.row(row))
+    }
+
+    fn read(&self, row: usize, into: &mut [f64]) -> Result<(), StageError> {
+        RowView::Memory(self.values, self.samples).read(row, into)
+    }
+}
+
+/// Refuses rows without values and values that are not finite, wherever they lie.
+///
+/// # Errors
+/// As [`Rows::new`]; a file that cannot be read.
+pub(super) fn check_rows(rows: &dyn RowSource) -> Result<(), EnsembleError> {
+    let samples = rows.row_length();
+    if samples == 0 || rows.rows() == 0 {
+        return Err(EnsembleError::Ragged { values: 0, samples });
+    }
+    in_blocks(rows, &all(rows), |first, block| {
+        for (event, row) in (first..).zip(block) {
+            if let Some(sample) = row.iter().position(|value| !value.is_finite()) {
+                return Err(EnsembleError::NotFinite { event, sample });
+            }
         }
+        Ok(())
+    })
+}
+
+/// All event indices in order.
+pub(super) fn all(rows: &dyn RowSource) -> Vec<usize> {
+    (0..rows.rows()).collect()
+}
+
+/// Refuses indices that point outside.
+pub(super) fn check_chosen(rows: &dyn RowSource, chosen: &[usize]) -> Result<(), EnsembleError> {
+    match chosen.iter().find(|&&index| index >= rows.rows()) {
+        Some(&index) => Err(EnsembleError::NoSuchEvent { index, count: rows.rows() }),
+        None => Ok(()),
     }
 }

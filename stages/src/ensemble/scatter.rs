@@ -1,11 +1,13 @@
 //! What is left of each event when amplitude, offset and loading slopes are taken out: the noise.
 
+use afmid_pipeline::rows::{RowSource, in_blocks};
 use rayon::prelude::*;
 
-use super::{EnsembleError, Rows};
+use super::EnsembleError;
+use super::rows::check_chosen;
 
 /// How each event differs from the mean, and the noise that remains.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scatter {
     /// Amplitude relative to the mean, per event; their mean is one.
     pub amplitude: Vec<f64>,
@@ -17,8 +19,6 @@ pub struct Scatter {
     pub rms: Vec<f64>,
     /// Variance of the noise of one event, per sample.
     pub noise_variance: Vec<f64>,
-    /// Remainders, row-major `[chosen event, time]`.
-    pub residual: Vec<f64>,
 }
 
 impl Scatter {
@@ -54,33 +54,45 @@ impl Scatter {
 ///
 /// # Errors
 /// Fewer than two events, fewer than sixteen samples, an index outside, or a constant mean.
-pub fn scatter(rows: Rows<'_>, chosen: &[usize], mean: &[f64], zero: usize) -> Result<Scatter, EnsembleError> {
-    rows.check(chosen)?;
+pub fn scatter(rows: impl RowSource, chosen: &[usize], mean: &[f64], zero: usize) -> Result<Scatter, EnsembleError> {
+    check_chosen(&rows, chosen)?;
     if chosen.len() < 2 {
         return Err(EnsembleError::TooFewEvents { got: chosen.len(), wanted: 2, purpose: "a noise variance" });
     }
-    let samples = rows.samples();
-    if samples < 16 || mean.len() != samples {
-        return Err(EnsembleError::TooFewSamples { got: samples.min(mean.len()), wanted: 16, purpose: "a regression" });
-    }
-    let basis = Basis::new(mean, zero)?;
-    let fits: Vec<Fit> = chosen.par_iter().map(|&i| basis.project(rows.row(i))).collect();
+    let samples = rows.row_length();
+    let basis = Basis::new(mean, zero, samples)?;
     let n = chosen.len() as f64;
     let freedom = samples as f64 / (samples - basis.columns.len()) as f64 / (n - 1.0);
-    let mut noise_variance = vec![0.0; samples];
-    for fit in &fits {
-        for (v, e) in noise_variance.iter_mut().zip(&fit.residual) {
-            *v += e * e * freedom;
+    let mut found = Scatter { noise_variance: vec![0.0; samples], ..Scatter::default() };
+    in_blocks(&rows, chosen, |_, block| -> Result<(), EnsembleError> {
+        let fits: Vec<Fit> = block.par_iter().map(|row| basis.project(row)).collect();
+        for fit in fits {
+            for (v, e) in found.noise_variance.iter_mut().zip(&fit.residual) {
+                *v += e * e * freedom;
+            }
+            found.amplitude.push(fit.amplitude);
+            found.offset.push(fit.offset);
+            found.lag.push(fit.lag);
+            found.rms.push((dot(&fit.residual, &fit.residual) / samples as f64).sqrt());
         }
+        Ok(())
+    })?;
+    Ok(found)
+}
+
+/// What [`scatter`] leaves of rows.
+pub(super) struct Remainders<'a>(Basis<'a>);
+
+impl<'a> Remainders<'a> {
+    /// Against this mean of rows of so many samples. Errors: as [`scatter`].
+    pub(super) fn new(mean: &'a [f64], zero: usize, samples: usize) -> Result<Self, EnsembleError> {
+        Basis::new(mean, zero, samples).map(Self)
     }
-    Ok(Scatter {
-        amplitude: fits.iter().map(|f| f.amplitude).collect(),
-        offset: fits.iter().map(|f| f.offset).collect(),
-        lag: fits.iter().map(|f| f.lag).collect(),
-        rms: fits.iter().map(|f| (dot(&f.residual, &f.residual) / samples as f64).sqrt()).collect(),
-        noise_variance,
-        residual: fits.into_iter().flat_map(|f| f.residual).collect(),
-    })
+
+    /// The remainders of some rows.
+    pub(super) fn of(&self, rows: &[&[f64]]) -> Vec<Vec<f64>> {
+        rows.par_iter().map(|row| self.0.project(row).residual).collect()
+    }
 }
 
 /// One event against the mean.
@@ -104,8 +116,11 @@ struct Basis<'a> {
 }
 
 impl<'a> Basis<'a> {
-    fn new(mean: &'a [f64], zero: usize) -> Result<Self, EnsembleError> {
-        let samples = mean.len();
+    fn new(mean: &'a [f64], zero: usize, samples: usize) -> Result<Self, EnsembleError> {
+        if samples < 16 || mean.len() != samples {
+            let got = samples.min(mean.len());
+            return Err(EnsembleError::TooFewSamples { got, wanted: 16, purpose: "a regression" });
+        }
         let time = |k: usize| (k as f64 - zero as f64) / samples as f64;
         let mut columns = Vec::new();
         orthogonalise(&mut columns, vec![1.0; samples]);
@@ -174,7 +189,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ensemble::moments;
+    use crate::ensemble::{Rows, moments};
     use crate::fixture::{Lever, white_noise};
 
     /// Events of the paper's lever: adhesion scatters by 20 %, offsets by 4 mV, loading slopes stay.
@@ -221,9 +236,10 @@ mod tests {
         let (values, _, samples) = events(6, 3, 0.0);
         let rows = Rows::new(&values, samples).unwrap();
         let mean = moments(rows, &rows.all()).unwrap();
-        let got = scatter(rows, &rows.all(), &mean.mean, 800).unwrap();
+        let events: Vec<&[f64]> = rows.all().iter().map(|&event| rows.row(event)).collect();
+        let rest = Remainders::new(&mean.mean, 800, samples).unwrap().of(&events);
         // rounding of values of order one
-        assert!(got.residual.iter().all(|e| e.abs() < 1e-13));
+        assert!(rest.iter().flatten().all(|e| e.abs() < 1e-13));
     }
 
     #[test]

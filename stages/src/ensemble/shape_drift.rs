@@ -1,12 +1,16 @@
 //! Does the shape of the events change slowly over the archive?
 
+use afmid_pipeline::rows::RowSource;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::gram::gram;
+use super::rows::all;
+use super::scatter::Remainders;
 use super::scatter::dot;
-use super::{EnsembleError, Rows, moments, scatter};
+use super::{EnsembleError, moments};
 
 /// How drift is looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +47,9 @@ pub struct ShapeDrift {
     pub p_value: f64,
 }
 
+/// Random orders that are judged in parallel.
+const ORDERS_AT_ONCE: usize = 64;
+
 /// Slow trends that the statistic looks for: linear, quadratic and cubic in the event index.
 const TREND_ORDERS: usize = 3;
 
@@ -74,8 +81,8 @@ const TREND_ORDERS: usize = 3;
 /// # Source
 /// Stark et al. 2005, "subensembles (ordered as well as randomized) were created and compared"; permutation tests: Phipson
 /// and Smyth, Stat. Appl. Genet. Mol. Biol. 9 (2010) 39.
-pub fn shape_drift(rows: Rows<'_>, zero: usize, settings: DriftSettings) -> Result<ShapeDrift, EnsembleError> {
-    let count = rows.count();
+pub fn shape_drift(rows: impl RowSource, zero: usize, settings: DriftSettings) -> Result<ShapeDrift, EnsembleError> {
+    let count = rows.rows();
     let wanted = (2 * settings.groups).max(8);
     if settings.groups < 2 {
         return Err(EnsembleError::Setting { name: "groups", got: settings.groups.to_string(), wanted: "at least 2" });
@@ -86,37 +93,35 @@ pub fn shape_drift(rows: Rows<'_>, zero: usize, settings: DriftSettings) -> Resu
     if count < wanted {
         return Err(EnsembleError::TooFewEvents { got: count, wanted, purpose: "a test for drift" });
     }
-    let all = rows.all();
-    let mean = moments(rows, &all)?.mean;
-    let rest = scatter(rows, &all, &mean, zero)?.residual;
-    let gram = gram(&rest, rows.samples());
+    let all = all(&rows);
+    let mean = moments(&rows, &all)?.mean;
+    let gram = gram(&rows, &Remainders::new(&mean, zero, rows.row_length())?)?;
     let trends = trends(count);
 
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let mut random = all.clone();
     random.shuffle(&mut rng);
-    let mut groups = compare_groups(rows, &all, settings.groups, true)?;
-    groups.extend(compare_groups(rows, &random, settings.groups, false)?);
+    let mut groups = compare_groups(&rows, &all, settings.groups, true)?;
+    groups.extend(compare_groups(&rows, &random, settings.groups, false)?);
 
     let observed = statistic(&gram, &trends, &all);
-    let null: Vec<f64> = (0..settings.permutations)
-        .map(|_| {
-            random.shuffle(&mut rng);
-            statistic(&gram, &trends, &random)
-        })
-        .collect();
+    let mut null = Vec::with_capacity(settings.permutations);
+    while null.len() < settings.permutations {
+        // orders are drawn one after the other, some at a time: they need not all be in memory
+        let orders: Vec<Vec<usize>> = (null.len()..settings.permutations.min(null.len() + ORDERS_AT_ONCE))
+            .map(|_| {
+                random.shuffle(&mut rng);
+                random.clone()
+            })
+            .collect();
+        null.par_extend(orders.par_iter().map(|order| statistic(&gram, &trends, order)));
+    }
     let exceed = null.iter().filter(|&&s| s >= observed).count();
     let p_value = (1 + exceed) as f64 / (1 + settings.permutations) as f64;
     let centre = null.iter().sum::<f64>() / null.len() as f64;
     let spread = (null.iter().map(|s| (s - centre).powi(2)).sum::<f64>() / null.len() as f64).sqrt();
     let z_score = if spread > 0.0 { (observed - centre) / spread } else { 0.0 };
     Ok(ShapeDrift { groups, z_score, p_value })
-}
-
-/// Inner products of all pairs of remainders, row-major.
-fn gram(rest: &[f64], samples: usize) -> Vec<Vec<f64>> {
-    let rows: Vec<&[f64]> = rest.chunks_exact(samples).collect();
-    rows.par_iter().map(|a| rows.iter().map(|b| dot(a, b)).collect()).collect()
 }
 
 /// Orthonormal polynomials of order 1 to 3 on the event index.
@@ -152,7 +157,7 @@ fn statistic(gram: &[Vec<f64>], trends: &[Vec<f64>], order: &[usize]) -> f64 {
 }
 
 fn compare_groups(
-    rows: Rows<'_>,
+    rows: &dyn RowSource,
     order: &[usize],
     groups: usize,
     ordered: bool,
@@ -186,6 +191,7 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ensemble::Rows;
     use crate::fixture::{Lever, white_noise};
 
     const SETTINGS: DriftSettings = DriftSettings { groups: 4, permutations: 199, seed: 7 };

@@ -1,7 +1,7 @@
 //! The stage `events.correlation`.
 
 use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
+    Array, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table, Values,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -9,8 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::correlation_averaging::{Aligned, AveragingSettings, Misfit, correlation_average};
 use super::detection::EventKind;
-use super::extraction::{Extraction, ExtractionSettings, extract};
+use super::extraction::{ExtractionSettings, extract};
 use super::listing::{Listed, ensemble_array, events_table, summary};
+use super::segments::{Searched, Segments, Stretch};
 use super::window::{WindowSettings, Windows, cut_windows, quality_outliers};
 
 /// Finds snap-off or snap-to-contact events in records and aligns them by iterative correlation averaging.
@@ -131,18 +132,25 @@ impl Stage for Correlation {
         let records = &inputs.get(&RECORDS)?.records;
         let rate = common_rate(records)?;
         cx.expect(records.len());
-        let extractions = records
+        let extraction = self.extraction();
+        let stretch = Stretch::new(&self.averaging(), extraction.before, extraction.after);
+        let segments = Segments::new(cx.row_writer(extraction.before + extraction.after), stretch);
+        let searched = records
             .par_iter()
             .map(|record| {
-                let extraction = extract(record.channel("deflection")?, &self.extraction());
+                let searched =
+                    extract(record.channel("deflection")?, &extraction).and_then(|found| segments.put(found));
                 cx.tick();
-                extraction.map_err(|error| if error.place.is_none() { error.at(&record.path) } else { error })
+                searched.map_err(|error| if error.place.is_none() { error.at(&record.path) } else { error })
             })
-            .collect::<Result<Vec<Extraction>, StageError>>()?;
-        let listed = self.align(records, extractions, cx)?;
+            .collect::<Result<Vec<Searched>, StageError>>()?;
+        let (listed, signal) = self.align(records, searched, &segments.finish(), stretch, cx)?;
         let unit = records.first().map_or("V", |record| record.channels.first().map_or("V", |channel| &channel.unit));
         Ok(Ports::new()
-            .with(&ENSEMBLE, ensemble_array(&listed, rate, self.pre_samples(), self.kind, unit))
+            .with(
+                &ENSEMBLE,
+                ensemble_array(&listed, (signal, self.window_samples), rate, self.pre_samples(), self.kind, unit),
+            )
             .with(&EVENTS, events_table(&listed, records, rate, unit))
             .with(&SUMMARY, summary(&listed, records, rate, self.kind)?))
     }
@@ -190,21 +198,30 @@ impl Correlation {
     }
 
     /// Aligns what was found, rejects what does not belong, and lists all.
-    fn align(&self, records: &[Record], extractions: Vec<Extraction>, cx: &Context) -> Result<Listed, StageError> {
+    fn align(
+        &self,
+        records: &[Record],
+        searched: Vec<Searched>,
+        segments: &Values,
+        stretch: Stretch,
+        cx: &Context,
+    ) -> Result<(Listed, Values), StageError> {
         let onset = self.extraction().before;
         let mut listed = Listed::default();
-        let (mut places, mut segments) = (Vec::new(), Vec::new());
-        for (record, extraction) in extractions.into_iter().enumerate() {
-            listed.refused.extend(extraction.refused.into_iter().map(|refused| (record, refused)));
-            for found in extraction.found {
-                places.push((record, found.start, found.saturated));
-                segments.push(found.segment);
+        let (mut places, mut numbers, mut stretches) = (Vec::new(), Vec::new(), Vec::new());
+        for (record, searched) in searched.into_iter().enumerate() {
+            listed.refused.extend(searched.refused.into_iter().map(|refused| (record, refused)));
+            for seen in searched.seen {
+                places.push((record, seen.start, seen.saturated));
+                numbers.push(seen.segment);
+                stretches.push(seen.stretch);
             }
         }
-        if segments.is_empty() {
+        if stretches.is_empty() {
             return Err(nothing_found(&listed, records));
         }
-        let averaging = correlation_average(&segments, onset, &self.averaging());
+        let averaging = correlation_average(&stretches, stretch.onset, &self.averaging());
+        drop(stretches);
         if averaging.last_change_samples > self.tolerance_samples {
             cx.warn(format!(
                 "the alignment still moved events by {:.4} samples after {} iterations, wanted {}: raise max_iterations",
@@ -218,7 +235,11 @@ impl Correlation {
                 Err(misfit) => listed.reject(places[index], onset, self.misfit_reason(misfit)),
             }
         }
-        let mut windows = self.windows(&mut segments, &kept, onset);
+        let windows_of = |kept: &[(usize, Aligned)]| {
+            let chosen: Vec<(usize, Aligned)> = kept.iter().map(|&(index, event)| (numbers[index], event)).collect();
+            self.windows(segments, &chosen, cx)
+        };
+        let mut windows = windows_of(&kept)?;
         let qualities: Vec<f64> = windows.events.iter().map(|event| event.quality).collect();
         let outliers = quality_outliers(&qualities, 6.0, self.max_residual_ratio);
         for &outlier in outliers.iter().rev() {
@@ -231,7 +252,7 @@ impl Correlation {
             listed.reject(places[index], onset, reason);
         }
         if !outliers.is_empty() {
-            windows = self.windows(&mut segments, &kept, onset);
+            windows = windows_of(&kept)?;
         }
         if kept.is_empty() {
             return Err(nothing_found(&listed, records));
@@ -240,18 +261,15 @@ impl Correlation {
             listed.keep(places[*index], event);
         }
         listed.iterations = averaging.iterations;
-        Ok(listed)
+        Ok((listed, windows.values))
     }
 
-    fn windows(&self, segments: &mut [Vec<f64>], kept: &[(usize, Aligned)], onset: usize) -> Windows {
-        // segments are long: they are lent, not copied
-        let lent: Vec<Vec<f64>> = kept.iter().map(|&(index, _)| std::mem::take(&mut segments[index])).collect();
-        let aligned: Vec<Aligned> = kept.iter().map(|&(_, aligned)| aligned).collect();
-        let windows = cut_windows(&lent, onset, &aligned, self.kind == EventKind::SnapOff, &self.window());
-        for (&(index, _), segment) in kept.iter().zip(lent) {
-            segments[index] = segment;
-        }
-        windows
+    /// Windows of the chosen segments, by their numbers.
+    fn windows(&self, segments: &Values, chosen: &[(usize, Aligned)], cx: &Context) -> Result<Windows, StageError> {
+        let ExtractionSettings { before, after, .. } = self.extraction();
+        let rows = segments.rows(before + after).ok_or_else(|| StageError::new("segments without samples"))?;
+        let writer = cx.row_writer(self.window_samples);
+        cut_windows(&rows, before, chosen, self.kind == EventKind::SnapOff, &self.window(), writer)
     }
 
     fn misfit_reason(&self, misfit: &Misfit) -> String {

@@ -199,3 +199,58 @@ fn parameters_out_of_range_are_named() {
     let stage: Correlation = afmid_pipeline::toml::from_str("kind = \"snap-to-contact\"").unwrap();
     assert_eq!(stage.kind, EventKind::SnapIn);
 }
+
+#[test]
+fn windows_in_a_file_are_those_in_memory_bit_for_bit_on_any_number_of_threads() {
+    let (_, mut records) = archive();
+    // one that the qualities reject, so that windows are cut twice
+    let signal: Vec<f64> = (0..).zip(curve(-0.8, 0.3).signal()).map(|(k, y)| y + ripple(k)).collect();
+    records.push(record("ripple.h5", quantised(&signal, 1.2e-3, 98)));
+    let mut ports = Ports::new();
+    ports.insert("records", Artifact::Recording(Arc::new(Recording { records })));
+    let outputs = |limit_bytes: usize, threads: usize| {
+        let scratch = afmid_pipeline::rows::Scratch::default().with_limit_bytes(limit_bytes);
+        let context = Context::new(Path::new("."), 1, &NoProgress).with_scratch(scratch);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Correlation::default().run(&ports, &context)).unwrap()
+    };
+    let memory = outputs(usize::MAX, 1);
+    assert!(matches!(memory.get(&ENSEMBLE).unwrap().variables[0].values, Values::Real(_)));
+    let summary = &memory.get(&SUMMARY).unwrap().0;
+    assert!(summary.to_string().contains("times the noise"), "nothing was rejected by its quality: {summary}");
+    // no room at all, and room for half of the segments
+    for (limit_bytes, threads) in [(0, 1), (0, 4), (6 * 8192 * 8, 4)] {
+        let file = outputs(limit_bytes, threads);
+        assert!(matches!(file.get(&ENSEMBLE).unwrap().variables[0].values, Values::Stored(_)));
+        assert_eq!(afmid_pipeline::conformance::difference(&memory, &file), None, "{limit_bytes} bytes, {threads}");
+    }
+}
+
+/// 100 mV, long after what the alignment looks at; too fast for the scan to see.
+fn ripple(k: u32) -> f64 {
+    if k > 83_000 { 0.1 * (f64::from(k) * 1.5).sin() } else { 0.0 }
+}
+
+#[test]
+fn the_alignment_has_the_same_bits_from_what_it_looks_at_as_from_whole_segments() {
+    let lever = crate::fixture::Lever::paper();
+    let stage = Correlation { max_shift_samples: 8, ..Correlation::default() };
+    let (averaging, extraction) = (stage.averaging(), stage.extraction());
+    let count = extraction.before + extraction.after;
+    let stretch = Stretch::new(&averaging, extraction.before, extraction.after);
+    // some at the largest shift, some beyond it, one of noise alone
+    let segments: Vec<Vec<f64>> = [-7.9, -7.5, 6.0, 7.7, 7.9, 7.95, 9.0, 30.0]
+        .iter()
+        .zip(0..)
+        .map(|(shift, seed)| {
+            let signal = lever.release(count, extraction.before as f64 + shift, if seed == 7 { 0.0 } else { -0.9 });
+            signal.iter().zip(white_noise(count, 1.2e-3, seed)).map(|(y, e)| y + e).collect()
+        })
+        .collect();
+    let whole = correlation_average(&segments, extraction.before, &averaging);
+    let cut: Vec<Vec<f64>> = segments.iter().map(|segment| stretch.of(segment)).collect();
+    let part = correlation_average(&cut, stretch.onset, &averaging);
+    assert!(cut[0].len() < 600 && whole.events.iter().any(Result::is_ok) && whole.events.iter().any(Result::is_err));
+    // debug text has every digit of a number
+    assert_eq!(format!("{whole:?}"), format!("{part:?}"));
+}

@@ -1,6 +1,6 @@
 //! Events as artifacts: ensemble, table, summary.
 
-use afmid_pipeline::{Array, Axis, Document, Record, StageError, Table};
+use afmid_pipeline::{Array, Axis, Document, Record, StageError, Table, Values};
 use serde::Serialize;
 
 use super::detection::EventKind;
@@ -42,13 +42,18 @@ impl Listed {
     }
 }
 
-/// Aligned events over event and time; time 0 is the onset.
-pub(super) fn ensemble_array(listed: &Listed, rate: f64, onset_sample: usize, kind: EventKind, unit: &str) -> Array {
+/// Aligned events over event and time, `signal` with so many samples each; time 0 is the onset.
+pub(super) fn ensemble_array(
+    listed: &Listed,
+    signal: (Values, usize),
+    rate: f64,
+    onset_sample: usize,
+    kind: EventKind,
+    unit: &str,
+) -> Array {
     let kept = &listed.kept;
-    let samples = kept.first().map_or(0, |first| first.event.values.len());
+    let (signal, samples) = signal;
     let time = (0..samples).map(|k| (k as f64 - onset_sample as f64) / rate).collect();
-    let mut signal = Vec::with_capacity(kept.len() * samples);
-    kept.iter().for_each(|kept| signal.extend_from_slice(&kept.event.values));
     let each = |value: &dyn Fn(&Kept) -> f64| -> Vec<f64> { kept.iter().map(value).collect() };
     Array::over(vec![
         Axis::new("event", "1", "event", (0..kept.len()).map(|k| k as f64).collect()),

@@ -16,6 +16,7 @@ mod listing;
 mod onset;
 mod robust_scale;
 mod saturation;
+mod segments;
 mod shift_refinement;
 mod window;
 

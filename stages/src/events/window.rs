@@ -1,11 +1,16 @@
 //! Aligned windows of an ensemble: what each event is, beside the others.
 
+use afmid_pipeline::rows::{RowSource, RowWriter, in_blocks};
+use afmid_pipeline::{StageError, Values};
 use rayon::prelude::*;
 
 use super::correlation_averaging::Aligned;
 use super::fractional_shift::{REACH, fractional_shift};
 use super::onset::{baseline, first_sustained_departure};
 use super::robust_scale::median_and_scale;
+
+/// Samples that the onset of the average must be sustained for.
+const SUSTAINED: usize = 4;
 
 /// The window that is cut for every event.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,11 +33,9 @@ impl WindowSettings {
     }
 }
 
-/// One aligned event.
-#[derive(Debug, Clone, PartialEq)]
+/// What one aligned event is.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EventWindow {
-    /// The signal, band-limited interpolated so that the onset of the average is sample `pre_samples`.
-    pub values: Vec<f64>,
     /// Position of the onset in the segment, fractional.
     pub onset: f64,
     /// Correlation with the average of the others.
@@ -48,10 +51,12 @@ pub struct EventWindow {
 }
 
 /// The aligned windows of an ensemble.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Windows {
-    /// In the order of the segments.
+    /// In the order of the events.
     pub events: Vec<EventWindow>,
+    /// The signals, band-limited interpolated so that the onset of the average is sample `pre_samples`: a row of `window_samples` per event.
+    pub values: Values,
     /// The onset of the average after the detected onsets, in samples; 0 if the average shows none.
     pub onset_correction: i64,
 }
@@ -68,56 +73,86 @@ pub struct Windows {
 ///
 /// `loaded_before`: a snap-off is free after the onset, a snap-to-contact before: there the offset is read.
 /// # Shapes
-/// Segments with [`WindowSettings::margins`] round `onset`, one [`Aligned`] each.
+/// Segments with [`WindowSettings::margins`] round `onset`; `chosen` are numbers of segments, each with its alignment. Windows go to `writer`; no
+/// more of them than a block is in memory otherwise.
 /// # Units
 /// As the segments; positions in samples.
 /// # Accuracy
 /// Interpolation 5e-5 of the jump at the onset, 1e-6 elsewhere (see [`fractional_shift`](super::fractional_shift)); the onset
 /// is late by the samples that the signal stays within the average's noise, one to three, alike in all events.
 /// # Errors
-/// None; segments shorter than that are padded with their end values.
+/// Segments that cannot be read, windows that cannot be written. Segments shorter than that are padded with their end values.
 pub fn cut_windows(
-    segments: &[Vec<f64>],
+    segments: &dyn RowSource,
     onset: usize,
-    aligned: &[Aligned],
+    chosen: &[(usize, Aligned)],
     loaded_before: bool,
     settings: &WindowSettings,
-) -> Windows {
-    let cut = |correction: i64| -> Vec<Vec<f64>> {
-        let shift_all = correction as f64 - settings.pre_samples as f64;
-        segments
-            .par_iter()
-            .zip(aligned)
-            .map(|(segment, event)| fractional_shift(segment, onset, settings.window_samples, event.shift + shift_all))
-            .collect()
-    };
-    let mut windows = cut(0);
-    let correction = onset_of_mean(&mean_of(&windows), settings).unwrap_or(0);
-    if correction != 0 {
-        windows = cut(correction);
-    }
-    let mean = mean_of(&windows);
+    mut writer: RowWriter,
+) -> Result<Windows, StageError> {
+    let cutting = Cutting { segments, onset, chosen, settings };
+    // the mean's onset asks for the samples before it and few after
+    let seen = (settings.pre_samples + settings.max_onset_samples + SUSTAINED).min(settings.window_samples);
+    let start = cutting.mean(0, seen, |_| Ok(()))?;
+    let correction = onset_of_mean(&start, settings).unwrap_or(0);
+    let mean = cutting.mean(correction, settings.window_samples, |window| writer.push(window).map(|_| ()))?;
+    let values = writer.finish();
     let jump = levels(&mean, settings.pre_samples).map_or(f64::NAN, |levels| levels.after - levels.before);
-    let mean_amplitude = aligned.iter().map(|event| event.amplitude).sum::<f64>() / aligned.len().max(1) as f64;
-    let events = windows
-        .par_iter()
-        .zip(aligned)
-        .map(|(values, event)| {
-            let levels = levels(values, settings.pre_samples);
-            let noise_std = levels.map_or(f64::NAN, |levels| levels.noise_std.max(settings.noise_floor));
-            EventWindow {
-                values: Vec::new(),
-                onset: onset as f64 + event.shift + correction as f64,
-                correlation: event.correlation,
-                amplitude: jump * event.amplitude / mean_amplitude,
-                offset: levels.map_or(f64::NAN, |levels| if loaded_before { levels.after } else { levels.before }),
-                noise_std,
-                quality: quality(values, &mean, windows.len(), settings.pre_samples, noise_std),
+    let mean_amplitude = chosen.iter().map(|(_, event)| event.amplitude).sum::<f64>() / chosen.len().max(1) as f64;
+    let describe = |values: &[f64], event: &Aligned| {
+        let levels = levels(values, settings.pre_samples);
+        let noise_std = levels.map_or(f64::NAN, |levels| levels.noise_std.max(settings.noise_floor));
+        EventWindow {
+            onset: onset as f64 + event.shift + correction as f64,
+            correlation: event.correlation,
+            amplitude: jump * event.amplitude / mean_amplitude,
+            offset: levels.map_or(f64::NAN, |levels| if loaded_before { levels.after } else { levels.before }),
+            noise_std,
+            quality: quality(values, &mean, chosen.len(), settings.pre_samples, noise_std),
+        }
+    };
+    let mut events = Vec::with_capacity(chosen.len());
+    let windows = values.rows(settings.window_samples).ok_or_else(|| StageError::new("windows without samples"))?;
+    in_blocks(&windows, &(0..chosen.len()).collect::<Vec<_>>(), |first, block| -> Result<(), StageError> {
+        events.par_extend(block.par_iter().zip(&chosen[first..]).map(|(values, (_, event))| describe(values, event)));
+        Ok(())
+    })?;
+    Ok(Windows { events, values, onset_correction: correction })
+}
+
+/// Segments and where to cut them.
+struct Cutting<'a> {
+    segments: &'a dyn RowSource,
+    onset: usize,
+    chosen: &'a [(usize, Aligned)],
+    settings: &'a WindowSettings,
+}
+
+impl Cutting<'_> {
+    /// The mean of the first `count` samples of all windows, which go to `each` in the order of the events.
+    fn mean(
+        &self,
+        correction: i64,
+        count: usize,
+        mut each: impl FnMut(&[f64]) -> Result<(), StageError>,
+    ) -> Result<Vec<f64>, StageError> {
+        let shift_all = correction as f64 - self.settings.pre_samples as f64;
+        let places: Vec<usize> = self.chosen.iter().map(|&(place, _)| place).collect();
+        let mut mean = vec![0.0; count];
+        in_blocks(self.segments, &places, |first, block| {
+            let aligned = &self.chosen[first..];
+            let cut = |(segment, (_, event)): (&&[f64], &(usize, Aligned))| {
+                fractional_shift(segment, self.onset, count, event.shift + shift_all)
+            };
+            let windows: Vec<Vec<f64>> = block.par_iter().zip(aligned).map(cut).collect();
+            for window in &windows {
+                mean.iter_mut().zip(window).for_each(|(mean, value)| *mean += value / self.chosen.len() as f64);
+                each(window)?;
             }
-        })
-        .collect::<Vec<_>>();
-    let events = events.into_iter().zip(windows).map(|(event, values)| EventWindow { values, ..event }).collect();
-    Windows { events, onset_correction: correction }
+            Ok::<(), StageError>(())
+        })?;
+        Ok(mean)
+    }
 }
 
 /// Indices of events whose quality is out of line: beyond the median by `significance` robust deviations and by a factor of
@@ -128,20 +163,12 @@ pub fn quality_outliers(qualities: &[f64], significance: f64, factor: f64) -> Ve
     (0..qualities.len()).filter(|&index| qualities[index] > limit).collect()
 }
 
-fn mean_of(windows: &[Vec<f64>]) -> Vec<f64> {
-    let mut mean = windows.first().map_or(Vec::new(), |first| vec![0.0; first.len()]);
-    for window in windows {
-        mean.iter_mut().zip(window).for_each(|(mean, value)| *mean += value / windows.len() as f64);
-    }
-    mean
-}
-
 /// The onset of the average against `pre_samples`.
 fn onset_of_mean(mean: &[f64], settings: &WindowSettings) -> Option<i64> {
     let (pre, reach) = (settings.pre_samples, settings.max_onset_samples);
     // the interpolation may ring ahead of the onset by its reach: the line comes from before
     let start = pre.checked_sub(reach)?;
-    let onset = first_sustained_departure(mean, start..pre + reach, pre / 2, 4.0, 4, 0.0)?;
+    let onset = first_sustained_departure(mean, start..pre + reach, pre / 2, 4.0, SUSTAINED, 0.0)?;
     Some(onset.index as i64 - pre as i64)
 }
 
@@ -203,6 +230,8 @@ fn quality(window: &[f64], mean: &[f64], count: usize, pre: usize, noise_std: f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use afmid_pipeline::rows::{RowView, Scratch};
+
     use crate::events::{AveragingSettings, correlation_average};
     use crate::fixture::{Lever, white_noise};
 
@@ -233,8 +262,13 @@ mod tests {
             .collect();
         let averaging = correlation_average(&segments, onset, &AVERAGING);
         let aligned: Vec<Aligned> = averaging.events.iter().map(|event| event.unwrap()).collect();
-        let windows = cut_windows(&segments, onset, &aligned, true, &WINDOW);
-        for (event, (shift, load, offset)) in windows.events.iter().zip(truth) {
+        let aligned: Vec<(usize, Aligned)> = aligned.into_iter().enumerate().collect();
+        let segments = segments.concat();
+        let view = RowView::Memory(&segments, 4600);
+        let writer = || RowWriter::new(Scratch::default(), WINDOW.window_samples);
+        let windows = cut_windows(&view, onset, &aligned, true, &WINDOW, writer()).unwrap();
+        let signals = windows.values.real().unwrap().unwrap();
+        for ((event, signal), (shift, load, offset)) in windows.events.iter().zip(signals.chunks(4096)).zip(truth) {
             let late = event.onset - (onset as f64 + shift);
             // the average's noise is 0.3 mV: the release leaves it within two samples
             assert!((-0.1..2.1).contains(&late), "{late}");
@@ -245,7 +279,7 @@ mod tests {
             // 1 / sqrt(2 * 480) = 3 % of the noise estimate: four of them
             assert!((event.quality - 1.0).abs() < 0.15, "{}", event.quality);
             let clean = lever.release(4096, 512.0 - late, load);
-            let squares: f64 = event.values.iter().zip(&clean).map(|(y, c)| (y - c - offset).powi(2)).sum();
+            let squares: f64 = signal.iter().zip(&clean).map(|(y, c)| (y - c - offset).powi(2)).sum();
             // interpolation leaves white noise as it is, less what lies above 0.45 of the rate: the rms must stay the noise's
             let rms = (squares / 4096.0).sqrt();
             assert!((0.8..1.1).contains(&(rms / 1.2e-3)), "{rms:.2e}");

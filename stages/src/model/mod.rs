@@ -32,6 +32,7 @@ mod stabilisation_stage;
 mod start_tests;
 mod subspace;
 mod subspace_stage;
+mod system_poles;
 mod tall;
 mod transmission;
 pub mod vector_fitting;
@@ -59,6 +60,7 @@ pub use ringdown_stage::{ErrorSource, JointNoise, KnownNumber, KnownQuantity, Mo
 pub use stabilisation_stage::{PoleMethod, StabilisationDiagram};
 pub use subspace::Subspace;
 pub use subspace_stage::{SubspaceEstimate, WeightKind};
+pub use system_poles::system_poles;
 pub use transmission::transmission_zeros;
 pub use vector_fitting_stage::{ResponseWeight, VectorFittingEstimate};
 pub use zeros_stage::Zeros;

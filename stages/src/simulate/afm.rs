@@ -170,7 +170,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many events
 impl Stage for Afm {
     const SPEC: Spec = Spec {
         name: "simulate.afm",
-        version: 1,
+        version: 2,
         summary: "simulates force curves with snap-in, adhesion and snap-off, and writes them as native records",
         inputs: &[],
         outputs: &[RECORDS.spec(), TRUTH.spec(), SUMMARY.spec()],

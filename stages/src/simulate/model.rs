@@ -91,7 +91,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many events
 impl Stage for AfmOfModel {
     const SPEC: Spec = Spec {
         name: "simulate.model",
-        version: 1,
+        version: 2,
         summary: "simulates force curves with a diagnosed lever, its causes included, and writes them as native records",
         inputs: &[MODEL.spec()],
         outputs: &[RECORDS.spec(), TRUTH.spec(), SUMMARY.spec()],

@@ -1,7 +1,7 @@
 //! The number of modes, from the data.
 
 use super::estimate::Ringdown;
-use super::fit::fit_ringdowns;
+use super::fit::{fit_ringdowns, fit_to};
 use super::fitted::{ARRIVED, Fitted, NEARLY};
 use super::freedom::freedom;
 use super::gaps::Gaps;
@@ -45,6 +45,8 @@ pub const HELD_OUT_EVENTS: usize = 4;
 /// Standard errors by which a further mode must do better on held-out events: one that is not there does so once in some ten thousand, one that is
 /// there does where its amplitude is known to a quarter.
 const CLEARLY: f64 = 2.0;
+/// Standard errors from the best at which all that rings is known well enough: another fit begins there.
+const BEGUN: f64 = 0.1;
 /// Numbers of modes tried beyond the best; more where a cause may draw poles away from modes.
 const BEYOND: usize = 2;
 const BEYOND_RINGING: usize = 4;
@@ -76,7 +78,7 @@ pub fn fit_counted_ringdowns(
     check(most, options)?;
     let all = Data { events, free, interval_s };
     let ladder = ladder(&all, most, BEYOND, options, ARRIVED)?;
-    let sufficient = all.fitted(&ladder.steps[ladder.best], options)?;
+    let sufficient = all.fitted(&ladder.steps[ladder.best], options, ARRIVED)?;
     let judged = RingdownOptions { noise: NoiseSource::Known(sufficient.noise.clone()), ..options.clone() };
     let tries: Vec<Try> = ladder.steps.iter().map(|start| Try::of(&all, start, &judged)).collect();
     let mut seen = Vec::new();
@@ -94,7 +96,7 @@ pub fn fit_counted_ringdowns(
         seen.push(ModeCount { modes: i + 1, chi_square: this.chi_square, bic: this.bic, held_out, worse_by });
     }
     let chosen = chosen.unwrap_or(ladder.best);
-    let fit = if chosen == ladder.best { sufficient } else { all.fitted(&ladder.steps[chosen], options)? };
+    let fit = if chosen == ladder.best { sufficient } else { all.fitted(&ladder.steps[chosen], options, ARRIVED)? };
     Ok(CountedRingdown { fit, modes: chosen + 1, seen })
 }
 
@@ -109,7 +111,7 @@ pub(crate) fn fit_all_that_rings(
     check(most, options)?;
     let all = Data { events, free, interval_s };
     let ladder = ladder(&all, most, BEYOND_RINGING, options, NEARLY)?;
-    all.fitted(&ladder.steps[ladder.best], options)
+    all.fitted(&ladder.steps[ladder.best], options, BEGUN)
 }
 
 fn check(most: usize, options: &RingdownOptions) -> Result<(), ModelError> {
@@ -137,9 +139,15 @@ pub(super) struct Data<'a> {
 }
 
 impl Data<'_> {
-    pub fn fitted(&self, start: &[Exponential], options: &RingdownOptions) -> Result<Ringdown, ModelError> {
+    /// From a start to at most `arrived` standard errors from the best.
+    pub fn fitted(
+        &self,
+        start: &[Exponential],
+        options: &RingdownOptions,
+        arrived: f64,
+    ) -> Result<Ringdown, ModelError> {
         let options = RingdownOptions { start: Some(start.to_vec()), ..options.clone() };
-        fit_ringdowns(self.events, self.free, self.interval_s, &options)
+        fit_to(self.events, self.free, self.interval_s, &options, arrived)
     }
 }
 
@@ -155,7 +163,7 @@ impl Try {
     fn of(all: &Data<'_>, start: &[Exponential], judged: &RingdownOptions) -> Self {
         let options = RingdownOptions { start: Some(start.to_vec()), bootstrap_draws: 0, ..judged.clone() };
         let none = Self { chi_square: f64::NAN, bic: f64::NAN, held_out: Vec::new() };
-        let Ok(fit) = all.fitted(start, &options) else { return none };
+        let Ok(fit) = all.fitted(start, &options, ARRIVED) else { return none };
         let chi_square = fit.reduced_chi_square * fit.freedom as f64;
         let missing: usize = options.missing.iter().flatten().map(|range| range.len()).sum();
         let observed = all.events.iter().map(|event| event.len()).sum::<usize>() - missing.min(fit.freedom);

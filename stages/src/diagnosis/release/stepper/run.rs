@@ -37,7 +37,10 @@ pub(super) struct Run<'a> {
     own: usize,
     pub position: Vec<f64>,
     pub velocity: Vec<f64>,
+    /// What causes add to it now.
     acceleration: Vec<f64>,
+    /// The velocity for which that is asked.
+    foreseen: Vec<f64>,
     /// Decaying loads now.
     pub decaying: Vec<c64>,
     amplitude: f64,
@@ -74,12 +77,13 @@ impl<'a> Run<'a> {
         let count = shares.len();
         let squares: f64 = lever.modes.iter().map(|m| m.omega.powi(-2)).sum();
         let tip = lever.modes.iter().map(|m| m.omega.powi(-2) / squares).collect();
-        Self {
+        let mut run = Self {
             effects,
             own: lever.modes.len(),
             position: vec![-release.amplitude; count],
             velocity: vec![0.0; count],
             acceleration: vec![0.0; count],
+            foreseen: vec![0.0; count],
             shares,
             tip,
             omega,
@@ -89,7 +93,11 @@ impl<'a> Run<'a> {
             thermal: release.thermal,
             time_s: 0.0,
             load_now: -release.amplitude * effects.remaining_load.iter().map(|load| load(0.0)).sum::<f64>(),
+        };
+        if effects.bend_the_motion() {
+            run.feel(0.0);
         }
+        run
     }
 
     pub fn turns(&self, h: f64) -> Turn {
@@ -108,14 +116,17 @@ impl<'a> Run<'a> {
         -self.amplitude * self.effects.remaining_load.iter().map(|load| load(t)).sum::<f64>()
     }
 
-    /// Half a step's force of the causes.
-    fn kick(&mut self, h: f64) {
-        self.acceleration.fill(0.0);
+    /// The causes' forces here, half a step of `h` on from the last kick: at the velocity to which the forces before would take it, so that one
+    /// question serves the half kicks on both sides and the error stays of second order.
+    fn feel(&mut self, h: f64) {
         let own = self.own;
+        let foreseen = self.foreseen.iter_mut().zip(&self.velocity).zip(&self.acceleration);
+        foreseen.for_each(|((ahead, v), a)| *ahead = v + 0.5 * h * a);
+        self.acceleration.fill(0.0);
         let gap = self.position.iter().zip(&self.tip).map(|(q, share)| share * (q + self.amplitude)).sum();
         let motion = Motion {
             position: &self.position[..own],
-            velocity: &self.velocity[..own],
+            velocity: &self.foreseen[..own],
             omega: &self.omega[..own],
             gap,
             thermal: self.thermal,
@@ -123,7 +134,11 @@ impl<'a> Run<'a> {
         for force in &self.effects.modal_force {
             force(&motion, &mut self.acceleration[..own]);
         }
-        self.velocity.iter_mut().zip(&self.acceleration).for_each(|(v, a)| *v += h * a);
+    }
+
+    /// Half a step under the forces last felt.
+    fn kick(&mut self, h: f64) {
+        self.velocity.iter_mut().zip(&self.acceleration).for_each(|(v, a)| *v += 0.5 * h * a);
     }
 
     /// Mean of the load from one time to another, from its values there and in the middle: Simpson's rule, halved where it jumps or bends.
@@ -145,7 +160,7 @@ impl<'a> Run<'a> {
     pub fn advance(&mut self, turn: &Turn, h: f64) {
         let bent = self.effects.bend_the_motion();
         if bent {
-            self.kick(0.5 * h);
+            self.kick(h);
         }
         let mut u = 0.0;
         if !self.effects.remaining_load.is_empty() {
@@ -157,7 +172,8 @@ impl<'a> Run<'a> {
         self.turn(turn, u);
         self.time_s += h;
         if bent {
-            self.kick(0.5 * h);
+            self.feel(h);
+            self.kick(h);
         }
     }
 
@@ -208,7 +224,8 @@ impl<'a> Run<'a> {
             quality: self.quality.clone(),
             position: none.clone(),
             velocity: none.clone(),
-            acceleration: none,
+            acceleration: none.clone(),
+            foreseen: none,
             decaying: vec![c64::new(0.0, 0.0); self.decaying.len()],
             load_now: 0.0,
             ..*self

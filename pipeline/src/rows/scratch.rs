@@ -1,0 +1,66 @@
+//! Files without a name.
+
+use std::fs::{self, File, OpenOptions};
+use std::path::{Path, PathBuf};
+
+use crate::cache::temporary_path;
+use crate::error::StageError;
+
+/// Most bytes of rows that stay in memory; the paper's 84 windows of 8192 samples are 5.5 MB.
+const LIMIT_BYTES: usize = 8 << 20;
+
+/// Where rows go that are too many for memory.
+#[derive(Debug, Clone)]
+pub struct Scratch {
+    /// The files lie beside this one, under temporary names.
+    beside: PathBuf,
+    limit_bytes: usize,
+}
+
+impl Scratch {
+    /// Files in the folder of `beside`, under names like that one's temporary ones: who sweeps these sweeps them too.
+    pub fn beside(beside: &Path) -> Self {
+        Self { beside: beside.to_owned(), limit_bytes: LIMIT_BYTES }
+    }
+
+    /// The same with another limit.
+    #[must_use]
+    pub fn with_limit_bytes(self, limit_bytes: usize) -> Self {
+        Self { limit_bytes, ..self }
+    }
+
+    /// Most bytes of a set of rows that stay in memory.
+    pub fn limit_bytes(&self) -> usize {
+        self.limit_bytes
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.beside
+    }
+
+    /// A new file without a name: it goes with its last handle, also in a kill. Errors: the folder cannot be made or written.
+    pub(super) fn file(&self) -> Result<File, StageError> {
+        let path = temporary_path(&self.beside);
+        let made = || {
+            if let Some(folder) = path.parent() {
+                fs::create_dir_all(folder)?;
+            }
+            let file = OpenOptions::new().read(true).write(true).create_new(true).open(&path)?;
+            // a kill between these two leaves an empty file, which the next sweep takes
+            fs::remove_file(&path)?;
+            Ok(file)
+        };
+        made().map_err(|error: std::io::Error| {
+            StageError::new(format!("a temporary file for rows of events cannot be made: {error}"))
+                .at(path.parent().unwrap_or(&path))
+                .help("choose another folder with --cache")
+        })
+    }
+}
+
+/// In the system's folder for temporary files.
+impl Default for Scratch {
+    fn default() -> Self {
+        Self::beside(&std::env::temp_dir().join("afmid-rows"))
+    }
+}

@@ -1,0 +1,71 @@
+//! Variables that are too large for memory: written block by block, left in the file when a stage's result is read.
+//!
+//! A contiguous dataset of little-endian doubles is what rows in a file are: they are read where it lies.
+
+use std::fs::File;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use hdf5::datatype::ByteOrder;
+use hdf5::types::{FloatSize, TypeDescriptor};
+use hdf5::{Dataset, Group};
+use ndarray::{ArrayView2, s};
+
+use super::error::{Result, StoreError};
+use super::{read, write};
+use crate::rows::{RowSource, Scratch, StoredRows, in_blocks};
+
+/// Writes rows as [`write::dataset`] would if all were in memory: the same bytes. Errors: those of the rows, and as there.
+pub(super) fn write_rows(parent: &Group, name: &str, shape: &[usize], rows: &StoredRows) -> Result<Dataset> {
+    let wrap = |error: hdf5::Error| StoreError::from(error).at(write::path_of(parent, name));
+    let (count, length) = (rows.rows(), rows.row_length());
+    if shape != [count, length] {
+        return Err(StoreError::new(format!("{count} rows of {length} values do not fill {shape:?}")));
+    }
+    let dataset = write::empty::<f64>(parent, name, shape)?;
+    let all: Vec<usize> = (0..count).collect();
+    in_blocks(rows, &all, |first, block| {
+        let values = block.concat();
+        let view = ArrayView2::from_shape((block.len(), length), &values)
+            .map_err(|error| StoreError::new(format!("a block of rows: {error}")))?;
+        dataset.write_slice(view, s![first..first + block.len(), ..]).map_err(wrap)
+    })?;
+    Ok(dataset)
+}
+
+/// A stage file, held open beside HDF5's own handle.
+pub(super) struct Backing {
+    file: File,
+    path: PathBuf,
+}
+
+impl Backing {
+    pub(super) fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|error| StoreError::io("cannot be opened", path, &error))?;
+        Ok(Self { file, path: path.to_owned() })
+    }
+
+    /// Whether the path still names this file: HDF5 opens by name, and another process may have replaced it in between.
+    fn is_current(&self) -> bool {
+        let id = |metadata: &std::fs::Metadata| (metadata.dev(), metadata.ino());
+        matches!((self.file.metadata(), std::fs::metadata(&self.path)), (Ok(own), Ok(now)) if id(&own) == id(&now))
+    }
+}
+
+/// A variable over two axes as rows in its file; none if it is small enough for memory, or cannot be read that way. Errors: damaged.
+pub(super) fn read_rows(parent: &Group, name: &str, backing: &Backing) -> Result<Option<StoredRows>> {
+    let dataset = read::dataset(parent, name)?;
+    let [rows, row_length] = dataset.shape()[..] else { return Ok(None) };
+    let bytes = rows.saturating_mul(row_length).saturating_mul(size_of::<f64>());
+    let plain = read::descriptor(&dataset)? == TypeDescriptor::Float(FloatSize::U8)
+        && dataset.dtype()?.byte_order() == ByteOrder::LittleEndian;
+    if bytes <= Scratch::default().limit_bytes() || !plain || !backing.is_current() {
+        return Ok(None);
+    }
+    read::check_size(&dataset, size_of::<f64>()).map_err(|error| error.at(write::path_of(parent, name)))?;
+    // none for what is chunked, that is, for what this program does not write
+    let Some(offset) = dataset.offset() else { return Ok(None) };
+    let file =
+        backing.file.try_clone().map_err(|error| StoreError::io("cannot be held open", &backing.path, &error))?;
+    Ok(Some(StoredRows::new(file, &backing.path, offset, rows, row_length)))
+}

@@ -1,0 +1,148 @@
+//! The command line with examples in the help of every command: data, parsed again by a test.
+
+use clap::{Command, CommandFactory};
+
+use super::Cli;
+
+/// Command, examples, and what else is to be known.
+struct Help {
+    command: &'static [&'static str],
+    examples: &'static [&'static str],
+    further: &'static str,
+}
+
+const fn help(command: &'static [&'static str], examples: &'static [&'static str]) -> Help {
+    Help { command, examples, further: "" }
+}
+
+const HELP: &[Help] = &[
+    help(
+        &["run"],
+        &[
+            "afmid run configs/paper.toml -o paper.h5",
+            "afmid run configs/free-lever.toml --set 'records.files=[\"archive/*.h5\"]' --set model.order=9 -o a.h5",
+            "afmid run configs/sweep-order.toml -o orders",
+        ],
+    ),
+    help(
+        &["batch"],
+        &[
+            "afmid batch configs/ringdown.toml archive/2004 archive/2005 -o years",
+            "afmid batch configs/ringdown.toml --manifest levers.jsonl -o years --retry-failed",
+            "afmid batch configs/ringdown.toml --manifest levers.jsonl -o years --shard 2/8",
+        ],
+    ),
+    Help {
+        command: &["submit", "slurm"],
+        examples: &[
+            "afmid submit slurm ringdown.toml --manifest levers.jsonl --shards 8 -o results",
+            "afmid submit slurm ringdown.toml lever-1 lever-2 --shards 2 -o results --partition main --time 2:00:00 --memory 4G --send",
+            "afmid submit slurm ringdown.toml --manifest levers.jsonl --shards 8 -o results --cpus 4 --sbatch=--nice=100 --send --json",
+        ],
+        further: "\
+Written are FOLDER/slurm/array.sbatch (a task per shard; a lost node's tasks are queued again), collect.sbatch (the table, after the last task, however it ended)
+and submit.sh, which sends both. A task succeeds when all its data sets were tried; the collecting job ends with 3 if some of them failed. To go on after time limits or
+faults, submit again: what is finished is not run again.",
+    },
+    help(&["submit"], &["afmid submit slurm ringdown.toml --manifest levers.jsonl --shards 8 -o results"]),
+    help(&["new"], &["afmid new pipeline archive/2004"]),
+    help(
+        &["new", "pipeline"],
+        &[
+            "afmid new pipeline archive/2004 -o levers.toml",
+            "afmid new pipeline recordings --goal ringdown --channel '/Group 1/deflection' --rate 5e6 --unit V",
+        ],
+    ),
+    help(&["check"], &["afmid check configs/paper.toml configs/ringdown.toml"]),
+    help(&["graph"], &["afmid graph configs/paper.toml", "afmid graph configs/paper.toml --format mermaid"]),
+    help(&["explain"], &["afmid explain configs/paper.toml --set model.order=9"]),
+    help(&["inspect"], &["afmid inspect archive/record_0001.tdms", "afmid inspect archive --json"]),
+    help(&["show"], &["afmid show paper.h5", "afmid show paper.h5 modes", "afmid show paper.h5 modes --json"]),
+    help(&["diff"], &["afmid diff monday.h5 tuesday.h5", "afmid diff monday.h5 tuesday.h5 --exit-code"]),
+    help(&["trace"], &["afmid trace paper.h5 'modes.modes[0].frequency_hz'"]),
+    help(&["rerun"], &["afmid rerun paper.h5", "afmid rerun paper.h5 --data /mnt/archive -o again.h5"]),
+    help(&["export"], &["afmid export paper.h5 --model mat", "afmid export paper.h5 --model json --stage model -o lever.json"]),
+    help(&["export-crate"], &["afmid export-crate paper.h5 -o paper-crate --with-data --license https://creativecommons.org/licenses/by/4.0/"]),
+    help(&["gc"], &["afmid gc --dry-run --older-than 30d", "afmid gc --max-size 20G"]),
+    help(&["report"], &["afmid report paper.h5 -o paper.html", "afmid report paper.h5 --figures figures"]),
+    help(&["stages"], &["afmid stages", "afmid stages model.pem"]),
+    help(&["causes"], &["afmid causes", "afmid causes finite-rupture"]),
+    help(&["exam"], &["afmid exam configs/diagnose.toml --seeds 20", "afmid exam configs/diagnose.toml --only clean --seeds 100 --json"]),
+    help(&["schema"], &["afmid schema"]),
+    help(&["doctor"], &["afmid doctor", "afmid doctor --cache /scratch/afmid --json"]),
+    help(&["completions"], &["afmid completions bash", "afmid completions zsh"]),
+    help(&["man"], &["afmid man", "afmid man man1"]),
+];
+
+/// The command line as the program parses it.
+pub fn command() -> Command {
+    HELP.iter().fold(Cli::command(), |command, help| with(command, help.command, &text(help)))
+}
+
+fn text(help: &Help) -> String {
+    let lines: String = help.examples.iter().map(|example| format!("  {example}\n")).collect();
+    let further = if help.further.is_empty() { String::new() } else { format!("\n{}", help.further) };
+    format!("Examples:\n{lines}{further}").trim_end().to_owned()
+}
+
+fn with(command: Command, path: &[&'static str], text: &str) -> Command {
+    match path {
+        [] => command.after_help(text.to_owned()),
+        [first, rest @ ..] => {
+            let (rest, text) = (rest.to_vec(), text.to_owned());
+            command.mut_subcommand(first, move |inner| with(inner, &rest, &text))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Words of a line as a shell splits it: spaces, single quotes.
+    fn words(line: &str) -> Vec<String> {
+        let (mut words, mut word, mut quoted) = (Vec::new(), String::new(), false);
+        for letter in line.chars() {
+            match letter {
+                '\'' => quoted = !quoted,
+                ' ' if !quoted => words.push(std::mem::take(&mut word)),
+                letter => word.push(letter),
+            }
+        }
+        words.push(word);
+        words
+    }
+
+    fn visible(command: &Command) -> Vec<Vec<String>> {
+        let inner = command.get_subcommands().filter(|inner| !inner.is_hide_set() && inner.get_name() != "help");
+        inner
+            .flat_map(|inner| {
+                let name = inner.get_name().to_owned();
+                let below = visible(inner).into_iter().map(|path| [vec![name.clone()], path].concat());
+                std::iter::once(vec![name.clone()]).chain(below).collect::<Vec<_>>()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_command_has_examples_and_every_example_is_a_command() {
+        let command = command();
+        for path in visible(&command) {
+            assert!(HELP.iter().any(|help| help.command == path), "no example of `afmid {}`", path.join(" "));
+        }
+        for help in HELP {
+            assert!(!help.examples.is_empty());
+            for example in help.examples {
+                let words = words(example);
+                assert_eq!(words[1..=help.command.len()], *help.command, "{example}");
+                let parsed = command.clone().try_get_matches_from(&words);
+                assert!(parsed.is_ok(), "{example}: {}", parsed.unwrap_err());
+            }
+        }
+    }
+
+    #[test]
+    fn the_definition_is_sound() {
+        command().debug_assert();
+    }
+}
