@@ -16,16 +16,31 @@ const LARGEST: usize = 1 << 18;
 pub(super) struct HeapGuard {
     /// The end of what has streamed by, as long as a collection might begin or continue in it.
     kept: Vec<u8>,
+    /// Whether one has begun in it.
+    begun: bool,
     endless: bool,
 }
 
 impl HeapGuard {
-    /// Takes the next stretch of the file.
+    /// Takes the next stretch of the file; copies next to nothing of it as long as no collection begins.
     pub(super) fn update(&mut self, bytes: &[u8]) {
-        self.kept.extend_from_slice(bytes);
+        let head = if self.begun { bytes.len() } else { bytes.len().min(BORDER) };
+        self.kept.extend_from_slice(&bytes[..head]);
+        if !self.begun {
+            self.begun = begins(&self.kept) || begins(bytes);
+            if !self.begun {
+                self.keep_border(&bytes[head..]);
+                return;
+            }
+            self.kept.extend_from_slice(&bytes[head..]);
+        }
         let complete = self.kept.len().saturating_sub(LARGEST);
         self.scan(complete);
         self.kept.drain(..complete);
+        self.begun = begins(&self.kept);
+        if !self.begun {
+            self.keep_border(&[]);
+        }
     }
 
     /// Whether the library would walk for ever.
@@ -34,12 +49,25 @@ impl HeapGuard {
         self.endless
     }
 
+    /// Keeps the last bytes of what is kept and what follows: a signature may begin in them.
+    fn keep_border(&mut self, rest: &[u8]) {
+        self.kept.extend_from_slice(&rest[rest.len().saturating_sub(BORDER)..]);
+        self.kept.drain(..self.kept.len().saturating_sub(BORDER));
+    }
+
     fn scan(&mut self, until: usize) {
-        let end = self.kept.len().min(until + SIGNATURE.len() - 1);
+        let end = self.kept.len().min(until + BORDER);
         for place in memchr::memmem::find_iter(&self.kept[..end], &SIGNATURE) {
             self.endless |= walk_is_endless(&self.kept[place..]);
         }
     }
+}
+
+/// Bytes of a signature before its last.
+const BORDER: usize = SIGNATURE.len() - 1;
+
+fn begins(bytes: &[u8]) -> bool {
+    memchr::memmem::find(bytes, &SIGNATURE).is_some()
 }
 
 /// Walks one collection as the library does.
@@ -102,7 +130,7 @@ mod tests {
         let broken = collection(&[(1, 3), (2, 12), (0, 0)]);
         for offset in [0, 1, 77, LARGEST - 5, 2 * LARGEST] {
             let around = |bytes: &[u8]| [vec![0; offset], bytes.to_vec(), vec![7; 3000]].concat();
-            for step in [5000, 1 << 18] {
+            for step in [3, 5000, 1 << 18] {
                 assert!(!endless(&around(&whole), step), "{offset} {step}");
                 assert!(endless(&around(&broken), step), "{offset} {step}");
             }

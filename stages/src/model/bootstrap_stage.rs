@@ -72,7 +72,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "gain
 impl Stage for BootstrapIntervals {
     const SPEC: Spec = Spec {
         name: "model.bootstrap",
-        version: 2,
+        version: 3,
         summary: "intervals on poles, zeros, gain, delay and frequency response by resampling events",
         inputs: &[ENSEMBLE.spec(), PAIR.spec(), MODEL.spec()],
         outputs: &[ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],

@@ -1,8 +1,10 @@
 //! A quotient of two low-order polynomials fitted to a few complex values.
 
+use pulp::{Simd, WithSimd};
 use rustfft::num_complex::Complex64;
 
-use super::least_squares::{Columns, Factored};
+use super::lane_squares::Factored;
+use super::lanes::{Complex, Lanes};
 
 /// Orders of the local model `(B(r) + turn(r) T(r)) / A(r)`, `A(0) = 1`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,118 +42,254 @@ pub(super) struct Fraction {
     pub rank: usize,
 }
 
-const ONE: Complex64 = Complex64::new(1.0, 0.0);
 /// Reweighted linear steps: peaks two bins wide settle within four.
 const LINEAR_STEPS: usize = 6;
 /// Change of the squares, as a share, after which further steps would move the value by less than a thousandth of its standard error.
 const SETTLED: f64 = 1e-6;
 /// Gauss-Newton steps at most: they end the bias that reweighting leaves in noise.
 const NEWTON_STEPS: usize = 8;
+/// Lengths that are tried of each.
+const HALVINGS: usize = 5;
 
-/// Fits by Levy's linear problem, reweighted (Sanathanan and Koerner 1963), then by Gauss-Newton on the true residual.
-pub(super) fn fit_fraction(points: &Points, orders: Orders) -> Fraction {
-    let mut best = vec![Complex64::new(0.0, 0.0); orders.count()];
-    let mut squares = residual(points, orders, &best).1;
-    let mut previous = vec![ONE; points.offset.len()];
-    let mut last = f64::INFINITY;
-    for _ in 0..if orders.denominator == 0 { 1 } else { LINEAR_STEPS } {
-        let theta = linear_step(points, orders, &previous);
-        previous = points.offset.iter().map(|&r| denominator(orders, &theta, r)).collect();
-        let now = residual(points, orders, &theta).1;
-        if now < squares {
-            (best, squares) = (theta, now);
+/// Fits by Levy's linear problem, reweighted (Sanathanan and Koerner 1963), then by Gauss-Newton on the true residual; each of `points`, all of as many
+/// values, for itself.
+pub(super) fn fit_fractions(points: &[Points], orders: Orders) -> Vec<Fraction> {
+    pulp::Arch::new().dispatch(Fit { points, orders })
+}
+
+/// Carries fits to the vector units: one per lane.
+struct Fit<'a> {
+    points: &'a [Points],
+    orders: Orders,
+}
+
+impl WithSimd for Fit<'_> {
+    type Output = Vec<Fraction>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<Fraction> {
+        let mut all = Vec::with_capacity(self.points.len());
+        for points in self.points.chunks(S::F64_LANES) {
+            let (fitted, lanes) = (Local::new(Lanes(simd), points, self.orders).fit(), points.len());
+            all.extend((0..lanes).map(|l| {
+                let at = |values: &S::f64s| Lanes::<S>::each(values)[l];
+                Fraction {
+                    value: Complex64::new(at(&fitted.value.re), at(&fitted.value.im)),
+                    unit_variance: at(&fitted.unit_variance),
+                    squares: at(&fitted.squares),
+                    rank: at(&fitted.rank) as usize,
+                }
+            }));
         }
-        if previous.iter().any(|a| a.norm_sqr() == 0.0) || (last - now).abs() <= SETTLED * now {
-            break;
-        }
-        last = now;
+        all
     }
-    if orders.denominator > 0 {
+}
+
+/// What a fit gives, lane by lane.
+struct Fitted<S: Simd> {
+    value: Complex<S>,
+    unit_variance: S::f64s,
+    squares: S::f64s,
+    rank: S::f64s,
+}
+
+/// The points of one fit per lane.
+struct Local<S: Simd> {
+    lanes: Lanes<S>,
+    orders: Orders,
+    offset: Vec<S::f64s>,
+    value: Vec<Complex<S>>,
+    weight: Vec<S::f64s>,
+    turn: Vec<Complex<S>>,
+}
+
+impl<S: Simd> Local<S> {
+    /// Lanes without points of their own get those of the last.
+    #[inline(always)]
+    fn new(lanes: Lanes<S>, points: &[Points], orders: Orders) -> Self {
+        let own = |l: usize| &points[l.min(points.len() - 1)];
+        let rows = points.iter().map(|points| points.offset.len()).min().unwrap_or(0);
+        let (mut offset, mut weight) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
+        let (mut value, mut turn) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
+        for i in 0..rows {
+            offset.push(lanes.gather(|l| own(l).offset[i]));
+            weight.push(lanes.gather(|l| own(l).weight[i]));
+            value.push(lanes.gather_complex(|l| own(l).value[i]));
+            turn.push(lanes.gather_complex(|l| own(l).turn[i]));
+        }
+        Self { lanes, orders, offset, value, weight, turn }
+    }
+
+    #[inline(always)]
+    fn fit(&self) -> Fitted<S> {
+        let (lanes, simd) = (self.lanes, self.lanes.0);
+        let [zero, one, settled] = [0.0, 1.0, SETTLED].map(|value| simd.splat_f64s(value));
+        let mut best = vec![lanes.real(0.0); self.orders.count()];
+        let mut squares = self.residual(&best).1;
+        // a lane that has come to its end keeps what it has
+        let mut active = simd.less_than_f64s(zero, one);
+        let mut previous = vec![one; self.offset.len()];
+        let mut last = simd.splat_f64s(f64::INFINITY);
+        for _ in 0..if self.orders.denominator == 0 { 1 } else { LINEAR_STEPS } {
+            let theta = self.linear_step(&previous);
+            let mut least = one;
+            for (previous, r) in previous.iter_mut().zip(&self.offset) {
+                *previous = simd.sqrt_f64s(lanes.square(self.denominator(&theta, *r)));
+                least = simd.min_f64s(least, *previous);
+            }
+            let now = self.residual(&theta).1;
+            let better = simd.and_m64s(active, simd.less_than_f64s(now, squares));
+            self.keep(better, &mut best, &theta);
+            squares = simd.select_f64s(better, now, squares);
+            let moves = simd.less_than_f64s(simd.mul_f64s(settled, now), simd.abs_f64s(simd.sub_f64s(last, now)));
+            active = simd.and_m64s(active, simd.and_m64s(moves, simd.less_than_f64s(zero, least)));
+            if !lanes.any(active) {
+                break;
+            }
+            last = now;
+        }
+        if self.orders.denominator > 0 {
+            self.descend(&mut best, &mut squares);
+        }
+        let (_, factored) = self.newton_step(&best);
+        Fitted { value: best[0], unit_variance: factored.first_variance(lanes), squares, rank: factored.rank(lanes) }
+    }
+
+    /// Gauss-Newton, each step halved until the residual falls.
+    #[inline(always)]
+    fn descend(&self, best: &mut [Complex<S>], squares: &mut S::f64s) {
+        let (lanes, simd) = (self.lanes, self.lanes.0);
+        let [zero, one, half, settled] = [0.0, 1.0, 0.5, SETTLED].map(|value| simd.splat_f64s(value));
+        let mut active = simd.less_than_f64s(zero, one);
         for _ in 0..NEWTON_STEPS {
-            let (step, _) = newton_step(points, orders, &best);
-            let Some((theta, now)) = shorten(points, orders, &best, &step, squares) else { break };
-            let gain = squares - now;
-            (best, squares) = (theta, now);
-            if gain <= SETTLED * squares {
+            let (step, _) = self.newton_step(best);
+            let from = best.to_vec();
+            let mut theta = from.clone();
+            let (mut length, mut gain, mut waiting) = (one, zero, active);
+            for _ in 0..HALVINGS {
+                for ((theta, from), step) in theta.iter_mut().zip(&from).zip(&step) {
+                    *theta = lanes.add(*from, lanes.scale(*step, length));
+                }
+                let now = self.residual(&theta).1;
+                let fallen = simd.and_m64s(waiting, simd.less_than_f64s(now, *squares));
+                self.keep(fallen, best, &theta);
+                gain = simd.select_f64s(fallen, simd.sub_f64s(*squares, now), gain);
+                *squares = simd.select_f64s(fallen, now, *squares);
+                waiting = simd.and_m64s(waiting, simd.not_m64s(fallen));
+                if !lanes.any(waiting) {
+                    break;
+                }
+                length = simd.mul_f64s(length, half);
+            }
+            // a lane whose step was no good gained nothing
+            active = simd.and_m64s(active, simd.less_than_f64s(simd.mul_f64s(settled, *squares), gain));
+            if !lanes.any(active) {
                 break;
             }
         }
     }
-    let (_, factored) = newton_step(points, orders, &best);
-    let mut gradient = vec![Complex64::new(0.0, 0.0); orders.count()];
-    gradient[0] = ONE;
-    Fraction { value: best[0], unit_variance: factored.variance(&gradient), squares, rank: factored.rank() }
-}
 
-/// Rows of one column per coefficient: numerator, transient, denominator (as a factor of `value`).
-fn columns(points: &Points, orders: Orders, scale: &[Complex64], value: &[Complex64]) -> Columns {
-    let mut all = Columns::new(points.offset.len(), orders.count());
-    let mut powers = |first: &mut dyn Iterator<Item = Complex64>, count: usize| {
-        all.push(first);
-        (1..count).for_each(|_| all.push_last_times(&points.offset));
-    };
-    powers(&mut scale.iter().copied(), orders.numerator + 1);
-    if let Some(t) = orders.transient {
-        powers(&mut scale.iter().zip(&points.turn).map(|(s, turn)| s * turn), t + 1);
+    #[inline(always)]
+    fn keep(&self, mask: S::m64s, best: &mut [Complex<S>], theta: &[Complex<S>]) {
+        for (best, theta) in best.iter_mut().zip(theta) {
+            *best = self.lanes.select(mask, *theta, *best);
+        }
     }
-    if orders.denominator > 0 {
-        let of_value = scale.iter().zip(value).zip(&points.offset).map(|((s, g), r)| -(s * g) * r);
-        powers(&mut of_value.into_iter(), orders.denominator);
+
+    /// Rows of one column per coefficient: numerator, transient, denominator (as a factor of `value`).
+    #[inline(always)]
+    fn columns(&self, scale: &[Complex<S>], value: &[Complex<S>]) -> Vec<Complex<S>> {
+        let (lanes, simd) = (self.lanes, self.lanes.0);
+        let mut all: Vec<Complex<S>> = Vec::with_capacity(self.orders.count() * self.offset.len());
+        all.extend_from_slice(scale);
+        self.powers(&mut all, self.orders.numerator);
+        if let Some(t) = self.orders.transient {
+            for (scale, turn) in scale.iter().zip(&self.turn) {
+                all.push(lanes.multiply(*scale, *turn));
+            }
+            self.powers(&mut all, t);
+        }
+        if self.orders.denominator > 0 {
+            for ((scale, value), r) in scale.iter().zip(value).zip(&self.offset) {
+                all.push(lanes.scale(lanes.multiply(*scale, *value), simd.neg_f64s(*r)));
+            }
+            self.powers(&mut all, self.orders.denominator - 1);
+        }
+        all
     }
-    all
-}
 
-fn linear_step(points: &Points, orders: Orders, previous: &[Complex64]) -> Vec<Complex64> {
-    let scale: Vec<Complex64> = points.weight.iter().zip(previous).map(|(w, a)| ONE * (w / a.norm())).collect();
-    let right: Vec<Complex64> = points.value.iter().zip(&scale).map(|(g, s)| g * s).collect();
-    Factored::new(&columns(points, orders, &scale, &points.value)).solve(&right)
-}
+    /// The last column times the offsets, `count` times over.
+    #[inline(always)]
+    fn powers(&self, all: &mut Vec<Complex<S>>, count: usize) {
+        for _ in 0..count {
+            let first = all.len() - self.offset.len();
+            for (i, offset) in self.offset.iter().enumerate() {
+                all.push(self.lanes.scale(all[first + i], *offset));
+            }
+        }
+    }
 
-fn newton_step(points: &Points, orders: Orders, theta: &[Complex64]) -> (Vec<Complex64>, Factored) {
-    let a: Vec<Complex64> = points.offset.iter().map(|&r| denominator(orders, theta, r)).collect();
-    let scale: Vec<Complex64> = points.weight.iter().zip(&a).map(|(w, a)| w / a).collect();
-    let (model, _) = residual(points, orders, theta);
-    let right: Vec<Complex64> =
-        points.value.iter().zip(&model).zip(&points.weight).map(|((g, m), w)| (g - m) * w).collect();
-    let factored = Factored::new(&columns(points, orders, &scale, &model));
-    (factored.solve(&right), factored)
-}
+    #[inline(always)]
+    fn linear_step(&self, previous: &[S::f64s]) -> Vec<Complex<S>> {
+        let (lanes, simd) = (self.lanes, self.lanes.0);
+        let zero = simd.splat_f64s(0.0);
+        let (mut scale, mut right) = (Vec::with_capacity(previous.len()), Vec::with_capacity(previous.len()));
+        for ((weight, previous), value) in self.weight.iter().zip(previous).zip(&self.value) {
+            let re = simd.div_f64s(*weight, *previous);
+            scale.push(Complex { re, im: zero });
+            right.push(lanes.scale(*value, re));
+        }
+        Factored::new(lanes, self.columns(&scale, &self.value), self.offset.len()).solve(lanes, &right)
+    }
 
-/// The step, halved until the residual falls.
-fn shorten(
-    points: &Points,
-    orders: Orders,
-    from: &[Complex64],
-    step: &[Complex64],
-    squares: f64,
-) -> Option<(Vec<Complex64>, f64)> {
-    (0..5).find_map(|halvings| {
-        let length = 0.5f64.powi(halvings);
-        let theta: Vec<Complex64> = from.iter().zip(step).map(|(t, s)| t + s * length).collect();
-        let now = residual(points, orders, &theta).1;
-        (now < squares).then_some((theta, now))
-    })
-}
+    #[inline(always)]
+    fn newton_step(&self, theta: &[Complex<S>]) -> (Vec<Complex<S>>, Factored<S>) {
+        let lanes = self.lanes;
+        let (model, _) = self.residual(theta);
+        let (mut scale, mut right) = (Vec::with_capacity(model.len()), Vec::with_capacity(model.len()));
+        for (((r, weight), value), model) in self.offset.iter().zip(&self.weight).zip(&self.value).zip(&model) {
+            scale.push(lanes.scale(lanes.inverse(self.denominator(theta, *r)), *weight));
+            right.push(lanes.scale(lanes.subtract(*value, *model), *weight));
+        }
+        let factored = Factored::new(lanes, self.columns(&scale, &model), self.offset.len());
+        (factored.solve(lanes, &right), factored)
+    }
 
-fn polynomial(coefficients: &[Complex64], r: f64) -> Complex64 {
-    coefficients.iter().rev().fold(Complex64::new(0.0, 0.0), |sum, c| sum * r + c)
-}
+    #[inline(always)]
+    fn polynomial(&self, coefficients: &[Complex<S>], r: S::f64s) -> Complex<S> {
+        let simd = self.lanes.0;
+        let mut sum = self.lanes.real(0.0);
+        for c in coefficients.iter().rev() {
+            sum = Complex { re: simd.mul_add_e_f64s(sum.re, r, c.re), im: simd.mul_add_e_f64s(sum.im, r, c.im) };
+        }
+        sum
+    }
 
-fn denominator(orders: Orders, theta: &[Complex64], r: f64) -> Complex64 {
-    ONE + polynomial(&theta[theta.len() - orders.denominator..], r) * r
-}
+    #[inline(always)]
+    fn denominator(&self, theta: &[Complex<S>], r: S::f64s) -> Complex<S> {
+        let own = self.polynomial(&theta[theta.len() - self.orders.denominator..], r);
+        self.lanes.add(self.lanes.real(1.0), self.lanes.scale(own, r))
+    }
 
-/// Model values and the weighted sum of squared residuals.
-fn residual(points: &Points, orders: Orders, theta: &[Complex64]) -> (Vec<Complex64>, f64) {
-    let (b, rest) = theta.split_at(orders.numerator + 1);
-    let t = &rest[..orders.transient.map_or(0, |t| t + 1)];
-    let model: Vec<Complex64> = points
-        .offset
-        .iter()
-        .zip(&points.turn)
-        .map(|(&r, turn)| (polynomial(b, r) + polynomial(t, r) * turn) / denominator(orders, theta, r))
-        .collect();
-    let squares =
-        model.iter().zip(&points.value).zip(&points.weight).map(|((m, g), w)| (g - m).norm_sqr() * w * w).sum::<f64>();
-    (model, if squares.is_finite() { squares } else { f64::INFINITY })
+    /// Model values and the weighted sum of squared residuals; infinite where that is not a number.
+    #[inline(always)]
+    fn residual(&self, theta: &[Complex<S>]) -> (Vec<Complex<S>>, S::f64s) {
+        let (lanes, simd) = (self.lanes, self.lanes.0);
+        let (b, rest) = theta.split_at(self.orders.numerator + 1);
+        let t = &rest[..self.orders.transient.map_or(0, |t| t + 1)];
+        let mut sum = simd.splat_f64s(0.0);
+        let mut model = Vec::with_capacity(self.offset.len());
+        for (i, &r) in self.offset.iter().enumerate() {
+            let above = lanes.add_product(self.polynomial(b, r), self.polynomial(t, r), self.turn[i]);
+            let value = match self.orders.denominator {
+                0 => above,
+                _ => lanes.multiply(above, lanes.inverse(self.denominator(theta, r))),
+            };
+            let left = lanes.scale(lanes.subtract(self.value[i], value), self.weight[i]);
+            sum = simd.add_f64s(sum, lanes.square(left));
+            model.push(value);
+        }
+        let infinite = simd.splat_f64s(f64::INFINITY);
+        (model, simd.select_f64s(simd.less_than_f64s(sum, infinite), sum, infinite))
+    }
 }

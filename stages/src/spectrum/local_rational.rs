@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-use super::fraction::{Fraction, Orders, Points, fit_fraction};
+use super::fraction::{Fraction, Orders, Points, fit_fractions};
 use super::neighbours::Usable;
 use super::{Bins, Smoothed, SpectrumError, SuppressedLine};
 
@@ -71,10 +71,11 @@ pub fn local_rational(
     let usable = Usable::new(bins, lines, full.count() + 2)?;
     let turns = settings.transient.map_or(0.0, |t| t.1);
     let pull = overfit(&usable, full, count, turns);
-    let rows: Vec<Local> = (0..usable.end)
-        .into_par_iter()
-        .map(|k| {
-            let points = gather(&usable, k, count, turns);
+    let all: Vec<usize> = (0..usable.end).collect();
+    let rows: Vec<Local> = all
+        .par_chunks(SIDE_BY_SIDE)
+        .flat_map_iter(|bins| {
+            let points: Vec<Points> = bins.iter().map(|&k| gather(&usable, k, count, turns)).collect();
             average(&points, full, usable.known_variance, pull)
         })
         .collect();
@@ -94,6 +95,9 @@ pub fn local_rational(
     }
     Ok(result)
 }
+
+/// Bins fitted together: a few times as many as the vector units take.
+const SIDE_BY_SIDE: usize = 32;
 
 fn gather(usable: &Usable<'_>, k: usize, count: usize, turns: f64) -> Points {
     let near = usable.nearest(k, count);
@@ -118,15 +122,28 @@ struct Local {
 ///
 /// To take the better of the two and forget the other counts the choice as certain: the variance then comes out a tenth too low wherever noise decides.
 /// Weighted, it is `(sum w sqrt(v + |g - mean|^2))^2` (Buckland, Burnham and Augustin 1997, Eq. 9).
-fn average(points: &Points, full: Orders, known_variance: bool, pull: f64) -> Local {
-    let fraction = fit_fraction(points, full);
+fn average(points: &[Points], full: Orders, known_variance: bool, pull: f64) -> Vec<Local> {
+    let fractions = fit_fractions(points, full);
     if full.denominator == 0 {
-        let misfit = misfit(points, &fraction);
-        let scale = if known_variance { 1.0 } else { misfit };
-        return Local { value: fraction.value, variance: fraction.unit_variance * scale, misfit };
+        let alone = |(points, fraction): (&Points, &Fraction)| {
+            let misfit = misfit(points, fraction);
+            let scale = if known_variance { 1.0 } else { misfit };
+            Local { value: fraction.value, variance: fraction.unit_variance * scale, misfit }
+        };
+        return points.iter().zip(&fractions).map(alone).collect();
     }
-    let plain = fit_fraction(points, Orders { denominator: 0, ..full });
-    let (a, b) = (akaike(points, &plain), akaike(points, &fraction));
+    let plain = fit_fractions(points, Orders { denominator: 0, ..full });
+    let both = plain.iter().zip(&fractions);
+    points
+        .iter()
+        .zip(both)
+        .map(|(points, (plain, fraction))| mixed(points, plain, fraction, known_variance, pull))
+        .collect()
+}
+
+/// The average of one bin.
+fn mixed(points: &Points, plain: &Fraction, fraction: &Fraction, known_variance: bool, pull: f64) -> Local {
+    let (a, b) = (akaike(points, plain), akaike(points, fraction));
     let share = 1.0 / (1.0 + (0.5 * (a - b)).clamp(-700.0, 700.0).exp());
     // a share that rounding alone leaves is none: the other model's value may be anything
     let share = if share < 1e-12 {
@@ -146,10 +163,10 @@ fn average(points: &Points, full: Orders, known_variance: bool, pull: f64) -> Lo
         }
     };
     let value = Complex64::new(mix(plain.value.re, fraction.value.re), mix(plain.value.im, fraction.value.im));
-    let misfit = mix(misfit(points, &plain), misfit(points, &fraction)) / (1.0 - pull * share);
+    let misfit = mix(misfit(points, plain), misfit(points, fraction)) / (1.0 - pull * share);
     let scale = if known_variance { 1.0 } else { misfit };
     let spread = |fit: &Fraction| (scale * fit.unit_variance + (fit.value - value).norm_sqr()).sqrt();
-    Local { value, variance: mix(spread(&plain), spread(&fraction)).powi(2), misfit }
+    Local { value, variance: mix(spread(plain), spread(fraction)).powi(2), misfit }
 }
 
 /// Squared residual per degree of freedom.
@@ -170,20 +187,25 @@ fn overfit(usable: &Usable<'_>, full: Orders, count: usize, turns: f64) -> f64 {
     let middle = usable.index[usable.index.len() / 2];
     let mut shape = gather(usable, middle, count, turns);
     shape.weight.fill(1.0);
-    let draws: Vec<[f64; 2]> = (0..DRAWS)
-        .into_par_iter()
-        .map(|draw| {
-            let mut rng = ChaCha8Rng::seed_from_u64(draw);
-            let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-            let value = shape.offset.iter().map(|_| Complex64::new(normal(), normal()) * 0.5f64.sqrt()).collect();
-            let points =
-                Points { value, offset: shape.offset.clone(), weight: shape.weight.clone(), turn: shape.turn.clone() };
-            let (plain, fraction) =
-                (fit_fraction(&points, Orders { denominator: 0, ..full }), fit_fraction(&points, full));
-            let (a, b) = (akaike(&points, &plain), akaike(&points, &fraction));
-            let share = 1.0 / (1.0 + (0.5 * (a - b)).clamp(-700.0, 700.0).exp());
-            let reference = misfit(&points, &plain);
-            [(1.0 - share) * (misfit(&points, &fraction) - reference), share]
+    let seeds: Vec<u64> = (0..DRAWS).collect();
+    let drawn = |&seed: &u64| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let value = shape.offset.iter().map(|_| Complex64::new(normal(), normal()) * 0.5f64.sqrt()).collect();
+        Points { value, offset: shape.offset.clone(), weight: shape.weight.clone(), turn: shape.turn.clone() }
+    };
+    let draws: Vec<[f64; 2]> = seeds
+        .par_chunks(SIDE_BY_SIDE)
+        .flat_map_iter(|seeds| {
+            let points: Vec<Points> = seeds.iter().map(drawn).collect();
+            let plain = fit_fractions(&points, Orders { denominator: 0, ..full });
+            let both: Vec<(Fraction, Fraction)> = plain.into_iter().zip(fit_fractions(&points, full)).collect();
+            points.into_iter().zip(both).map(|(points, (plain, fraction))| {
+                let (a, b) = (akaike(&points, &plain), akaike(&points, &fraction));
+                let share = 1.0 / (1.0 + (0.5 * (a - b)).clamp(-700.0, 700.0).exp());
+                let reference = misfit(&points, &plain);
+                [(1.0 - share) * (misfit(&points, &fraction) - reference), share]
+            })
         })
         .collect();
     // ordered sums: the same bits on any number of threads

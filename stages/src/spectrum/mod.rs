@@ -14,6 +14,8 @@ mod fourier;
 mod fraction;
 mod frf;
 mod frf_example;
+mod lane_squares;
+mod lanes;
 mod least_squares;
 mod local_polynomial;
 mod local_rational;

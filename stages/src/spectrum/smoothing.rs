@@ -98,7 +98,7 @@ pub(super) const SMOOTHED: Port<Array> =
 impl Stage for Smoothing {
     const SPEC: Spec = Spec {
         name: "spectrum.smoothing",
-        version: 3,
+        version: 4,
         summary: "smooths a transfer function by local rationals or polynomials of real and imaginary parts",
         inputs: &[ETFE.spec()],
         outputs: &[SMOOTHED.spec()],

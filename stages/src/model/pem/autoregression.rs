@@ -3,9 +3,11 @@
 use faer::{Mat, c64};
 
 use super::gradient::{Noise, Point, residual};
-use super::optimiser::{Limits, State, minimise};
+use super::optimiser::{Limits, minimise};
 use super::parametrisation::{coordinates, sections};
 use super::predictor::Problem;
+use super::state::State;
+use super::whitening::Whitened;
 use crate::model::error::ModelError;
 use crate::model::orthogonal::eigenvalues;
 
@@ -21,8 +23,10 @@ const SAMPLES_EACH: usize = 20;
 /// Source: L. Ljung, System Identification (1999), section 10.4; G. Box and G. Jenkins, Time Series Analysis (1970).
 pub(crate) fn whitened(problem: &Problem, mut state: State, limits: Limits) -> Result<State, ModelError> {
     for _ in 0..ROUNDS {
-        let errors = problem.regressors(&state.point.a(), &(Vec::new(), Vec::new()));
-        let filter = autoregression(problem, &residual(&errors, &state.projection.theta))?;
+        let plain = Whitened::new(&problem.experiments, (Vec::new(), Vec::new()));
+        let errors = problem.regressors(&state.point.a(), &plain);
+        let errors = residual(errors.as_ref(), &state.projection.theta);
+        let filter = autoregression(problem, errors.col(0).try_as_col_major().map_or(&[], |e| e.as_slice()))?;
         let rest = vec![[0.0; 2]; filter.len()];
         let point = Point { poles: state.point.poles.clone(), noise: Noise::Frozen(filter, rest) };
         let next = State { iterations: state.iterations, ..State::new(problem, point)? };
@@ -107,7 +111,6 @@ mod tests {
                 slope: false,
                 missing: Vec::new(),
                 priors: 0,
-                whitened: std::cell::RefCell::default(),
             };
             let found = levinson(&autocovariance(&problem, &y, 12), 4000);
             // standard error sqrt((1 - 0.8^2) / 4000) = 0.0095: four of them; BIC errs upwards in one of hundreds

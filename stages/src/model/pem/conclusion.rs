@@ -4,10 +4,11 @@ use faer::Mat;
 
 use super::covariance::{ResidualColour, covariance};
 use super::gradient::Noise;
-use super::optimiser::{Ending, State};
+use super::optimiser::Ending;
 use super::options::{Identified, NoiseModel, PemOptions, Verdict};
 use super::parametrisation::{LIMIT, roots, section_order, sections};
 use super::predictor::Problem;
+use super::state::State;
 use crate::model::error::ModelError;
 use crate::model::innovations::{InnovationsModel, InputGains, Section, kalman_gains};
 

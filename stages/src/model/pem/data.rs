@@ -1,7 +1,5 @@
 //! Records made ready: checked, with priors, without gaps.
 
-use std::cell::RefCell;
-
 use super::options::{Experiment, NoiseModel, PemOptions};
 use super::predictor::Problem;
 use crate::model::error::{ModelError, finite};
@@ -114,6 +112,5 @@ pub(super) fn checked<'a>(
         slope: options.slope,
         missing,
         priors: 0,
-        whitened: RefCell::default(),
     })
 }

@@ -3,10 +3,11 @@
 //! `de/da_ij = q^-j / a_i (H^-1 x_i + e)` with `x_i` section i's deterministic output: its filtered form is the regressors of section i
 //! times their parameters, already at hand. `de/dc_ij = -q^-j / c_i e`.
 
-use faer::Mat;
+use faer::{Mat, MatRef};
 
 use super::parametrisation::{Coefficients, coordinates, roots, section_order, sections, slopes};
-use super::predictor::{Problem, all_pole, delayed};
+use super::predictor::{Place, Problem, SIDE_BY_SIDE, respond};
+use crate::model::orthogonal::less;
 
 /// How the errors are whitened.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,14 +78,10 @@ impl Point {
     }
 }
 
-/// Prediction errors from the unscaled, filtered regressors and their parameters.
-pub(crate) fn residual(regressors: &Mat<f64>, theta: &[f64]) -> Vec<f64> {
-    let last = regressors.ncols() - 1;
-    let mut e: Vec<f64> = regressors.col(last).iter().copied().collect();
-    for (j, &value) in theta.iter().enumerate() {
-        e.iter_mut().zip(regressors.col(j).iter()).for_each(|(e, x)| *e -= value * x);
-    }
-    e
+/// Prediction errors from the unscaled, filtered regressors and their parameters: one column.
+pub(crate) fn residual(regressors: MatRef<'_, f64>, theta: &[f64]) -> Mat<f64> {
+    let (last, parameters) = (theta.len(), MatRef::from_column_major_slice(theta, theta.len(), 1));
+    less(regressors.get(.., last..last + 1).to_owned(), regressors.get(.., ..last), parameters)
 }
 
 /// Derivatives of e to the coefficients: a1, a2 of each section, then c1, c2 if these are free; rows x n or 2n.
@@ -103,30 +100,40 @@ pub(crate) fn coefficient_jacobian(
     let mut jacobian = Mat::zeros(problem.rows(), if c.is_some() { 2 * n } else { n });
     let mut top = 0;
     for (index, (_, y)) in problem.experiments.iter().enumerate() {
-        let rows = top..top + y.len();
+        let e = &e[top..top + y.len()];
         let own = problem.nuisance_column(index);
-        for (i, &section) in a.iter().enumerate() {
-            let order = section_order(n, i);
-            let mut x = if c.is_some() { e[rows.clone()].to_vec() } else { vec![0.0; y.len()] };
-            for j in 0..order {
-                let inputs = (0..problem.inputs).map(|input| problem.input_column(input) + 2 * i + j);
-                for column in inputs.chain([own + 2 * i + j]) {
-                    let filtered = regressors.col(column).iter().skip(top);
-                    x.iter_mut().zip(filtered).for_each(|(x, r)| *x += theta[column] * r);
+        let place = Place { top, column: 0, width: n, delay: 1 };
+        for (group, sections) in a.chunks(SIDE_BY_SIDE).enumerate() {
+            let first = group * SIDE_BY_SIDE;
+            // the columns of each section's deterministic output, with their weights
+            let mut parts: Vec<(usize, f64, &[f64])> = Vec::new();
+            for section in first..first + sections.len() {
+                for j in 0..section_order(n, section) {
+                    let inputs = (0..problem.inputs).map(|input| problem.input_column(input) + 2 * section + j);
+                    for column in inputs.chain([own + 2 * section + j]) {
+                        if let Some(filtered) = regressors.col(column).try_as_col_major() {
+                            parts.push((section - first, theta[column], &filtered.as_slice()[top..top + y.len()]));
+                        }
+                    }
                 }
             }
-            let sensitivity = all_pole(section, x.into_iter());
-            for j in 0..order {
-                delayed(&mut jacobian, top, 2 * i + j, &sensitivity, j + 1);
-            }
+            respond(&mut jacobian, place.group(group), sections, y.len(), |start, chunk| {
+                match c {
+                    Some(_) => chunk.iter_mut().zip(&e[start..]).for_each(|(x, e)| *x = [*e; SIDE_BY_SIDE]),
+                    None => chunk.fill([0.0; SIDE_BY_SIDE]),
+                }
+                for (i, weight, filtered) in &parts {
+                    chunk.iter_mut().zip(&filtered[start..]).for_each(|(x, r)| x[*i] += weight * r);
+                }
+            });
         }
-        for (i, &section) in c.iter().flatten().enumerate() {
-            let sensitivity = all_pole(section, e[rows.clone()].iter().map(|e| -e));
-            for j in 0..section_order(n, i) {
-                delayed(&mut jacobian, top, n + 2 * i + j, &sensitivity, j + 1);
-            }
+        for (group, sections) in c.as_deref().unwrap_or_default().chunks(SIDE_BY_SIDE).enumerate() {
+            let place = Place { column: n, ..place }.group(group);
+            respond(&mut jacobian, place, sections, e.len(), |start, chunk| {
+                chunk.iter_mut().zip(&e[start..]).for_each(|(x, e)| *x = [-e; SIDE_BY_SIDE]);
+            });
         }
-        top = rows.end;
+        top += y.len();
     }
     problem.mask(&mut jacobian);
     jacobian

@@ -6,10 +6,11 @@ use super::autoregression::whitened;
 use super::conclusion::conclude;
 use super::data::{checked, complete, prior_records};
 use super::gradient::{Noise, Point};
-use super::optimiser::{Limits, State, minimise};
+use super::optimiser::{Limits, minimise};
 use super::options::{Experiment, Focus, Identified, NoiseModel, PemOptions};
 use super::parametrisation::coordinates;
 use super::starts::{candidates, instrumental, lowest, predictors, ranked, refined};
+use super::state::State;
 use super::turns::{simulation, thermal_or_free};
 use crate::model::error::ModelError;
 use crate::model::subspace::Subspace;
@@ -21,7 +22,9 @@ use crate::model::subspace::Subspace;
 /// # Method
 /// Parallel sections of second order in reflection coefficients (stable by construction, A as well as A - K C, and without
 /// redundancy); b, D, x0, offset and slope eliminated by variable projection; Levenberg-Marquardt with analytic sensitivities on the rest,
-/// from several starts: subspace estimates with and without instruments. Cost per iteration: about `2 N (3 n)^2` operations.
+/// from several starts: subspace estimates with and without instruments. The linear part by inner
+/// products of the columns where these keep enough digits, which is checked, by rotations elsewhere. Cost per iteration: about `N (3 n)^2` operations, twice as
+/// many by rotations.
 /// # Shapes
 /// N samples per experiment; any number of experiments.
 /// # Units

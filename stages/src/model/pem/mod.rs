@@ -6,17 +6,23 @@ mod covariance;
 mod data;
 mod gradient;
 mod identify;
+mod linearised;
 mod noise;
 mod optimiser;
 mod options;
 mod parametrisation;
 mod predictor;
+mod products;
 mod projection;
+mod rotation;
+mod secant;
 mod starts;
+mod state;
 mod tangent;
 #[cfg(test)]
 mod tests;
 mod turns;
+mod whitening;
 
 pub use covariance::ResidualColour;
 pub(crate) use covariance::covariance as time_domain_covariance;

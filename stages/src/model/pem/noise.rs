@@ -23,9 +23,8 @@ pub(crate) struct Intensities {
 /// Multiplicative updates: a hundred bring the likelihood within a hundredth of its maximum.
 const UPDATES: usize = 100;
 
-/// Spectrum of a unit force through a section, `|z^-m / a_i|^2`, at angle `w`.
-fn through(a: Coefficients, w: f64) -> f64 {
-    let z = c64::cis(-w);
+/// Spectrum of a unit force through a section, `|z^-m / a_i|^2`, where `z^-1` is `z`.
+fn through(a: Coefficients, z: c64) -> f64 {
     1.0 / (1.0 + z * (a[0] + z * a[1])).norm_sqr()
 }
 
@@ -44,47 +43,75 @@ pub(crate) fn intensities(
     for (spectra, length) in all {
         for (i, (power, remaining)) in spectra.periodogram.iter().zip(&spectra.remaining).enumerate().skip(1) {
             if *remaining > 0.05 {
-                let w = std::f64::consts::TAU * i as f64 / *length as f64;
-                let colour: f64 = whitening.0.iter().map(|&a| through(a, w)).product::<f64>()
-                    / whitening.1.iter().map(|&c| through(c, w)).product::<f64>();
+                let z = c64::cis(-std::f64::consts::TAU * i as f64 / *length as f64);
+                let colour: f64 = whitening.0.iter().map(|&a| through(a, z)).product::<f64>()
+                    / whitening.1.iter().map(|&c| through(c, z)).product::<f64>();
                 weights.push(*remaining);
                 powers.push(power / remaining * colour);
                 basis[0].push(1.0);
-                basis[1..].iter_mut().zip(a).for_each(|(basis, &a)| basis.push(through(a, w)));
+                basis[1..].iter_mut().zip(a).for_each(|(basis, &a)| basis.push(through(a, z)));
             }
         }
     }
     let mean = powers.iter().sum::<f64>() / powers.len().max(1) as f64;
     let peak = |basis: &Vec<f64>| basis.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let mut values: Vec<f64> = basis.iter().map(|basis| mean / peak(basis)).collect();
-    let (mut first, mut second) = (vec![0.0; powers.len()], vec![0.0; powers.len()]);
-    for _ in 0..UPDATES {
-        first.fill(0.0);
-        for (basis, value) in basis.iter().zip(&values) {
-            first.iter_mut().zip(basis).for_each(|(level, b)| *level += b * value);
-        }
-        for (((first, second), weight), power) in first.iter_mut().zip(&mut second).zip(&weights).zip(&powers) {
-            *second = weight / *first;
-            *first = *second * power / *first;
-        }
-        for (value, basis) in values.iter_mut().zip(&basis) {
-            let (up, down) = (dot(basis, &first), dot(basis, &second));
-            *value *= if down > 0.0 { up / down } else { 0.0 };
-        }
-    }
+    // bins without weight fill the last round of the vector units
+    let whole = powers.len().next_multiple_of(LANES);
+    weights.resize(whole, 0.0);
+    powers.resize(whole, 0.0);
+    basis.iter_mut().for_each(|basis| basis.resize(whole, 1.0));
+    pulp::Arch::new().dispatch(Climb { weights: &weights, powers: &powers, basis: &basis, values: &mut values });
     let white = values[0].max(f64::MIN_POSITIVE);
     Intensities { white, forces: values.split_off(1) }
 }
 
-/// Inner product in partial sums, for the processor's vector units.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a, a_rest) = a.as_chunks::<8>();
-    let (b, b_rest) = b.as_chunks::<8>();
-    let mut lanes = [0.0; 8];
-    for (a, b) in a.iter().zip(b) {
-        (0..8).for_each(|l| lanes[l] += a[l] * b[l]);
+/// Bins taken side by side, for the processor's vector units.
+const LANES: usize = 8;
+
+/// Carries the multiplicative updates to the vector units.
+struct Climb<'a> {
+    weights: &'a [f64],
+    powers: &'a [f64],
+    basis: &'a [Vec<f64>],
+    values: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Climb<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { weights, powers, basis, values } = self;
+        let (weights, powers) = (weights.as_chunks::<LANES>().0, powers.as_chunks::<LANES>().0);
+        let basis: Vec<&[[f64; LANES]]> = basis.iter().map(|basis| &basis.as_chunks().0[..weights.len()]).collect();
+        let mut sums = vec![[[0.0; LANES]; 2]; basis.len()];
+        for _ in 0..UPDATES {
+            sums.fill([[0.0; LANES]; 2]);
+            for (r, (weight, power)) in weights.iter().zip(powers).enumerate() {
+                let mut level = [0.0; LANES];
+                for (basis, value) in basis.iter().zip(values.iter()) {
+                    (0..LANES).for_each(|l| level[l] = basis[r][l].mul_add(*value, level[l]));
+                }
+                let (mut up, mut down) = ([0.0; LANES], [0.0; LANES]);
+                for l in 0..LANES {
+                    let inverse = 1.0 / level[l];
+                    down[l] = weight[l] * inverse;
+                    up[l] = down[l] * power[l] * inverse;
+                }
+                for (basis, [ups, downs]) in basis.iter().zip(&mut sums) {
+                    for l in 0..LANES {
+                        ups[l] = basis[r][l].mul_add(up[l], ups[l]);
+                        downs[l] = basis[r][l].mul_add(down[l], downs[l]);
+                    }
+                }
+            }
+            for (value, sums) in values.iter_mut().zip(&sums) {
+                let [up, down] = sums.map(|lanes| lanes.iter().sum::<f64>());
+                *value *= if down > 0.0 { up / down } else { 0.0 };
+            }
+        }
     }
-    lanes.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// Attempts at the Riccati equation, each with a hundred times more white noise.

@@ -3,12 +3,10 @@
 //! `e = H^-1 (y - sum_i b_i/a_i u - D u - x0 response - offset)`, `H^-1 = prod_i a_i / c_i`: with a and c fixed, e is linear in all the
 //! rest, and the filtered regressors are the columns of a least-squares problem.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
 use faer::{ColMut, Mat};
 
-use super::parametrisation::{Coefficients, section_order};
+use super::parametrisation::Coefficients;
+use super::whitening::{IMPULSE, INPUT, LANES, ONE, OUTPUT, RAMP, Signals, Whitened};
 
 /// What the errors are computed from: the experiments share everything but initial state, offset and slope.
 ///
@@ -23,27 +21,11 @@ pub(crate) struct Problem<'a> {
     pub missing: Vec<usize>,
     /// How many of the last experiments are a prior's: they begin at rest and have no offset or slope.
     pub priors: usize,
-    /// The signals under the last whitening: a search stays with one filter for many points.
-    pub whitened: RefCell<Option<(Filter, Rc<Signals>)>>,
 }
 
 /// Share of the output's changes that a shortened problem sees, and its least samples for each linear parameter.
 const LIVELY_SHARE: f64 = 0.99;
 const LIVELY_LEAST: usize = 40;
-
-/// Numerator and denominator of a whitening filter.
-pub(crate) type Filter = (Vec<Coefficients>, Vec<Coefficients>);
-
-/// Per experiment the whitened signals side by side, and each further input.
-pub(crate) type Signals = Vec<(Vec<[f64; LANES]>, Vec<Vec<f64>>)>;
-
-/// Signals that pass the whitening filter side by side.
-const LANES: usize = 5;
-const INPUT: usize = 0;
-const IMPULSE: usize = 1;
-const ONE: usize = 2;
-const RAMP: usize = 3;
-const OUTPUT: usize = 4;
 
 impl<'a> Problem<'a> {
     /// The experiments without the prior's.
@@ -74,12 +56,7 @@ impl<'a> Problem<'a> {
         };
         let experiments: Vec<_> = self.experiments.iter().map(cut).collect();
         let rows: usize = experiments.iter().map(|(_, y)| y.len()).sum();
-        (4 * rows <= 3 * self.rows()).then(|| Problem {
-            experiments,
-            missing: Vec::new(),
-            whitened: RefCell::default(),
-            ..*self
-        })
+        (4 * rows <= 3 * self.rows()).then(|| Problem { experiments, missing: Vec::new(), ..*self })
     }
 
     /// Samples of all experiments.
@@ -114,50 +91,31 @@ impl<'a> Problem<'a> {
         self.input_column(self.inputs) + index * self.nuisances()
     }
 
-    /// Regressors filtered by `prod whitening.0 / whitening.1`, and the filtered output as the last column: rows x (columns + 1).
+    /// Whitened regressors, and the whitened output as the last column: rows x (columns + 1).
     ///
     /// Order of states within a section: observer form, `x1+ = -a1 x1 + x2 + b1 u`, `x2+ = -a2 x1 + b2 u`, `y = x1`.
-    pub fn regressors(&self, a: &[Coefficients], whitening: &Filter) -> Mat<f64> {
+    pub fn regressors(&self, a: &[Coefficients], whitened: &Whitened) -> Mat<f64> {
         let mut matrix = Mat::zeros(self.rows(), self.columns() + 1);
         let mut top = 0;
-        for (index, (signals, further)) in self.signals(whitening).iter().enumerate() {
-            self.fill_input(&mut matrix, top, 0, signals, |s| s[INPUT], a);
+        for (index, Signals { lanes, further }) in whitened.experiments.iter().enumerate() {
+            self.fill_input(&mut matrix, top, 0, lanes, |s| s[INPUT], a);
             for (input, signal) in further.iter().enumerate() {
                 self.fill_input(&mut matrix, top, input + 1, signal, |s| *s, a);
             }
             if index + self.priors < self.experiments.len() {
-                self.fill_own(&mut matrix, top, index, signals, a);
+                self.fill_own(&mut matrix, top, index, lanes, a);
             }
-            copy_lane(&mut matrix, top, self.columns(), signals, OUTPUT);
-            top += signals.len();
+            copy_lane(&mut matrix, top, self.columns(), lanes, OUTPUT);
+            top += lanes.len();
         }
         matrix
-    }
-
-    fn signals(&self, whitening: &Filter) -> Rc<Signals> {
-        if let Some((filter, signals)) = &*self.whitened.borrow()
-            && filter == whitening
-        {
-            return Rc::clone(signals);
-        }
-        let each = |(u, y): &(&[f64], &[f64])| {
-            let (first, further) = u.split_at(y.len());
-            let alone = |u: &[f64]| {
-                whiten(&whitening.0, &whitening.1, u.iter().map(|&u| [u]).collect()).into_iter().flatten().collect()
-            };
-            let further = further.chunks_exact(y.len()).map(alone).collect();
-            (whiten(&whitening.0, &whitening.1, lanes(first, y)), further)
-        };
-        let signals: Rc<Signals> = Rc::new(self.experiments.iter().map(each).collect());
-        *self.whitened.borrow_mut() = Some((whitening.clone(), Rc::clone(&signals)));
-        signals
     }
 
     /// The columns of an experiment's own parameters: initial state, offset, slope.
     fn fill_own(&self, matrix: &mut Mat<f64>, top: usize, index: usize, signals: &[[f64; LANES]], a: &[Coefficients]) {
         let own = self.nuisance_column(index);
-        let columns = |i: usize, j: usize| own + 2 * i + j;
-        self.fill_sections(matrix, top, a, signals, |s| s[IMPULSE], columns, 0);
+        let place = Place { top, column: own, width: self.order, delay: 0 };
+        fill_sections(matrix, place, a, signals, |s| s[IMPULSE]);
         if self.offset {
             copy_lane(matrix, top, own + self.order, signals, ONE);
         }
@@ -177,53 +135,79 @@ impl<'a> Problem<'a> {
         a: &[Coefficients],
     ) {
         let first = self.input_column(index);
-        self.fill_sections(matrix, top, a, signals, pick, |i, j| first + 2 * i + j, 1);
+        fill_sections(matrix, Place { top, column: first, width: self.order, delay: 1 }, a, signals, pick);
         if let Some(target) = column_slice(matrix, first + self.order) {
             target[top..top + signals.len()].iter_mut().zip(signals).for_each(|(t, s)| *t = pick(s));
         }
     }
+}
 
-    /// A signal through every section, delayed by `delay` and, where the section has two states, once more.
-    #[expect(clippy::too_many_arguments, reason = "what is filtered, by what, where to")]
-    fn fill_sections<T>(
-        &self,
-        matrix: &mut Mat<f64>,
-        top: usize,
-        a: &[Coefficients],
-        signals: &[T],
-        pick: impl Fn(&T) -> f64 + Copy,
-        column: impl Fn(usize, usize) -> usize,
-        delay: usize,
-    ) {
-        let length = signals.len();
-        for (group, sections) in a.chunks(SIDE_BY_SIDE).enumerate() {
-            let mut bank = Bank::new(sections);
-            let mut start = 0;
-            for signals in signals.chunks(CHUNK) {
-                let filtered = bank.run(signals, pick);
-                for i in 0..sections.len() {
-                    let section = group * SIDE_BY_SIDE + i;
-                    if let Some(target) = column_slice(matrix, column(section, 0)) {
-                        let first = top + start + delay;
-                        let kept = signals.len().min((length - start).saturating_sub(delay));
-                        target[first..first + kept].iter_mut().zip(&filtered).for_each(|(t, y)| *t = y[i]);
-                    }
-                }
-                start += signals.len();
-            }
-        }
-        for i in 0..a.len() {
-            if section_order(self.order, i) == 2 {
-                once_more(matrix, top, length, column(i, 0), column(i, 1));
-            }
-        }
+/// Where the responses of sections to their signals go: two columns for each, one for a last one of first order.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    /// First row.
+    pub top: usize,
+    /// First column.
+    pub column: usize,
+    /// How many columns.
+    pub width: usize,
+    /// Rows by which the first column of each section is late; the second is one row later.
+    pub delay: usize,
+}
+
+impl Place {
+    /// For the sections of group `index`.
+    pub fn group(self, index: usize) -> Self {
+        let first = 2 * SIDE_BY_SIDE * index;
+        Self { column: self.column + first, width: (self.width - first).min(2 * SIDE_BY_SIDE), ..self }
     }
 }
 
+/// One signal through every section.
+fn fill_sections<T>(
+    matrix: &mut Mat<f64>,
+    place: Place,
+    a: &[Coefficients],
+    signals: &[T],
+    pick: impl Fn(&T) -> f64 + Copy,
+) {
+    for (index, sections) in a.chunks(SIDE_BY_SIDE).enumerate() {
+        respond(matrix, place.group(index), sections, signals.len(), |start, chunk| {
+            chunk.iter_mut().zip(&signals[start..]).for_each(|(x, s)| *x = [pick(s); SIDE_BY_SIDE]);
+        });
+    }
+}
+
+/// A signal for each of up to [`SIDE_BY_SIDE`] sections, through `1 / a`: `signals` writes those from a row on.
+pub(super) fn respond(
+    matrix: &mut Mat<f64>,
+    place: Place,
+    sections: &[Coefficients],
+    length: usize,
+    mut signals: impl FnMut(usize, &mut [[f64; SIDE_BY_SIDE]]),
+) {
+    let Place { top, column, width, delay } = place;
+    let mut bank = Bank::new(sections);
+    let mut chunk = [[0.0; SIDE_BY_SIDE]; CHUNK];
+    for start in (0..length).step_by(CHUNK) {
+        let chunk = &mut chunk[..CHUNK.min(length - start)];
+        signals(start, chunk);
+        bank.run(chunk);
+        let first = top + start + delay;
+        let kept = chunk.len().min((length - start).saturating_sub(delay));
+        for i in 0..sections.len() {
+            if let Some(target) = column_slice(matrix, column + 2 * i) {
+                target[first..first + kept].iter_mut().zip(&*chunk).for_each(|(t, y)| *t = y[i]);
+            }
+        }
+    }
+    (0..width / 2).for_each(|i| once_more(matrix, top, length, column + 2 * i, column + 2 * i + 1));
+}
+
 /// Sections filtered side by side, for the processor's vector units.
-const SIDE_BY_SIDE: usize = 8;
-/// Samples at a time: what they give stays in the first-level cache.
-const CHUNK: usize = 128;
+pub(super) const SIDE_BY_SIDE: usize = 8;
+/// Samples at a time: they stay in the first-level cache.
+pub(super) const CHUNK: usize = 128;
 
 /// `1 / a` of several sections.
 struct Bank {
@@ -238,18 +222,18 @@ impl Bank {
         Self { a, past: [[0.0; SIDE_BY_SIDE]; 2] }
     }
 
-    fn run<T>(&mut self, signals: &[T], pick: impl Fn(&T) -> f64) -> [[f64; SIDE_BY_SIDE]; CHUNK] {
-        let mut out = [[0.0; SIDE_BY_SIDE]; CHUNK];
+    /// Filters the next samples of each section's own signal in place.
+    fn run(&mut self, signals: &mut [[f64; SIDE_BY_SIDE]]) {
         let [mut y1, mut y2] = self.past;
-        for (out, signal) in out.iter_mut().zip(signals) {
-            let x = pick(signal);
+        for signal in signals {
+            let mut y = [0.0; SIDE_BY_SIDE];
             for i in 0..SIDE_BY_SIDE {
-                out[i] = (x - self.a[1][i] * y2[i]) - self.a[0][i] * y1[i];
+                y[i] = (signal[i] - self.a[1][i] * y2[i]) - self.a[0][i] * y1[i];
             }
-            (y2, y1) = (y1, *out);
+            (y2, y1) = (y1, y);
+            *signal = y;
         }
         self.past = [y1, y2];
-        out
     }
 }
 
@@ -272,54 +256,6 @@ fn copy_lane(matrix: &mut Mat<f64>, top: usize, column: usize, signals: &[[f64; 
     if let Some(target) = target {
         target.as_slice_mut()[top..top + signals.len()].iter_mut().zip(signals).for_each(|(t, s)| *t = s[lane]);
     }
-}
-
-/// Writes `signal`, delayed by `delay`, into a column from row `top` on.
-pub(crate) fn delayed(matrix: &mut Mat<f64>, top: usize, column: usize, signal: &[f64], delay: usize) {
-    if let Some(target) = matrix.col_mut(column).try_as_col_major_mut() {
-        let kept = signal.len().saturating_sub(delay);
-        target.as_slice_mut()[top + delay.min(signal.len())..top + signal.len()].copy_from_slice(&signal[..kept]);
-    }
-}
-
-/// Input, impulse at the first sample, one, ramp from -1 to 1, output.
-fn lanes(u: &[f64], y: &[f64]) -> Vec<[f64; LANES]> {
-    let centre = 0.5 * (y.len() as f64 - 1.0).max(1.0);
-    u.iter()
-        .zip(y)
-        .enumerate()
-        .map(|(k, (&u, &y))| {
-            // a missing output takes no part: see the mask
-            let y = if y.is_nan() { 0.0 } else { y };
-            [u, if k == 0 { 1.0 } else { 0.0 }, 1.0, (k as f64 - centre) / centre, y]
-        })
-        .collect()
-}
-
-/// `prod a_i / c_i` applied to all lanes; transposed direct form II, zero initial state.
-fn whiten<const N: usize>(a: &[Coefficients], c: &[Coefficients], mut signals: Vec<[f64; N]>) -> Vec<[f64; N]> {
-    // slow sections first: a fast one alone would decay into denormal numbers
-    let mut order: Vec<usize> = (0..a.len()).collect();
-    order.sort_by(|&i, &j| radius(c[j]).total_cmp(&radius(c[i])));
-    for i in order {
-        let ([a1, a2], [c1, c2]) = (a[i], c[i]);
-        let (mut s1, mut s2) = ([0.0; N], [0.0; N]);
-        for sample in &mut signals {
-            for l in 0..N {
-                let x = sample[l];
-                let y = x + s1[l];
-                s1[l] = a1 * x - c1 * y + s2[l];
-                s2[l] = a2 * x - c2 * y;
-                sample[l] = y;
-            }
-        }
-    }
-    signals
-}
-
-fn radius(c: Coefficients) -> f64 {
-    let d = 0.25 * c[0] * c[0] - c[1];
-    if d < 0.0 { c[1].sqrt() } else { 0.5 * c[0].abs() + d.sqrt() }
 }
 
 /// `1 / (1 + a1 q^-1 + a2 q^-2)` applied to a signal.

@@ -1,90 +1,87 @@
 //! Separable least squares: everything that enters the prediction error linearly is eliminated exactly.
 //!
-//! Golub and Pereyra's variable projection with Kaufman's Jacobian: b, D, x0, offset and slope are solved for by one QR at every trial of
-//! the poles (a) and predictor poles (c), which alone are left to iterate on.
+//! Golub and Pereyra's variable projection with Kaufman's Jacobian: b, D, x0, offset and slope are solved for at every trial of
+//! the poles (a) and predictor poles (c), which alone are left to iterate on: by inner products where these keep enough digits, by rotations elsewhere.
 
-use faer::{Mat, MatMut};
+use std::borrow::Cow;
+
+use faer::Mat;
 
 use super::predictor::Problem;
+use super::products::Products;
+use super::rotation::Rotation;
 use crate::model::error::ModelError;
-use crate::model::orthogonal::{Svd, product};
-use crate::model::tall::TallQr;
-
-/// Singular values of the column-scaled regressors below this share of the largest count as zero: some 100 roundings.
-const RANK_TOLERANCE: f64 = 1e-13;
 
 /// The least-squares solution at fixed poles and predictor poles.
 pub(crate) struct Projection {
-    qr: TallQr,
-    /// Basis of the fitted space within the rotated regressors: columns x rank.
-    fitted: Mat<f64>,
+    factor: Factor,
     /// Solution, unscaled.
     pub theta: Vec<f64>,
     /// `sum e^2`.
     pub cost: f64,
-    /// The residual in rotated coordinates: the first columns + 1 entries, the rest is zero.
-    rotated: Vec<f64>,
+}
+
+/// Least squares solved.
+pub(super) struct Solution {
+    pub theta: Vec<f64>,
+    pub cost: f64,
+}
+
+/// How it was solved: what the sensitivities are projected by.
+enum Factor {
+    Products(Products),
+    Rotation(Rotation),
+}
+
+/// The projected Jacobian and the residual in one orthonormal frame, a few rows in place of all samples: the residual's part in the Jacobian's span is whole.
+pub(crate) struct Sensitivities {
+    /// Rows x coordinates.
+    pub rows: Mat<f64>,
+    /// As many as there are rows.
+    pub residual: Vec<f64>,
 }
 
 impl Projection {
     /// Solves for all linear parameters; the last column of `regressors` is the filtered output. Errors: no finite solution.
     pub fn new(problem: &Problem, regressors: &Mat<f64>) -> Result<Self, ModelError> {
-        let p = regressors.ncols() - 1;
-        let qr = if problem.missing.is_empty() {
-            TallQr::new(regressors.as_ref())
-        } else {
-            let mut matrix = regressors.clone();
-            problem.mask(&mut matrix);
-            TallQr::new(matrix.as_ref())
+        let present = present(problem, regressors);
+        let (factor, Solution { theta, cost }) = match Products::new(present.as_ref().as_ref()) {
+            Some((products, solution)) => (Factor::Products(products), solution),
+            None => {
+                let (rotation, solution) = Rotation::new(present.as_ref().as_ref())?;
+                (Factor::Rotation(rotation), solution)
+            }
         };
-        let r = qr.r();
-        // columns of the triangle are as long as those of the matrix
-        let mut scale = vec![1.0; p];
-        let mut scaled = Mat::zeros(p, p);
-        for (j, scale) in scale.iter_mut().enumerate() {
-            let norm = r.col(j).norm_l2();
-            if !norm.is_finite() {
-                return Err(ModelError::Degenerate("a filtered regressor overflows"));
-            }
-            if norm > 0.0 {
-                *scale = norm;
-            }
-            (0..=j).for_each(|i| scaled[(i, j)] = r[(i, j)] / *scale);
-        }
-        let svd = Svd::new(&scaled)?;
-        let rank = svd.rank(RANK_TOLERANCE);
-        let fitted = svd.u.as_ref().get(.., ..rank).to_owned();
-        let top: Vec<f64> = (0..p).map(|i| r[(i, p)]).collect();
-        let along: Vec<f64> = (0..rank).map(|k| (0..p).map(|i| fitted[(i, k)] * top[i]).sum()).collect();
-        let theta = (0..p)
-            .map(|j| (0..rank).map(|k| svd.v[(j, k)] * along[k] / svd.s[k]).sum::<f64>() / scale[j])
-            .collect::<Vec<f64>>();
-        let mut rotated: Vec<f64> =
-            (0..p).map(|i| top[i] - (0..rank).map(|k| fitted[(i, k)] * along[k]).sum::<f64>()).collect();
-        rotated.push(r[(p, p)]);
-        let cost = rotated.iter().map(|value| value * value).sum::<f64>();
-        if !cost.is_finite() || theta.iter().any(|value| !value.is_finite()) {
-            return Err(ModelError::Degenerate("the linear parameters are not finite"));
-        }
-        Ok(Self { qr, fitted, theta, cost, rotated })
+        Ok(Self { factor, theta, cost })
     }
 
-    /// Rotates `jacobian` as the residual is and removes the directions that the linear parameters reach.
-    ///
-    /// Returns the rows where the residual has entries; the others stay in `jacobian`.
-    pub fn project(&self, jacobian: MatMut<'_, f64>) -> Mat<f64> {
-        let mut head = self.qr.apply_transpose(jacobian);
-        let p = self.fitted.nrows();
-        let along = product(self.fitted.transpose(), head.as_ref().get(..p, ..));
-        let removed = product(self.fitted.as_ref(), along.as_ref());
-        for j in 0..removed.ncols() {
-            (0..p).for_each(|i| head[(i, j)] -= removed[(i, j)]);
+    /// A Jacobian without the directions that the linear parameters reach. Errors: no finite solution.
+    pub fn sensitivities(
+        &self,
+        problem: &Problem,
+        regressors: &Mat<f64>,
+        e: &[f64],
+        jacobian: Mat<f64>,
+    ) -> Result<Sensitivities, ModelError> {
+        match &self.factor {
+            Factor::Rotation(rotation) => Ok(rotation.sensitivities(jacobian)),
+            Factor::Products(products) => match products.sensitivities(regressors.as_ref(), e, &jacobian) {
+                Some(found) => Ok(found),
+                None => {
+                    let (rotation, _) = Rotation::new(present(problem, regressors).as_ref().as_ref())?;
+                    Ok(rotation.sensitivities(jacobian))
+                }
+            },
         }
-        head
     }
+}
 
-    /// Entry `row` of the residual in rotated coordinates.
-    pub fn rotated(&self, row: usize) -> f64 {
-        self.rotated.get(row).copied().unwrap_or(0.0)
+/// The regressors, rows whose output is missing cleared.
+fn present<'a>(problem: &Problem, regressors: &'a Mat<f64>) -> Cow<'a, Mat<f64>> {
+    if problem.missing.is_empty() {
+        return Cow::Borrowed(regressors);
     }
+    let mut matrix = regressors.clone();
+    problem.mask(&mut matrix);
+    Cow::Owned(matrix)
 }

@@ -6,9 +6,10 @@
 use faer::{Mat, c64};
 
 use super::gradient::{Noise, Point};
-use super::optimiser::{Limits, State, minimise};
+use super::optimiser::{Limits, minimise};
 use super::parametrisation::{coordinates, roots, section_order};
 use super::predictor::Problem;
+use super::state::State;
 use crate::model::error::ModelError;
 use crate::model::instrumental::{InstrumentalSubspace, Weight};
 use crate::model::orthogonal::{eigenvalues, least_squares};

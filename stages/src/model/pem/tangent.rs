@@ -5,10 +5,15 @@ use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 
 use crate::model::error::ModelError;
-use crate::model::orthogonal::{Qr, Svd, product};
+use crate::model::gram::gram;
+use crate::model::orthogonal::{Svd, Symmetric, product};
+use crate::model::tall::TallQr;
 
 /// Directions of the scaled Jacobian below this share are not determined by the data.
 const RANK_TOLERANCE: f64 = 1e-12;
+
+/// Least energy of a direction of the scaled Jacobian that products resolve to some seven digits.
+const LEAST_CLEAR: f64 = 1e-9;
 
 /// An orthonormal basis of the space that the Jacobian's columns span.
 pub(crate) struct Tangent {
@@ -21,39 +26,76 @@ pub(crate) struct Tangent {
 impl Tangent {
     /// Of a Jacobian, rows x parameters. Errors: no fewer directions than rows.
     pub fn new(jacobian: &Mat<f64>) -> Result<Self, ModelError> {
+        match Self::by_products(jacobian) {
+            Some(found) => Ok(found),
+            None => Self::by_rotation(jacobian),
+        }
+    }
+
+    /// By inner products, made orthonormal twice. None: the directions are too alike, or a value is not finite.
+    fn by_products(jacobian: &Mat<f64>) -> Option<Self> {
+        let (rows, p) = jacobian.shape();
+        let products = gram(jacobian.as_ref());
+        let scale: Vec<f64> = (0..p).map(|j| products[(j, j)].sqrt().recip()).collect();
+        if rows <= p || scale.iter().any(|s| !s.is_normal()) {
+            return None;
+        }
+        let axes = Symmetric::new(&Mat::from_fn(p, p, |i, j| products[(i, j)] * scale[i] * scale[j])).ok()?;
+        let clear = axes.values.first().is_some_and(|least| *least > LEAST_CLEAR);
+        if !clear {
+            return None;
+        }
+        let first = Mat::from_fn(p, p, |j, k| scale[j] * axes.vectors[(j, k)] / axes.values[k].sqrt());
+        let basis = product(jacobian.as_ref(), first.as_ref());
+        // what they lack of being orthonormal is small: its square is rounding
+        let lacking = gram(basis.as_ref());
+        let again = Mat::from_fn(p, p, |i, j| if i == j { 1.5 } else { 0.0 } - 0.5 * lacking[(i, j)]);
+        Some(Self { spread: product(first.as_ref(), again.as_ref()), basis })
+    }
+
+    fn by_rotation(jacobian: &Mat<f64>) -> Result<Self, ModelError> {
         let (rows, p) = jacobian.shape();
         let inverse = |norm: f64| if norm > 0.0 { 1.0 / norm } else { 0.0 };
         let scale: Vec<f64> = (0..p).map(|j| inverse(jacobian.col(j).norm_l2())).collect();
-        let scaled = Mat::from_fn(rows, p, |i, j| jacobian[(i, j)] * scale[j]);
-        let svd = Svd::new(&Qr::new(scaled.clone()).r())?;
+        let r = TallQr::triangle(jacobian.as_ref());
+        let svd = Svd::new(&Mat::from_fn(p, p, |i, j| r[(i, j)] * scale[j]))?;
         let rank = svd.rank(RANK_TOLERANCE);
         if rows <= rank {
             return Err(ModelError::TooShort { found: rows, wanted: rank + 1 });
         }
-        let weights = Mat::from_fn(p, rank, |j, k| svd.v[(j, k)] / svd.s[k]);
-        let spread = Mat::from_fn(p, rank, |j, k| scale[j] * weights[(j, k)]);
-        Ok(Self { basis: product(scaled.as_ref(), weights.as_ref()), spread })
+        let spread = Mat::from_fn(p, rank, |j, k| scale[j] * svd.v[(j, k)] / svd.s[k]);
+        Ok(Self { basis: product(jacobian.as_ref(), spread.as_ref()), spread })
     }
 
     /// The basis and the residual of one experiment (rows `top..top + length`), transformed.
     pub fn spectra(&self, e: &[f64], top: usize, length: usize, planner: &mut RealFftPlanner<f64>) -> Spectra {
         let forward = planner.plan_fft_forward(length);
         let scale = 1.0 / (length as f64).sqrt();
-        let transform = |values: &mut dyn Iterator<Item = f64>| {
-            let mut time = forward.make_input_vec();
-            time.iter_mut().zip(values).for_each(|(t, v)| *t = v * scale);
+        let mut time = forward.make_input_vec();
+        let mut scratch = forward.make_scratch_vec();
+        let mut transform = |fill: &mut dyn FnMut(&mut [f64])| {
+            fill(&mut time);
+            time.iter_mut().for_each(|t| *t *= scale);
             let mut spectrum = forward.make_output_vec();
             // lengths are the plan's own: no error is possible
-            let _ = forward.process(&mut time, &mut spectrum);
+            let _ = forward.process_with_scratch(&mut time, &mut spectrum, &mut scratch);
             spectrum
         };
         let basis: Vec<Vec<Complex64>> = (0..self.basis.ncols())
-            .map(|k| transform(&mut self.basis.col(k).iter().skip(top).take(length).copied()))
+            .map(|k| {
+                let column = self.basis.col(k).subrows(top, length);
+                transform(&mut |time| match column.try_as_col_major() {
+                    Some(column) => time.copy_from_slice(column.as_slice()),
+                    None => time.iter_mut().zip(column.iter()).for_each(|(t, v)| *t = *v),
+                })
+            })
             .collect();
-        let residual = transform(&mut e[top..top + length].iter().copied());
-        let remaining = (0..residual.len())
-            .map(|i| (1.0 - basis.iter().map(|direction| direction[i].norm_sqr()).sum::<f64>()).max(0.0))
-            .collect();
+        let residual = transform(&mut |time| time.copy_from_slice(&e[top..top + length]));
+        let mut remaining = vec![1.0; residual.len()];
+        for direction in &basis {
+            remaining.iter_mut().zip(direction).for_each(|(left, value)| *left -= value.norm_sqr());
+        }
+        remaining.iter_mut().for_each(|left| *left = left.max(0.0));
         Spectra { basis, periodogram: residual.iter().map(Complex64::norm_sqr).collect(), remaining }
     }
 }

@@ -6,11 +6,12 @@ use realfft::RealFftPlanner;
 use super::conclusion::full_jacobian;
 use super::gradient::{Noise, Point};
 use super::noise::{gain, intensities};
-use super::optimiser::{Ending, Limits, State, minimise};
+use super::optimiser::{Ending, Limits, minimise};
 use super::options::NoiseModel;
 use super::parametrisation::{coordinates, roots, section_order, sections};
 use super::predictor::Problem;
 use super::starts::{lowest, refined};
+use super::state::State;
 use super::tangent::Tangent;
 use crate::model::error::ModelError;
 
