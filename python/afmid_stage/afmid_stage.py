@@ -361,7 +361,10 @@ def _take(sent: dict, reader: _Reader) -> Any:
         variables = []
         for one in sent["variables"]:
             if one["kind"] == "complex":
-                values = get(one["re"]) + 1j * get(one["im"])
+                re = get(one["re"])
+                # re + 1j * im would lose the sign of a zero
+                values = np.empty(re.shape, dtype=complex)
+                values.real, values.imag = re, get(one["im"])
             else:
                 values = get(one["values"])
             values = values.reshape([lengths[dim] for dim in one["dims"]])

@@ -28,7 +28,9 @@ fn text(checks: &[Check]) -> String {
     let failed = checks.iter().filter(|check| check.outcome.is_err()).count();
     let end = match failed {
         0 => format!("a plugin: {} of {} passed\n", checks.len(), checks.len()),
-        failed => format!("{failed} failed, {} passed; what depends on a failure was not tried\n", checks.len() - failed),
+        failed => {
+            format!("{failed} failed, {} passed; what depends on a failure was not tried\n", checks.len() - failed)
+        }
     };
     checks.iter().map(line).chain([end]).collect()
 }

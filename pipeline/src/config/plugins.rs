@@ -32,7 +32,8 @@ const MOST_TIMEOUT_S: f64 = 604_800.0;
 
 const KEYS: [&str; 2] = ["command", "timeout_s"];
 
-const FORM: &str = "write `NAME = \"python3 my_stage.py\"` or `NAME = { command = [\"python3\", \"my_stage.py\"], timeout_s = 600 }`";
+const FORM: &str =
+    "write `NAME = \"python3 my_stage.py\"` or `NAME = { command = [\"python3\", \"my_stage.py\"], timeout_s = 600 }`";
 
 /// Reads the table, in the order of the text.
 pub(super) fn read(value: &Spanned<DeValue<'_>>, problems: &mut Vec<Problem>) -> Vec<PluginDecl> {
@@ -121,7 +122,9 @@ fn command(name: &str, value: &Spanned<DeValue<'_>>) -> Result<Vec<String>, Prob
                 None => Err(wrong(format!("found {}, wanted text", found(word.get_ref())), word.span(), "wanted text")),
             })
             .collect::<Result<_, _>>()?,
-        other => return Err(wrong(format!("found {}, wanted text or an array", found(other)), value.span(), "no command")),
+        other => {
+            return Err(wrong(format!("found {}, wanted text or an array", found(other)), value.span(), "no command"));
+        }
     };
     match words.first() {
         Some(program) if !program.is_empty() => Ok(words),
@@ -161,7 +164,10 @@ mod tests {
 
     #[test]
     fn quotes_hold_words_together() {
-        assert_eq!(words("python3  'my stage.py' \"\" -x"), Ok(["python3", "my stage.py", "", "-x"].map(str::to_owned).to_vec()));
+        assert_eq!(
+            words("python3  'my stage.py' \"\" -x"),
+            Ok(["python3", "my stage.py", "", "-x"].map(str::to_owned).to_vec())
+        );
         assert!(words("python3 'open").is_err());
     }
 

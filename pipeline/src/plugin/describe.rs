@@ -67,7 +67,8 @@ pub(super) fn describe(name: &str, shaken: &Handshake, answer: Value) -> Result<
 }
 
 fn ports(what: &str, ports: &[PortDescription]) -> Result<(), String> {
-    let letters = |name: &str| name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
+    let letters =
+        |name: &str| name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
     for (index, port) in ports.iter().enumerate() {
         let name = &port.name;
         if name.is_empty() || name.len() > 60 || !letters(name) {

@@ -54,7 +54,8 @@ pub(crate) fn entry(decl: &StageDecl, name: &str, plugins: &[PluginDecl], base: 
 
 fn missing(decl: &StageDecl, name: &str, plugins: &[PluginDecl]) -> Problem {
     let program = program_name(name);
-    let message = format!("{}: there is no plugin `{name}`: neither in [plugins] nor as `{program}` on the PATH", decl.title());
+    let message =
+        format!("{}: there is no plugin `{name}`: neither in [plugins] nor as `{program}` on the PATH", decl.title());
     let help = match crate::config::nearest(name, plugin_names(plugins)) {
         Some(_) => did_you_mean(name, "plugin", plugin_names(plugins)),
         None => format!("add `{name} = \"python3 my_stage.py\"` to [plugins], or install `{program}`"),

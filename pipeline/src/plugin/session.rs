@@ -28,7 +28,8 @@ pub(super) struct Session {
 }
 
 /// Where the handshake is written down.
-const FORM: &str = r#"the first line is {"afmid_stage": 1, "protocol": {"min": 1, "max": 1}, "name": "...", "version": "..."}"#;
+const FORM: &str =
+    r#"the first line is {"afmid_stage": 1, "protocol": {"min": 1, "max": 1}, "name": "...", "version": "..."}"#;
 
 impl Session {
     /// Starts a plugin and reads its handshake. Errors: it does not start, says something else, or speaks another protocol.
@@ -87,7 +88,8 @@ impl Session {
         self.requests += 1;
         let id = self.requests;
         self.process.send(&json!({ "id": id, "method": method, "params": params }).to_string());
-        let (deadline, doing) = (Instant::now() + timeout, format!("during `{method}` ({:.0} s allowed)", timeout.as_secs_f64()));
+        let (deadline, doing) =
+            (Instant::now() + timeout, format!("during `{method}` ({:.0} s allowed)", timeout.as_secs_f64()));
         loop {
             let line = self.process.receive(deadline, &doing)?;
             let reply = reply(&line, id, &doing)?;
@@ -99,7 +101,10 @@ impl Session {
                     return Err(PluginError::new(format!("refuses: {}", refusal.message), help).alive());
                 }
                 _ => {
-                    let what = format!("answered with none or several of `result`, `error`, `progress`: {}", shown(line.as_bytes()));
+                    let what = format!(
+                        "answered with none or several of `result`, `error`, `progress`: {}",
+                        shown(line.as_bytes())
+                    );
                     return Err(PluginError::new(what, "an answer has exactly one of them"));
                 }
             }
@@ -168,8 +173,16 @@ fn handshake(line: &str) -> Result<(Handshake, u64), PluginError> {
     let common = range.max.min(*PROTOCOL.end());
     if common < range.min.max(*PROTOCOL.start()) {
         let (low, high) = (range.min, range.max);
-        let what = format!("speaks the versions {low} to {high} of the protocol, this program {} to {}", PROTOCOL.start(), PROTOCOL.end());
-        let older = if low > *PROTOCOL.end() { "use a newer afmid, or an older version of the plugin" } else { "use a newer version of the plugin" };
+        let what = format!(
+            "speaks the versions {low} to {high} of the protocol, this program {} to {}",
+            PROTOCOL.start(),
+            PROTOCOL.end()
+        );
+        let older = if low > *PROTOCOL.end() {
+            "use a newer afmid, or an older version of the plugin"
+        } else {
+            "use a newer version of the plugin"
+        };
         return Err(PluginError::new(what, older));
     }
     Ok((handshake, common))
@@ -178,8 +191,9 @@ fn handshake(line: &str) -> Result<(Handshake, u64), PluginError> {
 fn reply(line: &str, id: u64, doing: &str) -> Result<Reply, PluginError> {
     let found = || shown(line.as_bytes());
     let help = "stdout is for the protocol alone, one JSON message a line: write everything else to stderr";
-    let reply: Reply = serde_json::from_str(line)
-        .map_err(|error| PluginError::new(format!("wrote something else than an answer {doing}: {} ({error})", found()), help))?;
+    let reply: Reply = serde_json::from_str(line).map_err(|error| {
+        PluginError::new(format!("wrote something else than an answer {doing}: {} ({error})", found()), help)
+    })?;
     match reply.id {
         Some(found) if found == id => Ok(reply),
         found_id => {

@@ -34,9 +34,10 @@ impl DynStage for PluginStage {
         Ok(())
     }
 
-    /// Parameters of the format `path` name files: their bytes are part of the cache key.
+    /// Parameters of the format `path` name files, an empty one none: their bytes are part of the cache key.
     fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
-        Ok(self.row.plugin.schema.paths(&self.params).into_iter().map(|path| base.join(path)).collect())
+        let named = self.row.plugin.schema.paths(&self.params).into_iter().filter(|path| !path.is_empty());
+        Ok(named.map(|path| base.join(path)).collect())
     }
 
     fn depends_on(&self) -> Vec<String> {
@@ -80,7 +81,8 @@ pub(super) fn run(
 ) -> Result<Ports, PluginError> {
     let (given, made) = session.files();
     let written = give(inputs, given.path()).map_err(|error| {
-        PluginError::new(format!("cannot be given its inputs: {error}"), "check TMPDIR and the space on its disk").alive()
+        PluginError::new(format!("cannot be given its inputs: {error}"), "check TMPDIR and the space on its disk")
+            .alive()
     })?;
     let base = std::path::absolute(cx.base()).unwrap_or_else(|_| cx.base().to_owned());
     let request = json!({
@@ -110,8 +112,9 @@ pub(super) fn run(
 }
 
 fn outputs(row: &Row, answer: Value, file: &Path, cx: &Context) -> Result<Ports, String> {
-    let made: Made = serde_path_to_error::deserialize(&answer)
-        .map_err(|error| format!("answered `run` with something else than outputs: at `{}`: {}", error.path(), error.inner()))?;
+    let made: Made = serde_path_to_error::deserialize(&answer).map_err(|error| {
+        format!("answered `run` with something else than outputs: at `{}`: {}", error.path(), error.inner())
+    })?;
     let declared = row.plugin.spec.outputs;
     if let Some(other) = made.outputs.keys().find(|name| !declared.iter().any(|port| port.name == name.as_str())) {
         return Err(format!("made the output `{other}`, which it does not declare"));
@@ -120,7 +123,8 @@ fn outputs(row: &Row, answer: Value, file: &Path, cx: &Context) -> Result<Ports,
     for port in declared {
         match (made.outputs.get(port.name), row.plugin.wanted(port.name)) {
             (Some(sent), Some(wanted)) => {
-                let artifact = take(sent, file, wanted).map_err(|wrong| format!("made a wrong output: `{}` {wrong}", port.name))?;
+                let artifact = take(sent, file, wanted)
+                    .map_err(|wrong| format!("made a wrong output: `{}` {wrong}", port.name))?;
                 ports.insert(port.name, artifact);
             }
             _ if port.optional => {}

@@ -35,7 +35,14 @@ impl Progress for NoProgress {
 impl<'a> Context<'a> {
     /// A context for one run of one stage.
     pub fn new(base: &Path, seed: u64, progress: &'a dyn Progress) -> Self {
-        Self { base: base.to_owned(), seed, warnings: Mutex::new(Vec::new()), log: Mutex::default(), progress, scratch: Scratch::default() }
+        Self {
+            base: base.to_owned(),
+            seed,
+            warnings: Mutex::new(Vec::new()),
+            log: Mutex::default(),
+            progress,
+            scratch: Scratch::default(),
+        }
     }
 
     /// The same with another place for rows that are too many for memory; the runner's is the cache's folder.

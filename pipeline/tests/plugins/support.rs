@@ -6,8 +6,8 @@ use afmid_pipeline::cache::Cache;
 use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native};
 use afmid_pipeline::runner::{Options, Quiet, RunError, run};
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Entry, Example, Matrix, Plan, Port, Ports, Problem, Recording, Registry, RunResult,
-    Spec, Stage, StageError, StateSpace, Table, graph,
+    Array, Axis, Caching, Context, Document, Entry, Example, Matrix, Plan, Port, Ports, Problem, Recording, Registry,
+    RunResult, Spec, Stage, StageError, StateSpace, Table, graph,
 };
 use num_complex::Complex64;
 use schemars::JsonSchema;
@@ -46,7 +46,17 @@ pub fn plan(folder: &Path, text: &str) -> Result<Plan, Vec<Problem>> {
 pub fn execute(folder: &Path, plan: &Plan) -> Result<RunResult, Vec<RunError>> {
     let cache = Cache::open(&folder.join("cache")).expect("a cache");
     let program = "afmid test".to_owned();
-    run(plan, &Options { base: folder.to_owned(), cache: &cache, fresh: false, program, overrides: Vec::new(), observer: &Quiet })
+    run(
+        plan,
+        &Options {
+            base: folder.to_owned(),
+            cache: &cache,
+            fresh: false,
+            program,
+            overrides: Vec::new(),
+            observer: &Quiet,
+        },
+    )
 }
 
 pub const ARRAY: Port<Array> = Port::new("array", "wave", "every kind of variable");
@@ -77,7 +87,7 @@ impl Stage for All {
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let path = record(cx.base());
-        let record = open_native(&path, &[Wanted { role: "deflection".to_owned(), location: "/deflection".to_owned() }])?;
+        let record = open_native(&path, &[Wanted { role: "deflection", location: "/deflection", required: true }])?;
         Ok(Ports::new()
             .with(&ARRAY, array())
             .with(&TABLE, table())
@@ -91,9 +101,20 @@ impl Stage for All {
     }
 }
 
-fn record(folder: &Path) -> PathBuf {
-    let _ = (folder, RecordStorage::default);
-    unimplemented!("{:?}", (std::any::type_name::<(NativeRecord<'_>, NativeChannel<'_>, Codes<'_>)>(), write_native as usize))
+/// A record of four samples.
+pub fn record(folder: &Path) -> PathBuf {
+    let path = folder.join("record.h5");
+    let channel = NativeChannel {
+        location: "deflection".to_owned(),
+        codes: Codes::Int16(vec![1, 2, 3, -4]),
+        unit: "V".to_owned(),
+        scale_factor: 0.5,
+        add_offset: 1.0,
+        long_name: "deflection".to_owned(),
+    };
+    let record = NativeRecord { sample_rate_hz: 5e6, started_at: String::new(), channels: vec![channel] };
+    write_native(&path, &record, RecordStorage::Raw).expect("a record");
+    path
 }
 
 pub fn array() -> Array {
@@ -141,5 +162,4 @@ pub fn model() -> StateSpace {
         covariance: matrix(2, 2, &[1.0, 0.1, 0.1, 2.0]),
         ..StateSpace::default()
     }
-    .clone()
 }

@@ -34,7 +34,8 @@ pub(super) fn trials(plugin: &Plugin) -> Result<Vec<Trial>, String> {
         .examples
         .iter()
         .map(|example| {
-            let inputs = own(plugin, &example.inputs).map_err(|wrong| format!("example `{}`: {wrong}", example.title))?;
+            let inputs =
+                own(plugin, &example.inputs).map_err(|wrong| format!("example `{}`: {wrong}", example.title))?;
             Ok(Trial { title: example.title.clone(), parameters: Value::Object(example.parameters.clone()), inputs })
         })
         .collect()
@@ -59,7 +60,8 @@ fn own(plugin: &Plugin, sent: &BTreeMap<String, Sent>) -> Result<Ports, String> 
 
 /// An artifact of a port's shape, of 64 samples or rows, the same every time.
 fn generated(port: &PortSpec) -> crate::artifact::Artifact {
-    let wave = |count: u32| (0..count).map(|n| (f64::from(n) * 0.3).sin() + 0.01 * f64::from(n % 7)).collect::<Vec<f64>>();
+    let wave =
+        |count: u32| (0..count).map(|n| (f64::from(n) * 0.3).sin() + 0.01 * f64::from(n % 7)).collect::<Vec<f64>>();
     let times = || (0..64).map(|n| f64::from(n) * 1e-6).collect::<Vec<f64>>();
     match port.shape {
         Shape::Array => {

@@ -58,7 +58,8 @@ impl Steps {
         launch.name.clone_into(&mut self.name);
         let Some(mut session) = self.step("it starts with the handshake", started(launch)) else { return };
         let Some(plugin) = self.step("it describes itself", described(&mut session)) else { return };
-        let row: &Row = Box::leak(Box::new(Row { launch: launch.clone(), fingerprint: session.fingerprint.clone(), plugin }));
+        let row: &Row =
+            Box::leak(Box::new(Row { launch: launch.clone(), fingerprint: session.fingerprint.clone(), plugin }));
         if self.step("it answers an unknown method with an error", unknown_method(&mut session)).is_none() {
             return;
         }
@@ -83,8 +84,11 @@ impl Steps {
             }
         }
         if let Some(outputs) = made.first() {
-            self.step("it gives the same bits twice", repeated(&mut session, row, first, outputs));
-            self.step("a new process gives the same bits", anew(row, first, outputs));
+            if self.step("it gives the same bits twice", repeated(&mut session, row, first, outputs)).is_none()
+                || self.step("a new process gives the same bits", anew(row, first, outputs)).is_none()
+            {
+                return;
+            }
         }
         self.step("it writes nothing but answers to stdout", quiet(&session));
         self.step("it ends on `shutdown`", ended(&mut session, true));
@@ -144,14 +148,16 @@ fn without_inputs(session: &mut Session, row: &Row) -> Seen<()> {
 }
 
 fn request(row: &Row, parameters: Value, inputs: &Ports, given: &Path, made: &Path) -> Result<Value, PluginError> {
-    let inputs = give(inputs, given).map_err(|error| PluginError::new(format!("gets no inputs: {error}"), "check TMPDIR"))?;
+    let inputs =
+        give(inputs, given).map_err(|error| PluginError::new(format!("gets no inputs: {error}"), "check TMPDIR"))?;
     let seed = row.plugin.spec.seeded.then_some(1);
     Ok(json!({ "parameters": parameters, "seed": seed, "base": row.launch.folder, "inputs": inputs, "output": made }))
 }
 
 fn resolved(row: &Row, trial: &Trial) -> Result<Value, PluginError> {
     row.plugin.schema.resolve(trial.parameters.clone()).map_err(|error| {
-        let what = format!("has an example, `{}`, with wrong parameters: {}: {}", trial.title, error.path, error.message);
+        let what =
+            format!("has an example, `{}`, with wrong parameters: {}: {}", trial.title, error.path, error.message);
         PluginError::new(what, "give `examples` that its own schema accepts; parameters without default need one")
     })
 }
@@ -160,7 +166,10 @@ fn once(session: &mut Session, row: &Row, trial: &Trial) -> Result<Ports, Plugin
     let context = Context::new(&row.launch.folder, 1, &NoProgress);
     let ran = run(session, row, &resolved(row, trial)?, &trial.inputs, &context);
     ran.map_err(|error| match row.plugin.examples.is_empty() {
-        true => PluginError { help: format!("{}; it ships no `examples`: these inputs were generated", error.help), ..error },
+        true => PluginError {
+            help: format!("{}; it ships no `examples`: these inputs were generated", error.help),
+            ..error
+        },
         false => error,
     })
 }
@@ -212,6 +221,9 @@ fn ended(session: &mut Session, asked: bool) -> Seen<()> {
     let status = session.close(END)?;
     match status.as_str() {
         "exit status: 0" => Ok(((), status)),
-        _ => Err(PluginError { log: session.take_log(), ..PluginError::new(format!("ended with {status}"), "end with status 0") }),
+        _ => Err(PluginError {
+            log: session.take_log(),
+            ..PluginError::new(format!("ended with {status}"), "end with status 0")
+        }),
     }
 }

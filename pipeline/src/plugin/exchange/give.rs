@@ -12,8 +12,9 @@ use crate::plugin::message::{
     SentChannel, SentColumn, SentDocument, SentRecord, SentRecording, SentStateSpace, SentTable, SentVariable,
 };
 use crate::recording::{Record, Recording};
+use crate::rows::StoredRows;
 use crate::stage::Ports;
-use crate::store::{StoreError, write};
+use crate::store::{StoreError, write, write_rows};
 
 type Result<T> = std::result::Result<T, StoreError>;
 
@@ -61,14 +62,30 @@ impl Giver {
     }
 
     fn dataset<T: H5Type>(&mut self, name: &str, shape: &[usize], values: &[T]) -> Result<Numbers> {
+        let place = self.free(name);
+        write::dataset(&self.group, &place, shape, values)?;
+        Ok(self.taken(place))
+    }
+
+    /// Rows that lie in a file, block by block.
+    fn rows(&mut self, name: &str, shape: &[usize], rows: &StoredRows) -> Result<Numbers> {
+        let place = self.free(name);
+        write_rows(&self.group, &place, shape, rows)?;
+        Ok(self.taken(place))
+    }
+
+    fn free(&self, name: &str) -> String {
         let mut place = place(name, self.taken.len());
         while self.taken.contains(&place) {
             place = format!("n{}{place}", self.taken.len());
         }
-        write::dataset(&self.group, &place, shape, values)?;
+        place
+    }
+
+    fn taken(&mut self, place: String) -> Numbers {
         let path = format!("{}/{place}", self.group.name());
         self.taken.push(place);
-        Ok(Numbers::Path(path))
+        Numbers::Path(path)
     }
 
     fn array(&mut self, array: &Array) -> Result<SentArray> {
@@ -80,11 +97,13 @@ impl Giver {
         }
         let mut variables = Vec::with_capacity(array.variables.len());
         for variable in &array.variables {
-            let length = |dim: &String| array.axes.iter().find(|axis| axis.name == *dim).map_or(0, |axis| axis.values.len());
+            let length =
+                |dim: &String| array.axes.iter().find(|axis| axis.name == *dim).map_or(0, |axis| axis.values.len());
             let shape: Vec<usize> = variable.dims.iter().map(length).collect();
             let name = &variable.name;
             let (kind, values, re, im) = match &variable.values {
                 Values::Real(values) => (Kind::Real, Some(self.dataset(name, &shape, values)?), None, None),
+                Values::Stored(rows) => (Kind::Real, Some(self.rows(name, &shape, rows)?), None, None),
                 Values::Integer(values) => (Kind::Integer, Some(self.dataset(name, &shape, values)?), None, None),
                 Values::Complex(values) => {
                     let part = |of: fn(&Complex64) -> f64| values.iter().map(of).collect::<Vec<f64>>();

@@ -78,12 +78,19 @@ impl Taker<'_> {
             let mut shape = Vec::with_capacity(variable.dims.len());
             for dim in &variable.dims {
                 let axis = array.axes.iter().find(|axis| axis.name == *dim);
-                let axis = axis.ok_or_else(|| format!("variable `{}` is over `{dim}`, which is no axis", variable.name))?;
+                let axis =
+                    axis.ok_or_else(|| format!("variable `{}` is over `{dim}`, which is no axis", variable.name))?;
                 shape.push(axis.values.len());
             }
             let values = self.variable(&variable, &shape)?;
             let long_name = or(&variable.long_name, &variable.name).to_owned();
-            array.variables.push(Variable { name: variable.name, unit: variable.unit, long_name, dims: variable.dims, values });
+            array.variables.push(Variable {
+                name: variable.name,
+                unit: variable.unit,
+                long_name,
+                dims: variable.dims,
+                values,
+            });
         }
         Ok(array)
     }
@@ -98,7 +105,9 @@ impl Taker<'_> {
                 Ok(Values::Complex(re.into_iter().zip(im).map(|(re, im)| Complex64::new(re, im)).collect()))
             }
             (Kind::Complex, ..) => Err(format!("{what} is complex: wanted `re` and `im`, and no `values`")),
-            (Kind::Real | Kind::Integer, ..) => Err(format!("{what} is not complex: wanted `values`, and no `re` or `im`")),
+            (Kind::Real | Kind::Integer, ..) => {
+                Err(format!("{what} is not complex: wanted `values`, and no `re` or `im`"))
+            }
             (Kind::Flag | Kind::Text, ..) => Err(format!("{what}: wanted the kind `real`, `complex` or `integer`")),
         }
     }

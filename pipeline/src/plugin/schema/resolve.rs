@@ -13,7 +13,8 @@ pub(super) fn resolve(schema: &Value, value: Value, path: &str) -> Result<Value,
         Value::Number(_) => number::check(schema, &value).map_err(|wanted| wrong(path, &value, &wanted))?,
         Value::String(_) => {
             let length = value.as_str().map_or(0, |text| text.chars().count());
-            within(schema, ("minLength", "maxLength"), length, "characters").map_err(|wanted| wrong(path, &value, &wanted))?;
+            within(schema, ("minLength", "maxLength"), length, "characters")
+                .map_err(|wanted| wrong(path, &value, &wanted))?;
         }
         Value::Array(items) => return array(schema, items, path),
         Value::Object(members) => return object(schema, members, path),
@@ -76,7 +77,8 @@ fn choices(schema: &Value, value: &Value, path: &str) -> Result<(), ParamError> 
     }
     let message = match (value, choices.iter().all(|choice| choice.is_string())) {
         (Value::String(found), true) => {
-            let known: Vec<String> = choices.iter().filter_map(|choice| Some(format!("`{}`", choice.as_str()?))).collect();
+            let known: Vec<String> =
+                choices.iter().filter_map(|choice| Some(format!("`{}`", choice.as_str()?))).collect();
             format!("unknown variant `{found}`, expected one of {}", known.join(", "))
         }
         _ => {
@@ -88,8 +90,10 @@ fn choices(schema: &Value, value: &Value, path: &str) -> Result<(), ParamError> 
 }
 
 fn array(schema: &Value, items: Vec<Value>, path: &str) -> Result<Value, ParamError> {
-    within(schema, ("minItems", "maxItems"), items.len(), "values")
-        .map_err(|wanted| ParamError { path: path.to_owned(), message: format!("found {} values, wanted {wanted}", items.len()) })?;
+    within(schema, ("minItems", "maxItems"), items.len(), "values").map_err(|wanted| ParamError {
+        path: path.to_owned(),
+        message: format!("found {} values, wanted {wanted}", items.len()),
+    })?;
     let Some(inner) = schema.get("items") else { return Ok(Value::Array(items)) };
     let each = |(index, item)| resolve(inner, item, &format!("{path}[{index}]"));
     items.into_iter().enumerate().map(each).collect()
@@ -113,7 +117,8 @@ fn object(schema: &Value, mut members: Map<String, Value>, path: &str) -> Result
         }
     }
     let required = schema.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str);
-    if let Some(name) = required.into_iter().find(|name| !resolved.contains_key(*name) && !members.contains_key(*name)) {
+    if let Some(name) = required.into_iter().find(|name| !resolved.contains_key(*name) && !members.contains_key(*name))
+    {
         return Err(ParamError { path: path.to_owned(), message: format!("missing field `{name}`") });
     }
     resolved.extend(members);

@@ -71,18 +71,27 @@ fn errors_are_in_the_words_that_configs_translate() {
         said(json!({ "points": 2 })),
         "points: invalid value: integer `2`, expected a whole number at least 3 and a multiple of 2"
     );
-    assert_eq!(said(json!({ "points": 4, "mode": "mirorr" })), "mode: unknown variant `mirorr`, expected one of `nearest`, `mirror`");
-    assert_eq!(said(json!({ "points": 4, "list": [1, true] })), "list[1]: invalid value: boolean `true`, expected a number");
+    assert_eq!(
+        said(json!({ "points": 4, "mode": "mirorr" })),
+        "mode: unknown variant `mirorr`, expected one of `nearest`, `mirror`"
+    );
+    assert_eq!(
+        said(json!({ "points": 4, "list": [1, true] })),
+        "list[1]: invalid value: boolean `true`, expected a number"
+    );
 }
 
 #[test]
 fn what_would_not_be_checked_is_refused() {
     let wrong = |schema: Value| Schema::new(&schema).expect_err("wrong");
     assert!(wrong(json!({ "type": "object" })).contains("additionalProperties"));
-    let with = |property: Value| json!({ "type": "object", "additionalProperties": false, "properties": { "x": property } });
+    let with =
+        |property: Value| json!({ "type": "object", "additionalProperties": false, "properties": { "x": property } });
     assert!(wrong(with(json!({ "oneOf": [] }))).contains("`x`: the keyword `oneOf` is not checked"));
     assert!(wrong(with(json!({ "minimun": 3 }))).contains("did you mean `minimum`?"));
     assert!(wrong(with(json!({ "type": "integer", "default": 1.5 }))).contains("its default is wrong"));
     assert!(wrong(with(json!({ "type": "float" }))).contains("`type` is none of"));
-    assert!(wrong(json!({ "type": "object", "additionalProperties": false, "required": ["y"] })).contains("no property"));
+    assert!(
+        wrong(json!({ "type": "object", "additionalProperties": false, "required": ["y"] })).contains("no property")
+    );
 }
