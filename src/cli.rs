@@ -113,6 +113,12 @@ pub enum Command {
     },
     /// Hide causes in simulated recordings, diagnose them with a config, and say how well it did.
     Exam(ExamArgs),
+    /// Try a stage that runs as a process of its own.
+    Plugin {
+        /// What to do with it.
+        #[command(subcommand)]
+        what: PluginCommand,
+    },
     /// Print the JSON Schema of a config.
     Schema,
     /// Look at everything that a run needs of this machine: library, cache, disk, arithmetic; say what to do where something is missing.
@@ -138,6 +144,29 @@ pub enum Command {
         #[arg(long)]
         check: bool,
     },
+}
+
+/// What to do with a plugin.
+#[derive(Debug, Subcommand)]
+pub enum PluginCommand {
+    /// Try whether a command is a plugin as docs/plugins.md has it: exit code 0 if everything passed, 1 if not.
+    Check {
+        /// How long one request may take, in seconds.
+        #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds)]
+        timeout: f64,
+        /// As JSON, alone on stdout.
+        #[arg(long)]
+        json: bool,
+        /// The command: a program, and its arguments.
+        #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true, value_name = "CMD")]
+        command: Vec<String>,
+    },
+}
+
+/// A time limit.
+fn seconds(text: &str) -> Result<f64, String> {
+    let wanted = || "wanted seconds above 0, at most a week".to_owned();
+    text.parse().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 604_800.0).ok_or_else(wanted)
 }
 
 /// A config and what changes it.

@@ -41,6 +41,7 @@ pub fn main(registry: &Registry) -> ExitCode {
         Ok(cli) => commands::dispatch(cli.command, registry),
         Err(error) => told(&error),
     };
+    afmid_pipeline::plugin::shut_down();
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),

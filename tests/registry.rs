@@ -74,7 +74,7 @@ fn the_schema_accepts_every_example_and_refuses_an_unknown_parameter() {
     let validator = jsonschema::draft7::new(&schema).expect("the schema is a JSON Schema");
     let mut wrong = Vec::new();
     for entry in registry.entries() {
-        for example in (entry.examples)() {
+        for example in entry.examples() {
             let params: afmid_pipeline::toml::Table = example.params.parse().expect("an example is TOML");
             let mut params = serde_json::to_value(params).expect("TOML fits into JSON");
             let errors: BTreeSet<String> = validator

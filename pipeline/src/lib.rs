@@ -14,6 +14,7 @@ pub mod config;
 pub mod conformance;
 pub mod error;
 pub mod graph;
+pub mod plugin;
 pub mod recording;
 pub mod reference;
 pub mod rows;

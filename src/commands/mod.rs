@@ -18,6 +18,7 @@ mod load;
 mod man;
 mod new;
 mod open;
+mod plugin;
 mod report;
 mod rerun;
 mod run;
@@ -56,6 +57,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::Stages { name } => stages::run(name.as_deref(), registry),
         Command::Causes { name, json } => causes::run(name.as_deref(), json),
         Command::Exam(args) => exam::run(&args, registry),
+        Command::Plugin { what } => plugin::run(&what),
         Command::Schema => schema::run(registry),
         Command::Doctor(args) => doctor::run(&args, registry),
         Command::Completions { shell } => completions::run(shell),

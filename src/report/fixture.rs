@@ -389,6 +389,7 @@ pub(crate) fn paper() -> RunResult {
             threads: 2,
             folder: "/home/somebody".to_owned(),
             config_file: "configs/free-lever.toml".to_owned(),
+            logs: Vec::new(),
             stages: timings,
         },
     }

@@ -13,7 +13,7 @@ pub(crate) fn instantiate(decl: &StageDecl, entry: &Entry) -> Result<(Box<dyn Dy
     let mut params = decl.params.clone();
     // serde stops at the first error: take the wrong parameter out and go on, so that all are seen at once
     let stage = loop {
-        match (entry.parse)(params.clone()) {
+        match entry.parse(params.clone()) {
             Ok(stage) => break stage,
             Err(error) => {
                 let kind = Kind::of(&error);
@@ -88,7 +88,7 @@ fn describe(decl: &StageDecl, entry: &Entry, path: &[String], kind: &Kind, error
             let message = ranged(decl, entry, path, &error.message).unwrap_or_else(|| plain(&error.message));
             Problem::new(format!("{subject}: {message}"), 0..0, "wrong value")
                 .at(decl.locate(path, false))
-                .help(format!("`afmid stages {name}` lists the parameters"))
+                .help(entry.manual())
         }
     }
 }
@@ -108,7 +108,7 @@ fn ranged(decl: &StageDecl, entry: &Entry, path: &[String], message: &str) -> Op
         all
     };
     // other parameters may be wrong too: then their defaults
-    let stage = (entry.parse)(with_all()).or_else(|_| (entry.parse)(params.clone())).ok()?;
+    let stage = entry.parse(with_all()).or_else(|_| entry.parse(params.clone())).ok()?;
     let said = stage.check().err()?.problem;
     let range = [" is 0, wanted ", ": found 0, wanted "]
         .into_iter()
@@ -120,7 +120,7 @@ fn ranged(decl: &StageDecl, entry: &Entry, path: &[String], message: &str) -> Op
 
 /// All parameters without default that are not given; at least the one that was found missing, if it is none that is wrong.
 fn missing(decl: &StageDecl, entry: &Entry, found: &Kind) -> Vec<Problem> {
-    let schema = (entry.schema)(&mut schemars::SchemaGenerator::default());
+    let schema = entry.schema(&mut schemars::SchemaGenerator::default());
     let required = schema.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str);
     let mut names: Vec<&str> = required.filter(|name| !decl.params.contains_key(*name)).collect();
     if let Kind::Missing(name) = found
@@ -137,7 +137,7 @@ fn lacks(decl: &StageDecl, entry: &Entry, path: &[String], field: &str) -> Probl
     let full = if path.is_empty() { field.to_owned() } else { format!("{}.{field}", dotted(path)) };
     Problem::new(format!("{} (`{name}`) lacks the parameter `{full}`", decl.title()), 0..0, format!("lacks `{field}`"))
         .at(decl.locate(path, false))
-        .help(format!("it has no default: add `{field} = ...`; see `afmid stages {name}`"))
+        .help(format!("it has no default: add `{field} = ...`; {}", entry.manual()))
 }
 
 /// A problem of [`DynStage::check`]: at the parameter that its message begins with, or at the whole table.

@@ -7,6 +7,7 @@ use toml::de::DeTable;
 use super::document;
 use super::overrides::{self, Override};
 use super::pipeline::{self, Pipeline};
+use super::plugins::{self, PluginDecl};
 use super::problem::Problem;
 use super::stage::{self, StageDecl};
 use super::suggest::did_you_mean;
@@ -30,6 +31,8 @@ pub struct Config {
     pub overrides: Vec<String>,
     /// `[sweep]`, in the order of the text, without what an argument sets. `stages` has the first point's values.
     pub sweep: Vec<Swept>,
+    /// `[plugins]`, in the order of the text.
+    pub plugins: Vec<PluginDecl>,
 }
 
 const TABLES: [&str; 4] = ["pipeline", "stage", "sweep", "plugins"];
@@ -101,11 +104,7 @@ impl Config {
             match key.get_ref().as_ref() {
                 "pipeline" | "stage" => {}
                 "sweep" => self.sweep = sweep::read(value, problems),
-                "plugins" => {
-                    let message = "[plugins] is not supported yet";
-                    let help = "this version runs built-in stages: remove the table `plugins`";
-                    problems.push(Problem::new(message, value.span(), "not supported yet").help(help));
-                }
+                "plugins" => self.plugins = plugins::read(value, problems),
                 other => {
                     let help = did_you_mean(other, "table", TABLES.into_iter());
                     let message = format!("a config has no table `{other}`");

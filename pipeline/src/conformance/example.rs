@@ -27,7 +27,7 @@ fn inputs(entry: &Entry, example: &Example) -> Result<Ports, String> {
 
 /// Checks that there is an example, that each runs with the declared ports and makes the declared ports, and that the truth comes out.
 pub fn examples_hold(entry: &Entry) -> Vec<String> {
-    let examples = (entry.examples)();
+    let examples = entry.examples();
     if examples.is_empty() {
         return vec!["there is no example".to_owned()];
     }
@@ -43,10 +43,10 @@ pub fn examples_hold(entry: &Entry) -> Vec<String> {
 pub fn unknown_key_refused(entry: &Entry) -> Vec<String> {
     const KEY: &str = "a_parameter_that_nobody_knows";
     let mut violations = Vec::new();
-    for example in (entry.examples)() {
+    for example in entry.examples() {
         let Ok(mut params) = example.params.parse::<toml::Table>() else { continue };
         params.insert(KEY.to_owned(), toml::Value::Boolean(true));
-        match (entry.parse)(params) {
+        match entry.parse(params) {
             Err(error) if error.message.contains(KEY) => {}
             Err(error) => violations.push(format!("an unknown parameter is refused without its name: {error}")),
             Ok(_) => violations.push("an unknown parameter is accepted: add `deny_unknown_fields`".to_owned()),
@@ -58,7 +58,7 @@ pub fn unknown_key_refused(entry: &Entry) -> Vec<String> {
 /// Checks that each example gives the same bits twice, and on one thread as on four.
 pub fn repeatable(entry: &Entry) -> Vec<String> {
     let mut violations = Vec::new();
-    for example in (entry.examples)() {
+    for example in entry.examples() {
         let runs = [1, 4, 4].map(|threads| on_threads(threads, || run_example(entry, &example)));
         let [Ok(one), Ok(four), Ok(again)] = runs else {
             violations.push(format!("example {:?} does not always run", example.title));
@@ -75,7 +75,7 @@ pub fn repeatable(entry: &Entry) -> Vec<String> {
 
 fn instance(entry: &Entry, example: &Example) -> Result<Box<dyn DynStage>, String> {
     let params: toml::Table = example.params.parse().map_err(|error| format!("params are not TOML: {error}"))?;
-    let stage = (entry.parse)(params).map_err(|error| format!("params: at {}: {error}", error.path))?;
+    let stage = entry.parse(params).map_err(|error| format!("params: at {}: {error}", error.path))?;
     stage.check().map_err(|error| format!("params: {error}"))?;
     Ok(stage)
 }
@@ -117,7 +117,7 @@ fn as_declared(what: &str, ports: &[PortSpec], have: &Ports) -> Result<(), Strin
 fn resolved_parameters_are_parameters(entry: &Entry, stage: &dyn DynStage) -> Result<(), String> {
     let resolved = stage.params().map_err(|error| error.to_string())?;
     let table = toml::Table::try_from(without_nulls(resolved.clone())).map_err(|error| format!("params: {error}"))?;
-    let again = (entry.parse)(table).map_err(|error| format!("its own parameters are refused: {error}"))?;
+    let again = entry.parse(table).map_err(|error| format!("its own parameters are refused: {error}"))?;
     let again = again.params().map_err(|error| error.to_string())?;
     if again == resolved { Ok(()) } else { Err(format!("parameters change when read again: {resolved} to {again}")) }
 }

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::{order, sweep, wiring};
 use crate::config::{Config, Problem, StageDecl, instantiate, nearest};
+use crate::plugin;
 use crate::stage::{DynStage, Entry, Registry};
 
 /// A checked graph: what the runner runs. Cloning is cheap: stages are shared.
@@ -110,7 +111,8 @@ fn settle(plan: Option<Plan>, mut problems: Vec<Problem>, arguments: &[String]) 
 }
 
 fn try_plan(config: Config, registry: &Registry, problems: &mut Vec<Problem>) -> Option<Plan> {
-    let entries: Vec<Option<Entry>> = config.stages.iter().map(|stage| find(stage, registry, problems)).collect();
+    let entries: Vec<Option<Entry>> =
+        config.stages.iter().map(|stage| find(stage, &config, registry, problems)).collect();
     let stages: Vec<_> = config
         .stages
         .iter()
@@ -139,18 +141,15 @@ fn try_plan(config: Config, registry: &Registry, problems: &mut Vec<Problem>) ->
     Some(Plan { nodes, config })
 }
 
-fn find(decl: &StageDecl, registry: &Registry, problems: &mut Vec<Problem>) -> Option<Entry> {
+fn find(decl: &StageDecl, config: &Config, registry: &Registry, problems: &mut Vec<Problem>) -> Option<Entry> {
     if decl.uses.is_empty() {
         return None;
     }
     if let Some(entry) = registry.find(&decl.uses) {
         return Some(*entry);
     }
-    let problem = match decl.uses.strip_prefix("exec:") {
-        Some(name) => {
-            let message = format!("{}: the plugin `{name}` is not supported yet", decl.title());
-            Problem::new(message, decl.uses_span.clone(), "not supported yet").help("use a built-in stage")
-        }
+    let found = match decl.uses.strip_prefix("exec:") {
+        Some(name) => plugin::entry(decl, name, &config.plugins, config.base()),
         None => {
             let nearest = nearest(&decl.uses, registry.entries().iter().map(|entry| entry.spec.name));
             let help = match nearest {
@@ -158,9 +157,8 @@ fn find(decl: &StageDecl, registry: &Registry, problems: &mut Vec<Problem>) -> O
                 None => "`afmid stages` lists all stages".to_owned(),
             };
             let message = format!("there is no stage named `{}`", decl.uses);
-            Problem::new(message, decl.uses_span.clone(), "unknown stage").help(help)
+            Err(Problem::new(message, decl.uses_span.clone(), "unknown stage").help(help))
         }
     };
-    problems.push(problem);
-    None
+    found.map_err(|problem| problems.push(problem)).ok()
 }

@@ -19,6 +19,6 @@ use crate::stage::Entry;
 /// The JSON Schema of a stage's parameters, with what it refers to beside it.
 pub(crate) fn params_schema(entry: &Entry) -> (Value, serde_json::Map<String, Value>) {
     let mut generator = schemars::generate::SchemaSettings::draft07().into_generator();
-    let schema = (entry.schema)(&mut generator);
+    let schema = entry.schema(&mut generator);
     (schema.to_value(), generator.take_definitions(true))
 }

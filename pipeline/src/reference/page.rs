@@ -33,7 +33,7 @@ pub fn page(entry: &Entry, examples: Examples) -> Result<String, String> {
     if doc.get("Source").is_none() {
         let _ = write!(text, "\n## Source\n\n{}\n", spec.source);
     }
-    for example in (entry.examples)() {
+    for example in entry.examples() {
         let _ = write!(text, "\n## Example: {}\n\n```toml\n{}```\n", example.title, example_toml(entry, &example));
         if examples == Examples::Run {
             let outcome = run_example(entry, &example).and_then(|outputs| (example.expect)(&outputs));

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::config::RESERVED_ID;
+use crate::config::{DEFAULT_TIMEOUT_S, RESERVED_ID};
 use crate::stage::{Entry, PortSpec, Registry};
 
 /// JSON Schema (draft 7, which all editors know) of a config with these stages.
@@ -14,7 +14,7 @@ pub fn config_schema(registry: &Registry) -> Value {
     let mut generator = schemars::generate::SchemaSettings::draft07().into_generator();
     let mut stages = Map::new();
     for entry in registry.entries() {
-        let params = (entry.schema)(&mut generator).to_value();
+        let params = entry.schema(&mut generator).to_value();
         stages.insert(definition(entry), stage(entry, params));
     }
     let mut definitions = generator.take_definitions(true);
@@ -51,7 +51,8 @@ pub fn config_schema(registry: &Registry) -> Value {
                 "additionalProperties": {
                     "anyOf": [{ "type": "array", "minItems": 1 }, { "type": "object" }]
                 }
-            }
+            },
+            "plugins": plugins()
         },
         "definitions": definitions
     })
@@ -73,7 +74,10 @@ fn any_stage(registry: &Registry) -> Value {
         "required": ["id", "uses"],
         "properties": {
             "id": id(),
-            "uses": { "description": "The stage's name in the registry.", "enum": names },
+            "uses": {
+                "description": "The stage's name in the registry, or `exec:NAME`: a plugin of [plugins] or on the PATH.",
+                "anyOf": [{ "enum": names }, { "type": "string", "pattern": "^exec:[a-z][a-z0-9_-]*$" }]
+            },
             "inputs": { "description": "Wires: port = \"stage id\" or \"stage id.port\".", "type": "object" },
             "params": { "description": "The parameters of the stage.", "type": "object" }
         },
@@ -116,6 +120,34 @@ fn stage(entry: &Entry, mut params: Value) -> Value {
             "params": params
         },
         "additionalProperties": false
+    })
+}
+
+/// Commands of stages that run as processes of their own; what they are is known when they are asked.
+fn plugins() -> Value {
+    let command = json!({
+        "anyOf": [
+            { "description": "Program and arguments, at white space.", "type": "string", "minLength": 1 },
+            { "description": "Program and arguments.", "type": "array", "minItems": 1, "items": { "type": "string" } }
+        ]
+    });
+    let long = json!({
+        "type": "object",
+        "additionalProperties": false,
+        "required": ["command"],
+        "properties": {
+            "command": command,
+            "timeout_s": {
+                "description": "How long one request may take.", "type": "number", "exclusiveMinimum": 0, "maximum": 604_800,
+                "default": DEFAULT_TIMEOUT_S
+            }
+        }
+    });
+    json!({
+        "description": "Commands of plugins: NAME = \"python3 my_stage.py\" is run by `uses = \"exec:NAME\"`; paths from the config's folder.",
+        "type": "object",
+        "propertyNames": { "pattern": "^[a-z][a-z0-9_-]*$" },
+        "additionalProperties": { "anyOf": [command, long] }
     })
 }
 

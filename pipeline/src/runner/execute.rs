@@ -56,6 +56,7 @@ struct Finished {
     origin: Origin,
     seconds: f64,
     cached: bool,
+    log: String,
 }
 
 /// Runs a plan: each stage as soon as its inputs are there, in parallel on the current rayon pool.
@@ -95,7 +96,7 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
     });
     // a panic there is a bug like any other: it goes on here
     let mut unkept = unkept.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-    let (mut stages, mut times, mut errors) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut stages, mut times, mut errors, mut logs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (index, outcome) in outcomes.into_iter().enumerate() {
         if let Some(error) = unkept.remove(&index) {
             errors.push(failed(index, error.into()));
@@ -103,6 +104,9 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
         match outcome {
             Outcome::Done(finished) => {
                 times.push((finished.record.id.clone(), finished.seconds, finished.cached));
+                if !finished.log.is_empty() {
+                    logs.push((finished.record.id.clone(), finished.log));
+                }
                 stages.push(finished.record);
             }
             Outcome::Failed(error) => errors.push(error),
@@ -120,6 +124,7 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
         folder: std::env::current_dir().map(|folder| folder.display().to_string()).unwrap_or_default(),
         config_file: plan.config.file.clone(),
         stages: times,
+        logs,
     };
     Ok(RunResult {
         name: plan.name().to_owned(),
@@ -152,11 +157,13 @@ fn step(
     let stored = node.stage.spec().caching == Caching::Stored;
     let hit = if stored && !options.fresh { options.cache.get(&planned.key) } else { None };
     let cached = hit.is_some();
+    let mut log = String::new();
     let result = match hit {
         Some(result) => result,
         None => {
             let scratch = Scratch::beside(&options.cache.path(&planned.key));
-            let result = execute(node, options, board, planned.seed.unwrap_or_default(), scratch)?;
+            let result;
+            (result, log) = execute(node, options, board, planned.seed.unwrap_or_default(), scratch)?;
             if stored {
                 // the other end lives as long as the run
                 let _ = made.send(Made { index, origin: planned.origin.clone(), result: result.clone() });
@@ -182,17 +189,17 @@ fn step(
         sources: planned.sources,
         result,
     };
-    Ok(Finished { record, origin: planned.origin, seconds: took.as_secs_f64(), cached })
+    Ok(Finished { record, origin: planned.origin, seconds: took.as_secs_f64(), cached, log })
 }
 
-/// Runs the stage itself and checks what it made: the ports it declares, with the shapes that it declares.
+/// Runs the stage itself and checks what it made: the ports it declares, with the shapes that it declares. Beside it: what its process said.
 fn execute(
     node: &Node,
     options: &Options<'_>,
     board: &Board<Finished, RunError>,
     seed: u64,
     scratch: Scratch,
-) -> Result<StageResult, StageError> {
+) -> Result<(StageResult, String), StageError> {
     let mut inputs = Ports::new();
     for wire in &node.inputs {
         let artifact = board.done(wire.node).and_then(|finished| finished.record.result.outputs.artifact(wire.output));
@@ -203,7 +210,8 @@ fn execute(
     let context = Context::new(&options.base, seed, progress.as_ref()).with_scratch(scratch);
     let outputs = node.stage.run(&inputs, &context)?;
     check_outputs(node, &outputs)?;
-    Ok(StageResult { outputs, warnings: context.into_warnings() })
+    let log = context.take_log();
+    Ok((StageResult { outputs, warnings: context.into_warnings() }, log))
 }
 
 fn check_outputs(node: &Node, outputs: &Ports) -> Result<(), StageError> {

@@ -64,6 +64,8 @@ pub struct RunInfo {
     pub config_file: String,
     /// Per stage id: seconds, and whether the result came from the cache.
     pub stages: Vec<(String, f64, bool)>,
+    /// Per stage id that ran a process which wrote to stderr: the end of that.
+    pub logs: Vec<(String, String)>,
 }
 
 /// A finished run: what a result file holds.

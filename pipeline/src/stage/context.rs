@@ -10,6 +10,7 @@ pub struct Context<'a> {
     base: PathBuf,
     seed: u64,
     warnings: Mutex<Vec<String>>,
+    log: Mutex<String>,
     progress: &'a dyn Progress,
     scratch: Scratch,
 }
@@ -34,7 +35,14 @@ impl Progress for NoProgress {
 impl<'a> Context<'a> {
     /// A context for one run of one stage.
     pub fn new(base: &Path, seed: u64, progress: &'a dyn Progress) -> Self {
-        Self { base: base.to_owned(), seed, warnings: Mutex::new(Vec::new()), progress, scratch: Scratch::default() }
+        Self {
+            base: base.to_owned(),
+            seed,
+            warnings: Mutex::new(Vec::new()),
+            log: Mutex::default(),
+            progress,
+            scratch: Scratch::default(),
+        }
     }
 
     /// The same with another place for rows that are too many for memory; the runner's is the cache's folder.
@@ -63,6 +71,16 @@ impl<'a> Context<'a> {
     /// Call it in a fixed order (not from parallel work): warnings are part of the result.
     pub fn warn(&self, text: impl Into<String>) {
         self.warnings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text.into());
+    }
+
+    /// Keeps what a process of another program said, beside the times of the run: a record for people, no part of the result.
+    pub fn log(&self, text: &str) {
+        self.log.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push_str(text);
+    }
+
+    /// What was kept so far.
+    pub fn take_log(&self) -> String {
+        std::mem::take(&mut self.log.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
 
     /// Announces items of work; call [`Context::tick`] for each, from any thread.

@@ -1,5 +1,6 @@
 //! A row of the registry: a stage without its type.
 
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 use schemars::{Schema, SchemaGenerator};
@@ -67,17 +68,24 @@ pub struct ParamError {
     pub message: String,
 }
 
+/// What makes the stages of a row: the built-in ones from a type, those of a plugin from what its process says of itself.
+pub trait Maker: Send + Sync {
+    /// Makes the stage from its `params` table. Errors: the first wrong parameter, in serde's words.
+    fn parse(&self, params: toml::Table) -> Result<Box<dyn DynStage>, ParamError>;
+    /// JSON Schema of its parameters; the description is the stage's documentation.
+    fn schema(&self, generator: &mut SchemaGenerator) -> Schema;
+    /// Its examples.
+    fn examples(&self) -> Vec<Example>;
+    /// Where its parameters are listed, for the help of errors.
+    fn manual(&self) -> String;
+}
+
 /// A row of the registry: everything that configs, docs, lists and tests need to know of a stage.
 #[derive(Clone, Copy)]
 pub struct Entry {
     /// Name, version, ports.
     pub spec: &'static Spec,
-    /// Makes the stage from its `params` table.
-    pub parse: fn(toml::Table) -> Result<Box<dyn DynStage>, ParamError>,
-    /// JSON Schema of its parameters; the description is the stage's documentation.
-    pub schema: fn(&mut SchemaGenerator) -> Schema,
-    /// Its examples.
-    pub examples: fn() -> Vec<Example>,
+    maker: &'static dyn Maker,
 }
 
 impl std::fmt::Debug for Entry {
@@ -89,17 +97,54 @@ impl std::fmt::Debug for Entry {
 impl Entry {
     /// The row of stage `S`.
     pub const fn of<S: Stage>() -> Self {
-        Self {
-            spec: const { &S::SPEC },
-            parse: parse::<S>,
-            schema: |generator| S::json_schema(generator),
-            examples: S::examples,
-        }
+        Self { spec: const { &S::SPEC }, maker: const { &Typed::<S>(PhantomData) } }
+    }
+
+    /// A row that no type stands behind.
+    pub(crate) const fn made_by(spec: &'static Spec, maker: &'static dyn Maker) -> Self {
+        Self { spec, maker }
+    }
+
+    /// See [`Maker::parse`].
+    pub fn parse(&self, params: toml::Table) -> Result<Box<dyn DynStage>, ParamError> {
+        self.maker.parse(params)
+    }
+
+    /// See [`Maker::schema`].
+    pub fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
+        self.maker.schema(generator)
+    }
+
+    /// See [`Maker::examples`].
+    pub fn examples(&self) -> Vec<Example> {
+        self.maker.examples()
+    }
+
+    /// See [`Maker::manual`].
+    pub(crate) fn manual(&self) -> String {
+        self.maker.manual()
     }
 }
 
-fn parse<S: Stage>(params: toml::Table) -> Result<Box<dyn DynStage>, ParamError> {
-    serde_path_to_error::deserialize::<_, S>(params)
-        .map(|stage| Box::new(stage) as Box<dyn DynStage>)
-        .map_err(|error| ParamError { path: error.path().to_string(), message: error.inner().message().to_owned() })
+/// Makes stages of one type.
+struct Typed<S>(PhantomData<fn() -> S>);
+
+impl<S: Stage> Maker for Typed<S> {
+    fn parse(&self, params: toml::Table) -> Result<Box<dyn DynStage>, ParamError> {
+        serde_path_to_error::deserialize::<_, S>(params)
+            .map(|stage| Box::new(stage) as Box<dyn DynStage>)
+            .map_err(|error| ParamError { path: error.path().to_string(), message: error.inner().message().to_owned() })
+    }
+
+    fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
+        S::json_schema(generator)
+    }
+
+    fn examples(&self) -> Vec<Example> {
+        S::examples()
+    }
+
+    fn manual(&self) -> String {
+        format!("`afmid stages {}` lists the parameters", S::SPEC.name)
+    }
 }

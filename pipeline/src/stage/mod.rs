@@ -7,7 +7,7 @@ mod registry;
 mod spec;
 
 pub use context::{Context, NoProgress, Progress};
-pub use entry::{DynStage, Entry, ParamError};
+pub use entry::{DynStage, Entry, Maker, ParamError};
 pub use port::{Port, PortSpec, Ports};
 pub use registry::{DoubleName, Registry};
 pub use spec::{Caching, Example, Spec, Stage};

@@ -194,6 +194,7 @@ pub(crate) fn run_result() -> RunResult {
             threads: 2,
             folder: "/home/somebody".to_owned(),
             config_file: "configs/free-lever.toml".to_owned(),
+            logs: vec![("plug".to_owned(), "said on stderr\n".to_owned())],
             stages: vec![("records".to_owned(), 0.5, false), ("events".to_owned(), 1.0, true)],
         },
     }

@@ -50,4 +50,5 @@ pub use names::RESERVED_STAGE_IDS;
 pub use ports::PortSummary;
 pub use result_file::write_result;
 pub use result_reader::{ResultFile, StageSummary, read_result};
+pub(crate) use rows::write_rows;
 pub use stage_file::{read_stage, write_stage};

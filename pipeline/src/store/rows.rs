@@ -16,7 +16,7 @@ use super::{read, write};
 use crate::rows::{RowSource, Scratch, StoredRows, in_blocks};
 
 /// Writes rows as [`write::dataset`] would if all were in memory: the same bytes. Errors: those of the rows, and as there.
-pub(super) fn write_rows(parent: &Group, name: &str, shape: &[usize], rows: &StoredRows) -> Result<Dataset> {
+pub(crate) fn write_rows(parent: &Group, name: &str, shape: &[usize], rows: &StoredRows) -> Result<Dataset> {
     let wrap = |error: hdf5::Error| StoreError::from(error).at(write::path_of(parent, name));
     let (count, length) = (rows.rows(), rows.row_length());
     if shape != [count, length] {

@@ -8,6 +8,8 @@ use crate::runner::RunInfo;
 
 const FOLDER: &str = "folder";
 const CONFIG_FILE: &str = "config_file";
+const LOG_STAGE: &str = "log_stage";
+const LOG: &str = "log";
 
 pub(super) fn write_run_info(parent: &Group, name: &str, info: &RunInfo) -> Result<()> {
     let group = write::nexus_group(parent, name, "NXcollection")?;
@@ -25,7 +27,13 @@ pub(super) fn write_run_info(parent: &Group, name: &str, info: &RunInfo) -> Resu
     write::text_attribute(&seconds, "units", "s")?;
     let cached: Vec<i8> = stages.iter().map(|stage| i8::from(stage.2)).collect();
     let cached = write::dataset(&group, "stage_from_cache", &[stages.len()], &cached)?;
-    write::text_attribute(&cached, "dtype", "bool")
+    write::text_attribute(&cached, "dtype", "bool")?;
+    // HDF5 text ends at a NUL, and the text is whatever a process wrote
+    let text = |log: &(String, String)| log.1.replace('\0', "\u{fffd}");
+    let logged: Vec<&str> = info.logs.iter().map(|log| log.0.as_str()).collect();
+    write::texts(&group, LOG_STAGE, &logged)?;
+    write::texts(&group, LOG, &info.logs.iter().map(text).collect::<Vec<_>>())?;
+    Ok(())
 }
 
 pub(super) fn read_run_info(parent: &Group, name: &str) -> Result<RunInfo> {
@@ -36,8 +44,10 @@ pub(super) fn read_run_info(parent: &Group, name: &str) -> Result<RunInfo> {
     if names.len() != seconds.len() || names.len() != cached.len() {
         return Err(StoreError::new("the lists of stages differ in length").at(group.name()));
     }
-    // files of earlier versions have neither
+    // files of earlier versions have none of these
     let optional = |name: &str| if group.link_exists(name) { read::text(&group, name) } else { Ok(String::new()) };
+    let texts = |name: &str| if group.link_exists(name) { read::texts(&group, name) } else { Ok(Vec::new()) };
+    let (logged, logs) = (texts(LOG_STAGE)?, texts(LOG)?);
     Ok(RunInfo {
         folder: optional(FOLDER)?,
         config_file: optional(CONFIG_FILE)?,
@@ -46,5 +56,6 @@ pub(super) fn read_run_info(parent: &Group, name: &str) -> Result<RunInfo> {
         host: read::text(&group, "host")?,
         threads: read::number::<u64>(&group, "threads")? as usize,
         stages: names.into_iter().zip(seconds).zip(cached).map(|((id, time), hit)| (id, time, hit != 0)).collect(),
+        logs: logged.into_iter().zip(logs).collect(),
     })
 }

@@ -87,11 +87,34 @@ fn ids_are_checked() {
 }
 
 #[test]
-fn tables_that_come_later_are_refused_clearly() {
-    let text = format!("{}[plugins]\ny = \"z\"\n", stage(""));
-    let wrong = wrong(&text, &[]);
-    assert_eq!(wrong.len(), 1);
-    assert!(wrong[0].starts_with("[plugins] | [plugins] is not supported yet | "));
+fn plugins_are_read_in_all_their_forms_and_every_mistake_has_its_place() {
+    let text = format!(
+        "{}[plugins]\na = \"python3 'my stage.py'\"\nb = [\"python3\", \"x.py\"]\nc = {{ command = \"x\", timeout_s = 5 }}\n",
+        stage("")
+    );
+    let config = Config::parse("c.toml", &text, &[]).expect("right");
+    let read: Vec<_> = config.plugins.iter().map(|plugin| (plugin.command.join("|"), plugin.timeout_s)).collect();
+    let wanted = [("python3|my stage.py", 600.0), ("python3|x.py", 600.0), ("x", 5.0)];
+    assert_eq!(read, wanted.map(|(command, timeout)| (command.to_owned(), timeout)));
+
+    let text = format!(
+        "{}[plugins]\nA = \"x\"\nb = 3\nc = []\nd = {{ comand = \"x\" }}\ne = {{ command = \"x\", timeout_s = 0 }}\nf = \"'x\"\ng = [\"x\", 1]\n",
+        stage("")
+    );
+    let form = "write `NAME = \"python3 my_stage.py\"` or `NAME = { command = [\"python3\", \"my_stage.py\"], timeout_s = 600 }`";
+    assert_eq!(
+        wrong(&text, &[]),
+        [
+            "A | `A` cannot be the name of a plugin | names are of lowercase letters, digits, `-` and `_`, and begin with a letter".to_owned(),
+            format!("3 | the command of plugin `b`: found the integer `3`, wanted text or an array | {form}"),
+            format!("[] | the command of plugin `c`: it is empty | {form}"),
+            format!("{{ comand = \"x\" }} | plugin `d` has no `command` | {form}"),
+            "comand | plugin `d` has no key `comand` | did you mean `command`?".to_owned(),
+            "0 | `timeout_s` of plugin `e`: found the integer `0`, wanted seconds above 0, at most a week | -".to_owned(),
+            format!("\"'x\" | the command of plugin `f`: a quote ' is not closed | {form}"),
+            format!("1 | the command of plugin `g`: found the integer `1`, wanted text | {form}"),
+        ]
+    );
 }
 
 #[test]
@@ -117,7 +140,7 @@ fn a_parameter_without_default_is_asked_for() {
     assert_eq!(
         wrong(&text, &[]),
         [
-            "[stage.params] | stage `a` (`test.load`) lacks the parameter `channel` | it has no default: add `channel = ...`; see `afmid stages test.load`",
+            "[stage.params] | stage `a` (`test.load`) lacks the parameter `channel` | it has no default: add `channel = ...`; `afmid stages test.load` lists the parameters",
             "3 | parameter `files` of stage `a`: found the integer `3`, wanted an array | `afmid stages test.load` lists the parameters",
         ]
     );

@@ -138,11 +138,22 @@ fn cycles_are_named_each_of_them() {
 }
 
 #[test]
-fn plugins_are_refused_clearly() {
+fn a_plugin_that_is_not_there_is_said_with_what_to_do() {
     let text = format!("{HEAD}[[stage]]\nid = \"x\"\nuses = \"exec:mine\"\n");
+    let said = "\"exec:mine\" | stage `x`: there is no plugin `mine`: neither in [plugins] nor as `afmid-stage-mine` on the PATH | ";
     assert_eq!(
         wrong(&text, &[]),
-        ["\"exec:mine\" | stage `x`: the plugin `mine` is not supported yet | use a built-in stage"]
+        [format!("{said}add `mine = \"python3 my_stage.py\"` to [plugins], or install `afmid-stage-mine`")]
+    );
+    let near = format!("{text}[plugins]\nmien = \"python3 x.py\"\n");
+    assert_eq!(wrong(&near, &[]), [format!("{said}did you mean `mien`?")]);
+    let gone = format!("{text}[plugins]\nmine = \"a-program-that-nobody-has x.py\"\n");
+    assert_eq!(
+        wrong(&gone, &[]),
+        [
+            "\"a-program-that-nobody-has x.py\" | the plugin `mine` cannot be started: there is no program `a-program-that-nobody-has` | \
+          name a program on the PATH, or a path from the config's folder with a `/` in it"
+        ]
     );
 }
 

@@ -15,8 +15,8 @@ const SENSITIVITY: Port<Document> = Port::new("sensitivity", "sensitivity", "");
 const SUMMARY: Port<Document> = Port::new("summary", "", "");
 
 fn run_example(entry: &Entry) {
-    for example in (entry.examples)() {
-        let stage = (entry.parse)(afmid_pipeline::toml::from_str(example.params).unwrap()).unwrap();
+    for example in entry.examples() {
+        let stage = entry.parse(afmid_pipeline::toml::from_str(example.params).unwrap()).unwrap();
         stage.check().unwrap();
         let cx = Context::new(Path::new("."), 1, &NoProgress);
         let outputs = stage.run(&(example.inputs)().unwrap(), &cx).unwrap();

@@ -56,11 +56,11 @@ pub(crate) fn ensemble() -> Array {
 pub(crate) fn run_examples(stages: &[afmid_pipeline::Entry]) {
     use afmid_pipeline::stage::NoProgress;
     for entry in stages {
-        let examples = (entry.examples)();
+        let examples = entry.examples();
         assert!(!examples.is_empty(), "{}: no example", entry.spec.name);
         for example in examples {
             let params = afmid_pipeline::toml::from_str(example.params).unwrap();
-            let stage = (entry.parse)(params).unwrap();
+            let stage = entry.parse(params).unwrap();
             stage.check().unwrap();
             let cx = afmid_pipeline::Context::new(std::path::Path::new("."), 7, &NoProgress);
             let outputs = stage.run(&(example.inputs)().unwrap(), &cx).unwrap();

@@ -1,0 +1,99 @@
+//! What a plugin says of itself, checked and made a row of the registry.
+
+use serde_json::Value;
+
+use super::error::PluginError;
+use super::exchange::Wanted;
+use super::message::{Description, ExampleDescription, Handshake, PortDescription, ShapeName};
+use super::schema::Schema;
+use crate::stage::{Caching, PortSpec, Spec};
+
+/// A plugin as its description has it. It lives as long as the program: see [`leak`].
+#[derive(Debug)]
+pub(super) struct Plugin {
+    pub(super) spec: Spec,
+    /// Its own name and version: part of the cache key.
+    pub(super) identity: String,
+    pub(super) schema: Schema,
+    pub(super) examples: Vec<ExampleDescription>,
+    outputs: Vec<PortDescription>,
+}
+
+impl Plugin {
+    /// What an output may hold; none if it is not declared.
+    pub(super) fn wanted(&self, output: &str) -> Option<Wanted> {
+        let port = self.outputs.iter().find(|port| port.name == output)?;
+        Some(Wanted { shape: port.shape.into(), finite: port.finite })
+    }
+}
+
+const HELP: &str = "docs/plugins.md says what a description holds";
+
+/// Checks a description. Errors: the first thing that is wrong with it.
+pub(super) fn describe(name: &str, shaken: &Handshake, answer: Value) -> Result<Plugin, PluginError> {
+    let wrong = |what: String| PluginError::new(format!("describes itself wrongly: {what}"), HELP);
+    let description: Description = serde_path_to_error::deserialize(&answer)
+        .map_err(|error| wrong(format!("at `{}`: {}", error.path(), error.inner())))?;
+    let own = (&description.name, &description.version);
+    if own != (&shaken.name, &shaken.version) {
+        let (name, version) = own;
+        let before = format!("`{} {}`", shaken.name, shaken.version);
+        return Err(wrong(format!("it is `{name} {version}`, its handshake said {before}")));
+    }
+    if description.summary.trim().is_empty() {
+        return Err(wrong("its `summary` is empty".to_owned()));
+    }
+    ports("input", &description.inputs).map_err(wrong)?;
+    ports("output", &description.outputs).map_err(wrong)?;
+    if description.outputs.is_empty() {
+        return Err(wrong("it has no output".to_owned()));
+    }
+    if let Some(port) = description.outputs.iter().find(|port| port.shape == ShapeName::Recording) {
+        return Err(wrong(format!("output `{}` is a recording: plugins read recordings and make none", port.name)));
+    }
+    let schema = Schema::new(&description.parameters).map_err(|what| wrong(format!("`parameters`: {what}")))?;
+    let spec = Spec {
+        name: leak(&format!("exec:{name}")),
+        version: 1,
+        summary: leak(description.summary.trim()),
+        inputs: specs(&description.inputs),
+        outputs: specs(&description.outputs),
+        caching: if description.deterministic { Caching::Stored } else { Caching::Always },
+        seeded: description.seeded,
+        source: leak(&description.source),
+    };
+    let identity = format!("plugin {} {}", description.name, description.version);
+    Ok(Plugin { spec, identity, schema, examples: description.examples, outputs: description.outputs })
+}
+
+fn ports(what: &str, ports: &[PortDescription]) -> Result<(), String> {
+    let letters =
+        |name: &str| name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
+    for (index, port) in ports.iter().enumerate() {
+        let name = &port.name;
+        if name.is_empty() || name.len() > 60 || !letters(name) {
+            return Err(format!("{what} `{name}`: wanted a name of lowercase letters, digits and `_`"));
+        }
+        if ports[..index].iter().any(|other| other.name == *name) {
+            return Err(format!("it has two {what}s `{name}`"));
+        }
+    }
+    Ok(())
+}
+
+fn specs(ports: &[PortDescription]) -> &'static [PortSpec] {
+    let spec = |port: &PortDescription| PortSpec {
+        name: leak(&port.name),
+        shape: port.shape.into(),
+        tag: leak(&port.tag),
+        optional: port.optional,
+        doc: leak(&port.doc),
+    };
+    Vec::leak(ports.iter().map(spec).collect())
+}
+
+/// Text that lives as long as the program, as the texts of built-in stages do: the registry, plans, wires and errors refer to it without
+/// owning it. It is made once per plugin and process (descriptions are kept, see [`super::row`]), some hundred bytes each.
+fn leak(text: &str) -> &'static str {
+    String::leak(text.to_owned())
+}

@@ -1,0 +1,205 @@
+//! A conversation with a plugin: the handshake, then requests and answers, one at a time.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use super::PROTOCOL;
+use super::describe::{self, Plugin};
+use super::error::PluginError;
+use super::fingerprint::{Fingerprint, fingerprint};
+use super::launch::Launch;
+use super::lines::shown;
+use super::message::{Handshake, Progress, Reply};
+use super::process::Process;
+
+/// A plugin that was started and has introduced itself, with a folder for what is exchanged.
+#[derive(Debug)]
+pub(super) struct Session {
+    pub(super) launch: Launch,
+    pub(super) fingerprint: Fingerprint,
+    pub(super) handshake: Handshake,
+    protocol: u64,
+    process: Process,
+    folder: TempDir,
+    requests: u64,
+}
+
+/// Where the handshake is written down.
+const FORM: &str =
+    r#"the first line is {"afmid_stage": 1, "protocol": {"min": 1, "max": 1}, "name": "...", "version": "..."}"#;
+
+impl Session {
+    /// Starts a plugin and reads its handshake. Errors: it does not start, says something else, or speaks another protocol.
+    pub(super) fn start(launch: &Launch) -> Result<Self, PluginError> {
+        let fingerprint = fingerprint(launch)?;
+        let folder = tempfile::Builder::new().prefix("afmid-plugin-").tempdir().map_err(|error| {
+            let what = format!("needs a temporary folder, and none can be made: {error}");
+            PluginError::new(what, "check TMPDIR and the space on its disk")
+        })?;
+        let mut process = Process::start(launch)?;
+        let deadline = Instant::now() + launch.start_timeout();
+        let greeted = process.receive(deadline, "before its handshake").and_then(|line| handshake(&line));
+        match greeted {
+            Ok((handshake, protocol)) => {
+                let launch = launch.clone();
+                Ok(Self { launch, fingerprint, handshake, protocol, process, folder, requests: 0 })
+            }
+            Err(error) => Err(PluginError { log: process.kill(), ..error }),
+        }
+    }
+
+    /// Asks what it is. Errors: as [`Session::request`]; a description that is not one.
+    pub(super) fn describe(&mut self) -> Result<Plugin, PluginError> {
+        let params = json!({ "protocol": self.protocol });
+        let answer = self.request("describe", &params, self.launch.start_timeout(), &mut |_| {})?;
+        describe::describe(&self.launch.name, &self.handshake, answer)
+    }
+
+    /// Sends a request and waits for its answer. Errors: the plugin says that it cannot (then it can be asked again), or anything else than the
+    /// protocol happens (then it was killed).
+    pub(super) fn request(
+        &mut self,
+        method: &str,
+        params: &Value,
+        timeout: Duration,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Value, PluginError> {
+        let answered = self.exchange(method, params, timeout, progress);
+        answered.map_err(|error| {
+            let log = if error.alive { self.process.take_log() } else { self.process.kill() };
+            PluginError { log, ..error }
+        })
+    }
+
+    fn exchange(
+        &mut self,
+        method: &str,
+        params: &Value,
+        timeout: Duration,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Value, PluginError> {
+        if let Some(line) = self.unasked(Duration::ZERO) {
+            let what = format!("wrote to stdout without being asked: {line}");
+            return Err(PluginError::new(what, "stdout is for the protocol alone: write everything else to stderr"));
+        }
+        self.requests += 1;
+        let id = self.requests;
+        self.process.send(&json!({ "id": id, "method": method, "params": params }).to_string());
+        let (deadline, doing) =
+            (Instant::now() + timeout, format!("during `{method}` ({:.0} s allowed)", timeout.as_secs_f64()));
+        loop {
+            let line = self.process.receive(deadline, &doing)?;
+            let reply = reply(&line, id, &doing)?;
+            match (reply.progress, reply.result, reply.error) {
+                (Some(told), None, None) => progress(told),
+                (None, Some(result), None) => return Ok(result),
+                (None, None, Some(refusal)) => {
+                    let help = refusal.help.unwrap_or_else(|| "this comes from the plugin itself".to_owned());
+                    return Err(PluginError::new(format!("refuses: {}", refusal.message), help).alive());
+                }
+                _ => {
+                    let what = format!(
+                        "answered with none or several of `result`, `error`, `progress`: {}",
+                        shown(line.as_bytes())
+                    );
+                    return Err(PluginError::new(what, "an answer has exactly one of them"));
+                }
+            }
+        }
+    }
+
+    /// A line that nobody asked for, if there is one within `wait`.
+    pub(super) fn unasked(&self, wait: Duration) -> Option<String> {
+        self.process.unasked(wait)
+    }
+
+    /// Files for the next request: what it is given, what it may write.
+    pub(super) fn files(&self) -> (Exchange, Exchange) {
+        let file = |what: &str| Exchange(self.folder.path().join(format!("{what}-{}.h5", self.requests + 1)));
+        (file("in"), file("out"))
+    }
+
+    /// What it wrote to stderr since it was asked last.
+    pub(super) fn take_log(&self) -> String {
+        self.process.take_log()
+    }
+
+    /// Kills it, and returns its last words.
+    pub(super) fn kill(&mut self) -> String {
+        self.process.kill()
+    }
+
+    /// Asks it to end, without waiting for that.
+    pub(super) fn ask_to_end(&mut self) {
+        self.requests += 1;
+        self.process.send(&json!({ "id": self.requests, "method": "shutdown" }).to_string());
+        self.process.close_input();
+    }
+
+    /// Ends it by closing its input, and says how it ended. Errors: it does not end in time.
+    pub(super) fn close(&mut self, wait: Duration) -> Result<String, PluginError> {
+        self.process.close(wait)
+    }
+}
+
+/// A file of the exchange: removed when it goes out of scope, whatever happened.
+#[derive(Debug)]
+pub(super) struct Exchange(PathBuf);
+
+impl Exchange {
+    pub(super) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Exchange {
+    fn drop(&mut self) {
+        // it may never have been written
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+fn handshake(line: &str) -> Result<(Handshake, u64), PluginError> {
+    let found = || shown(line.as_bytes());
+    let handshake: Handshake = serde_json::from_str(line)
+        .map_err(|error| PluginError::new(format!("does not begin with a handshake: {} ({error})", found()), FORM))?;
+    if handshake.afmid_stage != 1 || handshake.name.is_empty() || handshake.version.is_empty() {
+        return Err(PluginError::new(format!("does not begin with a handshake: {}", found()), FORM));
+    }
+    let range = handshake.protocol;
+    let common = range.max.min(*PROTOCOL.end());
+    if common < range.min.max(*PROTOCOL.start()) {
+        let (low, high) = (range.min, range.max);
+        let what = format!(
+            "speaks the versions {low} to {high} of the protocol, this program {} to {}",
+            PROTOCOL.start(),
+            PROTOCOL.end()
+        );
+        let older = if low > *PROTOCOL.end() {
+            "use a newer afmid, or an older version of the plugin"
+        } else {
+            "use a newer version of the plugin"
+        };
+        return Err(PluginError::new(what, older));
+    }
+    Ok((handshake, common))
+}
+
+fn reply(line: &str, id: u64, doing: &str) -> Result<Reply, PluginError> {
+    let found = || shown(line.as_bytes());
+    let help = "stdout is for the protocol alone, one JSON message a line: write everything else to stderr";
+    let reply: Reply = serde_json::from_str(line).map_err(|error| {
+        PluginError::new(format!("wrote something else than an answer {doing}: {} ({error})", found()), help)
+    })?;
+    match reply.id {
+        Some(found) if found == id => Ok(reply),
+        found_id => {
+            let told = found_id.map_or("no id".to_owned(), |found| format!("the id {found}"));
+            let what = format!("answered with {told}, wanted the id {id} of the request: {}", found());
+            Err(PluginError::new(what, "an answer carries the id of its request"))
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! A plugin with its parameters: a stage like any other.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::error::PluginError;
+use super::exchange::{give, take};
+use super::message::{Made, Progress};
+use super::pool;
+use super::row::Row;
+use super::session::Session;
+use crate::error::StageError;
+use crate::stage::{Context, DynStage, Ports, Spec};
+
+/// A plugin with its parameters.
+pub(super) struct PluginStage {
+    pub(super) row: &'static Row,
+    /// All parameters, defaults filled in.
+    pub(super) params: Value,
+}
+
+impl DynStage for PluginStage {
+    fn spec(&self) -> &'static Spec {
+        &self.row.plugin.spec
+    }
+
+    fn params(&self) -> Result<Value, StageError> {
+        Ok(self.params.clone())
+    }
+
+    /// The schema was checked when the parameters were read.
+    fn check(&self) -> Result<(), StageError> {
+        Ok(())
+    }
+
+    /// Parameters of the format `path` name files, an empty one none: their bytes are part of the cache key.
+    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+        let named = self.row.plugin.schema.paths(&self.params).into_iter().filter(|path| !path.is_empty());
+        Ok(named.map(|path| base.join(path)).collect())
+    }
+
+    fn depends_on(&self) -> Vec<String> {
+        let own = std::iter::once(self.row.plugin.identity.clone());
+        own.chain(self.row.fingerprint.iter().cloned()).collect()
+    }
+
+    fn location_params(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let launch = &self.row.launch;
+        let mut session = pool::take(launch, &self.row.fingerprint).map_err(|error| error.of(&launch.name))?;
+        let ran = run(&mut session, self.row, &self.params, inputs, cx);
+        cx.log(&session.take_log());
+        match ran {
+            Ok(outputs) => {
+                pool::put(session);
+                Ok(outputs)
+            }
+            Err(error) => {
+                if error.alive {
+                    pool::put(session);
+                } else {
+                    session.kill();
+                }
+                Err(error.of(&launch.name))
+            }
+        }
+    }
+}
+
+/// One item: inputs into a file, a request, its answer checked. Files are gone when it returns.
+pub(super) fn run(
+    session: &mut Session,
+    row: &Row,
+    params: &Value,
+    inputs: &Ports,
+    cx: &Context,
+) -> Result<Ports, PluginError> {
+    let (given, made) = session.files();
+    let written = give(inputs, given.path()).map_err(|error| {
+        PluginError::new(format!("cannot be given its inputs: {error}"), "check TMPDIR and the space on its disk")
+            .alive()
+    })?;
+    let base = std::path::absolute(cx.base()).unwrap_or_else(|_| cx.base().to_owned());
+    let request = json!({
+        "parameters": params,
+        // JSON numbers are doubles in many languages: 53 bits arrive whole
+        "seed": row.plugin.spec.seeded.then(|| cx.seed() >> 11),
+        "base": base,
+        "inputs": written,
+        "output": made.path(),
+    });
+    let mut seen: Option<Progress> = None;
+    let mut progress = |told: Progress| {
+        let before = seen.map_or(0, |seen| seen.done);
+        if seen.is_none() {
+            cx.expect(usize::try_from(told.total).unwrap_or(usize::MAX));
+        }
+        // no more ticks than were announced, whatever it says
+        let total = seen.map_or(told.total, |seen| seen.total);
+        let done = told.done.clamp(before, total.max(before));
+        (before..done).take(1 << 20).for_each(|_| cx.tick());
+        seen = Some(Progress { done, total });
+    };
+    let answer = session.request("run", &request, row.launch.timeout, &mut progress)?;
+    let outputs = outputs(row, answer, made.path(), cx);
+    // it answered in order: what it made is wrong, and the next item may be right
+    outputs.map_err(|what| PluginError::new(what, "mend the plugin; `afmid plugin check` tries it alone").alive())
+}
+
+fn outputs(row: &Row, answer: Value, file: &Path, cx: &Context) -> Result<Ports, String> {
+    let made: Made = serde_path_to_error::deserialize(&answer).map_err(|error| {
+        format!("answered `run` with something else than outputs: at `{}`: {}", error.path(), error.inner())
+    })?;
+    let declared = row.plugin.spec.outputs;
+    if let Some(other) = made.outputs.keys().find(|name| !declared.iter().any(|port| port.name == name.as_str())) {
+        return Err(format!("made the output `{other}`, which it does not declare"));
+    }
+    let mut ports = Ports::new();
+    for port in declared {
+        match (made.outputs.get(port.name), row.plugin.wanted(port.name)) {
+            (Some(sent), Some(wanted)) => {
+                let artifact = take(sent, file, wanted)
+                    .map_err(|wrong| format!("made a wrong output: `{}` {wrong}", port.name))?;
+                ports.insert(port.name, artifact);
+            }
+            _ if port.optional => {}
+            _ => return Err(format!("did not make the output `{}`, which it declares", port.name)),
+        }
+    }
+    made.warnings.into_iter().for_each(|warning| cx.warn(warning));
+    Ok(ports)
+}
