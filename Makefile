@@ -22,11 +22,13 @@ test: test-deps
 	cargo test --workspace --locked
 
 # afmid with other programs, which `make test` does without: a real Slurm of two emulated nodes (root; installs slurm-wlm and munge with apt where
-# they are missing), Snakemake, a model under Octave, a result in H5Web (octave, chromium, nodejs and npm with apt where they are missing; H5Web from
-# registry.npmjs.org). The first line builds the program as `make test` does.
+# they are missing), Snakemake, a model and a plugin under Octave, a plugin with scikit-rf, a result in H5Web (octave, chromium, nodejs and npm with apt where
+# they are missing; H5Web from registry.npmjs.org). The first line builds the program as `make test` does.
 test-interop: test-slurm test-deps
 	tests/interop/octave.sh target/debug/afmid .tools/bin/python
 	tests/interop/h5web.sh target/debug/afmid
+	tests/interop/report.sh target/debug/afmid
+	tests/interop/plugins.sh target/debug/afmid .tools/bin/python
 
 # The part of it that .ci/run calls where Slurm can be had.
 test-slurm: deps .tools/snakemake/installed

@@ -16,7 +16,7 @@ mod submit;
 pub use batch::{BatchArgs, SetsArgs};
 pub use examples::command;
 pub use export::{ExportArgs, ModelFormat};
-pub use new::{Goal, New, NewPipelineArgs};
+pub use new::{Goal, New, NewPipelineArgs, NewStageArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
 pub use submit::{SlurmArgs, SubmitTo};
 
@@ -53,6 +53,9 @@ pub enum Command {
         /// The configs.
         #[arg(required = true, value_name = "CONFIG")]
         configs: Vec<PathBuf>,
+        /// As JSON, alone on stdout: every problem with its line and column.
+        #[arg(long)]
+        json: bool,
     },
     /// Draw the graph of a config.
     Graph {
@@ -102,6 +105,9 @@ pub enum Command {
     Stages {
         /// The stage to document.
         name: Option<String>,
+        /// As JSON, alone on stdout: ports, and the JSON Schema of the parameters.
+        #[arg(long)]
+        json: bool,
     },
     /// List what a simulation can get wrong, or document one cause.
     Causes {

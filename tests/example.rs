@@ -7,6 +7,11 @@ use std::process::Command;
 
 use common::ROOT;
 
+/// What `afmid new stage --rust` begins with: its own test runs with these.
+#[path = "../examples/new_stage.rs"]
+#[allow(dead_code, reason = "its main is the example's")]
+mod new_stage;
+
 /// A program of the examples, which cargo builds before the tests run, beside the program's folder.
 fn example(name: &str, here: &Path, arguments: &[&str]) -> String {
     let program = Path::new(env!("CARGO_BIN_EXE_afmid")).with_file_name("examples").join(name);
@@ -45,4 +50,18 @@ fn a_cause_of_another_crate_is_hidden_and_named() {
     // four of its own standard errors: by chance once in 16,000
     assert!((of("value") - 0.01).abs() < 4.0 * of("std"), "{} +- {}", of("value"), of("std"));
     assert!(run(&["causes", "unequal-segments"]).contains("segments"));
+}
+
+#[test]
+fn what_a_new_stage_begins_with_runs_in_its_config() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let config = Path::new(ROOT).join("examples/new_stage.toml").display().to_string();
+    let archive = format!("archive.out='{}'", here.join("archive").display());
+    let run = |arguments: &[&str]| example("new_stage", here, arguments);
+    run(&["run", &config, "--set", &archive, "-o", "n.h5", "--cache", "cache"]);
+    let shown: serde_json::Value = serde_json::from_str(&run(&["show", "n.h5", "new_stage", "--json"])).expect("JSON");
+    // 0.7 V of mode 1, five decay times later: 4 mV, noise beside it
+    let rms = common::number(&shown, "/rms");
+    assert!(rms > 2e-3 && rms < 8e-3, "{rms} V");
 }

@@ -43,8 +43,12 @@ fn every_command_of_the_tutorials_runs() {
     copy(&Path::new(ROOT).join("configs"), &here.join("configs"));
     std::fs::create_dir(here.join("results")).expect("a folder");
     let program = Path::new(env!("CARGO_BIN_EXE_afmid")).parent().expect("a folder");
+    // the python3 of `make test-deps` comes first
+    let python = Path::new(ROOT).join(".tools/bin");
     let path = std::env::join_paths(
-        std::iter::once(program.to_owned()).chain(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())),
+        [program.to_owned(), python]
+            .into_iter()
+            .chain(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())),
     );
     let path = path.expect("a PATH");
     let mut count = 0;
@@ -68,6 +72,7 @@ fn told(line: &str, stdout: &str) {
         "afmid show results/diagnosis.h5 diagnosis --json" => ["\"named\"", "quadratic-detector"],
         "afmid show results/without.h5 diagnosis" => ["unexplained", "nearest"],
         "afmid show results/paper.h5 modes" | "afmid show results/mine.h5 modes" => ["frequency_hz", "fit_percent"],
+        "afmid show results/end-noise.h5 end_noise" => ["rms", "samples"],
         _ => return,
     };
     for word in promised {

@@ -9,6 +9,38 @@ use clap::{Args, Subcommand, ValueEnum};
 pub enum New {
     /// Write a config for recordings, from what they hold; what they don't say is asked for by name.
     Pipeline(NewPipelineArgs),
+    /// Write a folder with a stage of your own, its test and a config that runs it.
+    Stage(NewStageArgs),
+}
+
+/// Which stage, in which language.
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("language").required(true))]
+pub struct NewStageArgs {
+    /// Its name: lowercase letters, digits and `_`, a letter first.
+    #[arg(value_name = "NAME", value_parser = stage_name)]
+    pub name: String,
+    /// A plugin in Python: a process beside afmid.
+    #[arg(long, group = "language")]
+    pub python: bool,
+    /// A crate that adds the stage to a binary of its own; wants --sources.
+    #[arg(long, group = "language", requires = "sources")]
+    pub rust: bool,
+    /// A clone of afmid's repository, which the crate depends on.
+    #[arg(long, value_name = "FOLDER")]
+    pub sources: Option<PathBuf>,
+    /// The folder, which must not be there yet [default: NAME in the working directory].
+    #[arg(short, long, value_name = "FOLDER")]
+    pub output: Option<PathBuf>,
+}
+
+fn stage_name(text: &str) -> Result<String, String> {
+    let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    let right = text.starts_with(|c: char| c.is_ascii_lowercase()) && text.chars().all(letters) && text.len() <= 40;
+    match right {
+        true => Ok(text.to_owned()),
+        false => Err("wanted a name of lowercase letters, digits and `_`, a letter first, 40 at most".to_owned()),
+    }
 }
 
 /// For which recordings, and to find what.

@@ -12,7 +12,7 @@ use crate::failure::Failure;
 use crate::output::print;
 
 /// Pages of the book that are written by hand: title and file.
-const CHAPTERS: [(&str, &str); 11] = [
+const CHAPTERS: [(&str, &str); 12] = [
     ("The paper, figure by figure", "paper.md"),
     ("Diagnosis", "diagnosis.md"),
     ("Archives", "archives.md"),
@@ -22,6 +22,7 @@ const CHAPTERS: [(&str, &str); 11] = [
     ("Conventions", "conventions.md"),
     ("Glossary", "glossary.md"),
     ("Architecture", "architecture.md"),
+    ("Plugins", "plugins.md"),
     ("What a stage must keep", "stage-spec.md"),
     ("Decisions", "decisions/README.md"),
 ];
@@ -47,10 +48,11 @@ fn contents(registry: &Registry) -> String {
 }
 
 /// The tutorials, in reading order.
-const TUTORIALS: [(&str, &str); 3] = [
+const TUTORIALS: [(&str, &str); 4] = [
     ("The paper in ten minutes", "paper.md"),
     ("My own recordings", "recordings.md"),
     ("Find what my model misses", "diagnosis.md"),
+    ("My own stage", "stage.md"),
 ];
 
 /// Writes `FOLDER/stages/*.md`, `FOLDER/causes/*.md`, `FOLDER/SUMMARY.md` and `FOLDER/pipeline.schema.json`, or says what would change. Pages of what is gone are removed.

@@ -20,7 +20,8 @@ pub fn plan_text(file: &str, text: &str, set: &[String], registry: &Registry) ->
         .map_err(|problems| Failure::Usage(Message::Rendered(render(file, text, &problems))))
 }
 
-fn read(path: &Path) -> Result<String, Failure> {
+/// The text of a config. Errors: the file cannot be read, or is no text.
+pub fn read(path: &Path) -> Result<String, Failure> {
     let bytes = std::fs::read(path)
         .map_err(|error| Failure::usage(format!("the config {} cannot be read: {error}", path.display()), None))?;
     String::from_utf8(bytes).map_err(|error| {

@@ -6,16 +6,17 @@ use afmid_pipeline::Registry;
 use afmid_pipeline::cache::replace_with;
 
 use super::load::plan_text;
-use crate::cli::{New, NewPipelineArgs};
+use crate::cli::{New, NewPipelineArgs, NewStageArgs};
 use crate::failure::Failure;
 use crate::output::print;
 use crate::relative::folder_of;
-use crate::scaffold::{Wanted, look, pipeline};
+use crate::scaffold::{Wanted, look, pipeline, python, rust};
 
 /// Writes what was asked for.
 pub fn run(what: &New, registry: &Registry) -> Result<(), Failure> {
     match what {
         New::Pipeline(args) => new_pipeline(args, registry),
+        New::Stage(args) => new_stage(args),
     }
 }
 
@@ -39,4 +40,31 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
         output.display(),
         output.file_stem().unwrap_or_default().to_string_lossy()
     ))
+}
+
+fn new_stage(args: &NewStageArgs) -> Result<(), Failure> {
+    let name = &args.name;
+    let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(name));
+    if folder.exists() {
+        let help = "choose another folder with -o, or remove it".to_owned();
+        return Err(Failure::usage(format!("{} is there already", folder.display()), Some(help)));
+    }
+    let (files, next) = match &args.sources {
+        Some(sources) if args.rust => {
+            let clone =
+                sources.join("pipeline/Cargo.toml").is_file().then(|| std::path::absolute(sources).ok()).flatten();
+            let help = "give the folder of a clone of afmid's repository".to_owned();
+            let missing = || Failure::usage(format!("{} holds no pipeline/Cargo.toml", sources.display()), Some(help));
+            let next = format!("cargo test\n  cargo run -- run {name}.toml");
+            (rust(name, &clone.ok_or_else(missing)?), next)
+        }
+        _ => (python(name), format!("afmid plugin check -- python3 {name}.py\n  afmid run {name}.toml")),
+    };
+    let failed =
+        |error: std::io::Error| Failure::failed(format!("{} cannot be written: {error}", folder.display()), None);
+    for (file, text) in files {
+        let path = folder.join(file);
+        std::fs::create_dir_all(folder_of(&path)).and_then(|()| std::fs::write(&path, text)).map_err(failed)?;
+    }
+    print(&format!("{}\n  cd {0}\n  {next}\n", folder.display()))
 }

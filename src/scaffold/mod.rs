@@ -1,7 +1,9 @@
-//! Beginnings: configs for recordings that were looked at.
+//! Beginnings: configs for recordings that were looked at, stages of one's own.
 
 mod pipeline;
 mod recordings;
+mod stage;
 
 pub use pipeline::{Wanted, pipeline};
 pub use recordings::look;
+pub use stage::{python, rust};

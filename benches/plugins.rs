@@ -1,0 +1,95 @@
+//! What a stage in another language costs beside its own work: an array there and back, in a process that is already running.
+//!
+//! Wants the Python of `make test-deps`.
+
+use std::path::Path;
+
+use afmid_pipeline::cache::Cache;
+use afmid_pipeline::runner::{Options, Quiet, run};
+use afmid_pipeline::{
+    Array, Axis, Caching, Context, Entry, Example, Plan, Port, Ports, Registry, Spec, Stage, StageError, graph,
+    schemars, serde,
+};
+use criterion::{Criterion, criterion_group, criterion_main};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const SAMPLES: usize = 8192;
+const ARRAY: Port<Array> = Port::new("array", "", "three signals");
+
+/// Three signals of a window's length.
+#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, crate = "afmid_pipeline::serde")]
+#[schemars(crate = "afmid_pipeline::schemars")]
+struct Signals {
+    /// Changes nothing.
+    nothing: u32,
+}
+
+impl Stage for Signals {
+    const SPEC: Spec = Spec {
+        name: "bench.signals",
+        version: 1,
+        summary: "three signals",
+        inputs: &[],
+        outputs: &[ARRAY.spec()],
+        caching: Caching::Always,
+        seeded: false,
+        source: "",
+    };
+
+    fn run(&self, _inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
+        let time: Vec<f64> = (0..SAMPLES).map(|k| 2e-7 * k as f64).collect();
+        let wave = |f: f64| time.iter().map(|t| (f * t).sin()).collect::<Vec<f64>>();
+        let waves = [1e5, 2e5, 3e5].map(wave);
+        let array = Array::over(vec![Axis::new("time", "s", "time", time)]);
+        let names = ["a", "b", "c"].into_iter().zip(waves);
+        Ok(Ports::new()
+            .with(&ARRAY, names.fold(array, |array, (name, wave)| array.with(name, "V", name, &["time"], wave))))
+    }
+
+    fn examples() -> Vec<Example> {
+        Vec::new()
+    }
+}
+
+fn plan(folder: &Path, plugin: bool) -> Plan {
+    let python = Path::new(ROOT).join(".tools/bin/python");
+    assert!(python.exists(), "{} is missing: run `make test-deps`", python.display());
+    // not deterministic: nothing of it is put into the cache
+    let script = folder.join("echo.py");
+    let echo = std::fs::read_to_string(Path::new(ROOT).join("tests/plugins/echo.py")).expect("the plugin");
+    let echo = echo.replace("Path(__file__).resolve().parents[2]", &format!("Path({ROOT:?})"));
+    std::fs::write(&script, echo.replace("seeded=True", "deterministic=False")).expect("a script");
+    let mut text = format!("[pipeline]\nname = \"b\"\n[plugins]\necho = {{ command = [{python:?}, {script:?}] }}\n");
+    text.push_str("[[stage]]\nid = \"signals\"\nuses = \"bench.signals\"\n");
+    if plugin {
+        text.push_str("[[stage]]\nid = \"echo\"\nuses = \"exec:echo\"\ninputs = { array = \"signals\" }\n");
+    }
+    let registry = Registry::new().with(&[Entry::of::<Signals>()]).expect("one name");
+    graph::load(&folder.join("b.toml").display().to_string(), &text, &[], &registry).expect("a right config")
+}
+
+fn overhead(c: &mut Criterion) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cache = Cache::open(&folder.path().join("cache")).expect("a cache");
+    let mut group = c.benchmark_group("exec");
+    for (name, plugin) in [("without", false), ("with_echo", true)] {
+        let plan = plan(folder.path(), plugin);
+        let program = "bench".to_owned();
+        let options = Options {
+            base: folder.path().to_owned(),
+            cache: &cache,
+            fresh: true,
+            program,
+            overrides: Vec::new(),
+            observer: &Quiet,
+        };
+        group.bench_function(name, |b| b.iter(|| run(&plan, &options).expect("it runs")));
+    }
+    group.finish();
+}
+
+criterion_group! { name = benches; config = Criterion::default().sample_size(20); targets = overhead }
+criterion_main!(benches);

@@ -1,0 +1,121 @@
+//! Plugins on the command line: the examples in Python, a new stage, the conformance test. Octave's and scikit-rf's are in `make test-interop`.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use common::{ROOT, number};
+use serde_json::Value;
+
+/// afmid with the Python of `make test-deps` first on the PATH.
+fn afmid(here: &Path, arguments: &[&str]) -> Output {
+    let bin = Path::new(ROOT).join(".tools/bin");
+    assert!(bin.join("python3").exists(), "{} has no python3: run `make test-deps`", bin.display());
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths([bin].into_iter().chain(std::env::split_paths(&path))).expect("a PATH");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
+    command.current_dir(here).args(arguments).env("PATH", path).env("PYTHONDONTWRITEBYTECODE", "1");
+    command.output().expect("afmid starts")
+}
+
+fn told(here: &Path, arguments: &[&str]) -> String {
+    let output = afmid(here, arguments);
+    let all = [output.stdout.as_slice(), &output.stderr].concat();
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&all));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+fn plugins() -> PathBuf {
+    Path::new(ROOT).join("examples/plugins")
+}
+
+#[test]
+fn a_smoother_of_scipys_runs_beside_the_built_in_one() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let script = plugins().join("savgol.py").display().to_string();
+    let tried = told(here, &["plugin", "check", "--", "python3", &script]);
+    assert!(tried.contains("passed") && !tried.contains("FAIL"), "{tried}");
+    let config = plugins().join("savgol.toml").display().to_string();
+    let archive = format!("archive.out='{}'", here.join("archive").display());
+    told(here, &["run", &config, "--set", &archive, "-o", "s.h5", "--cache", "cache"]);
+    let shown: Value = serde_json::from_str(&told(here, &["show", "s.h5", "savgol", "--json"])).expect("JSON");
+    let comparison = find(&shown, "largest_peak_over_reference").expect("the comparison");
+    // mode 1 is two bins wide: a parabola over 21 bins flattens it to a few per cent, the local rational does not
+    let peak = number(comparison, "/largest_peak_over_reference");
+    assert!(peak > 0.05 && peak < 0.5, "{peak}");
+    let frequency = number(comparison, "/largest_peak_hz");
+    assert!((frequency / 46.3e3 - 1.0).abs() < 0.02, "{frequency} Hz");
+    // the second run takes all from the cache
+    let again = told(here, &["run", &config, "--set", &archive, "-o", "s.h5", "--cache", "cache", "--json"]);
+    let again: Value = serde_json::from_str(&again).expect("JSON");
+    // `simulate.afm` writes files and runs every time
+    assert_eq!(number(&again, "/stages") - number(&again, "/reused"), 1.0, "{again}");
+}
+
+/// The object that holds this key, wherever it lies.
+fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
+    match value {
+        Value::Object(fields) if fields.contains_key(key) => Some(value),
+        Value::Object(fields) => fields.values().find_map(|inner| find(inner, key)),
+        Value::Array(items) => items.iter().find_map(|inner| find(inner, key)),
+        _ => None,
+    }
+}
+
+#[test]
+fn a_new_stage_in_python_passes_and_runs() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    told(here, &["new", "stage", "end_noise", "--python"]);
+    let tried = told(&here.join("end_noise"), &["plugin", "check", "--", "python3", "end_noise.py"]);
+    assert!(tried.contains("passed") && !tried.contains("FAIL"), "{tried}");
+    told(here, &["run", "end_noise/end_noise.toml", "-o", "n.h5", "--cache", "cache"]);
+    let shown: Value = serde_json::from_str(&told(here, &["show", "n.h5", "end_noise", "--json"])).expect("JSON");
+    // 0.7 V of mode 1, five decay times later: 4 mV, noise beside it
+    let rms = number(find(&shown, "rms").expect("the summary"), "/rms");
+    assert!(rms > 2e-3 && rms < 8e-3, "{rms} V");
+    let twice = afmid(here, &["new", "stage", "end_noise", "--python"]);
+    assert!(String::from_utf8_lossy(&twice.stderr).contains("is there already"));
+    let wrong = afmid(here, &["new", "stage", "End-Noise", "--python"]);
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("lowercase letters"));
+}
+
+#[test]
+fn a_new_stage_in_rust_is_a_crate_that_cargo_understands() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    told(here, &["new", "stage", "end_noise", "--rust", "--sources", ROOT]);
+    // the program itself is examples/new_stage.rs, which cargo has built and tests/example.rs runs
+    let metadata = Command::new(env!("CARGO"))
+        .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
+        .current_dir(here.join("end_noise"))
+        .output()
+        .expect("cargo starts");
+    assert!(metadata.status.success(), "{}", String::from_utf8_lossy(&metadata.stderr));
+    let metadata: Value = serde_json::from_slice(&metadata.stdout).expect("JSON");
+    assert_eq!(metadata["packages"][0]["name"], "end_noise");
+    let names: Vec<&str> = metadata["packages"][0]["dependencies"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|one| one["name"].as_str())
+        .collect();
+    assert_eq!(names, ["afmid", "afmid-pipeline", "schemars", "serde", "serde_json"]);
+    let nowhere = afmid(here, &["new", "stage", "other", "--rust", "--sources", "."]);
+    assert!(String::from_utf8_lossy(&nowhere.stderr).contains("pipeline/Cargo.toml"));
+}
+
+#[test]
+fn a_broken_plugin_fails_with_what_is_wrong_and_the_exit_code_says_so() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let script = Path::new(ROOT).join("tests/plugins/broken/wrong_length.py").display().to_string();
+    let output = afmid(scratch.path(), &["plugin", "check", "--json", "--", "python3", &script]);
+    assert_eq!(output.status.code(), Some(1));
+    let all: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(all["passed"], false);
+    let failed =
+        all["checks"].as_array().expect("a list").iter().find(|check| check["passed"] == false).expect("a failure");
+    assert!(failed["said"].as_str().is_some_and(|said| said.contains("wrong_length.py")), "{failed}");
+}
