@@ -30,10 +30,12 @@ function afmid_stage(about, run)
   schema.required = names(cellfun(@(n) ! isfield(about.parameters.(n), "default"), names))';
   say(struct("afmid_stage", 1, "protocol", struct("min", 1, "max", 1), "name", about.name, "version", about.version));
   while true
-    line = fgetl(stdin);
-    if ! ischar(line)
+    % fgetl would wait for the byte behind the line
+    line = fscanf(stdin, "%[^\n]");
+    if isempty(line)
       break
     end
+    fread(stdin, 1);
     request = jsondecode(line);
     if strcmp(request.method, "shutdown")
       break

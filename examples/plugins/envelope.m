@@ -4,7 +4,7 @@
 % Source: D. Gabor, J. IEE 93 (1946) 429.
 1;
 
-function outputs = envelope(inputs, parameters, context)
+function outputs = analytic(inputs, parameters, context)
   average = inputs.average;
   signal = average.variables(1);
   y = signal.values(:);
@@ -44,4 +44,4 @@ about.inputs = {struct("name", "average", "shape", "array", "tag", "average", "d
 about.outputs = {struct("name", "envelope", "shape", "array", "tag", "envelope", "doc", "magnitude of the analytic signal")};
 about.parameters = struct("level_samples", struct("type", "integer", "minimum", 1, "default", 512, "description", "samples at the end whose mean is the level that it ends on"));
 about.examples = examples_of();
-afmid_stage(about, @envelope);
+afmid_stage(about, @analytic);

@@ -83,12 +83,11 @@ impl Steps {
                 None => return,
             }
         }
-        if let Some(outputs) = made.first() {
-            if self.step("it gives the same bits twice", repeated(&mut session, row, first, outputs)).is_none()
-                || self.step("a new process gives the same bits", anew(row, first, outputs)).is_none()
-            {
-                return;
-            }
+        if let Some(outputs) = made.first()
+            && (self.step("it gives the same bits twice", repeated(&mut session, row, first, outputs)).is_none()
+                || self.step("a new process gives the same bits", anew(row, first, outputs)).is_none())
+        {
+            return;
         }
         self.step("it writes nothing but answers to stdout", quiet(&session));
         self.step("it ends on `shutdown`", ended(&mut session, true));

@@ -165,7 +165,8 @@ impl Taker<'_> {
         let (x0, parameters) = (matrix("x0", n, 1, false)?, matrix("parameters", count, 1, count > 0)?);
         let known = sent.matrices.contains_key("covariance");
         let covariance = if known { matrix("covariance", count, count, true)? } else { Matrix::default() };
-        if !(sent.sample_time_s > 0.0) || !(sent.innovation_variance >= 0.0) {
+        let right = sent.sample_time_s > 0.0 && sent.innovation_variance >= 0.0;
+        if !right {
             return Err("wants a `sample_time_s` above 0 and an `innovation_variance` of 0 or more".to_owned());
         }
         Ok(StateSpace {

@@ -48,7 +48,8 @@ impl Products {
         let (correction, left) = own.solved((0..p).map(|i| after[(i, 0)]).collect());
         let energy = errors.squared_norm_l2();
         // not so either where something is not finite
-        if !(left <= MOST_LEFT * energy) {
+        let little = left <= MOST_LEFT * energy;
+        if !little {
             return None;
         }
         theta.iter_mut().zip(&correction).for_each(|(t, c)| *t += c);
@@ -95,7 +96,8 @@ impl Products {
         for (j, scale) in scale.iter_mut().enumerate() {
             let (own, left) = (whole[(j, j)], rest(j, j));
             if own > 0.0 {
-                if !(left * self.least_pivot >= LEAST_KEPT * own) {
+                let enough = left * self.least_pivot >= LEAST_KEPT * own;
+                if !enough {
                     return None;
                 }
                 *scale = left.sqrt().recip();
@@ -126,7 +128,8 @@ fn factor(mut matrix: Mat<f64>) -> Option<(Mat<f64>, f64)> {
     let mut least = 1.0_f64;
     for k in 0..n {
         let pivot = matrix[(k, k)];
-        if !(pivot >= LEAST_PIVOT) {
+        let clear = pivot >= LEAST_PIVOT;
+        if !clear {
             return None;
         }
         least = least.min(pivot);
