@@ -1,8 +1,11 @@
 //! What a stage in another language costs beside its own work: an array there and back, in a process that is already running.
+//! `with_echo` less `without` less `echo_alone`, which is the plugin's own reading, writing and answering.
 //!
 //! Wants the Python of `make test-deps`.
 
+use std::io::{BufRead, BufReader, Lines, Write};
 use std::path::Path;
+use std::process::{Child, ChildStdout, Command, Stdio};
 
 use afmid_pipeline::cache::Cache;
 use afmid_pipeline::runner::{Options, Quiet, run};
@@ -13,6 +16,7 @@ use afmid_pipeline::{
 use criterion::{Criterion, criterion_group, criterion_main};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 const SAMPLES: usize = 8192;
@@ -71,6 +75,62 @@ fn plan(folder: &Path, plugin: bool) -> Plan {
     graph::load(&folder.join("b.toml").display().to_string(), &text, &[], &registry).expect("a right config")
 }
 
+/// The plugin's own work: the same request again and again, sent to it without afmid, its input file ready.
+struct Alone {
+    child: Child,
+    lines: Lines<BufReader<ChildStdout>>,
+    request: String,
+}
+
+impl Alone {
+    fn start(folder: &Path) -> Self {
+        let (input, output) = (folder.join("in.h5"), folder.join("out.h5"));
+        let python = Path::new(ROOT).join(".tools/bin/python");
+        let names = ["time", "a", "b", "c"];
+        let made = format!(
+            "import h5py, numpy\nwith h5py.File({input:?}, 'w') as f:\n    for name in {names:?}: f[name] = numpy.arange({SAMPLES}) * 1.5"
+        );
+        assert!(Command::new(&python).args(["-c", &made]).status().expect("python starts").success());
+        let mut child = Command::new(&python)
+            .arg(folder.join("echo.py"))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("python starts");
+        let lines = BufReader::new(child.stdout.take().expect("a pipe")).lines();
+        let axis = json!({ "name": "time", "unit": "s", "long_name": "", "length": SAMPLES, "values": "/time" });
+        let variable = |name: &str| json!({ "name": name, "unit": "V", "long_name": "", "dims": ["time"], "kind": "real", "values": format!("/{name}") });
+        let variables: Vec<_> = names[1..].iter().map(|name| variable(name)).collect();
+        let array =
+            json!({ "shape": "array", "file": input, "axes": [axis], "variables": variables, "attributes": {} });
+        let parameters = json!({ "scale": 1.0, "steps": 0, "mode": "plain", "table": "" });
+        let params = json!({ "parameters": parameters, "seed": null, "base": folder, "inputs": { "array": array }, "output": output });
+        let request = json!({ "id": 1, "method": "run", "params": params }).to_string();
+        let mut alone = Self { child, lines, request };
+        assert!(alone.line().contains("afmid_stage"), "a handshake");
+        alone
+    }
+
+    fn line(&mut self) -> String {
+        self.lines.next().expect("a line").expect("text")
+    }
+
+    fn ask(&mut self) {
+        let input = self.child.stdin.as_mut().expect("a pipe");
+        writeln!(input, "{}", self.request).expect("it reads");
+        let answer = self.line();
+        assert!(answer.contains("outputs"), "{answer}");
+    }
+}
+
+impl Drop for Alone {
+    fn drop(&mut self) {
+        // it ends when its input does
+        drop(self.child.stdin.take());
+        let _ = self.child.wait();
+    }
+}
+
 fn overhead(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
     let cache = Cache::open(&folder.path().join("cache")).expect("a cache");
@@ -88,6 +148,8 @@ fn overhead(c: &mut Criterion) {
         };
         group.bench_function(name, |b| b.iter(|| run(&plan, &options).expect("it runs")));
     }
+    let mut alone = Alone::start(folder.path());
+    group.bench_function("echo_alone", |b| b.iter(|| alone.ask()));
     group.finish();
 }
 
