@@ -8,12 +8,13 @@ use std::process::{Command, Output};
 use common::{ROOT, number};
 use serde_json::Value;
 
-/// afmid with the Python of `make test-deps` first on the PATH.
+/// afmid with `bin` of the working folder and the Python of `make test-deps` first on the PATH.
 fn afmid(here: &Path, arguments: &[&str]) -> Output {
     let bin = Path::new(ROOT).join(".tools/bin");
     assert!(bin.join("python3").exists(), "{} has no python3: run `make test-deps`", bin.display());
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let path = std::env::join_paths([bin].into_iter().chain(std::env::split_paths(&path))).expect("a PATH");
+    let first = [here.join("bin"), bin];
+    let path = std::env::join_paths(first.into_iter().chain(std::env::split_paths(&path))).expect("a PATH");
     let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
     command.current_dir(here).args(arguments).env("PATH", path).env("PYTHONDONTWRITEBYTECODE", "1");
     command.output().expect("afmid starts")
@@ -118,4 +119,22 @@ fn a_broken_plugin_fails_with_what_is_wrong_and_the_exit_code_says_so() {
     let failed =
         all["checks"].as_array().expect("a list").iter().find(|check| check["passed"] == false).expect("a failure");
     assert!(failed["said"].as_str().is_some_and(|said| said.contains("wrong_length.py")), "{failed}");
+}
+
+#[test]
+fn a_program_on_the_path_is_a_plugin_by_its_name() {
+    use std::os::unix::fs::PermissionsExt;
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let program = here.join("bin/afmid-stage-echo");
+    std::fs::create_dir(here.join("bin")).expect("a folder");
+    let script = Path::new(ROOT).join("tests/plugins/echo.py");
+    std::fs::write(&program, format!("#!/bin/sh\nexec python3 '{}'\n", script.display())).expect("a program");
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("an executable");
+    let config =
+        "[pipeline]\nname = \"echo\"\n[[stage]]\nid = \"echo\"\nuses = \"exec:echo\"\nparams = { steps = 2 }\n";
+    std::fs::write(here.join("echo.toml"), config).expect("a config");
+    told(here, &["run", "echo.toml", "-o", "e.h5", "--cache", "cache"]);
+    let shown: Value = serde_json::from_str(&told(here, &["show", "e.h5", "echo", "--json"])).expect("JSON");
+    assert_eq!(number(find(&shown, "steps").expect("its parameters"), "/steps"), 2.0);
 }
