@@ -75,6 +75,10 @@ impl Source for Grid {
         Ok(self.number.decode(&bytes, self.big_endian))
     }
 
+    fn is_direct(&self) -> bool {
+        matches!(self.store, Store::File(_)) && self.step == self.number.bytes()
+    }
+
     fn kept_bytes(&self) -> u64 {
         match &self.store {
             Store::File(_) => 0,

@@ -56,6 +56,11 @@ pub trait Source: std::fmt::Debug + Send + Sync {
     fn kept_bytes(&self) -> u64 {
         0
     }
+
+    /// Whether a stretch costs what its bytes cost, however often it is asked for: nothing to inflate, to parse or to search.
+    fn is_direct(&self) -> bool {
+        false
+    }
 }
 
 /// A channel of a file.

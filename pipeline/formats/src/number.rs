@@ -89,6 +89,35 @@ impl Number {
         matches!(self, Self::F32 | Self::F64)
     }
 
+    /// Reads `count` numbers that lie side by side: `fill` gets as many bytes as they take. Errors: those of `fill`.
+    ///
+    /// Where this machine has the same type and byte order, they are read to where they stay.
+    pub fn read<E>(
+        self,
+        count: usize,
+        big_endian: bool,
+        fill: impl FnOnce(&mut [u8]) -> Result<(), E>,
+    ) -> Result<Raw, E> {
+        fn filled<T: bytemuck::Pod, E>(
+            count: usize,
+            fill: impl FnOnce(&mut [u8]) -> Result<(), E>,
+        ) -> Result<Vec<T>, E> {
+            let mut numbers = vec![T::zeroed(); count];
+            fill(bytemuck::cast_slice_mut(&mut numbers))?;
+            Ok(numbers)
+        }
+        if big_endian == cfg!(target_endian = "big") {
+            match self {
+                Self::I16 => return filled(count, fill).map(Raw::Int16),
+                Self::I32 => return filled(count, fill).map(Raw::Int32),
+                Self::F32 => return filled(count, fill).map(Raw::Float32),
+                Self::F64 => return filled(count, fill).map(Raw::Float64),
+                _ => {}
+            }
+        }
+        filled(count * self.bytes() as usize, fill).map(|bytes: Vec<u8>| self.decode(&bytes, big_endian))
+    }
+
     /// Decodes numbers that lie side by side; an incomplete last one is left out.
     pub fn decode(self, bytes: &[u8], big_endian: bool) -> Raw {
         let big = big_endian;

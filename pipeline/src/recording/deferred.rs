@@ -58,6 +58,10 @@ impl DeferredSource {
 }
 
 impl Source for DeferredSource {
+    fn is_direct(&self) -> bool {
+        self.reading.is_native() && self.native().is_ok_and(|source| source.is_direct())
+    }
+
     fn read(&self, start: usize, count: usize) -> Result<Raw, FormatError> {
         if self.reading.is_native() {
             return self.native()?.read(start, count);

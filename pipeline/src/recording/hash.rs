@@ -96,7 +96,7 @@ fn inspect_file(path: &Path) -> Result<Inspected, StageError> {
 
 fn inspect(file: &mut File) -> std::io::Result<Inspected> {
     let (mut hasher, mut guard) = (blake3::Hasher::new(), HeapGuard::default());
-    let mut buffer = vec![0; 1 << 18];
+    let mut buffer = vec![0; 1 << 16];
     loop {
         let count = file.read(&mut buffer)?;
         if count == 0 {

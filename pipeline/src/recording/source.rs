@@ -66,6 +66,10 @@ impl Source for Hdf5Source {
             Place::Contiguous { .. } | Place::Library => LIBRARY_SLICE,
         }
     }
+
+    fn is_direct(&self) -> bool {
+        matches!(self.place, Place::Contiguous { .. })
+    }
 }
 
 impl Hdf5Source {
@@ -76,21 +80,18 @@ impl Hdf5Source {
         if count == 0 {
             return Ok(self.kind.decode(&[], self.big_endian));
         }
-        if self.place == Place::Library {
-            return self.read_by_library(start, end);
-        }
         let file = self.open()?;
-        let sample = self.kind.bytes() as usize;
-        let bytes = match &self.place {
+        match &self.place {
             Place::Contiguous { offset } => {
-                self.read_bytes(&file, offset + start as u64 * self.kind.bytes(), count * sample)?
+                let at = offset + start as u64 * self.kind.bytes();
+                self.kind.read(count, self.big_endian, |bytes| self.fill(&file, at, bytes))
             }
             Place::Chunked { length, chunks, filters } => {
-                self.read_chunks(&file, start, end, *length, chunks, filters)?
+                let bytes = self.read_chunks(&file, start, end, *length, chunks, filters)?;
+                Ok(self.kind.decode(&bytes, self.big_endian))
             }
-            Place::Library => Vec::new(),
-        };
-        Ok(self.kind.decode(&bytes, self.big_endian))
+            Place::Library => self.read_by_library(start, end),
+        }
     }
 
     fn error(&self, problem: impl std::fmt::Display) -> StageError {
@@ -109,11 +110,10 @@ impl Hdf5Source {
         Ok(file)
     }
 
-    fn read_bytes(&self, file: &File, offset: u64, count: usize) -> Result<Vec<u8>, StageError> {
-        let mut bytes = vec![0; count];
-        file.read_exact_at(&mut bytes, offset)
-            .map_err(|error| self.error(format!("{count} bytes at {offset} cannot be read: {error}")))?;
-        Ok(bytes)
+    fn fill(&self, file: &File, offset: u64, bytes: &mut [u8]) -> Result<(), StageError> {
+        let count = bytes.len();
+        file.read_exact_at(bytes, offset)
+            .map_err(|error| self.error(format!("{count} bytes at {offset} cannot be read: {error}")))
     }
 
     fn read_chunks(
@@ -130,7 +130,8 @@ impl Hdf5Source {
         for index in start / length..=(end - 1) / length {
             let place = chunks.get(index).ok_or_else(|| self.error(format!("chunk {index} is missing")))?;
             let chunk = recent::chunk((self.number, index), || {
-                let stored = self.read_bytes(file, place.offset, place.bytes)?;
+                let mut stored = vec![0; place.bytes];
+                self.fill(file, place.offset, &mut stored)?;
                 undo_filters(stored, filters, place.skipped_filters, sample, length * sample)
                     .map_err(|problem| self.error(format!("damaged near sample {}: {problem}", index * length)))
             })?;

@@ -76,8 +76,9 @@ fn own(path: &Path, head: &[u8]) -> std::io::Result<bool> {
 }
 
 fn head(path: &Path) -> std::io::Result<Vec<u8>> {
-    let mut head = Vec::new();
-    File::open(path)?.take(HEAD).read_to_end(&mut head)?;
+    let file = File::open(path)?;
+    let mut head = Vec::with_capacity(file.metadata()?.len().min(HEAD) as usize);
+    file.take(HEAD).read_to_end(&mut head)?;
     Ok(head)
 }
 

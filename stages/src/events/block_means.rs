@@ -57,6 +57,11 @@ impl BlockMeans {
         Self { block_samples, scale, fill, means: Vec::new(), pending: Vec::new(), samples: 0, missing: 0 }
     }
 
+    /// Makes room for the means of `samples` more samples; for a million means at most, as a file may claim anything.
+    pub fn reserve(&mut self, samples: usize) {
+        self.means.reserve((samples / self.block_samples).min(1 << 20));
+    }
+
     /// Adds the next chunk, of any length.
     pub fn push<S: Sample>(&mut self, chunk: &[S]) {
         self.samples += chunk.len();
@@ -72,7 +77,6 @@ impl BlockMeans {
         }
         let blocks = rest.chunks_exact(self.block_samples);
         self.pending.extend(blocks.remainder().iter().map(|sample| sample.value()));
-        self.means.reserve(blocks.len());
         let factor = self.scale / self.block_samples as f64;
         for block in blocks {
             let sum = S::number(S::sum(block));

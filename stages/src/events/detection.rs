@@ -107,12 +107,14 @@ pub fn detect(means: &[f32], settings: &DetectionSettings) -> Detection {
     if means.len() < 3 {
         return Detection::default();
     }
-    let step_noise = step_noise(&compensated_steps(means), settings);
+    let mut steps = compensated_steps(means);
+    let step_noise = step_noise(&steps, settings);
     let threshold = settings.significance * step_noise;
-    let mut means = means.to_vec();
-    despike(&mut means, threshold);
-    let means = &means[..];
-    let steps = compensated_steps(means);
+    let mut bridged = means.to_vec();
+    if !despike(&mut bridged, threshold).is_empty() {
+        steps = compensated_steps(&bridged);
+    }
+    let means = &bridged[..];
     let nulls = null_scales(means, settings, step_noise);
     let edges = edges(&steps, threshold);
     let mut detection = Detection { step_noise, jump_noise: nulls.jump, ..Detection::default() };
@@ -145,16 +147,18 @@ fn judge(change: &LevelChange, nulls: &NullScales, significance: f64) -> Result<
 
 /// Step round each block, `b[k+1] - b[k-1]`, less twice the mean slope of the `MEMORY_BLOCKS` before.
 fn compensated_steps(means: &[f32]) -> Vec<f64> {
-    let at = |k: usize| f64::from(means[k]);
-    let mut steps = vec![0.0; means.len()];
-    for (k, step) in steps.iter_mut().enumerate().take(means.len().saturating_sub(1)).skip(1) {
-        let slope = match k.checked_sub(MEMORY_BLOCKS + 4) {
-            // the sum of the steps before telescopes
-            Some(first) => (at(k - 3) + at(k - 4) - at(first + 1) - at(first)) / (MEMORY_BLOCKS as f64),
-            None => 0.0,
-        };
-        *step = at(k + 1) - at(k - 1) - slope;
-    }
+    const BEFORE: usize = MEMORY_BLOCKS + 4;
+    let mut steps = Vec::with_capacity(means.len());
+    steps.push(0.0);
+    let uncompensated = means.windows(3).take(BEFORE - 1);
+    steps.extend(uncompensated.map(|around| f64::from(around[2]) - f64::from(around[0])));
+    // the sum of the steps before telescopes
+    steps.extend(means.windows(BEFORE + 2).map(|around| {
+        let at = |k: usize| f64::from(around[k]);
+        let slope = (at(BEFORE - 3) + at(BEFORE - 4) - at(1) - at(0)) / (MEMORY_BLOCKS as f64);
+        at(BEFORE + 1) - at(BEFORE - 1) - slope
+    }));
+    steps.resize(means.len(), 0.0);
     steps
 }
 

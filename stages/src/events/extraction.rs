@@ -56,7 +56,7 @@ pub struct Extraction {
     pub refused: Vec<Refused>,
 }
 
-/// Samples of a record that are kept while it is searched; a longer record is read again round its events.
+/// Samples of a record that are kept while it is searched; a longer record is read again round its events, as is one that costs nothing to decode.
 const KEPT_SAMPLES: usize = 1 << 24;
 
 /// Samples over which the line before an onset is fitted.
@@ -74,8 +74,8 @@ struct Samples<'a> {
 /// # Method
 /// One pass over the chunks for the block means, [`detect`], then round each candidate the first sustained departure from the
 /// line before it. A window that leaves the record, holds another event, missing samples, or samples at the converter's full
-/// scale, is refused. Memory: the record's own samples as stored (at most 32 MB of int16; longer ones are read twice), and the
-/// segments.
+/// scale, is refused. Memory: the record's own samples as stored if they are to be inflated or parsed (at most 32 MB of int16; others are read
+/// again round the candidates), and the segments.
 /// # Errors
 /// Those of the channel's source.
 pub fn extract(channel: &Channel, settings: &ExtractionSettings) -> Result<Extraction, StageError> {
@@ -112,8 +112,9 @@ pub fn extract(channel: &Channel, settings: &ExtractionSettings) -> Result<Extra
 fn scan(channel: &Channel, block_samples: usize) -> Result<(Samples<'_>, BlockMeans), StageError> {
     let chunk_samples = channel.source.preferred_samples().max(1);
     let mut means = BlockMeans::new(block_samples, channel.scale_factor, channel.fill_code);
+    means.reserve(channel.samples);
     let mut kept = Vec::new();
-    let keep = channel.samples <= KEPT_SAMPLES;
+    let keep = channel.samples <= KEPT_SAMPLES && !channel.source.is_direct();
     for start in (0..channel.samples).step_by(chunk_samples) {
         let raw = channel.read_raw(start, chunk_samples.min(channel.samples - start))?;
         match &raw {
@@ -122,7 +123,7 @@ fn scan(channel: &Channel, block_samples: usize) -> Result<(Samples<'_>, BlockMe
             Raw::Float32(values) => means.push(values),
             Raw::Float64(values) => means.push(values),
         }
-        // of a long record the first chunk alone: it tells codes from floats
+        // otherwise the first chunk alone: it tells codes from floats
         if keep || start == 0 {
             kept.push(raw);
         }

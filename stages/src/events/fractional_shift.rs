@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use pulp::Simd;
+
 /// Samples that the kernel reaches to either side.
 pub const REACH: usize = 32;
 
@@ -74,25 +76,61 @@ fn convolve(values: &[f64], first: i64, count: usize, weights: &[f64]) -> Vec<f6
     if let Ok(from) = usize::try_from(from)
         && let Some(stretch) = values.get(from..from + count + window - 1)
     {
-        return stretch.windows(window).map(|part| dot(part, weights)).collect();
+        return weighted_sums(stretch, weights);
     }
     let at = |index: i64| match usize::try_from(index) {
         Err(_) => values[0],
         Ok(index) => values.get(index).copied().unwrap_or(last),
     };
     let held: Vec<f64> = (from..from + (count + window) as i64 - 1).map(at).collect();
-    held.windows(window).map(|part| dot(part, weights)).collect()
+    weighted_sums(&held, weights)
 }
 
-/// Four running sums, in a fixed order: faster than one, and the same on every machine.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    for (a, b) in a.chunks_exact(4).zip(b.chunks_exact(4)) {
-        for lane in 0..4 {
-            sums[lane] += a[lane] * b[lane];
+/// `out[k] = sum_j weights[j] values[k + j]`, wherever all of these are.
+fn weighted_sums(values: &[f64], weights: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; (values.len() + 1).saturating_sub(weights.len())];
+    pulp::Arch::new().dispatch(Sums { values, weights, out: &mut out });
+    out
+}
+
+/// Carries the sums to the vector units: each lane has its own, so their order is that of the weights in every one.
+struct Sums<'a> {
+    values: &'a [f64],
+    weights: &'a [f64],
+    out: &'a mut [f64],
+}
+
+/// Vectors of sums at once: enough to hide the latency of an addition.
+const VECTORS: usize = 8;
+
+impl pulp::WithSimd for Sums<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { values, weights, out } = self;
+        let width = VECTORS * S::F64_LANES;
+        for (first, out) in (0..).step_by(width).zip(out.chunks_mut(width)) {
+            if out.len() < width {
+                for (k, out) in (first..).zip(out) {
+                    let products = values[k..].iter().zip(weights);
+                    *out = products.fold(0.0, |sum, (value, weight)| f64::mul_add(*value, *weight, sum));
+                }
+                break;
+            }
+            let mut sums = [simd.splat_f64s(0.0); VECTORS];
+            for (j, &weight) in weights.iter().enumerate() {
+                let weight = simd.splat_f64s(weight);
+                let (values, _) = S::as_simd_f64s(&values[first + j..first + j + width]);
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum = simd.mul_add_e_f64s(*value, weight, *sum);
+                }
+            }
+            for (out, sum) in out.chunks_exact_mut(S::F64_LANES).zip(sums) {
+                simd.partial_store_f64s(out, sum);
+            }
         }
     }
-    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
 /// Modified Bessel function of the first kind, order 0, by its power series (converges for every argument; 30 terms at 10).
