@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use afmid_pipeline::Plan;
-use afmid_pipeline::cache::{Cache, write_result};
-use afmid_pipeline::runner::{Options, Quiet, RunError, run, run_key};
+use afmid_pipeline::cache::Cache;
+use afmid_pipeline::runner::{Failed, Options, Quiet, RunError, run_key, run_to_file};
 use afmid_pipeline::store::is_own;
 
 use super::harvest::{harvest, numbers};
@@ -105,8 +105,10 @@ impl Work<'_> {
             overrides: plan.config.overrides.clone(),
             observer: &Quiet,
         };
-        let result = run(plan, &options).map_err(|errors| told(&errors))?;
-        write_result(&path, &result).map_err(|error| error.to_string())?;
+        let result = run_to_file(plan, &options, &path).map_err(|failed| match failed {
+            Failed::Stages(errors) => told(&errors),
+            Failed::File(error) => error.to_string(),
+        })?;
         let mut found = harvest(&result);
         if self.as_run {
             found.numbers = numbers(&result);

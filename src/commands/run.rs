@@ -4,8 +4,8 @@ use std::num::NonZeroU16;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::Registry;
-use afmid_pipeline::cache::{Cache, write_result};
-use afmid_pipeline::runner::{Options, RunError, run as run_plan};
+use afmid_pipeline::cache::Cache;
+use afmid_pipeline::runner::{Failed, Options, RunError, run as run_plan, run_to_file};
 use afmid_pipeline::{Plan, RunResult};
 use serde_json::{Value, json};
 
@@ -30,21 +30,21 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
     let output = args.output.clone().unwrap_or_else(|| default_output(plan.name()));
     prepare(&output, Target::Result, &inputs(&plan, &args.config.config))?;
     let cache = open_cache(args.cache.as_deref())?;
-    let result = compute(
-        &plan,
-        &Computation {
-            base: plan.config.base(),
-            cache: &cache,
-            fresh: args.fresh,
-            jobs: args.jobs,
-            overrides: &plan.config.overrides,
-        },
-    );
+    let computation = Computation {
+        base: plan.config.base(),
+        cache: &cache,
+        fresh: args.fresh,
+        jobs: args.jobs,
+        overrides: &plan.config.overrides,
+    };
+    let result = computation.run(|options| run_to_file(&plan, options, &output));
     for note in cache.take_notes() {
         say(&format!("note: {note}\n"));
     }
-    let result = result?;
-    write_result(&output, &result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    let result = result?.map_err(|failed| match failed {
+        Failed::Stages(errors) => stages_failed(&errors),
+        Failed::File(error) => Failure::failed(&error, error.help.clone()),
+    })?;
     if args.json {
         return print(&pretty(&as_json(&output, &result))?);
     }
@@ -75,27 +75,34 @@ pub struct Computation<'a> {
     pub overrides: &'a [String],
 }
 
-/// Computes a plan with progress on stderr. Errors: those of its stages.
-pub fn compute(plan: &Plan, how: &Computation) -> Result<RunResult, Failure> {
-    let observer = observer();
-    let options = Options {
-        base: how.base.to_owned(),
-        cache: how.cache,
-        fresh: how.fresh,
-        program: PROGRAM.to_owned(),
-        overrides: how.overrides.to_vec(),
-        observer: observer.as_ref(),
-    };
-    // 0: as many as there are processors
-    let threads = how.jobs.map_or(0, |jobs| usize::from(jobs.get()));
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|error| Failure::failed(format!("no threads can be started: {error}"), None))?;
-    pool.install(|| run_plan(plan, &options)).map_err(|errors| Failure::Failed(Message::Rendered(rendered(&errors))))
+impl Computation<'_> {
+    /// Runs `work` on its threads, with progress on stderr. Errors: there are no threads.
+    fn run<T: Send>(&self, work: impl FnOnce(&Options<'_>) -> T + Send) -> Result<T, Failure> {
+        let observer = observer();
+        let options = Options {
+            base: self.base.to_owned(),
+            cache: self.cache,
+            fresh: self.fresh,
+            program: PROGRAM.to_owned(),
+            overrides: self.overrides.to_vec(),
+            observer: observer.as_ref(),
+        };
+        // 0: as many as there are processors
+        let threads = self.jobs.map_or(0, |jobs| usize::from(jobs.get()));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|error| Failure::failed(format!("no threads can be started: {error}"), None))?;
+        Ok(pool.install(|| work(&options)))
+    }
 }
 
-fn rendered(errors: &[RunError]) -> String {
+/// Computes a plan with progress on stderr. Errors: those of its stages.
+pub fn compute(plan: &Plan, how: &Computation) -> Result<RunResult, Failure> {
+    how.run(|options| run_plan(plan, options))?.map_err(|errors| stages_failed(&errors))
+}
+
+fn stages_failed(errors: &[RunError]) -> Failure {
     let help = |error: &RunError| error.error.help.as_ref().map(|help| format!("  help: {help}\n")).unwrap_or_default();
-    errors.iter().map(|error| format!("error: {error}\n{}", help(error))).collect()
+    Failure::Failed(Message::Rendered(errors.iter().map(|error| format!("error: {error}\n{}", help(error))).collect()))
 }
 
 /// How many stages were reused.

@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use super::names::{Kind, STAMPS, kind_of};
 use super::origin::Origin;
-use super::replace::{replace_file, sweep};
+use super::replace::{PendingStage, replace_file, sweep};
 use crate::recording::keep_stamps_in;
 use crate::runner::StageResult;
 use crate::store::{StoreError, read_stage, write_stage};
@@ -87,12 +87,17 @@ impl Cache {
 
     /// Keeps a result with its origin. Errors: as [`Cache::put`].
     pub fn put_with_origin(&self, origin: &Origin, result: &StageResult) -> Result<(), StoreError> {
+        self.write_with_origin(origin, result)?.finish()
+    }
+
+    /// The first half of [`Cache::put_with_origin`]: the file is written, and not yet what the cache has under its key. Errors: as there.
+    pub(crate) fn write_with_origin(&self, origin: &Origin, result: &StageResult) -> Result<PendingStage, StoreError> {
         self.make_folder()?;
         // only explanations need it: a run does not fail for it
         if let Err(error) = origin.write(&self.origin_path(&origin.key)) {
             self.note(format!("where a result comes from was not kept: {error}"));
         }
-        self.put(&origin.key, result)
+        PendingStage::write(&self.path(&origin.key), result)
     }
 
     /// The origin of the result with this key, whether the result is still there or not.

@@ -21,6 +21,6 @@ pub use folder::Cache;
 pub use free::{Freed, Gone, Limits, Why, free};
 pub use key::{KeyParts, key};
 pub use origin::{Origin, OriginFile, OriginInput};
+pub(crate) use replace::{PendingResult, PendingStage, replace_unsynced, temporary_path};
 pub use replace::{probe, replace_file, replace_with, sweep, write_result};
-pub(crate) use replace::{replace_unsynced, temporary_path};
 pub use stock::{Sort, Stock, Stored};

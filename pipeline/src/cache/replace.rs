@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
-use crate::runner::RunResult;
-use crate::store::{self, StoreError};
+use crate::runner::{RunInfo, RunResult, StageRecord, StageResult};
+use crate::store::{self, ResultWriter, RunHead, StoreError};
 
 /// A temporary file that nobody has touched for a day has no owner any more.
 const STALE: Duration = Duration::from_secs(24 * 3600);
@@ -17,26 +17,54 @@ const STALE: Duration = Duration::from_secs(24 * 3600);
 /// `write` gets a name of its own in the same folder and leaves a closed file there.
 /// Errors: those of `write`; the folder is missing or cannot be written.
 pub fn replace_file(path: &Path, write: impl FnOnce(&Path) -> Result<(), StoreError>) -> Result<(), StoreError> {
-    let folder = folder_of(path);
-    let temporary = temporary_path(path);
-    let io = |doing: &str, error: &std::io::Error| StoreError::io(doing, path, error);
-    if !folder.is_dir() {
-        return Err(StoreError::new("its folder does not exist").file(path).help("make the folder first"));
+    let replacement = Replacement::new(path)?;
+    let written = write(&replacement.temporary);
+    replacement.take(written)
+}
+
+/// A file that is going to take another's place; dropped before, it is removed.
+struct Replacement {
+    path: PathBuf,
+    temporary: PathBuf,
+}
+
+impl Replacement {
+    /// Nothing is written yet. Errors: the folder is missing.
+    fn new(path: &Path) -> Result<Self, StoreError> {
+        if !folder_of(path).is_dir() {
+            return Err(StoreError::new("its folder does not exist").file(path).help("make the folder first"));
+        }
+        Ok(Self { path: path.to_owned(), temporary: temporary_path(path) })
     }
-    let written = write(&temporary)
-        .and_then(|()| {
-            File::open(&temporary).and_then(|file| file.sync_all()).map_err(|error| io("cannot be synced", &error))
-        })
-        .and_then(|()| fs::rename(&temporary, path).map_err(|error| io("cannot be renamed", &error)));
-    if let Err(error) = written {
-        // nothing more can be done about a file that cannot be removed: the next sweep takes it
-        let _ = fs::remove_file(&temporary);
-        // the temporary name is gone and tells nobody anything
-        let problem = error.problem.replace(&*temporary.to_string_lossy(), &path.to_string_lossy());
-        let file = if error.file == temporary { path.to_owned() } else { error.file };
-        return Err(StoreError { file, problem, ..error });
+
+    /// Takes the place, once it is `written`. Errors: those of writing it; it cannot be synced or renamed.
+    fn take(self, written: Result<(), StoreError>) -> Result<(), StoreError> {
+        let Self { path, temporary } = &self;
+        let io = |doing: &str, error: &std::io::Error| StoreError::io(doing, path, error);
+        written
+            .and_then(|()| {
+                File::open(temporary).and_then(|file| file.sync_all()).map_err(|error| io("cannot be synced", &error))
+            })
+            .and_then(|()| fs::rename(temporary, path).map_err(|error| io("cannot be renamed", &error)))
+            .map_err(|error| self.told(error))?;
+        File::open(folder_of(path))
+            .and_then(|folder| folder.sync_all())
+            .map_err(|error| io("its folder cannot be synced", &error))
     }
-    File::open(folder).and_then(|folder| folder.sync_all()).map_err(|error| io("its folder cannot be synced", &error))
+
+    /// The error without the temporary name, which is gone then and tells nobody anything.
+    fn told(&self, error: StoreError) -> StoreError {
+        let problem = error.problem.replace(&*self.temporary.to_string_lossy(), &self.path.to_string_lossy());
+        let file = if error.file == self.temporary { self.path.clone() } else { error.file };
+        StoreError { file, problem, ..error }
+    }
+}
+
+impl Drop for Replacement {
+    fn drop(&mut self) {
+        // renamed, never made, or in the way of nobody: the next sweep takes what cannot be removed
+        let _ = fs::remove_file(&self.temporary);
+    }
 }
 
 /// As [`replace_file`], for files that are none of the store's. Errors: those of `fill`, and as there.
@@ -64,11 +92,71 @@ pub fn probe(path: &Path) -> std::io::Result<()> {
 
 /// Writes a run's result file, whole or not at all, and sweeps what killed runs left beside it. Errors: as [`replace_file`].
 pub fn write_result(path: &Path, run: &RunResult) -> Result<(), StoreError> {
-    let prefix = format!(".{}.", file_name(path));
-    sweep(folder_of(path), &prefix);
+    sweep_beside(path);
     replace_file(path, |temporary| {
         store::write_result(temporary, run).map_err(|error| StoreError { file: path.to_owned(), ..error })
     })
+}
+
+/// A result file in the making: what is at its path stays until it is whole. As [`write_result`], stage by stage.
+pub(crate) struct PendingResult {
+    // before the replacement, which removes the file
+    writer: ResultWriter,
+    replacement: Replacement,
+}
+
+impl PendingResult {
+    /// Begins the file beside `path`. Errors: as [`replace_file`].
+    pub(crate) fn new(path: &Path, run: &RunHead) -> Result<Self, StoreError> {
+        sweep_beside(path);
+        let replacement = Replacement::new(path)?;
+        match ResultWriter::new(&replacement.temporary, run) {
+            Ok(writer) => Ok(Self { writer, replacement }),
+            Err(error) => Err(replacement.told(error)),
+        }
+    }
+
+    /// The place in the plan of the stage that is to be written next. None: all are written.
+    pub(crate) fn wanted(&self) -> Option<usize> {
+        self.writer.wanted()
+    }
+
+    /// Writes the stage that is wanted. Errors: the file cannot be written; an artifact is not valid.
+    pub(crate) fn stage(&mut self, stage: &StageRecord) -> Result<(), StoreError> {
+        self.writer.stage(stage).map_err(|error| self.replacement.told(error))
+    }
+
+    /// Puts the whole file in its place. Errors: as [`replace_file`].
+    pub(crate) fn finish(self, info: &RunInfo) -> Result<(), StoreError> {
+        let Self { writer, replacement } = self;
+        let written = writer.finish(info);
+        replacement.take(written)
+    }
+}
+
+/// A stage's file that is written, and not yet sealed, synced and in its place.
+pub(crate) struct PendingStage(Replacement);
+
+impl PendingStage {
+    /// Writes the file beside `path`. Errors: as [`replace_file`]; an artifact is not valid.
+    pub(super) fn write(path: &Path, result: &StageResult) -> Result<Self, StoreError> {
+        let replacement = Replacement::new(path)?;
+        match store::write_unsealed_stage(&replacement.temporary, result) {
+            Ok(()) => Ok(Self(replacement)),
+            Err(error) => Err(replacement.told(error)),
+        }
+    }
+
+    /// Seals and syncs the file and puts it in its place: nothing here waits for the HDF5 library. Errors: as [`replace_file`].
+    pub(crate) fn finish(self) -> Result<(), StoreError> {
+        let sealed = store::seal(&self.0.temporary);
+        self.0.take(sealed)
+    }
+}
+
+/// Sweeps what killed runs left beside a result file.
+fn sweep_beside(path: &Path) {
+    sweep(folder_of(path), &format!(".{}.", file_name(path)));
 }
 
 fn folder_of(path: &Path) -> &Path {

@@ -1,6 +1,16 @@
 //! A run that failed: which stage, which port, why.
 
 use crate::error::StageError;
+use crate::store::StoreError;
+
+/// Why a run left no result file.
+#[derive(Debug)]
+pub enum Failed {
+    /// Stages failed, in the plan's order.
+    Stages(Vec<RunError>),
+    /// All stages went through, and the file cannot be written.
+    File(StoreError),
+}
 
 /// A stage that failed. The runner adds what a stage does not know of itself.
 #[derive(Debug, thiserror::Error)]

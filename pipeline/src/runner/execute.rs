@@ -1,19 +1,20 @@
 //! One run of a plan.
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use super::error::RunError;
+use super::error::{Failed, RunError};
+use super::keeper::{Made, keep};
 use super::keys::plan_node;
 use super::result::{RunInfo, RunResult, StageRecord, StageResult};
 use super::schedule::{Board, Outcome, run_graph};
-use crate::cache::{Cache, Origin};
+use crate::cache::{Cache, Origin, PendingResult};
 use crate::error::StageError;
 use crate::graph::{Node, Plan};
 use crate::rows::Scratch;
 use crate::stage::{Caching, Context, Ports, Progress};
+use crate::store::{RunHead, StoreError};
 
 /// Who watches a run. Called from several threads.
 pub trait Observer: Send + Sync {
@@ -65,29 +66,45 @@ struct Finished {
 /// was computed in the last moments, and the run ends when all is kept and synced.
 /// Errors: all stages that failed or whose results cannot be kept, in the plan's order; independent stages are finished first.
 pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError>> {
+    perform(plan, options, None::<fn() -> _>).map(|(result, _)| result)
+}
+
+/// As [`run`], and writes the result file, each stage as soon as those before it are written: whole or not at all, as [`crate::cache::write_result`].
+///
+/// Errors: those of [`run`]; the file cannot be written.
+pub fn run_to_file(plan: &Plan, options: &Options<'_>, path: &Path) -> Result<RunResult, Failed> {
+    let ids: Vec<&str> = plan.nodes.iter().map(|node| node.id.as_str()).collect();
+    let needs = needs(plan);
+    let begin = || {
+        let (name, config) = (plan.name(), plan.config_text());
+        let Options { overrides, program, .. } = options;
+        PendingResult::new(
+            path,
+            &RunHead { name, seed: plan.seed(), config, overrides, program, ids: &ids, needs: &needs },
+        )
+    };
+    let (result, file) = perform(plan, options, Some(begin)).map_err(Failed::Stages)?;
+    if let Some(file) = file {
+        file.and_then(|file| file.finish(&result.info)).map_err(Failed::File)?;
+    }
+    Ok(result)
+}
+
+/// A run, and its result file but for its end, if `begin` makes one.
+fn perform(
+    plan: &Plan,
+    options: &Options<'_>,
+    begin: Option<impl FnOnce() -> Result<PendingResult, StoreError> + Send>,
+) -> Result<(RunResult, Option<Result<PendingResult, StoreError>>), Vec<RunError>> {
     let (started, clock) = (jiff::Timestamp::now(), Instant::now());
-    let needs: Vec<Vec<usize>> = plan
-        .nodes
-        .iter()
-        .map(|node| {
-            let mut sources: Vec<usize> = node.inputs.iter().map(|wire| wire.node).collect();
-            sources.sort_unstable();
-            sources.dedup();
-            sources
-        })
-        .collect();
+    let needs = needs(plan);
     let failed = |index: usize, error: StageError| {
         let node = &plan.nodes[index];
         RunError { id: node.id.clone(), uses: node.uses.clone(), error: Box::new(error) }
     };
-    let (outcomes, unkept) = std::thread::scope(|scope| {
-        let (made, keep) = mpsc::channel::<Made>();
-        let keeper = scope.spawn(move || {
-            let kept = |made: &Made| options.cache.put_with_origin(&made.origin, &made.result);
-            keep.iter()
-                .filter_map(|made| kept(&made).err().map(|error| (made.index, error)))
-                .collect::<BTreeMap<_, _>>()
-        });
+    let (outcomes, kept) = std::thread::scope(|scope| {
+        let (made, all) = mpsc::channel::<Made>();
+        let keeper = scope.spawn(move || keep(all, options.cache, begin));
         let outcomes = run_graph(&needs, |index, board| {
             step(plan, index, options, board, &made).map_err(|error| failed(index, error))
         });
@@ -95,10 +112,10 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
         (outcomes, keeper.join())
     });
     // a panic there is a bug like any other: it goes on here
-    let mut unkept = unkept.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    let mut kept = kept.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     let (mut stages, mut times, mut errors, mut logs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (index, outcome) in outcomes.into_iter().enumerate() {
-        if let Some(error) = unkept.remove(&index) {
+        if let Some(error) = kept.unkept.remove(&index) {
             errors.push(failed(index, error.into()));
         }
         match outcome {
@@ -126,7 +143,7 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
         stages: times,
         logs,
     };
-    Ok(RunResult {
+    let result = RunResult {
         name: plan.name().to_owned(),
         seed: plan.seed(),
         config: plan.config_text().to_owned(),
@@ -134,14 +151,19 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
         program: options.program.clone(),
         stages,
         info,
-    })
+    };
+    Ok((result, kept.file))
 }
 
-/// A new result, to be kept.
-struct Made {
-    index: usize,
-    origin: Origin,
-    result: StageResult,
+/// The stages that each stage needs, by their places in the plan.
+fn needs(plan: &Plan) -> Vec<Vec<usize>> {
+    let sources = |node: &Node| {
+        let mut sources: Vec<usize> = node.inputs.iter().map(|wire| wire.node).collect();
+        sources.sort_unstable();
+        sources.dedup();
+        sources
+    };
+    plan.nodes.iter().map(sources).collect()
 }
 
 fn step(
@@ -164,10 +186,6 @@ fn step(
             let scratch = Scratch::beside(&options.cache.path(&planned.key));
             let result;
             (result, log) = execute(node, options, board, planned.seed.unwrap_or_default(), scratch)?;
-            if stored {
-                // the other end lives as long as the run
-                let _ = made.send(Made { index, origin: planned.origin.clone(), result: result.clone() });
-            }
             result
         }
     };
@@ -189,6 +207,9 @@ fn step(
         sources: planned.sources,
         result,
     };
+    let origin = (stored && !cached).then(|| planned.origin.clone());
+    // the other end lives as long as the run
+    let _ = made.send(Made { index, origin, record: record.clone() });
     Ok(Finished { record, origin: planned.origin, seconds: took.as_secs_f64(), cached, log })
 }
 

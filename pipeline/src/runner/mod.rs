@@ -4,6 +4,7 @@ mod changes;
 mod error;
 mod execute;
 mod explain;
+mod keeper;
 mod keys;
 mod result;
 mod schedule;
@@ -11,8 +12,8 @@ mod schedule;
 mod tests;
 
 pub use changes::{Change, changes};
-pub use error::RunError;
-pub use execute::{Observer, Options, Quiet, run};
+pub use error::{Failed, RunError};
+pub use execute::{Observer, Options, Quiet, run, run_to_file};
 pub use explain::{Decision, Explanation, Nearest, explain};
 pub use keys::{StagePlan, run_key, stage_seed};
 pub use result::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};

@@ -1,7 +1,8 @@
 //! Runs the nodes of an acyclic graph, each as soon as what it needs is there.
 
-use std::sync::OnceLock;
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// What became of a node.
 #[derive(Debug)]
@@ -31,6 +32,7 @@ impl<T, E> Board<T, E> {
 
 /// Runs `work(node, board)` for each node once all nodes in `needs[node]` are done; independent nodes run in parallel on rayon's pool.
 ///
+/// What is ready first runs first: a long node at the head of a short branch is not left to the end by the short nodes of a long one.
 /// Model: `needs` is acyclic and refers to smaller indices only (topological order). A node after a failed one is skipped.
 /// The results do not depend on the order in which nodes happen to run, as long as `work` does not.
 pub(super) fn run_graph<T, E, W>(needs: &[Vec<usize>], work: W) -> Vec<Outcome<T, E>>
@@ -47,11 +49,10 @@ where
             feeds[source].push(node);
         }
     }
-    let graph = Graph { needs, feeds: &feeds, waiting: &waiting, board: &board, work: &work };
+    let ready = Mutex::default();
+    let graph = Graph { needs, feeds: &feeds, waiting: &waiting, ready: &ready, board: &board, work: &work };
     rayon::scope(|scope| {
-        for node in (0..needs.len()).filter(|&node| needs[node].is_empty()) {
-            scope.spawn(move |scope| graph.step(scope, node));
-        }
+        (0..needs.len()).filter(|&node| needs[node].is_empty()).for_each(|node| graph.start(scope, node));
     });
     board.slots.into_iter().map(|slot| slot.into_inner().unwrap_or(Outcome::Skipped)).collect()
 }
@@ -60,6 +61,8 @@ struct Graph<'a, T, E, W> {
     needs: &'a [Vec<usize>],
     feeds: &'a [Vec<usize>],
     waiting: &'a [AtomicUsize],
+    /// In the order in which they became so.
+    ready: &'a Mutex<VecDeque<usize>>,
     board: &'a Board<T, E>,
     work: &'a W,
 }
@@ -78,6 +81,15 @@ where
     E: Send + Sync,
     W: Fn(usize, &Board<T, E>) -> Result<T, E> + Sync,
 {
+    /// A node is ready: another task for the pool, which takes whichever has been so for longest.
+    fn start(self, scope: &rayon::Scope<'a>, node: usize) {
+        self.ready.lock().unwrap_or_else(PoisonError::into_inner).push_back(node);
+        scope.spawn(move |scope| {
+            let next = self.ready.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+            next.into_iter().for_each(|node| self.step(scope, node));
+        });
+    }
+
     fn step(self, scope: &rayon::Scope<'a>, node: usize) {
         let outcome = if self.needs[node].iter().all(|&source| self.board.done(source).is_some()) {
             match (self.work)(node, self.board) {
@@ -92,7 +104,7 @@ where
         for &next in &self.feeds[node] {
             // the last source to finish starts the node; AcqRel makes all sources' slots visible to it
             if self.waiting[next].fetch_sub(1, Ordering::AcqRel) == 1 {
-                scope.spawn(move |scope| self.step(scope, next));
+                self.start(scope, next);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Writing result files: everything that a run left behind, in one NeXus file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hdf5::{File, Group};
 use serde_json::Value;
@@ -13,7 +13,7 @@ use super::run_info::write_run_info;
 use super::seal::seal;
 use super::write;
 use crate::artifact::{Artifact, Values};
-use crate::runner::{RunResult, StageRecord};
+use crate::runner::{RunInfo, RunResult, StageRecord};
 use crate::stage::Ports;
 
 pub(super) const KIND: &str = "result";
@@ -29,50 +29,133 @@ pub(super) const GROUPS: &str = "stage_groups";
 ///
 /// Errors: the file exists or cannot be written; an artifact is not valid.
 pub fn write_result(path: &Path, run: &RunResult) -> std::result::Result<(), StoreError> {
-    write_file(path, run).map_err(|error| error.file(path))?;
-    seal(path)
+    let ids: Vec<&str> = run.stages.iter().map(|stage| stage.id.as_str()).collect();
+    let place = |id: &String| ids.iter().position(|own| own == id);
+    let needs = |stage: &StageRecord| stage.wires.iter().filter_map(|(_, source, _)| place(source)).collect();
+    let needs: Vec<Vec<usize>> = run.stages.iter().map(needs).collect();
+    let RunResult { name, seed, config, overrides, program, .. } = run;
+    let head = RunHead { name, seed: *seed, config, overrides, program, ids: &ids, needs: &needs };
+    let mut writer = ResultWriter::new(path, &head)?;
+    while let Some(stage) = writer.wanted().and_then(|index| run.stages.get(index)) {
+        writer.stage(stage)?;
+    }
+    writer.finish(&run.info)
 }
 
-fn write_file(path: &Path, run: &RunResult) -> Result<()> {
-    let file = write::create_file(path)?;
-    write_contents(&file, run)?;
-    Ok(file.close()?)
+/// The order in which stages are written, whatever the order in which they end: those that need nothing, those that need these, and so on. So a run
+/// of several threads seldom waits for one that ends late.
+fn by_depth(needs: &[Vec<usize>]) -> Vec<usize> {
+    let mut depths: Vec<usize> = Vec::new();
+    for sources in needs {
+        // in topological order: the sources have theirs
+        let depth = sources.iter().filter_map(|&source| depths.get(source)).max().map_or(0, |deepest| deepest + 1);
+        depths.push(depth);
+    }
+    let mut order: Vec<usize> = (0..needs.len()).collect();
+    order.sort_by_key(|&index| depths[index]);
+    order
 }
 
-fn write_contents(file: &File, run: &RunResult) -> Result<()> {
-    write_format(file, KIND)?;
-    write::text_attribute(file, "default", ENTRY)?;
-    let entry = write::nexus_group(file, ENTRY, "NXentry")?;
-    write::text(&entry, "title", &run.name)?;
-    write_pipeline(&entry, run)?;
-    let groups = group_names(run.stages.iter().map(|stage| stage.id.as_str()), &RESERVED_STAGE_IDS);
-    let mut default = None;
-    for (index, (stage, group)) in run.stages.iter().zip(&groups).enumerate() {
-        let process = write_stage_record(&entry, group, stage, &run.program)?;
+/// What is known of a run before its stages.
+pub(crate) struct RunHead<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) seed: u64,
+    pub(crate) config: &'a str,
+    pub(crate) overrides: &'a [String],
+    pub(crate) program: &'a str,
+    /// The stages in topological order.
+    pub(crate) ids: &'a [&'a str],
+    /// What each needs, by its place among them.
+    pub(crate) needs: &'a [Vec<usize>],
+}
+
+/// A result file that grows while its stages run: the same bytes as if it were written at the end.
+pub(crate) struct ResultWriter {
+    path: PathBuf,
+    // before the file, which does not close while it lives
+    entry: Group,
+    file: File,
+    program: String,
+    /// Of the stages, in order.
+    groups: Vec<String>,
+    /// The places of those that are still to be written, the next one last.
+    rest: Vec<usize>,
+    /// The last stage in the plan that has something to plot.
+    default: Option<usize>,
+}
+
+impl ResultWriter {
+    /// A new file. Errors: it exists or cannot be written.
+    pub(crate) fn new(path: &Path, run: &RunHead) -> std::result::Result<Self, StoreError> {
+        let begin = || -> Result<Self> {
+            let file = write::create_file(path)?;
+            write_format(&file, KIND)?;
+            write::text_attribute(&file, "default", ENTRY)?;
+            let entry = write::nexus_group(&file, ENTRY, "NXentry")?;
+            write::text(&entry, "title", run.name)?;
+            let groups = group_names(run.ids.iter().copied(), &RESERVED_STAGE_IDS);
+            write_pipeline(&entry, run, &groups)?;
+            let (path, program) = (path.to_owned(), run.program.to_owned());
+            let rest = by_depth(run.needs).into_iter().rev().collect();
+            Ok(Self { path, entry, file, program, groups, rest, default: None })
+        };
+        begin().map_err(|error| error.file(path))
+    }
+
+    /// The place in the plan of the stage that is to be written next. None: all are written.
+    pub(crate) fn wanted(&self) -> Option<usize> {
+        self.rest.last().copied()
+    }
+
+    /// Writes the stage that is wanted. Errors: the file cannot be written; an artifact is not valid.
+    pub(crate) fn stage(&mut self, stage: &StageRecord) -> std::result::Result<(), StoreError> {
+        self.write_stage(stage).map_err(|error| error.file(&self.path))
+    }
+
+    fn write_stage(&mut self, stage: &StageRecord) -> Result<()> {
+        let Some((index, group)) = self.rest.pop().and_then(|index| Some((index, self.groups.get(index)?))) else {
+            return Err(StoreError::new(format!("`{}` is one stage too many", stage.id)));
+        };
+        let process = write_stage_record(&self.entry, group, stage, &self.program)?;
         write::scalar(&process, "sequence_index", index as i64 + 1)?;
         if let Some(port) = default_port(&stage.result.outputs) {
             write::text_attribute(&process, "default", &port)?;
-            default = Some(group);
+            self.default = self.default.max(Some(index));
         }
+        Ok(())
     }
-    if let Some(group) = default {
-        write::text_attribute(&entry, "default", group)?;
+
+    /// Ends the file, seals and syncs it. Errors: a stage is missing; it cannot be written.
+    pub(crate) fn finish(self, info: &RunInfo) -> std::result::Result<(), StoreError> {
+        let Self { path, entry, file, groups, rest, default, .. } = self;
+        let end = move || -> Result<()> {
+            let group = |index: &usize| groups.get(*index).map_or("", String::as_str);
+            if let Some(missing) = rest.last().map(group) {
+                return Err(StoreError::new(format!("the stage of group `{missing}` was not written")));
+            }
+            if let Some(default) = default.as_ref().map(group) {
+                write::text_attribute(&entry, "default", default)?;
+            }
+            write_run_info(&entry, RUN, info)?;
+            drop(entry);
+            Ok(file.close()?)
+        };
+        end().map_err(|error| error.file(&path))?;
+        seal(&path)
     }
-    write_run_info(&entry, RUN, &run.info)
 }
 
-fn write_pipeline(entry: &Group, run: &RunResult) -> Result<()> {
+fn write_pipeline(entry: &Group, run: &RunHead, groups: &[String]) -> Result<()> {
     let group = write::nexus_group(entry, PIPELINE, "NXcollection")?;
-    write::text(&group, "name", &run.name)?;
+    write::text(&group, "name", run.name)?;
     write::scalar(&group, "seed", run.seed)?;
-    write::text(&group, "program", &run.program)?;
-    write::texts(&group, "overrides", &run.overrides)?;
-    let ids: Vec<&str> = run.stages.iter().map(|stage| stage.id.as_str()).collect();
-    write::texts(&group, STAGES, &ids)?;
-    write::texts(&group, GROUPS, &group_names(ids.into_iter(), &RESERVED_STAGE_IDS))?;
+    write::text(&group, "program", run.program)?;
+    write::texts(&group, "overrides", run.overrides)?;
+    write::texts(&group, STAGES, run.ids)?;
+    write::texts(&group, GROUPS, groups)?;
     let config = write::nexus_group(&group, "config", "NXnote")?;
     write::text(&config, "type", "application/toml")?;
-    write::text(&config, "data", &run.config)?;
+    write::text(&config, "data", run.config)?;
     Ok(())
 }
 

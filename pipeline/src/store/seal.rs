@@ -15,7 +15,7 @@ const HASH_LENGTH: u64 = 64;
 const LENGTH: u64 = MAGIC.len() as u64 + HASH_LENGTH + 1;
 
 /// Seals a closed file and syncs it. Errors: it cannot be read or written.
-pub(super) fn seal(path: &Path) -> Result<()> {
+pub(crate) fn seal(path: &Path) -> Result<()> {
     let seal = || -> std::io::Result<()> {
         let mut file = OpenOptions::new().read(true).append(true).open(path)?;
         let size = file.metadata()?.len();
@@ -67,7 +67,7 @@ fn last_line(file: &mut File, size: u64) -> std::io::Result<Option<(u64, String)
 fn hash_start(file: &mut File, size: u64) -> std::io::Result<blake3::Hash> {
     file.seek(SeekFrom::Start(0))?;
     let mut hasher = blake3::Hasher::new();
-    let mut buffer = vec![0; 1 << 18];
+    let mut buffer = vec![0; 1 << 16];
     let mut rest = file.take(size);
     loop {
         match rest.read(&mut buffer)? {

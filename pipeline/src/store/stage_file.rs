@@ -18,14 +18,18 @@ const WARNINGS: &str = "warnings";
 
 /// Writes a stage's result to a new file, seals and syncs it. Errors: the file exists or cannot be written; an artifact is not valid.
 pub fn write_stage(path: &Path, result: &StageResult) -> std::result::Result<(), StoreError> {
-    write_hdf5(path, result).map_err(|error| error.file(path))?;
+    write_unsealed_stage(path, result)?;
     seal(path)
 }
 
-fn write_hdf5(path: &Path, result: &StageResult) -> Result<()> {
-    let file = write::create_file(path)?;
-    write_contents(&file, result)?;
-    Ok(file.close()?)
+/// The same file before it is sealed and synced: what is left needs nothing of the HDF5 library.
+pub(crate) fn write_unsealed_stage(path: &Path, result: &StageResult) -> std::result::Result<(), StoreError> {
+    let write = || -> Result<()> {
+        let file = write::create_file(path)?;
+        write_contents(&file, result)?;
+        Ok(file.close()?)
+    };
+    write().map_err(|error| error.file(path))
 }
 
 fn write_contents(file: &File, result: &StageResult) -> Result<()> {
