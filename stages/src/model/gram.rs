@@ -14,19 +14,27 @@ const TILE: usize = 3;
 /// `matrix^T matrix`, columns x columns; about `rows columns^2` operations, always on the calling thread.
 pub(crate) fn gram(matrix: MatRef<'_, f64>) -> Mat<f64> {
     match slices(matrix) {
-        Some(columns) => pulp::Arch::new().dispatch(Products { left: &columns, right: &columns, symmetric: true }),
+        Some(columns) => gram_of(&columns),
         None => product(matrix.transpose(), matrix),
     }
 }
 
-/// `left^T right`, for as many rows on either side.
-pub(crate) fn cross(left: MatRef<'_, f64>, right: MatRef<'_, f64>) -> Mat<f64> {
-    match (slices(left), slices(right)) {
-        (Some(left), Some(right)) => {
-            pulp::Arch::new().dispatch(Products { left: &left, right: &right, symmetric: false })
-        }
-        _ => product(left.transpose(), right),
-    }
+/// The products of all columns with one another. They may overlap in memory.
+pub(crate) fn gram_of(columns: &[&[f64]]) -> Mat<f64> {
+    pulp::Arch::new().dispatch(Products { left: columns, right: columns, symmetric: true })
+}
+
+/// The products of the columns on the left with those on the right, all of one length.
+pub(crate) fn cross_of(left: &[&[f64]], right: &[&[f64]]) -> Mat<f64> {
+    pulp::Arch::new().dispatch(Products { left, right, symmetric: false })
+}
+
+/// The sum of the columns, each with its weight.
+pub(crate) fn combined(columns: &[&[f64]], weights: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut sum = vec![0.0; columns.first().map_or(0, |column| column.len())];
+    let columns: Vec<(&[f64], f64)> = columns.iter().copied().zip(weights).collect();
+    pulp::Arch::new().dispatch(Combined { columns: &columns, sum: &mut sum });
+    sum
 }
 
 /// The columns, where each is contiguous.
@@ -66,6 +74,34 @@ impl pulp::WithSimd for Products<'_> {
             let (i, j) = if symmetric { (i.min(j), i.max(j)) } else { (i, j) };
             simd.reduce_sum_f64s(sums[i / TILE * across + j / TILE][i % TILE][j % TILE])
         })
+    }
+}
+
+/// Carries the sum to the vector units.
+struct Combined<'a> {
+    columns: &'a [(&'a [f64], f64)],
+    sum: &'a mut [f64],
+}
+
+impl pulp::WithSimd for Combined<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for (index, sum) in self.sum.chunks_mut(BLOCK).enumerate() {
+            let rows = index * BLOCK..index * BLOCK + sum.len();
+            let (sum, rest) = S::as_mut_simd_f64s(sum);
+            for (column, weight) in self.columns {
+                let (own, last) = S::as_simd_f64s(&column[rows.clone()]);
+                let weights = simd.splat_f64s(*weight);
+                for (sum, own) in sum.iter_mut().zip(own) {
+                    *sum = simd.mul_add_e_f64s(*own, weights, *sum);
+                }
+                for (sum, own) in rest.iter_mut().zip(last) {
+                    *sum += weight * own;
+                }
+            }
+        }
     }
 }
 
@@ -129,7 +165,11 @@ mod tests {
             let plain = |x: &Mat<f64>, y: &Mat<f64>, i: usize, j: usize| -> f64 {
                 (0..rows).map(|k| x[(k, i)] * y[(k, j)]).sum()
             };
-            let (own, both) = (gram(a.as_ref()), cross(a.as_ref(), b.as_ref()));
+            let (left, right) = (slices(a.as_ref()).unwrap(), slices(b.as_ref()).unwrap());
+            let (own, both) = (gram(a.as_ref()), cross_of(&left, &right));
+            let sum = combined(&left, (0..m).map(|j| 0.5 + j as f64));
+            let slow = |k: usize| (0..m).map(|j| (0.5 + j as f64) * a[(k, j)]).sum::<f64>();
+            (0..rows).for_each(|k| assert!((sum[k] - slow(k)).abs() < 1e-12)); // rounding of sums near a hundred
             assert_eq!((own.shape(), both.shape()), ((m, m), (m, n)));
             for i in 0..m {
                 // some roundings of `rows` numbers near one
@@ -138,7 +178,7 @@ mod tests {
             }
         }
         assert_eq!(gram(Mat::<f64>::zeros(0, 3).as_ref()), Mat::<f64>::zeros(3, 3));
-        assert_eq!(cross(Mat::<f64>::zeros(4, 0).as_ref(), noise(4, 2, 1).as_ref()).shape(), (0, 2));
+        assert_eq!(cross_of(&[], &[&[1.0], &[2.0]]).shape(), (0, 2));
     }
 
     #[test]

@@ -205,12 +205,6 @@ pub(crate) fn product(lhs: MatRef<'_, f64>, rhs: MatRef<'_, f64>) -> Mat<f64> {
     out
 }
 
-/// `out - lhs rhs`.
-pub(crate) fn less(mut out: Mat<f64>, lhs: MatRef<'_, f64>, rhs: MatRef<'_, f64>) -> Mat<f64> {
-    matmul(out.as_mut(), Accum::Add, lhs, rhs, -1.0, Par::Seq);
-    out
-}
-
 /// Lower Cholesky factor of a symmetric positive semidefinite matrix: a direction with less than `1e-14` of its own variance left is rounding
 /// and gets `1e-7` of its scale.
 pub(crate) fn cholesky(matrix: &Mat<f64>) -> Mat<f64> {

@@ -25,8 +25,7 @@ pub(crate) fn whitened(problem: &Problem, mut state: State, limits: Limits) -> R
     for _ in 0..ROUNDS {
         let plain = Whitened::new(&problem.experiments, (Vec::new(), Vec::new()));
         let errors = problem.regressors(&state.point.a(), &plain);
-        let errors = residual(errors.as_ref(), &state.projection.theta);
-        let filter = autoregression(problem, errors.col(0).try_as_col_major().map_or(&[], |e| e.as_slice()))?;
+        let filter = autoregression(problem, &residual(&errors.slices(), &state.projection.theta))?;
         let rest = vec![[0.0; 2]; filter.len()];
         let point = Point { poles: state.point.poles.clone(), noise: Noise::Frozen(filter, rest) };
         let next = State { iterations: state.iterations, ..State::new(problem, point)? };

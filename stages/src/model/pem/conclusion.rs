@@ -112,12 +112,16 @@ fn parameter_covariance(
 /// Derivatives of e to all a, free c, then all linear parameters.
 pub(super) fn full_jacobian(problem: &Problem, state: &State) -> Mat<f64> {
     let nonlinear = state.coefficient_jacobian(problem);
-    let (rows, q, p) = (nonlinear.nrows(), nonlinear.ncols(), problem.columns());
+    let (rows, q, p) = (problem.rows(), nonlinear.count(), problem.columns());
     let mut jacobian = Mat::zeros(rows, q + p);
-    jacobian.as_mut().get_mut(.., ..q).copy_from(&nonlinear);
-    for j in 0..p {
-        jacobian.col_mut(q + j).iter_mut().zip(state.regressors.col(j).iter()).for_each(|(t, x)| *t = -x);
+    for j in 0..q {
+        jacobian.col_mut(j).iter_mut().zip(nonlinear.column(j)).for_each(|(t, x)| *t = *x);
     }
-    problem.mask(&mut jacobian);
+    for j in 0..p {
+        jacobian.col_mut(q + j).iter_mut().zip(state.regressors.column(j)).for_each(|(t, x)| *t = -x);
+    }
+    for &row in &problem.missing {
+        jacobian.row_mut(row).iter_mut().for_each(|value| *value = 0.0);
+    }
     jacobian
 }

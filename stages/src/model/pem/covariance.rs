@@ -5,10 +5,11 @@
 //! taken at face value would promise too much.
 
 use faer::Mat;
-use realfft::RealFftPlanner;
+use realfft::num_complex::Complex64;
 
-use super::tangent::{Spectra, Tangent};
+use super::tangent::{Tangent, Transform, periodogram, remaining};
 use crate::model::error::ModelError;
+use crate::model::gram::gram;
 use crate::model::orthogonal::product;
 
 /// Bins averaged on each side, as a share of N: 33 bins at 8192 samples, which give a standard error to 9 %.
@@ -39,10 +40,12 @@ pub(crate) fn covariance(
             (0..rank).for_each(|k| meat[(k, k)] = variance);
         }
         ResidualColour::Spectrum => {
-            let mut planner = RealFftPlanner::<f64>::new();
+            let mut transform = Transform::default();
             let mut top = 0;
             for &length in lengths {
-                meat += coloured(&tangent.spectra(e, top, length, &mut planner), length);
+                let basis = tangent.transformed(top, length, &mut transform);
+                let power = periodogram(&transform.of(&e[top..top + length]));
+                meat += coloured(&basis, &smoothed(&power, &remaining(&basis, length), length), length);
                 top += length;
             }
         }
@@ -51,14 +54,12 @@ pub(crate) fn covariance(
     Ok(product(half.as_ref(), tangent.spread.transpose()))
 }
 
-/// `W^T Omega W` of one experiment.
-fn coloured(spectra: &Spectra, length: usize) -> Mat<f64> {
-    let density = smoothed(spectra, length);
+/// `W^T Omega W` of one experiment, W the transformed basis and Omega of this density.
+fn coloured(basis: &[Vec<Complex64>], density: &[f64], length: usize) -> Mat<f64> {
     let bins = density.len();
-    let rank = spectra.basis.len();
-    let mut weighted = Mat::zeros(2 * bins, rank);
-    for (k, direction) in spectra.basis.iter().enumerate() {
-        for (i, (value, density)) in direction.iter().zip(&density).enumerate() {
+    let mut weighted = Mat::zeros(2 * bins, basis.len());
+    for (k, direction) in basis.iter().enumerate() {
+        for (i, (value, density)) in direction.iter().zip(density).enumerate() {
             // one-sided: all bins but the first and, for even N, the last stand for two
             let both = if i == 0 || 2 * i == length { 1.0 } else { 2.0 };
             let weight = (both * density).sqrt();
@@ -66,19 +67,19 @@ fn coloured(spectra: &Spectra, length: usize) -> Mat<f64> {
             weighted[(2 * i + 1, k)] = weight * value.im;
         }
     }
-    product(weighted.transpose(), weighted.as_ref())
+    gram(weighted.as_ref())
 }
 
 /// Power of the errors by bin: local sums of the residual's over those of the remaining shares.
-fn smoothed(spectra: &Spectra, length: usize) -> Vec<f64> {
+fn smoothed(power: &[f64], remaining: &[f64], length: usize) -> Vec<f64> {
     let reach = (length / SMOOTHING_SHARE).max(1);
-    let bins = spectra.periodogram.len();
+    let bins = power.len();
     let sums = |values: &[f64]| {
         let mut sums = vec![0.0; bins + 1];
         values.iter().enumerate().for_each(|(i, value)| sums[i + 1] = sums[i] + value);
         sums
     };
-    let (power, remaining) = (sums(&spectra.periodogram), sums(&spectra.remaining));
+    let (power, remaining) = (sums(power), sums(remaining));
     (0..bins)
         .map(|i| {
             let (low, high) = (i.saturating_sub(reach), (i + reach + 1).min(bins));

@@ -3,11 +3,10 @@
 //! `de/da_ij = q^-j / a_i (H^-1 x_i + e)` with `x_i` section i's deterministic output: its filtered form is the regressors of section i
 //! times their parameters, already at hand. `de/dc_ij = -q^-j / c_i e`.
 
-use faer::{Mat, MatRef};
-
+use super::columns::{Columns, Part, Place, SIDE_BY_SIDE};
 use super::parametrisation::{Coefficients, coordinates, roots, section_order, sections, slopes};
-use super::predictor::{Place, Problem, SIDE_BY_SIDE, respond};
-use crate::model::orthogonal::less;
+use super::predictor::Problem;
+use crate::model::gram::combined;
 
 /// How the errors are whitened.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,10 +77,9 @@ impl Point {
     }
 }
 
-/// Prediction errors from the unscaled, filtered regressors and their parameters: one column.
-pub(crate) fn residual(regressors: MatRef<'_, f64>, theta: &[f64]) -> Mat<f64> {
-    let (last, parameters) = (theta.len(), MatRef::from_column_major_slice(theta, theta.len(), 1));
-    less(regressors.get(.., last..last + 1).to_owned(), regressors.get(.., ..last), parameters)
+/// Prediction errors from the unscaled, filtered regressors (the last of `columns` is the output) and their parameters.
+pub(crate) fn residual(columns: &[&[f64]], theta: &[f64]) -> Vec<f64> {
+    combined(columns, theta.iter().map(|theta| -theta).chain([1.0]))
 }
 
 /// Derivatives of e to the coefficients: a1, a2 of each section, then c1, c2 if these are free; rows x n or 2n.
@@ -90,19 +88,20 @@ pub(crate) fn residual(regressors: MatRef<'_, f64>, theta: &[f64]) -> Mat<f64> {
 pub(crate) fn coefficient_jacobian(
     problem: &Problem,
     point: &Point,
-    regressors: &Mat<f64>,
+    regressors: &Columns,
     theta: &[f64],
     e: &[f64],
-) -> Mat<f64> {
+) -> Columns {
     let n = problem.order;
     let a = point.a();
     let c = if let Noise::Free(c) = &point.noise { Some(sections(c)) } else { None };
-    let mut jacobian = Mat::zeros(problem.rows(), if c.is_some() { 2 * n } else { n });
+    let count = if c.is_some() { 2 * n } else { n };
+    let mut jacobian = Columns::new(problem.rows(), &[Part::Single(count)], 1);
     let mut top = 0;
     for (index, (_, y)) in problem.experiments.iter().enumerate() {
         let e = &e[top..top + y.len()];
         let own = problem.nuisance_column(index);
-        let place = Place { top, column: 0, width: n, delay: 1 };
+        let place = Place { top, length: y.len(), column: 0, width: n, delay: 1 };
         for (group, sections) in a.chunks(SIDE_BY_SIDE).enumerate() {
             let first = group * SIDE_BY_SIDE;
             // the columns of each section's deterministic output, with their weights
@@ -111,13 +110,11 @@ pub(crate) fn coefficient_jacobian(
                 for j in 0..section_order(n, section) {
                     let inputs = (0..problem.inputs).map(|input| problem.input_column(input) + 2 * section + j);
                     for column in inputs.chain([own + 2 * section + j]) {
-                        if let Some(filtered) = regressors.col(column).try_as_col_major() {
-                            parts.push((section - first, theta[column], &filtered.as_slice()[top..top + y.len()]));
-                        }
+                        parts.push((section - first, theta[column], &regressors.column(column)[top..top + y.len()]));
                     }
                 }
             }
-            respond(&mut jacobian, place.group(group), sections, y.len(), |start, chunk| {
+            jacobian.respond(place.group(group), sections, |start, chunk| {
                 match c {
                     Some(_) => chunk.iter_mut().zip(&e[start..]).for_each(|(x, e)| *x = [*e; SIDE_BY_SIDE]),
                     None => chunk.fill([0.0; SIDE_BY_SIDE]),
@@ -129,28 +126,27 @@ pub(crate) fn coefficient_jacobian(
         }
         for (group, sections) in c.as_deref().unwrap_or_default().chunks(SIDE_BY_SIDE).enumerate() {
             let place = Place { column: n, ..place }.group(group);
-            respond(&mut jacobian, place, sections, e.len(), |start, chunk| {
+            jacobian.respond(place, sections, |start, chunk| {
                 chunk.iter_mut().zip(&e[start..]).for_each(|(x, e)| *x = [-e; SIDE_BY_SIDE]);
             });
         }
         top += y.len();
     }
-    problem.mask(&mut jacobian);
+    jacobian.clear_rows(&problem.missing);
     jacobian
 }
 
 /// Chain rule from coefficients to coordinates, in place.
-pub(crate) fn to_coordinates(jacobian: &mut Mat<f64>, point: &Point) {
+pub(crate) fn to_coordinates(jacobian: &mut Columns, point: &Point) {
     let mut column = 0;
     for coordinates in [point.poles.as_slice(), point.free()] {
         for p in coordinates.chunks(2) {
             let [d11, d12, d22] = slopes(p);
-            let (first, second) = jacobian.as_mut().get_mut(.., column..column + p.len()).split_at_col_mut(1);
-            let first = first.col_mut(0).iter_mut();
             if p.len() == 2 {
-                first.zip(second.col_mut(0).iter_mut()).for_each(|(x, y)| (*x, *y) = (d11 * *x, d12 * *x + d22 * *y));
+                let (first, second) = jacobian.two_mut(column);
+                first.iter_mut().zip(second).for_each(|(x, y)| (*x, *y) = (d11 * *x, d12 * *x + d22 * *y));
             } else {
-                first.for_each(|x| *x *= d11);
+                jacobian.single_mut(column).iter_mut().for_each(|x| *x *= d11);
             }
             column += p.len();
         }

@@ -1,6 +1,7 @@
 //! Prediction error method: the innovations form of Eq. 8, fitted by minimum one-step prediction error.
 
 mod autoregression;
+mod columns;
 mod conclusion;
 mod covariance;
 mod data;

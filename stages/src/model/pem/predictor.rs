@@ -3,8 +3,7 @@
 //! `e = H^-1 (y - sum_i b_i/a_i u - D u - x0 response - offset)`, `H^-1 = prod_i a_i / c_i`: with a and c fixed, e is linear in all the
 //! rest, and the filtered regressors are the columns of a least-squares problem.
 
-use faer::{ColMut, Mat};
-
+use super::columns::{Columns, Part, Place, SIDE_BY_SIDE};
 use super::parametrisation::Coefficients;
 use super::whitening::{IMPULSE, INPUT, LANES, ONE, OUTPUT, RAMP, Signals, Whitened};
 
@@ -74,13 +73,6 @@ impl<'a> Problem<'a> {
         index * (self.order + 1)
     }
 
-    /// Clears the rows whose output is missing.
-    pub fn mask(&self, matrix: &mut Mat<f64>) {
-        for &row in &self.missing {
-            matrix.row_mut(row).iter_mut().for_each(|value| *value = 0.0);
-        }
-    }
-
     /// Linear parameters of one experiment alone.
     pub fn nuisances(&self) -> usize {
         self.order + usize::from(self.offset) + usize::from(self.slope)
@@ -94,40 +86,47 @@ impl<'a> Problem<'a> {
     /// Whitened regressors, and the whitened output as the last column: rows x (columns + 1).
     ///
     /// Order of states within a section: observer form, `x1+ = -a1 x1 + x2 + b1 u`, `x2+ = -a2 x1 + b2 u`, `y = x1`.
-    pub fn regressors(&self, a: &[Coefficients], whitened: &Whitened) -> Mat<f64> {
-        let mut matrix = Mat::zeros(self.rows(), self.columns() + 1);
+    pub fn regressors(&self, a: &[Coefficients], whitened: &Whitened) -> Columns {
+        let mut parts = vec![];
+        (0..self.inputs).for_each(|_| parts.extend([Part::Sections(self.order), Part::Single(1)]));
+        let own = Part::Single(self.nuisances() - self.order);
+        self.measured().iter().for_each(|_| parts.extend([Part::Sections(self.order), own]));
+        // a prior's have none of their own
+        let spare = self.columns() - self.nuisance_column(self.measured().len());
+        parts.push(Part::Single(spare + 1));
+        let mut columns = Columns::new(self.rows(), &parts, self.experiments.len());
         let mut top = 0;
         for (index, Signals { lanes, further }) in whitened.experiments.iter().enumerate() {
-            self.fill_input(&mut matrix, top, 0, lanes, |s| s[INPUT], a);
+            self.fill_input(&mut columns, top, 0, lanes, |s| s[INPUT], a);
             for (input, signal) in further.iter().enumerate() {
-                self.fill_input(&mut matrix, top, input + 1, signal, |s| *s, a);
+                self.fill_input(&mut columns, top, input + 1, signal, |s| *s, a);
             }
             if index + self.priors < self.experiments.len() {
-                self.fill_own(&mut matrix, top, index, lanes, a);
+                self.fill_own(&mut columns, top, index, lanes, a);
             }
-            copy_lane(&mut matrix, top, self.columns(), lanes, OUTPUT);
+            copy_lane(&mut columns, top, self.columns(), lanes, OUTPUT);
             top += lanes.len();
         }
-        matrix
+        columns
     }
 
     /// The columns of an experiment's own parameters: initial state, offset, slope.
-    fn fill_own(&self, matrix: &mut Mat<f64>, top: usize, index: usize, signals: &[[f64; LANES]], a: &[Coefficients]) {
+    fn fill_own(&self, columns: &mut Columns, top: usize, index: usize, signals: &[[f64; LANES]], a: &[Coefficients]) {
         let own = self.nuisance_column(index);
-        let place = Place { top, column: own, width: self.order, delay: 0 };
-        fill_sections(matrix, place, a, signals, |s| s[IMPULSE]);
+        let place = Place { top, length: signals.len(), column: own, width: self.order, delay: 0 };
+        fill_sections(columns, place, a, signals, |s| s[IMPULSE]);
         if self.offset {
-            copy_lane(matrix, top, own + self.order, signals, ONE);
+            copy_lane(columns, top, own + self.order, signals, ONE);
         }
         if self.slope {
-            copy_lane(matrix, top, own + self.order + usize::from(self.offset), signals, RAMP);
+            copy_lane(columns, top, own + self.order + usize::from(self.offset), signals, RAMP);
         }
     }
 
     /// The columns of one input, whitened: its response through every section, and itself.
     fn fill_input<T>(
         &self,
-        matrix: &mut Mat<f64>,
+        columns: &mut Columns,
         top: usize,
         index: usize,
         signals: &[T],
@@ -135,127 +134,32 @@ impl<'a> Problem<'a> {
         a: &[Coefficients],
     ) {
         let first = self.input_column(index);
-        fill_sections(matrix, Place { top, column: first, width: self.order, delay: 1 }, a, signals, pick);
-        if let Some(target) = column_slice(matrix, first + self.order) {
-            target[top..top + signals.len()].iter_mut().zip(signals).for_each(|(t, s)| *t = pick(s));
-        }
-    }
-}
-
-/// Where the responses of sections to their signals go: two columns for each, one for a last one of first order.
-#[derive(Clone, Copy)]
-pub(super) struct Place {
-    /// First row.
-    pub top: usize,
-    /// First column.
-    pub column: usize,
-    /// How many columns.
-    pub width: usize,
-    /// Rows by which the first column of each section is late; the second is one row later.
-    pub delay: usize,
-}
-
-impl Place {
-    /// For the sections of group `index`.
-    pub fn group(self, index: usize) -> Self {
-        let first = 2 * SIDE_BY_SIDE * index;
-        Self { column: self.column + first, width: (self.width - first).min(2 * SIDE_BY_SIDE), ..self }
+        let place = Place { top, length: signals.len(), column: first, width: self.order, delay: 1 };
+        fill_sections(columns, place, a, signals, pick);
+        let target = &mut columns.single_mut(first + self.order)[top..top + signals.len()];
+        target.iter_mut().zip(signals).for_each(|(t, s)| *t = pick(s));
     }
 }
 
 /// One signal through every section.
 fn fill_sections<T>(
-    matrix: &mut Mat<f64>,
+    columns: &mut Columns,
     place: Place,
     a: &[Coefficients],
     signals: &[T],
     pick: impl Fn(&T) -> f64 + Copy,
 ) {
     for (index, sections) in a.chunks(SIDE_BY_SIDE).enumerate() {
-        respond(matrix, place.group(index), sections, signals.len(), |start, chunk| {
+        columns.respond(place.group(index), sections, |start, chunk| {
             chunk.iter_mut().zip(&signals[start..]).for_each(|(x, s)| *x = [pick(s); SIDE_BY_SIDE]);
         });
     }
 }
 
-/// A signal for each of up to [`SIDE_BY_SIDE`] sections, through `1 / a`: `signals` writes those from a row on.
-pub(super) fn respond(
-    matrix: &mut Mat<f64>,
-    place: Place,
-    sections: &[Coefficients],
-    length: usize,
-    mut signals: impl FnMut(usize, &mut [[f64; SIDE_BY_SIDE]]),
-) {
-    let Place { top, column, width, delay } = place;
-    let mut bank = Bank::new(sections);
-    let mut chunk = [[0.0; SIDE_BY_SIDE]; CHUNK];
-    for start in (0..length).step_by(CHUNK) {
-        let chunk = &mut chunk[..CHUNK.min(length - start)];
-        signals(start, chunk);
-        bank.run(chunk);
-        let first = top + start + delay;
-        let kept = chunk.len().min((length - start).saturating_sub(delay));
-        for i in 0..sections.len() {
-            if let Some(target) = column_slice(matrix, column + 2 * i) {
-                target[first..first + kept].iter_mut().zip(&*chunk).for_each(|(t, y)| *t = y[i]);
-            }
-        }
-    }
-    (0..width / 2).for_each(|i| once_more(matrix, top, length, column + 2 * i, column + 2 * i + 1));
-}
-
-/// Sections filtered side by side, for the processor's vector units.
-pub(super) const SIDE_BY_SIDE: usize = 8;
-/// Samples at a time: they stay in the first-level cache.
-pub(super) const CHUNK: usize = 128;
-
-/// `1 / a` of several sections.
-struct Bank {
-    a: [[f64; SIDE_BY_SIDE]; 2],
-    past: [[f64; SIDE_BY_SIDE]; 2],
-}
-
-impl Bank {
-    fn new(sections: &[Coefficients]) -> Self {
-        let mut a = [[0.0; SIDE_BY_SIDE]; 2];
-        sections.iter().enumerate().for_each(|(i, own)| (a[0][i], a[1][i]) = (own[0], own[1]));
-        Self { a, past: [[0.0; SIDE_BY_SIDE]; 2] }
-    }
-
-    /// Filters the next samples of each section's own signal in place.
-    fn run(&mut self, signals: &mut [[f64; SIDE_BY_SIDE]]) {
-        let [mut y1, mut y2] = self.past;
-        for signal in signals {
-            let mut y = [0.0; SIDE_BY_SIDE];
-            for i in 0..SIDE_BY_SIDE {
-                y[i] = (signal[i] - self.a[1][i] * y2[i]) - self.a[0][i] * y1[i];
-            }
-            (y2, y1) = (y1, y);
-            *signal = y;
-        }
-        self.past = [y1, y2];
-    }
-}
-
-fn column_slice(matrix: &mut Mat<f64>, column: usize) -> Option<&mut [f64]> {
-    matrix.col_mut(column).try_as_col_major_mut().map(ColMut::as_slice_mut)
-}
-
-/// Copies rows `top..top + length` of a column into a later one, one row down.
-fn once_more(matrix: &mut Mat<f64>, top: usize, length: usize, from: usize, to: usize) {
-    let (before, after) = matrix.split_at_col_mut(to);
-    let source = before.as_ref().col(from).try_as_col_major();
-    if let (Some(source), Some(target)) = (source, after.col_mut(0).try_as_col_major_mut()) {
-        target.as_slice_mut()[top + 1..top + length].copy_from_slice(&source.as_slice()[top..top + length - 1]);
-    }
-}
-
 /// Writes one of the whitened signals into a column from row `top` on.
-fn copy_lane(matrix: &mut Mat<f64>, top: usize, column: usize, signals: &[[f64; LANES]], lane: usize) {
-    let target = matrix.col_mut(column).try_as_col_major_mut();
-    if let Some(target) = target {
-        target.as_slice_mut()[top..top + signals.len()].iter_mut().zip(signals).for_each(|(t, s)| *t = s[lane]);
-    }
+fn copy_lane(columns: &mut Columns, top: usize, column: usize, signals: &[[f64; LANES]], lane: usize) {
+    let target = &mut columns.single_mut(column)[top..top + signals.len()];
+    target.iter_mut().zip(signals).for_each(|(t, s)| *t = s[lane]);
 }
 
 /// `1 / (1 + a1 q^-1 + a2 q^-2)` applied to a signal.

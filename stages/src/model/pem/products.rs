@@ -4,12 +4,12 @@
 //! seminormal equations). What the correction finds is the check: where rounding has left a share of the residual in the space that the regressors
 //! span, nothing here is used. Source: A. Bjorck, Linear Algebra Appl. 88/89 (1987) 31.
 
-use faer::{Mat, MatRef};
+use faer::Mat;
 
 use super::gradient::residual;
 use super::projection::{Sensitivities, Solution};
-use crate::model::gram::{cross, gram};
-use crate::model::orthogonal::{Symmetric, product};
+use crate::model::gram::{cross_of, gram_of};
+use crate::model::orthogonal::Symmetric;
 
 /// Least energy that a regressor of unit length keeps beside those before it: the correction then leaves less than a hundred-thousandth of itself.
 const LEAST_PIVOT: f64 = 1e-10;
@@ -28,10 +28,10 @@ pub(super) struct Products {
 }
 
 impl Products {
-    /// Solves for all linear parameters; the last column of `matrix` is the filtered output. None: too ill-conditioned for products.
-    pub fn new(matrix: MatRef<'_, f64>) -> Option<(Self, Solution)> {
-        let p = matrix.ncols() - 1;
-        let products = gram(matrix);
+    /// Solves for all linear parameters; the last of `columns` is the filtered output. None: too ill-conditioned for products.
+    pub fn new(columns: &[&[f64]]) -> Option<(Self, Solution)> {
+        let p = columns.len() - 1;
+        let products = gram_of(columns);
         // a regressor of zeros gets no weight
         let inverse = |norm: f64| if norm > 0.0 { norm.recip() } else { 0.0 };
         let scale: Vec<f64> = (0..p).map(|j| inverse(products[(j, j)].sqrt())).collect();
@@ -43,10 +43,10 @@ impl Products {
         let (lower, least_pivot) = factor(Mat::from_fn(p, p, scaled))?;
         let own = Self { lower, scale, least_pivot };
         let mut theta = own.solved((0..p).map(|i| products[(i, p)]).collect()).0;
-        let errors = residual(matrix, &theta);
-        let after = product(matrix.get(.., ..p).transpose(), errors.as_ref());
+        let errors = residual(columns, &theta);
+        let after = cross_of(&columns[..p], &[&errors]);
         let (correction, left) = own.solved((0..p).map(|i| after[(i, 0)]).collect());
-        let energy = errors.squared_norm_l2();
+        let energy = cross_of(&[&errors], &[&errors])[(0, 0)];
         // not so either where something is not finite
         let little = left <= MOST_LEFT * energy;
         if !little {
@@ -79,11 +79,11 @@ impl Products {
     }
 
     /// The Jacobian without the directions that the linear parameters reach. None: too little of it is left for products.
-    pub fn sensitivities(&self, regressors: MatRef<'_, f64>, e: &[f64], jacobian: &Mat<f64>) -> Option<Sensitivities> {
-        let (p, q) = (self.scale.len(), jacobian.ncols());
-        let shared = cross(regressors.get(.., ..p), jacobian.as_ref());
-        let whole = gram(jacobian.as_ref());
-        let gradient = product(jacobian.transpose(), MatRef::from_column_major_slice(e, e.len(), 1));
+    pub fn sensitivities(&self, regressors: &[&[f64]], e: &[f64], jacobian: &[&[f64]]) -> Option<Sensitivities> {
+        let (p, q) = (self.scale.len(), jacobian.len());
+        let shared = cross_of(&regressors[..p], jacobian);
+        let whole = gram_of(jacobian);
+        let gradient = cross_of(jacobian, &[e]);
         let along: Vec<Vec<f64>> = (0..q)
             .map(|j| {
                 let mut own: Vec<f64> = (0..p).map(|i| shared[(i, j)] * self.scale[i]).collect();
@@ -151,6 +151,11 @@ mod tests {
     use super::super::rotation::Rotation;
     use super::*;
     use crate::fixture::white_noise;
+    use crate::model::orthogonal::product;
+
+    fn columns(matrix: &Mat<f64>) -> Vec<&[f64]> {
+        matrix.col_iter().map(|column| column.try_as_col_major().unwrap().as_slice()).collect()
+    }
 
     /// Columns that are alike up to `apart`, and an output that they explain up to a hundredth.
     fn regressors(apart: f64) -> Mat<f64> {
@@ -172,14 +177,14 @@ mod tests {
             let matrix = regressors(apart);
             // sensitivities that partly lie along the regressors
             let jacobian = Mat::from_fn(500, 4, |i, j| values[i + j * 500] + matrix[(i, j)] / 10.0_f64.powi(j as i32));
-            let (products, ours) = Products::new(matrix.as_ref()).unwrap();
+            let (products, ours) = Products::new(&columns(&matrix)).unwrap();
             let (rotation, exact) = Rotation::new(matrix.as_ref()).unwrap();
             assert!((ours.cost / exact.cost - 1.0).abs() < 1e-12); // rounding of 500 squares
-            let (e, slow) = (residual(matrix.as_ref(), &ours.theta), residual(matrix.as_ref(), &exact.theta));
+            let (e, slow) = (residual(&columns(&matrix), &ours.theta), residual(&columns(&matrix), &exact.theta));
             // both to the condition's share of a residual of 0.2
-            assert!((&e - &slow).norm_l2() < 1e-10 / apart, "{apart}");
-            let e: Vec<f64> = e.col(0).iter().copied().collect();
-            let ours = products.sensitivities(matrix.as_ref(), &e, &jacobian).unwrap();
+            let apart_by = e.iter().zip(&slow).map(|(e, slow)| (e - slow) * (e - slow)).sum::<f64>().sqrt();
+            assert!(apart_by < 1e-10 / apart, "{apart}");
+            let ours = products.sensitivities(&columns(&matrix), &e, &columns(&jacobian)).unwrap();
             let exact = rotation.sensitivities(jacobian.clone());
             let square = |s: &Sensitivities| product(s.rows.transpose(), s.rows.as_ref());
             let gradient = |s: &Sensitivities, j: usize| -> f64 {
@@ -198,27 +203,27 @@ mod tests {
 
     #[test]
     fn what_products_cannot_resolve_is_left_to_rotations() {
-        assert!(Products::new(regressors(1e-6).as_ref()).is_none());
+        assert!(Products::new(&columns(&regressors(1e-6))).is_none());
         // an output that is explained to rounding
         let mut matrix = regressors(1.0);
         let copy = matrix.col(2).to_owned();
         matrix.col_mut(6).copy_from(&copy);
         assert!(
-            Products::new(matrix.as_ref()).is_none_or(|(_, solution)| solution.cost < 1e-24 * copy.squared_norm_l2())
+            Products::new(&columns(&matrix)).is_none_or(|(_, solution)| solution.cost < 1e-24 * copy.squared_norm_l2())
         );
         // a sensitivity that is a regressor but for a billionth
         let matrix = regressors(1e-2);
-        let (products, solution) = Products::new(matrix.as_ref()).unwrap();
-        let e: Vec<f64> = residual(matrix.as_ref(), &solution.theta).col(0).iter().copied().collect();
+        let (products, solution) = Products::new(&columns(&matrix)).unwrap();
+        let e = residual(&columns(&matrix), &solution.theta);
         let jacobian = Mat::from_fn(500, 1, |i, _| matrix[(i, 1)] + 1e-9 * e[i]);
-        assert!(products.sensitivities(matrix.as_ref(), &e, &jacobian).is_none());
+        assert!(products.sensitivities(&columns(&matrix), &e, &columns(&jacobian)).is_none());
         // an input of zeros has no weight, not a number or a refusal
         let mut matrix = regressors(1.0);
         matrix.col_mut(3).iter_mut().for_each(|x| *x = 0.0);
-        let (_, solution) = Products::new(matrix.as_ref()).unwrap();
+        let (_, solution) = Products::new(&columns(&matrix)).unwrap();
         assert!(solution.theta[3] == 0.0 && solution.theta.iter().all(|t| t.is_finite()));
         let mut matrix = regressors(1.0);
         matrix[(7, 0)] = f64::INFINITY;
-        assert!(Products::new(matrix.as_ref()).is_none());
+        assert!(Products::new(&columns(&matrix)).is_none());
     }
 }

@@ -3,10 +3,9 @@
 //! Golub and Pereyra's variable projection with Kaufman's Jacobian: b, D, x0, offset and slope are solved for at every trial of
 //! the poles (a) and predictor poles (c), which alone are left to iterate on: by inner products where these keep enough digits, by rotations elsewhere.
 
-use std::borrow::Cow;
-
 use faer::Mat;
 
+use super::columns::Columns;
 use super::predictor::Problem;
 use super::products::Products;
 use super::rotation::Rotation;
@@ -43,12 +42,12 @@ pub(crate) struct Sensitivities {
 
 impl Projection {
     /// Solves for all linear parameters; the last column of `regressors` is the filtered output. Errors: no finite solution.
-    pub fn new(problem: &Problem, regressors: &Mat<f64>) -> Result<Self, ModelError> {
+    pub fn new(problem: &Problem, regressors: &Columns) -> Result<Self, ModelError> {
         let present = present(problem, regressors);
-        let (factor, Solution { theta, cost }) = match Products::new(present.as_ref().as_ref()) {
+        let (factor, Solution { theta, cost }) = match Products::new(&present.slices()) {
             Some((products, solution)) => (Factor::Products(products), solution),
             None => {
-                let (rotation, solution) = Rotation::new(present.as_ref().as_ref())?;
+                let (rotation, solution) = Rotation::new(present.to_mat().as_ref())?;
                 (Factor::Rotation(rotation), solution)
             }
         };
@@ -59,17 +58,17 @@ impl Projection {
     pub fn sensitivities(
         &self,
         problem: &Problem,
-        regressors: &Mat<f64>,
+        regressors: &Columns,
         e: &[f64],
-        jacobian: Mat<f64>,
+        jacobian: Columns,
     ) -> Result<Sensitivities, ModelError> {
         match &self.factor {
-            Factor::Rotation(rotation) => Ok(rotation.sensitivities(jacobian)),
-            Factor::Products(products) => match products.sensitivities(regressors.as_ref(), e, &jacobian) {
+            Factor::Rotation(rotation) => Ok(rotation.sensitivities(jacobian.to_mat())),
+            Factor::Products(products) => match products.sensitivities(&regressors.slices(), e, &jacobian.slices()) {
                 Some(found) => Ok(found),
                 None => {
-                    let (rotation, _) = Rotation::new(present(problem, regressors).as_ref().as_ref())?;
-                    Ok(rotation.sensitivities(jacobian))
+                    let (rotation, _) = Rotation::new(present(problem, regressors).to_mat().as_ref())?;
+                    Ok(rotation.sensitivities(jacobian.to_mat()))
                 }
             },
         }
@@ -77,11 +76,26 @@ impl Projection {
 }
 
 /// The regressors, rows whose output is missing cleared.
-fn present<'a>(problem: &Problem, regressors: &'a Mat<f64>) -> Cow<'a, Mat<f64>> {
+fn present<'a>(problem: &Problem, regressors: &'a Columns) -> Present<'a> {
     if problem.missing.is_empty() {
-        return Cow::Borrowed(regressors);
+        return Present::All(regressors);
     }
-    let mut matrix = regressors.clone();
-    problem.mask(&mut matrix);
-    Cow::Owned(matrix)
+    Present::Masked(regressors.without_rows(&problem.missing))
+}
+
+/// Regressors, as they are or with rows cleared.
+enum Present<'a> {
+    All(&'a Columns),
+    Masked(Columns),
+}
+
+impl std::ops::Deref for Present<'_> {
+    type Target = Columns;
+
+    fn deref(&self) -> &Columns {
+        match self {
+            Self::All(columns) => columns,
+            Self::Masked(columns) => columns,
+        }
+    }
 }

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use faer::Mat;
-
+use super::columns::Columns;
 use super::gradient::{Point, coefficient_jacobian, residual, to_coordinates};
 use super::optimiser::{DAMPING, Ending};
 use super::predictor::Problem;
@@ -17,7 +16,7 @@ pub(crate) struct State {
     pub point: Point,
     /// The records through the point's whitening.
     pub whitened: Arc<Whitened>,
-    pub regressors: Mat<f64>,
+    pub regressors: Columns,
     pub projection: Projection,
     pub gradient: f64,
     pub iterations: usize,
@@ -81,7 +80,7 @@ impl State {
 
     /// Prediction errors.
     pub fn residual(&self) -> Vec<f64> {
-        residual(self.regressors.as_ref(), &self.projection.theta).col(0).iter().copied().collect()
+        residual(&self.regressors.slices(), &self.projection.theta)
     }
 
     /// Kaufman's Jacobian in coordinates, projected, and the residual.
@@ -93,11 +92,11 @@ impl State {
     }
 
     /// Derivatives of the residual to the coefficients of poles and, where free, predictor.
-    pub fn coefficient_jacobian(&self, problem: &Problem) -> Mat<f64> {
+    pub fn coefficient_jacobian(&self, problem: &Problem) -> Columns {
         self.jacobian(problem, &self.residual())
     }
 
-    fn jacobian(&self, problem: &Problem, e: &[f64]) -> Mat<f64> {
+    fn jacobian(&self, problem: &Problem, e: &[f64]) -> Columns {
         coefficient_jacobian(problem, &self.point, &self.regressors, &self.projection.theta, e)
     }
 }

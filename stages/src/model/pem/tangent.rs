@@ -1,8 +1,8 @@
 //! The tangent space of a fit: which directions of the data its parameters have absorbed, in time and frequency.
 
 use faer::Mat;
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
+use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::model::error::ModelError;
 use crate::model::gram::gram;
@@ -67,45 +67,58 @@ impl Tangent {
         Ok(Self { basis: product(jacobian.as_ref(), spread.as_ref()), spread })
     }
 
-    /// The basis and the residual of one experiment (rows `top..top + length`), transformed.
-    pub fn spectra(&self, e: &[f64], top: usize, length: usize, planner: &mut RealFftPlanner<f64>) -> Spectra {
-        let forward = planner.plan_fft_forward(length);
-        let scale = 1.0 / (length as f64).sqrt();
-        let mut time = forward.make_input_vec();
-        let mut scratch = forward.make_scratch_vec();
-        let mut transform = |fill: &mut dyn FnMut(&mut [f64])| {
-            fill(&mut time);
-            time.iter_mut().for_each(|t| *t *= scale);
-            let mut spectrum = forward.make_output_vec();
-            // lengths are the plan's own: no error is possible
-            let _ = forward.process_with_scratch(&mut time, &mut spectrum, &mut scratch);
-            spectrum
-        };
-        let basis: Vec<Vec<Complex64>> = (0..self.basis.ncols())
-            .map(|k| {
-                let column = self.basis.col(k).subrows(top, length);
-                transform(&mut |time| match column.try_as_col_major() {
-                    Some(column) => time.copy_from_slice(column.as_slice()),
-                    None => time.iter_mut().zip(column.iter()).for_each(|(t, v)| *t = *v),
-                })
+    /// The basis within one experiment (rows `top..top + length`), transformed: rank x bins.
+    pub fn transformed(&self, top: usize, length: usize, transform: &mut Transform) -> Vec<Vec<Complex64>> {
+        let column = |k: usize| self.basis.col(k).subrows(top, length);
+        (0..self.basis.ncols())
+            .map(|k| match column(k).try_as_col_major() {
+                Some(column) => transform.of(column.as_slice()),
+                None => transform.of(&column(k).iter().copied().collect::<Vec<_>>()),
             })
-            .collect();
-        let residual = transform(&mut |time| time.copy_from_slice(&e[top..top + length]));
-        let mut remaining = vec![1.0; residual.len()];
-        for direction in &basis {
-            remaining.iter_mut().zip(direction).for_each(|(left, value)| *left -= value.norm_sqr());
-        }
-        remaining.iter_mut().for_each(|left| *left = left.max(0.0));
-        Spectra { basis, periodogram: residual.iter().map(Complex64::norm_sqr).collect(), remaining }
+            .collect()
     }
 }
 
-/// Frequency domain of one experiment, bins 0 to N/2.
-pub(crate) struct Spectra {
-    /// Transforms of the basis, rank x bins, scaled by `1 / sqrt(N)`.
-    pub basis: Vec<Vec<Complex64>>,
-    /// `|E|^2 / N`.
-    pub periodogram: Vec<f64>,
-    /// Share of the noise power in each bin that the fit has not absorbed: `E |E|^2 / N = S * remaining`.
-    pub remaining: Vec<f64>,
+/// Fourier transforms of real signals, scaled by `1 / sqrt(N)`: bins 0 to N/2.
+#[derive(Default)]
+pub(crate) struct Transform {
+    plan: Option<(usize, Plan)>,
+    time: Vec<f64>,
+    scratch: Vec<Complex64>,
+}
+
+type Plan = std::sync::Arc<dyn RealToComplex<f64>>;
+
+impl Transform {
+    /// Of one signal; signals of one length share their plan.
+    pub fn of(&mut self, signal: &[f64]) -> Vec<Complex64> {
+        let plan = match self.plan.take() {
+            Some((length, plan)) if length == signal.len() => plan,
+            _ => RealFftPlanner::<f64>::new().plan_fft_forward(signal.len()),
+        };
+        let scale = 1.0 / (signal.len() as f64).sqrt();
+        self.time.clear();
+        self.time.extend(signal.iter().map(|value| value * scale));
+        self.scratch.resize(plan.get_scratch_len(), Complex64::ZERO);
+        let mut spectrum = plan.make_output_vec();
+        // lengths are the plan's own: no error is possible
+        let _ = plan.process_with_scratch(&mut self.time, &mut spectrum, &mut self.scratch);
+        self.plan = Some((signal.len(), plan));
+        spectrum
+    }
+}
+
+/// `|E|^2 / N` by bin.
+pub(crate) fn periodogram(residual: &[Complex64]) -> Vec<f64> {
+    residual.iter().map(Complex64::norm_sqr).collect()
+}
+
+/// Share of the noise power in each bin that the fit has not absorbed: `E |E|^2 / N = S * remaining`. Of the transformed basis of N samples.
+pub(crate) fn remaining(basis: &[Vec<Complex64>], length: usize) -> Vec<f64> {
+    let mut remaining = vec![1.0; length / 2 + 1];
+    for direction in basis {
+        remaining.iter_mut().zip(direction).for_each(|(left, value)| *left -= value.norm_sqr());
+    }
+    remaining.iter_mut().for_each(|left| *left = left.max(0.0));
+    remaining
 }

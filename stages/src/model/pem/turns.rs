@@ -1,18 +1,17 @@
 //! Poles and noise in turns, and the output error after them.
 
 use faer::c64;
-use realfft::RealFftPlanner;
 
 use super::conclusion::full_jacobian;
 use super::gradient::{Noise, Point};
-use super::noise::{gain, intensities};
+use super::noise::{Seen, gain, intensities};
 use super::optimiser::{Ending, Limits, minimise};
 use super::options::NoiseModel;
 use super::parametrisation::{coordinates, roots, section_order, sections};
 use super::predictor::Problem;
 use super::starts::{lowest, refined};
 use super::state::State;
-use super::tangent::Tangent;
+use super::tangent::{Tangent, Transform, periodogram, remaining};
 use crate::model::error::ModelError;
 
 /// Prediction errors with a noise filter, from the output error's starts, which compete on the shortened problem.
@@ -64,13 +63,15 @@ fn thermal(problem: &Problem, short: &Problem, starts: Vec<State>, limits: Limit
     if first.ending == Ending::Exact {
         return minimise(problem, State::carried(problem, first.point.clone(), &first)?, limits);
     }
-    let noise = thermal_noise(short, &first)?;
+    let noise = thermal_noise(short, &first, &shares_left(short, &first)?)?;
     poles.push(first.point.poles);
     let whitened = poles.into_iter().map(|poles| State::new(short, Point { poles, noise: noise.clone() }));
     let best = refined(short, whitened.filter_map(Result::ok).collect(), limits)?;
     let mut state = State::carried(problem, best.point.clone(), &best)?;
+    // a round moves poles by a fraction of their errors: what a fit absorbs stays the same
+    let shares = shares_left(problem, &state)?;
     for _ in 0..THERMAL_ROUNDS {
-        let noise = thermal_noise(problem, &state)?;
+        let noise = thermal_noise(problem, &state, &shares)?;
         state = State::carried(problem, Point { poles: state.point.poles.clone(), noise }, &state)?;
         state = minimise(problem, state, limits)?;
     }
@@ -108,19 +109,31 @@ fn without_drift(problem: &Problem, state: State, limits: Limits) -> Result<Stat
 /// Where an exchanged pole begins: fast, apart from the usual starts.
 const EXCHANGE: f64 = 0.4;
 
-/// Whitening by the noise that the residual shows.
-fn thermal_noise(problem: &Problem, state: &State) -> Result<Noise, ModelError> {
+/// Share of the noise's power that the fit leaves, of each measured experiment by bin.
+fn shares_left(problem: &Problem, state: &State) -> Result<Vec<Vec<f64>>, ModelError> {
     let tangent = Tangent::new(&full_jacobian(problem, state))?;
-    let e = state.residual();
-    let mut planner = RealFftPlanner::<f64>::new();
+    let mut transform = Transform::default();
     let mut top = 0;
-    let mut spectra = Vec::new();
-    for (_, y) in problem.measured() {
-        spectra.push((tangent.spectra(&e, top, y.len(), &mut planner), y.len()));
+    let shares = problem.measured().iter().map(|(_, y)| {
+        let basis = tangent.transformed(top, y.len(), &mut transform);
         top += y.len();
-    }
+        remaining(&basis, y.len())
+    });
+    Ok(shares.collect())
+}
+
+/// Whitening by the noise that the residual shows, where so much of it is left.
+fn thermal_noise(problem: &Problem, state: &State, shares: &[Vec<f64>]) -> Result<Noise, ModelError> {
+    let e = state.residual();
+    let mut transform = Transform::default();
+    let mut top = 0;
+    let seen = problem.measured().iter().zip(shares).map(|((_, y), remaining)| {
+        let own = &e[top..top + y.len()];
+        top += y.len();
+        Seen { length: y.len(), periodogram: periodogram(&transform.of(own)), remaining }
+    });
     let a = state.point.a();
-    let intensities = intensities(&a, &state.point.whitening(), &spectra);
+    let intensities = intensities(&a, &state.point.whitening(), &seen.collect::<Vec<_>>());
     let (_, predictor) = gain(problem.order, &a, &intensities)?;
     Ok(Noise::Frozen(a, sections(&coordinates(&predictor))))
 }
