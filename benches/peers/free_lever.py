@@ -36,7 +36,7 @@ from scipy.optimize import least_squares
 
 lap("import scipy")
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT, SCRIPT = Path(__file__).resolve().parents[2], __file__
 LENGTH, BEFORE, MARGIN, GUARD = 8192, 1024, 8, 50
 MODES, REAL, ORDER = 4, 3, 11
 HEAD = 128  # samples after t0 in which real poles may show
@@ -280,7 +280,7 @@ def main():
                 for name in source:
                     target.create_dataset(name, data=source[name][()]).attrs.update(source[name].attrs)
         os.sync()  # nothing left to write back while the clock runs
-        script = [sys.executable, __file__, "--job", raw, Path(folder, "script.h5")]
+        script = [sys.executable, SCRIPT, "--job", raw, Path(folder, "script.h5")]
         ours = [options.afmid, "run", ROOT / "configs/free-lever.toml", "--set", f'records.files=["{raw}/*.h5"]']
         times = {"script": [], "afmid": []}
         for i in range(options.runs):
