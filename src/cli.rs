@@ -65,6 +65,9 @@ pub enum Command {
         /// How to draw it.
         #[arg(long, value_enum, default_value = "text")]
         format: GraphFormat,
+        /// As JSON, alone on stdout: --format json.
+        #[arg(long, conflicts_with = "format")]
+        json: bool,
     },
     /// Say which stages would run, and why.
     Explain(ExplainArgs),
@@ -260,6 +263,12 @@ pub struct ReportArgs {
     /// Also write every figure as an SVG file into this folder.
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
+    /// With --figures: each as a PNG file as well, 2000 pixels across (300 to the inch at 17 cm).
+    #[arg(long, requires = "figures")]
+    pub png: bool,
+    /// What was written, as JSON, alone on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What to explain.
@@ -296,4 +305,6 @@ pub enum GraphFormat {
     Mermaid,
     /// Graphviz.
     Dot,
+    /// Stages and wires, for programs.
+    Json,
 }

@@ -159,6 +159,38 @@ fn a_run_leaves_a_result_that_can_be_shown_and_the_next_one_reuses_it() {
 }
 
 #[test]
+fn commands_that_write_tell_programs_what_they_wrote() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    archive(folder);
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        let output = afmid(folder, arguments);
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        serde_json::from_str(&stdout(&output)).expect("JSON alone on stdout")
+    };
+    let graph = json(&["graph", "count.toml", "--json"]);
+    assert_eq!(graph, json(&["graph", "count.toml", "--format", "json"]));
+    assert_eq!(graph["stages"][1]["inputs"]["records"], "records.records");
+    json(&["run", "count.toml", "--cache", "cache", "-o", "a.h5", "--json"]);
+    let report = json(&["report", "a.h5", "--figures", "figures", "--png", "--json"]);
+    let figures: Vec<&str> =
+        report["figures"].as_array().expect("a list").iter().filter_map(|name| name.as_str()).collect();
+    assert!(folder.join(report["page"].as_str().expect("a page")).is_file());
+    for pair in figures.chunks(2) {
+        assert_eq!(pair[0].replace(".svg", ".png"), pair[1]);
+        let bytes = std::fs::read(folder.join(pair[1])).expect("a picture");
+        assert!(bytes.starts_with(b"\x89PNG\r\n"), "{}", pair[1]);
+    }
+    assert_eq!(code(&afmid(folder, &["report", "a.h5", "--png"])), 2, "--png wants --figures");
+    let stage = json(&["new", "stage", "mine", "--python", "--json"]);
+    let files = stage["files"].as_array().expect("a list");
+    assert!(files.len() >= 3 && files.iter().all(|name| folder.join(name.as_str().expect("a name")).is_file()));
+    let made = json(&["export-crate", "a.h5", "--json"]);
+    assert_eq!((&made["inputs"], &made["missing"]), (&3.into(), &0.into()));
+    assert!(folder.join(made["folder"].as_str().expect("a folder")).is_dir());
+}
+
+#[test]
 fn explain_says_what_would_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

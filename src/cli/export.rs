@@ -18,6 +18,9 @@ pub struct ExportArgs {
     /// The file [default: the result file's and the stage's name, with `.mat` or `.json`, in the working directory].
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// What was written, as JSON, alone on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// A format for models.

@@ -32,6 +32,9 @@ pub struct NewStageArgs {
     /// The folder, which must not be there yet [default: NAME in the working directory].
     #[arg(short, long, value_name = "FOLDER")]
     pub output: Option<PathBuf>,
+    /// What was written, as JSON, alone on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 fn stage_name(text: &str) -> Result<String, String> {
@@ -64,6 +67,9 @@ pub struct NewPipelineArgs {
     /// The config [default: the goal's name with `.toml`, in the working directory]; a file that is there is left alone.
     #[arg(short, long, value_name = "CONFIG.toml")]
     pub output: Option<PathBuf>,
+    /// What was written, as JSON, alone on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What a pipeline is to find.

@@ -86,6 +86,9 @@ pub struct CrateArgs {
     /// The licence of the crate, as an address.
     #[arg(long, value_name = "URL")]
     pub license: Option<String>,
+    /// What was written, as JSON, alone on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What to free.

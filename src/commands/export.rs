@@ -7,6 +7,7 @@ use afmid_pipeline::cache::replace_with;
 use afmid_pipeline::config::nearest;
 use afmid_pipeline::store::ResultFile;
 use afmid_pipeline::{Artifact, Shape};
+use serde_json::json;
 
 use super::diff::open;
 use super::show::find;
@@ -15,6 +16,7 @@ use crate::cli::{ExportArgs, ModelFormat};
 use crate::export::{ExportedModel, Origin, model_json, model_mat, units};
 use crate::failure::Failure;
 use crate::output::print;
+use crate::show::pretty;
 
 /// What is exported if nothing is said: the stage that fits all events in every shipped config.
 const USUAL: &str = "model";
@@ -32,6 +34,9 @@ pub fn run(args: &ExportArgs) -> Result<(), Failure> {
     };
     replace_with(&output, |temporary| fs::write(temporary, &bytes))
         .map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    if args.json {
+        return print(&pretty(&json!({ "file": output.display().to_string(), "stage": id, "port": port }))?);
+    }
     print(&format!("{}\n", output.display()))
 }
 

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::cache::replace_with;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::diff::open;
 use crate::cli::CrateArgs;
@@ -12,6 +12,7 @@ use crate::failure::Failure;
 use crate::output::print;
 use crate::provenance::files::{Finder, Now};
 use crate::provenance::research_object::{CONFIG, CrateInput, METADATA, Stated, inputs, metadata, result_name};
+use crate::show::pretty;
 
 /// Writes a crate and says what is in it.
 pub fn run(args: &CrateArgs) -> Result<(), Failure> {
@@ -47,6 +48,12 @@ pub fn run(args: &CrateArgs) -> Result<(), Failure> {
     }
     // last: a folder without it is no crate
     write(&folder.join(METADATA), &text(&metadata)?)?;
+    if args.json {
+        let folder = folder.display().to_string();
+        return print(&pretty(
+            &json!({ "folder": folder, "inputs": inputs.len(), "missing": gone.len(), "copied": args.with_data }),
+        )?);
+    }
     print(&told(&folder, &inputs, gone.len()))
 }
 

@@ -32,7 +32,7 @@ mod trace;
 
 use afmid_pipeline::Registry;
 
-use crate::cli::Command;
+use crate::cli::{Command, GraphFormat};
 use crate::failure::Failure;
 
 /// Runs a command with the stages of a program.
@@ -53,7 +53,9 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::Report(args) => report::run(&args),
         Command::New { what } => new::run(&what, registry),
         Command::Check { configs, json } => check::run(&configs, json, registry),
-        Command::Graph { config, format } => graph::run(&config, format, registry),
+        Command::Graph { config, format, json } => {
+            graph::run(&config, if json { GraphFormat::Json } else { format }, registry)
+        }
         Command::Stages { name, json } => stages::run(name.as_deref(), json, registry),
         Command::Causes { name, json } => causes::run(name.as_deref(), json),
         Command::Exam(args) => exam::run(&args, registry),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use afmid_pipeline::Registry;
 use afmid_pipeline::cache::replace_with;
+use serde_json::json;
 
 use super::load::plan_text;
 use crate::cli::{New, NewPipelineArgs, NewStageArgs};
@@ -11,6 +12,7 @@ use crate::failure::Failure;
 use crate::output::print;
 use crate::relative::folder_of;
 use crate::scaffold::{Wanted, look, pipeline, python, rust};
+use crate::show::pretty;
 
 /// Writes what was asked for.
 pub fn run(what: &New, registry: &Registry) -> Result<(), Failure> {
@@ -34,6 +36,9 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
     plan_text(&output.display().to_string(), &text, &[], registry)?;
     replace_with(&output, |file| std::fs::write(file, &text))
         .map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    if args.json {
+        return print(&pretty(&json!({ "config": output.display().to_string(), "recordings": source.files }))?);
+    }
     let files = if source.files == 1 { "1 file".to_owned() } else { format!("{} files", source.files) };
     print(&format!(
         "{}: {files}\n  afmid run {0} -o {1}.h5\n",
@@ -62,9 +67,14 @@ fn new_stage(args: &NewStageArgs) -> Result<(), Failure> {
     };
     let failed =
         |error: std::io::Error| Failure::failed(format!("{} cannot be written: {error}", folder.display()), None);
+    let mut written = Vec::new();
     for (file, text) in files {
         let path = folder.join(file);
         std::fs::create_dir_all(folder_of(&path)).and_then(|()| std::fs::write(&path, text)).map_err(failed)?;
+        written.push(path.display().to_string());
+    }
+    if args.json {
+        return print(&pretty(&json!({ "folder": folder.display().to_string(), "files": written }))?);
     }
     print(&format!("{}\n  cd {0}\n  {next}\n", folder.display()))
 }

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::store::read_result;
+use serde_json::json;
 
 use super::open::require_result;
 use super::target::{Target, prepare};
@@ -11,7 +12,8 @@ use crate::cli::ReportArgs;
 use crate::failure::Failure;
 use crate::output::print;
 use crate::relative::{address, folder_of, relative};
-use crate::report::{figures, report};
+use crate::report::{Painter, figures, report};
+use crate::show::pretty;
 
 /// Writes the page, and the figures if asked for, and says where.
 pub fn run(args: &ReportArgs) -> Result<(), Failure> {
@@ -21,19 +23,31 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     let run = read_result(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let (results, page) = (folder_of(&args.result), folder_of(&output));
     let page = report(&run, &|name| beside(results, page, name)).map_err(|error| Failure::failed(error, None))?;
-    write(&output, &page)?;
-    let mut written = format!("{}\n", output.display());
+    write(&output, page.as_bytes())?;
+    let mut written = Vec::new();
     if let Some(folder) = &args.figures {
         fs::create_dir_all(folder).map_err(|error| {
             Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
         })?;
+        let painter = args.png.then(Painter::new);
         for (name, text) in figures(&run) {
             let path = folder.join(name);
-            write(&path, &text)?;
-            written.push_str(&format!("{}\n", path.display()));
+            write(&path, text.as_bytes())?;
+            let picture = path.with_extension("png");
+            written.push(path);
+            if let Some(painter) = &painter {
+                let cannot = |error| Failure::failed(format!("{} cannot be drawn: {error}", picture.display()), None);
+                write(&picture, &painter.png(&text).map_err(cannot)?)?;
+                written.push(picture);
+            }
         }
     }
-    print(&written)
+    let figures: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
+    if args.json {
+        return print(&pretty(&json!({ "page": output.display().to_string(), "figures": figures }))?);
+    }
+    let all = std::iter::once(output.display().to_string()).chain(figures);
+    print(&all.map(|path| path + "\n").collect::<String>())
 }
 
 /// The address of a data set's page, if it has one, or else of its result.
@@ -48,11 +62,11 @@ fn default_output(result: &Path) -> PathBuf {
 }
 
 /// Writes under a temporary name beside it and renames: a page is whole or not there.
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let mut temporary = path.as_os_str().to_owned();
     temporary.push(format!(".{}.tmp", std::process::id()));
     let temporary = PathBuf::from(temporary);
-    let written = fs::write(&temporary, text).and_then(|()| fs::rename(&temporary, path));
+    let written = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
     written.map_err(|error| {
         // a half-written file is of no use to anybody; if it cannot be removed either, the first error says why
         let _ = fs::remove_file(&temporary);

@@ -15,6 +15,7 @@ mod number;
 mod page;
 mod palette;
 mod paper;
+mod png;
 mod view;
 
 #[cfg(test)]
@@ -23,3 +24,4 @@ mod fixture;
 mod tests;
 
 pub(crate) use page::{figures, report};
+pub(crate) use png::Painter;
