@@ -17,13 +17,15 @@ pub(super) struct Made {
     pub(super) record: StageRecord,
 }
 
+/// The result file with the stages that have ended, if one was wanted.
+pub(super) type ResultFile = Option<Result<PendingResult, StoreError>>;
+
 /// What was written down.
 #[derive(Default)]
 pub(super) struct Kept {
     /// What could not be put into the cache.
     pub(super) unkept: BTreeMap<usize, StoreError>,
-    /// The result file with the stages that have ended, if one was wanted.
-    pub(super) file: Option<Result<PendingResult, StoreError>>,
+    pub(super) file: ResultFile,
 }
 
 /// Puts results into the cache as they come and into the result file in an order of its own, until the run has ended.
