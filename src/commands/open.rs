@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use afmid_pipeline::recording::recognised;
 use afmid_pipeline::store::{FileKind, file_kind};
 
 use crate::failure::Failure;
@@ -13,7 +14,8 @@ pub fn require_result(path: &Path) -> Result<(), Failure> {
         return Err(Failure::usage(format!("{shown} is a folder, wanted a result file"), None));
     }
     if !path.is_file() {
-        return Err(Failure::usage(format!("there is no file {shown}"), None));
+        let help = "a result is made by `afmid run CONFIG -o OUT.h5`".to_owned();
+        return Err(Failure::usage(format!("there is no file {shown}"), Some(help)));
     }
     let kind = file_kind(path).map_err(|error| Failure::usage(format!("{shown} cannot be read: {error}"), None))?;
     let help = match kind {
@@ -25,6 +27,15 @@ pub fn require_result(path: &Path) -> Result<(), Failure> {
         FileKind::Toml => format!(
             "if it is a config, `afmid run {shown} -o OUT.h5` makes a result, and `afmid check {shown}` checks it"
         ),
+        FileKind::Text | FileKind::Other if recognised(path) => {
+            let help = format!(
+                "`afmid inspect {shown}` says what it holds, `afmid new pipeline {shown}` writes a config for it"
+            );
+            return Err(Failure::usage(
+                format!("{shown} is a recording or a table, wanted a result file of `afmid run`"),
+                Some(help),
+            ));
+        }
         _ => "`afmid run CONFIG -o OUT.h5` makes one".to_owned(),
     };
     Err(Failure::usage(format!("{shown} is {kind}, wanted a result file of `afmid run`"), Some(help)))

@@ -88,7 +88,7 @@ fn of_channel(channel: &Channel) -> (Answer, String) {
         Some(rate) => (
             Answer::Yes,
             format!(
-                "{rate} samples per second, {longest} samples without interruption, rings of up to {} Hz",
+                "{rate} samples per second, {longest} samples without interruption: enough for a lever's first mode of up to {} Hz",
                 rate / PERIOD_SAMPLES
             ),
         ),
@@ -125,7 +125,7 @@ mod tests {
         let with = |values: Values| Channel { values: Some(values), ..good() };
         let values = |codes, missing, saturated| Values { least: 0.0, largest: 1.0, codes, missing, saturated };
         for (channel, answer, word) in [
-            (good(), Answer::Yes, "rings of up to 250000 Hz"),
+            (good(), Answer::Yes, "first mode of up to 250000 Hz"),
             (channel("/a", Some(1e4), 90_000), Answer::No, "min_sample_rate_hz"),
             (channel("/a", None, 90_000), Answer::Unknown, "sample_rate_hz"),
             (channel("/a", Some(5e6), 500), Answer::No, "500 samples"),

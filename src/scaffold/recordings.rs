@@ -34,9 +34,12 @@ pub fn look(paths: &[PathBuf]) -> Result<Source, (String, Option<String>)> {
             let (pattern, found) = kind(path)?;
             patterns.push(pattern);
             files.extend(found);
-        } else {
+        } else if path.exists() {
             patterns.push(path.clone());
             files.push(path.clone());
+        } else {
+            let help = "give the folder of the recordings, or the files".to_owned();
+            return Err((format!("there is no file or folder {}", path.display()), Some(help)));
         }
     }
     let first = files.first().cloned().ok_or_else(|| ("there are no recordings".to_owned(), None))?;

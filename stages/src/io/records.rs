@@ -211,7 +211,7 @@ impl Records {
         let count = failures.len();
         let Some(mut first) = failures.into_iter().next() else { return Ok(records) };
         if count > 1 {
-            first.problem = format!("{} (the first of {count} unreadable among {total} files)", first.problem);
+            first.problem = format!("{} (the first of {count} files that cannot be used, of {total})", first.problem);
         }
         if first.help.is_none() {
             first.help = Some("mend or remove it, or set `skip_unreadable = true`".to_owned());

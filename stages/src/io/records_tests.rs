@@ -102,7 +102,7 @@ fn files_that_are_no_records_are_errors_that_name_them() {
     fs::write(folder.0.join("r4.h5"), b"").unwrap();
     let error = folder.run(&all()).unwrap_err();
     let text = error.to_string();
-    assert!(text.contains("r2.h5") && text.contains("the first of 3 unreadable among 4 files"), "{text}");
+    assert!(text.contains("r2.h5") && text.contains("the first of 3 files that cannot be used, of 4"), "{text}");
     assert!(error.help.is_some());
     let (ports, warnings) = folder.run(&Records { skip_unreadable: true, ..all() }).unwrap();
     let Some(Artifact::Recording(recording)) = ports.artifact("records") else { panic!("no recording") };
