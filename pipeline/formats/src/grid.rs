@@ -69,7 +69,11 @@ impl Source for Grid {
         }
         let at = self.first.saturating_add((start as u64).saturating_mul(self.step));
         let bytes = match &self.store {
-            Store::File(file) => self.plain_bytes(&file.reopen()?, at, count)?,
+            Store::File(file) if self.is_direct() => {
+                let file = file.reopen()?;
+                return self.number.read(count, self.big_endian, |bytes| read_at(&file, at, bytes));
+            }
+            Store::File(file) => self.spread_bytes(&file.reopen()?, at, count)?,
             Store::Packed(packed) => self.packed_bytes(&packed.bytes()?, at, count)?,
         };
         Ok(self.number.decode(&bytes, self.big_endian))
@@ -99,13 +103,9 @@ impl Source for Backwards {
 }
 
 impl Grid {
-    fn plain_bytes(&self, file: &File, at: u64, count: usize) -> Result<Vec<u8>, FormatError> {
+    /// Of numbers that do not lie side by side.
+    fn spread_bytes(&self, file: &File, at: u64, count: usize) -> Result<Vec<u8>, FormatError> {
         let size = self.number.bytes();
-        if self.step == size {
-            let mut bytes = vec![0; count * size as usize];
-            read_at(file, at, &mut bytes)?;
-            return Ok(bytes);
-        }
         let at_once = if self.step > FAR_BYTES { 1 } else { (BLOCK_BYTES / self.step).max(1) as usize };
         let mut bytes = Vec::with_capacity(count * size as usize);
         let mut block = Vec::new();

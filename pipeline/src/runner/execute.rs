@@ -5,7 +5,7 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use super::error::{Failed, RunError};
-use super::keeper::{Made, ResultFile, keep};
+use super::keeper::{Made, Pending, keep};
 use super::keys::plan_node;
 use super::result::{RunInfo, RunResult, StageRecord, StageResult};
 use super::schedule::{Board, Outcome, run_graph};
@@ -95,7 +95,7 @@ fn perform(
     plan: &Plan,
     options: &Options<'_>,
     begin: Option<impl FnOnce() -> Result<PendingResult, StoreError> + Send>,
-) -> Result<(RunResult, ResultFile), Vec<RunError>> {
+) -> Result<(RunResult, Pending), Vec<RunError>> {
     let (started, clock) = (jiff::Timestamp::now(), Instant::now());
     let needs = needs(plan);
     let failed = |index: usize, error: StageError| {

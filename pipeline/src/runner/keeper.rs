@@ -18,14 +18,14 @@ pub(super) struct Made {
 }
 
 /// The result file with the stages that have ended, if one was wanted.
-pub(super) type ResultFile = Option<Result<PendingResult, StoreError>>;
+pub(super) type Pending = Option<Result<PendingResult, StoreError>>;
 
 /// What was written down.
 #[derive(Default)]
 pub(super) struct Kept {
     /// What could not be put into the cache.
     pub(super) unkept: BTreeMap<usize, StoreError>,
-    pub(super) file: ResultFile,
+    pub(super) file: Pending,
 }
 
 /// Puts results into the cache as they come and into the result file in an order of its own, until the run has ended.

@@ -130,6 +130,21 @@ mod tests {
     }
 
     #[test]
+    fn what_is_ready_first_runs_first() {
+        // one short branch (1, 3, 4, 5) and one long node (2), both behind node 0
+        let needs = [vec![], vec![0], vec![0], vec![1], vec![3], vec![4]];
+        let order = Mutex::new(Vec::new());
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+        pool.install(|| {
+            run_graph(&needs, |node, _| {
+                order.lock().expect("nobody panics").push(node);
+                Ok::<(), ()>(())
+            })
+        });
+        assert_eq!(order.into_inner().expect("nobody panics"), [0, 1, 2, 3, 4, 5]);
+    }
+
+    #[test]
     fn a_node_after_a_failed_one_is_skipped_and_others_run() {
         let outcomes = sums(&[vec![], vec![], vec![0], vec![1], vec![3], vec![2, 4], vec![2]]);
         assert!(matches!(&outcomes[3], Outcome::Failed(why) if why == "three fails"));

@@ -6,13 +6,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Decision, Options, Quiet, RunError, explain, run};
+use super::{Decision, Options, Quiet, RunError, explain, run, run_to_file};
 use crate::artifact::{Array, Axis};
-use crate::cache::Cache;
+use crate::cache::{Cache, write_result};
 use crate::error::StageError;
 use crate::graph::{Plan, load};
 use crate::runner::RunResult;
 use crate::stage::{Caching, Context, Entry, Example, Port, Ports, Registry, Spec, Stage};
+use crate::store::compare;
 
 const OUT: Port<Array> = Port::new("out", "series", "a series");
 const IN: Port<Array> = Port::new("in", "series", "a series");
@@ -95,12 +96,13 @@ fn plan(count: usize, limit: f64) -> Plan {
     load("squares.toml", &text, &[], &registry).expect("a valid config")
 }
 
+fn options(cache: &Cache, fresh: bool) -> Options<'_> {
+    let (base, program) = (Path::new(".").to_owned(), "afmid test".to_owned());
+    Options { base, cache, fresh, program, overrides: Vec::new(), observer: &Quiet }
+}
+
 fn execute(plan: &Plan, cache: &Cache, fresh: bool) -> Result<RunResult, Vec<RunError>> {
-    let program = "afmid test".to_owned();
-    run(
-        plan,
-        &Options { base: Path::new(".").to_owned(), cache, fresh, program, overrides: Vec::new(), observer: &Quiet },
-    )
+    run(plan, &options(cache, fresh))
 }
 
 fn cached(result: &RunResult) -> Vec<bool> {
@@ -127,6 +129,12 @@ fn a_result_is_computed_once_and_again_only_when_something_changed() {
         "warnings are part of the result"
     );
     assert_eq!(SQUARES.load(Ordering::SeqCst), 1);
+
+    // a file that grows with the run holds what one written after it holds
+    let (grown, after) = (folder.path().join("grown.h5"), folder.path().join("after.h5"));
+    run_to_file(&plan(4, 10.0), &options(&cache, false), &grown).expect("runs");
+    write_result(&after, &again).expect("written");
+    assert_eq!(compare(&grown, &after).expect("both whole"), []);
 
     let other_limit = execute(&plan(4, 11.0), &cache, false).expect("runs");
     assert_eq!(cached(&other_limit), [true, false]);

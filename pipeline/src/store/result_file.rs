@@ -221,3 +221,16 @@ fn default_port(ports: &Ports) -> Option<String> {
     let groups = group_names(ports.iter().map(|(name, _)| name), &TAKEN_BY_STAGE);
     ports.iter().zip(groups).find(|((_, artifact), _)| plots(artifact)).map(|(_, group)| group)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::by_depth;
+
+    #[test]
+    fn stages_are_written_by_their_distance_from_the_beginning() {
+        // a chain 0, 1, 2, 3 and a branch 0, 4, that joins it in 5
+        let needs = [vec![], vec![0], vec![1], vec![2], vec![0], vec![3, 4]];
+        assert_eq!(by_depth(&needs), [0, 1, 4, 2, 3, 5]);
+        assert!(by_depth(&[]).is_empty());
+    }
+}
