@@ -1,6 +1,7 @@
 //! A plugin's process: started, written to, read from, ended. No call of it waits without a limit.
 
 use std::io::Write;
+use std::os::fd::OwnedFd;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
@@ -37,7 +38,15 @@ impl Process {
         };
         let mut child = command.spawn().map_err(failed)?;
         let (input, output, errors) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let ((requests, to_write), (found, lines), log) = (mpsc::channel::<Vec<u8>>(), mpsc::channel(), Log::default());
+        let ((requests, to_write), (found, lines)) = (mpsc::channel::<Vec<u8>>(), mpsc::channel());
+        let (log, follow) = match errors.map(|errors| Log::of(OwnedFd::from(errors).into())).transpose() {
+            Ok(Some((log, follow))) => (log, Some(follow)),
+            Ok(None) => (Log::default(), None),
+            Err(error) => {
+                kill_group(&mut child);
+                return Err(failed(error));
+            }
+        };
         // one thread per pipe: a plugin that does not read, or that fills stderr, blocks a thread of its own and nothing else
         let threads = [
             spawn("stdin", move || {
@@ -53,10 +62,7 @@ impl Process {
                     read_lines(output, MOST_BYTES, |line| found.send(line).is_ok());
                 }
             }),
-            {
-                let log = log.clone();
-                spawn("stderr", move || errors.into_iter().for_each(|errors| log.follow(errors)))
-            },
+            spawn("stderr", move || follow.into_iter().for_each(|follow| follow())),
         ];
         let process = Self { child, requests: Some(requests), lines, log, ended: false };
         match threads.into_iter().find_map(Result::err) {
