@@ -7,7 +7,7 @@ use hdf5::{Dataset, Group};
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use super::dimension_scale::{attach_scale, make_scale};
+use super::dimension_scale::Scales;
 use super::error::{Result, StoreError};
 use super::layout::{StoredAttribute, read_attributes, read_layout, write_attributes, write_layout};
 use super::rows::{Backing, read_rows, write_rows};
@@ -47,18 +47,18 @@ const MAGNITUDE: &str = "_magnitude";
 pub(super) fn write_array(parent: &Group, name: &str, array: &Array) -> Result<Group> {
     array.validate().map_err(|error| StoreError::new(error.to_string()).at(write::path_of(parent, name)))?;
     let group = write::nexus_group(parent, name, "NXdata")?;
-    let mut scales = Vec::with_capacity(array.axes.len());
+    let mut scales = Scales::default();
     for axis in &array.axes {
         let scale = write::dataset(&group, &axis.name, &[axis.values.len()], &axis.values)?;
-        make_scale(&scale, &axis.name)?;
         describe(&scale, &axis.unit, &axis.long_name)?;
-        scales.push((axis, scale));
+        scales.add(&axis.name, scale)?;
     }
     let mut variables = Vec::with_capacity(array.variables.len());
     for variable in &array.variables {
-        let kind = write_variable(&group, variable, &scales)?;
+        let kind = write_variable(&group, variable, &array.axes, &mut scales)?;
         variables.push(StoredVariable { name: variable.name.clone(), kind, dims: variable.dims.clone() });
     }
+    scales.finish()?;
     write_signal(&group, array)?;
     let attributes = write_attributes(&group, &array.attributes)?;
     write_layout(
@@ -68,17 +68,15 @@ pub(super) fn write_array(parent: &Group, name: &str, array: &Array) -> Result<G
     Ok(group)
 }
 
-fn write_variable(group: &Group, variable: &Variable, scales: &[(&Axis, Dataset)]) -> Result<Kind> {
-    let mut over = Vec::with_capacity(variable.dims.len());
-    for dim in &variable.dims {
-        let found = scales.iter().find(|(axis, _)| axis.name == *dim);
-        over.push(found.ok_or_else(|| StoreError::new(format!("variable `{}`: no axis `{dim}`", variable.name)))?);
-    }
-    let shape: Vec<usize> = over.iter().map(|(axis, _)| axis.values.len()).collect();
-    let finish = |dataset: Dataset, long_name: &str| -> Result<Dataset> {
-        for (dimension, (axis, scale)) in over.iter().enumerate() {
-            attach_scale(&dataset, scale, dimension, &axis.name)?;
-        }
+fn write_variable(group: &Group, variable: &Variable, axes: &[Axis], scales: &mut Scales) -> Result<Kind> {
+    let length = |dim: &String| {
+        let found = axes.iter().find(|axis| axis.name == *dim).map(|axis| axis.values.len());
+        found.ok_or_else(|| StoreError::new(format!("variable `{}`: no axis `{dim}`", variable.name)))
+    };
+    let shape: Vec<usize> = variable.dims.iter().map(length).collect::<Result<_>>()?;
+    let over: Vec<Option<&str>> = variable.dims.iter().map(|dim| Some(dim.as_str())).collect();
+    let mut finish = |dataset: Dataset, long_name: &str| -> Result<Dataset> {
+        scales.attach(&dataset, &over)?;
         describe(&dataset, &variable.unit, long_name)?;
         Ok(dataset)
     };

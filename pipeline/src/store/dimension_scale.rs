@@ -1,40 +1,72 @@
 //! Dimension scales: what ties a variable's axes to their coordinates for netCDF readers such as xarray.
 //!
-//! HDF5's high-level library (H5DS) has no safe interface, hence the only unsafe code of this package.
-#![allow(unsafe_code)]
+//! Both ends know of each other, as HDF5's dimension scale specification wants: a variable lists its scales (`DIMENSION_LIST`), a scale the
+//! variables that it belongs to (`REFERENCE_LIST`). H5DSattach_scale rewrites the second list with every variable; here it is written once.
 
-use std::ffi::{CString, c_char, c_int, c_uint};
-
-use hdf5::Dataset;
-use hdf5_sys::h5i::hid_t;
+use hdf5::types::VarLenArray;
+use hdf5::{Dataset, ObjectReference1};
 
 use super::error::{Result, StoreError};
+use super::library::{ScaledDimension, attribute, make_scale};
 
-unsafe extern "C" {
-    fn H5DSset_scale(scale: hid_t, name: *const c_char) -> c_int;
-    fn H5DSattach_scale(dataset: hid_t, scale: hid_t, dimension: c_uint) -> c_int;
+const SCALES: &str = "DIMENSION_LIST";
+const USES: &str = "REFERENCE_LIST";
+
+/// The scales of a group's variables.
+#[derive(Debug, Default)]
+pub(super) struct Scales(Vec<Scale>);
+
+#[derive(Debug)]
+struct Scale {
+    name: String,
+    dataset: Dataset,
+    reference: ObjectReference1,
+    uses: Vec<ScaledDimension>,
 }
 
-/// Makes a one-dimensional dataset the scale `name`. Errors: the library refuses.
-pub(super) fn make_scale(scale: &Dataset, name: &str) -> Result<()> {
-    let text = CString::new(name).map_err(|_| StoreError::new(format!("the axis name {name:?} holds a NUL")))?;
-    // SAFETY: the handle is a live dataset for the length of the call, since `scale` is borrowed; the library copies the text,
-    // which ends with a NUL; the global lock is held.
-    let status = hdf5::sync::sync(|| unsafe { H5DSset_scale(scale.id(), text.as_ptr()) });
-    check(status, "make a dimension scale of", name)
+impl Scales {
+    /// Makes a one-dimensional dataset the scale `name`. Errors: the library refuses.
+    pub(super) fn add(&mut self, name: &str, dataset: Dataset) -> Result<()> {
+        let failed = |error| wrapped("make a dimension scale of", name, error);
+        make_scale(&dataset, name).map_err(failed)?;
+        let reference = dataset.reference(".").map_err(failed)?;
+        self.0.push(Scale { name: name.to_owned(), dataset, reference, uses: Vec::new() });
+        Ok(())
+    }
+
+    /// Attaches scales by name, one for every dimension of a dataset that has one. Errors: one is not there; the library refuses.
+    pub(super) fn attach(&mut self, dataset: &Dataset, names: &[Option<&str>]) -> Result<()> {
+        if names.iter().all(Option::is_none) {
+            return Ok(());
+        }
+        let failed = |error| wrapped("attach dimension scales to", &dataset.name(), error);
+        let own: ObjectReference1 = dataset.reference(".").map_err(failed)?;
+        let mut list = Vec::with_capacity(names.len());
+        for (dimension, name) in (0..).zip(names) {
+            let Some(name) = name else {
+                list.push(VarLenArray::from_slice(&[]));
+                continue;
+            };
+            let found = self.0.iter_mut().find(|scale| scale.name == *name);
+            let scale = found.ok_or_else(|| StoreError::new(format!("no axis `{name}`")).at(dataset.name()))?;
+            scale.uses.push(ScaledDimension::new(own, dimension));
+            list.push(VarLenArray::from_slice(&[scale.reference]));
+        }
+        attribute(dataset, SCALES, &[list.len()], &list).map_err(failed)
+    }
+
+    /// Tells every scale what it belongs to. Errors: the library refuses.
+    pub(super) fn finish(self) -> Result<()> {
+        for Scale { name, dataset, uses, .. } in self.0 {
+            if !uses.is_empty() {
+                attribute(&dataset, USES, &[uses.len()], &uses)
+                    .map_err(|error| wrapped("list the uses of the scale", &name, error))?;
+            }
+        }
+        Ok(())
+    }
 }
 
-/// Attaches a scale to one dimension of a dataset. Errors: the library refuses (a scale has no scales itself).
-pub(super) fn attach_scale(dataset: &Dataset, scale: &Dataset, dimension: usize, name: &str) -> Result<()> {
-    let Ok(index) = c_uint::try_from(dimension) else {
-        return Err(StoreError::new(format!("dimension {dimension} is beyond what HDF5 can hold")));
-    };
-    // SAFETY: both handles are live datasets for the length of the call, since both are borrowed; the global lock is held. An
-    // index beyond the rank is an error status.
-    let status = hdf5::sync::sync(|| unsafe { H5DSattach_scale(dataset.id(), scale.id(), index) });
-    check(status, "attach the dimension scale", name)
-}
-
-fn check(status: c_int, doing: &str, name: &str) -> Result<()> {
-    if status < 0 { Err(StoreError::new(format!("HDF5 cannot {doing} `{name}`"))) } else { Ok(()) }
+fn wrapped(doing: &str, name: &str, error: hdf5::Error) -> StoreError {
+    StoreError::new(format!("HDF5 cannot {doing} `{name}`: {error}"))
 }

@@ -22,6 +22,7 @@ mod error;
 mod file_kind;
 mod format;
 mod layout;
+mod library;
 mod names;
 mod ports;
 pub(crate) mod read;

@@ -3,7 +3,7 @@
 use hdf5::{Dataset, Group};
 use serde::{Deserialize, Serialize};
 
-use super::dimension_scale::{attach_scale, make_scale};
+use super::dimension_scale::Scales;
 use super::error::{Result, StoreError};
 use super::layout::{StoredAttribute, read_attributes, read_layout, write_attributes, write_layout};
 use super::{read, write};
@@ -27,30 +27,22 @@ pub(super) fn write_state_space(parent: &Group, name: &str, model: &StateSpace) 
     let group = write::nexus_group(parent, name, "NXcollection")?;
     write::text_attribute(&group, "title", "x(t+Ts) = A x(t) + B u(t) + K e(t), y(t) = C x(t) + D u(t) + e(t)")?;
     let count = model.parameters.len();
-    let scales = [
+    let axes = [
         (NEXT, model.a.rows),
         (STATE, model.a.columns),
         (INPUT, model.b.columns),
         (OUTPUT, model.c.rows),
         (PARAMETER, count),
         (OTHER, if model.covariance.values.is_empty() { 0 } else { count }),
-    ]
-    .into_iter()
-    .map(|(name, length)| {
+    ];
+    let mut scales = Scales::default();
+    for (name, length) in axes {
         let numbers: Vec<i64> = (0..length as i64).collect();
-        let scale = write::dataset(&group, name, &[length], &numbers)?;
-        make_scale(&scale, name)?;
-        Ok((name, length, scale))
-    })
-    .collect::<Result<Vec<_>>>()?;
-    let attach = |dataset: &Dataset, dims: &[&str], shape: &[usize]| -> Result<()> {
-        for (dimension, (dim, length)) in dims.iter().zip(shape).enumerate() {
-            let scale = scales.iter().find(|(name, have, _)| name == dim && have == length);
-            if let Some((name, _, scale)) = scale {
-                attach_scale(dataset, scale, dimension, name)?;
-            }
-        }
-        Ok(())
+        scales.add(name, write::dataset(&group, name, &[length], &numbers)?)?;
+    }
+    let mut attach = |dataset: &Dataset, dims: &[&'static str], shape: &[usize]| -> Result<()> {
+        let fits = |(dim, length): (&&'static str, &usize)| axes.contains(&(*dim, *length)).then_some(*dim);
+        scales.attach(dataset, &dims.iter().zip(shape).map(fits).collect::<Vec<_>>())
     };
     for (name, dims, matrix) in matrices(model) {
         let shape = [matrix.rows, matrix.columns];
@@ -60,6 +52,7 @@ pub(super) fn write_state_space(parent: &Group, name: &str, model: &StateSpace) 
     attach(&write::dataset(&group, "parameters", &[count], &model.parameters)?, &[PARAMETER], &[count])?;
     let names = &model.parameter_names;
     attach(&write::texts(&group, "parameter_names", names)?, &[PARAMETER], &[names.len()])?;
+    scales.finish()?;
     let time = write::scalar(&group, "sample_time_s", model.sample_time_s)?;
     write::text_attribute(&time, "units", "s")?;
     write::scalar(&group, "innovation_variance", model.innovation_variance)?;

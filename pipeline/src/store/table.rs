@@ -5,7 +5,7 @@
 use hdf5::{Dataset, Group};
 use serde::{Deserialize, Serialize};
 
-use super::dimension_scale::{attach_scale, make_scale};
+use super::dimension_scale::Scales;
 use super::error::{Result, StoreError};
 use super::layout::{StoredAttribute, read_attributes, read_layout, write_attributes, write_layout};
 use super::{read, write};
@@ -46,16 +46,18 @@ pub(super) fn write_table(parent: &Group, name: &str, table: &Table) -> Result<G
     }
     let numbers: Vec<i64> = (0..table.rows() as i64).collect();
     let scale = write::dataset(&group, &rows, &[numbers.len()], &numbers)?;
-    make_scale(&scale, &rows)?;
     write::text_attribute(&scale, "long_name", "row")?;
+    let mut scales = Scales::default();
+    scales.add(&rows, scale)?;
     let mut columns = Vec::with_capacity(table.columns.len());
     for column in &table.columns {
         let (dataset, kind) = write_column(&group, column)?;
-        attach_scale(&dataset, &scale, 0, &rows)?;
+        scales.attach(&dataset, &[Some(&rows)])?;
         write::text_attribute(&dataset, "units", &column.unit)?;
         write::text_attribute(&dataset, "long_name", &column.long_name)?;
         columns.push(StoredColumn { name: column.name.clone(), kind });
     }
+    scales.finish()?;
     let attributes = write_attributes(&group, &table.attributes)?;
     write_layout(&group, &Layout { columns, attributes })?;
     Ok(group)

@@ -6,9 +6,9 @@ use std::str::FromStr;
 use hdf5::file::{FileCloseDegree, LibraryVersion};
 use hdf5::types::VarLenUnicode;
 use hdf5::{Dataset, File, Group, H5Type, Location};
-use ndarray::ArrayView;
 
 use super::error::{Result, StoreError};
+use super::library;
 
 /// Creates an HDF5 file whose bytes depend on its contents alone. Errors: it exists, or the folder cannot be written.
 ///
@@ -26,8 +26,7 @@ pub(crate) fn create_file(path: &Path) -> Result<File> {
 
 pub(crate) fn group(parent: &Group, name: &str) -> Result<Group> {
     check_name(name).map_err(|error| error.at(parent.name()))?;
-    let group = parent.create_group_builder().obj_track_times(false).create(name);
-    group.map_err(|error| StoreError::from(error).at(path_of(parent, name)))
+    library::group(parent, name).map_err(|error| StoreError::from(error).at(path_of(parent, name)))
 }
 
 /// A group with its NeXus class.
@@ -41,20 +40,15 @@ pub(super) fn nexus_group(parent: &Group, name: &str, class: &str) -> Result<Gro
 ///
 /// Contiguous and raw: gzip takes a tenth off aligned ensembles and means (noise does not compress) at a tenth of the speed.
 pub(crate) fn dataset<T: H5Type>(parent: &Group, name: &str, shape: &[usize], values: &[T]) -> Result<Dataset> {
-    let wrap = |error: hdf5::Error| StoreError::from(error).at(path_of(parent, name));
-    let view = ArrayView::from_shape(shape, values)
-        .map_err(|error| StoreError::new(format!("{} values do not fill {shape:?}: {error}", values.len())))?;
-    let dataset = empty::<T>(parent, name, shape)?;
-    if !values.is_empty() {
-        dataset.write(view).map_err(wrap)?;
-    }
-    Ok(dataset)
+    check_name(name).map_err(|error| error.at(parent.name()))?;
+    let dataset = library::filled_dataset(parent, name, shape, values);
+    dataset.map_err(|error| StoreError::from(error).at(path_of(parent, name)))
 }
 
 /// Such a dataset before anything is written to it.
 pub(super) fn empty<T: H5Type>(parent: &Group, name: &str, shape: &[usize]) -> Result<Dataset> {
     check_name(name).map_err(|error| error.at(parent.name()))?;
-    let dataset = parent.new_dataset::<T>().obj_track_times(false).shape(shape).create(name);
+    let dataset = library::empty_dataset::<T>(parent, name, shape);
     dataset.map_err(|error| StoreError::from(error).at(path_of(parent, name)))
 }
 
@@ -74,7 +68,7 @@ pub(super) fn texts<S: AsRef<str>>(parent: &Group, name: &str, values: &[S]) -> 
 
 pub(crate) fn attribute<T: H5Type>(owner: &Location, name: &str, value: &T) -> Result<()> {
     let wrap = |error: hdf5::Error| StoreError::from(error).at(format!("{}@{name}", owner.name()));
-    owner.new_attr::<T>().create(name).map_err(wrap)?.write_scalar(value).map_err(wrap)
+    library::attribute(owner, name, &[], std::slice::from_ref(value)).map_err(wrap)
 }
 
 pub(crate) fn text_attribute(owner: &Location, name: &str, value: &str) -> Result<()> {
@@ -85,8 +79,7 @@ pub(crate) fn text_attribute(owner: &Location, name: &str, value: &str) -> Resul
 pub(super) fn texts_attribute<S: AsRef<str>>(owner: &Location, name: &str, values: &[S]) -> Result<()> {
     let wrap = |error: hdf5::Error| StoreError::from(error).at(format!("{}@{name}", owner.name()));
     let values: Vec<VarLenUnicode> = values.iter().map(|value| unicode(value.as_ref())).collect::<Result<_>>()?;
-    let attribute = owner.new_attr::<VarLenUnicode>().shape([values.len()]).create(name).map_err(wrap)?;
-    attribute.write_raw(&values).map_err(wrap)
+    library::attribute(owner, name, &[values.len()], &values).map_err(wrap)
 }
 
 /// HDF5 text ends at the first NUL, so one inside cannot be stored.

@@ -1,0 +1,166 @@
+//! The HDF5 library itself, for the small objects of which a result has hundreds.
+//!
+//! Its safe wrapper makes property lists and spaces anew for every object and asks back about each: more than half of the time that a
+//! result file took. Here they are made once. All unsafe code of this package is in this file.
+#![allow(unsafe_code)]
+
+use std::ffi::{CString, c_char, c_int};
+use std::sync::OnceLock;
+
+use hdf5::plist::link_create::CharEncoding;
+use hdf5::plist::{DatasetCreate, LinkCreate};
+use hdf5::types::{CompoundField, CompoundType, TypeDescriptor};
+use hdf5::{Dataset, Dataspace, Datatype, Group, H5Type, Location, ObjectReference1, ReferencedObject};
+use hdf5_sys::h5a::{H5Aclose, H5Acreate2, H5Awrite};
+use hdf5_sys::h5d::{H5Dcreate2, H5Dwrite};
+use hdf5_sys::h5g::H5Gcreate2;
+use hdf5_sys::h5i::hid_t;
+use hdf5_sys::h5o::H5O_type_t;
+use hdf5_sys::h5p::{H5P_CLS_GROUP_CREATE, H5P_DEFAULT, H5Pcreate, H5Pset_obj_track_times};
+use hdf5_sys::h5s::H5S_ALL;
+
+unsafe extern "C" {
+    // the high-level part of the library has no wrapper
+    fn H5DSset_scale(scale: hid_t, name: *const c_char) -> c_int;
+}
+
+/// What every object is made with: links in UTF-8, no times.
+struct Kit {
+    link: LinkCreate,
+    dataset: DatasetCreate,
+    /// Open until the process ends.
+    group: hid_t,
+}
+
+/// Errors: the library has no memory left.
+fn kit() -> hdf5::Result<&'static Kit> {
+    static KIT: OnceLock<Kit> = OnceLock::new();
+    if let Some(kit) = KIT.get() {
+        return Ok(kit);
+    }
+    // SAFETY: a class of lists that the library has from its beginning, with the global lock held; the list was just made.
+    let group = hdf5::sync::sync(|| unsafe {
+        let list = checked(H5Pcreate(*H5P_CLS_GROUP_CREATE))?;
+        checked(H5Pset_obj_track_times(list, 0).into()).map(|_| list)
+    })?;
+    let link = LinkCreate::build().create_intermediate_group(true).char_encoding(CharEncoding::Utf8).finish()?;
+    let dataset = DatasetCreate::build().obj_track_times(false).finish()?;
+    Ok(KIT.get_or_init(|| Kit { link, dataset, group }))
+}
+
+/// A new group. Errors: the library refuses.
+pub(super) fn group(parent: &Group, name: &str) -> hdf5::Result<Group> {
+    let (kit, text) = (kit()?, c_text(name)?);
+    // SAFETY: every handle is live for the length of the call, since its owner is borrowed; the name ends with a NUL; the lock is held.
+    let id = hdf5::sync::sync(|| unsafe {
+        checked(H5Gcreate2(parent.id(), text.as_ptr(), kit.link.id(), kit.group, H5P_DEFAULT))
+    })?;
+    match ReferencedObject::from_type_and_id(H5O_type_t::H5O_TYPE_GROUP, id)? {
+        ReferencedObject::Group(group) => Ok(group),
+        other => Err(format!("{other:?} instead of a group").into()),
+    }
+}
+
+/// A new contiguous dataset, nothing written to it. Errors: the library refuses.
+pub(super) fn empty_dataset<T: H5Type>(parent: &Group, name: &str, shape: &[usize]) -> hdf5::Result<Dataset> {
+    create(parent, name, shape, &Datatype::from_type::<T>()?)
+}
+
+/// A new contiguous dataset of these values, row-major. Errors: the library refuses; they do not fill the shape.
+pub(super) fn filled_dataset<T: H5Type>(
+    parent: &Group,
+    name: &str,
+    shape: &[usize],
+    values: &[T],
+) -> hdf5::Result<Dataset> {
+    check_count(shape, values)?;
+    let kind = Datatype::from_type::<T>()?;
+    let dataset = create(parent, name, shape, &kind)?;
+    if !values.is_empty() {
+        // SAFETY: both handles are live; the dataset was made with this shape and type, and `values` are as many of it, laid out as the type says
+        // (`H5Type`); the lock is held.
+        hdf5::sync::sync(|| unsafe {
+            let from = values.as_ptr().cast();
+            checked(H5Dwrite(dataset.id(), kind.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, from).into())
+        })?;
+    }
+    Ok(dataset)
+}
+
+fn create(parent: &Group, name: &str, shape: &[usize], kind: &Datatype) -> hdf5::Result<Dataset> {
+    let (kit, text, space) = (kit()?, c_text(name)?, Dataspace::try_new(shape)?);
+    let (link, creation) = (kit.link.id(), kit.dataset.id());
+    // SAFETY: as for groups
+    let id = hdf5::sync::sync(|| unsafe {
+        checked(H5Dcreate2(parent.id(), text.as_ptr(), kind.id(), space.id(), link, creation, H5P_DEFAULT))
+    })?;
+    match ReferencedObject::from_type_and_id(H5O_type_t::H5O_TYPE_DATASET, id)? {
+        ReferencedObject::Dataset(dataset) => Ok(dataset),
+        other => Err(format!("{other:?} instead of a dataset").into()),
+    }
+}
+
+/// A new attribute of these values. Errors: the library refuses; they do not fill the shape.
+pub(super) fn attribute<T: H5Type>(owner: &Location, name: &str, shape: &[usize], values: &[T]) -> hdf5::Result<()> {
+    check_count(shape, values)?;
+    let (text, kind, space) = (c_text(name)?, Datatype::from_type::<T>()?, Dataspace::try_new(shape)?);
+    // SAFETY: every handle is live; the attribute is made with this shape and type, and `values` are as many of it, laid out as the type says
+    // (`H5Type`); the name ends with a NUL; the lock is held. The new handle is closed and nobody else has it.
+    hdf5::sync::sync(|| unsafe {
+        let id = checked(H5Acreate2(owner.id(), text.as_ptr(), kind.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT))?;
+        let written = checked(H5Awrite(id, kind.id(), values.as_ptr().cast()).into());
+        let closed = checked(H5Aclose(id).into());
+        written.and(closed).map(drop)
+    })
+}
+
+/// Makes a one-dimensional dataset the dimension scale `name`. Errors: the library refuses.
+pub(super) fn make_scale(scale: &Dataset, name: &str) -> hdf5::Result<()> {
+    let text = c_text(name)?;
+    // SAFETY: the handle is live; the library copies the text, which ends with a NUL; the lock is held.
+    hdf5::sync::sync(|| unsafe { checked(H5DSset_scale(scale.id(), text.as_ptr()).into()) }).map(drop)
+}
+
+/// One dimension of a dataset that has a scale: an element of the scale's `REFERENCE_LIST`.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(super) struct ScaledDimension {
+    dataset: ObjectReference1,
+    dimension: u32,
+    /// What lies between two elements, so that it is the same in every file.
+    gap: u32,
+}
+
+impl ScaledDimension {
+    pub(super) fn new(dataset: ObjectReference1, dimension: u32) -> Self {
+        Self { dataset, dimension, gap: 0 }
+    }
+}
+
+// SAFETY: the fields lie where the descriptor says, the size is that of the structure, and none of its bytes is uninitialised.
+unsafe impl H5Type for ScaledDimension {
+    fn type_descriptor() -> TypeDescriptor {
+        let field = |name: &str, kind, offset, index| CompoundField::new(name, kind, offset, index);
+        let fields = vec![
+            field("dataset", ObjectReference1::type_descriptor(), std::mem::offset_of!(Self, dataset), 0),
+            field("dimension", u32::type_descriptor(), std::mem::offset_of!(Self, dimension), 1),
+        ];
+        TypeDescriptor::Compound(CompoundType { fields, size: size_of::<Self>() })
+    }
+}
+
+fn check_count<T>(shape: &[usize], values: &[T]) -> hdf5::Result<()> {
+    match shape.iter().try_fold(1_usize, |count, &length| count.checked_mul(length)) {
+        Some(count) if count == values.len() => Ok(()),
+        _ => Err(format!("{} values do not fill {shape:?}", values.len()).into()),
+    }
+}
+
+fn c_text(text: &str) -> hdf5::Result<CString> {
+    CString::new(text).map_err(|_| format!("the name {text:?} holds a NUL").into())
+}
+
+/// A handle or a status, unless it says that a call failed.
+fn checked(answer: hid_t) -> hdf5::Result<hid_t> {
+    if answer < 0 { Err(hdf5::Error::query()?) } else { Ok(answer) }
+}
