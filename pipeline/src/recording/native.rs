@@ -11,7 +11,7 @@ use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5::{Dataset, File, Group, Location};
 
 use super::chunk::ChunkFilter;
-use super::hash::inspect_hdf5;
+use super::hash::{Inspected, inspect_hdf5};
 use super::recent::source_number;
 use super::source::{ChunkPlace, Hdf5Source, Place};
 use super::{Channel, Reading, Record};
@@ -39,6 +39,11 @@ pub struct Wanted<'a> {
 pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
     let size = size_of_file(path)?;
     let inspected = inspect_hdf5(path)?;
+    // one turn for all its calls of the library: threads that open a file each would otherwise wait for one another some fifty times
+    hdf5::sync::sync(|| open_inspected(path, wanted, size, inspected))
+}
+
+fn open_inspected(path: &Path, wanted: &[Wanted], size: u64, inspected: Inspected) -> Result<Record, StageError> {
     let file = open_file(path)?;
     let sample_rate_hz = number_attribute(&file, "/", "sample_rate_hz").map_err(|error| {
         error
@@ -70,7 +75,8 @@ pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError>
 /// Whether a file is HDF5 that states a sample rate: a native record, whatever its channels.
 pub(crate) fn is_native(path: &Path) -> bool {
     // damage that keeps the library busy for ever is looked for first
-    inspect_hdf5(path).is_ok() && open_file(path).is_ok_and(|file| has_attribute(&file, "sample_rate_hz"))
+    let states_rate = || open_file(path).is_ok_and(|file| has_attribute(&file, "sample_rate_hz"));
+    inspect_hdf5(path).is_ok() && hdf5::sync::sync(states_rate)
 }
 
 pub(super) fn size_of_file(path: &Path) -> Result<u64, StageError> {
