@@ -18,7 +18,9 @@ const STALE: Duration = Duration::from_secs(24 * 3600);
 /// Errors: those of `write`; the folder is missing or cannot be written.
 pub fn replace_file(path: &Path, write: impl FnOnce(&Path) -> Result<(), StoreError>) -> Result<(), StoreError> {
     let replacement = Replacement::new(path)?;
-    let written = write(&replacement.temporary);
+    let io = |error: std::io::Error| StoreError::io("cannot be synced", path, &error);
+    let sync = || File::open(&replacement.temporary).and_then(|file| file.sync_all()).map_err(io);
+    let written = write(&replacement.temporary).and_then(|()| sync());
     replacement.take(written)
 }
 
@@ -37,14 +39,11 @@ impl Replacement {
         Ok(Self { path: path.to_owned(), temporary: temporary_path(path) })
     }
 
-    /// Takes the place, once it is `written`. Errors: those of writing it; it cannot be synced or renamed.
+    /// Takes the place, once it is `written` and synced. Errors: those of writing it; it cannot be renamed, or the folder not be synced.
     fn take(self, written: Result<(), StoreError>) -> Result<(), StoreError> {
         let Self { path, temporary } = &self;
         let io = |doing: &str, error: &std::io::Error| StoreError::io(doing, path, error);
         written
-            .and_then(|()| {
-                File::open(temporary).and_then(|file| file.sync_all()).map_err(|error| io("cannot be synced", &error))
-            })
             .and_then(|()| fs::rename(temporary, path).map_err(|error| io("cannot be renamed", &error)))
             .map_err(|error| self.told(error))?;
         File::open(folder_of(path))
@@ -103,7 +102,12 @@ pub(crate) struct PendingResult {
     // before the replacement, which removes the file
     writer: ResultWriter,
     replacement: Replacement,
+    /// The file's length when it was last on its way to the disk.
+    sent: u64,
 }
+
+/// What a file must grow by to be sent to the disk before it ends: less is there in no time.
+const SHARE: u64 = 1 << 20;
 
 impl PendingResult {
     /// Begins the file beside `path`. Errors: as [`replace_file`].
@@ -111,7 +115,7 @@ impl PendingResult {
         sweep_beside(path);
         let replacement = Replacement::new(path)?;
         match ResultWriter::new(&replacement.temporary, run) {
-            Ok(writer) => Ok(Self { writer, replacement }),
+            Ok(writer) => Ok(Self { writer, replacement, sent: 0 }),
             Err(error) => Err(replacement.told(error)),
         }
     }
@@ -126,9 +130,20 @@ impl PendingResult {
         self.writer.stage(stage).map_err(|error| self.replacement.told(error))
     }
 
+    /// The file as it is, if it has grown so much that another thread should send it to the disk: little is left to wait for when it ends.
+    pub(crate) fn next_share(&mut self) -> Option<File> {
+        // one that cannot be opened is told of at the end
+        let file = File::open(&self.replacement.temporary).ok()?;
+        let length = file.metadata().ok()?.len();
+        (length >= self.sent + SHARE).then(|| {
+            self.sent = length;
+            file
+        })
+    }
+
     /// Puts the whole file in its place. Errors: as [`replace_file`].
     pub(crate) fn finish(self, info: &RunInfo) -> Result<(), StoreError> {
-        let Self { writer, replacement } = self;
+        let Self { writer, replacement, .. } = self;
         let written = writer.finish(info);
         replacement.take(written)
     }

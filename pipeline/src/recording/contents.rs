@@ -47,6 +47,11 @@ pub(super) fn is_recognised(path: &Path) -> bool {
     head_of(path).is_ok_and(|head| is_hdf5(&head) || recognise(&head, path).is_some())
 }
 
+/// Whether a file begins as HDF5 does. Errors: it cannot be read.
+pub(super) fn is_hdf5_file(path: &Path) -> Result<bool, StageError> {
+    Ok(is_hdf5(&head_of(path)?))
+}
+
 /// HDF5 begins at byte 0, or behind a user block of 512, 1024, ... bytes; MATLAB 7.3 has one of 512.
 fn is_hdf5(head: &[u8]) -> bool {
     [0, 512, 1024, 2048].iter().any(|&at| head.get(at..).is_some_and(|rest| rest.starts_with(SIGNATURE)))

@@ -39,13 +39,28 @@ pub struct Wanted<'a> {
 pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
     let size = size_of_file(path)?;
     let inspected = inspect_hdf5(path)?;
-    // one turn for all its calls of the library: threads that open a file each would otherwise wait for one another some fifty times
-    hdf5::sync::sync(|| open_inspected(path, wanted, size, inspected))
+    hdf5::sync::sync(|| read_record(&open_file(path)?, path, wanted, size, inspected))
 }
 
-fn open_inspected(path: &Path, wanted: &[Wanted], size: u64, inspected: Inspected) -> Result<Record, StageError> {
-    let file = open_file(path)?;
-    let sample_rate_hz = number_attribute(&file, "/", "sample_rate_hz").map_err(|error| {
+/// As [`open_native`] if the file is a native record: HDF5 that states a sample rate, whatever its channels. None: it is another file, or damaged.
+pub(super) fn open_if_native(path: &Path, wanted: &[Wanted]) -> Result<Option<Record>, StageError> {
+    let size = size_of_file(path)?;
+    let Ok(inspected) = inspect_hdf5(path) else { return Ok(None) };
+    // one turn for all calls of the library: threads that open a file each would otherwise wait for one another some fifty times
+    hdf5::sync::sync(|| match open_file(path) {
+        Ok(file) if states_rate(&file) => read_record(&file, path, wanted, size, inspected).map(Some),
+        _ => Ok(None),
+    })
+}
+
+fn read_record(
+    file: &File,
+    path: &Path,
+    wanted: &[Wanted],
+    size: u64,
+    inspected: Inspected,
+) -> Result<Record, StageError> {
+    let sample_rate_hz = number_attribute(file, "/", "sample_rate_hz").map_err(|error| {
         error
             .at(path)
             .help("native records state it as a file attribute: h5py.File(name, 'a').attrs['sample_rate_hz'] = 5e6")
@@ -55,7 +70,7 @@ fn open_inspected(path: &Path, wanted: &[Wanted], size: u64, inspected: Inspecte
     }
     let mut channels = Vec::with_capacity(wanted.len());
     for channel in wanted {
-        if let Some(dataset) = find(&file, path, channel)? {
+        if let Some(dataset) = find(file, path, channel)? {
             channels.push(open_channel(&dataset, path, channel).map_err(|error| error.at(path))?);
         }
     }
@@ -65,18 +80,21 @@ fn open_inspected(path: &Path, wanted: &[Wanted], size: u64, inspected: Inspecte
         size,
         blake3: inspected.blake3,
         sample_rate_hz,
-        started_at: text_attribute(&file, "started_at").unwrap_or_default(),
+        started_at: text_attribute(file, "started_at").unwrap_or_default(),
         first_sample: 0,
         reading: Reading::default(),
         channels,
     })
 }
 
-/// Whether a file is HDF5 that states a sample rate: a native record, whatever its channels.
+/// Whether a file is a native record, as [`open_if_native`] has it.
 pub(crate) fn is_native(path: &Path) -> bool {
     // damage that keeps the library busy for ever is looked for first
-    let states_rate = || open_file(path).is_ok_and(|file| has_attribute(&file, "sample_rate_hz"));
-    inspect_hdf5(path).is_ok() && hdf5::sync::sync(states_rate)
+    inspect_hdf5(path).is_ok() && hdf5::sync::sync(|| open_file(path).is_ok_and(|file| states_rate(&file)))
+}
+
+fn states_rate(file: &File) -> bool {
+    has_attribute(file, "sample_rate_hz")
 }
 
 pub(super) fn size_of_file(path: &Path) -> Result<u64, StageError> {

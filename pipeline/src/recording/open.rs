@@ -4,11 +4,11 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::contents::{format_of, is_recognised};
+use super::contents::{format_of, is_hdf5_file, is_recognised};
 use super::deferred::DeferredSource;
 use super::hash::hash_file;
-use super::how::{How, NATIVE, Reading};
-use super::native::{Wanted, open_native, size_of_file};
+use super::how::{AUTO, How, NATIVE, Reading};
+use super::native::{Wanted, open_if_native, open_native, size_of_file};
 use super::stretches::uninterrupted;
 use super::{Channel, Contents, FoundChannel, Record, kept};
 use crate::error::StageError;
@@ -41,17 +41,21 @@ pub fn recognised(path: &Path) -> bool {
 /// that differ.
 pub fn open_records(path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened, StageError> {
     how.reading.check()?;
-    let format = format_of(path, &how.reading)?;
-    if format == NATIVE {
-        let record = open_native(path, wanted)?;
+    let native = match how.reading.format.as_str() {
+        NATIVE => Some(open_native(path, wanted)?),
+        AUTO if is_hdf5_file(path)? => open_if_native(path, wanted)?,
+        _ => None,
+    };
+    if let Some(record) = native {
         agreed_rate(Some(record.sample_rate_hz), how, "the file").map_err(|error| error.at(path))?;
         for wanted in wanted {
             if let Ok(channel) = record.channel(wanted.role) {
                 agreed_unit(&channel.unit, how, wanted).map_err(|error| error.at(path))?;
             }
         }
-        return Ok(Opened { format, records: vec![record], remarks: Vec::new() });
+        return Ok(Opened { format: NATIVE, records: vec![record], remarks: Vec::new() });
     }
+    let format = format_of(path, &how.reading)?;
     let reading = Reading { format: format.to_owned(), raw: how.reading.raw.clone() };
     let size = size_of_file(path)?;
     let contents = kept::contents(path, size, &reading)?;

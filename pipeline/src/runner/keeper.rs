@@ -1,6 +1,7 @@
 //! The thread that writes down what a run makes, while its stages go on.
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::sync::mpsc::{self, Receiver};
 use std::thread;
 
@@ -28,6 +29,14 @@ pub(super) struct Kept {
     pub(super) file: Pending,
 }
 
+/// What waits for the disk.
+enum Unsynced {
+    /// A stage's file, to be put in its place.
+    Stage(usize, PendingStage),
+    /// The result file as far as it is written.
+    Share(File),
+}
+
 /// Puts results into the cache as they come and into the result file in an order of its own, until the run has ended.
 ///
 /// A second thread waits for the disk: meanwhile the next file is written.
@@ -49,7 +58,7 @@ pub(super) fn keep(
                             syncer = Some(scope.spawn(move || finish(rest)));
                         }
                         // the other end lives until this one goes
-                        let _ = written.send((index, file));
+                        let _ = written.send(Unsynced::Stage(index, file));
                     }
                     Err(error) => drop(kept.unkept.insert(index, error)),
                 }
@@ -57,6 +66,14 @@ pub(super) fn keep(
             if let Some(Ok(_)) = kept.file {
                 early.insert(index, record);
                 kept.file = kept.file.take().map(|file| file.and_then(|file| grown(file, &mut early)));
+                // nobody waits for the last share but the end itself
+                if let Some(Ok(file)) = &mut kept.file
+                    && syncer.is_some()
+                    && file.wanted().is_some()
+                    && let Some(share) = file.next_share()
+                {
+                    let _ = written.send(Unsynced::Share(share));
+                }
             }
         }
         drop(written);
@@ -67,9 +84,17 @@ pub(super) fn keep(
     kept
 }
 
-/// Puts written files in their places. Returns those that could not be.
-fn finish(written: Receiver<(usize, PendingStage)>) -> Vec<(usize, StoreError)> {
-    written.into_iter().filter_map(|(index, file)| file.finish().err().map(|error| (index, error))).collect()
+/// Sends files to the disk and puts those of stages in their places. Returns those that could not be.
+fn finish(written: Receiver<Unsynced>) -> Vec<(usize, StoreError)> {
+    let end = |unsynced| match unsynced {
+        Unsynced::Stage(index, file) => file.finish().err().map(|error| (index, error)),
+        Unsynced::Share(file) => {
+            // the end of the file is waited for in any case, and tells what is wrong
+            let _ = file.sync_data();
+            None
+        }
+    };
+    written.into_iter().filter_map(end).collect()
 }
 
 /// The file with all stages that are there and wanted. Errors: one cannot be written.

@@ -47,7 +47,7 @@ impl fmt::Display for FileKind {
 
 /// How far into a file its kind is looked for. The store writes its format's name first, into the root group's header, some hundred bytes
 /// behind the signature.
-const HEAD: u64 = 1 << 16;
+const HEAD: u64 = 1 << 13;
 
 const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 

@@ -56,6 +56,10 @@ fn by_depth(needs: &[Vec<usize>]) -> Vec<usize> {
     order
 }
 
+/// Before so many stages the library writes down what it has put off, the headers of hundreds of objects: most runs end with stages that others
+/// wait for, and at the very end somebody waits.
+const LAST: usize = 2;
+
 /// What is known of a run before its stages.
 pub(crate) struct RunHead<'a> {
     pub(crate) name: &'a str,
@@ -121,6 +125,10 @@ impl ResultWriter {
         if let Some(port) = default_port(&stage.result.outputs) {
             write::text_attribute(&process, "default", &port)?;
             self.default = self.default.max(Some(index));
+        }
+        // at a fixed place in the file's making: what is written where depends on it
+        if self.rest.len() == LAST {
+            self.file.flush()?;
         }
         Ok(())
     }

@@ -14,6 +14,9 @@ const MAGIC: &str = "\nafmid seal, BLAKE3 of all bytes before this line: ";
 const HASH_LENGTH: u64 = 64;
 const LENGTH: u64 = MAGIC.len() as u64 + HASH_LENGTH + 1;
 
+/// Bytes that threads hash together.
+const SHARED: u64 = 1 << 20;
+
 /// Seals a closed file and syncs it. Errors: it cannot be read or written.
 pub(crate) fn seal(path: &Path) -> Result<()> {
     let seal = || -> std::io::Result<()> {
@@ -67,11 +70,14 @@ fn last_line(file: &mut File, size: u64) -> std::io::Result<Option<(u64, String)
 fn hash_start(file: &mut File, size: u64) -> std::io::Result<blake3::Hash> {
     file.seek(SeekFrom::Start(0))?;
     let mut hasher = blake3::Hasher::new();
-    let mut buffer = vec![0; 1 << 16];
+    // several threads hash large files where there is a pool of them
+    let together = size >= 2 * SHARED && rayon::current_thread_index().is_some();
+    let mut buffer = vec![0; if together { SHARED as usize } else { 1 << 16 }];
     let mut rest = file.take(size);
     loop {
         match rest.read(&mut buffer)? {
             0 => return Ok(hasher.finalize()),
+            count if together => hasher.update_rayon(&buffer[..count]),
             count => hasher.update(&buffer[..count]),
         };
     }

@@ -103,7 +103,7 @@ const MAX_ONSET_SAMPLES: usize = 16;
 impl Stage for Correlation {
     const SPEC: Spec = Spec {
         name: "events.correlation",
-        version: 3,
+        version: 4,
         summary: "finds snap-off or snap-to-contact events and aligns them by iterative correlation averaging",
         inputs: &[RECORDS.spec()],
         outputs: &[ENSEMBLE.spec(), EVENTS.spec(), SUMMARY.spec()],

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::despike::despike;
-use super::level_change::{LevelChange, level_change};
+use super::level_change::{LevelChange, jump_and_slope, level_change};
 use super::robust_scale::median_and_scale;
 
 /// What happened to the tip.
@@ -183,9 +183,9 @@ fn null_scales(means: &[f32], settings: &DetectionSettings, step_noise: f64) -> 
     let (mut jumps, mut slopes) = (Vec::new(), Vec::new());
     // some 500 positions give the scale to 4 %
     for block in (span..means.len()).step_by((means.len() / 512).max(span / 2).max(1)) {
-        if let Some(change) = level_change(means, block, span, 0, means.len()) {
-            jumps.push(change.jump);
-            slopes.push(change.late_slope_change);
+        if let Some((jump, slope)) = jump_and_slope(means, block, span) {
+            jumps.push(jump);
+            slopes.push(slope);
         }
     }
     let n = span as f64;

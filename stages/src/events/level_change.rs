@@ -25,9 +25,9 @@ impl Line {
     /// Least squares. `first` is the position of `values[0]`.
     fn fit(values: &[f32], first: usize) -> Self {
         let n = values.len() as f64;
-        let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / n;
         let half = 0.5 * (n - 1.0);
-        let moment: f64 = values.iter().enumerate().map(|(k, &value)| (k as f64 - half) * f64::from(value)).sum();
+        let (sum, moment) = sums(values, half);
+        let mean = sum / n;
         // sum (k - half)^2 = n (n^2 - 1) / 12
         let slope = if values.len() > 1 { moment * 12.0 / (n * (n * n - 1.0)) } else { 0.0 };
         Self { center: first as f64 + half, mean, slope }
@@ -38,6 +38,46 @@ impl Line {
     }
 }
 
+/// Sums side by side: one waits for no other's addition.
+const LANES: usize = 8;
+
+/// The sum of the values, and that of each times its place less `half`.
+fn sums(values: &[f32], half: f64) -> (f64, f64) {
+    let (mut sums, mut moments) = ([0.0; LANES], [0.0; LANES]);
+    let mut places: [f64; LANES] = std::array::from_fn(|lane| lane as f64 - half);
+    let chunks = values.chunks_exact(LANES);
+    let rest = chunks.remainder();
+    for chunk in chunks {
+        for lane in 0..LANES {
+            let value = f64::from(chunk[lane]);
+            sums[lane] += value;
+            moments[lane] += places[lane] * value;
+            places[lane] += LANES as f64;
+        }
+    }
+    for (lane, &value) in rest.iter().enumerate() {
+        sums[lane] += f64::from(value);
+        moments[lane] += places[lane] * f64::from(value);
+    }
+    (sums.iter().sum(), moments.iter().sum())
+}
+
+/// Lines through what lies before and after a block.
+struct Sides<'a> {
+    before: Line,
+    after: Line,
+    after_start: usize,
+    stretch: &'a [f32],
+    /// Of the line after, half a span later.
+    late_slope: f64,
+}
+
+/// The jump at `block` and the late change of slope alone: what many places are asked for. As [`level_change`].
+pub(super) fn jump_and_slope(means: &[f32], block: usize, span: usize) -> Option<(f64, f64)> {
+    let sides = Sides::of(means, block, span, 0, means.len())?;
+    Some((sides.jump(block), sides.late_slope - sides.before.slope))
+}
+
 /// The change of level at `block`, from up to `span` blocks on either side within `[low, high)`.
 ///
 /// # Method
@@ -46,32 +86,44 @@ impl Line {
 /// # Errors
 /// `None` where a side has fewer than `span / 4` blocks (at least 2).
 pub fn level_change(means: &[f32], block: usize, span: usize, low: usize, high: usize) -> Option<LevelChange> {
-    let high = high.min(means.len());
-    let shortest = (span / 4).max(2);
-    let before_end = block.checked_sub(1)?;
-    let before_start = before_end.saturating_sub(span).max(low);
-    let after_start = block + 2;
-    let after_end = (after_start + span).min(high);
-    if before_end < before_start + shortest || after_end < after_start + shortest {
-        return None;
-    }
-    let before = Line::fit(&means[before_start..before_end], before_start);
-    let stretch = &means[after_start..after_end];
-    let after = Line::fit(stretch, after_start);
+    let sides = Sides::of(means, block, span, low, high)?;
+    let Sides { before, after, after_start, stretch, late_slope } = &sides;
     let squares: f64 =
-        (after_start..).zip(stretch).map(|(k, &mean)| (f64::from(mean) - after.at(k as f64)).powi(2)).sum();
-    let (late_start, late_end) = (after_start + span / 2, (after_start + span / 2 + span).min(high));
-    let late = if late_end >= late_start + shortest {
-        Line::fit(&means[late_start..late_end], late_start).slope
-    } else {
-        after.slope
-    };
+        (*after_start..).zip(*stretch).map(|(k, &mean)| (f64::from(mean) - after.at(k as f64)).powi(2)).sum();
     Some(LevelChange {
-        jump: after.at(block as f64) - before.at(block as f64),
+        jump: sides.jump(block),
         slope_change: after.slope - before.slope,
-        late_slope_change: late - before.slope,
+        late_slope_change: late_slope - before.slope,
         ringing_rms: (squares / stretch.len() as f64).sqrt(),
     })
+}
+
+impl<'a> Sides<'a> {
+    fn of(means: &'a [f32], block: usize, span: usize, low: usize, high: usize) -> Option<Self> {
+        let high = high.min(means.len());
+        let shortest = (span / 4).max(2);
+        let before_end = block.checked_sub(1)?;
+        let before_start = before_end.saturating_sub(span).max(low);
+        let after_start = block + 2;
+        let after_end = (after_start + span).min(high);
+        if before_end < before_start + shortest || after_end < after_start + shortest {
+            return None;
+        }
+        let before = Line::fit(&means[before_start..before_end], before_start);
+        let stretch = &means[after_start..after_end];
+        let after = Line::fit(stretch, after_start);
+        let (late_start, late_end) = (after_start + span / 2, (after_start + span / 2 + span).min(high));
+        let late_slope = if late_end >= late_start + shortest {
+            Line::fit(&means[late_start..late_end], late_start).slope
+        } else {
+            after.slope
+        };
+        Some(Self { before, after, after_start, stretch, late_slope })
+    }
+
+    fn jump(&self, block: usize) -> f64 {
+        self.after.at(block as f64) - self.before.at(block as f64)
+    }
 }
 
 #[cfg(test)]

@@ -131,7 +131,7 @@ const PARAMETERS: Port<Table> =
 impl Stage for GreyEstimate {
     const SPEC: Spec = Spec {
         name: "model.grey",
-        version: 3,
+        version: 4,
         summary: "fits modes, real poles, delay and feedthrough: the grey modal form",
         inputs: &[PAIR.spec(), START.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec(), MODES.spec(), PARAMETERS.spec()],

@@ -143,7 +143,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Pem {
     const SPEC: Spec = Spec {
         name: "model.pem",
-        version: 6,
+        version: 7,
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],

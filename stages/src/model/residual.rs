@@ -3,7 +3,8 @@
 use faer::Mat;
 
 use super::error::{ModelError, finite};
-use super::orthogonal::{Qr, Svd};
+use super::orthogonal::Svd;
+use super::tall::TallQr;
 use crate::calibration::chi_square_tail;
 
 /// A test statistic with its tail probability.
@@ -108,7 +109,7 @@ pub fn input_dependence(u: &[f64], e: &[f64], lags: usize) -> Result<TestResult,
         matrix.col_mut(lag).iter_mut().zip(&column).for_each(|(m, u)| *m = *u);
     }
     matrix.col_mut(lags + 1).iter_mut().zip(&target).for_each(|(m, e)| *m = *e);
-    let r = Qr::new(matrix).r();
+    let r = TallQr::triangle(matrix.as_ref());
     let svd = Svd::new(&r.as_ref().get(..lags + 1, ..lags + 1).to_owned())?;
     // directions 1e9 times weaker than the strongest are rounding of the means
     let rank = if svd.s.first().is_some_and(|s| *s > 0.0) { svd.rank(1e-9) } else { 0 };

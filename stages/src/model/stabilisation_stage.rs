@@ -100,7 +100,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "how 
 impl Stage for StabilisationDiagram {
     const SPEC: Spec = Spec {
         name: "model.stabilisation",
-        version: 3,
+        version: 4,
         summary: "shows which poles stay as the order grows, and names the modes and the order",
         inputs: &[PAIR.spec()],
         outputs: &[POLES.spec(), MODES.spec(), SUMMARY.spec()],

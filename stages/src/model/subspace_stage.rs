@@ -74,7 +74,7 @@ impl Default for SubspaceEstimate {
 impl Stage for SubspaceEstimate {
     const SPEC: Spec = Spec {
         name: "model.subspace",
-        version: 3,
+        version: 4,
         summary: "estimates a state-space model by subspace methods: N4SID, MOESP, CVA weights",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],

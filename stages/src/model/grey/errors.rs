@@ -57,7 +57,8 @@ pub(super) fn errors(
     let meat = match colour {
         ResidualColour::White => Mat::from_fn(count, count, |i, j| variance * data[(i, j)]),
         ResidualColour::Spectrum => {
-            let plain = time_domain_covariance(&series.jacobian, &series.residual, &series.lengths, colour)?;
+            let columns: Vec<&[f64]> = (0..count).map(|j| series.jacobian.col_as_slice(j)).collect();
+            let plain = time_domain_covariance(&columns, &series.residual, &series.lengths, colour)?;
             product(product(data.as_ref(), plain.as_ref()).as_ref(), data.as_ref())
         }
     };

@@ -2,12 +2,14 @@
 
 use faer::Mat;
 
+use super::columns::Columns;
 use super::covariance::{ResidualColour, covariance};
 use super::gradient::Noise;
 use super::optimiser::Ending;
 use super::options::{Identified, NoiseModel, PemOptions, Verdict};
 use super::parametrisation::{LIMIT, roots, section_order, sections};
 use super::predictor::Problem;
+use super::projection::{Present, present};
 use super::state::State;
 use crate::model::error::ModelError;
 use crate::model::innovations::{InnovationsModel, InputGains, Section, kalman_gains};
@@ -101,27 +103,32 @@ fn parameter_covariance(
     colour: ResidualColour,
 ) -> Result<Mat<f64>, ModelError> {
     let n = problem.order;
-    let jacobian = full_jacobian(problem, state);
+    let jacobian = Jacobian::new(problem, state);
     let lengths: Vec<usize> = problem.experiments.iter().map(|(_, y)| y.len()).collect();
-    let all = covariance(&jacobian, e, &lengths, colour)?;
-    let linear = jacobian.ncols() - problem.columns();
+    let all = covariance(&jacobian.columns(), e, &lengths, colour)?;
+    let linear = jacobian.nonlinear.count();
     let kept: Vec<usize> = (0..n).chain(linear..linear + problem.input_column(problem.inputs)).collect();
-    Ok(Mat::from_fn(kept.len(), kept.len(), |i, j| all[(kept[i], kept[j])]))
+    // the prediction errors fall where a regressor's share grows
+    let sign = |parameter: usize| if parameter < linear { 1.0 } else { -1.0 };
+    Ok(Mat::from_fn(kept.len(), kept.len(), |i, j| sign(kept[i]) * sign(kept[j]) * all[(kept[i], kept[j])]))
 }
 
-/// Derivatives of e to all a, free c, then all linear parameters.
-pub(super) fn full_jacobian(problem: &Problem, state: &State) -> Mat<f64> {
-    let nonlinear = state.coefficient_jacobian(problem);
-    let (rows, q, p) = (problem.rows(), nonlinear.count(), problem.columns());
-    let mut jacobian = Mat::zeros(rows, q + p);
-    for j in 0..q {
-        jacobian.col_mut(j).iter_mut().zip(nonlinear.column(j)).for_each(|(t, x)| *t = *x);
+/// Derivatives of e: to all a and free c, then to all linear parameters, these with the sign of the regressors.
+pub(super) struct Jacobian<'a> {
+    nonlinear: Columns,
+    regressors: Present<'a>,
+    linear: usize,
+}
+
+impl<'a> Jacobian<'a> {
+    pub fn new(problem: &Problem, state: &'a State) -> Self {
+        let nonlinear = state.coefficient_jacobian(problem);
+        Self { nonlinear, regressors: present(problem, &state.regressors), linear: problem.columns() }
     }
-    for j in 0..p {
-        jacobian.col_mut(q + j).iter_mut().zip(state.regressors.column(j)).for_each(|(t, x)| *t = -x);
+
+    pub fn columns(&self) -> Vec<&[f64]> {
+        let mut all = self.nonlinear.slices();
+        all.extend((0..self.linear).map(|index| self.regressors.column(index)));
+        all
     }
-    for &row in &problem.missing {
-        jacobian.row_mut(row).iter_mut().for_each(|value| *value = 0.0);
-    }
-    jacobian
 }

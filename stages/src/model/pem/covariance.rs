@@ -5,7 +5,6 @@
 //! taken at face value would promise too much.
 
 use faer::Mat;
-use realfft::num_complex::Complex64;
 
 use super::tangent::{Tangent, Transform, periodogram, remaining};
 use crate::model::error::ModelError;
@@ -24,14 +23,14 @@ pub enum ResidualColour {
     White,
 }
 
-/// Covariance of the parameters of `jacobian` (rows of all experiments x parameters), e of the same rows, split at `lengths`.
+/// Covariance of the parameters, one for each of the Jacobian's `columns` (rows of all experiments), e of the same rows, split at `lengths`.
 pub(crate) fn covariance(
-    jacobian: &Mat<f64>,
+    columns: &[&[f64]],
     e: &[f64],
     lengths: &[usize],
     colour: ResidualColour,
 ) -> Result<Mat<f64>, ModelError> {
-    let tangent = Tangent::new(jacobian)?;
+    let tangent = Tangent::new(columns)?;
     let rank = tangent.spread.ncols();
     let mut meat = Mat::zeros(rank, rank);
     match colour {
@@ -45,7 +44,8 @@ pub(crate) fn covariance(
             for &length in lengths {
                 let basis = tangent.transformed(top, length, &mut transform);
                 let power = periodogram(&transform.of(&e[top..top + length]));
-                meat += coloured(&basis, &smoothed(&power, &remaining(&basis, length), length), length);
+                let density = smoothed(&power, &remaining(basis.as_ref()), length);
+                meat += coloured(basis, &density, length);
                 top += length;
             }
         }
@@ -55,19 +55,14 @@ pub(crate) fn covariance(
 }
 
 /// `W^T Omega W` of one experiment, W the transformed basis and Omega of this density.
-fn coloured(basis: &[Vec<Complex64>], density: &[f64], length: usize) -> Mat<f64> {
-    let bins = density.len();
-    let mut weighted = Mat::zeros(2 * bins, basis.len());
-    for (k, direction) in basis.iter().enumerate() {
-        for (i, (value, density)) in direction.iter().zip(density).enumerate() {
-            // one-sided: all bins but the first and, for even N, the last stand for two
-            let both = if i == 0 || 2 * i == length { 1.0 } else { 2.0 };
-            let weight = (both * density).sqrt();
-            weighted[(2 * i, k)] = weight * value.re;
-            weighted[(2 * i + 1, k)] = weight * value.im;
-        }
+fn coloured(mut basis: Mat<f64>, density: &[f64], length: usize) -> Mat<f64> {
+    // one-sided: all bins but the first and, for even N, the last stand for two
+    let both = |bin: usize| if bin == 0 || 2 * bin == length { 1.0 } else { 2.0 };
+    let weights: Vec<f64> = density.iter().enumerate().map(|(bin, density)| (both(bin) * density).sqrt()).collect();
+    for direction in basis.col_iter_mut() {
+        direction.iter_mut().enumerate().for_each(|(row, part)| *part *= weights[row / 2]);
     }
-    gram(weighted.as_ref())
+    gram(basis.as_ref())
 }
 
 /// Power of the errors by bin: local sums of the residual's over those of the remaining shares.

@@ -76,7 +76,7 @@ impl Projection {
 }
 
 /// The regressors, rows whose output is missing cleared.
-fn present<'a>(problem: &Problem, regressors: &'a Columns) -> Present<'a> {
+pub(super) fn present<'a>(problem: &Problem, regressors: &'a Columns) -> Present<'a> {
     if problem.missing.is_empty() {
         return Present::All(regressors);
     }
@@ -84,7 +84,7 @@ fn present<'a>(problem: &Problem, regressors: &'a Columns) -> Present<'a> {
 }
 
 /// Regressors, as they are or with rows cleared.
-enum Present<'a> {
+pub(super) enum Present<'a> {
     All(&'a Columns),
     Masked(Columns),
 }

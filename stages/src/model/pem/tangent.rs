@@ -1,82 +1,92 @@
 //! The tangent space of a fit: which directions of the data its parameters have absorbed, in time and frequency.
 
-use faer::Mat;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
 use realfft::num_complex::Complex64;
 use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::model::error::ModelError;
-use crate::model::gram::gram;
-use crate::model::orthogonal::{Svd, Symmetric, product};
+use crate::model::gram::gram_of;
+use crate::model::orthogonal::{Svd, Symmetric};
 use crate::model::tall::TallQr;
 
 /// Directions of the scaled Jacobian below this share are not determined by the data.
 const RANK_TOLERANCE: f64 = 1e-12;
 
-/// Least energy of a direction of the scaled Jacobian that products resolve to some seven digits.
+/// Least energy of a direction of the scaled Jacobian that products resolve: to some five digits, of errors and shares that noise blurs in the second.
 const LEAST_CLEAR: f64 = 1e-9;
 
-/// An orthonormal basis of the space that the Jacobian's columns span.
-pub(crate) struct Tangent {
-    /// The basis: rows x rank.
-    pub basis: Mat<f64>,
-    /// Parameters' change per unit along each direction: parameters x rank.
+/// Rows multiplied at a time: they stay in the first-level cache, before and after.
+const BLOCK: usize = 64;
+
+/// An orthonormal basis of the space that a Jacobian's columns span.
+pub(crate) struct Tangent<'a> {
+    /// The Jacobian's columns: rows each.
+    columns: &'a [&'a [f64]],
+    /// Parameters' change per unit along each direction: parameters x rank. The columns times it are the basis.
     pub spread: Mat<f64>,
 }
 
-impl Tangent {
-    /// Of a Jacobian, rows x parameters. Errors: no fewer directions than rows.
-    pub fn new(jacobian: &Mat<f64>) -> Result<Self, ModelError> {
-        match Self::by_products(jacobian) {
-            Some(found) => Ok(found),
-            None => Self::by_rotation(jacobian),
-        }
+impl<'a> Tangent<'a> {
+    /// Of a Jacobian's columns. Errors: no fewer directions than rows.
+    pub fn new(columns: &'a [&'a [f64]]) -> Result<Self, ModelError> {
+        let spread = match by_products(columns) {
+            Some(found) => found,
+            None => by_rotation(columns)?,
+        };
+        Ok(Self { columns, spread })
     }
 
-    /// By inner products, made orthonormal twice. None: the directions are too alike, or a value is not finite.
-    fn by_products(jacobian: &Mat<f64>) -> Option<Self> {
-        let (rows, p) = jacobian.shape();
-        let products = gram(jacobian.as_ref());
-        let scale: Vec<f64> = (0..p).map(|j| products[(j, j)].sqrt().recip()).collect();
-        if rows <= p || scale.iter().any(|s| !s.is_normal()) {
-            return None;
+    /// The basis within one experiment (rows `top..top + length`), transformed: real and imaginary part of each bin x rank.
+    ///
+    /// Columns are transformed, then combined block by block: the basis in time is never made.
+    pub fn transformed(&self, top: usize, length: usize, transform: &mut Transform) -> Mat<f64> {
+        let (p, rank) = self.spread.shape();
+        let mut parts = Mat::zeros(2 * (length / 2 + 1), p);
+        for (mut target, column) in parts.col_iter_mut().zip(self.columns) {
+            let spectrum = transform.of(&column[top..top + length]);
+            for (i, value) in spectrum.iter().enumerate() {
+                (target[2 * i], target[2 * i + 1]) = (value.re, value.im);
+            }
         }
-        let axes = Symmetric::new(&Mat::from_fn(p, p, |i, j| products[(i, j)] * scale[i] * scale[j])).ok()?;
-        let clear = axes.values.first().is_some_and(|least| *least > LEAST_CLEAR);
-        if !clear {
-            return None;
+        let mut block = Mat::zeros(BLOCK, rank);
+        for first in (0..parts.nrows()).step_by(BLOCK) {
+            let rows = BLOCK.min(parts.nrows() - first);
+            let mut own = parts.as_mut().get_mut(first..first + rows, ..);
+            let mut combined = block.as_mut().get_mut(..rows, ..);
+            matmul(combined.as_mut(), Accum::Replace, own.as_ref(), self.spread.as_ref(), 1.0, Par::Seq);
+            own.as_mut().get_mut(.., ..rank).copy_from(&combined);
         }
-        let first = Mat::from_fn(p, p, |j, k| scale[j] * axes.vectors[(j, k)] / axes.values[k].sqrt());
-        let basis = product(jacobian.as_ref(), first.as_ref());
-        // what they lack of being orthonormal is small: its square is rounding
-        let lacking = gram(basis.as_ref());
-        let again = Mat::from_fn(p, p, |i, j| if i == j { 1.5 } else { 0.0 } - 0.5 * lacking[(i, j)]);
-        Some(Self { spread: product(first.as_ref(), again.as_ref()), basis })
+        parts.resize_with(parts.nrows(), rank, |_, _| 0.0);
+        parts
     }
+}
 
-    fn by_rotation(jacobian: &Mat<f64>) -> Result<Self, ModelError> {
-        let (rows, p) = jacobian.shape();
-        let inverse = |norm: f64| if norm > 0.0 { 1.0 / norm } else { 0.0 };
-        let scale: Vec<f64> = (0..p).map(|j| inverse(jacobian.col(j).norm_l2())).collect();
-        let r = TallQr::triangle(jacobian.as_ref());
-        let svd = Svd::new(&Mat::from_fn(p, p, |i, j| r[(i, j)] * scale[j]))?;
-        let rank = svd.rank(RANK_TOLERANCE);
-        if rows <= rank {
-            return Err(ModelError::TooShort { found: rows, wanted: rank + 1 });
-        }
-        let spread = Mat::from_fn(p, rank, |j, k| scale[j] * svd.v[(j, k)] / svd.s[k]);
-        Ok(Self { basis: product(jacobian.as_ref(), spread.as_ref()), spread })
+/// The spread by inner products. None: the directions are too alike, or a value is not finite.
+fn by_products(columns: &[&[f64]]) -> Option<Mat<f64>> {
+    let (rows, p) = (columns.first().map_or(0, |column| column.len()), columns.len());
+    let products = gram_of(columns);
+    let scale: Vec<f64> = (0..p).map(|j| products[(j, j)].sqrt().recip()).collect();
+    if rows <= p || scale.iter().any(|s| !s.is_normal()) {
+        return None;
     }
+    let axes = Symmetric::new(&Mat::from_fn(p, p, |i, j| products[(i, j)] * scale[i] * scale[j])).ok()?;
+    let clear = axes.values.first().is_some_and(|least| *least > LEAST_CLEAR);
+    clear.then(|| Mat::from_fn(p, p, |j, k| scale[j] * axes.vectors[(j, k)] / axes.values[k].sqrt()))
+}
 
-    /// The basis within one experiment (rows `top..top + length`), transformed: rank x bins.
-    pub fn transformed(&self, top: usize, length: usize, transform: &mut Transform) -> Vec<Vec<Complex64>> {
-        let column = |k: usize| self.basis.col(k).subrows(top, length);
-        (0..self.basis.ncols())
-            .map(|k| match column(k).try_as_col_major() {
-                Some(column) => transform.of(column.as_slice()),
-                None => transform.of(&column(k).iter().copied().collect::<Vec<_>>()),
-            })
-            .collect()
+fn by_rotation(columns: &[&[f64]]) -> Result<Mat<f64>, ModelError> {
+    let (rows, p) = (columns.first().map_or(0, |column| column.len()), columns.len());
+    let jacobian = Mat::from_fn(rows, p, |i, j| columns[j][i]);
+    let inverse = |norm: f64| if norm > 0.0 { 1.0 / norm } else { 0.0 };
+    let scale: Vec<f64> = (0..p).map(|j| inverse(jacobian.col(j).norm_l2())).collect();
+    let r = TallQr::triangle(jacobian.as_ref());
+    let svd = Svd::new(&Mat::from_fn(p, p, |i, j| r[(i, j)] * scale[j]))?;
+    let rank = svd.rank(RANK_TOLERANCE);
+    if rows <= rank {
+        return Err(ModelError::TooShort { found: rows, wanted: rank + 1 });
     }
+    Ok(Mat::from_fn(p, rank, |j, k| scale[j] * svd.v[(j, k)] / svd.s[k]))
 }
 
 /// Fourier transforms of real signals, scaled by `1 / sqrt(N)`: bins 0 to N/2.
@@ -113,12 +123,11 @@ pub(crate) fn periodogram(residual: &[Complex64]) -> Vec<f64> {
     residual.iter().map(Complex64::norm_sqr).collect()
 }
 
-/// Share of the noise power in each bin that the fit has not absorbed: `E |E|^2 / N = S * remaining`. Of the transformed basis of N samples.
-pub(crate) fn remaining(basis: &[Vec<Complex64>], length: usize) -> Vec<f64> {
-    let mut remaining = vec![1.0; length / 2 + 1];
-    for direction in basis {
-        remaining.iter_mut().zip(direction).for_each(|(left, value)| *left -= value.norm_sqr());
+/// Share of the noise power in each bin that the fit has not absorbed: `E |E|^2 / N = S * remaining`. Of the transformed basis.
+pub(crate) fn remaining(basis: MatRef<'_, f64>) -> Vec<f64> {
+    let mut absorbed = vec![0.0; basis.nrows()];
+    for direction in basis.col_iter() {
+        absorbed.iter_mut().zip(direction.iter()).for_each(|(sum, part)| *sum += part * part);
     }
-    remaining.iter_mut().for_each(|left| *left = left.max(0.0));
-    remaining
+    absorbed.chunks_exact(2).map(|parts| (1.0 - (parts[0] + parts[1])).max(0.0)).collect()
 }

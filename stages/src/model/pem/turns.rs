@@ -2,7 +2,7 @@
 
 use faer::c64;
 
-use super::conclusion::full_jacobian;
+use super::conclusion::Jacobian;
 use super::gradient::{Noise, Point};
 use super::noise::{Seen, gain, intensities};
 use super::optimiser::{Ending, Limits, minimise};
@@ -111,13 +111,15 @@ const EXCHANGE: f64 = 0.4;
 
 /// Share of the noise's power that the fit leaves, of each measured experiment by bin.
 fn shares_left(problem: &Problem, state: &State) -> Result<Vec<Vec<f64>>, ModelError> {
-    let tangent = Tangent::new(&full_jacobian(problem, state))?;
+    let jacobian = Jacobian::new(problem, state);
+    let columns = jacobian.columns();
+    let tangent = Tangent::new(&columns)?;
     let mut transform = Transform::default();
     let mut top = 0;
     let shares = problem.measured().iter().map(|(_, y)| {
         let basis = tangent.transformed(top, y.len(), &mut transform);
         top += y.len();
-        remaining(&basis, y.len())
+        remaining(basis.as_ref())
     });
     Ok(shares.collect())
 }
