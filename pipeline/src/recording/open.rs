@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::contents::{format_of, is_hdf5_file, is_recognised};
 use super::deferred::DeferredSource;
 use super::hash::hash_file;
-use super::how::{AUTO, How, NATIVE, Reading};
+use super::how::{AUTO, HDF5, How, NATIVE, Reading};
 use super::native::{Wanted, open_if_native, open_native, size_of_file};
 use super::stretches::uninterrupted;
 use super::{Channel, Contents, FoundChannel, Record, kept};
@@ -41,10 +41,10 @@ pub fn recognised(path: &Path) -> bool {
 /// that differ.
 pub fn open_records(path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened, StageError> {
     how.reading.check()?;
-    let native = match how.reading.format.as_str() {
-        NATIVE => Some(open_native(path, wanted)?),
-        AUTO if is_hdf5_file(path)? => open_if_native(path, wanted)?,
-        _ => None,
+    let (native, format) = match how.reading.format.as_str() {
+        NATIVE => (Some(open_native(path, wanted)?), NATIVE),
+        AUTO if is_hdf5_file(path)? => (open_if_native(path, wanted)?, HDF5),
+        _ => (None, format_of(path, &how.reading)?),
     };
     if let Some(record) = native {
         agreed_rate(Some(record.sample_rate_hz), how, "the file").map_err(|error| error.at(path))?;
@@ -55,7 +55,6 @@ pub fn open_records(path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened,
         }
         return Ok(Opened { format: NATIVE, records: vec![record], remarks: Vec::new() });
     }
-    let format = format_of(path, &how.reading)?;
     let reading = Reading { format: format.to_owned(), raw: how.reading.raw.clone() };
     let size = size_of_file(path)?;
     let contents = kept::contents(path, size, &reading)?;
