@@ -131,3 +131,51 @@ pub(crate) fn remaining(basis: MatRef<'_, f64>) -> Vec<f64> {
     }
     absorbed.chunks_exact(2).map(|parts| (1.0 - (parts[0] + parts[1])).max(0.0)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::white_noise;
+
+    const ROWS: usize = 401;
+    const COLUMNS: usize = 5;
+
+    /// Columns of noise, of all sizes, that differ from the first by a share.
+    fn columns(apart: f64) -> Vec<Vec<f64>> {
+        let noise = white_noise(ROWS * COLUMNS, 1.0, 1);
+        let own = |j: usize, i: usize| noise[i + j * ROWS];
+        let value = |j: usize, i: usize| if j == 0 { own(0, i) } else { own(0, i) + apart * own(j, i) };
+        (0..COLUMNS).map(|j| (0..ROWS).map(|i| 10.0_f64.powi(j as i32) * value(j, i)).collect()).collect()
+    }
+
+    /// What is left in each bin, and the sum of what is absorbed over both halves of the spectrum.
+    fn shares(columns: &[&[f64]], spread: Mat<f64>) -> (Vec<f64>, f64) {
+        let basis = Tangent { columns, spread }.transformed(0, ROWS, &mut Transform::default());
+        let left = remaining(basis.as_ref());
+        let absorbed = left.iter().enumerate().map(|(bin, left)| if bin == 0 { 1.0 } else { 2.0 } * (1.0 - left)).sum();
+        (left, absorbed)
+    }
+
+    #[test]
+    fn products_give_what_rotations_give_down_to_where_they_are_refused() {
+        for apart in [1.0, 1e-2, 2e-4] {
+            let all = columns(apart);
+            let columns: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
+            let ours = by_products(&columns).expect("clear enough");
+            let exact = by_rotation(&columns).expect("enough rows");
+            // roundings of sums of 400 products, over the least energy, which goes with the square of what tells the columns apart
+            let tolerance = 1e-14 / (apart * apart);
+            let square = |spread: &Mat<f64>| spread * spread.transpose();
+            let (mine, own) = (square(&ours), square(&exact));
+            for j in 0..COLUMNS {
+                assert!((mine[(j, j)] / own[(j, j)] - 1.0).abs() < tolerance, "{apart}: {j}");
+            }
+            let ((left, absorbed), (exact, _)) = (shares(&columns, ours), shares(&columns, exact));
+            assert!(left.iter().zip(&exact).all(|(left, exact)| (left - exact).abs() < tolerance), "{apart}");
+            // Parseval: as much as there are directions
+            assert!((absorbed - COLUMNS as f64).abs() < COLUMNS as f64 * tolerance, "{apart}: {absorbed}");
+        }
+        let all = columns(1e-6);
+        assert!(by_products(&all.iter().map(Vec::as_slice).collect::<Vec<_>>()).is_none());
+    }
+}
