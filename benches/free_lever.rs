@@ -6,8 +6,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use afmid_pipeline::cache::{Cache, write_result};
+use afmid_pipeline::cache::Cache;
 use afmid_pipeline::runner::{Options, Quiet, run};
+use afmid_pipeline::store::write_result;
 use afmid_pipeline::{Plan, graph};
 use criterion::{Criterion, SamplingMode};
 
@@ -40,10 +41,18 @@ fn plan(config: &str, arguments: &[String]) -> Plan {
 /// One run with an empty cache, its result file written.
 fn execute(plan: &Plan, scratch: &Path) {
     let folder = tempfile::tempdir_in(scratch).expect("a folder");
-    let cache = Cache::open(&folder.path().join("cache")).expect("a cache");
+    let cache = Cache::open(&folder.path().join("cache"));
     let base = Path::new(ROOT).join("configs");
     let program = "bench".to_owned();
-    let options = Options { base, cache: &cache, fresh: false, program, overrides: Vec::new(), observer: &Quiet };
+    let options = Options {
+        base,
+        cache: &cache,
+        files: cache.input_files(false),
+        fresh: false,
+        program,
+        overrides: Vec::new(),
+        observer: &Quiet,
+    };
     let result = run(plan, &options).expect("it runs");
     write_result(&folder.path().join("result.h5"), &result).expect("it is written");
 }

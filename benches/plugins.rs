@@ -133,7 +133,7 @@ impl Drop for Alone {
 
 fn overhead(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
-    let cache = Cache::open(&folder.path().join("cache")).expect("a cache");
+    let cache = Cache::open(&folder.path().join("cache"));
     let mut group = c.benchmark_group("exec");
     for (name, plugin) in [("without", false), ("with_echo", true)] {
         let plan = plan(folder.path(), plugin);
@@ -141,6 +141,7 @@ fn overhead(c: &mut Criterion) {
         let options = Options {
             base: folder.path().to_owned(),
             cache: &cache,
+            files: cache.input_files(false),
             fresh: true,
             program,
             overrides: Vec::new(),

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::Record;
-use afmid_pipeline::recording::{Wanted, open_native};
+use afmid_pipeline::recording::{InputFiles, Wanted, open_native};
 use common::{ROOT, afmid, command, config, numbers, shown, simulated};
 use serde_json::Value;
 
@@ -140,7 +140,7 @@ fn an_archive_in_another_format_gives_the_same_events_and_modes() {
         std::fs::create_dir(&folder).unwrap();
         for file in native_files(&archive.folder) {
             let wanted = ["deflection", "piezo"].map(|role| Wanted { role, location: role, required: true });
-            let record = open_native(&file, &wanted).unwrap();
+            let record = open_native(&InputFiles::new(), &file, &wanted).unwrap();
             let name = file.with_extension(writer.ending);
             std::fs::write(folder.join(name.file_name().unwrap()), (writer.bytes)(&record)).unwrap();
         }

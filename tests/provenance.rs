@@ -318,7 +318,7 @@ fn rerun_of_a_simulation_leaves_the_archive_alone_and_a_changed_result_is_seen()
     let mut other = afmid_pipeline::store::read_result(&here.join("archive.h5")).expect("a result");
     let stage = other.stages.first_mut().expect("a stage");
     stage.result.outputs.insert("truth", nudged(stage.result.outputs.artifact("truth").expect("the truth")));
-    afmid_pipeline::cache::write_result(&here.join("other.h5"), &other).expect("a result");
+    afmid_pipeline::store::write_result(&here.join("other.h5"), &other).expect("a result");
     let output = run(here, &["rerun", "other.h5", "--cache", "cache"]);
     assert_eq!(code(&output), 1, "{}", stderr(&output));
     assert!(stdout(&output).contains("other.h5: differs in 1 dataset of"), "{}", stdout(&output));

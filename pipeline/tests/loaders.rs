@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{Reading, open_contents};
+use afmid_pipeline::recording::{InputFiles, Reading, open_contents};
 
 /// What a file must give.
 enum Expected {
@@ -180,7 +180,7 @@ fn every_real_file_loads_right_or_is_refused_with_a_reason() {
 }
 
 fn check(name: &str, path: &Path, expected: &Expected) {
-    let opened = open_contents(path, &Reading::of("auto", None));
+    let opened = open_contents(&InputFiles::new(), path, &Reading::of("auto", None));
     match (expected, opened) {
         (Refused(words), Err(error)) => {
             assert!(error.to_string().contains(words) && error.help.is_some(), "{name}: {error}");

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::cache::replace_with;
+use afmid_pipeline::files::replace_with;
 use serde::{Deserialize, Serialize};
 
 use super::harvest::Harvest;

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::artifact::ColumnValues;
-use afmid_pipeline::cache::{replace_with, write_result};
+use afmid_pipeline::files::replace_with;
+use afmid_pipeline::store::write_result;
 use afmid_pipeline::{Ports, RunInfo, RunResult, Shaped, StageRecord, StageResult, Table};
 use serde_json::json;
 
@@ -77,7 +78,7 @@ pub struct Title<'a> {
 /// Writes `summary.csv`, `summary.parquet`, `trends.csv` and `summary.h5`, each whole or not at all: the same bytes from the same entries, whoever computed them.
 pub fn write(folder: &Path, title: &Title<'_>, entries: &[Entry]) -> Result<PathBuf, Failure> {
     let (table, trends) = (table(entries), trends::table(entries));
-    let failed = |error: afmid_pipeline::store::StoreError| Failure::failed(&error, error.help.clone());
+    let failed = |error: afmid_pipeline::error::StoreError| Failure::failed(&error, error.help.clone());
     for (name, table) in [("summary.csv", &table), ("trends.csv", &trends)] {
         replace_with(&folder.join(name), |path| csv(path, table)).map_err(failed)?;
     }
@@ -104,7 +105,7 @@ pub const SWEEP: &str = "sweep.summary";
 
 /// Writes `summary.h5`, `summary.parquet` and `summary.csv` of a sweep, each whole or not at all. The first of them says whose the others are.
 pub fn write_sweep(folder: &Path, title: &Title<'_>, table: Table) -> Result<PathBuf, Failure> {
-    let failed = |error: afmid_pipeline::store::StoreError| Failure::failed(&error, error.help.clone());
+    let failed = |error: afmid_pipeline::error::StoreError| Failure::failed(&error, error.help.clone());
     let path = folder.join("summary.h5");
     let mut outputs = Ports::new();
     outputs.insert("points", table.clone().wrap());

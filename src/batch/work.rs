@@ -6,9 +6,10 @@ use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
+use afmid_pipeline::InputFiles;
 use afmid_pipeline::Plan;
 use afmid_pipeline::cache::Cache;
-use afmid_pipeline::runner::{Failed, Options, Quiet, RunError, run_key, run_to_file};
+use afmid_pipeline::runner::{Failed, Options, Quiet, RunError, Surroundings, run_key, run_to_file};
 use afmid_pipeline::store::is_own;
 
 use super::harvest::{harvest, numbers};
@@ -19,6 +20,8 @@ use crate::provenance::repeat::writers;
 pub struct Work<'a> {
     /// Where stage results are kept.
     pub cache: &'a Cache,
+    /// Hashes of input files.
+    pub files: &'a InputFiles,
     /// Where results and ledger lie.
     pub ledger: &'a Ledger,
     /// The program and its version.
@@ -47,7 +50,7 @@ impl Work<'_> {
     pub fn one(&self, name: &str, plan: &Plan) -> Done {
         let clock = Instant::now();
         let base = plan.config.base();
-        let key = match run_key(plan, base, self.program) {
+        let key = match self.key(plan) {
             Ok(key) if self.as_run => stated(&key, plan),
             Ok(key) => key,
             Err(error) => return self.kept(Entry::failed(name, None, told(&[error])), clock, (0, 0)),
@@ -67,10 +70,15 @@ impl Work<'_> {
         }
     }
 
+    fn key(&self, plan: &Plan) -> Result<String, RunError> {
+        let (base, program, files) = (plan.config.base(), self.program, self.files);
+        run_key(plan, &Surroundings { base, program, arithmetic: "", files })
+    }
+
     /// What the ledger has of a data set, without running anything: what is no longer what would be run counts as failed, as does what was never run.
     pub fn found(&self, name: &str, plan: &Plan) -> Done {
         let failed = |why: &str| Entry::failed(name, None, why.to_owned());
-        let entry = match (run_key(plan, plan.config.base(), self.program), self.ledger.read(name)) {
+        let entry = match (self.key(plan), self.ledger.read(name)) {
             (_, None) => failed("no run of it has ended"),
             (Err(error), Some(_)) => Entry::failed(name, None, told(&[error])),
             (Ok(key), Some(entry)) if entry.key.as_ref().is_some_and(|own| *own != key) => {
@@ -100,6 +108,7 @@ impl Work<'_> {
         let options = Options {
             base: base.to_owned(),
             cache: self.cache,
+            files: self.files.clone(),
             fresh: self.fresh,
             program: self.program.to_owned(),
             overrides: plan.config.overrides.clone(),

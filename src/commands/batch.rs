@@ -109,12 +109,14 @@ pub fn ledger(folder: &Path) -> Result<Ledger, Failure> {
 }
 
 fn computed(args: &BatchArgs, sets: &[(&DataSet, Plan)], ledger: &Ledger) -> Result<Vec<Done>, Failure> {
-    let cache = open_cache(args.cache.as_deref())?;
+    let cache = open_cache(args.cache.as_deref());
+    let files = cache.input_files(args.fresh);
     // 0: as many as there are processors
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.map_or(0, |jobs| usize::from(jobs.get()))).build();
     let pool = pool.map_err(|error| Failure::failed(format!("no threads can be started: {error}"), None))?;
     let work = Work {
         cache: &cache,
+        files: &files,
         ledger,
         program: PROGRAM,
         fresh: args.fresh,

@@ -136,10 +136,11 @@ fn diagnosed(drawn: &Draw, args: &ExamArgs, registry: &Registry, base: &Path) ->
     set.push(format!("{STAGE}.detector_poles_hz=[{}]", poles.join(", ")));
     set.push(format!("{STAGE}.without={:?}", drawn.without));
     let plan = load(&args.config.config, &set, registry).map_err(Sitting::Config)?;
-    let cache = Cache::open(&base.join("cache")).map_err(|error| Sitting::Run(error.to_string()))?;
+    let cache = Cache::open(&base.join("cache"));
     let options = Options {
         base: plan.config.base().to_owned(),
         cache: &cache,
+        files: cache.input_files(true),
         fresh: true,
         program: concat!("afmid ", env!("CARGO_PKG_VERSION")).to_owned(),
         overrides: plan.config.overrides.clone(),

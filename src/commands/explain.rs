@@ -1,8 +1,8 @@
 //! `afmid explain`: which stages would run, and why.
 
-use afmid_pipeline::cache::Cache;
-use afmid_pipeline::runner::{Decision, Explanation, explain};
-use afmid_pipeline::{Plan, Registry};
+use afmid_pipeline::cache::{Cache, arithmetic};
+use afmid_pipeline::runner::{Decision, Explanation, Surroundings, explain};
+use afmid_pipeline::{InputFiles, Plan, Registry};
 use serde_json::{Value, json};
 
 use super::load::load;
@@ -19,11 +19,13 @@ const MOST: usize = 8;
 /// Says on stdout what a run would do with each stage.
 pub fn run(args: &ExplainArgs, registry: &Registry) -> Result<(), Failure> {
     let plan = load(&args.config.config, &args.config.set, registry)?;
-    let cache = open_cache(args.cache.as_deref())?;
+    let cache = open_cache(args.cache.as_deref());
+    let (files, arithmetic) = (cache.input_files(false), arithmetic());
+    let with = Explained { cache: &cache, files: &files, arithmetic: &arithmetic };
     if let Some(count) = plan.points() {
-        return points(&plan, count, &cache, args.json);
+        return points(&plan, count, &with, args.json);
     }
-    let rows = explain(&plan, plan.config.base(), PROGRAM, &cache);
+    let rows = with.rows(&plan);
     if args.json {
         return print(&pretty(&json!({ "stages": rows.iter().map(as_json).collect::<Vec<_>>() }))?);
     }
@@ -32,14 +34,28 @@ pub fn run(args: &ExplainArgs, registry: &Registry) -> Result<(), Failure> {
     print(&grid(&table))
 }
 
+/// What plans are explained with.
+struct Explained<'a> {
+    cache: &'a Cache,
+    files: &'a InputFiles,
+    arithmetic: &'a str,
+}
+
+impl Explained<'_> {
+    fn rows(&self, plan: &Plan) -> Vec<Explanation> {
+        let Self { cache, files, arithmetic } = *self;
+        explain(plan, &Surroundings { base: plan.config.base(), program: PROGRAM, arithmetic, files }, cache)
+    }
+}
+
 /// What a run of a sweep would do: a stage has a row per group of points that share its result.
-fn points(plan: &Plan, count: usize, cache: &Cache, json: bool) -> Result<(), Failure> {
+fn points(plan: &Plan, count: usize, with: &Explained, json: bool) -> Result<(), Failure> {
     let mut groups: Vec<Vec<Group>> = plan.nodes.iter().map(|_| Vec::new()).collect();
     for index in 0..count {
         let point = plan.point(index).map_err(|problems| {
             Failure::failed(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "), None)
         })?;
-        for (row, groups) in explain(&point, point.config.base(), PROGRAM, cache).into_iter().zip(&mut groups) {
+        for (row, groups) in with.rows(&point).into_iter().zip(&mut groups) {
             match groups.iter_mut().find(|group| group.row.key == row.key && group.row.decision == row.decision) {
                 Some(group) => group.points.push(index),
                 None => groups.push(Group { row, points: vec![index] }),

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::cache::replace_with;
 use afmid_pipeline::config::nearest;
+use afmid_pipeline::files::replace_with;
 use afmid_pipeline::store::ResultFile;
 use afmid_pipeline::{Artifact, Shape};
 use serde_json::json;

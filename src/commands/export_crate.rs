@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::cache::replace_with;
+use afmid_pipeline::files::replace_with;
 use serde_json::{Value, json};
 
 use super::diff::open;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use afmid_pipeline::Registry;
-use afmid_pipeline::cache::replace_with;
+use afmid_pipeline::files::replace_with;
 use serde_json::json;
 
 use super::load::plan_text;

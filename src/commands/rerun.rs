@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::cache::write_result;
 use afmid_pipeline::store::ResultFile;
+use afmid_pipeline::store::write_result;
 use afmid_pipeline::{Plan, Registry, SourceFile, graph};
 use serde_json::{Value, json};
 
@@ -34,13 +34,13 @@ pub fn run(args: &RerunArgs, registry: &Registry) -> Result<(), Failure> {
     let (plan, writers) = plan(&file, &base, &finder, scratch.path(), registry)?;
     let output = args.output.clone().unwrap_or_else(|| scratch.path().join("repeated.h5"));
     prepare(&output, Target::Result, &inputs(args, &file, &finder))?;
-    let cache = open_cache(args.cache.as_deref())?;
+    let cache = open_cache(args.cache.as_deref());
     let overrides = &file.run().overrides;
     let mut repeated =
         compute(&plan, &Computation { base: &base, cache: &cache, fresh: !args.reuse, jobs: args.jobs, overrides });
     repeated.iter_mut().for_each(|repeated| writers.iter().for_each(|writer| writer.put_back(repeated)));
     cache.take_notes().iter().for_each(|note| say(&format!("note: {note}\n")));
-    let failed = |error: &afmid_pipeline::store::StoreError| Failure::failed(error, error.help.clone());
+    let failed = |error: &afmid_pipeline::error::StoreError| Failure::failed(error, error.help.clone());
     write_result(&output, &repeated?).map_err(|error| failed(&error))?;
     let diff = Diff::of(&file, &open(&output)?).map_err(|error| failed(&error))?;
     let verdict = judge(&diff);

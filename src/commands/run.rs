@@ -29,7 +29,7 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
     }
     let output = args.output.clone().unwrap_or_else(|| default_output(plan.name()));
     prepare(&output, Target::Result, &inputs(&plan, &args.config.config))?;
-    let cache = open_cache(args.cache.as_deref())?;
+    let cache = open_cache(args.cache.as_deref());
     let computation = Computation {
         base: plan.config.base(),
         cache: &cache,
@@ -52,8 +52,8 @@ pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
 }
 
 /// The cache that was asked for, or the user's.
-pub fn open_cache(folder: Option<&Path>) -> Result<Cache, Failure> {
-    Cache::open(&cache_folder(folder)).map_err(|error| Failure::usage(&error, error.help.clone()))
+pub fn open_cache(folder: Option<&Path>) -> Cache {
+    Cache::open(&cache_folder(folder))
 }
 
 /// The folder of the cache that was asked for, or the user's.
@@ -82,6 +82,7 @@ impl Computation<'_> {
         let options = Options {
             base: self.base.to_owned(),
             cache: self.cache,
+            files: self.cache.input_files(self.fresh),
             fresh: self.fresh,
             program: PROGRAM.to_owned(),
             overrides: self.overrides.to_vec(),

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use afmid_pipeline::Registry;
-use afmid_pipeline::cache::replace_with;
+use afmid_pipeline::files::replace_with;
 use serde_json::json;
 
 use super::batch::{data_sets, ledger, planned, whole};

@@ -79,11 +79,20 @@ fn require_own(folder: &Path) -> Result<(), Failure> {
 }
 
 fn computed(plan: &Plan, count: usize, args: &RunArgs, ledger: &Ledger) -> Result<Vec<Point>, Failure> {
-    let cache = open_cache(args.cache.as_deref())?;
+    let cache = open_cache(args.cache.as_deref());
     // 0: as many as there are processors
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.map_or(0, |jobs| usize::from(jobs.get()))).build();
     let pool = pool.map_err(|error| Failure::failed(format!("no threads can be started: {error}"), None))?;
-    let work = Work { cache: &cache, ledger, program: PROGRAM, fresh: args.fresh, retry_failed: true, as_run: true };
+    let files = cache.input_files(args.fresh);
+    let work = Work {
+        cache: &cache,
+        files: &files,
+        ledger,
+        program: PROGRAM,
+        fresh: args.fresh,
+        retry_failed: true,
+        as_run: true,
+    };
     let progress = Sets::new("points", count);
     let one = |&index: &usize| match plan.point(index) {
         Ok(point) => pool.install(|| work.one(&point::name(index), &point)),

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::cache::probe;
+use afmid_pipeline::files::probe;
 use afmid_pipeline::store::{FileKind, file_kind};
 
 use crate::export::is_exported;

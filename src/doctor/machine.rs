@@ -1,7 +1,7 @@
 //! Program, processor, library, environment.
 
 use afmid_pipeline::Registry;
-use afmid_pipeline::store::library_version;
+use afmid_pipeline::hdf5_files::library_version;
 
 use super::Finding;
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::StageError;
-use afmid_pipeline::recording::{Reading, open_contents};
+use afmid_pipeline::recording::{InputFiles, Reading, open_contents};
 use afmid_pipeline::store::is_own;
 
 use super::channel::Channel;
@@ -65,7 +65,7 @@ fn refused(error: StageError) -> Outcome {
 }
 
 fn read(path: &Path) -> Result<Holdings, StageError> {
-    let (name, contents) = open_contents(path, &Reading::of("auto", None))?;
+    let (name, contents) = open_contents(&InputFiles::new(), path, &Reading::of("auto", None))?;
     let channels = contents.channels.iter().enumerate();
     let channels: Vec<Channel> =
         channels.map(|(index, found)| Channel::of(found, index < MOST_READ)).collect::<Result<_, _>>()?;

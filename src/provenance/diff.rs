@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use afmid_pipeline::store::{Difference, Numbers, ResultFile, StageSummary, StoreError, compare};
+use afmid_pipeline::error::StoreError;
+use afmid_pipeline::store::{Difference, Numbers, ResultFile, StageSummary, compare};
 use afmid_pipeline::{Shape, SourceFile, StageRecord};
 use serde::Serialize;
 use serde_json::{Value, json};

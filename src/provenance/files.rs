@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::hash_file;
+use afmid_pipeline::InputFiles;
 use afmid_pipeline::{RunInfo, SourceFile};
 
 use super::diff::file_name;
@@ -91,7 +91,7 @@ fn look(path: &Path, file: &SourceFile) -> Now {
     if metadata.len() != file.size {
         return Now::Other(path.to_owned());
     }
-    match hash_file(path) {
+    match InputFiles::new().hash(path) {
         Ok(hash) if hash == file.blake3 => Now::Same(path.to_owned()),
         Ok(_) => Now::Other(path.to_owned()),
         Err(error) => Now::Unreadable(error.to_string()),
@@ -128,7 +128,11 @@ mod tests {
         let file = |name: &str, text: &str| {
             let hashed = here.join("hashed");
             fs::write(&hashed, text).unwrap();
-            SourceFile { path: name.to_owned(), size: text.len() as u64, blake3: hash_file(&hashed).unwrap() }
+            SourceFile {
+                path: name.to_owned(),
+                size: text.len() as u64,
+                blake3: InputFiles::new().hash(&hashed).unwrap(),
+            }
         };
         let plain = Finder::new(&run, &[]);
         assert_eq!(plain.find(&file("a", "one")), Now::Same(here.join("a")));

@@ -1,7 +1,8 @@
 //! From a path to a number and to the dataset that holds it.
 
 use afmid_pipeline::artifact::{ColumnValues, std_name};
-use afmid_pipeline::store::{PortSummary, ResultFile, StageSummary, StoreError};
+use afmid_pipeline::error::StoreError;
+use afmid_pipeline::store::{PortSummary, ResultFile, StageSummary};
 use afmid_pipeline::{Array, Artifact, Shape, Table, Values};
 use serde::Serialize;
 use serde_json::{Value, json};

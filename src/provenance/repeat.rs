@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::hash_file;
+use afmid_pipeline::InputFiles;
 use afmid_pipeline::store::ResultFile;
 use afmid_pipeline::{Artifact, Node, Plan, Ports, RunInfo, RunResult, SourceFile, StageRecord};
 use serde_json::Value;
@@ -133,7 +133,7 @@ fn reads_the_same(node: &Node, record: &StageRecord, base: &Path) -> bool {
     let Ok(now) = node.stage.sources(base) else { return false };
     let same = |(path, source): (&PathBuf, &SourceFile)| {
         file_name(&path.to_string_lossy()) == file_name(&source.path)
-            && hash_file(path).is_ok_and(|hash| hash == source.blake3)
+            && InputFiles::new().hash(path).is_ok_and(|hash| hash == source.blake3)
     };
     now.len() == record.sources.len() && now.iter().zip(&record.sources).all(same)
 }

@@ -18,6 +18,7 @@ pub fn change_text(change: &Change) -> String {
         }
         Change::Parameter { name, was: Some(was), is: None } => format!("`{name}` is no parameter any more, was {was}"),
         Change::Seed { was, is } => was_is("the seed", &seed(*was), &seed(*is)),
+        Change::Arithmetic { was, is } => was_is("processor or build", was, is),
         Change::DependsOn { was, is } => was_is("what it depends on", &was.join(", "), &is.join(", ")),
         Change::File { name, was: Some(_), is: Some(_) } => format!("file `{name}` has other bytes"),
         Change::File { name, was: None, .. } => format!("file `{name}` is read in addition"),
@@ -51,6 +52,7 @@ pub fn change_json(change: &Change) -> Value {
         Change::Version { was, is } => row("version", Value::Null, json!(was), json!(is)),
         Change::Parameter { name, was, is } => row("parameter", json!(name), json!(was), json!(is)),
         Change::Seed { was, is } => row("seed", Value::Null, json!(was), json!(is)),
+        Change::Arithmetic { was, is } => row("arithmetic", Value::Null, json!(was), json!(is)),
         Change::DependsOn { was, is } => row("depends_on", Value::Null, json!(was), json!(is)),
         Change::File { name, was, is } => row("file", json!(name), file(was), file(is)),
         Change::Order => row("order", Value::Null, Value::Null, Value::Null),

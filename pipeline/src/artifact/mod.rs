@@ -3,6 +3,7 @@
 mod array;
 mod attribute;
 mod document;
+mod row_writer;
 mod standard_error;
 mod state_space;
 mod table;
@@ -12,6 +13,7 @@ use std::sync::Arc;
 pub use array::{Array, Axis, Values, Variable};
 pub use attribute::Attribute;
 pub use document::Document;
+pub use row_writer::RowWriter;
 pub use standard_error::std_name;
 pub use state_space::{Matrix, StateSpace};
 pub use table::{Column, ColumnValues, Table};
@@ -85,7 +87,7 @@ impl Artifact {
     }
 }
 
-/// A type that is an artifact's shape: what a [`Port`](crate::Port) is typed with.
+/// A type that is an artifact's shape: what a [`Port`](crate::outcome::Port) is typed with.
 pub trait Shaped: Sized + Send + Sync + 'static {
     /// The shape.
     const SHAPE: Shape;

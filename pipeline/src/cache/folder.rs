@@ -7,10 +7,12 @@ use std::time::SystemTime;
 
 use super::names::{Kind, STAMPS, kind_of};
 use super::origin::Origin;
-use super::replace::{PendingStage, replace_file, sweep};
-use crate::recording::keep_stamps_in;
-use crate::runner::StageResult;
-use crate::store::{StoreError, read_stage, write_stage};
+use super::pending_stage::PendingStage;
+use crate::error::StoreError;
+use crate::files::sweep;
+use crate::outcome::StageResult;
+use crate::recording::InputFiles;
+use crate::store::{StageIdentity, read_stage};
 
 /// A folder of stage results by key.
 #[derive(Debug)]
@@ -20,13 +22,21 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// Opens the cache in `folder`, makes the folder if it is missing, and sweeps what killed runs left. Hashes of input files are kept there from now on. Errors: it cannot be made.
-    pub fn open(folder: &Path) -> Result<Self, StoreError> {
+    /// Opens the cache in `folder`, makes the folder if it is missing, and removes what killed runs left.
+    ///
+    /// Where the folder cannot be made, nothing is found and nothing kept, and [`Cache::take_notes`] says so: a run goes on to its result.
+    pub fn open(folder: &Path) -> Self {
         let cache = Self { folder: folder.to_owned(), notes: Mutex::default() };
-        cache.make_folder()?;
-        sweep(folder, ".");
-        keep_stamps_in(folder.join(STAMPS));
-        Ok(cache)
+        match cache.make_folder() {
+            Ok(()) => sweep(folder, "."),
+            Err(error) => cache.note(format!("nothing is kept: {error}")),
+        }
+        cache
+    }
+
+    /// The input files of a run, with what earlier runs hashed: kept beside the results. `fresh` hashes every file again.
+    pub fn input_files(&self, fresh: bool) -> InputFiles {
+        InputFiles::keeping_hashes(&self.folder.join(STAMPS), fresh)
     }
 
     fn make_folder(&self) -> Result<(), StoreError> {
@@ -55,16 +65,18 @@ impl Cache {
         self.path(key).is_file()
     }
 
-    /// The result with this key, marked as used. A damaged file counts as absent: it is removed, and [`Cache::take_notes`] says so.
+    /// The result of this stage with this key, marked as used. A file that is damaged, or the result of something else, counts as absent: it is
+    /// removed, and [`Cache::take_notes`] says so.
     ///
-    /// What comes back is in memory, or in the file, held open: removing it afterwards takes nothing from a run.
-    pub fn get(&self, key: &str) -> Option<StageResult> {
-        let path = self.path(key);
+    /// What comes back is in memory, or in the file, held open: removing it afterwards takes nothing from a run. Recordings in it are read through `files`.
+    pub fn get(&self, identity: &StageIdentity, files: &InputFiles) -> Option<StageResult> {
+        let path = self.path(identity.key);
         if !path.is_file() {
             return None;
         }
+        let read = || read_stage(&path, identity, files);
         // twice: another process may remove the file and put it again between looking and reading
-        match read_stage(&path).or_else(|_| read_stage(&path)) {
+        match read().or_else(|_| read()) {
             Ok(result) => {
                 mark_used(&path);
                 Some(result)
@@ -73,31 +85,31 @@ impl Cache {
             Err(_) if !path.exists() => None,
             Err(error) => {
                 let removed = if fs::remove_file(&path).is_ok() { "removed" } else { "ignored" };
-                self.note(format!("a damaged file in the cache was {removed}: {error}"));
+                self.note(format!("a file in the cache was {removed}, its stage runs again: {error}"));
                 None
             }
         }
     }
 
     /// Keeps a result; makes the folder again if somebody removed it. Errors: the folder cannot be written; an artifact is not valid.
-    pub fn put(&self, key: &str, result: &StageResult) -> Result<(), StoreError> {
+    pub fn put(&self, identity: &StageIdentity, result: &StageResult) -> Result<(), StoreError> {
         self.make_folder()?;
-        replace_file(&self.path(key), |temporary| write_stage(temporary, result))
+        PendingStage::write(&self.path(identity.key), identity, result)?.finish()
     }
 
-    /// Keeps a result with its origin. Errors: as [`Cache::put`].
-    pub fn put_with_origin(&self, origin: &Origin, result: &StageResult) -> Result<(), StoreError> {
-        self.write_with_origin(origin, result)?.finish()
-    }
-
-    /// The first half of [`Cache::put_with_origin`]: the file is written, and not yet what the cache has under its key. Errors: as there.
-    pub(crate) fn write_with_origin(&self, origin: &Origin, result: &StageResult) -> Result<PendingStage, StoreError> {
+    /// Keeps a result with its origin, which is written first: the file is written, and not yet what the cache has under its key. Errors: as [`Cache::put`].
+    pub(crate) fn write_with_origin(
+        &self,
+        origin: &Origin,
+        identity: &StageIdentity,
+        result: &StageResult,
+    ) -> Result<PendingStage, StoreError> {
         self.make_folder()?;
         // only explanations need it: a run does not fail for it
         if let Err(error) = origin.write(&self.origin_path(&origin.key)) {
             self.note(format!("where a result comes from was not kept: {error}"));
         }
-        PendingStage::write(&self.path(&origin.key), result)
+        PendingStage::write(&self.path(&origin.key), identity, result)
     }
 
     /// The origin of the result with this key, whether the result is still there or not.
@@ -120,7 +132,8 @@ impl Cache {
         Some((self.origin(key)?, used))
     }
 
-    fn note(&self, note: String) {
+    /// Something that the user should know.
+    pub(crate) fn note(&self, note: String) {
         self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note);
     }
 

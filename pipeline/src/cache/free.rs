@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use super::stock::{Sort, Stock, Stored, age};
-use crate::store::StoreError;
+use crate::error::StoreError;
 
 /// What may stay.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

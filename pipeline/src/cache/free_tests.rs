@@ -7,7 +7,9 @@ use std::time::{Duration, SystemTime};
 use serde_json::json;
 
 use super::*;
-use crate::store::fixture::{Folder, stage_result};
+use crate::files::fixture::Folder;
+use crate::recording::InputFiles;
+use crate::store::fixture::{identity, stage_result};
 
 const DAY: Duration = Duration::from_secs(24 * 3600);
 
@@ -88,16 +90,16 @@ fn the_least_recently_used_go_until_the_size_is_kept() {
 #[test]
 fn a_result_that_is_used_is_the_last_to_go() {
     let folder = Folder::new("used");
-    let cache = Cache::open(&folder.0).unwrap();
+    let cache = Cache::open(&folder.0);
     for digit in ['a', 'b'] {
-        cache.put(&key(digit), &stage_result()).unwrap();
+        cache.put(&identity(&key(digit)), &stage_result()).unwrap();
         let file = File::options().write(true).open(cache.path(&key(digit))).unwrap();
         file.set_modified(SystemTime::now() - DAY * if digit == 'a' { 9 } else { 2 }).unwrap();
     }
-    assert!(cache.get(&key('a')).is_some());
+    assert!(cache.get(&identity(&key('a')), &InputFiles::new()).is_some());
     let freed = free(&folder.0, &Limits { older_than: Some(DAY), max_bytes: None }, false).unwrap();
     assert_eq!(names(&freed), ["bb"]);
-    assert!(cache.get(&key('a')).is_some());
+    assert!(cache.get(&identity(&key('a')), &InputFiles::new()).is_some());
 }
 
 #[test]
@@ -111,7 +113,7 @@ fn a_folder_that_is_not_there_is_empty_and_stays_away() {
 #[test]
 fn origins_come_back_and_broken_ones_are_left_out() {
     let folder = Folder::new("origins");
-    let cache = Cache::open(&folder.0).unwrap();
+    let cache = Cache::open(&folder.0);
     let origin = |digit: char| Origin {
         key: key(digit),
         format: 1,
@@ -120,6 +122,7 @@ fn origins_come_back_and_broken_ones_are_left_out() {
         params: json!({ "a": 0.1, "files": ["x"] }),
         location_params: vec!["files".to_owned()],
         depends_on: Vec::new(),
+        arithmetic: "x86_64 [avx2]".to_owned(),
         seed: Some(u64::MAX),
         files: vec![OriginFile { name: "a.h5".to_owned(), size: 3, blake3: "00".to_owned() }],
         inputs: Vec::new(),
@@ -127,20 +130,24 @@ fn origins_come_back_and_broken_ones_are_left_out() {
         id: "events".to_owned(),
         program: "afmid 1".to_owned(),
     };
-    cache.put_with_origin(&origin('a'), &stage_result()).unwrap();
-    cache.put_with_origin(&origin('b'), &stage_result()).unwrap();
+    let put = |digit: char| {
+        let key = key(digit);
+        cache.write_with_origin(&origin(digit), &identity(&key), &stage_result()).unwrap().finish().unwrap();
+    };
+    put('a');
+    put('b');
     assert_eq!(cache.origin(&key('a')), Some(origin('a')));
     fs::write(cache.origin_path(&key('b')), b"{\"key\":").unwrap();
     fs::remove_file(cache.path(&key('b'))).unwrap();
     let found: Vec<Origin> = cache.origins().into_iter().map(|(origin, _)| origin).collect();
     assert_eq!(found, [origin('a')]);
-    assert!(cache.get(&key('a')).is_some() && cache.take_notes().is_empty());
+    assert!(cache.get(&identity(&key('a')), &InputFiles::new()).is_some() && cache.take_notes().is_empty());
 }
 
 #[test]
 fn whatever_is_removed_at_any_moment_gets_and_puts_go_on() {
     let folder = Folder::new("race");
-    let cache = Cache::open(&folder.0).unwrap();
+    let cache = Cache::open(&folder.0);
     let stop = std::sync::atomic::AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -149,9 +156,9 @@ fn whatever_is_removed_at_any_moment_gets_and_puts_go_on() {
             }
         });
         for _ in 0..60 {
-            cache.put(&key('a'), &stage_result()).unwrap();
+            cache.put(&identity(&key('a')), &stage_result()).unwrap();
             // there or gone, never half of it
-            if let Some(found) = cache.get(&key('a')) {
+            if let Some(found) = cache.get(&identity(&key('a')), &InputFiles::new()) {
                 assert_eq!(found.warnings, stage_result().warnings);
             }
         }

@@ -3,7 +3,7 @@
 use blake3::Hasher;
 use serde_json::Value;
 
-use crate::runner::SourceFile;
+use crate::outcome::SourceFile;
 use crate::store::FORMAT_VERSION;
 
 /// Everything that a stage's result depends on.
@@ -19,6 +19,8 @@ pub struct KeyParts<'a> {
     pub location_params: &'a [&'a str],
     /// What else the result depends on: plugins of the stage with their versions.
     pub depends_on: &'a [String],
+    /// What of processor and build may change last bits: see [`arithmetic`](super::arithmetic()).
+    pub arithmetic: &'a str,
     /// The seed, if the stage draws random numbers.
     pub seed: Option<u64>,
     /// The files that it reads, in order: names without folders, and hashes, count.
@@ -37,12 +39,12 @@ pub fn key(parts: &KeyParts) -> String {
     text(&mut hasher, parts.stage);
     number(&mut hasher, u64::from(parts.version));
     params(&mut hasher, parts.params, parts.location_params);
-    // most stages depend on nothing more: their keys are those of before
     if !parts.depends_on.is_empty() {
         text(&mut hasher, "depends on");
         number(&mut hasher, parts.depends_on.len() as u64);
         parts.depends_on.iter().for_each(|other| text(&mut hasher, other));
     }
+    text(&mut hasher, parts.arithmetic);
     number(&mut hasher, u64::from(parts.seed.is_some()));
     number(&mut hasher, parts.seed.unwrap_or(0));
     number(&mut hasher, parts.sources.len() as u64);

@@ -4,12 +4,13 @@
 //! folder at once: every file is written under a name of its own, synced and renamed. Beside it lies `DIR/KEY.json`: what the key was made
 //! of, in words ([`Origin`]). Any file may go at any moment ([`free`]): a run has what it needs in memory or open, the next one computes it again.
 
+mod arithmetic;
 mod folder;
 mod free;
 mod key;
 mod names;
 mod origin;
-mod replace;
+mod pending_stage;
 mod stock;
 
 #[cfg(test)]
@@ -17,10 +18,10 @@ mod free_tests;
 #[cfg(test)]
 mod tests;
 
+pub use arithmetic::arithmetic;
 pub use folder::Cache;
 pub use free::{Freed, Gone, Limits, Why, free};
 pub use key::{KeyParts, key};
 pub use origin::{Origin, OriginFile, OriginInput};
-pub(crate) use replace::{PendingResult, PendingStage, replace_unsynced, temporary_path};
-pub use replace::{probe, replace_file, replace_with, sweep, write_result};
+pub(crate) use pending_stage::PendingStage;
 pub use stock::{Sort, Stock, Stored};

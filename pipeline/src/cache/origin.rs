@@ -10,8 +10,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::replace::replace_unsynced;
-use crate::store::StoreError;
+use crate::error::StoreError;
+use crate::files::replace_unsynced;
 
 /// The parts of a result's key, and who made it first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,6 +30,9 @@ pub struct Origin {
     pub location_params: Vec<String>,
     /// Plugins of the stage with their versions.
     pub depends_on: Vec<String>,
+    /// What of processor and build may change last bits.
+    #[serde(default)]
+    pub arithmetic: String,
     /// Seed, if the stage draws random numbers.
     pub seed: Option<u64>,
     /// The files that it read, in order.

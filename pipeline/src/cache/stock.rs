@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use super::names::{Kind, STAMPS, is_stamp, kind_of};
-use super::replace::stale;
-use crate::store::StoreError;
+use crate::error::StoreError;
+use crate::files::stale;
 
 /// An origin without a result that is older has no result to come: writing the longest takes minutes.
 const ORPHANED: Duration = Duration::from_secs(3600);

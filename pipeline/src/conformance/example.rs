@@ -1,29 +1,8 @@
 //! A stage's examples run, and what they make is what the stage declares.
 
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use super::same::difference;
 use crate::error::StageError;
-use crate::stage::{Context, DynStage, Entry, Example, NoProgress, PortSpec, Ports};
-
-/// The seed of every example.
-const SEED: u64 = 1;
-
-/// Runs an example in a folder of its own, which is removed again: its outputs. Errors: why it does not run.
-pub fn run_example(entry: &Entry, example: &Example) -> Result<Ports, String> {
-    run(instance(entry, example)?.as_ref(), &inputs(entry, example)?)
-}
-
-/// An example's inputs: those that the stage declares, as in a run.
-fn inputs(entry: &Entry, example: &Example) -> Result<Ports, String> {
-    let given = (example.inputs)().map_err(|error| format!("inputs: {error}"))?;
-    let mut inputs = Ports::new();
-    for (name, artifact) in given.iter().filter(|(name, _)| entry.spec.inputs.iter().any(|port| port.name == *name)) {
-        inputs.insert(name, artifact.clone());
-    }
-    Ok(inputs)
-}
+use crate::outcome::{PortSpec, Ports, difference};
+use crate::stage::{DynStage, Entry, Example, example_inputs, instance, run_example, run_in_folder};
 
 /// Checks that there is an example, that each runs with the declared ports and makes the declared ports, and that the truth comes out.
 pub fn examples_hold(entry: &Entry) -> Vec<String> {
@@ -73,24 +52,12 @@ pub fn repeatable(entry: &Entry) -> Vec<String> {
     violations
 }
 
-fn instance(entry: &Entry, example: &Example) -> Result<Box<dyn DynStage>, String> {
-    let params: toml::Table = example.params.parse().map_err(|error| format!("params are not TOML: {error}"))?;
-    let stage = entry.parse(params).map_err(|error| format!("params: at {}: {error}", error.path))?;
-    stage.check().map_err(|error| format!("params: {error}"))?;
-    Ok(stage)
-}
-
-fn run(stage: &dyn DynStage, inputs: &Ports) -> Result<Ports, String> {
-    let folder = Folder::new().map_err(|error| format!("no temporary folder: {error}"))?;
-    stage.run(inputs, &Context::new(&folder.0, SEED, &NoProgress)).map_err(|error| error.to_string())
-}
-
 fn holds(entry: &Entry, example: &Example) -> Result<(), String> {
-    let inputs = inputs(entry, example)?;
+    let inputs = example_inputs(entry, example)?;
     as_declared("input", entry.spec.inputs, &inputs)?;
     let stage = instance(entry, example)?;
     resolved_parameters_are_parameters(entry, stage.as_ref())?;
-    let outputs = run(stage.as_ref(), &inputs)?;
+    let outputs = run_in_folder(stage.as_ref(), &inputs)?;
     as_declared("output", entry.spec.outputs, &outputs)?;
     (example.expect)(&outputs).map(|_| ())
 }
@@ -138,24 +105,4 @@ fn without_nulls(value: serde_json::Value) -> serde_json::Value {
 fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T, String> + Send) -> Result<T, String> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| error.to_string())?;
     pool.install(work)
-}
-
-/// A folder that goes away again.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new() -> std::io::Result<Self> {
-        static COUNT: AtomicUsize = AtomicUsize::new(0);
-        let name = format!("afmid-example-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-        let path = std::env::temp_dir().join(name);
-        std::fs::create_dir_all(&path)?;
-        Ok(Self(path))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // what is left behind lies in the system's temporary folder
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }

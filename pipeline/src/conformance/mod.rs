@@ -2,11 +2,9 @@
 
 mod documented;
 mod example;
-mod same;
 
 pub use documented::documented;
-pub use example::{examples_hold, repeatable, run_example, unknown_key_refused};
-pub use same::difference;
+pub use example::{examples_hold, repeatable, unknown_key_refused};
 
 use crate::stage::Entry;
 

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use super::plan;
 use crate::config::{Input, Problem, StageDecl, did_you_mean, list, nearest};
-use crate::stage::{Entry, PortSpec};
+use crate::outcome::PortSpec;
+use crate::stage::Entry;
 
 /// A wire between declarations, with its place in the text.
 #[derive(Debug, Clone)]

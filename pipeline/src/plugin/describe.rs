@@ -6,7 +6,8 @@ use super::error::PluginError;
 use super::exchange::Wanted;
 use super::message::{Description, ExampleDescription, Handshake, PortDescription, ShapeName};
 use super::schema::Schema;
-use crate::stage::{Caching, PortSpec, Spec};
+use crate::outcome::PortSpec;
+use crate::stage::{Caching, Spec};
 
 /// A plugin as its description has it. It lives as long as the program: see [`leak`].
 #[derive(Debug)]

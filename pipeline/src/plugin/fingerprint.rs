@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use super::error::PluginError;
 use super::launch::Launch;
-use crate::recording::hash_file;
+use crate::recording::InputFiles;
 
 /// File name and BLAKE3 hash of the program, and of every argument that is a file.
 pub(super) type Fingerprint = Vec<String>;
@@ -36,7 +36,7 @@ fn described(path: &Path) -> Result<String, PluginError> {
     let kept = if metadata.len() > SMALL_BYTES { known().get(&stamp).cloned() } else { None };
     let hash = match kept {
         Some(hash) => hash,
-        None => hash_file(path).map_err(|error| unreadable(error.to_string()))?,
+        None => InputFiles::new().hash(path).map_err(|error| unreadable(error.to_string()))?,
     };
     known().insert(stamp, hash.clone());
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();

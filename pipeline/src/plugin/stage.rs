@@ -11,7 +11,8 @@ use super::pool;
 use super::row::Row;
 use super::session::Session;
 use crate::error::StageError;
-use crate::stage::{Context, DynStage, Ports, Spec};
+use crate::outcome::Ports;
+use crate::stage::{Context, DynStage, Spec};
 
 /// A plugin with its parameters.
 pub(super) struct PluginStage {

@@ -6,6 +6,7 @@ use afmid_formats::{Contents, formats, head_of, recognise};
 
 use super::foreign_hdf5;
 use super::how::{AUTO, HDF5, NATIVE, RAW, Reading};
+use super::input_files::InputFiles;
 use super::native::is_native;
 use crate::error::StageError;
 
@@ -14,11 +15,15 @@ const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// Opens a file: everything but the samples, and the name of the format that opened it. Native records are listed like any HDF5 file.
 ///
 /// Errors: it cannot be read; nobody recognises it; it is damaged.
-pub fn open_contents(path: &Path, reading: &Reading) -> Result<(&'static str, Contents), StageError> {
+pub fn open_contents(
+    files: &InputFiles,
+    path: &Path,
+    reading: &Reading,
+) -> Result<(&'static str, Contents), StageError> {
     reading.check()?;
-    let name = format_of(path, reading)?;
+    let name = format_of(files, path, reading)?;
     let contents = match (name, &reading.raw) {
-        (NATIVE | HDF5, _) => foreign_hdf5::open(path)?,
+        (NATIVE | HDF5, _) => foreign_hdf5::open(files, path)?,
         (RAW, Some(raw)) => raw.open(path).map_err(|error| error.in_file(path))?,
         _ => match formats().iter().find(|known| known.name == name) {
             Some(known) => known.open(path)?,
@@ -29,7 +34,7 @@ pub fn open_contents(path: &Path, reading: &Reading) -> Result<(&'static str, Co
 }
 
 /// The name of the format that opens a file. Errors: it cannot be read; nobody recognises it.
-pub(super) fn format_of(path: &Path, reading: &Reading) -> Result<&'static str, StageError> {
+pub(super) fn format_of(files: &InputFiles, path: &Path, reading: &Reading) -> Result<&'static str, StageError> {
     if reading.format != AUTO {
         let names = Reading::names();
         let found = names.into_iter().find(|name| *name == reading.format);
@@ -37,7 +42,7 @@ pub(super) fn format_of(path: &Path, reading: &Reading) -> Result<&'static str, 
     }
     let head = head_of(path)?;
     if is_hdf5(&head) {
-        return Ok(if is_native(path) { NATIVE } else { HDF5 });
+        return Ok(if is_native(files, path) { NATIVE } else { HDF5 });
     }
     recognise(&head, path).map(|known| known.name).ok_or_else(|| unknown(path, &head))
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use super::*;
-use crate::store::fixture::Folder;
+use crate::files::fixture::Folder;
 
 fn expected(name: &str, sample: usize) -> f64 {
     if name == "partly-written" && sample >= 5000 {
@@ -26,7 +26,7 @@ fn every_storage_of_other_programs_is_read_or_refused_clearly() {
         let path = entry.unwrap().path();
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         let wanted = [Wanted { role: "deflection", location: "deflection", required: true }];
-        let read = open_native(&path, &wanted).and_then(|record| {
+        let read = open_native(&InputFiles::new(), &path, &wanted).and_then(|record| {
             assert_eq!((record.sample_rate_hz, record.started_at.as_str()), (5e6, "2005-03-01T10:00:00Z"), "{name}");
             let channel = &record.channels[0];
             assert_eq!((channel.unit.as_str(), channel.samples), ("V", 70_000), "{name}");

@@ -1,20 +1,18 @@
 //! Recordings: lazy, re-readable record files. They are streamed, never held whole.
 
 mod chunk;
+mod chunk_cache;
 mod contents;
-mod deferred;
 mod errors;
 mod foreign_hdf5;
-mod global_heap;
-mod hash;
 mod how;
-mod kept;
+mod input_files;
+mod lazy_source;
 mod native;
 mod open;
-mod recent;
+mod opened_files;
 mod series;
 mod source;
-mod stamps;
 mod stretches;
 mod write;
 
@@ -28,12 +26,12 @@ mod tests;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-pub(crate) use deferred::DeferredSource;
-pub use hash::hash_file;
+pub(crate) use input_files::HashedFile;
+pub use input_files::InputFiles;
+pub(crate) use lazy_source::LazySource;
 pub(crate) use native::is_native;
 pub use native::{Wanted, open_native};
 pub use series::{read_number_attribute, read_series};
-pub(crate) use stamps::keep_in as keep_stamps_in;
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
 
 pub use afmid_formats::{Contents, FormatError, FoundChannel, Raw, RawBinary, Source, formats};

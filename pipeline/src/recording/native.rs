@@ -11,12 +11,12 @@ use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5::{Dataset, File, Group, Location};
 
 use super::chunk::ChunkFilter;
-use super::hash::{Inspected, inspect_hdf5};
-use super::recent::source_number;
+use super::chunk_cache::ChunkCache;
+use super::input_files::{InputFiles, Inspected};
 use super::source::{ChunkPlace, Hdf5Source, Place};
 use super::{Channel, Reading, Record};
 use crate::error::StageError;
-use crate::store::read::{check_size, open_file, read_texts};
+use crate::hdf5_files::read::{check_size, open_file, read_texts};
 
 /// A channel to look for in a record.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,24 +36,25 @@ pub struct Wanted<'a> {
 /// `long_name`, `_FillValue`. value = stored * scale_factor + add_offset.
 ///
 /// Errors: no file, not HDF5, cut short, damaged; an attribute or a required channel is missing or of another type.
-pub fn open_native(path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
+pub fn open_native(files: &InputFiles, path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
     let size = size_of_file(path)?;
-    let inspected = inspect_hdf5(path)?;
-    hdf5::sync::sync(|| read_record(&open_file(path)?, path, wanted, size, inspected))
+    let inspected = files.inspect_hdf5(path)?;
+    hdf5::sync::sync(|| read_record(files, &open_file(path)?, path, wanted, size, inspected))
 }
 
 /// As [`open_native`] if the file is a native record: HDF5 that states a sample rate, whatever its channels. None: it is another file, or damaged.
-pub(super) fn open_if_native(path: &Path, wanted: &[Wanted]) -> Result<Option<Record>, StageError> {
+pub(super) fn open_if_native(files: &InputFiles, path: &Path, wanted: &[Wanted]) -> Result<Option<Record>, StageError> {
     let size = size_of_file(path)?;
-    let Ok(inspected) = inspect_hdf5(path) else { return Ok(None) };
+    let Ok(inspected) = files.inspect_hdf5(path) else { return Ok(None) };
     // one turn for all calls of the library: threads that open a file each would otherwise wait for one another some fifty times
     hdf5::sync::sync(|| match open_file(path) {
-        Ok(file) if states_rate(&file) => read_record(&file, path, wanted, size, inspected).map(Some),
+        Ok(file) if states_rate(&file) => read_record(files, &file, path, wanted, size, inspected).map(Some),
         _ => Ok(None),
     })
 }
 
 fn read_record(
+    files: &InputFiles,
     file: &File,
     path: &Path,
     wanted: &[Wanted],
@@ -71,7 +72,7 @@ fn read_record(
     let mut channels = Vec::with_capacity(wanted.len());
     for channel in wanted {
         if let Some(dataset) = find(file, path, channel)? {
-            channels.push(open_channel(&dataset, path, channel).map_err(|error| error.at(path))?);
+            channels.push(open_channel(files.chunks(), &dataset, path, channel).map_err(|error| error.at(path))?);
         }
     }
     Ok(Record {
@@ -88,9 +89,9 @@ fn read_record(
 }
 
 /// Whether a file is a native record, as [`open_if_native`] has it.
-pub(crate) fn is_native(path: &Path) -> bool {
+pub(crate) fn is_native(files: &InputFiles, path: &Path) -> bool {
     // damage that keeps the library busy for ever is looked for first
-    inspect_hdf5(path).is_ok() && hdf5::sync::sync(|| open_file(path).is_ok_and(|file| states_rate(&file)))
+    files.inspect_hdf5(path).is_ok() && hdf5::sync::sync(|| open_file(path).is_ok_and(|file| states_rate(&file)))
 }
 
 fn states_rate(file: &File) -> bool {
@@ -134,9 +135,9 @@ fn datasets(file: &File) -> Vec<String> {
     names
 }
 
-fn open_channel(dataset: &Dataset, path: &Path, wanted: &Wanted) -> Result<Channel, StageError> {
+fn open_channel(chunks: &ChunkCache, dataset: &Dataset, path: &Path, wanted: &Wanted) -> Result<Channel, StageError> {
     let location = wanted.location;
-    let source = describe(dataset, path, location)?;
+    let source = describe(chunks, dataset, path, location)?;
     let unit = text_attribute(dataset, "units").ok_or_else(|| {
         StageError::new(format!("{location}: the attribute `units` is missing"))
             .help("state the unit of stored * scale_factor + add_offset, such as `V`")
@@ -165,14 +166,14 @@ fn open_channel(dataset: &Dataset, path: &Path, wanted: &Wanted) -> Result<Chann
 }
 
 /// Opens one dataset of a file as a source of samples. Errors: as [`open_native`].
-pub(super) fn open_source(path: &Path, location: &str) -> Result<Hdf5Source, StageError> {
+pub(super) fn open_source(chunks: &ChunkCache, path: &Path, location: &str) -> Result<Hdf5Source, StageError> {
     let file = open_file(path)?;
     let dataset =
         file.dataset(location).map_err(|_| StageError::new(format!("there is no channel `{location}`")).at(path))?;
-    describe(&dataset, path, location).map_err(|error| error.at(path))
+    describe(chunks, &dataset, path, location).map_err(|error| error.at(path))
 }
 
-fn describe(dataset: &Dataset, path: &Path, location: &str) -> Result<Hdf5Source, StageError> {
+fn describe(chunks: &ChunkCache, dataset: &Dataset, path: &Path, location: &str) -> Result<Hdf5Source, StageError> {
     let fail = |problem: String| StageError::new(format!("{location}: {problem}"));
     let hdf5 = |error: hdf5::Error| fail(format!("damaged: {error}"));
     let shape = dataset.get_shape().map_err(hdf5)?;
@@ -200,7 +201,8 @@ fn describe(dataset: &Dataset, path: &Path, location: &str) -> Result<Hdf5Source
         kind,
         big_endian,
         place,
-        number: source_number(),
+        number: chunks.source_number(),
+        chunks: chunks.clone(),
     })
 }
 

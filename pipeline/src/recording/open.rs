@@ -5,12 +5,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::contents::{format_of, is_hdf5_file, is_recognised};
-use super::deferred::DeferredSource;
-use super::hash::hash_file;
 use super::how::{AUTO, HDF5, How, NATIVE, Reading};
+use super::input_files::InputFiles;
+use super::lazy_source::LazySource;
 use super::native::{Wanted, open_if_native, open_native, size_of_file};
+use super::opened_files::contents;
 use super::stretches::uninterrupted;
-use super::{Channel, Contents, FoundChannel, Record, kept};
+use super::{Channel, Contents, FoundChannel, Record};
 use crate::error::StageError;
 
 /// Channels named in a message.
@@ -39,12 +40,12 @@ pub fn recognised(path: &Path) -> bool {
 ///
 /// Errors: as [`super::open_contents`]; a required channel is missing; no sample rate or unit, neither in the file nor in `how`, or two
 /// that differ.
-pub fn open_records(path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened, StageError> {
+pub fn open_records(files: &InputFiles, path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened, StageError> {
     how.reading.check()?;
     let (native, format) = match how.reading.format.as_str() {
-        NATIVE => (Some(open_native(path, wanted)?), NATIVE),
-        AUTO if is_hdf5_file(path)? => (open_if_native(path, wanted)?, HDF5),
-        _ => (None, format_of(path, &how.reading)?),
+        NATIVE => (Some(open_native(files, path, wanted)?), NATIVE),
+        AUTO if is_hdf5_file(path)? => (open_if_native(files, path, wanted)?, HDF5),
+        _ => (None, format_of(files, path, &how.reading)?),
     };
     if let Some(record) = native {
         agreed_rate(Some(record.sample_rate_hz), how, "the file").map_err(|error| error.at(path))?;
@@ -57,8 +58,8 @@ pub fn open_records(path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened,
     }
     let reading = Reading { format: format.to_owned(), raw: how.reading.raw.clone() };
     let size = size_of_file(path)?;
-    let contents = kept::contents(path, size, &reading)?;
-    let file = File { path, size, reading, contents: &contents };
+    let contents = contents(files, path, size, &reading)?;
+    let file = File { files, path, size, reading, contents: &contents };
     let records = file.records(wanted, how).map_err(|error| error.at(path))?;
     let mut remarks = contents.remarks.clone();
     if records.len() > 1 {
@@ -69,6 +70,7 @@ pub fn open_records(path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened,
 
 /// A file that is open.
 struct File<'a> {
+    files: &'a InputFiles,
     path: &'a Path,
     size: u64,
     reading: Reading,
@@ -98,7 +100,7 @@ impl File<'_> {
         let sample_rate_hz = rate.map(|(_, rate)| rate).or(how.sample_rate_hz).unwrap_or(f64::NAN);
         let samples = found.iter().map(|(_, channel)| channel.samples).max().unwrap_or(0);
         let stretches = uninterrupted(samples, found.iter().map(|(_, channel)| channel.gaps.as_slice()));
-        let blake3 = hash_file(self.path)?;
+        let blake3 = self.files.hash(self.path)?;
         let several = stretches.len() > 1;
         let record = |(number, stretch): (usize, &Range<usize>)| {
             let name = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -154,7 +156,7 @@ impl File<'_> {
     ) -> Result<Channel, StageError> {
         let end = stretch.end.min(found.samples);
         let samples = end.saturating_sub(stretch.start);
-        let source = DeferredSource::new(self.path, self.size, &found.location, samples);
+        let source = LazySource::new(self.files, self.path, self.size, &found.location, samples);
         Ok(Channel {
             role: wanted.role.to_owned(),
             location: found.location.clone(),

@@ -6,7 +6,7 @@ use afmid_formats::SampleType;
 
 use super::how::HDF5;
 use super::*;
-use crate::store::fixture::Folder;
+use crate::files::fixture::Folder;
 
 fn wanted(location: &str) -> [Wanted<'_>; 2] {
     [
@@ -26,7 +26,7 @@ fn written(folder: &Folder, name: &str, bytes: &[u8]) -> PathBuf {
 }
 
 fn refused(path: &Path, location: &str, how: &How) -> String {
-    let error = open_records(path, &wanted(location), how).unwrap_err();
+    let error = open_records(&InputFiles::new(), path, &wanted(location), how).unwrap_err();
     assert_eq!(error.place.as_deref(), Some(path), "{error}");
     format!("{error} {}", error.help.clone().unwrap_or_default())
 }
@@ -39,7 +39,7 @@ fn missing_metadata_is_asked_for_by_name_and_stated_metadata_is_not_overruled() 
     let rated = How { sample_rate_hz: Some(5e6), ..auto() };
     assert!(refused(&bare, "deflection", &rated).contains("unit = "));
     let how = How { unit: Some("V".to_owned()), ..rated };
-    let opened = open_records(&bare, &wanted("/deflection"), &how).unwrap();
+    let opened = open_records(&InputFiles::new(), &bare, &wanted("/deflection"), &how).unwrap();
     let record = &opened.records[0];
     assert_eq!((opened.format, record.sample_rate_hz, record.name.as_str()), ("text", 5e6, "bare.csv"));
     assert_eq!(record.channel("deflection").unwrap().read(1, 2).unwrap(), [-2.0, 3.0]);
@@ -49,7 +49,10 @@ fn missing_metadata_is_asked_for_by_name_and_stated_metadata_is_not_overruled() 
 
     let stated = written(&folder, "stated.csv", b"Time (s),deflection (V)\n0.0,1.5\n0.1,-2\n0.2,3\n");
     let same = How { sample_rate_hz: Some(10.0), unit: Some("V".to_owned()), ..auto() };
-    assert_eq!(open_records(&stated, &wanted("deflection"), &same).unwrap().records[0].sample_rate_hz, 10.0);
+    assert_eq!(
+        open_records(&InputFiles::new(), &stated, &wanted("deflection"), &same).unwrap().records[0].sample_rate_hz,
+        10.0
+    );
     let other = How { sample_rate_hz: Some(11.0), ..auto() };
     assert!(refused(&stated, "deflection", &other).contains("given as 11, deflection states 10"));
     let other = How { unit: Some("mV".to_owned()), ..auto() };
@@ -75,7 +78,7 @@ fn an_interrupted_recording_is_one_record_per_stretch() {
     ]
     .concat();
     let path = written(&folder, "r.lvm", text.as_bytes());
-    let opened = open_records(&path, &wanted("deflection"), &auto()).unwrap();
+    let opened = open_records(&InputFiles::new(), &path, &wanted("deflection"), &auto()).unwrap();
     let told: Vec<(&str, usize, usize)> = opened
         .records
         .iter()
@@ -90,7 +93,7 @@ fn an_interrupted_recording_is_one_record_per_stretch() {
     assert!(opened.remarks[0].contains("2 uninterrupted stretches"), "{:?}", opened.remarks);
 
     // as a stored recording is reopened
-    let again = DeferredSource::new(&path, second.size, "deflection", 3).of_stretch(4, &second.reading);
+    let again = LazySource::new(&InputFiles::new(), &path, second.size, "deflection", 3).of_stretch(4, &second.reading);
     assert_eq!(again.read(0, 3).unwrap().widened(), [5.0, 6.0, 7.0]);
     std::fs::write(&path, "other").unwrap();
     let error = StageError::from(again.read(0, 3).unwrap_err());
@@ -105,7 +108,7 @@ fn files_without_a_header_are_what_the_user_says() {
     let raw =
         RawBinary { sample: SampleType::I16, big_endian: true, channels: 2, scale_factor: 0.5, ..RawBinary::default() };
     let how = How { reading: Reading::of("auto", Some(raw)), sample_rate_hz: Some(1e6), unit: Some("V".to_owned()) };
-    let record = open_records(&path, &wanted("/channel[1]"), &how).unwrap().records.remove(0);
+    let record = open_records(&InputFiles::new(), &path, &wanted("/channel[1]"), &how).unwrap().records.remove(0);
     assert_eq!(record.channels[0].read(2, 3).unwrap(), [2.5, 3.5, 4.5]);
     assert_eq!(record.reading.format, "raw");
     let json = serde_json::to_string(&record.reading).unwrap();
@@ -142,7 +145,7 @@ fn hdf5_of_any_layout_gives_rows_or_columns_with_units_and_rates() {
     let folder = Folder::new("layout");
     let path = folder.file("gmode.h5");
     foreign(&path);
-    let (format, contents) = open_contents(&path, &Reading::of("auto", None)).unwrap();
+    let (format, contents) = open_contents(&InputFiles::new(), &path, &Reading::of("auto", None)).unwrap();
     let found: Vec<(&str, usize, Option<f64>, &str)> = contents
         .channels
         .iter()
@@ -165,13 +168,13 @@ fn hdf5_of_any_layout_gives_rows_or_columns_with_units_and_rates() {
     );
     assert_eq!((format, contents.channels[0].long_name.as_str()), (HDF5, "Deflection"));
     assert!(contents.remarks.iter().any(|remark| remark.contains("/cube is left out")), "{:?}", contents.remarks);
-    let record = open_records(&path, &wanted(&rows[2]), &auto()).unwrap().records.remove(0);
+    let record = open_records(&InputFiles::new(), &path, &wanted(&rows[2]), &auto()).unwrap().records.remove(0);
     assert_eq!(record.channels[0].read(699, 3).unwrap(), [2699.0, 2000.0, 2001.0]);
     assert_eq!(record.channels[0].read(0, 2000).unwrap().len(), 2000);
     let volts = How { unit: Some("V".to_owned()), ..auto() };
-    let record = open_records(&path, &wanted("pair[1]"), &volts).unwrap().records.remove(0);
+    let record = open_records(&InputFiles::new(), &path, &wanted("pair[1]"), &volts).unwrap().records.remove(0);
     assert_eq!(record.channels[0].read(898, 2).unwrap(), [4490.5, 4495.5]);
-    let record = open_records(&path, &wanted("/long"), &volts).unwrap().records.remove(0);
+    let record = open_records(&InputFiles::new(), &path, &wanted("/long"), &volts).unwrap().records.remove(0);
     assert_eq!(record.channels[0].read(1, 2).unwrap(), [-5.0, (1_u64 << 40) as f64]);
 }
 
@@ -195,7 +198,7 @@ fn damaged_hdf5_of_other_layouts_is_an_error_never_a_panic() {
             _ => (0..=random(4)).for_each(|_| bytes[random(whole.len().min(4096))] = random(256) as u8),
         }
         std::fs::write(&path, &bytes).unwrap();
-        let Ok((_, contents)) = open_contents(&path, &Reading::of("auto", None)) else { continue };
+        let Ok((_, contents)) = open_contents(&InputFiles::new(), &path, &Reading::of("auto", None)) else { continue };
         for channel in contents.channels.iter().take(20) {
             let _ = channel.source.read(0, channel.samples.min(1 << 16));
             let _ = channel.source.read(channel.samples / 2, 1);

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use super::hash::inspect_hdf5;
+use super::input_files::InputFiles;
 use super::native::{Wanted, find, has_attribute, number_attribute, open_source};
 use super::source::Hdf5Source;
 use crate::error::StageError;
-use crate::store::read::open_file;
+use crate::hdf5_files::read::open_file;
 
 /// Longest series that is read at once: a density or a sweep, not a recording.
 const LONGEST: usize = 1 << 26;
@@ -14,14 +14,14 @@ const LONGEST: usize = 1 << 26;
 /// Reads a one-dimensional dataset: stored * scale_factor + add_offset, where it has these attributes.
 ///
 /// Errors: no file, not HDF5, damaged; no such dataset, not one-dimensional, not numbers, longer than 2^26 values.
-pub fn read_series(path: &Path, location: &str) -> Result<Vec<f64>, StageError> {
+pub fn read_series(files: &InputFiles, path: &Path, location: &str) -> Result<Vec<f64>, StageError> {
     use super::Source;
-    inspect_hdf5(path)?;
+    files.inspect_hdf5(path)?;
     let optional = |name: &str, otherwise: f64| -> Result<f64, StageError> {
         Ok(read_number_attribute(path, location, name)?.unwrap_or(otherwise))
     };
     let (scale, offset) = (optional("scale_factor", 1.0)?, optional("add_offset", 0.0)?);
-    let source: Hdf5Source = open_source(path, location)?;
+    let source: Hdf5Source = open_source(files.chunks(), path, location)?;
     if source.samples > LONGEST {
         let problem = format!("{location} has {} values, wanted at most {LONGEST}", source.samples);
         return Err(StageError::new(problem).at(path));

@@ -5,10 +5,10 @@ use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 
 use super::chunk::{ChunkFilter, undo_filters};
-use super::recent;
+use super::chunk_cache::ChunkCache;
 use super::{FormatError, Raw, Source};
 use crate::error::StageError;
-use crate::store::read::open_file;
+use crate::hdf5_files::read::open_file;
 use afmid_formats::Number;
 
 /// Samples read at once through the library, under its global lock: short enough to let others in between.
@@ -52,6 +52,8 @@ pub(super) struct Hdf5Source {
     pub(super) kind: Number,
     pub(super) big_endian: bool,
     pub(super) place: Place,
+    pub(super) chunks: ChunkCache,
+    /// Tells its chunks from those of other sources.
     pub(super) number: u64,
 }
 
@@ -129,7 +131,7 @@ impl Hdf5Source {
         let mut bytes = Vec::with_capacity((end - start) * sample);
         for index in start / length..=(end - 1) / length {
             let place = chunks.get(index).ok_or_else(|| self.error(format!("chunk {index} is missing")))?;
-            let chunk = recent::chunk((self.number, index), || {
+            let chunk = self.chunks.chunk((self.number, index), || {
                 let mut stored = vec![0; place.bytes];
                 self.fill(file, place.offset, &mut stored)?;
                 undo_filters(stored, filters, place.skipped_filters, sample, length * sample)

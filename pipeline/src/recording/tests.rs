@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::*;
-use crate::store::fixture::Folder;
+use crate::files::fixture::Folder;
 
 fn deflection() -> Wanted<'static> {
     Wanted { role: "deflection", location: "/deflection", required: true }
@@ -48,7 +48,9 @@ fn any_stretch_of_any_storage_is_what_was_written() {
         let path = folder.file("record.h5");
         write_native(&path, &written, storage).unwrap();
         let other = |location| Wanted { role: location, location, required: true };
-        let read = open_native(&path, &[deflection(), other("single"), other("double"), piezo(false)]).unwrap();
+        let read =
+            open_native(&InputFiles::new(), &path, &[deflection(), other("single"), other("double"), piezo(false)])
+                .unwrap();
         assert_eq!((read.name.as_str(), read.sample_rate_hz), ("record.h5", 5e6));
         assert_eq!(read.started_at, "2005-03-01T10:00:00Z");
         assert_eq!(read.blake3, blake3::hash(&std::fs::read(&path).unwrap()).to_hex().to_string());
@@ -99,7 +101,7 @@ fn errors_say_what_was_found_and_what_is_wanted() {
     let folder = Folder::new("errors");
     let path = folder.file("record.h5");
     let says = |path: &Path, wanted: &[Wanted], words: &[&str]| {
-        let error = open_native(path, wanted).unwrap_err();
+        let error = open_native(&InputFiles::new(), path, wanted).unwrap_err();
         let text = format!("{error} {}", error.help.clone().unwrap_or_default());
         for word in words {
             assert!(text.contains(word), "{word:?} in {text:?}");
@@ -155,7 +157,7 @@ fn a_file_that_changes_under_the_reader_is_an_error() {
     let folder = Folder::new("changes");
     let path = folder.file("record.h5");
     write_native(&path, &record(vec![channel("deflection", Codes::Int16(codes(90_000)))]), RecordStorage::Raw).unwrap();
-    let read = open_native(&path, &[deflection()]).unwrap();
+    let read = open_native(&InputFiles::new(), &path, &[deflection()]).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     let error = read.channel("deflection").unwrap().read_raw(80_000, 10).unwrap_err();
@@ -166,7 +168,7 @@ fn a_file_that_changes_under_the_reader_is_an_error() {
 
 /// Reads everything that can be read of a file.
 fn read_all(path: &Path) {
-    let Ok(record) = open_native(path, &[deflection(), piezo(false)]) else { return };
+    let Ok(record) = open_native(&InputFiles::new(), path, &[deflection(), piezo(false)]) else { return };
     for channel in &record.channels {
         let step = channel.source.preferred_samples();
         for start in (0..channel.samples.min(400_000)).step_by(step) {
@@ -228,11 +230,11 @@ fn measured_archives_open() {
         let path = folder.file("record.h5");
         let written = record(vec![channel("deflection", Codes::Int16(codes(900_000)))]);
         write_native(&path, &written, RecordStorage::Deflate(4)).unwrap();
-        assert_eq!(open_native(&path, &[deflection()]).unwrap().channels[0].samples, 900_000);
+        assert_eq!(open_native(&InputFiles::new(), &path, &[deflection()]).unwrap().channels[0].samples, 900_000);
         println!("stand-in: 1 record in place of shared/data/afm/lever-a");
         return;
     }
-    let record = open_native(&archive, &[deflection(), piezo(true)]).unwrap();
+    let record = open_native(&InputFiles::new(), &archive, &[deflection(), piezo(true)]).unwrap();
     assert_eq!(record.sample_rate_hz, 5e6);
     for channel in &record.channels {
         assert_eq!((channel.samples, channel.unit.as_str()), (900_000, "V"));

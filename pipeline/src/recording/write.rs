@@ -4,9 +4,9 @@ use std::path::Path;
 
 use hdf5::{Group, H5Type};
 
-use crate::cache::replace_file;
-use crate::store::StoreError;
-use crate::store::write;
+use crate::error::StoreError;
+use crate::files::replace_file;
+use crate::hdf5_files::write;
 
 /// Samples per chunk of a compressed channel.
 const CHUNK: usize = 1 << 16;

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use super::headings::Sections;
 use super::parameters::parameters;
-use crate::conformance::run_example;
-use crate::stage::{Caching, Entry, Example, PortSpec};
+use crate::outcome::PortSpec;
+use crate::stage::{Caching, Entry, Example, run_example};
 
 /// Whether a page tells what its examples gave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,8 @@
 use serde_json::{Map, Value, json};
 
 use crate::config::{DEFAULT_TIMEOUT_S, RESERVED_ID};
-use crate::stage::{Entry, PortSpec, Registry};
+use crate::outcome::PortSpec;
+use crate::stage::{Entry, Registry};
 
 /// JSON Schema (draft 7, which all editors know) of a config with these stages.
 ///

@@ -3,11 +3,14 @@
 use std::fs::{self, File, OpenOptions};
 use std::path::{Path, PathBuf};
 
-use crate::cache::temporary_path;
 use crate::error::StageError;
+use crate::files::temporary_path;
 
 /// Most bytes of rows that stay in memory; the paper's 84 windows of 8192 samples are 5.5 MB.
 const LIMIT_BYTES: usize = 8 << 20;
+
+/// Begins the names of files in the system's folder for temporary ones.
+const TITLE: &str = "afmid-rows";
 
 /// Where rows go that are too many for memory.
 #[derive(Debug, Clone)]
@@ -34,23 +37,16 @@ impl Scratch {
         self.limit_bytes
     }
 
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.beside
     }
 
     /// A new file without a name: it goes with its last handle, also in a kill. Errors: the folder cannot be made or written.
-    pub(super) fn file(&self) -> Result<File, StageError> {
+    pub(crate) fn file(&self) -> Result<File, StageError> {
         let path = temporary_path(&self.beside);
-        let made = || {
-            if let Some(folder) = path.parent() {
-                fs::create_dir_all(folder)?;
-            }
-            let file = OpenOptions::new().read(true).write(true).create_new(true).open(&path)?;
-            // a kill between these two leaves an empty file, which the next sweep takes
-            fs::remove_file(&path)?;
-            Ok(file)
-        };
-        made().map_err(|error: std::io::Error| {
+        // a cache that cannot be written stops no run
+        let elsewhere = temporary_path(&std::env::temp_dir().join(TITLE));
+        unnamed(&path).or_else(|error| unnamed(&elsewhere).map_err(|_| error)).map_err(|error| {
             StageError::new(format!("a temporary file for rows of events cannot be made: {error}"))
                 .at(path.parent().unwrap_or(&path))
                 .help("choose another folder with --cache")
@@ -58,9 +54,20 @@ impl Scratch {
     }
 }
 
+/// A new file at a path where nothing lies, without its name.
+fn unnamed(path: &Path) -> std::io::Result<File> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    let file = OpenOptions::new().read(true).write(true).create_new(true).open(path)?;
+    // a kill between these two leaves an empty file, which the next sweep takes
+    fs::remove_file(path)?;
+    Ok(file)
+}
+
 /// In the system's folder for temporary files.
 impl Default for Scratch {
     fn default() -> Self {
-        Self::beside(&std::env::temp_dir().join("afmid-rows"))
+        Self::beside(&std::env::temp_dir().join(TITLE))
     }
 }

@@ -37,6 +37,13 @@ pub enum Change {
         /// Now.
         is: Option<u64>,
     },
+    /// Processor or build.
+    Arithmetic {
+        /// Before.
+        was: String,
+        /// Now.
+        is: String,
+    },
     /// Plugins of the stage.
     DependsOn {
         /// Before.
@@ -85,6 +92,9 @@ pub fn changes(was: &Origin, is: &Origin) -> Vec<Change> {
     parameters(was, is, &mut found);
     if was.depends_on != is.depends_on {
         found.push(Change::DependsOn { was: was.depends_on.clone(), is: is.depends_on.clone() });
+    }
+    if was.arithmetic != is.arithmetic {
+        found.push(Change::Arithmetic { was: was.arithmetic.clone(), is: is.arithmetic.clone() });
     }
     if was.seed != is.seed {
         found.push(Change::Seed { was: was.seed, is: is.seed });
@@ -181,6 +191,7 @@ mod tests {
             params: json!({ "x": 1, "files": ["a"] }),
             location_params: vec!["files".to_owned()],
             depends_on: Vec::new(),
+            arithmetic: String::new(),
             seed: None,
             files: vec![file("a", "0"), file("b", "1")],
             inputs: Vec::new(),

@@ -1,7 +1,7 @@
 //! A run that failed: which stage, which port, why.
 
 use crate::error::StageError;
-use crate::store::StoreError;
+use crate::error::StoreError;
 
 /// Why a run left no result file.
 #[derive(Debug)]

@@ -4,17 +4,21 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use super::error::{Failed, RunError};
-use super::keeper::{Made, Pending, keep};
-use super::keys::plan_node;
-use super::result::{RunInfo, RunResult, StageRecord, StageResult};
+use super::keys::{StagePlan, Surroundings, plan_node};
 use super::schedule::{Board, Outcome, run_graph};
-use crate::cache::{Cache, Origin, PendingResult};
-use crate::error::StageError;
+use super::writing::{Made, Pending, keep};
+use crate::artifact::Artifact;
+use crate::cache::{Cache, Origin, arithmetic};
+use crate::error::{StageError, StoreError};
 use crate::graph::{Node, Plan};
+use crate::outcome::{Ports, RunInfo, RunResult, StageRecord, StageResult};
+use crate::recording::{HashedFile, InputFiles};
 use crate::rows::Scratch;
-use crate::stage::{Caching, Context, Ports, Progress};
-use crate::store::{RunHead, StoreError};
+use crate::stage::{Caching, Context, Progress};
+use crate::store::{PendingResult, RunHead, StageIdentity};
 
 /// Who watches a run. Called from several threads.
 pub trait Observer: Send + Sync {
@@ -42,6 +46,8 @@ pub struct Options<'a> {
     pub base: PathBuf,
     /// Where stage results are kept.
     pub cache: &'a Cache,
+    /// What opens and hashes input files: [`Cache::input_files`].
+    pub files: InputFiles,
     /// Ignore what the cache holds (results are still put there).
     pub fresh: bool,
     /// The program and its version, for the record.
@@ -64,12 +70,13 @@ struct Finished {
 ///
 /// A stage that needs a result begins at once, while a thread of its own puts the result into the cache, one after the other: a kill loses what
 /// was computed in the last moments, and the run ends when all is kept and synced.
-/// Errors: all stages that failed or whose results cannot be kept, in the plan's order; independent stages are finished first.
+/// A result that cannot be kept is a note of the cache's ([`Cache::take_notes`]). Errors: all stages that failed, in the plan's order; independent
+/// stages are finished first.
 pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError>> {
     perform(plan, options, None::<fn() -> _>).map(|(result, _)| result)
 }
 
-/// As [`run`], and writes the result file, each stage as soon as those before it are written: whole or not at all, as [`crate::cache::write_result`].
+/// As [`run`], and writes the result file, each stage as soon as those before it are written: whole or not at all, as [`crate::store::write_result`].
 ///
 /// Errors: those of [`run`]; the file cannot be written.
 pub fn run_to_file(plan: &Plan, options: &Options<'_>, path: &Path) -> Result<RunResult, Failed> {
@@ -102,22 +109,22 @@ fn perform(
         let node = &plan.nodes[index];
         RunError { id: node.id.clone(), uses: node.uses.clone(), error: Box::new(error) }
     };
-    let (outcomes, kept) = std::thread::scope(|scope| {
+    let arithmetic = arithmetic();
+    let around =
+        Surroundings { base: &options.base, program: &options.program, arithmetic: &arithmetic, files: &options.files };
+    let (outcomes, file) = std::thread::scope(|scope| {
         let (made, all) = mpsc::channel::<Made>();
         let keeper = scope.spawn(move || keep(all, options.cache, begin));
         let outcomes = run_graph(&needs, |index, board| {
-            step(plan, index, options, board, &made).map_err(|error| failed(index, error))
+            step(plan, index, (options, &around), board, &made).map_err(|error| failed(index, error))
         });
         drop(made);
         (outcomes, keeper.join())
     });
     // a panic there is a bug like any other: it goes on here
-    let mut kept = kept.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    let file = file.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     let (mut stages, mut times, mut errors, mut logs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for (index, outcome) in outcomes.into_iter().enumerate() {
-        if let Some(error) = kept.unkept.remove(&index) {
-            errors.push(failed(index, error.into()));
-        }
+    for outcome in outcomes {
         match outcome {
             Outcome::Done(finished) => {
                 times.push((finished.record.id.clone(), finished.seconds, finished.cached));
@@ -152,7 +159,7 @@ fn perform(
         stages,
         info,
     };
-    Ok((result, kept.file))
+    Ok((result, file))
 }
 
 /// The stages that each stage needs, by their places in the plan.
@@ -169,15 +176,17 @@ fn needs(plan: &Plan) -> Vec<Vec<usize>> {
 fn step(
     plan: &Plan,
     index: usize,
-    options: &Options<'_>,
+    (options, around): (&Options<'_>, &Surroundings<'_>),
     board: &Board<Finished, RunError>,
     made: &mpsc::Sender<Made>,
 ) -> Result<Finished, StageError> {
     let (clock, node) = (Instant::now(), &plan.nodes[index]);
     let upstream = |index: usize| board.done(index).map(|finished| &finished.origin);
-    let planned = plan_node(plan, node, &options.base, &options.program, &upstream)?;
-    let stored = node.stage.spec().caching == Caching::Stored;
-    let hit = if stored && !options.fresh { options.cache.get(&planned.key) } else { None };
+    let planned = plan_node(plan, node, around, &upstream)?;
+    let spec = node.stage.spec();
+    let stored = spec.caching == Caching::Stored;
+    let identity = StageIdentity { key: &planned.key, stage: spec.name, version: spec.version, outputs: spec.outputs };
+    let hit = if stored && !options.fresh { options.cache.get(&identity, &options.files) } else { None };
     let cached = hit.is_some();
     let mut log = String::new();
     let result = match hit {
@@ -185,7 +194,7 @@ fn step(
         None => {
             let scratch = Scratch::beside(&options.cache.path(&planned.key));
             let result;
-            (result, log) = execute(node, options, board, planned.seed.unwrap_or_default(), scratch)?;
+            (result, log) = execute(node, options, board, &planned, scratch)?;
             result
         }
     };
@@ -199,7 +208,7 @@ fn step(
     let record = StageRecord {
         id: node.id.clone(),
         uses: node.uses.clone(),
-        version: node.stage.spec().version,
+        version: spec.version,
         params: node.params.clone(),
         wires,
         seed: planned.seed,
@@ -209,16 +218,17 @@ fn step(
     };
     let origin = (stored && !cached).then(|| planned.origin.clone());
     // the other end lives as long as the run
-    let _ = made.send(Made { index, origin, record: record.clone() });
+    let _ = made.send(Made { index, origin, outputs: spec.outputs, record: record.clone() });
     Ok(Finished { record, origin: planned.origin, seconds: took.as_secs_f64(), cached, log })
 }
 
-/// Runs the stage itself and checks what it made: the ports it declares, with the shapes that it declares. Beside it: what its process said.
+/// Runs the stage itself and checks what it made: the ports it declares, with the shapes that it declares, from files that are still those that were
+/// hashed. Beside it: what its process wrote to stderr.
 fn execute(
     node: &Node,
     options: &Options<'_>,
     board: &Board<Finished, RunError>,
-    seed: u64,
+    planned: &StagePlan,
     scratch: Scratch,
 ) -> Result<(StageResult, String), StageError> {
     let mut inputs = Ports::new();
@@ -227,12 +237,39 @@ fn execute(
         let missing = || StageError::new(format!("the source of port `{}` made no `{}`", wire.port, wire.output));
         inputs.insert(wire.port, artifact.ok_or_else(missing)?.clone());
     }
+    let recorded = recorded(&inputs, &options.files)?;
     let progress = options.observer.begin(&node.id);
-    let context = Context::new(&options.base, seed, progress.as_ref()).with_scratch(scratch);
+    let seed = planned.seed.unwrap_or_default();
+    let context = Context::new(&options.base, seed, progress.as_ref());
+    let context = context.with_scratch(scratch).with_files(options.files.clone());
     let outputs = node.stage.run(&inputs, &context)?;
     check_outputs(node, &outputs)?;
+    // the hashes of what was read are in the key: they hold only if nothing has changed since
+    planned.hashed.iter().chain(&recorded).try_for_each(HashedFile::check_unchanged)?;
     let log = context.take_log();
     Ok((StageResult { outputs, warnings: context.into_warnings() }, log))
+}
+
+/// The files of all recordings among the inputs. Errors: one has other bytes than were recorded.
+fn recorded(inputs: &Ports, files: &InputFiles) -> Result<Vec<HashedFile>, StageError> {
+    let mut recorded: Vec<(&Path, &str)> = Vec::new();
+    for (_, artifact) in inputs.iter() {
+        if let Artifact::Recording(recording) = artifact {
+            recorded.extend(recording.records.iter().map(|record| (record.path.as_path(), record.blake3.as_str())));
+        }
+    }
+    recorded.sort_unstable();
+    recorded.dedup();
+    let hashed = |&(path, blake3): &(&Path, &str)| {
+        let file = files.hashed(path)?;
+        match file.blake3 == blake3 {
+            true => Ok(file),
+            false => Err(StageError::new("the file is not the one that was recorded: its bytes have changed")
+                .at(path)
+                .help("run again when nothing writes to it")),
+        }
+    };
+    recorded.par_iter().map(hashed).collect()
 }
 
 fn check_outputs(node: &Node, outputs: &Ports) -> Result<(), StageError> {

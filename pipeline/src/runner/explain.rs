@@ -1,10 +1,9 @@
 //! What a run would do with each stage, and why.
 
-use std::path::Path;
 use std::time::SystemTime;
 
 use super::changes::{Change, changes};
-use super::keys::plan_node;
+use super::keys::{Surroundings, plan_node};
 use crate::cache::{Cache, Origin};
 use crate::graph::{Node, Plan};
 use crate::stage::Caching;
@@ -47,12 +46,12 @@ pub struct Nearest {
 }
 
 /// Says for each stage of a plan whether it would run, and what has changed since its nearest earlier result, without running anything.
-pub fn explain(plan: &Plan, base: &Path, program: &str, cache: &Cache) -> Vec<Explanation> {
+pub fn explain(plan: &Plan, around: &Surroundings, cache: &Cache) -> Vec<Explanation> {
     let mut origins: Vec<Option<Origin>> = Vec::new();
     let mut rows = Vec::new();
     let mut earlier: Option<Vec<(Origin, SystemTime)>> = None;
     for node in &plan.nodes {
-        let planned = plan_node(plan, node, base, program, &|index| origins.get(index).and_then(Option::as_ref));
+        let planned = plan_node(plan, node, around, &|index| origins.get(index).and_then(Option::as_ref));
         let (origin, decision) = match planned {
             Err(error) => (None, Decision::Unknown(error.to_string())),
             Ok(planned) => {

@@ -5,11 +5,11 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::error::RunError;
-use super::result::SourceFile;
 use crate::cache::{KeyParts, Origin, OriginFile, OriginInput, key};
 use crate::error::StageError;
 use crate::graph::{Node, Plan};
-use crate::recording::hash_file;
+use crate::outcome::SourceFile;
+use crate::recording::{HashedFile, InputFiles};
 use crate::stage::Caching;
 use crate::store::FORMAT_VERSION;
 
@@ -23,15 +23,30 @@ pub fn stage_seed(pipeline_seed: u64, id: &str) -> u64 {
     u64::from_le_bytes(bytes)
 }
 
+/// What keys are made from beside the plan.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// The folder where relative paths of parameters begin.
+    pub base: &'a Path,
+    /// The program and its version, for the record.
+    pub program: &'a str,
+    /// What of processor and build may change last bits: [`crate::cache::arithmetic`].
+    pub arithmetic: &'a str,
+    /// Hashes of input files.
+    pub files: &'a InputFiles,
+}
+
 /// What a run of a node would depend on.
 #[derive(Debug, Clone)]
-pub struct StagePlan {
+pub(super) struct StagePlan {
     /// Content address of its result.
     pub key: String,
     /// Seed, if it draws random numbers.
     pub seed: Option<u64>,
     /// The files that it reads.
     pub sources: Vec<SourceFile>,
+    /// The same, in the state in which they were hashed.
+    pub hashed: Vec<HashedFile>,
     /// The same in words, for the cache.
     pub origin: Origin,
 }
@@ -40,13 +55,13 @@ pub struct StagePlan {
 pub(super) fn plan_node<'a>(
     plan: &Plan,
     node: &Node,
-    base: &Path,
-    program: &str,
+    around: &Surroundings,
     upstream: &dyn Fn(usize) -> Option<&'a Origin>,
 ) -> Result<StagePlan, StageError> {
     let spec = node.stage.spec();
-    let sources = node.stage.sources(base)?.par_iter().map(|path| source_file(path)).collect::<Result<Vec<_>, _>>();
-    let sources = sources?;
+    let paths = node.stage.sources(around.base)?;
+    let hashed = paths.par_iter().map(|path| around.files.hashed(path)).collect::<Result<Vec<_>, _>>()?;
+    let sources: Vec<SourceFile> = paths.iter().zip(&hashed).map(|(path, file)| source_file(path, file)).collect();
     let seed = spec.seeded.then(|| stage_seed(plan.seed(), &node.id));
     let (inputs, depends_on) = (inputs(plan, node, upstream)?, node.stage.depends_on());
     let mut wires: Vec<(String, String, String)> =
@@ -58,6 +73,7 @@ pub(super) fn plan_node<'a>(
         params: &node.params,
         location_params: node.stage.location_params(),
         depends_on: &depends_on,
+        arithmetic: around.arithmetic,
         seed,
         sources: &sources,
         upstream: &wires,
@@ -70,23 +86,26 @@ pub(super) fn plan_node<'a>(
         params: node.params.clone(),
         location_params: node.stage.location_params().iter().map(|&name| name.to_owned()).collect(),
         depends_on,
+        arithmetic: around.arithmetic.to_owned(),
         seed,
         files: sources.iter().map(origin_file).collect(),
         inputs,
         pipeline: plan.name().to_owned(),
         id: node.id.clone(),
-        program: program.to_owned(),
+        program: around.program.to_owned(),
     };
-    Ok(StagePlan { key, seed, sources, origin })
+    Ok(StagePlan { key, seed, sources, hashed, origin })
 }
 
-/// One hash of the content addresses of all stages: whether a run would give the same results again, without running anything.
+/// One hash of the content addresses of all stages: whether a run would give the same results again, without running anything. The last bits, which
+/// processors may change, do not count: nodes of a cluster agree.
 ///
 /// Errors: a stage whose files cannot be listed or read.
-pub fn run_key(plan: &Plan, base: &Path, program: &str) -> Result<String, RunError> {
+pub fn run_key(plan: &Plan, around: &Surroundings) -> Result<String, RunError> {
+    let around = Surroundings { arithmetic: "", ..*around };
     let mut origins: Vec<Origin> = Vec::with_capacity(plan.nodes.len());
     for node in &plan.nodes {
-        let planned = plan_node(plan, node, base, program, &|index| origins.get(index));
+        let planned = plan_node(plan, node, &around, &|index| origins.get(index));
         let failed = |error| RunError { id: node.id.clone(), uses: node.uses.clone(), error: Box::new(error) };
         origins.push(planned.map_err(failed)?.origin);
     }
@@ -124,9 +143,6 @@ fn origin_file(file: &SourceFile) -> OriginFile {
     OriginFile { name, size: file.size, blake3: file.blake3.clone() }
 }
 
-fn source_file(path: &Path) -> Result<SourceFile, StageError> {
-    let size = std::fs::metadata(path)
-        .map_err(|error| StageError::new(format!("the file cannot be looked at: {error}")).at(path))?
-        .len();
-    Ok(SourceFile { path: path.display().to_string(), size, blake3: hash_file(path)? })
+fn source_file(path: &Path, file: &HashedFile) -> SourceFile {
+    SourceFile { path: path.display().to_string(), size: file.size(), blake3: file.blake3.clone() }
 }

@@ -4,16 +4,14 @@ mod changes;
 mod error;
 mod execute;
 mod explain;
-mod keeper;
 mod keys;
-mod result;
 mod schedule;
 #[cfg(test)]
 mod tests;
+mod writing;
 
 pub use changes::{Change, changes};
 pub use error::{Failed, RunError};
 pub use execute::{Observer, Options, Quiet, run, run_to_file};
 pub use explain::{Decision, Explanation, Nearest, explain};
-pub use keys::{StagePlan, run_key, stage_seed};
-pub use result::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};
+pub use keys::{Surroundings, run_key, stage_seed};

@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 
 use super::{Decision, Options, Quiet, RunError, explain, run, run_to_file};
 use crate::artifact::{Array, Axis};
-use crate::cache::{Cache, write_result};
+use crate::cache::Cache;
 use crate::error::StageError;
 use crate::graph::{Plan, load};
-use crate::runner::RunResult;
-use crate::stage::{Caching, Context, Entry, Example, Port, Ports, Registry, Spec, Stage};
-use crate::store::compare;
+use crate::outcome::{Port, Ports, RunResult};
+use crate::stage::{Caching, Context, Entry, Example, Registry, Spec, Stage};
+use crate::store::{compare, write_result};
 
 const OUT: Port<Array> = Port::new("out", "series", "a series");
 const IN: Port<Array> = Port::new("in", "series", "a series");
@@ -98,11 +98,17 @@ fn plan(count: usize, limit: f64) -> Plan {
 
 fn options(cache: &Cache, fresh: bool) -> Options<'_> {
     let (base, program) = (Path::new(".").to_owned(), "afmid test".to_owned());
-    Options { base, cache, fresh, program, overrides: Vec::new(), observer: &Quiet }
+    Options { base, cache, files: cache.input_files(fresh), fresh, program, overrides: Vec::new(), observer: &Quiet }
 }
 
 fn execute(plan: &Plan, cache: &Cache, fresh: bool) -> Result<RunResult, Vec<RunError>> {
     run(plan, &options(cache, fresh))
+}
+
+fn explanations(plan: &Plan, cache: &Cache) -> Vec<super::Explanation> {
+    let (files, arithmetic) = (cache.input_files(false), crate::cache::arithmetic());
+    let (base, program) = (Path::new("."), "test");
+    explain(plan, &super::Surroundings { base, program, arithmetic: &arithmetic, files: &files }, cache)
 }
 
 fn cached(result: &RunResult) -> Vec<bool> {
@@ -113,7 +119,7 @@ fn cached(result: &RunResult) -> Vec<bool> {
 #[test]
 fn a_result_is_computed_once_and_again_only_when_something_changed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let cache = Cache::open(folder.path()).expect("a cache");
+    let cache = Cache::open(folder.path());
     let first = execute(&plan(4, 10.0), &cache, false).expect("runs");
     let out =
         first.stage("square").and_then(|stage| stage.result.outputs.find(&OUT).ok().flatten()).expect("an output");
@@ -139,15 +145,13 @@ fn a_result_is_computed_once_and_again_only_when_something_changed() {
     let other_limit = execute(&plan(4, 11.0), &cache, false).expect("runs");
     assert_eq!(cached(&other_limit), [true, false]);
     let other_count = plan(5, 10.0);
-    let decisions: Vec<Decision> =
-        explain(&other_count, Path::new("."), "test", &cache).into_iter().map(|row| row.decision).collect();
+    let decisions: Vec<Decision> = explanations(&other_count, &cache).into_iter().map(|row| row.decision).collect();
     assert_eq!(decisions, [Decision::Run, Decision::Run]);
     assert_eq!(cached(&execute(&plan(4, 10.0), &cache, true).expect("runs")), [false, false], "--fresh");
 
     let errors = execute(&plan(5, 3.0), &cache, false).expect_err("4 is above 3");
     assert_eq!(errors.len(), 1);
     assert_eq!(errors[0].to_string(), "stage `square` (test.square), port `in`: found 4, wanted at most 3");
-    let decisions: Vec<Decision> =
-        explain(&plan(5, 3.0), Path::new("."), "test", &cache).into_iter().map(|row| row.decision).collect();
+    let decisions: Vec<Decision> = explanations(&plan(5, 3.0), &cache).into_iter().map(|row| row.decision).collect();
     assert_eq!(decisions, [Decision::Reuse, Decision::Run], "what was finished before the failure is kept");
 }

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use crate::rows::{RowWriter, Scratch};
+use crate::artifact::RowWriter;
+use crate::recording::InputFiles;
+use crate::rows::Scratch;
 
 /// What a stage may ask of the runner: its seed, its folder, a place for warnings and progress.
 pub struct Context<'a> {
@@ -13,6 +15,7 @@ pub struct Context<'a> {
     log: Mutex<String>,
     progress: &'a dyn Progress,
     scratch: Scratch,
+    files: InputFiles,
 }
 
 /// Where progress goes. Implementations are called from several threads.
@@ -42,6 +45,7 @@ impl<'a> Context<'a> {
             log: Mutex::default(),
             progress,
             scratch: Scratch::default(),
+            files: InputFiles::new(),
         }
     }
 
@@ -49,6 +53,17 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn with_scratch(self, scratch: Scratch) -> Self {
         Self { scratch, ..self }
+    }
+
+    /// The same with what is known of input files; the runner's is the run's.
+    #[must_use]
+    pub fn with_files(self, files: InputFiles) -> Self {
+        Self { files, ..self }
+    }
+
+    /// What opens and hashes input files.
+    pub fn files(&self) -> &InputFiles {
+        &self.files
     }
 
     /// A writer of rows, say the windows of events: in memory up to some megabytes, in a file without a name beyond.

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use schemars::{Schema, SchemaGenerator};
 use serde_json::Value;
 
-use super::{Context, Example, Ports, Spec, Stage};
+use super::{Context, Example, Spec, Stage};
 use crate::error::StageError;
+use crate::outcome::Ports;
 
 /// A stage with its parameters, without its type.
 pub trait DynStage: Send + Sync {

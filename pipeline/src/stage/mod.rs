@@ -2,12 +2,13 @@
 
 mod context;
 mod entry;
-mod port;
+mod example;
 mod registry;
 mod spec;
 
 pub use context::{Context, NoProgress, Progress};
 pub use entry::{DynStage, Entry, Maker, ParamError};
-pub use port::{Port, PortSpec, Ports};
+pub use example::run_example;
+pub(crate) use example::{example_inputs, instance, run_in_folder};
 pub use registry::{DoubleName, Registry};
 pub use spec::{Caching, Example, Spec, Stage};

@@ -6,8 +6,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::{Context, PortSpec, Ports};
+use super::Context;
 use crate::error::StageError;
+use crate::outcome::{PortSpec, Ports};
 
 /// What a stage is, apart from its parameters.
 #[derive(Debug, Clone, Copy)]

@@ -7,12 +7,12 @@ use hdf5::{Dataset, Group};
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use super::dimension_scale::Scales;
-use super::error::{Result, StoreError};
 use super::layout::{StoredAttribute, read_attributes, read_layout, write_attributes, write_layout};
 use super::rows::{Backing, read_rows, write_rows};
-use super::{read, write};
 use crate::artifact::{Array, Axis, Values, Variable};
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::Scales;
+use crate::hdf5_files::{read, write};
 
 #[derive(Debug, Serialize, Deserialize)]
 struct Layout {

@@ -2,9 +2,9 @@
 
 use hdf5::Group;
 
-use super::error::{Result, StoreError};
-use super::{read, write};
 use crate::artifact::Document;
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::{read, write};
 
 /// The field of NXnote that holds the text.
 const JSON: &str = "data";

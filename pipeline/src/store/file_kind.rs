@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::format::FORMAT;
 use super::seal::has_seal;
-use crate::recording::is_native;
+use crate::recording::{InputFiles, is_native};
 
 /// What a file is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +58,7 @@ pub fn file_kind(path: &Path) -> std::io::Result<FileKind> {
         return Ok(FileKind::Own);
     }
     if head.starts_with(HDF5_SIGNATURE) {
-        return Ok(if is_native(path) { FileKind::Record } else { FileKind::Hdf5 });
+        return Ok(if is_native(&InputFiles::new(), path) { FileKind::Record } else { FileKind::Hdf5 });
     }
     Ok(text_kind(path, &head))
 }

@@ -7,34 +7,10 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use serde_json::json;
 
-use crate::artifact::{Array, Artifact, Attribute, Axis, Document, Matrix, StateSpace, Table};
-use crate::recording::{Channel, DeferredSource, RawBinary, Reading, Record, Recording};
-use crate::runner::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};
-use crate::stage::Ports;
-
-/// A folder that is removed again.
-pub(crate) struct Folder(pub(crate) PathBuf);
-
-impl Folder {
-    pub(crate) fn new(name: &str) -> Self {
-        use std::sync::atomic::{AtomicUsize, Ordering};
-        static COUNT: AtomicUsize = AtomicUsize::new(0);
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("afmid-{name}-{}-{count}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    pub(crate) fn file(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
+use super::StageIdentity;
+use crate::artifact::{Array, Artifact, Attribute, Axis, Document, Matrix, Shape, StateSpace, Table};
+use crate::outcome::{PortSpec, Ports, RunInfo, RunResult, SourceFile, StageRecord, StageResult};
+use crate::recording::{Channel, InputFiles, LazySource, RawBinary, Reading, Record, Recording};
 
 pub(crate) fn array() -> Array {
     let samples = 5;
@@ -104,7 +80,8 @@ pub(crate) fn recording() -> Recording {
         add_offset: 0.0,
         fill_code,
         source: Arc::new(
-            DeferredSource::new(path, 600_000, &format!("/{role}"), 900_000).of_stretch(part(index).0, &part(index).1),
+            LazySource::new(&InputFiles::new(), path, 600_000, &format!("/{role}"), 900_000)
+                .of_stretch(part(index).0, &part(index).1),
         ),
     };
     let path = |index: usize| PathBuf::from(format!("archive/record_{index:04}.h5"));
@@ -147,6 +124,29 @@ fn empty() -> [(&'static str, Artifact); 5] {
         ("no-model", Artifact::StateSpace(Arc::new(StateSpace::default()))),
         ("version", Artifact::Recording(Arc::new(Recording::default()))),
     ]
+}
+
+const fn output(name: &'static str, shape: Shape) -> PortSpec {
+    PortSpec { name, shape, tag: "", optional: false, doc: "" }
+}
+
+const OUTPUTS: &[PortSpec] = &[
+    output("ensemble", Shape::Array),
+    output("spectrum", Shape::Array),
+    output("events", Shape::Table),
+    output("model", Shape::StateSpace),
+    output("records", Shape::Recording),
+    output("summary", Shape::Document),
+    output("no-rows", Shape::Table),
+    output("no-columns", Shape::Table),
+    output("no-samples", Shape::Array),
+    output("no-model", Shape::StateSpace),
+    output("version", Shape::Recording),
+];
+
+/// What [`stage_result`] is the result of.
+pub(crate) fn identity(key: &str) -> StageIdentity<'_> {
+    StageIdentity { key, stage: "test.everything", version: 3, outputs: OUTPUTS }
 }
 
 pub(crate) fn stage_result() -> StageResult {

@@ -2,8 +2,8 @@
 
 use hdf5::{File, Group};
 
-use super::error::{Result, StoreError};
-use super::{read, write};
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::{read, write};
 
 /// Version of the layout of stage and result files; part of every cache key.
 pub const FORMAT_VERSION: u32 = 2;

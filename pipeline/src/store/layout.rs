@@ -6,9 +6,9 @@ use hdf5::{Group, Location};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::error::{Result, StoreError};
-use super::{read, write};
 use crate::artifact::Attribute;
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::{read, write};
 
 /// The attribute that holds a layout.
 const LAYOUT: &str = "afmid_layout";

@@ -16,26 +16,24 @@
 
 mod array;
 mod compare;
-mod dimension_scale;
 mod document;
-mod error;
 mod file_kind;
 mod format;
 mod layout;
-mod library;
 mod names;
+mod pending_result;
 mod ports;
-pub(crate) mod read;
 mod recording;
 mod result_file;
 mod result_reader;
 mod rows;
+#[cfg(test)]
+mod rows_tests;
 mod run_info;
 mod seal;
 mod stage_file;
 mod state_space;
 mod table;
-pub(crate) mod write;
 
 #[cfg(test)]
 pub(crate) mod fixture;
@@ -43,16 +41,15 @@ pub(crate) mod fixture;
 mod tests;
 
 pub use compare::{Difference, Numbers, compare};
-pub use error::StoreError;
 pub use file_kind::{FileKind, file_kind, is_own};
 pub use format::FORMAT_VERSION;
-pub use hdf5::library_version;
 pub use names::RESERVED_STAGE_IDS;
+pub(crate) use pending_result::PendingResult;
+pub use pending_result::write_result;
 pub use ports::PortSummary;
-pub use result_file::write_result;
-pub(crate) use result_file::{ResultWriter, RunHead};
+pub(crate) use result_file::RunHead;
 pub use result_reader::{ResultFile, StageSummary, read_result};
 pub(crate) use rows::write_rows;
 pub(crate) use seal::seal;
 pub(crate) use stage_file::write_unsealed_stage;
-pub use stage_file::{read_stage, write_stage};
+pub use stage_file::{StageIdentity, read_stage, write_stage};

@@ -6,15 +6,16 @@ use std::sync::Arc;
 
 use super::array::{read_array, write_array};
 use super::document::{read_document, write_document};
-use super::error::{Result, StoreError};
 use super::names::{TAKEN_BY_STAGE, group_names};
 use super::recording::{read_recording, write_recording};
 use super::rows::Backing;
 use super::state_space::{read_state_space, write_state_space};
 use super::table::{read_table, write_table};
-use super::{read, write};
 use crate::artifact::{Artifact, Shape};
-use crate::stage::Ports;
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::{read, write};
+use crate::outcome::Ports;
+use crate::recording::InputFiles;
 
 /// The attribute that lists a stage's ports in order.
 const PORTS: &str = "afmid_ports";
@@ -78,22 +79,27 @@ fn shape(parent: &Group, name: &str) -> Result<Shape> {
 }
 
 /// Reads one artifact; with a `backing`, large arrays stay in the file. Errors: it is missing or damaged.
-pub(super) fn read_port(parent: &Group, port: &PortSummary, backing: Option<&Backing>) -> Result<Artifact> {
+pub(super) fn read_port(
+    parent: &Group,
+    port: &PortSummary,
+    files: &InputFiles,
+    backing: Option<&Backing>,
+) -> Result<Artifact> {
     let group = read::group(parent, &port.group)?;
     Ok(match port.shape {
         Shape::Array => Artifact::Array(Arc::new(read_array(&group, backing)?)),
         Shape::Table => Artifact::Table(Arc::new(read_table(&group)?)),
         Shape::StateSpace => Artifact::StateSpace(Arc::new(read_state_space(&group)?)),
         Shape::Document => Artifact::Document(Arc::new(read_document(&group)?)),
-        Shape::Recording => Artifact::Recording(Arc::new(read_recording(&group)?)),
+        Shape::Recording => Artifact::Recording(Arc::new(read_recording(&group, files)?)),
     })
 }
 
 /// Reads all artifacts, in order, as [`read_port`]. Errors: one is missing or damaged.
-pub(super) fn read_ports(parent: &Group, backing: Option<&Backing>) -> Result<Ports> {
+pub(super) fn read_ports(parent: &Group, files: &InputFiles, backing: Option<&Backing>) -> Result<Ports> {
     let mut ports = Ports::new();
     for port in list_ports(parent)? {
-        ports.insert(&port.name, read_port(parent, &port, backing)?);
+        ports.insert(&port.name, read_port(parent, &port, files, backing)?);
     }
     Ok(ports)
 }

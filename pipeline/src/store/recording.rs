@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use hdf5::Group;
 
-use super::error::{Result, StoreError};
 use super::table::{read_table, write_table};
-use super::write;
 use crate::artifact::Table;
-use crate::recording::{Channel, DeferredSource, Reading, Record, Recording};
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::write;
+use crate::recording::{Channel, InputFiles, LazySource, Reading, Record, Recording};
 
 /// Writes a recording as the group `name` with the tables `records` and `channels`.
 pub(super) fn write_recording(parent: &Group, name: &str, recording: &Recording) -> Result<Group> {
@@ -82,9 +82,9 @@ fn reading(json: &str) -> std::result::Result<Reading, crate::StageError> {
 }
 
 /// Reads what [`write_recording`] wrote; the samples are looked for in the record files when they are asked for.
-pub(super) fn read_recording(group: &Group) -> Result<Recording> {
-    let files = read_table(&super::read::group(group, "records")?)?;
-    let channels = read_table(&super::read::group(group, "channels")?)?;
+pub(super) fn read_recording(group: &Group, input_files: &InputFiles) -> Result<Recording> {
+    let files = read_table(&crate::hdf5_files::read::group(group, "records")?)?;
+    let channels = read_table(&crate::hdf5_files::read::group(group, "channels")?)?;
     let wrap = |error: crate::StageError| StoreError::new(error.to_string()).at(group.name());
     let mut records = Vec::with_capacity(files.rows());
     let columns = (files.text("file").map_err(wrap)?, files.text("path").map_err(wrap)?);
@@ -112,7 +112,7 @@ pub(super) fn read_recording(group: &Group) -> Result<Recording> {
         record.reading = reading(json).map_err(wrap)?;
     }
     for row in 0..channels.rows() {
-        let (index, channel) = read_channel(&channels, row, &records).map_err(wrap)?;
+        let (index, channel) = read_channel(input_files, &channels, row, &records).map_err(wrap)?;
         if let Some(record) = records.get_mut(index) {
             record.channels.push(channel);
         }
@@ -121,6 +121,7 @@ pub(super) fn read_recording(group: &Group) -> Result<Recording> {
 }
 
 fn read_channel(
+    input_files: &InputFiles,
     table: &Table,
     row: usize,
     records: &[Record],
@@ -136,7 +137,7 @@ fn read_channel(
         .get(index)
         .ok_or_else(|| crate::StageError::new(format!("channel {row} belongs to record {index}, which is missing")))?;
     let (role, location, samples) = (text("role")?, text("location")?, whole("samples")?);
-    let source = DeferredSource::new(&record.path, record.size, &location, samples);
+    let source = LazySource::new(input_files, &record.path, record.size, &location, samples);
     let source = source.of_stretch(record.first_sample, &record.reading);
     let has_fill_code = table.flag("has_fill_code")?.get(row) == Some(&true);
     let channel = Channel {

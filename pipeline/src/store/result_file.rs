@@ -1,20 +1,18 @@
-//! Writing result files: everything that a run left behind, in one NeXus file.
+//! The contents of result files: everything that a run left behind, in one NeXus file.
 
 use std::path::{Path, PathBuf};
 
 use hdf5::{File, Group};
 use serde_json::Value;
 
-use super::error::{Result, StoreError};
 use super::format::write_format;
 use super::names::{RESERVED_STAGE_IDS, TAKEN_BY_STAGE, group_names};
 use super::ports::write_ports;
 use super::run_info::write_run_info;
-use super::seal::seal;
-use super::write;
 use crate::artifact::{Artifact, Values};
-use crate::runner::{RunInfo, RunResult, StageRecord};
-use crate::stage::Ports;
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::write;
+use crate::outcome::{Ports, RunInfo, StageRecord};
 
 pub(super) const KIND: &str = "result";
 pub(super) const ENTRY: &str = "entry";
@@ -24,23 +22,6 @@ pub(super) const PROVENANCE: &str = "provenance";
 pub(super) const STAGES: &str = "stages";
 /// The groups of the stages, under the entry.
 pub(super) const GROUPS: &str = "stage_groups";
-
-/// Writes a run's result to a new file, seals and syncs it; [`crate::cache::write_result`] replaces an old one safely.
-///
-/// Errors: the file exists or cannot be written; an artifact is not valid.
-pub fn write_result(path: &Path, run: &RunResult) -> std::result::Result<(), StoreError> {
-    let ids: Vec<&str> = run.stages.iter().map(|stage| stage.id.as_str()).collect();
-    let place = |id: &String| ids.iter().position(|own| own == id);
-    let needs = |stage: &StageRecord| stage.wires.iter().filter_map(|(_, source, _)| place(source)).collect();
-    let needs: Vec<Vec<usize>> = run.stages.iter().map(needs).collect();
-    let RunResult { name, seed, config, overrides, program, .. } = run;
-    let head = RunHead { name, seed: *seed, config, overrides, program, ids: &ids, needs: &needs };
-    let mut writer = ResultWriter::new(path, &head)?;
-    while let Some(stage) = writer.wanted().and_then(|index| run.stages.get(index)) {
-        writer.stage(stage)?;
-    }
-    writer.finish(&run.info)
-}
 
 /// The order in which stages are written, whatever the order in which they end: those that need nothing, those that need these, and so on. So a run
 /// of several threads seldom waits for one that ends late.
@@ -107,11 +88,11 @@ impl ResultWriter {
     }
 
     /// The place in the plan of the stage that is to be written next. None: all are written.
-    pub(crate) fn wanted(&self) -> Option<usize> {
+    pub(crate) fn next_stage(&self) -> Option<usize> {
         self.rest.last().copied()
     }
 
-    /// Writes the stage that is wanted. Errors: the file cannot be written; an artifact is not valid.
+    /// Writes the next stage. Errors: the file cannot be written; an artifact is not valid.
     pub(crate) fn stage(&mut self, stage: &StageRecord) -> std::result::Result<(), StoreError> {
         self.write_stage(stage).map_err(|error| error.file(&self.path))
     }
@@ -133,7 +114,7 @@ impl ResultWriter {
         Ok(())
     }
 
-    /// Ends the file, seals and syncs it. Errors: a stage is missing; it cannot be written.
+    /// Ends the file, unsealed. Errors: a stage is missing; it cannot be written.
     pub(crate) fn finish(self, info: &RunInfo) -> std::result::Result<(), StoreError> {
         let Self { path, entry, file, groups, rest, default, .. } = self;
         let end = move || -> Result<()> {
@@ -148,8 +129,7 @@ impl ResultWriter {
             drop(entry);
             Ok(file.close()?)
         };
-        end().map_err(|error| error.file(&path))?;
-        seal(&path)
+        end().map_err(|error| error.file(&path))
     }
 }
 

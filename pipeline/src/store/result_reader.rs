@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 
 use hdf5::{File, Group};
 
-use super::error::{Result, StoreError};
 use super::format::check_format;
 use super::ports::{PortSummary, list_ports, read_port, read_ports};
-use super::read;
 use super::result_file::{ENTRY, GROUPS, KIND, PIPELINE, PROVENANCE, RUN, STAGES, WIRES};
 use super::run_info::read_run_info;
 use super::seal::check_seal;
 use crate::artifact::Artifact;
-use crate::runner::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};
-use crate::stage::Ports;
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::read;
+use crate::outcome::{Ports, RunInfo, RunResult, SourceFile, StageRecord, StageResult};
+use crate::recording::InputFiles;
 
 /// A stage of a result file, without its artifacts.
 #[derive(Debug, Clone)]
@@ -34,6 +34,8 @@ pub struct ResultFile {
     /// The run without its stages.
     run: RunResult,
     stages: Vec<StageSummary>,
+    /// For the samples of recordings.
+    files: InputFiles,
 }
 
 impl ResultFile {
@@ -51,7 +53,7 @@ impl ResultFile {
         let entry = read::group(&file, ENTRY)?;
         let (run, ids) = read_pipeline(&entry)?;
         let stages = ids.iter().map(|(id, group)| read_summary(&entry, id, group)).collect::<Result<_>>()?;
-        Ok(Self { path: path.to_owned(), file, run, stages })
+        Ok(Self { path: path.to_owned(), file, run, stages, files: InputFiles::new() })
     }
 
     /// The stages, in topological order.
@@ -85,7 +87,9 @@ impl ResultFile {
             let have: Vec<&str> = stage.ports.iter().map(|port| port.name.as_str()).collect();
             fail(format!("stage `{id}` has no output `{port}`; it has: {}", have.join(", ")))
         })?;
-        self.process(stage).and_then(|process| read_port(&process, found, None)).map_err(|error| error.file(&self.path))
+        self.process(stage)
+            .and_then(|process| read_port(&process, found, &self.files, None))
+            .map_err(|error| error.file(&self.path))
     }
 
     fn process(&self, stage: &StageSummary) -> Result<Group> {
@@ -97,7 +101,7 @@ impl ResultFile {
         let mut run = self.run.clone();
         for summary in &self.stages {
             let mut record = summary.record.clone();
-            let outputs = self.process(summary).and_then(|process| read_ports(&process, None));
+            let outputs = self.process(summary).and_then(|process| read_ports(&process, &self.files, None));
             record.result.outputs = outputs.map_err(|error| error.file(&self.path))?;
             run.stages.push(record);
         }

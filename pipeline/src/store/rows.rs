@@ -11,8 +11,8 @@ use hdf5::types::{FloatSize, TypeDescriptor};
 use hdf5::{Dataset, Group};
 use ndarray::{ArrayView2, s};
 
-use super::error::{Result, StoreError};
-use super::{read, write};
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::{read, write};
 use crate::rows::{RowSource, Scratch, StoredRows, in_blocks};
 
 /// Writes rows as [`write::dataset`] would if all were in memory: the same bytes. Errors: those of the rows, and as there.

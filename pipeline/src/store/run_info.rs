@@ -2,9 +2,9 @@
 
 use hdf5::Group;
 
-use super::error::{Result, StoreError};
-use super::{read, write};
-use crate::runner::RunInfo;
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::{read, write};
+use crate::outcome::RunInfo;
 
 const FOLDER: &str = "folder";
 const CONFIG_FILE: &str = "config_file";

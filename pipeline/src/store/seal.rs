@@ -7,8 +7,9 @@ use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-use super::error::{Result, StoreError};
 use super::file_kind::{FileKind, file_kind};
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::HeapGuard;
 
 const MAGIC: &str = "\nafmid seal, BLAKE3 of all bytes before this line: ";
 const HASH_LENGTH: u64 = 64;
@@ -22,7 +23,7 @@ pub(crate) fn seal(path: &Path) -> Result<()> {
     let seal = || -> std::io::Result<()> {
         let mut file = OpenOptions::new().read(true).append(true).open(path)?;
         let size = file.metadata()?.len();
-        let hash = hash_start(&mut file, size)?;
+        let hash = hash_start(&mut file, size, |_| {})?;
         file.write_all(format!("{MAGIC}{hash}\n").as_bytes())?;
         file.sync_all()
     };
@@ -43,9 +44,13 @@ pub(super) fn check_seal(path: &Path) -> Result<()> {
             other => Err(StoreError::new(format!("not a file of afmid's: it is {other}")).file(path)),
         };
     };
-    let hash = hash_start(&mut file, body).map_err(io)?;
+    let mut guard = HeapGuard::default();
+    let hash = hash_start(&mut file, body, |bytes| guard.update(bytes)).map_err(io)?;
     if last != format!("{MAGIC}{hash}\n") {
         return broken("damaged or altered: its bytes do not have the hash that its last line states");
+    }
+    if guard.finish() {
+        return broken("damaged: a heap collection of the HDF5 file never ends");
     }
     Ok(())
 }
@@ -66,8 +71,8 @@ fn last_line(file: &mut File, size: u64) -> std::io::Result<Option<(u64, String)
     Ok(String::from_utf8(last).ok().filter(|last| last.starts_with(MAGIC)).map(|last| (body, last)))
 }
 
-/// BLAKE3 of the first `size` bytes.
-fn hash_start(file: &mut File, size: u64) -> std::io::Result<blake3::Hash> {
+/// BLAKE3 of the first `size` bytes; `each` sees them as they pass.
+fn hash_start(file: &mut File, size: u64, mut each: impl FnMut(&[u8])) -> std::io::Result<blake3::Hash> {
     file.seek(SeekFrom::Start(0))?;
     let mut hasher = blake3::Hasher::new();
     // several threads hash large files where there is a pool of them
@@ -75,7 +80,9 @@ fn hash_start(file: &mut File, size: u64) -> std::io::Result<blake3::Hash> {
     let mut buffer = vec![0; if together { SHARED as usize } else { 1 << 16 }];
     let mut rest = file.take(size);
     loop {
-        match rest.read(&mut buffer)? {
+        let count = rest.read(&mut buffer)?;
+        each(&buffer[..count]);
+        match count {
             0 => return Ok(hasher.finalize()),
             count if together => hasher.update_rayon(&buffer[..count]),
             count => hasher.update(&buffer[..count]),

@@ -5,11 +5,11 @@
 use hdf5::{Dataset, Group};
 use serde::{Deserialize, Serialize};
 
-use super::dimension_scale::Scales;
-use super::error::{Result, StoreError};
 use super::layout::{StoredAttribute, read_attributes, read_layout, write_attributes, write_layout};
-use super::{read, write};
 use crate::artifact::{Column, ColumnValues, Table};
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::Scales;
+use crate::hdf5_files::{read, write};
 
 #[derive(Debug, Serialize, Deserialize)]
 struct Layout {

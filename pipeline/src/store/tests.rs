@@ -7,11 +7,12 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::fixture::{Folder, run_result, stage_result};
+use super::fixture::{identity, run_result, stage_result};
 use super::*;
-use crate::artifact::{Array, Artifact, Axis, Document, Table};
-use crate::runner::{RunInfo, StageResult};
-use crate::stage::Ports;
+use crate::artifact::{Array, Artifact, Axis, Document, Shape, Table};
+use crate::files::fixture::Folder;
+use crate::outcome::{PortSpec, Ports, RunInfo, StageResult};
+use crate::recording::InputFiles;
 
 /// NaN-proof equality: the debug text tells every bit but a NaN's, which no stage uses.
 fn same(a: &impl Debug, b: &impl Debug) {
@@ -26,8 +27,8 @@ fn all_shapes_survive_a_stage_file() {
     let folder = Folder::new("stage");
     let path = folder.file("a.h5");
     let result = stage_result();
-    write_stage(&path, &result).unwrap();
-    same(&read_stage(&path).unwrap(), &result);
+    write_stage(&path, &identity("k"), &result).unwrap();
+    same(&read_stage(&path, &identity("k"), &InputFiles::new()).unwrap(), &result);
 }
 
 #[test]
@@ -105,11 +106,14 @@ fn random_result(random: &mut Random) -> StageResult {
 #[test]
 fn random_artifacts_survive_bit_by_bit() {
     let folder = Folder::new("random");
+    let output = |name, shape| PortSpec { name, shape, tag: "", optional: false, doc: "" };
+    let outputs = [output("array", Shape::Array), output("table", Shape::Table), output("document", Shape::Document)];
+    let identity = StageIdentity { outputs: &outputs, ..identity("k") };
     for seed in 0..60 {
         let result = random_result(&mut Random(seed));
         let path = folder.file(&format!("{seed}.h5"));
-        write_stage(&path, &result).unwrap();
-        same(&read_stage(&path).unwrap(), &result);
+        write_stage(&path, &identity, &result).unwrap();
+        same(&read_stage(&path, &identity, &InputFiles::new()).unwrap(), &result);
     }
 }
 
@@ -137,7 +141,7 @@ fn what_cannot_be_stored_is_an_error_that_says_so() {
         let path = folder.file("x.h5");
         let mut outputs = Ports::new();
         outputs.insert("port", artifact);
-        let error = write_stage(&path, &StageResult { outputs, warnings: Vec::new() }).unwrap_err();
+        let error = write_stage(&path, &identity("k"), &StageResult { outputs, warnings: Vec::new() }).unwrap_err();
         assert!(error.to_string().contains(word) && error.to_string().contains("port"), "{error}");
         std::fs::remove_file(&path).unwrap();
     };
@@ -233,10 +237,10 @@ fn another_version_and_another_kind_are_refused() {
     let error = read_result(&path).unwrap_err();
     assert!(error.to_string().contains("found format version 99, wanted 2") && error.help.is_some(), "{error}");
     let stage = folder.file("stage.h5");
-    write_stage(&stage, &stage_result()).unwrap();
+    write_stage(&stage, &identity("k"), &stage_result()).unwrap();
     let error = read_result(&stage).unwrap_err().to_string();
     assert!(error.contains("found an afmid stage file, wanted a result file"), "{error}");
-    assert!(read_stage(&path).is_err());
+    assert!(read_stage(&path, &identity("k"), &InputFiles::new()).is_err());
 }
 
 /// The same script checks results of real runs; here it sees every shape, empty ones included.

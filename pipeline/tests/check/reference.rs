@@ -1,6 +1,7 @@
 //! Documentation and checks that are derived from the registry.
 
-use afmid_pipeline::conformance::{difference, violations};
+use afmid_pipeline::conformance::violations;
+use afmid_pipeline::outcome::difference;
 use afmid_pipeline::reference::{Examples, config_schema, files, page, parameters};
 use afmid_pipeline::{Array, Axis, Port, Ports, Registry};
 

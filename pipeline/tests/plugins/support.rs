@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::cache::Cache;
-use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native};
+use afmid_pipeline::recording::{
+    Codes, InputFiles, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native,
+};
 use afmid_pipeline::runner::{Options, Quiet, RunError, run};
 use afmid_pipeline::{
     Array, Axis, Caching, Context, Document, Entry, Example, Matrix, Plan, Port, Ports, Problem, Recording, Registry,
@@ -44,13 +46,14 @@ pub fn plan(folder: &Path, text: &str) -> Result<Plan, Vec<Problem>> {
 }
 
 pub fn execute(folder: &Path, plan: &Plan) -> Result<RunResult, Vec<RunError>> {
-    let cache = Cache::open(&folder.join("cache")).expect("a cache");
+    let cache = Cache::open(&folder.join("cache"));
     let program = "afmid test".to_owned();
     run(
         plan,
         &Options {
             base: folder.to_owned(),
             cache: &cache,
+            files: cache.input_files(false),
             fresh: false,
             program,
             overrides: Vec::new(),
@@ -87,7 +90,11 @@ impl Stage for All {
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let path = record(cx.base());
-        let record = open_native(&path, &[Wanted { role: "deflection", location: "/deflection", required: true }])?;
+        let record = open_native(
+            &InputFiles::new(),
+            &path,
+            &[Wanted { role: "deflection", location: "/deflection", required: true }],
+        )?;
         Ok(Ports::new()
             .with(&ARRAY, array())
             .with(&TABLE, table())

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{Wanted, open_native};
+use afmid_pipeline::recording::{InputFiles, Wanted, open_native};
 use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Context, Document, Entry, Port, Ports, Recording, Stage};
 
@@ -41,7 +41,7 @@ fn lever_a() -> Ports {
     paths.sort();
     let channels = [("deflection", "/deflection"), ("piezo", "/piezo")];
     let wanted = channels.map(|(role, location)| Wanted { role, location, required: true });
-    let records = paths.iter().map(|path| open_native(path, &wanted).unwrap()).collect();
+    let records = paths.iter().map(|path| open_native(&InputFiles::new(), path, &wanted).unwrap()).collect();
     Ports::new().with(&RECORDS, Recording { records })
 }
 

@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::sync::Mutex;
 
-use afmid_pipeline::conformance::difference;
-use afmid_pipeline::rows::{RowSource, RowWriter, Scratch};
+use afmid_pipeline::artifact::RowWriter;
+use afmid_pipeline::outcome::difference;
+use afmid_pipeline::rows::{RowSource, Scratch};
 use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Artifact, Context, Ports, Stage, StageError, Values};
 

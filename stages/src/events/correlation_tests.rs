@@ -222,7 +222,7 @@ fn windows_in_a_file_are_those_in_memory_bit_for_bit_on_any_number_of_threads() 
     for (limit_bytes, threads) in [(0, 1), (0, 4), (6 * 8192 * 8, 4)] {
         let file = outputs(limit_bytes, threads);
         assert!(matches!(file.get(&ENSEMBLE).unwrap().variables[0].values, Values::Stored(_)));
-        assert_eq!(afmid_pipeline::conformance::difference(&memory, &file), None, "{limit_bytes} bytes, {threads}");
+        assert_eq!(afmid_pipeline::outcome::difference(&memory, &file), None, "{limit_bytes} bytes, {threads}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use afmid_pipeline::rows::RowWriter;
+use afmid_pipeline::artifact::RowWriter;
 use afmid_pipeline::{StageError, Values};
 
 use super::correlation_averaging::AveragingSettings;

@@ -1,6 +1,7 @@
 //! Aligned windows of an ensemble: what each event is, beside the others.
 
-use afmid_pipeline::rows::{RowSource, RowWriter, in_blocks};
+use afmid_pipeline::artifact::RowWriter;
+use afmid_pipeline::rows::{RowSource, in_blocks};
 use afmid_pipeline::{StageError, Values};
 use rayon::prelude::*;
 

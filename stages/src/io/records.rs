@@ -136,7 +136,7 @@ impl Stage for Records {
         let opened: Vec<Result<Opened, StageError>> = paths
             .par_iter()
             .map(|path| {
-                let record = self.open(path);
+                let record = self.open(path, cx);
                 cx.tick();
                 record
             })
@@ -186,12 +186,12 @@ impl Records {
         How { reading, sample_rate_hz: self.sample_rate_hz, unit: self.unit.clone() }
     }
 
-    fn open(&self, path: &Path) -> Result<Opened, StageError> {
+    fn open(&self, path: &Path, cx: &Context) -> Result<Opened, StageError> {
         let mut wanted = vec![Wanted { role: "deflection", location: &self.channel, required: true }];
         if !self.piezo_channel.is_empty() {
             wanted.push(Wanted { role: "piezo", location: &self.piezo_channel, required: false });
         }
-        open_records(path, &wanted, &self.how())
+        open_records(cx.files(), path, &wanted, &self.how())
     }
 
     /// The files that could be opened. Errors: some could not, and these are not to be skipped; or none could.

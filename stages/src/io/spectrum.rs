@@ -118,7 +118,7 @@ impl Stage for Spectrum {
         let [path] = &paths[..] else {
             return Err(StageError::new(format!("`file` matches {} files, wanted one", paths.len())));
         };
-        let (f, p) = (read_series(path, &self.frequency)?, read_series(path, &self.density)?);
+        let (f, p) = (read_series(cx.files(), path, &self.frequency)?, read_series(cx.files(), path, &self.density)?);
         let averages = match self.averages {
             Some(averages) => averages,
             None => self.stored_averages(path)?,

@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::cache::replace_file;
-use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native};
-use afmid_pipeline::store::StoreError;
+use afmid_pipeline::error::StoreError;
+use afmid_pipeline::files::replace_file;
+use afmid_pipeline::recording::{
+    Codes, InputFiles, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native,
+};
 use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -364,7 +366,8 @@ impl Afm {
         };
         write_native(path, &native, storage).map_err(|error| StageError::from_error(error).at(path))?;
         let wanted = |role, location| Wanted { role, location, required: true };
-        let opened = open_native(path, &[wanted("deflection", "/deflection"), wanted("piezo", "/piezo")])?;
+        let opened =
+            open_native(&InputFiles::new(), path, &[wanted("deflection", "/deflection"), wanted("piezo", "/piezo")])?;
         Ok((opened, record.events, record.saturated))
     }
 }

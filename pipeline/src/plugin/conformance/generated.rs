@@ -6,11 +6,11 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::artifact::{Array, Axis, Document, Matrix, Shape, Shaped, StateSpace, Table};
+use crate::outcome::{PortSpec, Ports};
 use crate::plugin::describe::Plugin;
 use crate::plugin::exchange::{Wanted, take};
 use crate::plugin::message::Sent;
 use crate::recording::Recording;
-use crate::stage::{PortSpec, Ports};
 
 /// What a plugin is tried with.
 pub(super) struct Trial {

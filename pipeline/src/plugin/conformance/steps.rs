@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 
 use super::Check;
 use super::generated::{Trial, trials};
-use crate::conformance::difference;
+use crate::outcome::Ports;
+use crate::outcome::difference;
 use crate::plugin::describe::Plugin;
 use crate::plugin::error::PluginError;
 use crate::plugin::exchange::{give, shape_name};
@@ -15,7 +16,7 @@ use crate::plugin::launch::Launch;
 use crate::plugin::row::Row;
 use crate::plugin::session::Session;
 use crate::plugin::stage::run;
-use crate::stage::{Caching, Context, NoProgress, Ports};
+use crate::stage::{Caching, Context, NoProgress};
 
 /// How long nothing may come out of a plugin that was not asked.
 const QUIET: Duration = Duration::from_millis(300);
@@ -107,8 +108,8 @@ fn started(launch: &Launch) -> Seen<Session> {
 
 fn described(session: &mut Session) -> Seen<Plugin> {
     let plugin = session.describe()?;
-    let port = |port: &crate::stage::PortSpec| format!("{} ({})", port.name, shape_name(port.shape));
-    let list = |ports: &[crate::stage::PortSpec]| ports.iter().map(port).collect::<Vec<_>>().join(", ");
+    let port = |port: &crate::outcome::PortSpec| format!("{} ({})", port.name, shape_name(port.shape));
+    let list = |ports: &[crate::outcome::PortSpec]| ports.iter().map(port).collect::<Vec<_>>().join(", ");
     let seen = format!("{} -> {}; {}", list(plugin.spec.inputs), list(plugin.spec.outputs), plugin.schema.manual());
     Ok((plugin, seen))
 }

@@ -7,14 +7,16 @@ use hdf5::{File, Group, H5Type};
 use num_complex::Complex64;
 
 use crate::artifact::{Array, Artifact, ColumnValues, Matrix, StateSpace, Table, Values};
+use crate::error::StoreError;
+use crate::hdf5_files::write;
+use crate::outcome::Ports;
 use crate::plugin::message::{
     Kind, Numbers, OnlyArray, OnlyDocument, OnlyRecording, OnlyStateSpace, OnlyTable, Sent, SentArray, SentAxis,
     SentChannel, SentColumn, SentDocument, SentRecord, SentRecording, SentStateSpace, SentTable, SentVariable,
 };
 use crate::recording::{Record, Recording};
 use crate::rows::StoredRows;
-use crate::stage::Ports;
-use crate::store::{StoreError, write, write_rows};
+use crate::store::write_rows;
 
 type Result<T> = std::result::Result<T, StoreError>;
 

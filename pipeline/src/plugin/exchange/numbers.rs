@@ -5,8 +5,9 @@ use std::path::Path;
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5::{Dataset, File, H5Type};
 
+use crate::error::StoreError;
+use crate::hdf5_files::read;
 use crate::plugin::message::Numbers;
-use crate::store::{StoreError, read};
 
 /// The largest output file, and the most bytes of numbers taken from one answer.
 const MOST_BYTES: u64 = 2 << 30;

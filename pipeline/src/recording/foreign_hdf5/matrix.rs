@@ -11,8 +11,8 @@ use ndarray::Ix1;
 
 use super::walk::Found;
 use crate::error::StageError;
+use crate::hdf5_files::read::open_file;
 use crate::recording::native::size_of_file;
-use crate::store::read::open_file;
 
 /// Samples read at once through the library, under its global lock: short enough to let others in between.
 const SLICE: usize = 1 << 16;

@@ -22,10 +22,10 @@ use std::path::Path;
 
 use afmid_formats::Contents;
 
-use super::hash::inspect_hdf5;
+use super::input_files::InputFiles;
 use super::native::text_attribute;
 use crate::error::StageError;
-use crate::store::read::open_file;
+use crate::hdf5_files::read::open_file;
 use scope::Scopes;
 use variable::Variable;
 
@@ -36,8 +36,8 @@ const MOST_CHANNELS: usize = 1 << 16;
 const MOST_REMARKS: usize = 100;
 
 /// Lists what a file holds. Errors: it cannot be read, is cut short, or is damaged beyond its list of datasets.
-pub(super) fn open(path: &Path) -> Result<Contents, StageError> {
-    inspect_hdf5(path)?;
+pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageError> {
+    files.inspect_hdf5(path)?;
     let file = open_file(path)?;
     let matlab = starts_like_matlab(path);
     let mut remarks = Vec::new();
@@ -62,7 +62,7 @@ pub(super) fn open(path: &Path) -> Result<Contents, StageError> {
             remarks.push(format!("{} is left out: its {} channels are too many", found.location, series.lanes()));
             continue;
         }
-        match series.channels(found, path, rate, if matlab { 1 } else { 0 }, &mut remarks) {
+        match series.channels(files.chunks(), found, path, rate, if matlab { 1 } else { 0 }, &mut remarks) {
             Ok(more) => channels.extend(more),
             Err(error) => remarks.push(format!("{} is left out: {}", found.location, error.problem)),
         }

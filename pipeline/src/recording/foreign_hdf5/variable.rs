@@ -9,10 +9,11 @@ use hdf5::types::{IntSize, TypeDescriptor};
 use super::matrix::{Lane, Matrix};
 use super::walk::Found;
 use crate::error::StageError;
+use crate::hdf5_files::read::check_size;
+use crate::recording::chunk_cache::ChunkCache;
 use crate::recording::native::{
     check_filters, has_attribute, number_attribute, open_source, sample_type, text_attribute,
 };
-use crate::store::read::check_size;
 
 /// A dataset of numbers.
 #[derive(Debug)]
@@ -91,6 +92,7 @@ impl Series {
     /// The channels. Errors: the samples cannot be found in the file; a scale that is none.
     pub(super) fn channels(
         &self,
+        chunks: &ChunkCache,
         found: &Found,
         path: &Path,
         sample_rate_hz: Option<f64>,
@@ -118,7 +120,7 @@ impl Series {
             return Err(StageError::new(problem));
         }
         let fill_code = optional("_FillValue")?.map_or_else(|| optional("missing_value"), |code| Ok(Some(code)))?;
-        let sources = self.sources(found, path, base)?;
+        let sources = self.sources(chunks, found, path, base)?;
         let channel = |(index, source): Indexed| FoundChannel {
             location: format!("{location}{index}"),
             samples: self.lanes.samples,
@@ -136,9 +138,15 @@ impl Series {
     }
 
     /// A source for each lane: the fast reader of native records for one dimension of its types.
-    fn sources(&self, found: &Found, path: &Path, base: usize) -> Result<Vec<Indexed>, StageError> {
+    fn sources(
+        &self,
+        chunks: &ChunkCache,
+        found: &Found,
+        path: &Path,
+        base: usize,
+    ) -> Result<Vec<Indexed>, StageError> {
         if self.shape.len() == 1 && !self.number.may_be_rounded() {
-            return Ok(vec![(String::new(), Arc::new(open_source(path, &found.location)?))]);
+            return Ok(vec![(String::new(), Arc::new(open_source(chunks, path, &found.location)?))]);
         }
         let matrix = Arc::new(Matrix::of(found, path, &self.shape, self.number)?);
         let lane = |(index, first): (String, u64)| {

@@ -11,10 +11,10 @@ use hdf5::{Container, Group, Location};
 pub use numbers::Numbers;
 
 use self::values::{Found, Values, differing, read_numbers};
-use super::error::{Result, StoreError};
-use super::read;
 use super::seal::check_seal;
 use crate::artifact::std_name;
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::read;
 
 /// Left out: when and where a run took place.
 const LEFT_OUT: &str = "/entry/run";
@@ -57,10 +57,10 @@ fn compare_groups(a: &Group, b: &Group, found: &mut Vec<Difference>) -> Result<(
     compare_attributes(a, b, &place, found)?;
     let (left, right) = (names(a)?, names(b)?);
     for name in only_in(&right, &left) {
-        push(found, &super::write::path_of(a, name), "only in the second file");
+        push(found, &crate::hdf5_files::write::path_of(a, name), "only in the second file");
     }
     for name in &left {
-        let place = super::write::path_of(a, name);
+        let place = crate::hdf5_files::write::path_of(a, name);
         if !right.contains(name) {
             push(found, &place, "only in the first file");
         } else if let (Ok(x), Ok(y)) = (a.group(name), b.group(name)) {

@@ -3,10 +3,10 @@
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5::{Container, H5Type};
 
-use super::super::error::{Result, StoreError};
-use super::super::read;
 use super::document;
 use super::numbers::Numbers;
+use crate::error::{Result, StoreError};
+use crate::hdf5_files::read;
 
 /// What differs between two datasets.
 pub(super) struct Found {

@@ -49,7 +49,7 @@ fn kit() -> hdf5::Result<&'static Kit> {
 }
 
 /// A new group. Errors: the library refuses.
-pub(super) fn group(parent: &Group, name: &str) -> hdf5::Result<Group> {
+pub(crate) fn group(parent: &Group, name: &str) -> hdf5::Result<Group> {
     let (kit, text) = (kit()?, c_text(name)?);
     // SAFETY: every handle is live for the length of the call, since its owner is borrowed; the name ends with a NUL; the lock is held.
     let id = hdf5::sync::sync(|| unsafe {
@@ -62,12 +62,12 @@ pub(super) fn group(parent: &Group, name: &str) -> hdf5::Result<Group> {
 }
 
 /// A new contiguous dataset, nothing written to it. Errors: the library refuses.
-pub(super) fn empty_dataset<T: H5Type>(parent: &Group, name: &str, shape: &[usize]) -> hdf5::Result<Dataset> {
+pub(crate) fn empty_dataset<T: H5Type>(parent: &Group, name: &str, shape: &[usize]) -> hdf5::Result<Dataset> {
     create(parent, name, shape, &Datatype::from_type::<T>()?)
 }
 
 /// A new contiguous dataset of these values, row-major. Errors: the library refuses; they do not fill the shape.
-pub(super) fn filled_dataset<T: H5Type>(
+pub(crate) fn filled_dataset<T: H5Type>(
     parent: &Group,
     name: &str,
     shape: &[usize],
@@ -101,7 +101,7 @@ fn create(parent: &Group, name: &str, shape: &[usize], kind: &Datatype) -> hdf5:
 }
 
 /// A new attribute of these values. Errors: the library refuses; they do not fill the shape.
-pub(super) fn attribute<T: H5Type>(owner: &Location, name: &str, shape: &[usize], values: &[T]) -> hdf5::Result<()> {
+pub(crate) fn attribute<T: H5Type>(owner: &Location, name: &str, shape: &[usize], values: &[T]) -> hdf5::Result<()> {
     check_count(shape, values)?;
     let (text, kind, space) = (c_text(name)?, Datatype::from_type::<T>()?, Dataspace::try_new(shape)?);
     // SAFETY: every handle is live; the attribute is made with this shape and type, and `values` are as many of it, laid out as the type says
@@ -115,7 +115,7 @@ pub(super) fn attribute<T: H5Type>(owner: &Location, name: &str, shape: &[usize]
 }
 
 /// Makes a one-dimensional dataset the dimension scale `name`. Errors: the library refuses.
-pub(super) fn make_scale(scale: &Dataset, name: &str) -> hdf5::Result<()> {
+pub(crate) fn make_scale(scale: &Dataset, name: &str) -> hdf5::Result<()> {
     let text = c_text(name)?;
     // SAFETY: the handle is live; the library copies the text, which ends with a NUL; the lock is held.
     hdf5::sync::sync(|| unsafe { checked(H5DSset_scale(scale.id(), text.as_ptr()).into()) }).map(drop)
@@ -124,7 +124,7 @@ pub(super) fn make_scale(scale: &Dataset, name: &str) -> hdf5::Result<()> {
 /// One dimension of a dataset that has a scale: an element of the scale's `REFERENCE_LIST`.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub(super) struct ScaledDimension {
+pub(crate) struct ScaledDimension {
     dataset: ObjectReference1,
     dimension: u32,
     /// What lies between two elements, so that it is the same in every file.
@@ -132,7 +132,7 @@ pub(super) struct ScaledDimension {
 }
 
 impl ScaledDimension {
-    pub(super) fn new(dataset: ObjectReference1, dimension: u32) -> Self {
+    pub(crate) fn new(dataset: ObjectReference1, dimension: u32) -> Self {
         Self { dataset, dimension, gap: 0 }
     }
 }

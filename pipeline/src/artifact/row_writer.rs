@@ -3,9 +3,9 @@
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 
-use super::{Scratch, StoredRows};
-use crate::artifact::Values;
+use super::Values;
 use crate::error::StageError;
+use crate::rows::{Scratch, StoredRows};
 
 /// Takes rows of equal length: up to a limit they stay in memory, beyond it all go into a file without a name.
 #[derive(Debug)]

@@ -1,13 +1,20 @@
 use std::fs;
 use std::sync::Mutex;
 
-use super::blocks::rows_per_block;
-use super::*;
-use crate::artifact::{Array, Artifact, Axis, Values};
+use crate::artifact::{Array, Artifact, Axis, RowWriter, Shape, Values};
 use crate::error::StageError;
-use crate::runner::StageResult;
-use crate::stage::Ports;
-use crate::store::{read_stage, write_stage};
+use crate::outcome::{PortSpec, Ports, StageResult, difference};
+use crate::recording::InputFiles;
+use crate::rows::rows_per_block;
+use crate::rows::*;
+use crate::store::{StageIdentity, read_stage, write_stage};
+
+const IDENTITY: StageIdentity<'static> = StageIdentity {
+    key: "k",
+    stage: "test.rows",
+    version: 1,
+    outputs: &[PortSpec { name: "ensemble", shape: Shape::Array, tag: "", optional: false, doc: "" }],
+};
 
 fn folder() -> tempfile::TempDir {
     tempfile::tempdir().unwrap()
@@ -69,12 +76,14 @@ fn a_file_of_rows_has_no_name_so_that_a_kill_leaves_nothing() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_made_and_a_row_of_another_length_are_errors() {
+fn rows_go_elsewhere_where_a_folder_cannot_be_made_and_a_row_of_another_length_is_an_error() {
     let folder = folder();
     fs::write(folder.path().join("file"), "").unwrap();
     let scratch = Scratch::beside(&folder.path().join("file").join("x.h5")).with_limit_bytes(0);
-    let error = RowWriter::new(scratch.clone(), 10).push(&row(0, 10)).unwrap_err();
-    assert!(error.to_string().contains("temporary file") && error.help.unwrap().contains("--cache"));
+    // a cache that cannot be written stops no run
+    let mut writer = RowWriter::new(scratch.clone(), 10);
+    writer.push(&row(0, 10)).unwrap();
+    assert!(matches!(writer.finish(), Values::Stored(rows) if bits(rows.whole().unwrap()) == bits(&row(0, 10))));
     let error = RowWriter::new(scratch, 10).push(&row(0, 11)).unwrap_err();
     assert_eq!(error.to_string(), "a row has 11 values, the others 10");
 }
@@ -153,17 +162,17 @@ fn stage_files_are_the_same_bytes_wherever_the_rows_lay_and_are_read_where_they_
     let of = |limit| stage_of(written(&scratch.clone().with_limit_bytes(limit), rows, length), rows, length);
     let (memory, file) = (of(usize::MAX), of(0));
     assert!(matches!((signal(&memory), signal(&file)), (Values::Real(_), Values::Stored(_))));
-    assert_eq!(crate::conformance::difference(&memory.outputs, &file.outputs), None);
+    assert_eq!(difference(&memory.outputs, &file.outputs), None);
     let [a, b] = ["a.h5", "b.h5"].map(|name| folder.path().join(name));
-    write_stage(&a, &memory).unwrap();
-    write_stage(&b, &file).unwrap();
+    write_stage(&a, &IDENTITY, &memory).unwrap();
+    write_stage(&b, &IDENTITY, &file).unwrap();
     assert!(fs::read(&a).unwrap() == fs::read(&b).unwrap(), "the files differ");
 
-    let back = read_stage(&a).unwrap();
+    let back = read_stage(&a, &IDENTITY, &InputFiles::new()).unwrap();
     let Values::Stored(stored) = signal(&back) else { panic!("all of it is in memory") };
     // as another process may do at any moment
     fs::remove_file(&a).unwrap();
-    assert_eq!(crate::conformance::difference(&memory.outputs, &back.outputs), None);
+    assert_eq!(difference(&memory.outputs, &back.outputs), None);
     assert_eq!(bits(stored.whole().unwrap()), bits(signal(&memory).real().unwrap().unwrap()));
 }
 
@@ -171,8 +180,8 @@ fn stage_files_are_the_same_bytes_wherever_the_rows_lay_and_are_read_where_they_
 fn small_variables_are_read_into_memory() {
     let folder = folder();
     let path = folder.path().join("a.h5");
-    write_stage(&path, &stage_of(written(&Scratch::default(), 100, 1000), 100, 1000)).unwrap();
-    assert!(matches!(signal(&read_stage(&path).unwrap()), Values::Real(_)));
+    write_stage(&path, &IDENTITY, &stage_of(written(&Scratch::default(), 100, 1000), 100, 1000)).unwrap();
+    assert!(matches!(signal(&read_stage(&path, &IDENTITY, &InputFiles::new()).unwrap()), Values::Real(_)));
 }
 
 #[test]
@@ -180,8 +189,8 @@ fn a_file_that_is_cut_short_while_it_is_in_use_is_told() {
     let folder = folder();
     let path = folder.path().join("a.h5");
     let (rows, length) = (260, 4050);
-    write_stage(&path, &stage_of(written(&Scratch::default(), rows, length), rows, length)).unwrap();
-    let back = read_stage(&path).unwrap();
+    write_stage(&path, &IDENTITY, &stage_of(written(&Scratch::default(), rows, length), rows, length)).unwrap();
+    let back = read_stage(&path, &IDENTITY, &InputFiles::new()).unwrap();
     fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(4_000_000).unwrap();
     let view = signal(&back).rows(length).unwrap();
     let mut into = vec![0.0; length];
@@ -190,6 +199,6 @@ fn a_file_that_is_cut_short_while_it_is_in_use_is_told() {
     assert!(error.to_string().contains("cut short") && error.to_string().contains("a.h5"), "{error}");
     assert!(signal(&back).real().unwrap().is_err());
     // and a result file is not written from it
-    let error = write_stage(&folder.path().join("b.h5"), &back).unwrap_err();
+    let error = write_stage(&folder.path().join("b.h5"), &IDENTITY, &back).unwrap_err();
     assert!(error.to_string().contains("cut short"), "{error}");
 }

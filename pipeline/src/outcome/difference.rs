@@ -2,9 +2,9 @@
 
 use num_complex::Complex64;
 
+use super::Ports;
 use crate::artifact::{Array, Artifact, Attribute, ColumnValues, Matrix, StateSpace, Table, Values};
 use crate::recording::Recording;
-use crate::stage::Ports;
 
 /// Where two sets of artifacts first differ, bit for bit (a NaN equals itself); nothing if they don't.
 pub fn difference(a: &Ports, b: &Ports) -> Option<String> {

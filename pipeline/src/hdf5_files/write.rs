@@ -7,8 +7,8 @@ use hdf5::file::{FileCloseDegree, LibraryVersion};
 use hdf5::types::VarLenUnicode;
 use hdf5::{Dataset, File, Group, H5Type, Location};
 
-use super::error::{Result, StoreError};
 use super::library;
+use crate::error::{Result, StoreError};
 
 /// Creates an HDF5 file whose bytes depend on its contents alone. Errors: it exists, or the folder cannot be written.
 ///
@@ -30,7 +30,7 @@ pub(crate) fn group(parent: &Group, name: &str) -> Result<Group> {
 }
 
 /// A group with its NeXus class.
-pub(super) fn nexus_group(parent: &Group, name: &str, class: &str) -> Result<Group> {
+pub(crate) fn nexus_group(parent: &Group, name: &str, class: &str) -> Result<Group> {
     let group = group(parent, name)?;
     text_attribute(&group, "NX_class", class)?;
     Ok(group)
@@ -46,21 +46,21 @@ pub(crate) fn dataset<T: H5Type>(parent: &Group, name: &str, shape: &[usize], va
 }
 
 /// Such a dataset before anything is written to it.
-pub(super) fn empty<T: H5Type>(parent: &Group, name: &str, shape: &[usize]) -> Result<Dataset> {
+pub(crate) fn empty<T: H5Type>(parent: &Group, name: &str, shape: &[usize]) -> Result<Dataset> {
     check_name(name).map_err(|error| error.at(parent.name()))?;
     let dataset = library::empty_dataset::<T>(parent, name, shape);
     dataset.map_err(|error| StoreError::from(error).at(path_of(parent, name)))
 }
 
-pub(super) fn scalar<T: H5Type>(parent: &Group, name: &str, value: T) -> Result<Dataset> {
+pub(crate) fn scalar<T: H5Type>(parent: &Group, name: &str, value: T) -> Result<Dataset> {
     dataset(parent, name, &[], &[value])
 }
 
-pub(super) fn text(parent: &Group, name: &str, value: &str) -> Result<Dataset> {
+pub(crate) fn text(parent: &Group, name: &str, value: &str) -> Result<Dataset> {
     scalar(parent, name, unicode(value).map_err(|error| error.at(path_of(parent, name)))?)
 }
 
-pub(super) fn texts<S: AsRef<str>>(parent: &Group, name: &str, values: &[S]) -> Result<Dataset> {
+pub(crate) fn texts<S: AsRef<str>>(parent: &Group, name: &str, values: &[S]) -> Result<Dataset> {
     let values: Result<Vec<VarLenUnicode>> = values.iter().map(|value| unicode(value.as_ref())).collect();
     let values = values.map_err(|error| error.at(path_of(parent, name)))?;
     dataset(parent, name, &[values.len()], &values)
@@ -76,7 +76,7 @@ pub(crate) fn text_attribute(owner: &Location, name: &str, value: &str) -> Resul
     attribute(owner, name, &value)
 }
 
-pub(super) fn texts_attribute<S: AsRef<str>>(owner: &Location, name: &str, values: &[S]) -> Result<()> {
+pub(crate) fn texts_attribute<S: AsRef<str>>(owner: &Location, name: &str, values: &[S]) -> Result<()> {
     let wrap = |error: hdf5::Error| StoreError::from(error).at(format!("{}@{name}", owner.name()));
     let values: Vec<VarLenUnicode> = values.iter().map(|value| unicode(value.as_ref())).collect::<Result<_>>()?;
     library::attribute(owner, name, &[values.len()], &values).map_err(wrap)
@@ -99,7 +99,7 @@ pub(crate) fn check_name(name: &str) -> Result<()> {
     Ok(())
 }
 
-pub(super) fn path_of(parent: &Group, name: &str) -> String {
+pub(crate) fn path_of(parent: &Group, name: &str) -> String {
     let parent = parent.name();
     if parent == "/" { format!("/{name}") } else { format!("{parent}/{name}") }
 }

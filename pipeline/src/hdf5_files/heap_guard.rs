@@ -32,7 +32,7 @@ impl HeuristicFrequencyRank for Neighbours {
 
 /// Looks for collections while a file streams by.
 #[derive(Debug, Default)]
-pub(super) struct HeapGuard {
+pub(crate) struct HeapGuard {
     /// The end of what has streamed by, as long as a collection might begin or continue in it.
     kept: Vec<u8>,
     /// Whether one has begun in it.
@@ -42,7 +42,7 @@ pub(super) struct HeapGuard {
 
 impl HeapGuard {
     /// Takes the next stretch of the file; copies next to nothing of it as long as no collection begins.
-    pub(super) fn update(&mut self, bytes: &[u8]) {
+    pub(crate) fn update(&mut self, bytes: &[u8]) {
         let head = if self.begun { bytes.len() } else { bytes.len().min(BORDER) };
         self.kept.extend_from_slice(&bytes[..head]);
         if !self.begun {
@@ -63,7 +63,7 @@ impl HeapGuard {
     }
 
     /// Whether the library would walk for ever.
-    pub(super) fn finish(mut self) -> bool {
+    pub(crate) fn finish(mut self) -> bool {
         self.scan(self.kept.len());
         self.endless
     }

@@ -6,8 +6,8 @@ use hdf5::file::FileCloseDegree;
 use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5::{Container, Dataset, File, Group, H5Type, Location};
 
-use super::error::{Result, StoreError};
 use super::write::path_of;
+use crate::error::{Result, StoreError};
 
 /// Deflate shrinks by at most 1032 to 1: a dataset that claims more than this times the file's bytes is damaged.
 const MOST_COMPRESSION: u64 = 1100;
@@ -32,11 +32,11 @@ pub(crate) fn open_file(path: &Path) -> Result<File> {
         })
 }
 
-pub(super) fn group(parent: &Group, name: &str) -> Result<Group> {
+pub(crate) fn group(parent: &Group, name: &str) -> Result<Group> {
     parent.group(name).map_err(|_| missing("group", parent, name))
 }
 
-pub(super) fn dataset(parent: &Group, name: &str) -> Result<Dataset> {
+pub(crate) fn dataset(parent: &Group, name: &str) -> Result<Dataset> {
     parent.dataset(name).map_err(|_| missing("dataset", parent, name))
 }
 
@@ -46,7 +46,7 @@ fn missing(what: &str, parent: &Group, name: &str) -> StoreError {
 }
 
 /// All values of a dataset of numbers. Errors: missing, of another type, damaged.
-pub(super) fn numbers<T: H5Type>(parent: &Group, name: &str) -> Result<Vec<T>> {
+pub(crate) fn numbers<T: H5Type>(parent: &Group, name: &str) -> Result<Vec<T>> {
     let dataset = dataset(parent, name)?;
     let place = path_of(parent, name);
     let (wanted, found) = (T::type_descriptor(), descriptor(&dataset).map_err(|error| error.at(&place))?);
@@ -57,29 +57,29 @@ pub(super) fn numbers<T: H5Type>(parent: &Group, name: &str) -> Result<Vec<T>> {
     dataset.read_raw().map_err(|error| StoreError::from(error).at(place))
 }
 
-pub(super) fn number<T: H5Type + Copy>(parent: &Group, name: &str) -> Result<T> {
+pub(crate) fn number<T: H5Type + Copy>(parent: &Group, name: &str) -> Result<T> {
     one(numbers(parent, name)?).map_err(|error| error.at(path_of(parent, name)))
 }
 
 /// All texts of a dataset. Errors: missing, of another type, damaged, not UTF-8.
-pub(super) fn texts(parent: &Group, name: &str) -> Result<Vec<String>> {
+pub(crate) fn texts(parent: &Group, name: &str) -> Result<Vec<String>> {
     let dataset = dataset(parent, name)?;
     read_texts(&dataset).map_err(|error| error.at(path_of(parent, name)))
 }
 
-pub(super) fn text(parent: &Group, name: &str) -> Result<String> {
+pub(crate) fn text(parent: &Group, name: &str) -> Result<String> {
     one(texts(parent, name)?).map_err(|error| error.at(path_of(parent, name)))
 }
 
 /// A text attribute. Errors: missing, another type.
-pub(super) fn text_attribute(owner: &Location, name: &str) -> Result<String> {
+pub(crate) fn text_attribute(owner: &Location, name: &str) -> Result<String> {
     let place = || format!("{}@{name}", owner.name());
     let attribute = owner.attr(name).map_err(|_| StoreError::new("the attribute is missing or damaged").at(place()))?;
     one(read_texts(&attribute).map_err(|error| error.at(place()))?).map_err(|error| error.at(place()))
 }
 
 /// A numeric attribute of type `T`. Errors: missing, another type.
-pub(super) fn attribute<T: H5Type + Copy>(owner: &Location, name: &str) -> Result<T> {
+pub(crate) fn attribute<T: H5Type + Copy>(owner: &Location, name: &str) -> Result<T> {
     let place = || format!("{}@{name}", owner.name());
     let attribute = owner.attr(name).map_err(|_| StoreError::new("the attribute is missing or damaged").at(place()))?;
     let found = descriptor(&attribute).map_err(|error| error.at(place()))?;

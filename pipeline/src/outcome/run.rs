@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::stage::Ports;
+use super::Ports;
 
 /// What a stage made: the unit of the cache.
 #[derive(Debug, Clone, Default)]

@@ -6,15 +6,15 @@
 use hdf5::types::VarLenArray;
 use hdf5::{Dataset, ObjectReference1};
 
-use super::error::{Result, StoreError};
 use super::library::{ScaledDimension, attribute, make_scale};
+use crate::error::{Result, StoreError};
 
 const SCALES: &str = "DIMENSION_LIST";
 const USES: &str = "REFERENCE_LIST";
 
 /// The scales of a group's variables.
 #[derive(Debug, Default)]
-pub(super) struct Scales(Vec<Scale>);
+pub(crate) struct Scales(Vec<Scale>);
 
 #[derive(Debug)]
 struct Scale {
@@ -26,7 +26,7 @@ struct Scale {
 
 impl Scales {
     /// Makes a one-dimensional dataset the scale `name`. Errors: the library refuses.
-    pub(super) fn add(&mut self, name: &str, dataset: Dataset) -> Result<()> {
+    pub(crate) fn add(&mut self, name: &str, dataset: Dataset) -> Result<()> {
         let failed = |error| wrapped("make a dimension scale of", name, error);
         make_scale(&dataset, name).map_err(failed)?;
         let reference = dataset.reference(".").map_err(failed)?;
@@ -35,7 +35,7 @@ impl Scales {
     }
 
     /// Attaches scales by name, one for every dimension of a dataset that has one. Errors: one is not there; the library refuses.
-    pub(super) fn attach(&mut self, dataset: &Dataset, names: &[Option<&str>]) -> Result<()> {
+    pub(crate) fn attach(&mut self, dataset: &Dataset, names: &[Option<&str>]) -> Result<()> {
         if names.iter().all(Option::is_none) {
             return Ok(());
         }
@@ -56,7 +56,7 @@ impl Scales {
     }
 
     /// Tells every scale what it belongs to. Errors: the library refuses.
-    pub(super) fn finish(self) -> Result<()> {
+    pub(crate) fn finish(self) -> Result<()> {
         for Scale { name, dataset, uses, .. } in self.0 {
             if !uses.is_empty() {
                 attribute(&dataset, USES, &[uses.len()], &uses)

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use super::how::Reading;
+use super::opened_files::contents;
 use super::source::Hdf5Source;
-use super::{FormatError, Raw, Source, kept};
+use super::{FormatError, InputFiles, Raw, Source};
 
 /// A stretch of a channel of a file.
 #[derive(Debug)]
-pub(crate) struct DeferredSource {
+pub(crate) struct LazySource {
     path: PathBuf,
     file_size: u64,
     location: String,
@@ -18,11 +19,12 @@ pub(crate) struct DeferredSource {
     samples: usize,
     reading: Reading,
     native: OnceLock<Hdf5Source>,
+    files: InputFiles,
 }
 
-impl DeferredSource {
+impl LazySource {
     /// A whole channel of a native record.
-    pub(crate) fn new(path: &Path, file_size: u64, location: &str, samples: usize) -> Self {
+    pub(crate) fn new(files: &InputFiles, path: &Path, file_size: u64, location: &str, samples: usize) -> Self {
         Self {
             path: path.to_owned(),
             file_size,
@@ -31,6 +33,7 @@ impl DeferredSource {
             samples,
             reading: Reading::default(),
             native: OnceLock::new(),
+            files: files.clone(),
         }
     }
 
@@ -44,7 +47,7 @@ impl DeferredSource {
         if let Some(source) = self.native.get() {
             return Ok(source);
         }
-        let source = super::native::open_source(&self.path, &self.location)?;
+        let source = super::native::open_source(self.files.chunks(), &self.path, &self.location)?;
         if source.file_size != self.file_size || source.samples != self.samples {
             return Err(self.error("the file is not the one that was recorded: its size differs"));
         }
@@ -52,12 +55,12 @@ impl DeferredSource {
     }
 
     fn error(&self, problem: &str) -> FormatError {
-        FormatError::new(format!("{}: {problem}", self.location), "run again, so that it is opened anew")
+        FormatError::new(format!("{}: {problem}", self.location), "run again, so that it is opened again")
             .in_file(&self.path)
     }
 }
 
-impl Source for DeferredSource {
+impl Source for LazySource {
     fn is_direct(&self) -> bool {
         self.reading.is_native() && self.native().is_ok_and(|source| source.is_direct())
     }
@@ -70,7 +73,7 @@ impl Source for DeferredSource {
             let problem = format!("samples {start} to {start} + {count} asked for, there are {}", self.samples);
             return Err(self.error(&problem));
         }
-        let contents = kept::contents(&self.path, self.file_size, &self.reading)?;
+        let contents = contents(&self.files, &self.path, self.file_size, &self.reading)?;
         let channel = contents.channels.iter().find(|channel| channel.location == self.location);
         let end = self.first.saturating_add(self.samples);
         let channel = channel.filter(|channel| channel.samples >= end).ok_or_else(|| {

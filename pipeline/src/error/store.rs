@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::StageError;
+use super::StageError;
 
 /// Why a file could not be written or read: the file, the place within it, what was found and what was wanted.
 #[derive(Debug, thiserror::Error)]

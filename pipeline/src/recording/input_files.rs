@@ -1,0 +1,189 @@
+//! The files that a program reads: what they hash to, and which of them are open.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::chunk_cache::ChunkCache;
+use super::opened_files::OpenedFiles;
+use crate::error::StageError;
+use crate::files::{FileState, KnownHashes};
+use crate::hdf5_files::HeapGuard;
+
+/// The files that a program reads. A value that is passed to whatever reads: cloning is cheap, and clones share what they know.
+///
+/// A file is hashed once per state (device, inode, size, times of modification and change); with a folder also once over several runs. What foreign
+/// files were parsed or inflated to is kept up to a bound.
+#[derive(Clone, Default)]
+pub struct InputFiles(Arc<Inner>);
+
+impl std::fmt::Debug for InputFiles {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("InputFiles")
+    }
+}
+
+#[derive(Default)]
+struct Inner {
+    inspected: Mutex<HashMap<PathBuf, (FileState, Inspected)>>,
+    earlier: Option<KnownHashes>,
+    opened: OpenedFiles,
+    chunks: ChunkCache,
+}
+
+/// What one pass through a file found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Inspected {
+    /// BLAKE3 hash of its bytes, in hexadecimal.
+    pub(crate) blake3: String,
+    /// See [`HeapGuard`].
+    pub(super) endless: bool,
+}
+
+/// A file in the state in which it was hashed.
+#[derive(Debug, Clone)]
+pub(crate) struct HashedFile {
+    path: PathBuf,
+    state: FileState,
+    /// Whether any later change must show in the state.
+    settled: bool,
+    /// BLAKE3 hash of its bytes, in hexadecimal.
+    pub(crate) blake3: String,
+}
+
+impl InputFiles {
+    /// Nothing is known, and nothing is kept beyond this value's life.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Hashes are kept in `folder` over several runs; those of earlier runs count unless `fresh`.
+    pub fn keeping_hashes(folder: &Path, fresh: bool) -> Self {
+        Self(Arc::new(Inner { earlier: Some(KnownHashes::new(folder, fresh)), ..Inner::default() }))
+    }
+
+    /// BLAKE3 hash of a file's bytes, in hexadecimal. Streams.
+    ///
+    /// Errors: the file cannot be read, or changes meanwhile.
+    pub fn hash(&self, path: &Path) -> Result<String, StageError> {
+        self.hashed(path).map(|file| file.blake3)
+    }
+
+    /// The same with the state that the file had. Errors: as [`InputFiles::hash`].
+    pub(crate) fn hashed(&self, path: &Path) -> Result<HashedFile, StageError> {
+        let (state, found) = self.inspect(path)?;
+        Ok(HashedFile { path: path.to_owned(), settled: state.is_settled(), state, blake3: found.blake3 })
+    }
+
+    /// What one pass through a file that the HDF5 library is to open found. Errors: as [`InputFiles::hash`]; damage that the library does not survive.
+    pub(super) fn inspect_hdf5(&self, path: &Path) -> Result<Inspected, StageError> {
+        let (_, inspected) = self.inspect(path)?;
+        if inspected.endless {
+            return Err(StageError::new("damaged: a heap collection of the HDF5 file never ends").at(path));
+        }
+        Ok(inspected)
+    }
+
+    pub(super) fn opened(&self) -> &OpenedFiles {
+        &self.0.opened
+    }
+
+    pub(super) fn chunks(&self) -> &ChunkCache {
+        &self.0.chunks
+    }
+
+    fn inspect(&self, path: &Path) -> Result<(FileState, Inspected), StageError> {
+        let fail = |error: std::io::Error| StageError::new(format!("the file cannot be read: {error}")).at(path);
+        let mut file = File::open(path).map_err(fail)?;
+        let state = FileState::of(&file).map_err(fail)?;
+        let key = std::path::absolute(path).map_err(fail)?;
+        let known = |map: &HashMap<PathBuf, (FileState, Inspected)>| {
+            map.get(&key).filter(|(have, _)| *have == state).map(|(_, found)| found.clone())
+        };
+        let lock = || self.0.inspected.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = known(&lock()) {
+            return Ok((state, found));
+        }
+        let earlier = self.0.earlier.as_ref();
+        if let Some(found) = earlier.and_then(|known| known.find(&key, &state)).and_then(|line| Inspected::parse(&line))
+        {
+            lock().insert(key, (state, found.clone()));
+            return Ok((state, found));
+        }
+        let found = pass(&mut file).map_err(fail)?;
+        if FileState::of(&file).map_err(fail)? != state {
+            return Err(changed(path));
+        }
+        // a state that may hide a change is not remembered
+        if state.is_settled() {
+            if let Some(known) = earlier {
+                known.keep(&key, &state, &found.line());
+            }
+            lock().insert(key, (state, found.clone()));
+        }
+        Ok((state, found))
+    }
+}
+
+impl HashedFile {
+    /// Bytes.
+    pub(crate) fn size(&self) -> u64 {
+        self.state.size()
+    }
+
+    /// Sees whether the file is still the one that was hashed, so that what was read since has this hash. Errors: it has changed, or is gone.
+    ///
+    /// The state tells, since programs cannot set back the time of a file's last change; a file that was written shortly before it was hashed is
+    /// hashed again.
+    pub(crate) fn check_unchanged(&self) -> Result<(), StageError> {
+        let now = FileState::at(&self.path)
+            .map_err(|error| StageError::new(format!("the file was there, and now: {error}")).at(&self.path))?;
+        if now != self.state {
+            return Err(changed(&self.path));
+        }
+        if self.settled {
+            return Ok(());
+        }
+        let again = InputFiles::new().hash(&self.path)?;
+        if again == self.blake3 { Ok(()) } else { Err(changed(&self.path)) }
+    }
+}
+
+fn changed(path: &Path) -> StageError {
+    StageError::new("the file was changed while it was read: nothing made from it is kept")
+        .at(path)
+        .help("run again when nothing writes to it")
+}
+
+impl Inspected {
+    fn line(&self) -> String {
+        format!("{} {}", self.blake3, if self.endless { "endless" } else { "whole" })
+    }
+
+    fn parse(line: &str) -> Option<Self> {
+        let (blake3, endless) = line.split_once(' ')?;
+        let is_hash = blake3.len() == 64 && blake3.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
+        let endless = match endless {
+            "whole" => false,
+            "endless" => true,
+            _ => return None,
+        };
+        is_hash.then(|| Self { blake3: blake3.to_owned(), endless })
+    }
+}
+
+/// Hashes a file and looks for damage that the HDF5 library does not survive.
+fn pass(file: &mut File) -> std::io::Result<Inspected> {
+    let (mut hasher, mut guard) = (blake3::Hasher::new(), HeapGuard::default());
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        let count = file.read(&mut buffer)?;
+        if count == 0 {
+            return Ok(Inspected { blake3: hasher.finalize().to_hex().to_string(), endless: guard.finish() });
+        }
+        hasher.update(&buffer[..count]);
+        guard.update(&buffer[..count]);
+    }
+}
