@@ -1,0 +1,1 @@
+//! Results of earlier formats stay readable.

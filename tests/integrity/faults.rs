@@ -1,0 +1,1 @@
+//! Full disks, read-only folders, clocks that go backwards, several runs on one cache.

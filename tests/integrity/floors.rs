@@ -1,0 +1,146 @@
+//! The floors of every crate: a folder uses only those below it.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use super::common::ROOT;
+use super::paths::arrows;
+
+/// A crate and its folders, from the ground up. What stands in one row may not know of each other.
+struct Crate {
+    name: &'static str,
+    src: &'static str,
+    floors: &'static [&'static [&'static str]],
+}
+
+const CRATES: [Crate; 4] = [
+    Crate {
+        name: "afmid-formats",
+        src: "pipeline/formats/src",
+        floors: &[
+            &["fail", "number", "text", "calendar", "rate", "lanes"],
+            &["pinned"],
+            &["inflating", "opened", "raw"],
+            &["packed"],
+            &["grid"],
+            &["archive", "listing"],
+            &["igor", "jpk", "matlab", "nanoscope", "numpy", "raw_binary", "tdms", "text_table", "uff"],
+            &["registry"],
+        ],
+    },
+    Crate {
+        name: "afmid-pipeline",
+        src: "pipeline/src",
+        floors: &[
+            &["error"],
+            &["files"],
+            &["hdf5_files", "rows"],
+            &["recording"],
+            &["artifact"],
+            &["outcome"],
+            &["stage"],
+            &["config"],
+            &["reference", "store"],
+            &["cache", "conformance"],
+            &["graph"],
+            &["plugin"],
+            &["runner"],
+        ],
+    },
+    Crate {
+        name: "afmid-stages",
+        src: "stages/src",
+        floors: &[
+            &["statistics", "fixture"],
+            &["io", "causes", "lever_model"],
+            &["events", "simulate"],
+            &["ensemble", "calibration"],
+            &["force", "spectrum"],
+            &["model"],
+            &["diagnosis"],
+            &["exam"],
+        ],
+    },
+    Crate {
+        name: "afmid",
+        src: "src",
+        floors: &[
+            &["failure", "diagnostic", "relative", "export", "cli"],
+            &["output"],
+            &["show", "progress"],
+            &["provenance", "inspect", "doctor"],
+            &["batch", "scaffold"],
+            &["sweep", "report"],
+            &["commands"],
+        ],
+    },
+];
+
+fn floor_of(own: &Crate, folder: &str) -> Option<usize> {
+    own.floors.iter().position(|floor| floor.contains(&folder))
+}
+
+#[test]
+fn no_folder_names_one_that_lies_beside_or_above_it() {
+    let mut wrong = String::new();
+    for own in &CRATES {
+        for ((from, to), places) in arrows(&Path::new(ROOT).join(own.src)) {
+            let listed = places.iter().take(4).cloned().collect::<Vec<_>>().join("; ");
+            match (floor_of(own, &from), floor_of(own, &to)) {
+                (Some(a), Some(b)) if a > b => {}
+                (Some(_), Some(_)) => {
+                    let _ = writeln!(wrong, "{}: {from} uses {to}, which does not lie below it: {listed}", own.name);
+                }
+                (None, _) => {
+                    let _ = writeln!(wrong, "{}: the folder {from} has no floor in this test", own.name);
+                }
+                (_, None) => {
+                    let _ = writeln!(wrong, "{}: the folder {to} has no floor in this test", own.name);
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "\n{wrong}");
+}
+
+#[test]
+fn every_folder_has_a_floor_and_every_floor_is_there() {
+    for own in &CRATES {
+        let entries = fs::read_dir(Path::new(ROOT).join(own.src)).expect("a crate");
+        let there: BTreeSet<String> = entries
+            .filter_map(|entry| {
+                let path = entry.ok()?.path();
+                let name = path.file_stem()?.to_string_lossy().into_owned();
+                let code = path.is_dir() || path.extension().is_some_and(|extension| extension == "rs");
+                (code && !matches!(name.as_str(), "lib" | "main") && !name.ends_with("tests")).then_some(name)
+            })
+            .collect();
+        let listed: BTreeSet<String> =
+            own.floors.iter().flat_map(|floor| floor.iter()).map(|&name| name.to_owned()).collect();
+        assert_eq!(there, listed, "{}", own.name);
+    }
+}
+
+#[test]
+fn docs_architecture_shows_these_floors() {
+    let mut drawn = String::new();
+    for own in CRATES.iter().rev() {
+        let _ = writeln!(drawn, "{} ({}/)", own.name, own.src);
+        for floor in own.floors.iter().rev() {
+            let _ = writeln!(drawn, "    {}", floor.join("  "));
+        }
+        drawn.push('\n');
+    }
+    let drawn = format!("```text\n{}\n```", drawn.trim_end());
+    let path = Path::new(ROOT).join("docs/architecture.md");
+    let page = fs::read_to_string(&path).expect("docs/architecture.md");
+    if std::env::var_os("UPDATE_EXPECTED").is_some() {
+        let (head, rest) = page.split_once("<!-- floors -->\n").expect("a place for the floors");
+        let (_, tail) = rest.split_once("\n<!-- end of floors -->").expect("its end");
+        fs::write(&path, format!("{head}<!-- floors -->\n{drawn}\n<!-- end of floors -->{tail}")).expect("written");
+        return;
+    }
+    assert!(page.contains(&drawn), "docs/architecture.md differs; UPDATE_EXPECTED=1 writes it:\n{drawn}");
+}

@@ -1,0 +1,1 @@
+//! What a key knows: processor, build, the whole command of a plugin.

@@ -1,0 +1,1 @@
+//! FIFOs, devices, sizes of configs, numbers of problems.

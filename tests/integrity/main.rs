@@ -1,0 +1,22 @@
+//! What the engine promises whatever happens: what is stored was computed from the bytes that are stated, nothing of others is lost, strangers' files
+//! neither run commands nor take all time and memory.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod cache_files;
+mod corpus;
+mod earlier_results;
+mod faults;
+mod floors;
+mod hostile;
+mod inputs;
+mod interrupts;
+mod keys;
+mod kills;
+mod limits;
+mod ownership;
+mod paths;
+mod scaling;
+mod strangers;
+mod terminal;

@@ -1,0 +1,1 @@
+//! No command replaces or removes a file that afmid did not write.

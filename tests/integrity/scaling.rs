@@ -1,0 +1,1 @@
+//! Work grows in proportion to the number of items.

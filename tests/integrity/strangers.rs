@@ -1,0 +1,1 @@
+//! Opening never executes; executing asks.

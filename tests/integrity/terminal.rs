@@ -1,0 +1,1 @@
+//! Nothing that a file says reaches a terminal or a table raw.
