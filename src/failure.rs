@@ -1,9 +1,6 @@
 //! How a command ends when it does not succeed.
 
 use std::fmt::Display;
-use std::process::ExitCode;
-
-use crate::output::say;
 
 /// How a command ends when it does not succeed.
 #[derive(Debug)]
@@ -36,23 +33,5 @@ impl Failure {
     /// Something failed.
     pub fn failed(message: impl Display, help: Option<String>) -> Self {
         Self::Failed(Message::Line(message.to_string(), help))
-    }
-
-    /// Says it on stderr, and gives the exit code.
-    pub fn report(self) -> ExitCode {
-        let (message, code) = match self {
-            Self::Usage(message) => (message, 2),
-            Self::Failed(message) => (message, 1),
-            Self::Partly(message) => (message, 3),
-            Self::Closed => return ExitCode::SUCCESS,
-        };
-        match message {
-            Message::Line(line, help) => {
-                let help = help.map(|help| format!("  help: {help}\n")).unwrap_or_default();
-                say(&format!("error: {line}\n{help}"));
-            }
-            Message::Rendered(text) => say(&text),
-        }
-        ExitCode::from(code)
     }
 }

@@ -44,13 +44,13 @@ pub fn main(registry: &Registry) -> ExitCode {
     afmid_pipeline::plugin::shut_down();
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+        Err(failure) => output::report(failure),
     }
 }
 
 /// How a program ends whose stages do not make a registry.
 pub fn fail(error: &DoubleName) -> ExitCode {
-    Failure::failed(error, None).report()
+    output::report(Failure::failed(error, None))
 }
 
 /// Help and version go to stdout, mistakes to stderr, in colour if a person looks at them.

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::load::{load, read};
 use crate::failure::{Failure, Message};
-use crate::output::print;
+use crate::output::{print, report};
 use crate::show::pretty;
 
 /// Checks every config before it gives up.
@@ -28,7 +28,7 @@ pub fn run(configs: &[PathBuf], as_json: bool, registry: &Registry) -> Result<()
             Ok(_) => {}
             Err(failure) => {
                 wrong += 1;
-                failure.report();
+                report(failure);
             }
         }
     }

@@ -9,7 +9,8 @@ use crate::cli::DiffArgs;
 use crate::failure::{Failure, Message};
 use crate::output::print;
 use crate::provenance::diff::Diff;
-use crate::show::{diff_text, pretty};
+use crate::provenance::differences::diff_text;
+use crate::show::pretty;
 
 /// Compares two result files.
 pub fn run(args: &DiffArgs) -> Result<(), Failure> {

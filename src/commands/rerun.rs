@@ -15,10 +15,11 @@ use crate::diagnostic::render;
 use crate::failure::{Failure, Message};
 use crate::output::{print, say};
 use crate::provenance::diff::Diff;
+use crate::provenance::differences::results_text;
 use crate::provenance::files::{Finder, Now};
 use crate::provenance::repeat::{Writer, base, config_path, places, unfit, writers};
 use crate::provenance::same::{TOLERANCE, Verdict, distance, judge, results};
-use crate::show::{number, pretty, results_text};
+use crate::show::{number, pretty};
 
 /// Files that are told of where some are missing.
 const MOST: usize = 20;

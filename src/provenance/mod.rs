@@ -1,6 +1,7 @@
 //! Where results come from: differences, traces, repetitions, crates.
 
 pub mod diff;
+pub mod differences;
 pub mod digest;
 pub mod files;
 pub mod located;

@@ -2,7 +2,6 @@
 
 mod artifact;
 mod change;
-mod differences;
 mod document;
 mod grid;
 mod json;
@@ -14,7 +13,6 @@ mod stage;
 
 pub use artifact::artifact_text;
 pub use change::{change_json, change_text};
-pub use differences::{diff_text, results_text};
 pub use grid::grid;
 pub use json::artifact_json;
 pub use number::{number, with_std};

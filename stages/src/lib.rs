@@ -11,6 +11,7 @@ pub mod io;
 pub mod model;
 pub mod simulate;
 pub mod spectrum;
+pub mod statistics;
 
 use afmid_pipeline::stage::DoubleName;
 use afmid_pipeline::{Entry, Registry};

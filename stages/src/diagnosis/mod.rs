@@ -1,7 +1,6 @@
 //! What the simulation gets wrong: the verdict of a diagnosis, and the diagnosis of a measured input and output.
 
 mod example;
-mod lever_model;
 mod measured_events;
 pub mod records;
 pub mod release;
@@ -19,13 +18,7 @@ mod system_stage;
 mod system_story;
 mod verdict;
 
-pub(crate) use lever_model::MODEL;
-pub use lever_model::{
-    Estimated, LEVER_MODEL, LeverModel, LinearPart, ModelAmplitude, ModelCause, ModelMode, ModelNoise, ModelThermal,
-    ModelWander,
-};
 pub use release_stage::ReleaseDiagnose;
-pub(crate) use replay_example::model as example_model;
 pub use replay_stage::ReleaseReplay;
 pub use system_stage::{JudgedPart, SystemDiagnose};
 pub use verdict::{DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};

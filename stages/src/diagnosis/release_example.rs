@@ -5,14 +5,9 @@ use afmid_pipeline::{Array, Axis, Document, Example, Port, Ports, Recording, Sha
 
 use super::release::{Lever, LeverMode};
 use crate::io::{memory_channel, memory_record};
+use crate::simulate::example::{BEND, DETECTOR_POLE_HZ, MODES, NOISE_V, RATE_HZ, RECORDS};
 
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict");
-/// Weight of the square of the signal, 1/V.
-pub(super) const BEND: f64 = 0.02;
-pub(super) const RATE_HZ: f64 = 5e6;
-pub(super) const RECORDS: usize = 8;
-/// White noise, V.
-pub(super) const NOISE_V: f64 = 1.2e-3;
 /// First sample after the release.
 const RELEASE: usize = 6000;
 const SAMPLES: usize = 60_000;
@@ -39,16 +34,10 @@ pub(super) fn examples() -> Vec<Example> {
 }
 
 /// The lever that is released.
-pub(super) fn lever() -> Lever {
-    let mode = |frequency_hz: f64, quality_factor: f64, share: f64| LeverMode {
-        omega: std::f64::consts::TAU * frequency_hz,
-        quality_factor,
-        share,
-    };
-    Lever {
-        modes: vec![mode(46.3e3, 40.8, 0.92), mode(247.4e3, 193.2, 0.08)],
-        poles: vec![std::f64::consts::TAU * 1.5e6],
-    }
+fn lever() -> Lever {
+    let omega = |frequency_hz: f64| std::f64::consts::TAU * frequency_hz;
+    let mode = |(frequency_hz, quality_factor, share)| LeverMode { omega: omega(frequency_hz), quality_factor, share };
+    Lever { modes: MODES.map(mode).to_vec(), poles: vec![omega(DETECTOR_POLE_HZ)] }
 }
 
 /// Eight records with a release each, and their ensemble.

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use super::lever_model::{
-    Estimated, LeverModel, LinearPart, ModelAmplitude, ModelCause, ModelMode, ModelNoise, ModelThermal, ModelWander,
-};
 use super::release::{JointFit, Naming, Problem};
 use super::verdict::{Diagnosis, NamedCause, Verdict};
 use crate::causes::find;
+use crate::simulate::{
+    Estimated, LeverModel, LinearPart, ModelAmplitude, ModelCause, ModelMode, ModelNoise, ModelThermal, ModelWander,
+};
 
 /// Baseline, extension and noise as an artifact; the extension is that of the answer: none unless causes are named.
 pub(super) fn lever_model(

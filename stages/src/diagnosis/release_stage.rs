@@ -7,7 +7,6 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::lever_model::LEVER_MODEL;
 use super::measured_events::{check_cut, cut_out, onsets};
 use super::records::{
     Begun, CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, abstentions,
@@ -23,6 +22,7 @@ use super::verdict::Verdict;
 use crate::causes::{added, catalogue, find};
 use crate::events::EventKind;
 use crate::model::ModeNumber;
+use crate::simulate::LEVER_MODEL;
 
 /// Says what a linear lever and detector get wrong in snap-off events: names the causes, extends the model, measures the gain.
 ///

@@ -1,11 +1,10 @@
 //! The example of `diagnosis.replay`: the releases of `diagnosis.release`, and the model that made them.
 
-use std::collections::BTreeMap;
-
 use afmid_pipeline::{Document, Example, Port};
 
-use super::lever_model::{Estimated, LeverModel, LinearPart, MODEL, ModelAmplitude, ModelCause, ModelMode, ModelNoise};
-use super::release_example::{BEND, NOISE_V, RATE_HZ, RECORDS, inputs, lever};
+use super::release_example::inputs;
+use crate::simulate::MODEL;
+use crate::simulate::example::model;
 
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "what is left");
 
@@ -26,35 +25,4 @@ pub(super) fn examples() -> Vec<Example> {
             }
         },
     }]
-}
-
-/// The truth of the example as a diagnosis would hand it on.
-pub(crate) fn model() -> LeverModel {
-    let known = |value: f64| Estimated { value, std: None };
-    let lever = lever();
-    let part = LinearPart {
-        modes: lever
-            .modes
-            .iter()
-            .map(|mode| ModelMode {
-                frequency_hz: known(mode.omega / std::f64::consts::TAU),
-                quality_factor: known(mode.quality_factor),
-                share: known(mode.share),
-            })
-            .collect(),
-        detector_poles_hz: lever.poles.iter().map(|pole| known(pole / std::f64::consts::TAU)).collect(),
-    };
-    LeverModel {
-        sample_rate_hz: RATE_HZ,
-        records: RECORDS,
-        baseline: part.clone(),
-        extended: part,
-        causes: vec![ModelCause {
-            id: "quadratic-detector".to_owned(),
-            parameters: BTreeMap::from([("a2".to_owned(), known(BEND))]),
-            assumed: Vec::new(),
-        }],
-        noise: ModelNoise { white_v2: NOISE_V * NOISE_V, thermal: Vec::new(), wander: Vec::new() },
-        amplitude: ModelAmplitude { mean_v: 0.95, scatter_v: 0.09, events: RECORDS },
-    }
 }

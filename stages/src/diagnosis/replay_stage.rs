@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::lever_model::{LeverModel, MODEL};
 use super::measured_events::{check_cut, cut_out, onsets};
 use super::release::{Cut, EventWindow};
 use super::replay::{ReplayedEvent, Replayer};
 use crate::causes::Instant;
+use crate::simulate::{LeverModel, MODEL};
 
 /// Simulates every measured snap-off again, by the lever alone and with the named causes, and shows what either leaves.
 ///

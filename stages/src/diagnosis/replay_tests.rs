@@ -8,9 +8,10 @@ use serde_json::Value;
 
 use super::release::{Cut, EventWindow};
 use super::replay::Replayer;
-use super::{LeverModel, MODEL, ReleaseDiagnose, ReleaseReplay};
+use super::{ReleaseDiagnose, ReleaseReplay};
 use crate::causes::{Instant, find};
 use crate::simulate::{Afm, AfmOfModel, Cut as SimulatedCut, Hidden, Place};
+use crate::simulate::{LeverModel, MODEL};
 
 const RECORDS: Port<Recording> = Port::new("records", "records", "records");
 const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "events");

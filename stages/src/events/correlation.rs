@@ -286,7 +286,7 @@ impl Correlation {
 }
 
 fn middle(values: &[f64]) -> f64 {
-    super::robust_scale::median(&mut values.to_vec())
+    crate::statistics::median(&mut values.to_vec())
 }
 
 fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), StageError> {

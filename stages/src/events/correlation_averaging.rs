@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use super::cross_correlation::CrossCorrelator;
 use super::fractional_shift::{REACH, fractional_shift};
-use super::robust_scale::median;
 use super::shift_refinement::refine_shift;
+use crate::statistics::median;
 
 /// How events are aligned.
 #[derive(Debug, Clone, Copy, PartialEq)]

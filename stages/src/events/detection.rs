@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::despike::despike;
 use super::level_change::{LevelChange, jump_and_slope, level_change};
-use super::robust_scale::median_and_scale;
+use crate::statistics::median_and_scale;
 
 /// What happened to the tip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::robust_scale::median;
+use crate::statistics::median;
 
 /// A straight stretch of signal and its noise.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::correlation_averaging::Aligned;
 use super::fractional_shift::{REACH, fractional_shift};
 use super::onset::{baseline, first_sustained_departure};
-use super::robust_scale::median_and_scale;
+use crate::statistics::median_and_scale;
 
 /// Samples that the onset of the average must be sustained for.
 const SUSTAINED: usize = 4;

@@ -3,7 +3,7 @@
 use afmid_pipeline::{Matrix, StageError, StateSpace};
 
 use crate::causes::Effects;
-use crate::diagnosis::LeverModel;
+use crate::simulate::LeverModel;
 use crate::simulate::{Afm, AfmSystem};
 
 /// Lever, detector and linear causes as a discrete model, maps of the detector to be inverted, and what is left as it is.

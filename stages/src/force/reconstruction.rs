@@ -14,8 +14,8 @@ use super::{
     ForcePrior, IdentifiedModel, Reconstruction as Kernel, ReconstructionSettings, Rise, Weighting, band_inflation,
     fit_line, reconstruct, rise,
 };
-use crate::diagnosis::{LEVER_MODEL, LeverModel};
 use crate::ensemble::{Rows, onset_sample};
+use crate::simulate::{LEVER_MODEL, LeverModel};
 
 /// Tip force against time, from single events and an identified model, with its error band.
 ///

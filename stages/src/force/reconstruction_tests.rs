@@ -3,8 +3,8 @@
 use super::extension::Extension;
 use super::reconstruction::identified;
 use super::*;
-use crate::diagnosis::LeverModel;
 use crate::model::pem::{Experiment, Identified, PemOptions, identify};
+use crate::simulate::LeverModel;
 use crate::simulate::{Afm, Archive, ArchiveLayout, Hidden, Scatter, Target};
 
 const SAMPLES: usize = 8192;

@@ -17,8 +17,9 @@ mod from_model;
 mod hidden;
 mod hidden_motion;
 mod lever;
+mod lever_model;
 mod model;
-mod model_example;
+pub(crate) mod model_example;
 mod motion;
 mod noise_free;
 mod optics;
@@ -49,7 +50,13 @@ pub use error::SimulateError;
 pub use hidden::{Hidden, Setting, effects};
 pub use hidden_motion::simulate_hidden;
 pub use lever::{ModalLever, Mode};
+pub(crate) use lever_model::MODEL;
+pub use lever_model::{
+    Estimated, LEVER_MODEL, LeverModel, LinearPart, ModelAmplitude, ModelCause, ModelMode, ModelNoise, ModelThermal,
+    ModelWander,
+};
 pub use model::AfmOfModel;
+pub(crate) use model_example as example;
 pub use motion::{ContactEvent, Drive, EventKind, Motion, Sampling, simulate_motion};
 pub use noise_free::Cut;
 pub use phases::{PhaseProblem, RecordPlan, Target};

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::afm::Afm;
-use crate::diagnosis::{LeverModel, MODEL};
+use super::lever_model::{LeverModel, MODEL};
 
 /// Simulates force curves with a diagnosed lever and writes them as native records.
 ///

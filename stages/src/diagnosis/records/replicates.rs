@@ -17,7 +17,7 @@ const MOST_WEIGHT: f64 = 4.0;
 /// The same where the replicates' variances are as the inverse of their weights.
 pub(super) fn weighted_mean_and_error(values: &[Weighted]) -> (f64, f64) {
     let mut weights: Vec<f64> = values.iter().map(|(_, weight)| *weight).collect();
-    let most = MOST_WEIGHT * crate::events::median(&mut weights);
+    let most = MOST_WEIGHT * crate::statistics::median(&mut weights);
     let capped = || values.iter().map(|(value, weight)| (*value, weight.min(most)));
     let sum: f64 = capped().map(|(_, w)| w).sum();
     let mean = capped().map(|(v, w)| w * v).sum::<f64>() / sum;

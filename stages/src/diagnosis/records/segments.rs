@@ -3,7 +3,8 @@
 use super::basis::{polynomials, span};
 use super::points::Points;
 use super::summary::RecordEvent;
-use crate::events::{EventKind, median};
+use crate::events::EventKind;
+use crate::statistics::median;
 
 /// What a stretch is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

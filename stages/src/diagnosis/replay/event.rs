@@ -5,8 +5,8 @@ use afmid_pipeline::StageError;
 use super::fit::least_squares;
 use crate::causes::{Effects, Instant};
 use crate::diagnosis::release::{Cut, EventWindow};
-use crate::diagnosis::{LeverModel, LinearPart};
 use crate::simulate::{Afm, Cut as SimulatedCut, Microscope, Release};
+use crate::simulate::{LeverModel, LinearPart};
 
 /// A microscope that simulates measured events again, with causes or without.
 pub struct Replayer {

@@ -2,9 +2,8 @@
 
 use serde_json::Value;
 
-use super::grid::grid;
-use super::number::number;
-use crate::provenance::diff::{Diff, Files, Lines, Pair, ResultDiff, StageDiff};
+use super::diff::{Diff, Files, Lines, Pair, ResultDiff, StageDiff};
+use crate::show::{grid, number};
 
 /// Datasets that are told of one stage; `--json` has all.
 const MOST: usize = 40;

@@ -6,8 +6,8 @@ use afmid_pipeline::{Document, Port, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::{Hidden, effects};
 use crate::causes::{Effects, find};
-use crate::simulate::{Hidden, effects};
 
 /// Kind of the document port that carries a [`LeverModel`].
 pub const LEVER_MODEL: &str = "lever-model";
@@ -205,7 +205,7 @@ const FAST: f64 = 3.0 * std::f64::consts::PI;
 #[cfg(test)]
 impl LeverModel {
     /// The truth of a simulation as a diagnosis would hand it on.
-    pub(crate) fn of(afm: &crate::simulate::Afm) -> Self {
+    pub(crate) fn of(afm: &super::Afm) -> Self {
         let known = |value: f64| Estimated { value, std: None };
         let shares = afm.quality_factors.iter().zip(&afm.detector_shares);
         let modes = afm.frequencies_hz.iter().zip(shares).map(|(f, (q, share))| ModelMode {
