@@ -34,12 +34,19 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     all
 }
 
+/// Runs a command that must refuse; what it says.
+fn fails(here: &Path, arguments: &[&str]) -> String {
+    let output = command(here, arguments).output().expect("afmid starts");
+    let told = [output.stdout, output.stderr].concat();
+    let told = String::from_utf8_lossy(&told).into_owned();
+    assert!(matches!(output.status.code(), Some(1..=3)), "afmid {arguments:?}: {}\n{told}", output.status);
+    told
+}
+
 /// Runs a command that must refuse, and changes no file of those that are there.
 fn refused(here: &Path, arguments: &[&str]) -> String {
     let before = files(here);
-    let output = command(here, arguments).output().expect("afmid starts");
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(matches!(output.status.code(), Some(1..=3)), "afmid {arguments:?}: {}\n{told}", output.status);
+    let told = fails(here, arguments);
     let after = files(here);
     for (path, bytes) in &before {
         assert!(after.get(path) == Some(bytes), "afmid {arguments:?} changed {}: {told}", path.display());
@@ -53,7 +60,8 @@ fn kept(here: &Path, place: &str, arguments: &[&str]) {
     fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
     for others in [&b"<!DOCTYPE html>\n<html>mine</html>\n"[..], b"1,2,3\n", b"{\"mine\": 1}\n", b"\x89PNG\r\n\x1a\n"] {
         fs::write(&path, others).expect("written");
-        let told = refused(here, arguments);
+        let told = fails(here, arguments);
+        assert!(fs::read(&path).expect("bytes") == others, "afmid {arguments:?} replaced {place}: {told}");
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         assert!(told.contains(&name), "it says which: {told}");
     }
@@ -66,8 +74,8 @@ fn kept(here: &Path, place: &str, arguments: &[&str]) {
     let middle = whole.len() / 2;
     edited[middle] ^= 1;
     fs::write(&path, &edited).expect("written");
-    let told = refused(here, arguments);
-    assert!(told.contains("changed since"), "{told}");
+    let told = fails(here, arguments);
+    assert!(fs::read(&path).expect("bytes") == edited && told.contains("changed since"), "{place}: {told}");
     fs::write(&path, &whole).expect("written");
     afmid(here, arguments);
     fs::write(&path, "").expect("written");
@@ -136,14 +144,10 @@ fn results_pages_models_and_figures_replace_their_own_kind_only_and_none_that_wa
         .filter(|name| !name.starts_with('.'))
         .collect();
     names.sort();
-    if let [first, second, ..] = &names[..] {
-        for name in [first, second] {
-            kept(
-                here,
-                &format!("figures/{name}"),
-                &["report", "out.h5", "-o", "page.html", "--figures", "figures", "--png"],
-            );
-        }
+    for ending in [".png", ".svg"] {
+        let name = names.iter().find(|name| name.ends_with(ending)).expect("a figure");
+        let draw = ["report", "out.h5", "-o", "page.html", "--figures", "figures", "--png"];
+        kept(here, &format!("figures/{name}"), &draw);
     }
     fs::write(here.join("new.toml"), "mine").expect("written");
     refused(here, &["new", "pipeline", "archive", "-o", "new.toml"]);
@@ -161,7 +165,8 @@ fn batches_and_sweeps_keep_tables_results_and_ledgers_of_others() {
     let again = [&batch[..], &["--fresh"]].concat();
     kept(here, "out/archive.h5", &again);
     fs::write(here.join("out/ledger/archive.json"), "{\"mine\": 1}").expect("written");
-    assert!(refused(here, &again).contains("archive.json"));
+    assert!(fails(here, &again).contains("archive.json"));
+    assert_eq!(fs::read(here.join("out/ledger/archive.json")).expect("bytes"), b"{\"mine\": 1}");
     let sweep = format!(
         "{}\n[sweep]\n\"overview.stretches\" = [40, 50]\n",
         fs::read_to_string(here.join(CONFIG)).expect("text")
