@@ -79,7 +79,7 @@ fn what_cannot_be_reported_is_said_with_the_exit_code() {
         (&["text.h5"], 2, "text.h5 is a text file, wanted a result file"),
         (&["waves.h5", "-o", "no/such/folder.html"], 2, "the folder no/such does not exist"),
         (&["waves.h5", "-o", "other-name.h5"], 2, "would replace the result file"),
-        (&["waves.h5", "-o", "text.h5"], 2, "only an HTML page is replaced"),
+        (&["waves.h5", "-o", "text.h5"], 2, "only a page that `afmid report` wrote is replaced"),
         (&["waves.h5", "-o", "/dev/null"], 2, "is a device"),
         (&["waves.h5", "-o", "device.html"], 2, "is a device"),
         (&["waves.h5", "-o", "."], 2, "is a folder"),

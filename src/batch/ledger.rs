@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::files::replace_with;
+use afmid_pipeline::files::{replace_with, sweep};
 use serde::{Deserialize, Serialize};
 
 use super::harvest::Harvest;
@@ -24,6 +24,9 @@ pub struct Entry {
     /// What the run found.
     pub found: Harvest,
 }
+
+/// How every entry begins.
+const HEAD: &[u8] = b"{\n  \"version\": ";
 
 /// The layout that this version writes.
 const VERSION: u32 = 1;
@@ -54,9 +57,11 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// In the folder of results. Errors: its own folder cannot be made.
+    /// In the folder of results; removes what killed runs left in both. Errors: its own folder cannot be made.
     pub fn open(folder: &Path) -> std::io::Result<Self> {
-        std::fs::create_dir_all(folder.join("ledger"))?;
+        let own = folder.join("ledger");
+        std::fs::create_dir_all(&own)?;
+        [folder, &own].into_iter().for_each(sweep);
         Ok(Self { folder: folder.to_owned() })
     }
 
@@ -78,8 +83,11 @@ impl Ledger {
     /// Keeps what became of a data set, whole or not at all. Errors: the folder cannot be written.
     pub fn write(&self, entry: &Entry) -> Result<(), String> {
         let text = serde_json::to_vec_pretty(entry).map_err(|error| error.to_string())?;
-        replace_with(&self.place(&entry.name), |temporary| std::fs::write(temporary, &text))
-            .map_err(|error| error.to_string())
+        let place = self.place(&entry.name);
+        if std::fs::read(&place).is_ok_and(|there| !there.is_empty() && !there.starts_with(HEAD)) {
+            return Err(format!("{} is no entry of a ledger: it is not replaced", place.display()));
+        }
+        replace_with(&place, |temporary| std::fs::write(temporary, &text)).map_err(|error| error.to_string())
     }
 
     /// Keeps that a run went through, with the length of the result file as it lies there now. Errors: as [`Self::write`]; there is no result file.
@@ -131,6 +139,9 @@ mod tests {
         let whole = std::fs::read(&place).unwrap();
         std::fs::write(&place, &whole[..whole.len() / 2]).unwrap();
         assert!(ledger.read("a").is_none());
+        ledger.write(&Entry::failed("a", None, "no".into())).unwrap();
+        std::fs::write(&place, "my notes").unwrap();
+        assert!(ledger.write(&done).unwrap_err().contains("no entry of a ledger"));
         ledger.write(&Entry::failed("b", None, "no".into())).unwrap();
         assert!(!ledger.read("b").unwrap().is_done());
     }

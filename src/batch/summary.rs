@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::artifact::ColumnValues;
-use afmid_pipeline::files::replace_with;
-use afmid_pipeline::store::write_result;
+use afmid_pipeline::files::FilledFolder;
+use afmid_pipeline::store::{ResultFile, write_result};
 use afmid_pipeline::{Ports, RunInfo, RunResult, Shaped, StageRecord, StageResult, Table};
 use serde_json::json;
 
 use super::harvest::ModeFound;
 use super::ledger::Entry;
+use super::work::in_the_way;
 use super::{parquet, trends};
 use crate::failure::Failure;
 
@@ -75,17 +76,81 @@ pub struct Title<'a> {
     pub program: &'a str,
 }
 
-/// Writes `summary.csv`, `summary.parquet`, `trends.csv` and `summary.h5`, each whole or not at all: the same bytes from the same entries, whoever computed them.
-pub fn write(folder: &Path, title: &Title<'_>, entries: &[Entry]) -> Result<PathBuf, Failure> {
-    let (table, trends) = (table(entries), trends::table(entries));
-    let failed = |error: afmid_pipeline::error::StoreError| Failure::failed(&error, error.help.clone());
-    for (name, table) in [("summary.csv", &table), ("trends.csv", &trends)] {
-        replace_with(&folder.join(name), |path| csv(path, table)).map_err(failed)?;
+/// The tables of a batch or a sweep, and the folder that they lie in.
+#[derive(Debug)]
+pub struct Tables {
+    folder: FilledFolder,
+    /// Whether `summary.h5` is the table of an earlier run of the same kind: then the tables beside it are known, though earlier versions kept no list.
+    earlier: bool,
+}
+
+/// The table that says whose the others are.
+const SUMMARY: &str = "summary.h5";
+
+impl Tables {
+    /// Sees, before anything runs, that no table of others would be replaced. `uses` is [`BATCH`] or [`SWEEP`].
+    ///
+    /// Errors, usage: one lies there.
+    pub fn open(folder: &Path, uses: &str) -> Result<Self, Failure> {
+        let usage = |problem: String, help: &str| Err(Failure::usage(problem, Some(help.to_owned())));
+        let summary = folder.join(SUMMARY);
+        let others = "give another folder with -o, or remove the file first if it is no longer needed";
+        if let Some(found) = in_the_way(&summary) {
+            return usage(format!("{} exists and {found}: it is not replaced", summary.display()), others);
+        }
+        let stages = ResultFile::open(&summary).map(|file| file.stages().iter().any(|stage| stage.record.uses == uses));
+        if let Ok(false) = stages {
+            let kind = uses.split('.').next().unwrap_or_default();
+            let problem = format!("{} exists and is no table of a {kind}: it is not replaced", summary.display());
+            return usage(problem, "give another folder with -o");
+        }
+        let opened = FilledFolder::open(folder).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+        let tables = Self { folder: opened, earlier: stages.is_ok() };
+        for name in ["summary.csv", "trends.csv", "summary.parquet"] {
+            let own = tables.folder.require_own(name, |_| tables.earlier);
+            own.map_err(|error| Failure::usage(error.to_string(), Some(others.to_owned())))?;
+        }
+        Ok(tables)
     }
-    replace_with(&folder.join("summary.parquet"), |path| parquet::write(path, &table)).map_err(failed)?;
-    let path = folder.join("summary.h5");
-    write_result(&path, &summary(title, entries)).map_err(failed)?;
-    Ok(path)
+
+    fn csv(&self, name: &str, table: &Table) -> Result<(), Failure> {
+        self.put(name, |path| csv(path, table))
+    }
+
+    fn parquet(&self, table: &Table) -> Result<(), Failure> {
+        self.put("summary.parquet", |path| parquet::write(path, table))
+    }
+
+    fn put(&self, name: &str, fill: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<(), Failure> {
+        let replaced = self.folder.replace_with(name, |_| self.earlier, fill);
+        replaced.map_err(|error| Failure::failed(&error, error.help.clone()))
+    }
+
+    fn summary(&self, run: &RunResult) -> Result<PathBuf, Failure> {
+        let path = self.folder.folder().join(SUMMARY);
+        write_result(&path, run).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+        Ok(path)
+    }
+
+    /// Writes `summary.csv`, `summary.parquet`, `trends.csv` and `summary.h5`, each whole or not at all: the same bytes from the same entries, whoever
+    /// computed them.
+    pub fn write_batch(&self, title: &Title<'_>, entries: &[Entry]) -> Result<PathBuf, Failure> {
+        let (table, trends) = (table(entries), trends::table(entries));
+        self.csv("summary.csv", &table)?;
+        self.csv("trends.csv", &trends)?;
+        self.parquet(&table)?;
+        self.summary(&summary(title, entries))
+    }
+
+    /// Writes `summary.h5`, `summary.parquet` and `summary.csv` of a sweep, each whole or not at all.
+    pub fn write_sweep(&self, title: &Title<'_>, table: Table) -> Result<PathBuf, Failure> {
+        let mut outputs = Ports::new();
+        outputs.insert("points", table.clone().wrap());
+        let path = self.summary(&result(title, SWEEP, outputs))?;
+        self.parquet(&table)?;
+        self.csv("summary.csv", &table)?;
+        Ok(path)
+    }
 }
 
 /// What `summary.h5` holds.
@@ -102,18 +167,6 @@ pub const BATCH: &str = "batch.summary";
 
 /// What the summary of a sweep uses.
 pub const SWEEP: &str = "sweep.summary";
-
-/// Writes `summary.h5`, `summary.parquet` and `summary.csv` of a sweep, each whole or not at all. The first of them says whose the others are.
-pub fn write_sweep(folder: &Path, title: &Title<'_>, table: Table) -> Result<PathBuf, Failure> {
-    let failed = |error: afmid_pipeline::error::StoreError| Failure::failed(&error, error.help.clone());
-    let path = folder.join("summary.h5");
-    let mut outputs = Ports::new();
-    outputs.insert("points", table.clone().wrap());
-    write_result(&path, &result(title, SWEEP, outputs)).map_err(failed)?;
-    replace_with(&folder.join("summary.parquet"), |path| parquet::write(path, &table)).map_err(failed)?;
-    replace_with(&folder.join("summary.csv"), |path| csv(path, &table)).map_err(failed)?;
-    Ok(path)
-}
 
 /// The tables as the result of a stage, so that `afmid show`, `report` and HDF5 viewers open them.
 fn result(title: &Title<'_>, uses: &str, outputs: Ports) -> RunResult {

@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use afmid_pipeline::InputFiles;
-use afmid_pipeline::Plan;
 use afmid_pipeline::cache::Cache;
-use afmid_pipeline::runner::{Failed, Options, Quiet, RunError, Surroundings, run_key, run_to_file};
-use afmid_pipeline::store::is_own;
+use afmid_pipeline::runner::{Failed, Options, Quiet, RunError, RunKey, Surroundings, run_key, run_to_file};
+use afmid_pipeline::store::{FileKind, Written, written};
+use afmid_pipeline::{Plan, SourceFile};
 
 use super::harvest::{harvest, numbers};
 use super::ledger::{Entry, Ledger};
@@ -50,9 +50,9 @@ impl Work<'_> {
     pub fn one(&self, name: &str, plan: &Plan) -> Done {
         let clock = Instant::now();
         let base = plan.config.base();
-        let key = match self.key(plan) {
-            Ok(key) if self.as_run => stated(&key, plan),
-            Ok(key) => key,
+        let RunKey { key, sources } = match self.key(plan) {
+            Ok(known) if self.as_run => RunKey { key: stated(&known.key, plan), ..known },
+            Ok(known) => known,
             Err(error) => return self.kept(Entry::failed(name, None, told(&[error])), clock, (0, 0)),
         };
         let again = self.fresh || self.as_run && !writers(plan, base, Path::new("")).is_empty();
@@ -61,7 +61,7 @@ impl Work<'_> {
         {
             return Done { entry, took: None, stages: (0, 0) };
         }
-        match self.ran(name, plan, base, &key) {
+        match self.ran(name, plan, base, (&key, &sources)) {
             Ok((entry, stages)) => self.kept(entry, clock, stages),
             Err(error) => match self.elsewhere(name, &key) {
                 Some(entry) => Done { entry, took: Some(clock.elapsed()), stages: (0, 0) },
@@ -70,7 +70,7 @@ impl Work<'_> {
         }
     }
 
-    fn key(&self, plan: &Plan) -> Result<String, RunError> {
+    fn key(&self, plan: &Plan) -> Result<RunKey, RunError> {
         let (base, program, files) = (plan.config.base(), self.program, self.files);
         run_key(plan, &Surroundings { base, program, arithmetic: "", files })
     }
@@ -81,7 +81,7 @@ impl Work<'_> {
         let entry = match (self.key(plan), self.ledger.read(name)) {
             (_, None) => failed("no run of it has ended"),
             (Err(error), Some(_)) => Entry::failed(name, None, told(&[error])),
-            (Ok(key), Some(entry)) if entry.key.as_ref().is_some_and(|own| *own != key) => {
+            (Ok(known), Some(entry)) if entry.key.as_ref().is_some_and(|own| *own != known.key) => {
                 failed("its records, the config or the program have changed since its last run: run the batch again")
             }
             (Ok(_), Some(entry)) if entry.is_done() && !self.ledger.holds(&entry) => {
@@ -99,11 +99,16 @@ impl Work<'_> {
             .filter(|entry| entry.key.as_deref() == Some(key) && self.ledger.holds(entry) && !self.fresh)
     }
 
-    fn ran(&self, name: &str, plan: &Plan, base: &Path, key: &str) -> Result<(Entry, (usize, usize)), String> {
+    fn ran(
+        &self,
+        name: &str,
+        plan: &Plan,
+        base: &Path,
+        (key, sources): (&str, &[SourceFile]),
+    ) -> Result<(Entry, (usize, usize)), String> {
         let path = self.ledger.result(name);
-        // an empty file holds nothing that could be lost
-        if std::fs::metadata(&path).is_ok_and(|there| there.len() > 0) && !is_own(&path).unwrap_or(false) {
-            return Err(format!("{} exists and is no result of afmid's: it is not replaced\n", path.display()));
+        if let Some(found) = in_the_way(&path) {
+            return Err(format!("{} exists and {found}: it is not replaced\n", path.display()));
         }
         let options = Options {
             base: base.to_owned(),
@@ -118,6 +123,12 @@ impl Work<'_> {
             Failed::Stages(errors) => told(&errors),
             Failed::File(error) => error.to_string(),
         })?;
+        // the key was made before the run: it is the run's only if both read the same files
+        let read = result.stages.iter().flat_map(|stage| &stage.sources);
+        if !read.clone().eq(sources) {
+            let changed = read.zip(sources).find(|(now, then)| now != then).map(|(now, _)| now.path.as_str());
+            return Err(format!("{}: changed while the run began\n", changed.unwrap_or("the list of its files")));
+        }
         let mut found = harvest(&result);
         if self.as_run {
             found.numbers = numbers(&result);
@@ -162,6 +173,16 @@ pub fn all<T: Sync>(
     let mut finished = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
     finished.sort_by_key(|(index, _)| *index);
     finished.into_iter().map(|(_, done)| done).collect()
+}
+
+/// What lies where a result is going to be written and must stay; none if nothing does.
+pub fn in_the_way(path: &Path) -> Option<String> {
+    // what is not there, or cannot be read, is for the writer to complain about; an empty file holds nothing that could be lost
+    match written(path).ok()? {
+        Written::AsWritten | Written::CutShort | Written::Other(FileKind::Empty) => None,
+        Written::Changed => Some("was changed since afmid wrote it".to_owned()),
+        Written::Other(kind) => Some(format!("is {kind}, no result of afmid's")),
+    }
 }
 
 /// A run's key with all that its result states beside its stages.

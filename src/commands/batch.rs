@@ -11,9 +11,9 @@ use super::run::{PROGRAM, default_output, open_cache};
 use super::sweep::refuse;
 use crate::batch::dataset::{DataSet, sorted};
 use crate::batch::ledger::{Entry, Ledger};
-use crate::batch::summary::Title;
+use crate::batch::manifest;
+use crate::batch::summary::{BATCH, Tables, Title};
 use crate::batch::work::{Done, Work, all};
-use crate::batch::{manifest, summary};
 use crate::cli::{BatchArgs, ConfigArgs, SetsArgs};
 use crate::failure::{Failure, Message};
 use crate::output::print;
@@ -27,16 +27,13 @@ pub fn run(args: &BatchArgs, registry: &Registry) -> Result<(), Failure> {
     let whole = whole(&args.config, registry)?;
     let folder = args.output.clone().unwrap_or_else(|| default_output(whole.name()).with_extension(""));
     let ledger = ledger(&folder)?;
+    // a shard writes none: whoever collects does
+    let tables = args.shard.is_none().then(|| Tables::open(&folder, BATCH)).transpose()?;
     let own = |set: &&DataSet| args.shard.is_none_or(|shard| shard.holds(&set.name));
     let done = computed(args, &planned(&args.config, sets.iter().filter(own), registry)?, &ledger)?;
     let entries: Vec<Entry> = done.iter().map(|done| done.entry.clone()).collect();
-    let table = match args.shard {
-        Some(_) => None,
-        None => {
-            let title = Title { name: whole.name(), seed: whole.seed(), config: whole.config_text(), program: PROGRAM };
-            Some(summary::write(&folder, &title, &entries)?)
-        }
-    };
+    let title = Title { name: whole.name(), seed: whole.seed(), config: whole.config_text(), program: PROGRAM };
+    let table = tables.map(|tables| tables.write_batch(&title, &entries)).transpose()?;
     print(&told(args.json, &folder, &done, table.as_deref(), clock)?)?;
     match entries.iter().filter(|entry| !entry.is_done()).count() {
         0 => Ok(()),

@@ -79,6 +79,21 @@ pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failur
         let help = "write them with `cargo run -- docs`".to_owned();
         return Err(Failure::failed(format!("the generated documentation is old: {}", names.join(", ")), Some(help)));
     }
+    let known = folder.join("pipeline.schema.json");
+    if let Some((there, _)) = changed.iter().find(|(path, _)| path.exists()).filter(|_| !known.is_file()) {
+        let problem = format!("{} exists, and {} holds no book of afmid's", there.display(), folder.display());
+        return Err(Failure::usage(
+            problem,
+            Some("give the folder of afmid's documentation, or an empty one".to_owned()),
+        ));
+    }
+    if let Some(there) = stale.first().filter(|_| !known.is_file()) {
+        let problem = format!("{} is no page of afmid's, and would be removed", there.display());
+        return Err(Failure::usage(
+            problem,
+            Some("give the folder of afmid's documentation, or an empty one".to_owned()),
+        ));
+    }
     let fail = |path: &Path, error| Failure::failed(format!("{} cannot be written: {error}", path.display()), None);
     for folder in [&stages, &causes] {
         fs::create_dir_all(folder).map_err(|error| fail(folder, error))?;

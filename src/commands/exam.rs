@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use afmid_pipeline::cache::Cache;
+use afmid_pipeline::files::{FilledFolder, LIST};
 use afmid_pipeline::runner::{Options, Quiet, run as run_plan};
 use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Artifact, Context, Ports, Registry, Stage};
@@ -100,12 +101,18 @@ fn keep(drawn: &Draw, verdict: &Value, base: &Path, folder: &Path) -> Result<(),
     };
     std::fs::create_dir_all(folder).map_err(|error| failed(&error))?;
     let archive = base.join(OUT);
+    let filled = FilledFolder::open(folder).map_err(|error| failed(&error))?;
     for entry in std::fs::read_dir(&archive).into_iter().flatten().flatten() {
-        std::fs::copy(entry.path(), folder.join(entry.file_name())).map_err(|error| failed(&error))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name == LIST {
+            continue;
+        }
+        let copied = |temporary: &Path| std::fs::copy(entry.path(), temporary).map(|_| ());
+        filled.replace_with(&name, |_| false, copied).map_err(|error| failed(&error))?;
     }
     let told = serde_json::json!({ "draw": drawn, "diagnosis": verdict });
     let text = serde_json::to_string_pretty(&told).map_err(|error| failed(&error))?;
-    std::fs::write(folder.join("exam.json"), text + "\n").map_err(|error| failed(&error))
+    filled.write("exam.json", |_| false, (text + "\n").as_bytes()).map_err(|error| failed(&error))
 }
 
 /// Why there is no answer.

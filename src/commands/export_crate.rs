@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::files::replace_with;
+use afmid_pipeline::error::StoreError;
+use afmid_pipeline::files::{FilledFolder, LIST};
 use serde_json::{Value, json};
 
 use super::diff::open;
@@ -36,18 +37,18 @@ pub fn run(args: &CrateArgs) -> Result<(), Failure> {
     }
     let stated = Stated { agent: args.agent.clone(), agent_id: args.agent_id.clone(), license: args.license.clone() };
     let result = result_name(&args.result);
-    let failed = |error: std::io::Error| Failure::failed(format!("an input cannot be read: {error}"), None);
-    let metadata = metadata(&file, &result, &inputs, &stated).map_err(failed)?;
+    let unread = |error: std::io::Error| Failure::failed(format!("an input cannot be read: {error}"), None);
+    let metadata = metadata(&file, &result, &inputs, &stated).map_err(unread)?;
     make_folder(&folder)?;
-    copy(&args.result, &folder.join(&result))?;
-    write(&folder.join(CONFIG), &file.run().config)?;
-    for input in &inputs {
-        if let (Some(from), Some(place)) = (&input.found, &input.copy) {
-            copy(from, &folder.join(place))?;
-        }
-    }
+    let held = Held::open(&folder)?;
+    let mut copies: Vec<(&Path, &str)> = vec![(&args.result, &result)];
+    copies.extend(inputs.iter().filter_map(|input| Some((input.found.as_deref()?, input.copy.as_deref()?))));
+    copies.iter().try_for_each(|(_, name)| held.require_own(name))?;
+    [CONFIG, METADATA].iter().try_for_each(|name| held.require_own(name))?;
+    copies.iter().try_for_each(|(from, name)| held.copy(from, name))?;
+    held.write(CONFIG, &file.run().config)?;
     // last: a folder without it is no crate
-    write(&folder.join(METADATA), &text(&metadata)?)?;
+    held.write(METADATA, &text(&metadata)?)?;
     if args.json {
         let folder = folder.display().to_string();
         return print(&pretty(
@@ -80,7 +81,7 @@ fn make_folder(folder: &Path) -> Result<(), Failure> {
     let shown = folder.display();
     let another = || Some("give another place with -o".to_owned());
     match fs::read_dir(folder).map(|mut entries| entries.next().is_some()) {
-        Ok(true) if !folder.join(METADATA).is_file() => {
+        Ok(true) if ![METADATA, LIST].iter().any(|name| folder.join(name).is_file()) => {
             Err(Failure::usage(format!("{shown} holds other things than a crate: only a crate is replaced"), another()))
         }
         Ok(_) => Ok(()),
@@ -89,24 +90,45 @@ fn make_folder(folder: &Path) -> Result<(), Failure> {
     }
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    replaced(path, |temporary| fs::write(temporary, text))
+/// What lies in a crate's folder.
+struct Held {
+    folder: FilledFolder,
+    /// Whether a version that kept no list made the crate: its files are known by it.
+    earlier: bool,
 }
 
-fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
-    if let Some(folder) = to.parent() {
-        fs::create_dir_all(folder).map_err(|error| {
-            Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
-        })?;
+impl Held {
+    fn open(folder: &Path) -> Result<Self, Failure> {
+        let metadata = fs::read_to_string(folder.join(METADATA)).unwrap_or_default();
+        let earlier = metadata.contains("\"SoftwareApplication\"") && metadata.contains("\"name\": \"afmid\"");
+        Ok(Self { folder: FilledFolder::open(folder).map_err(failed)?, earlier })
     }
-    // a crate may be made of a result that lies in it
-    let same = |path: &Path| fs::canonicalize(path).ok();
-    if same(from).is_some() && same(from) == same(to) {
-        return Ok(());
+
+    fn require_own(&self, name: &str) -> Result<(), Failure> {
+        self.folder.require_own(name, |_| self.earlier).map_err(failed)
     }
-    replaced(to, |temporary| fs::copy(from, temporary).map(|_| ()))
+
+    fn write(&self, name: &str, text: &str) -> Result<(), Failure> {
+        self.folder.write(name, |_| self.earlier, text.as_bytes()).map_err(failed)
+    }
+
+    fn copy(&self, from: &Path, name: &str) -> Result<(), Failure> {
+        let to = self.folder.folder().join(name);
+        if let Some(folder) = to.parent() {
+            fs::create_dir_all(folder).map_err(|error| {
+                Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
+            })?;
+        }
+        // a crate may be made of a result that lies in it
+        let same = |path: &Path| fs::canonicalize(path).ok();
+        if same(from).is_some() && same(from) == same(&to) {
+            return Ok(());
+        }
+        let copied = |temporary: &Path| fs::copy(from, temporary).map(|_| ());
+        self.folder.replace_with(name, |_| self.earlier, copied).map_err(failed)
+    }
 }
 
-fn replaced(path: &Path, fill: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<(), Failure> {
-    replace_with(path, fill).map_err(|error| Failure::failed(&error, error.help.clone()))
+fn failed(error: StoreError) -> Failure {
+    Failure::failed(&error, error.help.clone())
 }

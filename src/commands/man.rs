@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use afmid_pipeline::files::FilledFolder;
 use clap::Command;
 use clap_mangen::Man;
 
@@ -19,8 +20,12 @@ pub fn run(folder: Option<&Path>) -> Result<(), Failure> {
     };
     std::fs::create_dir_all(folder).map_err(failed)?;
     let pages = pages(command, "afmid")?;
+    let filled = FilledFolder::open(folder).map_err(|error| Failure::failed(&error, None))?;
+    // a page of a version that kept no list
+    let earlier = |path: &Path| std::fs::read_to_string(path).is_ok_and(|page| page.contains(".TH afmid"));
     for (name, text) in &pages {
-        std::fs::write(folder.join(name), text).map_err(failed)?;
+        let written = filled.write(name, earlier, text.as_bytes());
+        written.map_err(|error| Failure::failed(&error, error.help.clone()))?;
     }
     print(&format!("{}: {} pages\n", folder.display(), pages.len()))
 }

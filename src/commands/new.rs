@@ -26,7 +26,8 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
     let usage = |(problem, help): (String, Option<String>)| Failure::usage(problem, help);
     let source = look(&args.recordings).map_err(usage)?;
     let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", args.goal.name())));
-    if output.exists() {
+    // also a link to nothing
+    if output.symlink_metadata().is_ok() {
         let help = "choose another file with -o, or remove it".to_owned();
         return Err(Failure::usage(format!("{} is there already", output.display()), Some(help)));
     }
@@ -52,7 +53,7 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
 fn new_stage(args: &NewStageArgs) -> Result<(), Failure> {
     let name = &args.name;
     let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(name));
-    if folder.exists() {
+    if folder.symlink_metadata().is_ok() {
         let help = "choose another folder with -o, or remove it".to_owned();
         return Err(Failure::usage(format!("{} is there already", folder.display()), Some(help)));
     }

@@ -3,6 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::RunResult;
+use afmid_pipeline::error::StoreError;
+use afmid_pipeline::files::{FilledFolder, replace_with};
 use afmid_pipeline::store::read_result;
 use serde_json::json;
 
@@ -23,25 +26,9 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     let run = read_result(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let (results, page) = (folder_of(&args.result), folder_of(&output));
     let page = report(&run, &|name| beside(results, page, name)).map_err(|error| Failure::failed(error, None))?;
-    write(&output, page.as_bytes())?;
-    let mut written = Vec::new();
-    if let Some(folder) = &args.figures {
-        fs::create_dir_all(folder).map_err(|error| {
-            Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
-        })?;
-        let painter = args.png.then(Painter::new);
-        for (name, text) in figures(&run) {
-            let path = folder.join(name);
-            write(&path, text.as_bytes())?;
-            let picture = path.with_extension("png");
-            written.push(path);
-            if let Some(painter) = &painter {
-                let cannot = |error| Failure::failed(format!("{} cannot be drawn: {error}", picture.display()), None);
-                write(&picture, &painter.png(&text).map_err(cannot)?)?;
-                written.push(picture);
-            }
-        }
-    }
+    let drawn = args.figures.as_ref().map(|folder| Figures::new(folder, &run, args.png)).transpose()?;
+    replace_with(&output, |temporary| fs::write(temporary, page.as_bytes())).map_err(|error| failed(&error))?;
+    let written = drawn.map(|drawn| drawn.write()).transpose()?.unwrap_or_default();
     let figures: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
     if args.json {
         return print(&pretty(&json!({ "page": output.display().to_string(), "figures": figures }))?);
@@ -61,15 +48,54 @@ fn default_output(result: &Path) -> PathBuf {
     PathBuf::from(result.file_stem().unwrap_or_default()).with_extension("html")
 }
 
-/// Writes under a temporary name beside it and renames: a page is whole or not there.
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(format!(".{}.tmp", std::process::id()));
-    let temporary = PathBuf::from(temporary);
-    let written = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
-    written.map_err(|error| {
-        // a half-written file is of no use to anybody; if it cannot be removed either, the first error says why
-        let _ = fs::remove_file(&temporary);
-        Failure::failed(format!("{} cannot be written: {error}", path.display()), None)
-    })
+fn failed(error: &StoreError) -> Failure {
+    Failure::failed(error, error.help.clone())
+}
+
+/// The figures as files of their own.
+struct Figures {
+    folder: FilledFolder,
+    /// Names and what they hold; a PNG file after its SVG file.
+    files: Vec<(String, Vec<u8>)>,
+}
+
+impl Figures {
+    /// Draws them; nothing is written yet. Errors: the folder cannot be made; a file of others lies in it.
+    fn new(folder: &Path, run: &RunResult, png: bool) -> Result<Self, Failure> {
+        fs::create_dir_all(folder).map_err(|error| {
+            Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
+        })?;
+        let painter = png.then(Painter::new);
+        let mut files = Vec::new();
+        for (name, text) in figures(run) {
+            let picture = painter.as_ref().map(|painter| painter.png(&text)).transpose();
+            let picture = picture.map_err(|error| Failure::failed(format!("{name} cannot be drawn: {error}"), None))?;
+            let drawn = Path::new(&name).with_extension("png").to_string_lossy().into_owned();
+            files.push((name, text.into_bytes()));
+            files.extend(picture.map(|picture| (drawn, picture)));
+        }
+        let folder = FilledFolder::open(folder).map_err(|error| failed(&error))?;
+        for (name, _) in &files {
+            folder.require_own(name, of_earlier_version).map_err(|error| failed(&error))?;
+        }
+        Ok(Self { folder, files })
+    }
+
+    /// Writes them, and says where.
+    fn write(self) -> Result<Vec<PathBuf>, Failure> {
+        let write = |(name, bytes): (String, Vec<u8>)| {
+            self.folder.write(&name, of_earlier_version, &bytes).map_err(|error| failed(&error))?;
+            Ok(self.folder.folder().join(name))
+        };
+        self.files.into_iter().map(write).collect()
+    }
+}
+
+/// How every figure begins.
+const FIGURE: &[u8] =
+    b"<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"figure\"";
+
+/// A figure that a version without lists wrote.
+fn of_earlier_version(path: &Path) -> bool {
+    fs::read(path).is_ok_and(|bytes| bytes.starts_with(FIGURE))
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use afmid_pipeline::Registry;
-use afmid_pipeline::files::replace_with;
+use afmid_pipeline::files::FilledFolder;
 use serde_json::json;
 
 use super::batch::{data_sets, ledger, planned, whole};
@@ -87,6 +87,12 @@ fn write(here: &Path, jobs: &Jobs, sets: &[DataSet], config: &str) -> Result<(),
     let failed = |error: &dyn std::fmt::Display| Failure::failed(format!("the jobs cannot be written: {error}"), None);
     std::fs::create_dir_all(here.join(LOG)).map_err(|error| failed(&error))?;
     let manifest = manifest::write(sets).map_err(|error| failed(&error))?;
+    // a version that kept no list is known by its script
+    let earlier = std::fs::read_to_string(here.join(SUBMIT)).is_ok_and(|script| script.contains(ARRAY));
+    let filled = FilledFolder::open(here).map_err(|error| failed(&error))?;
+    for name in [MANIFEST, CONFIG, ARRAY, COLLECT, SUBMIT] {
+        filled.require_own(name, |_| earlier).map_err(|error| failed(&error))?;
+    }
     for (name, text) in [
         (MANIFEST, manifest.as_str()),
         (CONFIG, config),
@@ -95,11 +101,11 @@ fn write(here: &Path, jobs: &Jobs, sets: &[DataSet], config: &str) -> Result<(),
         (SUBMIT, &jobs.submit()),
     ] {
         let mode = if name == SUBMIT { 0o755 } else { 0o644 };
-        replace_with(&here.join(name), |path| {
+        let fill = |path: &Path| {
             std::fs::write(path, text)?;
             std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode))
-        })
-        .map_err(|error| failed(&error))?;
+        };
+        filled.replace_with(name, |_| earlier, fill).map_err(|error| failed(&error))?;
     }
     Ok(())
 }

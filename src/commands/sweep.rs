@@ -3,13 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use afmid_pipeline::store::ResultFile;
 use afmid_pipeline::{Artifact, Plan};
 use serde_json::{Value, json};
 
 use super::run::{PROGRAM, default_output, open_cache};
 use crate::batch::ledger::{Entry, Ledger};
-use crate::batch::summary::{SWEEP, Title, write_sweep};
+use crate::batch::summary::{SWEEP, Tables, Title};
 use crate::batch::work::{Done, Work, all};
 use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
@@ -19,21 +18,18 @@ use crate::show::{artifact_text, pretty};
 use crate::sweep::point::{self, Point};
 use crate::sweep::table::{shown, table};
 
-/// The tables of a sweep, in its folder.
-const TABLES: [&str; 3] = ["summary.h5", "summary.parquet", "summary.csv"];
-
 /// Runs all points, one after the other: each finds in the cache what those before it have computed. One that fails stops no other; then the exit code is 3.
 pub fn run(plan: &Plan, count: usize, args: &RunArgs) -> Result<(), Failure> {
     let clock = Instant::now();
     let folder = folder(plan, args)?;
-    require_own(&folder)?;
     let ledger = Ledger::open(&folder).map_err(|error| {
         let help = "give another folder with -o".to_owned();
         Failure::usage(format!("the folder {} cannot be made: {error}", folder.display()), Some(help))
     })?;
+    let tables = Tables::open(&folder, SWEEP)?;
     let points = computed(plan, count, args, &ledger)?;
     let title = Title { name: plan.name(), seed: plan.seed(), config: plan.config_text(), program: PROGRAM };
-    let summary = write_sweep(&folder, &title, table(&points))?;
+    let summary = tables.write_sweep(&title, table(&points))?;
     let told = Told { folder: &folder, points: &points, summary: &summary, ledger: &ledger };
     print(&if args.json { pretty(&told.json())? } else { told.text(clock) })?;
     match points.iter().filter(|point| !point.done.entry.is_done()).count() {
@@ -64,18 +60,6 @@ fn folder(plan: &Plan, args: &RunArgs) -> Result<PathBuf, Failure> {
         return Err(Failure::usage(message, Some(help)));
     }
     Ok(output.clone())
-}
-
-/// Errors, usage: the folder has tables of others, of a batch for instance, which would be replaced.
-fn require_own(folder: &Path) -> Result<(), Failure> {
-    let holds = |name: &&&str| std::fs::metadata(folder.join(name)).is_ok_and(|there| there.len() > 0);
-    let Some(there) = TABLES.iter().find(holds) else { return Ok(()) };
-    let summary = ResultFile::open(&folder.join(TABLES[0]));
-    if summary.is_ok_and(|file| file.stages().iter().any(|stage| stage.record.uses == SWEEP)) {
-        return Ok(());
-    }
-    let message = format!("{} exists and is no table of a sweep: it is not replaced", folder.join(there).display());
-    Err(Failure::usage(message, Some("give another folder with -o".to_owned())))
 }
 
 fn computed(plan: &Plan, count: usize, args: &RunArgs, ledger: &Ledger) -> Result<Vec<Point>, Failure> {

@@ -1,15 +1,16 @@
-//! Where a command may write: never over its own inputs, and over nothing that afmid did not write.
+//! Where a command may write: never over its own inputs, and over nothing that afmid did not write, or that was changed since.
 
 use std::fs::{self, Metadata};
 use std::io::{ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::files::probe;
-use afmid_pipeline::store::{FileKind, file_kind};
+use afmid_pipeline::files::{has_mark, probe, states_mark, sweep_beside};
+use afmid_pipeline::store::{FileKind, Written, file_kind, written};
 
 use crate::export::is_exported;
 use crate::failure::Failure;
+use crate::report::is_page;
 
 /// What is to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,20 +24,40 @@ pub enum Target {
 }
 
 impl Target {
-    /// An empty file holds nothing that could be lost: a script may have made it to reserve the name.
-    fn may_replace(self, path: &Path, kind: FileKind) -> bool {
-        kind == FileKind::Empty
-            || match self {
-                Self::Result => kind == FileKind::Own,
-                Self::Page => kind == FileKind::Html,
-                Self::Model => head(path).is_ok_and(|head| is_exported(&head)),
+    /// Why what lies at the path must stay, in words that follow its name; none: it may be replaced. An empty file holds nothing that could be lost: a
+    /// script may have made it to reserve the name.
+    ///
+    /// Results, pages and models state the hash of what was written; pages and models of earlier versions are known by how they begin. Errors: it cannot
+    /// be read.
+    fn in_the_way(self, path: &Path) -> std::io::Result<Option<String>> {
+        let kind = file_kind(path)?;
+        if kind == FileKind::Empty {
+            return Ok(None);
+        }
+        let (own, changed) = match self {
+            Self::Result => match written(path)? {
+                Written::AsWritten | Written::CutShort => (true, false),
+                Written::Changed => (true, true),
+                Written::Other(_) => (false, false),
+            },
+            Self::Page | Self::Model => {
+                let head = head(path)?;
+                let looks =
+                    if self == Self::Page { kind == FileKind::Html && is_page(&head) } else { is_exported(&head) };
+                (looks, looks && states_mark(path)? && !has_mark(path)?)
             }
+        };
+        Ok(match (own, changed) {
+            (true, false) => None,
+            (true, true) => Some("was changed since afmid wrote it: it is not replaced".to_owned()),
+            (false, _) => Some(format!("is {kind}: only {} is replaced", self.wanted())),
+        })
     }
 
     const fn wanted(self) -> &'static str {
         match self {
             Self::Result => "a result of afmid's",
-            Self::Page => "an HTML page",
+            Self::Page => "a page that `afmid report` wrote",
             Self::Model => "a model that `afmid export` wrote",
         }
     }
@@ -45,7 +66,8 @@ impl Target {
 /// An input of the command, and what it is to it.
 pub type Input = (&'static str, PathBuf);
 
-/// Sees to it, before anything runs, that `path` can be written and that nothing is lost by it. Makes its folder if only that is missing.
+/// Sees to it, before anything runs, that `path` can be written and that nothing is lost by it. Makes its folder if only that is missing, and removes what
+/// killed commands left beside it.
 ///
 /// Errors, all usage: it is an input; it exists and is no regular file, or a file of another kind; its folder cannot be made or written.
 pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Failure> {
@@ -67,6 +89,7 @@ pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Fail
         return Err(usage(format!("{shown} is a folder, wanted a file"), ANOTHER));
     }
     make_folder(path)?;
+    sweep_beside(path);
     probe(path).map_err(|error| match error.kind() {
         ErrorKind::InvalidFilename => {
             usage(format!("{shown} cannot be written: its name is too long ({error})"), ANOTHER)
@@ -102,20 +125,21 @@ fn existing(path: &Path, metadata: &Metadata, target: Target, inputs: &[Input]) 
             "give another name with -o",
         ));
     }
-    let kind = file_kind(path).map_err(|error| usage(format!("{shown} cannot be looked at: {error}"), ANOTHER))?;
-    if target.may_replace(path, kind) {
-        return Ok(());
+    let found =
+        target.in_the_way(path).map_err(|error| usage(format!("{shown} cannot be looked at: {error}"), ANOTHER))?;
+    match found {
+        None => Ok(()),
+        Some(found) => Err(usage(
+            format!("{shown} exists and {found}"),
+            "give another name with -o, or remove the file first if it is no longer needed",
+        )),
     }
-    Err(usage(
-        format!("{shown} exists and is {kind}: only {} is replaced", target.wanted()),
-        "give another name with -o, or remove the file first if it is no longer needed",
-    ))
 }
 
-/// As much of a file as tells an exported model.
+/// As much of a file as tells a page or an exported model.
 fn head(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
-    fs::File::open(path)?.take(128).read_to_end(&mut head)?;
+    fs::File::open(path)?.take(1 << 13).read_to_end(&mut head)?;
     Ok(head)
 }
 

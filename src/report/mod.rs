@@ -23,5 +23,5 @@ mod fixture;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use page::{figures, report};
+pub(crate) use page::{figures, is_page, report};
 pub(crate) use png::Painter;

@@ -1,5 +1,6 @@
 //! Assembles the page.
 
+use afmid_pipeline::files::marked;
 use afmid_pipeline::{Document, Recording, RunResult};
 use minijinja::Environment;
 use minijinja::value::Serde;
@@ -83,7 +84,14 @@ pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportE
         page_css: include_str!("page.css"),
         script: include_str!("figure.js"),
     };
-    Ok(environment.get_template("report.html")?.render(Serde(page))?)
+    let page = environment.get_template("report.html")?.render(Serde(page))?;
+    let marked = marked(|mark| format!("{}\n<!-- {mark} -->\n", page.trim_end()).into_bytes());
+    Ok(marked.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or(page))
+}
+
+/// Whether a file that begins with these bytes is a page of [`report`]: pages of earlier versions bear no mark.
+pub(crate) fn is_page(head: &[u8]) -> bool {
+    String::from_utf8_lossy(head).contains("<meta name=\"generator\" content=\"afmid")
 }
 
 /// A batch's own; or the diagnosis first, where there is one: it is what the run was for.

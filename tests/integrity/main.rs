@@ -18,5 +18,6 @@ mod limits;
 mod ownership;
 mod paths;
 mod scaling;
+mod small;
 mod strangers;
 mod terminal;

@@ -2,15 +2,24 @@
 
 use crate::fail;
 use crate::{FormatError, Raw};
-use std::fs::File;
-use std::os::unix::fs::FileExt;
+use std::fs::{File, Metadata};
+use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-/// A file's path and the size it had when it was opened. Holds no open file.
+/// A file's path, size and state when it was opened. Holds no open file.
 #[derive(Debug, Clone)]
 pub(crate) struct Pinned {
     path: PathBuf,
     bytes: u64,
+    state: State,
+}
+
+/// Device, inode, times of modification and of the last change: what tells that it is the same file, unchanged.
+type State = [i64; 6];
+
+fn state(about: &Metadata) -> State {
+    let [device, inode] = [about.dev().cast_signed(), about.ino().cast_signed()];
+    [device, inode, about.mtime(), about.mtime_nsec(), about.ctime(), about.ctime_nsec()]
 }
 
 impl Pinned {
@@ -22,7 +31,7 @@ impl Pinned {
         if !about.is_file() {
             return Err(fail::plain("this is a folder or device, a file was wanted", "name the file itself"));
         }
-        Ok((Self { path: path.to_owned(), bytes: about.len() }, file))
+        Ok((Self { path: path.to_owned(), bytes: about.len(), state: state(&about) }, file))
     }
 
     /// Size in bytes.
@@ -30,12 +39,16 @@ impl Pinned {
         self.bytes
     }
 
-    /// Opens it once more. Errors: gone, or of another size by now.
+    /// Opens it once more. Errors: gone, or changed by now.
     pub(crate) fn reopen(&self) -> Result<File, FormatError> {
         let (now, file) = Self::open(&self.path)?;
         if now.bytes != self.bytes {
             let problem = format!("the file had {} bytes when it was opened and has {} now", self.bytes, now.bytes);
             return Err(fail::plain(problem, "wait until the recording has ended, then open it again"));
+        }
+        if now.state != self.state {
+            let problem = "the file was changed since it was opened";
+            return Err(fail::plain(problem, "wait until nothing writes to it, then open it again"));
         }
         Ok(file)
     }

@@ -1,23 +1,35 @@
 //! What of processor and build may change the last bits of a result.
 //!
-//! Sums and products are the same everywhere: the compiler contracts nothing. Two things are not: which vector units the FFT, linear algebra and
-//! loops of this program choose at run time (other orders of summation, fused multiply-add), and the C library's functions (`exp`, `sin`, ...),
-//! which choose by processor and differ between releases. The first is stated by name, the second by what the functions return.
+//! Sums and products are the same everywhere: the compiler contracts nothing. Four things are not:
+//!
+//! - which vector units the FFT, linear algebra and loops of this program choose at run time (other orders of summation, fused multiply-add): stated by
+//!   name;
+//! - the C library's functions (`exp`, `sin`, ...), which choose by processor and differ between releases: stated by what they return;
+//! - the build: compiler, target and its features, level of optimisation (what is computed when the program is built may be rounded otherwise), checks;
+//! - where there is no AVX2 with fused multiply-add, products of large matrices are summed in blocks that fit the processor's caches: stated by size.
+//!
+//! Threads, memory and the order in which stages end change nothing (`tests/threads.rs`).
 
 use blake3::Hasher;
 
 /// The arithmetic of this process, in words: part of every key. The same text, the same bits.
-///
-/// Architecture, vector units in use, compiler, optimised or not, and a hash of the C library's functions at fixed arguments.
 pub fn arithmetic() -> String {
-    let optimised = if cfg!(debug_assertions) { "checked" } else { "optimised" };
-    format!(
-        "{} [{}], {}, {optimised}, functions {}",
-        std::env::consts::ARCH,
-        vector_units().join(" "),
-        env!("AFMID_COMPILER"),
-        functions()
-    )
+    let units = vector_units();
+    let blocks = if ["avx2", "fma"].iter().all(|unit| units.contains(unit)) { String::new() } else { caches() };
+    let units = units.join(" ");
+    format!("{} [{units}]{blocks}, {}, functions {}", std::env::consts::ARCH, env!("AFMID_BUILD"), functions())
+}
+
+/// Sizes of the first processor's caches: the faer and gemm crates choose blocks by them.
+fn caches() -> String {
+    let size = |index: usize| {
+        let folder = format!("/sys/devices/system/cpu/cpu0/cache/index{index}");
+        let read =
+            |name: &str| std::fs::read_to_string(format!("{folder}/{name}")).unwrap_or_default().trim().to_owned();
+        format!("{}/{}/{}", read("size"), read("ways_of_associativity"), read("coherency_line_size"))
+    };
+    let sizes: Vec<String> = (0..4).map(size).collect();
+    format!(" caches {}", sizes.join(" "))
 }
 
 /// The vector units that FFTs, linear algebra and loops choose among.
@@ -30,6 +42,10 @@ fn vector_units() -> Vec<&'static str> {
             ("avx2", std::arch::is_x86_feature_detected!("avx2")),
             ("fma", std::arch::is_x86_feature_detected!("fma")),
             ("avx512f", std::arch::is_x86_feature_detected!("avx512f")),
+            ("avx512bw", std::arch::is_x86_feature_detected!("avx512bw")),
+            ("avx512cd", std::arch::is_x86_feature_detected!("avx512cd")),
+            ("avx512dq", std::arch::is_x86_feature_detected!("avx512dq")),
+            ("avx512vl", std::arch::is_x86_feature_detected!("avx512vl")),
         ];
         known.into_iter().filter_map(|(name, there)| there.then_some(name)).collect()
     }
@@ -68,6 +84,12 @@ mod tests {
     #[test]
     fn the_same_process_states_the_same_arithmetic() {
         assert_eq!(arithmetic(), arithmetic());
-        assert!(arithmetic().starts_with(std::env::consts::ARCH));
+        let told = arithmetic();
+        let checked = if cfg!(debug_assertions) { ", checked," } else { ", unchecked," };
+        assert!(
+            told.starts_with(std::env::consts::ARCH) && told.contains("opt-level ") && told.contains(checked),
+            "{told}"
+        );
+        assert!(told.contains("rustc 1.") && !told.contains("unknown version"), "{told}");
     }
 }

@@ -28,7 +28,7 @@ impl Cache {
     pub fn open(folder: &Path) -> Self {
         let cache = Self { folder: folder.to_owned(), notes: Mutex::default() };
         match cache.make_folder() {
-            Ok(()) => sweep(folder, "."),
+            Ok(()) => [folder, &folder.join(STAMPS)].into_iter().for_each(sweep),
             Err(error) => cache.note(format!("nothing is kept: {error}")),
         }
         cache

@@ -30,12 +30,12 @@ fn folder() -> Folder {
     }
     write(&folder.file(&format!("{}.json", key('c'))), 7, 40);
     write(&folder.file(&format!("{}.json", key('d'))), 7, 2);
-    write(&folder.file(&format!(".{}.h5.another-host.1.0.tmp", key('e'))), 50, 3);
+    write(&folder.file(&format!(".{}.h5.0123456789ab.1.0.tmp", key('e'))), 50, 3);
     fs::create_dir(folder.file("stamps")).unwrap();
     write(&folder.file(&format!("stamps/{}", key('f'))), 9, 40);
     write(&folder.file("stamps/notes.txt"), 9, 400);
     write(&folder.file("thesis.h5"), 1000, 400);
-    write(&folder.file(&format!(".{}.h5.another-host.1.1.tmp", key('e'))), 50, 0);
+    write(&folder.file(&format!(".{}.h5.0123456789ab.1.1.tmp", key('e'))), 50, 0);
     folder
 }
 

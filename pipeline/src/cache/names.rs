@@ -1,5 +1,7 @@
 //! The names that the cache gives its files. What has another name is none of its own.
 
+use crate::files::TemporaryName;
+
 /// A folder of stamps: what the files of earlier runs hashed to.
 pub(super) const STAMPS: &str = "stamps";
 
@@ -11,14 +13,15 @@ pub(super) enum Kind<'a> {
     /// The origin of the result with this key.
     Origin(&'a str),
     /// Being written, or left by a killed run.
-    Temporary,
+    Temporary(TemporaryName<'a>),
 }
 
 /// What a file with this name is; none if it is not the cache's.
 pub(super) fn kind_of(name: &str) -> Option<Kind<'_>> {
-    if let Some(hidden) = name.strip_prefix('.') {
-        let own = hidden.split_once('.').is_some_and(|(key, rest)| is_key(key) && is_temporary(rest));
-        return own.then_some(Kind::Temporary);
+    if name.starts_with('.') {
+        let temporary = TemporaryName::parse(name)?;
+        let own = matches!(temporary.target.split_once('.'), Some((key, "h5" | "json")) if is_key(key));
+        return own.then_some(Kind::Temporary(temporary));
     }
     match name.split_once('.')? {
         (key, "h5") if is_key(key) => Some(Kind::Result(key)),
@@ -32,17 +35,15 @@ pub(super) fn is_key(text: &str) -> bool {
     text.len() == 64 && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
 }
 
-/// `h5.HOST.PID.COUNT.tmp`, as `replace_file` names them.
-fn is_temporary(rest: &str) -> bool {
-    let parts: Vec<&str> = rest.split('.').collect();
-    matches!(parts[..], ["h5" | "json", _, pid, count, "tmp"]
-        if [pid, count].iter().all(|number| number.parse::<u64>().is_ok()))
+/// Whether a file in the folder of stamps is one: its name is a hash, of earlier versions with an ending.
+pub(super) fn is_stamp(name: &str) -> bool {
+    let stem = name.split('.').next().unwrap_or_default();
+    stem.len() >= 32 && stem.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
-/// Whether a file in the folder of stamps is one: its name begins with a hash.
-pub(super) fn is_stamp(name: &str) -> bool {
-    let start = name.strip_prefix('.').unwrap_or(name);
-    start.split('.').next().is_some_and(|stem| stem.len() >= 32 && stem.bytes().all(|byte| byte.is_ascii_hexdigit()))
+/// The temporary name of a stamp.
+pub(super) fn temporary_stamp(name: &str) -> Option<TemporaryName<'_>> {
+    TemporaryName::parse(name).filter(|temporary| is_stamp(temporary.target))
 }
 
 #[cfg(test)]
@@ -54,8 +55,9 @@ mod tests {
         let key = "0123456789abcdef".repeat(4);
         assert_eq!(kind_of(&format!("{key}.h5")), Some(Kind::Result(&key)));
         assert_eq!(kind_of(&format!("{key}.json")), Some(Kind::Origin(&key)));
-        assert_eq!(kind_of(&format!(".{key}.h5.host-1.12.0.tmp")), Some(Kind::Temporary));
-        assert_eq!(kind_of(&format!(".{key}.json.host-1.12.0.tmp")), Some(Kind::Temporary));
+        for temporary in ["h5.0123456789ab.12-34.0.tmp", "json.0123456789ab.12.0.tmp"] {
+            assert!(matches!(kind_of(&format!(".{key}.{temporary}")), Some(Kind::Temporary(_))), "{temporary}");
+        }
         let others = [
             "thesis.h5".to_owned(),
             key.clone(),
@@ -66,14 +68,16 @@ mod tests {
             ".thesis.tmp".to_owned(),
             format!(".{key}.h5"),
             format!(".{key}.h5.mine.tmp"),
-            ".result.h5.host.12.0.tmp".to_owned(),
+            format!(".{key}.h5.host-1.12.0.tmp"),
+            ".result.h5.0123456789ab.12.0.tmp".to_owned(),
             String::new(),
             "..".to_owned(),
         ];
         for other in others {
             assert_eq!(kind_of(&other), None, "{other}");
         }
-        assert!(is_stamp(&key) && is_stamp(&format!("{key}.json")) && is_stamp(&format!(".{key}.h.1.2.tmp")));
-        assert!(!is_stamp("notes.txt") && !is_stamp("cafe"));
+        assert!(is_stamp(&key) && is_stamp(&format!("{key}.json")) && !is_stamp("notes.txt") && !is_stamp("cafe"));
+        assert!(temporary_stamp(&format!(".{key}.0123456789ab.1-2.3.tmp")).is_some());
+        assert!(temporary_stamp(&format!(".{key}.tmp")).is_none());
     }
 }

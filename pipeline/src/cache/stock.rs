@@ -4,7 +4,7 @@ use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use super::names::{Kind, STAMPS, is_stamp, kind_of};
+use super::names::{Kind, STAMPS, is_stamp, kind_of, temporary_stamp};
 use crate::error::StoreError;
 use crate::files::stale;
 
@@ -100,8 +100,8 @@ fn stored(entry: &DirEntry, now: SystemTime) -> Option<Stored> {
             (Sort::Result, metadata.len() + origin)
         }
         Kind::Origin(_) if path.with_extension("h5").exists() || age(used, now) < ORPHANED => return None,
-        Kind::Temporary if !stale(&path, &name) => return None,
-        Kind::Origin(_) | Kind::Temporary => (Sort::Leftover, metadata.len()),
+        Kind::Temporary(temporary) if !stale(&path, &temporary) => return None,
+        Kind::Origin(_) | Kind::Temporary(_) => (Sort::Leftover, metadata.len()),
     };
     Some(Stored { path, sort, bytes, used })
 }
@@ -110,12 +110,10 @@ fn stamp(entry: &DirEntry) -> Option<Stored> {
     let metadata = entry.metadata().ok().filter(fs::Metadata::is_file)?;
     let (name, path, used) =
         (entry.file_name().to_string_lossy().into_owned(), entry.path(), metadata.modified().ok()?);
-    if !is_stamp(&name) {
-        return None;
-    }
-    let temporary = name.starts_with('.');
-    if temporary && !stale(&path, &name) {
-        return None;
-    }
-    Some(Stored { path, sort: if temporary { Sort::Leftover } else { Sort::Stamp }, bytes: metadata.len(), used })
+    let sort = match temporary_stamp(&name) {
+        Some(temporary) if stale(&path, &temporary) => Sort::Leftover,
+        None if is_stamp(&name) => Sort::Stamp,
+        _ => return None,
+    };
+    Some(Stored { path, sort, bytes: metadata.len(), used })
 }

@@ -156,7 +156,7 @@ fn temporary_files_of_the_dead_are_swept_those_of_the_living_stay() {
     // pid_max is at most 2^22
     let dead = folder.file(&format!(".k.h5.{host}.4194999.0.tmp"));
     let living = folder.file(&format!(".k.h5.{host}.{}.0.tmp", std::process::id()));
-    let elsewhere = folder.file(".k.h5.another-host.4194999.0.tmp");
+    let elsewhere = folder.file(".k.h5.0123456789ab.4194999.0.tmp");
     let result = folder.file("k.h5");
     for path in [&dead, &living, &elsewhere, &result] {
         std::fs::write(path, b"x").unwrap();

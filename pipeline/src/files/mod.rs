@@ -1,17 +1,21 @@
-//! Files that are either whole or not there, temporary names, and what tells two states of a file apart.
+//! Files that are either whole or not there, temporary names, what tells two states of a file apart, and which files this program wrote.
 
 mod file_state;
+mod filled_folder;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod known_hashes;
+mod mark;
 mod replace;
 mod temporary;
 
 pub(crate) use file_state::FileState;
+pub use filled_folder::{FilledFolder, LIST};
 pub(crate) use known_hashes::KnownHashes;
+pub use mark::{MARK, has_mark, marked, states_mark};
 pub(crate) use replace::{Replacement, replace_unsynced};
 pub use replace::{probe, replace_file, replace_with};
 #[cfg(test)]
 pub(crate) use temporary::host;
-pub use temporary::sweep;
-pub(crate) use temporary::{stale, sweep_beside, temporary_path};
+pub(crate) use temporary::{TemporaryName, stale, temporary_path};
+pub use temporary::{sweep, sweep_beside};

@@ -77,13 +77,22 @@ impl InputFiles {
         Ok(HashedFile { path: path.to_owned(), settled: state.is_settled(), state, blake3: found.blake3 })
     }
 
-    /// What one pass through a file that the HDF5 library is to open found. Errors: as [`InputFiles::hash`]; damage that the library does not survive.
-    pub(super) fn inspect_hdf5(&self, path: &Path) -> Result<Inspected, StageError> {
-        let (_, inspected) = self.inspect(path)?;
+    /// A whole file, for what is small. The bytes are those that have the file's hash. Errors: as [`InputFiles::hash`].
+    pub fn read(&self, path: &Path) -> Result<Vec<u8>, StageError> {
+        let wanted = self.hash(path)?;
+        let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error))?;
+        if blake3::hash(&bytes).to_hex().as_str() == wanted { Ok(bytes) } else { Err(changed(path)) }
+    }
+
+    /// What one pass through a file that the HDF5 library is to open found, and the state that the file had.
+    ///
+    /// Errors: as [`InputFiles::hash`]; damage that the library does not survive.
+    pub(super) fn inspect_hdf5(&self, path: &Path) -> Result<(FileState, Inspected), StageError> {
+        let (state, inspected) = self.inspect(path)?;
         if inspected.endless {
             return Err(StageError::new("damaged: a heap collection of the HDF5 file never ends").at(path));
         }
-        Ok(inspected)
+        Ok((state, inspected))
     }
 
     pub(super) fn opened(&self) -> &OpenedFiles {
@@ -94,8 +103,8 @@ impl InputFiles {
         &self.0.chunks
     }
 
-    fn inspect(&self, path: &Path) -> Result<(FileState, Inspected), StageError> {
-        let fail = |error: std::io::Error| StageError::new(format!("the file cannot be read: {error}")).at(path);
+    pub(super) fn inspect(&self, path: &Path) -> Result<(FileState, Inspected), StageError> {
+        let fail = |error: std::io::Error| unreadable(path, &error);
         let mut file = File::open(path).map_err(fail)?;
         let state = FileState::of(&file).map_err(fail)?;
         let key = std::path::absolute(path).map_err(fail)?;
@@ -149,6 +158,28 @@ impl HashedFile {
         let again = InputFiles::new().hash(&self.path)?;
         if again == self.blake3 { Ok(()) } else { Err(changed(&self.path)) }
     }
+}
+
+/// Errors: the file that lies at a path now is not in the state in which it was opened. Whatever was read by name since was read from the same file.
+pub(super) fn require_state(path: &Path, then: &FileState) -> Result<(), StageError> {
+    let now = FileState::at(path).map_err(|error| unreadable(path, &error))?;
+    require_same(path, &now, then)
+}
+
+/// The same of the file that `now` is the state of.
+pub(super) fn require_same(path: &Path, now: &FileState, then: &FileState) -> Result<(), StageError> {
+    if now == then {
+        return Ok(());
+    }
+    let problem = match (now.size(), then.size()) {
+        (now, then) if now != then => format!("the file has {now} bytes, it had {then} when it was opened"),
+        _ => "the file was changed since it was opened".to_owned(),
+    };
+    Err(StageError::new(problem).at(path).help("wait until nothing writes to it, then run again"))
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> StageError {
+    StageError::new(format!("the file cannot be read: {error}")).at(path)
 }
 
 fn changed(path: &Path) -> StageError {

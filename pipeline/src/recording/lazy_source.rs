@@ -7,32 +7,44 @@ use super::how::Reading;
 use super::opened_files::contents;
 use super::source::Hdf5Source;
 use super::{FormatError, InputFiles, Raw, Source};
+use crate::files::FileState;
 
 /// A stretch of a channel of a file.
 #[derive(Debug)]
 pub(crate) struct LazySource {
     path: PathBuf,
     file_size: u64,
+    blake3: String,
     location: String,
     /// Sample of the file's channel that is the stretch's first.
     first: usize,
     samples: usize,
     reading: Reading,
     native: OnceLock<Hdf5Source>,
+    /// The state in which the file was found to have its hash.
+    state: OnceLock<FileState>,
     files: InputFiles,
 }
 
 impl LazySource {
-    /// A whole channel of a native record.
-    pub(crate) fn new(files: &InputFiles, path: &Path, file_size: u64, location: &str, samples: usize) -> Self {
+    /// A whole channel of a native record, whose file had this size and hash.
+    pub(crate) fn new(
+        files: &InputFiles,
+        path: &Path,
+        (file_size, blake3): (u64, &str),
+        location: &str,
+        samples: usize,
+    ) -> Self {
         Self {
             path: path.to_owned(),
             file_size,
+            blake3: blake3.to_owned(),
             location: location.to_owned(),
             first: 0,
             samples,
             reading: Reading::default(),
             native: OnceLock::new(),
+            state: OnceLock::new(),
             files: files.clone(),
         }
     }
@@ -47,11 +59,28 @@ impl LazySource {
         if let Some(source) = self.native.get() {
             return Ok(source);
         }
-        let source = super::native::open_source(self.files.chunks(), &self.path, &self.location)?;
-        if source.file_size != self.file_size || source.samples != self.samples {
-            return Err(self.error("the file is not the one that was recorded: its size differs"));
+        let source = super::native::open_source(self.files.chunks(), &self.path, self.state()?, &self.location)?;
+        if source.samples != self.samples {
+            return Err(self.error("the file is not the one that was recorded: its channel has another length"));
         }
         Ok(self.native.get_or_init(|| source))
+    }
+
+    /// The file's state, in which it has the hash that was recorded: whoever opens it next sees that it is still in it.
+    fn state(&self) -> Result<FileState, FormatError> {
+        if let Some(state) = self.state.get() {
+            return Ok(*state);
+        }
+        let metadata =
+            std::fs::metadata(&self.path).map_err(|error| self.error(&format!("the file cannot be read: {error}")))?;
+        if metadata.len() != self.file_size {
+            return Err(self.error("the file is not the one that was recorded: its size differs"));
+        }
+        let (state, inspected) = self.files.inspect(&self.path)?;
+        if inspected.blake3 != self.blake3 {
+            return Err(self.error("the file is not the one that was recorded: its bytes have changed"));
+        }
+        Ok(*self.state.get_or_init(|| state))
     }
 
     fn error(&self, problem: &str) -> FormatError {
@@ -73,7 +102,7 @@ impl Source for LazySource {
             let problem = format!("samples {start} to {start} + {count} asked for, there are {}", self.samples);
             return Err(self.error(&problem));
         }
-        let contents = contents(&self.files, &self.path, self.file_size, &self.reading)?;
+        let contents = contents(&self.files, &self.path, self.state()?, &self.reading)?;
         let channel = contents.channels.iter().find(|channel| channel.location == self.location);
         let end = self.first.saturating_add(self.samples);
         let channel = channel.filter(|channel| channel.samples >= end).ok_or_else(|| {

@@ -32,7 +32,7 @@ pub(crate) use lazy_source::LazySource;
 pub(crate) use native::is_native;
 pub use native::{Wanted, open_native};
 pub use series::{read_number_attribute, read_series};
-pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
+pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native, write_native_in};
 
 pub use afmid_formats::{Contents, FormatError, FoundChannel, Raw, RawBinary, Source, formats};
 pub use contents::open_contents;

@@ -12,10 +12,11 @@ use hdf5::{Dataset, File, Group, Location};
 
 use super::chunk::ChunkFilter;
 use super::chunk_cache::ChunkCache;
-use super::input_files::{InputFiles, Inspected};
+use super::input_files::{InputFiles, Inspected, require_state};
 use super::source::{ChunkPlace, Hdf5Source, Place};
 use super::{Channel, Reading, Record};
 use crate::error::StageError;
+use crate::files::FileState;
 use crate::hdf5_files::read::{check_size, open_file, read_texts};
 
 /// A channel to look for in a record.
@@ -37,18 +38,16 @@ pub struct Wanted<'a> {
 ///
 /// Errors: no file, not HDF5, cut short, damaged; an attribute or a required channel is missing or of another type.
 pub fn open_native(files: &InputFiles, path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
-    let size = size_of_file(path)?;
     let inspected = files.inspect_hdf5(path)?;
-    hdf5::sync::sync(|| read_record(files, &open_file(path)?, path, wanted, size, inspected))
+    hdf5::sync::sync(|| read_record(files, &open_file(path)?, path, wanted, inspected))
 }
 
 /// As [`open_native`] if the file is a native record: HDF5 that states a sample rate, whatever its channels. None: it is another file, or damaged.
 pub(super) fn open_if_native(files: &InputFiles, path: &Path, wanted: &[Wanted]) -> Result<Option<Record>, StageError> {
-    let size = size_of_file(path)?;
     let Ok(inspected) = files.inspect_hdf5(path) else { return Ok(None) };
     // one turn for all calls of the library: threads that open a file each would otherwise wait for one another some fifty times
     hdf5::sync::sync(|| match open_file(path) {
-        Ok(file) if states_rate(&file) => read_record(files, &file, path, wanted, size, inspected).map(Some),
+        Ok(file) if states_rate(&file) => read_record(files, &file, path, wanted, inspected).map(Some),
         _ => Ok(None),
     })
 }
@@ -58,8 +57,7 @@ fn read_record(
     file: &File,
     path: &Path,
     wanted: &[Wanted],
-    size: u64,
-    inspected: Inspected,
+    (state, inspected): (FileState, Inspected),
 ) -> Result<Record, StageError> {
     let sample_rate_hz = number_attribute(file, "/", "sample_rate_hz").map_err(|error| {
         error
@@ -72,13 +70,16 @@ fn read_record(
     let mut channels = Vec::with_capacity(wanted.len());
     for channel in wanted {
         if let Some(dataset) = find(file, path, channel)? {
-            channels.push(open_channel(files.chunks(), &dataset, path, channel).map_err(|error| error.at(path))?);
+            channels
+                .push(open_channel(files.chunks(), &dataset, (path, state), channel).map_err(|error| error.at(path))?);
         }
     }
+    // the library opened it by name
+    require_state(path, &state)?;
     Ok(Record {
         name: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         path: path.to_owned(),
-        size,
+        size: state.size(),
         blake3: inspected.blake3,
         sample_rate_hz,
         started_at: text_attribute(file, "started_at").unwrap_or_default(),
@@ -96,12 +97,6 @@ pub(crate) fn is_native(files: &InputFiles, path: &Path) -> bool {
 
 fn states_rate(file: &File) -> bool {
     has_attribute(file, "sample_rate_hz")
-}
-
-pub(super) fn size_of_file(path: &Path) -> Result<u64, StageError> {
-    std::fs::metadata(path)
-        .map(|metadata| metadata.len())
-        .map_err(|error| StageError::new(format!("the file cannot be read: {error}")).at(path))
 }
 
 pub(super) fn find(file: &File, path: &Path, wanted: &Wanted) -> Result<Option<Dataset>, StageError> {
@@ -135,9 +130,14 @@ fn datasets(file: &File) -> Vec<String> {
     names
 }
 
-fn open_channel(chunks: &ChunkCache, dataset: &Dataset, path: &Path, wanted: &Wanted) -> Result<Channel, StageError> {
+fn open_channel(
+    chunks: &ChunkCache,
+    dataset: &Dataset,
+    file: (&Path, FileState),
+    wanted: &Wanted,
+) -> Result<Channel, StageError> {
     let location = wanted.location;
-    let source = describe(chunks, dataset, path, location)?;
+    let source = describe(chunks, dataset, file, location)?;
     let unit = text_attribute(dataset, "units").ok_or_else(|| {
         StageError::new(format!("{location}: the attribute `units` is missing"))
             .help("state the unit of stored * scale_factor + add_offset, such as `V`")
@@ -165,15 +165,28 @@ fn open_channel(chunks: &ChunkCache, dataset: &Dataset, path: &Path, wanted: &Wa
     })
 }
 
-/// Opens one dataset of a file as a source of samples. Errors: as [`open_native`].
-pub(super) fn open_source(chunks: &ChunkCache, path: &Path, location: &str) -> Result<Hdf5Source, StageError> {
+/// Opens one dataset of a file in this state as a source of samples. Errors: as [`open_native`]; the file is in another state.
+pub(super) fn open_source(
+    chunks: &ChunkCache,
+    path: &Path,
+    state: FileState,
+    location: &str,
+) -> Result<Hdf5Source, StageError> {
     let file = open_file(path)?;
     let dataset =
         file.dataset(location).map_err(|_| StageError::new(format!("there is no channel `{location}`")).at(path))?;
-    describe(chunks, &dataset, path, location).map_err(|error| error.at(path))
+    let source = describe(chunks, &dataset, (path, state), location).map_err(|error| error.at(path))?;
+    // the library opened it by name
+    require_state(path, &state)?;
+    Ok(source)
 }
 
-fn describe(chunks: &ChunkCache, dataset: &Dataset, path: &Path, location: &str) -> Result<Hdf5Source, StageError> {
+fn describe(
+    chunks: &ChunkCache,
+    dataset: &Dataset,
+    (path, state): (&Path, FileState),
+    location: &str,
+) -> Result<Hdf5Source, StageError> {
     let fail = |problem: String| StageError::new(format!("{location}: {problem}"));
     let hdf5 = |error: hdf5::Error| fail(format!("damaged: {error}"));
     let shape = dataset.get_shape().map_err(hdf5)?;
@@ -190,12 +203,11 @@ fn describe(chunks: &ChunkCache, dataset: &Dataset, path: &Path, location: &str)
     })?;
     check_size(dataset, kind.bytes() as usize).map_err(|error| fail(error.problem))?;
     let big_endian = matches!(dtype.byte_order(), ByteOrder::BigEndian);
-    let file_size = size_of_file(path)?;
     check_filters(dataset).map_err(|error| fail(error.problem).help(error.help.unwrap_or_default()))?;
-    let place = locate(dataset, kind, samples, file_size).map_err(fail)?;
+    let place = locate(dataset, kind, samples, state.size()).map_err(fail)?;
     Ok(Hdf5Source {
         path: path.to_owned(),
-        file_size,
+        state,
         location: location.to_owned(),
         samples,
         kind,

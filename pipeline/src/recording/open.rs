@@ -8,7 +8,7 @@ use super::contents::{format_of, is_hdf5_file, is_recognised};
 use super::how::{AUTO, HDF5, How, NATIVE, Reading};
 use super::input_files::InputFiles;
 use super::lazy_source::LazySource;
-use super::native::{Wanted, open_if_native, open_native, size_of_file};
+use super::native::{Wanted, open_if_native, open_native};
 use super::opened_files::contents;
 use super::stretches::uninterrupted;
 use super::{Channel, Contents, FoundChannel, Record};
@@ -57,9 +57,9 @@ pub fn open_records(files: &InputFiles, path: &Path, wanted: &[Wanted], how: &Ho
         return Ok(Opened { format: NATIVE, records: vec![record], remarks: Vec::new() });
     }
     let reading = Reading { format: format.to_owned(), raw: how.reading.raw.clone() };
-    let size = size_of_file(path)?;
-    let contents = contents(files, path, size, &reading)?;
-    let file = File { files, path, size, reading, contents: &contents };
+    let (state, inspected) = files.inspect(path)?;
+    let contents = contents(files, path, state, &reading)?;
+    let file = File { files, path, size: state.size(), blake3: &inspected.blake3, reading, contents: &contents };
     let records = file.records(wanted, how).map_err(|error| error.at(path))?;
     let mut remarks = contents.remarks.clone();
     if records.len() > 1 {
@@ -73,6 +73,7 @@ struct File<'a> {
     files: &'a InputFiles,
     path: &'a Path,
     size: u64,
+    blake3: &'a str,
     reading: Reading,
     contents: &'a Contents,
 }
@@ -100,7 +101,6 @@ impl File<'_> {
         let sample_rate_hz = rate.map(|(_, rate)| rate).or(how.sample_rate_hz).unwrap_or(f64::NAN);
         let samples = found.iter().map(|(_, channel)| channel.samples).max().unwrap_or(0);
         let stretches = uninterrupted(samples, found.iter().map(|(_, channel)| channel.gaps.as_slice()));
-        let blake3 = self.files.hash(self.path)?;
         let several = stretches.len() > 1;
         let record = |(number, stretch): (usize, &Range<usize>)| {
             let name = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -112,7 +112,7 @@ impl File<'_> {
                 name: if several { format!("{name}[{}]", number + 1) } else { name },
                 path: self.path.to_owned(),
                 size: self.size,
-                blake3: blake3.clone(),
+                blake3: self.blake3.to_owned(),
                 sample_rate_hz,
                 // how long an interruption lasted is not known
                 started_at: if number == 0 { self.contents.started_at.clone() } else { String::new() },
@@ -156,7 +156,7 @@ impl File<'_> {
     ) -> Result<Channel, StageError> {
         let end = stretch.end.min(found.samples);
         let samples = end.saturating_sub(stretch.start);
-        let source = LazySource::new(self.files, self.path, self.size, &found.location, samples);
+        let source = LazySource::new(self.files, self.path, (self.size, self.blake3), &found.location, samples);
         Ok(Channel {
             role: wanted.role.to_owned(),
             location: found.location.clone(),

@@ -93,7 +93,8 @@ fn an_interrupted_recording_is_one_record_per_stretch() {
     assert!(opened.remarks[0].contains("2 uninterrupted stretches"), "{:?}", opened.remarks);
 
     // as a stored recording is reopened
-    let again = LazySource::new(&InputFiles::new(), &path, second.size, "deflection", 3).of_stretch(4, &second.reading);
+    let again = LazySource::new(&InputFiles::new(), &path, (second.size, &second.blake3), "deflection", 3)
+        .of_stretch(4, &second.reading);
     assert_eq!(again.read(0, 3).unwrap().widened(), [5.0, 6.0, 7.0]);
     std::fs::write(&path, "other").unwrap();
     let error = StageError::from(again.read(0, 3).unwrap_err());

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::contents::open_contents;
 use super::how::Reading;
+use super::input_files::require_state;
 use super::{Contents, FormatError, InputFiles};
 use crate::files::FileState;
 
@@ -28,28 +29,27 @@ struct Key {
 #[derive(Debug, Default)]
 pub(super) struct OpenedFiles(Mutex<Vec<(Key, Slot)>>);
 
-/// What a file holds, as it was opened last or anew. Errors: it has another size than `size`; as [`open_contents`].
+/// What a file holds that is in this state, as it was opened last or anew. Errors: it is in another; as [`open_contents`].
 pub(super) fn contents(
     files: &InputFiles,
     path: &Path,
-    size: u64,
+    state: FileState,
     reading: &Reading,
 ) -> Result<Arc<Contents>, FormatError> {
-    let cannot = |error: std::io::Error| {
-        FormatError::new(format!("the file cannot be read: {error}"), "check its path and permissions").in_file(path)
-    };
-    let state = FileState::at(path).map_err(cannot)?;
-    if state.size() != size {
-        let problem = format!("the file has {} bytes, it had {size} when it was recorded", state.size());
-        return Err(FormatError::new(problem, "wait until nothing writes to it, then run again").in_file(path));
-    }
+    require_state(path, &state)?;
     let key = Key { path: path.to_owned(), state, reading: reading.clone() };
     let slot = files.opened().slot_of(&key);
     if let Some(opened) = slot.get() {
         return opened.clone();
     }
     // opened outside the lock: another thread may want another file meanwhile, the same file is opened once
-    let opened = slot.get_or_init(|| Ok(Arc::new(open_contents(files, path, reading)?.1))).clone();
+    let open = || {
+        let contents = open_contents(files, path, reading)?.1;
+        // what was read may be of a file that changed meanwhile
+        require_state(path, &state)?;
+        Ok(Arc::new(contents))
+    };
+    let opened = slot.get_or_init(open).clone();
     files.opened().trim(&key, opened.is_err());
     opened
 }

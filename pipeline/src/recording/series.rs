@@ -16,12 +16,12 @@ const LONGEST: usize = 1 << 26;
 /// Errors: no file, not HDF5, damaged; no such dataset, not one-dimensional, not numbers, longer than 2^26 values.
 pub fn read_series(files: &InputFiles, path: &Path, location: &str) -> Result<Vec<f64>, StageError> {
     use super::Source;
-    files.inspect_hdf5(path)?;
+    let (state, _) = files.inspect_hdf5(path)?;
     let optional = |name: &str, otherwise: f64| -> Result<f64, StageError> {
         Ok(read_number_attribute(path, location, name)?.unwrap_or(otherwise))
     };
     let (scale, offset) = (optional("scale_factor", 1.0)?, optional("add_offset", 0.0)?);
-    let source: Hdf5Source = open_source(files.chunks(), path, location)?;
+    let source: Hdf5Source = open_source(files.chunks(), path, state, location)?;
     if source.samples > LONGEST {
         let problem = format!("{location} has {} values, wanted at most {LONGEST}", source.samples);
         return Err(StageError::new(problem).at(path));

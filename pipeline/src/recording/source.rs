@@ -6,8 +6,10 @@ use std::path::PathBuf;
 
 use super::chunk::{ChunkFilter, undo_filters};
 use super::chunk_cache::ChunkCache;
+use super::input_files::{require_same, require_state};
 use super::{FormatError, Raw, Source};
 use crate::error::StageError;
+use crate::files::FileState;
 use crate::hdf5_files::read::open_file;
 use afmid_formats::Number;
 
@@ -46,7 +48,8 @@ pub(super) struct ChunkPlace {
 #[derive(Debug)]
 pub(super) struct Hdf5Source {
     pub(super) path: PathBuf,
-    pub(super) file_size: u64,
+    /// The state in which it was opened: every read sees that it is still in it.
+    pub(super) state: FileState,
     pub(super) location: String,
     pub(super) samples: usize,
     pub(super) kind: Number,
@@ -103,12 +106,9 @@ impl Hdf5Source {
     fn open(&self) -> Result<File, StageError> {
         let fail = |error: std::io::Error| self.error(format!("the file cannot be read: {error}"));
         let file = File::open(&self.path).map_err(fail)?;
-        let size = file.metadata().map_err(fail)?.len();
-        if size != self.file_size {
-            return Err(self
-                .error(format!("the file has {size} bytes, it had {} when it was opened", self.file_size))
-                .help("wait until nothing writes to it, then run again"));
-        }
+        let now = FileState::of(&file).map_err(fail)?;
+        require_same(&self.path, &now, &self.state)
+            .map_err(|error| StageError { problem: format!("{}: {}", self.location, error.problem), ..error })?;
         Ok(file)
     }
 
@@ -168,6 +168,9 @@ impl Hdf5Source {
         let file = open_file(&self.path)?;
         let fail = |error: hdf5::Error| self.error(format!("samples {from} to {to} cannot be read: {error}"));
         let dataset = file.dataset(&self.location).map_err(fail)?;
-        Ok(dataset.read_slice_1d::<T, _>(from..to).map_err(fail)?.into_raw_vec_and_offset().0)
+        let samples = dataset.read_slice_1d::<T, _>(from..to).map_err(fail)?.into_raw_vec_and_offset().0;
+        // the library opened it by name
+        require_state(&self.path, &self.state)?;
+        Ok(samples)
     }
 }

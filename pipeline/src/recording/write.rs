@@ -5,7 +5,7 @@ use std::path::Path;
 use hdf5::{Group, H5Type};
 
 use crate::error::StoreError;
-use crate::files::replace_file;
+use crate::files::{FilledFolder, replace_file};
 use crate::hdf5_files::write;
 
 /// Samples per chunk of a compressed channel.
@@ -65,6 +65,22 @@ pub enum RecordStorage {
 /// Errors: the folder cannot be written; a channel's name is empty, used twice or holds a slash.
 pub fn write_native(path: &Path, record: &NativeRecord, storage: RecordStorage) -> Result<(), StoreError> {
     replace_file(path, |temporary| write_file(temporary, record, storage).map_err(|error| error.file(path)))
+}
+
+/// The same into a folder that this program fills: the file is listed there, and one that this program did not write, or that was changed since, is not
+/// replaced. `earlier` knows files of versions that kept no list.
+///
+/// Errors: as [`write_native`]; the file is another's.
+pub fn write_native_in(
+    folder: &FilledFolder,
+    name: &str,
+    earlier: impl FnOnce(&Path) -> bool,
+    record: &NativeRecord,
+    storage: RecordStorage,
+) -> Result<(), StoreError> {
+    folder.replace(name, earlier, |temporary| {
+        write_file(temporary, record, storage).map_err(|error| error.file(&folder.folder().join(name)))
+    })
 }
 
 fn write_file(path: &Path, record: &NativeRecord, storage: RecordStorage) -> Result<(), StoreError> {

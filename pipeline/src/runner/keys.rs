@@ -97,17 +97,29 @@ pub(super) fn plan_node<'a>(
     Ok(StagePlan { key, seed, sources, hashed, origin })
 }
 
-/// One hash of the content addresses of all stages: whether a run would give the same results again, without running anything. The last bits, which
-/// processors may change, do not count: nodes of a cluster agree.
+/// What a whole run depends on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunKey {
+    /// One hash of the content addresses of all stages.
+    pub key: String,
+    /// The files that its stages read, in the order of the stages: what the hash was made from.
+    pub sources: Vec<SourceFile>,
+}
+
+/// Whether a run would give the same results again, without running anything. The last bits, which processors may change, do not count: nodes of a
+/// cluster agree.
 ///
 /// Errors: a stage whose files cannot be listed or read.
-pub fn run_key(plan: &Plan, around: &Surroundings) -> Result<String, RunError> {
+pub fn run_key(plan: &Plan, around: &Surroundings) -> Result<RunKey, RunError> {
     let around = Surroundings { arithmetic: "", ..*around };
+    let mut sources = Vec::new();
     let mut origins: Vec<Origin> = Vec::with_capacity(plan.nodes.len());
     for node in &plan.nodes {
         let planned = plan_node(plan, node, &around, &|index| origins.get(index));
         let failed = |error| RunError { id: node.id.clone(), uses: node.uses.clone(), error: Box::new(error) };
-        origins.push(planned.map_err(failed)?.origin);
+        let planned = planned.map_err(failed)?;
+        sources.extend(planned.sources);
+        origins.push(planned.origin);
     }
     let mut hasher = blake3::Hasher::new();
     let mut all: Vec<String> = origins.iter().map(|origin| format!("{}={}\n", origin.id, origin.key)).collect();
@@ -115,7 +127,7 @@ pub fn run_key(plan: &Plan, around: &Surroundings) -> Result<String, RunError> {
     all.iter().for_each(|one| {
         hasher.update(one.as_bytes());
     });
-    Ok(hasher.finalize().to_hex().to_string())
+    Ok(RunKey { key: hasher.finalize().to_hex().to_string(), sources })
 }
 
 fn inputs<'a>(

@@ -4,6 +4,8 @@ mod changes;
 mod error;
 mod execute;
 mod explain;
+#[cfg(test)]
+mod input_tests;
 mod keys;
 mod schedule;
 #[cfg(test)]
@@ -14,4 +16,4 @@ pub use changes::{Change, changes};
 pub use error::{Failed, RunError};
 pub use execute::{Observer, Options, Quiet, run, run_to_file};
 pub use explain::{Decision, Explanation, Nearest, explain};
-pub use keys::{Surroundings, run_key, stage_seed};
+pub use keys::{RunKey, Surroundings, run_key, stage_seed};

@@ -80,7 +80,7 @@ pub(crate) fn recording() -> Recording {
         add_offset: 0.0,
         fill_code,
         source: Arc::new(
-            LazySource::new(&InputFiles::new(), path, 600_000, &format!("/{role}"), 900_000)
+            LazySource::new(&InputFiles::new(), path, (600_000, &"ab".repeat(32)), &format!("/{role}"), 900_000)
                 .of_stretch(part(index).0, &part(index).1),
         ),
     };

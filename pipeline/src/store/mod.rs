@@ -34,6 +34,7 @@ mod seal;
 mod stage_file;
 mod state_space;
 mod table;
+mod written;
 
 #[cfg(test)]
 pub(crate) mod fixture;
@@ -53,3 +54,4 @@ pub(crate) use rows::write_rows;
 pub(crate) use seal::seal;
 pub(crate) use stage_file::write_unsealed_stage;
 pub use stage_file::{StageIdentity, read_stage, write_stage};
+pub use written::{Written, written};

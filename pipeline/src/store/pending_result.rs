@@ -19,6 +19,7 @@ pub fn write_result(path: &Path, run: &RunResult) -> Result<(), StoreError> {
     let needs: Vec<Vec<usize>> = run.stages.iter().map(needs).collect();
     let RunResult { name, seed, config, overrides, program, .. } = run;
     let head = RunHead { name, seed: *seed, config, overrides, program, ids: &ids, needs: &needs };
+    sweep_beside(path);
     let mut pending = PendingResult::new(path, &head)?;
     while let Some(stage) = pending.next_stage().and_then(|index| run.stages.get(index)) {
         pending.stage(stage)?;
@@ -27,6 +28,7 @@ pub fn write_result(path: &Path, run: &RunResult) -> Result<(), StoreError> {
 }
 
 /// A result file that grows while its stages run: what is at its path stays until it is whole. The same bytes as [`write_result`].
+/// It sweeps nothing: thousands of results may lie in one folder.
 pub(crate) struct PendingResult {
     // before the replacement, which removes the file
     writer: ResultWriter,
@@ -41,7 +43,6 @@ const SHARE: u64 = 1 << 20;
 impl PendingResult {
     /// Begins the file beside `path`. Errors: as [`write_result`].
     pub(crate) fn new(path: &Path, run: &RunHead) -> Result<Self, StoreError> {
-        sweep_beside(path);
         let replacement = Replacement::new(path)?;
         match ResultWriter::new(replacement.temporary(), run) {
             Ok(writer) => Ok(Self { writer, replacement, sent: 0 }),

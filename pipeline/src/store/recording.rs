@@ -137,7 +137,7 @@ fn read_channel(
         .get(index)
         .ok_or_else(|| crate::StageError::new(format!("channel {row} belongs to record {index}, which is missing")))?;
     let (role, location, samples) = (text("role")?, text("location")?, whole("samples")?);
-    let source = LazySource::new(input_files, &record.path, record.size, &location, samples);
+    let source = LazySource::new(input_files, &record.path, (record.size, &record.blake3), &location, samples);
     let source = source.of_stretch(record.first_sample, &record.reading);
     let has_fill_code = table.flag("has_fill_code")?.get(row) == Some(&true);
     let channel = Channel {

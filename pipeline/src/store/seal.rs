@@ -11,7 +11,7 @@ use super::file_kind::{FileKind, file_kind};
 use crate::error::{Result, StoreError};
 use crate::hdf5_files::HeapGuard;
 
-const MAGIC: &str = "\nafmid seal, BLAKE3 of all bytes before this line: ";
+pub(super) const MAGIC: &str = "\nafmid seal, BLAKE3 of all bytes before this line: ";
 const HASH_LENGTH: u64 = 64;
 const LENGTH: u64 = MAGIC.len() as u64 + HASH_LENGTH + 1;
 
@@ -53,6 +53,25 @@ pub(super) fn check_seal(path: &Path) -> Result<()> {
         return broken("damaged: a heap collection of the HDF5 file never ends");
     }
     Ok(())
+}
+
+/// What a file says of itself in its last line.
+pub(super) enum Seal {
+    /// Its bytes have the hash that the last line states.
+    Fits,
+    /// They have another.
+    DoesNotFit,
+    /// The last line is no seal.
+    None,
+}
+
+/// Errors: the file cannot be read.
+pub(super) fn look_at_seal(path: &Path) -> std::io::Result<Seal> {
+    let mut file = File::open(path)?;
+    let size = file.metadata()?.len();
+    let Some((body, last)) = last_line(&mut file, size)? else { return Ok(Seal::None) };
+    let hash = hash_start(&mut file, body, |_| {})?;
+    Ok(if last == format!("{MAGIC}{hash}\n") { Seal::Fits } else { Seal::DoesNotFit })
 }
 
 /// Whether a file ends in a seal, whether it fits or not. Errors: it cannot be read.

@@ -1,6 +1,7 @@
 //! The file: a header of 128 bytes, then a variable after the other.
 
 use afmid_pipeline::Attribute;
+use afmid_pipeline::files::marked;
 
 use super::element::MatError;
 use super::value::Value;
@@ -14,15 +15,16 @@ const TEXT: usize = 116;
 /// The model as a MATLAB file: variables named as the keys of the JSON, and `Ts` beside `sample_time_s`; `poles` is a complex column. What is
 /// unknown is NaN, or an empty matrix. Errors: something is too large for the format.
 pub fn model_mat(model: &ExportedModel) -> Result<Vec<u8>, MatError> {
-    let mut out = header();
+    let mut body = Vec::new();
     for (name, value) in variables(model) {
-        value.write(&mut out, name)?;
+        value.write(&mut body, name)?;
     }
-    Ok(out)
+    // the mark fills the header's text to its last byte
+    Ok(marked(|mark| [header(mark), body].concat()).unwrap_or_default())
 }
 
-fn header() -> Vec<u8> {
-    let mut out = TITLE.as_bytes().to_vec();
+fn header(mark: &str) -> Vec<u8> {
+    let mut out = format!("{TITLE}, {mark}").into_bytes();
     out.resize(TEXT, b' ');
     // no subsystem data: eight zeros
     out.resize(TEXT + 8, 0);

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::error::StoreError;
-use afmid_pipeline::files::replace_file;
+use afmid_pipeline::files::{FilledFolder, sweep_beside};
 use afmid_pipeline::recording::{
-    Codes, InputFiles, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native,
+    Codes, InputFiles, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native_in,
 };
 use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
 use rayon::prelude::*;
@@ -208,7 +208,7 @@ impl Stage for Afm {
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let folder = cx.base().join(&self.out);
         let names: Vec<String> = (0..self.records).map(|record| format!("record_{record:04}.h5")).collect();
-        prepare(&folder, &names)?;
+        let filled = prepare(&folder, &names)?;
         let seed = self.seed.unwrap_or_else(|| cx.seed());
         let (microscope, layout) = (self.microscope(), self.layout(seed));
         let effects = effects(&self.hidden)?;
@@ -219,7 +219,7 @@ impl Stage for Afm {
             .enumerate()
             .map(|(record, name)| {
                 let simulated = archive.simulate_with(&microscope, record, &effects);
-                let written = self.write(&folder.join(name), record, simulated);
+                let written = self.write(&filled, name, record, simulated);
                 cx.tick();
                 written
             })
@@ -254,7 +254,7 @@ impl Stage for Afm {
             "saturated": saturated,
             "out": self.out,
         });
-        write_truth(&folder.with_extension("truth.json"), &truth)?;
+        write_truth(&filled, &truth)?;
         let records = written.into_iter().map(|(record, ..)| record).collect();
         Ok(Ports::new()
             .with(&RECORDS, Recording { records })
@@ -340,7 +340,8 @@ impl Afm {
 
     fn write(
         &self,
-        path: &Path,
+        filled: &FilledFolder,
+        name: &str,
         number: usize,
         record: SimulatedRecord,
     ) -> Result<(Record, Vec<RecordedEvent>, usize), StageError> {
@@ -356,18 +357,16 @@ impl Afm {
             sample_rate_hz: self.sample_rate_hz,
             started_at: started_at(number),
             channels: vec![
-                channel("deflection", record.deflection, self.lsb_v, "photodiode signal"),
-                channel("piezo", record.piezo, self.piezo_lsb_v, "z piezo monitor"),
+                channel("deflection", record.deflection, self.lsb_v, DEFLECTION),
+                channel("piezo", record.piezo, self.piezo_lsb_v, PIEZO),
             ],
         };
         let storage = match self.compression {
             0 => RecordStorage::Raw,
             level => RecordStorage::Deflate(level),
         };
-        write_native(path, &native, storage).map_err(|error| StageError::from_error(error).at(path))?;
-        let wanted = |role, location| Wanted { role, location, required: true };
-        let opened =
-            open_native(&InputFiles::new(), path, &[wanted("deflection", "/deflection"), wanted("piezo", "/piezo")])?;
+        write_native_in(filled, name, |path| is_simulated(path, number), &native, storage)?;
+        let opened = open_native(&InputFiles::new(), &filled.folder().join(name), &CHANNELS)?;
         Ok((opened, record.events, record.saturated))
     }
 }
@@ -378,8 +377,28 @@ fn started_at(record: usize) -> String {
     format!("2005-03-{:02}T{:02}:{:02}:00Z", 1 + minutes / 1440 % 31, minutes / 60 % 24, minutes % 60)
 }
 
-/// Makes the folder; refuses one that holds records of another archive, which a pattern would pick up together with the new ones.
-fn prepare(folder: &Path, names: &[String]) -> Result<(), StageError> {
+/// The channels of a simulated record.
+const CHANNELS: [Wanted<'static>; 2] = [
+    Wanted { role: "deflection", location: "/deflection", required: true },
+    Wanted { role: "piezo", location: "/piezo", required: true },
+];
+
+/// Whether a file is a simulated record of this number, by what it says of itself: versions that kept no list of what they wrote are known by it.
+fn is_simulated(path: &Path, number: usize) -> bool {
+    let named = |record: &Record, role, name| record.channel(role).is_ok_and(|channel| channel.long_name == name);
+    open_native(&InputFiles::new(), path, &CHANNELS).is_ok_and(|record| {
+        record.started_at == started_at(number)
+            && named(&record, "deflection", DEFLECTION)
+            && named(&record, "piezo", PIEZO)
+    })
+}
+
+const DEFLECTION: &str = "photodiode signal";
+const PIEZO: &str = "z piezo monitor";
+
+/// Makes the folder; refuses one that holds records of another archive, which a pattern would pick up together with the new ones, and files under the
+/// names of the new ones that no simulation wrote.
+fn prepare(folder: &Path, names: &[String]) -> Result<FilledFolder, StageError> {
     let failed = |error: std::io::Error| StageError::new(format!("the folder cannot be used: {error}")).at(folder);
     std::fs::create_dir_all(folder).map_err(failed)?;
     for entry in std::fs::read_dir(folder).map_err(failed)? {
@@ -390,22 +409,36 @@ fn prepare(folder: &Path, names: &[String]) -> Result<(), StageError> {
                 .help("choose another `out`, or remove the old records"));
         }
     }
-    Ok(())
+    let filled = FilledFolder::open(folder)?;
+    sweep_beside(&folder.with_extension("truth.json"));
+    let own = |error: StoreError| StageError::from(error).help("choose another `out`, or remove the file");
+    let numbered: Vec<(usize, &String)> = names.iter().enumerate().collect();
+    numbered
+        .par_iter()
+        .map(|(number, name)| filled.require_own(name, |path| is_simulated(path, *number)).map_err(own))
+        .collect::<Result<(), StageError>>()?;
+    filled.require_own(&truth_name(folder), is_truth).map_err(own)?;
+    Ok(filled)
 }
 
-fn write_truth(path: &Path, truth: &Truth) -> Result<(), StageError> {
+/// The file of the truth, seen from the folder of the records.
+fn truth_name(folder: &Path) -> String {
+    let name = folder.with_extension("truth.json");
+    format!("../{}", name.file_name().unwrap_or_default().to_string_lossy())
+}
+
+/// Whether a file is the truth of an archive, by what it holds.
+fn is_truth(path: &Path) -> bool {
+    let json: Option<serde_json::Value> =
+        std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    json.is_some_and(|json| ["parameters", "seed", "counted_means", "counts"].iter().all(|key| json.get(key).is_some()))
+}
+
+fn write_truth(filled: &FilledFolder, truth: &Truth) -> Result<(), StageError> {
     let mut text = serde_json::to_string_pretty(truth)
         .map_err(|error| StageError::new(format!("the truth cannot be written as JSON: {error}")))?;
     text.push('\n');
-    replace_file(path, |temporary| {
-        std::fs::write(temporary, text).map_err(|error| StoreError {
-            file: path.to_owned(),
-            place: String::new(),
-            problem: format!("cannot be written: {error}"),
-            help: None,
-        })
-    })
-    .map_err(|error| StageError::from_error(error).at(path))
+    Ok(filled.write(&truth_name(filled.folder()), is_truth, text.as_bytes())?)
 }
 
 #[cfg(test)]

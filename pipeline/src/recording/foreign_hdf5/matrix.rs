@@ -11,8 +11,9 @@ use ndarray::Ix1;
 
 use super::walk::Found;
 use crate::error::StageError;
+use crate::files::FileState;
 use crate::hdf5_files::read::open_file;
-use crate::recording::native::size_of_file;
+use crate::recording::input_files::require_state;
 
 /// Samples read at once through the library, under its global lock: short enough to let others in between.
 const SLICE: usize = 1 << 16;
@@ -24,7 +25,7 @@ const MOST_COMPRESSION: u64 = 1100;
 #[derive(Debug)]
 pub(super) struct Matrix {
     path: PathBuf,
-    file_size: u64,
+    state: FileState,
     location: String,
     /// Length of its last axis, and whether it has another.
     columns: usize,
@@ -46,10 +47,15 @@ pub(super) struct Lane {
 
 impl Matrix {
     /// Errors: damaged; a chunk larger than the file allows.
-    pub(super) fn of(found: &Found, path: &Path, shape: &[usize], number: Number) -> Result<Self, StageError> {
+    pub(super) fn of(
+        found: &Found,
+        (path, state): (&Path, FileState),
+        shape: &[usize],
+        number: Number,
+    ) -> Result<Self, StageError> {
         let hdf5 = |error: hdf5::Error| StageError::new(format!("damaged: {error}"));
         let creation = found.dataset.dcpl().map_err(hdf5)?;
-        let file_size = size_of_file(path)?;
+        let file_size = state.size();
         let chunk = creation.chunk().unwrap_or_default();
         let chunk_bytes = chunk.iter().fold(number.bytes(), |product, &size| product.saturating_mul(size as u64));
         if !chunk.is_empty() && chunk_bytes > file_size.saturating_mul(MOST_COMPRESSION) {
@@ -60,7 +66,7 @@ impl Matrix {
         let contiguous = matches!(creation.layout(), Layout::Contiguous);
         Ok(Self {
             path: path.to_owned(),
-            file_size,
+            state,
             location: found.location.clone(),
             columns: shape.last().copied().unwrap_or(1),
             flat: shape.len() == 1,
@@ -126,16 +132,16 @@ impl Source for Lane {
             let problem = format!("samples {start} to {start} + {count} asked for, there are {}", self.samples);
             return Err(StageError::new(problem).at(&matrix.path).into());
         };
-        if size_of_file(&matrix.path)? != matrix.file_size {
-            let problem = format!("{}: the file's size has changed since it was opened", matrix.location);
-            return Err(StageError::new(problem).at(&matrix.path).help("wait until nothing writes to it").into());
-        }
+        require_state(&matrix.path, &matrix.state)?;
         let selection = |from, to| self.selection(from, to);
-        Ok(match matrix.number {
+        let samples = match matrix.number {
             Number::I8 | Number::U8 | Number::I16 => Raw::Int16(matrix.read(selection, start, end)?),
             Number::U16 | Number::I32 => Raw::Int32(matrix.read(selection, start, end)?),
             Number::F32 => Raw::Float32(matrix.read(selection, start, end)?),
             Number::U32 | Number::I64 | Number::U64 | Number::F64 => Raw::Float64(matrix.read(selection, start, end)?),
-        })
+        };
+        // the library opened it by name
+        require_state(&matrix.path, &matrix.state)?;
+        Ok(samples)
     }
 }

@@ -22,7 +22,7 @@ use std::path::Path;
 
 use afmid_formats::Contents;
 
-use super::input_files::InputFiles;
+use super::input_files::{InputFiles, require_state};
 use super::native::text_attribute;
 use crate::error::StageError;
 use crate::hdf5_files::read::open_file;
@@ -37,7 +37,7 @@ const MOST_REMARKS: usize = 100;
 
 /// Lists what a file holds. Errors: it cannot be read, is cut short, or is damaged beyond its list of datasets.
 pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageError> {
-    files.inspect_hdf5(path)?;
+    let (state, _) = files.inspect_hdf5(path)?;
     let file = open_file(path)?;
     let matlab = starts_like_matlab(path);
     let mut remarks = Vec::new();
@@ -62,7 +62,7 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
             remarks.push(format!("{} is left out: its {} channels are too many", found.location, series.lanes()));
             continue;
         }
-        match series.channels(files.chunks(), found, path, rate, if matlab { 1 } else { 0 }, &mut remarks) {
+        match series.channels(files.chunks(), found, (path, state), rate, if matlab { 1 } else { 0 }, &mut remarks) {
             Ok(more) => channels.extend(more),
             Err(error) => remarks.push(format!("{} is left out: {}", found.location, error.problem)),
         }
@@ -73,6 +73,8 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
         remarks.push(format!("{unsaid} more remarks of this kind"));
     }
     let started_at = ["started_at", "start_time"].into_iter().find_map(|name| text_attribute(&file, name));
+    // the library opened it by name
+    require_state(path, &state)?;
     let format = if matlab { "MATLAB 7.3 MAT-file (HDF5)" } else { "HDF5 file" };
     Ok(Contents { format: format.to_owned(), started_at: started_at.unwrap_or_default(), channels, remarks })
 }

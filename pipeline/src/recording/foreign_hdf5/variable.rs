@@ -9,6 +9,7 @@ use hdf5::types::{IntSize, TypeDescriptor};
 use super::matrix::{Lane, Matrix};
 use super::walk::Found;
 use crate::error::StageError;
+use crate::files::FileState;
 use crate::hdf5_files::read::check_size;
 use crate::recording::chunk_cache::ChunkCache;
 use crate::recording::native::{
@@ -94,7 +95,7 @@ impl Series {
         &self,
         chunks: &ChunkCache,
         found: &Found,
-        path: &Path,
+        (path, state): (&Path, FileState),
         sample_rate_hz: Option<f64>,
         base: usize,
         remarks: &mut Vec<String>,
@@ -120,7 +121,7 @@ impl Series {
             return Err(StageError::new(problem));
         }
         let fill_code = optional("_FillValue")?.map_or_else(|| optional("missing_value"), |code| Ok(Some(code)))?;
-        let sources = self.sources(chunks, found, path, base)?;
+        let sources = self.sources(chunks, found, (path, state), base)?;
         let channel = |(index, source): Indexed| FoundChannel {
             location: format!("{location}{index}"),
             samples: self.lanes.samples,
@@ -142,13 +143,13 @@ impl Series {
         &self,
         chunks: &ChunkCache,
         found: &Found,
-        path: &Path,
+        (path, state): (&Path, FileState),
         base: usize,
     ) -> Result<Vec<Indexed>, StageError> {
         if self.shape.len() == 1 && !self.number.may_be_rounded() {
-            return Ok(vec![(String::new(), Arc::new(open_source(chunks, path, &found.location)?))]);
+            return Ok(vec![(String::new(), Arc::new(open_source(chunks, path, state, &found.location)?))]);
         }
-        let matrix = Arc::new(Matrix::of(found, path, &self.shape, self.number)?);
+        let matrix = Arc::new(Matrix::of(found, (path, state), &self.shape, self.number)?);
         let lane = |(index, first): (String, u64)| {
             let lane = Lane::new(&matrix, first, self.lanes.step, self.lanes.samples);
             lane.source().map(|source| (index, source))

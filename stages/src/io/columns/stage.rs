@@ -137,7 +137,7 @@ impl Stage for Columns {
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let path = self.path(cx.base());
         let place = |error: String| StageError::new(format!("{}: {error}", path.display()));
-        let bytes = std::fs::read(&path).map_err(|error| place(error.to_string()))?;
+        let bytes = cx.files().read(&path)?;
         let table = read_columns(&self.file, &bytes, self.separator).map_err(|error| place(error.to_string()))?;
         let series = Series::new(self, &table)?;
         let (pair, summary) = series.split(self)?;

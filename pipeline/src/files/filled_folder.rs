@@ -1,0 +1,238 @@
+//! Folders that this program fills with files: what it wrote there is listed with its hash, so that nothing else is ever replaced.
+
+use std::collections::HashMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::replace::Replacement;
+use super::temporary::sweep;
+use crate::error::StoreError;
+
+/// The list in such a folder: a line per file, BLAKE3 hash and name, as `b3sum --check` takes them. A name may have several lines: what was written
+/// there before.
+pub const LIST: &str = ".afmid-files";
+
+/// A folder that this program fills with files.
+///
+/// A file that it wrote is replaced as long as it is as it was written; a file of others, or one that somebody edited since, never. Several threads and
+/// processes may fill one folder at once.
+#[derive(Debug)]
+pub struct FilledFolder {
+    folder: PathBuf,
+    /// Hashes of what was written under a name.
+    listed: Mutex<HashMap<String, Vec<String>>>,
+}
+
+impl FilledFolder {
+    /// A folder that exists; removes what killed runs left there. Errors: its list cannot be read.
+    pub fn open(folder: &Path) -> Result<Self, StoreError> {
+        sweep(folder);
+        let list = folder.join(LIST);
+        let bytes = match fs::read(&list) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
+            Err(error) => return Err(StoreError::io("cannot be read", &list, &error)),
+        };
+        Ok(Self { folder: folder.to_owned(), listed: Mutex::new(parse(&String::from_utf8_lossy(&bytes))) })
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn listed(&self) -> MutexGuard<'_, HashMap<String, Vec<String>>> {
+        self.listed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Sees that nothing of others lies at a name in the folder (with `/` in levels below it). `earlier` knows files of earlier versions, which kept no
+    /// list: it is asked where the list does not have the name. An empty file holds nothing that could be lost.
+    ///
+    /// Errors: the file is not one that was written here, or it was changed since; it cannot be read.
+    pub fn require_own(&self, name: &str, earlier: impl FnOnce(&Path) -> bool) -> Result<(), StoreError> {
+        let path = self.folder.join(name);
+        let metadata = match fs::symlink_metadata(&path) {
+            Ok(metadata) => metadata,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(StoreError::io("cannot be looked at", &path, &error)),
+        };
+        let refused = |found: &str| {
+            StoreError::new(format!("{found}: it is not replaced"))
+                .file(&path)
+                .help("choose another place, or remove the file first if it is no longer needed")
+        };
+        if !metadata.is_file() {
+            return Err(refused("exists and is no regular file"));
+        }
+        if metadata.len() == 0 {
+            return Ok(());
+        }
+        let Some(hashes) = self.listed().get(name).cloned() else {
+            return if earlier(&path) { Ok(()) } else { Err(refused("exists, and afmid did not write it")) };
+        };
+        let now = hash(&path).map_err(|error| StoreError::io("cannot be read", &path, &error))?;
+        if hashes.contains(&now) { Ok(()) } else { Err(refused("was changed since afmid wrote it")) }
+    }
+
+    /// Writes a file, whole or not at all, synced, and lists it. `fill` gets a name of its own in the same folder and leaves a closed file there.
+    ///
+    /// Errors: as [`FilledFolder::require_own`]; those of `fill`; the folder cannot be written.
+    pub fn replace(
+        &self,
+        name: &str,
+        earlier: impl FnOnce(&Path) -> bool,
+        fill: impl FnOnce(&Path) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
+        self.require_own(name, earlier)?;
+        let path = self.folder.join(name);
+        let replacement = Replacement::new(&path)?;
+        let temporary = replacement.temporary();
+        let io = |error: std::io::Error| StoreError::io("cannot be written", &path, &error);
+        let listed = || {
+            let hash = hash(temporary).map_err(io)?;
+            File::open(temporary).and_then(|file| file.sync_all()).map_err(io)?;
+            // before the file is there: a kill in between leaves a line about what lies nowhere, not a file that nobody knows
+            self.list(name, hash)
+        };
+        let written = fill(temporary).and_then(|()| listed());
+        replacement.take(written)
+    }
+
+    /// The same for files that are none of the store's. Errors: those of `fill`, and as there.
+    pub fn replace_with(
+        &self,
+        name: &str,
+        earlier: impl FnOnce(&Path) -> bool,
+        fill: impl FnOnce(&Path) -> std::io::Result<()>,
+    ) -> Result<(), StoreError> {
+        let path = self.folder.join(name);
+        let fill =
+            |temporary: &Path| fill(temporary).map_err(|error| StoreError::io("cannot be written", &path, &error));
+        self.replace(name, earlier, fill)
+    }
+
+    /// The same with these bytes. Errors: as there.
+    pub fn write(&self, name: &str, earlier: impl FnOnce(&Path) -> bool, bytes: &[u8]) -> Result<(), StoreError> {
+        self.replace_with(name, earlier, |temporary| fs::write(temporary, bytes))
+    }
+
+    fn list(&self, name: &str, hash: String) -> Result<(), StoreError> {
+        let mut listed = self.listed();
+        let hashes = listed.entry(name.to_owned()).or_default();
+        if hashes.contains(&hash) {
+            return Ok(());
+        }
+        let path = self.folder.join(LIST);
+        let append = || -> std::io::Result<()> {
+            let mut file = OpenOptions::new().read(true).append(true).create(true).open(&path)?;
+            // a line that a kill left half written spoils no other
+            let mut last = [b'\n'];
+            if let Some(end) = file.metadata()?.len().checked_sub(1) {
+                file.read_exact_at(&mut last, end)?;
+            }
+            let begin = if last == [b'\n'] { "" } else { "\n" };
+            file.write_all(format!("{begin}{}\n", line(name, &hash)).as_bytes())?;
+            file.sync_data()
+        };
+        append().map_err(|error| StoreError::io("cannot be written", &path, &error))?;
+        hashes.push(hash);
+        Ok(())
+    }
+}
+
+/// As `b3sum` has it: a name with a backslash or the end of a line in it is escaped, and its line begins with a backslash.
+fn line(name: &str, hash: &str) -> String {
+    let escaped = name.replace('\\', "\\\\").replace('\n', "\\n");
+    let mark = if escaped == name { "" } else { "\\" };
+    format!("{mark}{hash}  {escaped}")
+}
+
+fn parse(text: &str) -> HashMap<String, Vec<String>> {
+    let mut listed: HashMap<String, Vec<String>> = HashMap::new();
+    for line in text.lines() {
+        let (escaped, line) = line.strip_prefix('\\').map_or((false, line), |rest| (true, rest));
+        let Some((hash, name)) = line.split_once("  ") else { continue };
+        let whole = hash.len() == 64 && hash.bytes().all(|byte| byte.is_ascii_hexdigit());
+        if whole && !name.is_empty() {
+            let name = if escaped { unescaped(name) } else { name.to_owned() };
+            listed.entry(name).or_default().push(hash.to_owned());
+        }
+    }
+    listed
+}
+
+fn unescaped(name: &str) -> String {
+    let mut out = String::with_capacity(name.len());
+    let mut letters = name.chars();
+    while let Some(letter) = letters.next() {
+        match letter {
+            '\\' => out.extend(letters.next().map(|next| if next == 'n' { '\n' } else { next })),
+            letter => out.push(letter),
+        }
+    }
+    out
+}
+
+fn hash(path: &Path) -> std::io::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(File::open(path)?)?;
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::fixture::Folder;
+
+    fn nobody(_: &Path) -> bool {
+        false
+    }
+
+    #[test]
+    fn what_was_written_is_replaced_and_what_others_wrote_or_edited_is_not() {
+        let folder = Folder::new("filled");
+        let own = FilledFolder::open(&folder.0).unwrap();
+        own.write("a.csv", nobody, b"1").unwrap();
+        own.write("a.csv", nobody, b"2").unwrap();
+        // another process
+        let again = FilledFolder::open(&folder.0).unwrap();
+        again.write("a.csv", nobody, b"3").unwrap();
+        fs::write(folder.file("a.csv"), "2").unwrap();
+        again.write("a.csv", nobody, b"4").unwrap();
+        fs::write(folder.file("a.csv"), "mine").unwrap();
+        let error = again.write("a.csv", |_| true, b"5").unwrap_err();
+        assert!(error.problem.contains("changed since"), "{error}");
+        assert_eq!(fs::read(folder.file("a.csv")).unwrap(), b"mine");
+        fs::write(folder.file("b.csv"), "theirs").unwrap();
+        let error = again.write("b.csv", nobody, b"5").unwrap_err();
+        assert!(error.problem.contains("afmid did not write it") && error.help.is_some(), "{error}");
+        again.write("b.csv", |_| true, b"of an earlier version").unwrap();
+        fs::create_dir(folder.file("c")).unwrap();
+        assert!(again.write("c", |_| true, b"").is_err());
+        std::os::unix::fs::symlink(folder.file("nowhere"), folder.file("link")).unwrap();
+        assert!(again.write("link", |_| true, b"").is_err(), "what a link leads to is another's");
+        fs::write(folder.file("reserved"), "").unwrap();
+        again.write("reserved", nobody, b"x").unwrap();
+        let mut names: Vec<String> =
+            fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        assert_eq!(names, [LIST, "a.csv", "b.csv", "c", "link", "reserved"]);
+    }
+
+    #[test]
+    fn odd_names_and_half_lines_come_back() {
+        let folder = Folder::new("lines");
+        let own = FilledFolder::open(&folder.0).unwrap();
+        fs::write(folder.file(LIST), &"0123456789abcdef".repeat(2)).unwrap();
+        for name in ["a  b", "a\\n", "ä\n"] {
+            own.write(name, nobody, name.as_bytes()).unwrap();
+        }
+        let again = FilledFolder::open(&folder.0).unwrap();
+        for name in ["a  b", "a\\n", "ä\n"] {
+            again.write(name, nobody, b"other").unwrap();
+        }
+    }
+}
