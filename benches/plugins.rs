@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 use afmid_pipeline::cache::Cache;
+use afmid_pipeline::plugin::{AllStages, Plugins, Rule};
 use afmid_pipeline::runner::{Options, Quiet, run};
 use afmid_pipeline::{
     Array, Axis, Caching, Context, Entry, Example, Plan, Port, Ports, Registry, Spec, Stage, StageError, graph,
@@ -72,7 +73,10 @@ fn plan(folder: &Path, plugin: bool) -> Plan {
         text.push_str("[[stage]]\nid = \"echo\"\nuses = \"exec:echo\"\ninputs = { array = \"signals\" }\n");
     }
     let registry = Registry::new().with(&[Entry::of::<Signals>()]).expect("one name");
-    graph::load(&folder.join("b.toml").display().to_string(), &text, &[], &registry).expect("a right config")
+    // its processes wait for the runs
+    let plugins = Box::leak(Box::new(Plugins::new(Rule::All, None)));
+    let file = folder.join("b.toml").display().to_string();
+    graph::load(&file, &text, &[], &AllStages { registry: &registry, plugins }).expect("a right config")
 }
 
 /// The plugin's own work: the same request again and again, sent to it without afmid, its input file ready.

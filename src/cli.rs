@@ -10,6 +10,7 @@ mod batch;
 mod examples;
 mod export;
 mod new;
+mod plugins;
 mod provenance;
 mod submit;
 
@@ -17,6 +18,7 @@ pub use batch::{BatchArgs, SetsArgs};
 pub use examples::command;
 pub use export::{ExportArgs, ModelFormat};
 pub use new::{Goal, New, NewPipelineArgs, NewStageArgs};
+pub use plugins::{AllowArgs, PluginCommand, TrustArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
 pub use submit::{SlurmArgs, SubmitTo};
 
@@ -122,6 +124,8 @@ pub enum Command {
     },
     /// Hide causes in simulated recordings, diagnose them with a config, and say how well it did.
     Exam(ExamArgs),
+    /// List what the plugins of a config would run, ask them to describe themselves, and remember that you agree.
+    Trust(TrustArgs),
     /// Try a stage that runs as a process of its own.
     Plugin {
         /// What to do with it.
@@ -155,29 +159,6 @@ pub enum Command {
     },
 }
 
-/// What to do with a plugin.
-#[derive(Debug, Subcommand)]
-pub enum PluginCommand {
-    /// Try whether a command is a plugin as docs/plugins.md has it: exit code 0 if everything passed, 1 if not.
-    Check {
-        /// How long one request may take, in seconds.
-        #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds)]
-        timeout: f64,
-        /// As JSON, alone on stdout.
-        #[arg(long)]
-        json: bool,
-        /// The command: a program, and its arguments.
-        #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true, value_name = "CMD")]
-        command: Vec<String>,
-    },
-}
-
-/// A time limit.
-fn seconds(text: &str) -> Result<f64, String> {
-    let wanted = || "wanted seconds above 0, at most a week".to_owned();
-    text.parse().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 604_800.0).ok_or_else(wanted)
-}
-
 /// A config and what changes it.
 #[derive(Debug, Args)]
 pub struct ConfigArgs {
@@ -206,6 +187,9 @@ pub struct ExamArgs {
     /// Keep the recordings and the verdict of every archive that was judged wrong, in a folder per seed.
     #[arg(long, value_name = "FOLDER")]
     pub keep: Option<PathBuf>,
+    /// Whether plugins may start.
+    #[command(flatten)]
+    pub plugins: AllowArgs,
     /// As JSON, alone on stdout, every archive with its draw.
     #[arg(long)]
     pub json: bool,
@@ -242,6 +226,9 @@ pub struct RunArgs {
     /// Where stage results are kept [default: $AFMID_CACHE, or `afmid` in the user's cache folder].
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
+    /// Whether plugins may start.
+    #[command(flatten)]
+    pub plugins: AllowArgs,
     /// As JSON, alone on stdout; of a config with [sweep], all points.
     #[arg(long)]
     pub json: bool,

@@ -36,16 +36,15 @@ pub fn registry() -> Result<Registry, DoubleName> {
 
 /// The command line of a program with these stages: parses the arguments, runs the command, reports.
 pub fn main(registry: &Registry) -> ExitCode {
+    if let Some(code) = afmid_pipeline::plugin::host_main() {
+        return code;
+    }
     let parsed = cli::command().try_get_matches().and_then(|matches| cli::Cli::from_arg_matches(&matches));
-    let done = match parsed {
+    match parsed {
         Ok(cli) => commands::dispatch(cli.command, registry),
         Err(error) => told(&error),
-    };
-    afmid_pipeline::plugin::shut_down();
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => output::report(failure),
     }
+    .map_or_else(output::report, |()| ExitCode::SUCCESS)
 }
 
 /// How a program ends whose stages do not make a registry.

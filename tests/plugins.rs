@@ -17,6 +17,7 @@ fn afmid(here: &Path, arguments: &[&str]) -> Output {
     let path = std::env::join_paths(first.into_iter().chain(std::env::split_paths(&path))).expect("a PATH");
     let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
     command.current_dir(here).args(arguments).env("PATH", path).env("PYTHONDONTWRITEBYTECODE", "1");
+    command.env("AFMID_TRUST", here.join("trust"));
     command.output().expect("afmid starts")
 }
 
@@ -40,7 +41,7 @@ fn a_smoother_of_scipys_runs_beside_the_built_in_one() {
     assert!(tried.contains("passed") && !tried.contains("FAIL"), "{tried}");
     let config = plugins().join("savgol.toml").display().to_string();
     let archive = format!("archive.out='{}'", here.join("archive").display());
-    told(here, &["run", &config, "--set", &archive, "-o", "s.h5", "--cache", "cache"]);
+    told(here, &["run", &config, "--allow-plugins", "--set", &archive, "-o", "s.h5", "--cache", "cache"]);
     let shown: Value = serde_json::from_str(&told(here, &["show", "s.h5", "savgol", "--json"])).expect("JSON");
     let comparison = find(&shown, "largest_peak_over_reference").expect("the comparison");
     // mode 1 is two bins wide: a parabola over 21 bins flattens it to a few per cent, the local rational does not
@@ -49,7 +50,8 @@ fn a_smoother_of_scipys_runs_beside_the_built_in_one() {
     let frequency = number(comparison, "/largest_peak_hz");
     assert!((frequency / 46.3e3 - 1.0).abs() < 0.02, "{frequency} Hz");
     // the second run takes all from the cache
-    let again = told(here, &["run", &config, "--set", &archive, "-o", "s.h5", "--cache", "cache", "--json"]);
+    let again = ["run", &config, "--allow-plugins", "--set", &archive, "-o", "s.h5", "--cache", "cache", "--json"];
+    let again = told(here, &again);
     let again: Value = serde_json::from_str(&again).expect("JSON");
     // `simulate.afm` writes files and runs every time
     assert_eq!(number(&again, "/stages") - number(&again, "/reused"), 1.0, "{again}");
@@ -72,6 +74,7 @@ fn a_new_stage_in_python_passes_and_runs() {
     told(here, &["new", "stage", "end_noise", "--python"]);
     let tried = told(&here.join("end_noise"), &["plugin", "check", "--", "python3", "end_noise.py"]);
     assert!(tried.contains("passed") && !tried.contains("FAIL"), "{tried}");
+    told(here, &["trust", "end_noise/end_noise.toml"]);
     told(here, &["run", "end_noise/end_noise.toml", "-o", "n.h5", "--cache", "cache"]);
     let shown: Value = serde_json::from_str(&told(here, &["show", "n.h5", "end_noise", "--json"])).expect("JSON");
     // 0.7 V of mode 1, five decay times later: 4 mV, noise beside it
@@ -134,7 +137,7 @@ fn a_program_on_the_path_is_a_plugin_by_its_name() {
     let config =
         "[pipeline]\nname = \"echo\"\n[[stage]]\nid = \"echo\"\nuses = \"exec:echo\"\nparams = { steps = 2 }\n";
     std::fs::write(here.join("echo.toml"), config).expect("a config");
-    told(here, &["run", "echo.toml", "-o", "e.h5", "--cache", "cache"]);
+    told(here, &["run", "echo.toml", "--allow-plugins", "-o", "e.h5", "--cache", "cache"]);
     let shown: Value = serde_json::from_str(&told(here, &["show", "e.h5", "echo", "--json"])).expect("JSON");
     assert_eq!(number(find(&shown, "steps").expect("its parameters"), "/steps"), 2.0);
 }

@@ -56,6 +56,7 @@ fn every_command_of_the_tutorials_runs() {
         for line in commands(&std::fs::read_to_string(&page).expect("a tutorial")) {
             let mut shell = Command::new("sh");
             shell.current_dir(here).args(["-c", &line]).env("PATH", &path).env("AFMID_CACHE", here.join("cache"));
+            shell.env("AFMID_TRUST", here.join("trust"));
             let output = shell.output().expect("sh starts");
             assert!(output.status.success(), "{}: {line}\n{}", page.display(), String::from_utf8_lossy(&output.stderr));
             let stdout = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -1,4 +1,4 @@
-% The envelope of an averaged event, in Octave: `afmid run examples/plugins/envelope.toml`.
+% The envelope of an averaged event, in Octave: `afmid run examples/plugins/envelope.toml --allow-plugins`.
 %
 % The magnitude of the analytic signal: the transform's negative frequencies are left out. A mode that rings alone leaves exp(-t / tau), tau = Q / (pi f).
 % Source: D. Gabor, J. IEE 93 (1946) 429.

@@ -1,6 +1,7 @@
 """A stage of one's own in Python: what `afmid new stage NAME --python` begins with.
 
     afmid plugin check -- python3 new_stage.py       # tries it
+    afmid trust new_stage.toml                       # shows what would run, and remembers that you agree
     afmid run new_stage.toml                         # runs it on simulated records
 """
 import sys

@@ -1,4 +1,4 @@
-"""A transfer function smoothed by scipy's Savitzky-Golay filter, beside afmid's own: `afmid run examples/plugins/savgol.toml`.
+"""A transfer function smoothed by scipy's Savitzky-Golay filter, beside afmid's own: `afmid run examples/plugins/savgol.toml --allow-plugins`.
 
 Real and imaginary parts are smoothed, never magnitudes: noise adds to those. A polynomial over `half_width_bins` on either side flattens resonances that are
 hardly wider than that, which the comparison shows.

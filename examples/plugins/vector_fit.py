@@ -1,4 +1,4 @@
-"""Modes by scikit-rf's vector fitting, beside afmid's own: `afmid run examples/plugins/vector_fit.toml`.
+"""Modes by scikit-rf's vector fitting, beside afmid's own: `afmid run examples/plugins/vector_fit.toml --allow-plugins`.
 
 Vector fitting takes a smoothed transfer function for exact: it gives no errors.
 """

@@ -12,6 +12,8 @@ pub const FOLDER: &str = "slurm";
 pub const MANIFEST: &str = "manifest.jsonl";
 /// The config as it was when the scripts were written.
 pub const CONFIG: &str = "config.toml";
+/// The seals of the plugins that the jobs may start.
+pub const AGREED: &str = "agreed-plugins";
 /// The job array.
 pub const ARRAY: &str = "array.sbatch";
 /// The job that collects.
@@ -107,6 +109,8 @@ pub struct Jobs<'a> {
     pub set: &'a [String],
     /// Run again what failed.
     pub retry_failed: bool,
+    /// Whether there are plugins: [`AGREED`] lists those that may start.
+    pub plugins: bool,
     /// How many data sets.
     pub data_sets: usize,
     /// How many shards.
@@ -177,7 +181,7 @@ exit "$code"
 program={program}
 config={config}
 folder={folder}
-{redirection}batch=("$config" --manifest "$folder/{FOLDER}/{MANIFEST}" -o "$folder"{set})
+{redirection}batch=("$config" --manifest "$folder/{FOLDER}/{MANIFEST}" -o "$folder"{set}{agreed})
 # every file is written under a name of its own and renamed: no locks are needed, and not all file systems of clusters have them
 export HDF5_USE_FILE_LOCKING=FALSE
 {environment}
@@ -190,6 +194,8 @@ fi"#,
             config = quoted(self.config),
             folder = quoted(self.folder),
             redirection = log.redirection(),
+            agreed =
+                if self.plugins { format!(" --agreed-plugins \"$folder/{FOLDER}/{AGREED}\"") } else { String::new() },
             environment = environment.collect::<String>().trim_end(),
         )
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{ConfigArgs, threads};
+use super::{AllowArgs, ConfigArgs, threads};
 use crate::batch::shard::Shard;
 
 /// Data sets.
@@ -49,6 +49,12 @@ pub struct BatchArgs {
     /// Run nothing: make the summary from what the ledger holds of these data sets; what has changed since its run counts as failed.
     #[arg(long, conflicts_with_all = ["shard", "fresh", "retry_failed"])]
     pub collect: bool,
+    /// Whether plugins may start.
+    #[command(flatten)]
+    pub plugins: AllowArgs,
+    /// Start the plugins whose seals this file holds: what `afmid submit` hands to its jobs.
+    #[arg(long, value_name = "FILE", hide = true)]
+    pub agreed_plugins: Option<PathBuf>,
     /// As JSON, alone on stdout.
     #[arg(long)]
     pub json: bool,

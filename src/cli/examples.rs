@@ -66,6 +66,14 @@ faults, submit again: what is finished is not run again.",
     help(&["export-crate"], &["afmid export-crate paper.h5 -o paper-crate --with-data --license https://creativecommons.org/licenses/by/4.0/"]),
     help(&["gc"], &["afmid gc --dry-run --older-than 30d", "afmid gc --max-size 20G"]),
     help(&["report"], &["afmid report paper.h5 -o paper.html", "afmid report paper.h5 --figures figures --png"]),
+    Help {
+        command: &["trust"],
+        examples: &["afmid trust savgol.toml", "afmid trust --list", "afmid trust --revoke savgol.toml --json"],
+        further: "\
+Opening a config runs nothing. `run`, `batch`, `rerun`, `exam` and the jobs of `submit` start a plugin (a command of [plugins], or afmid-stage-NAME on the PATH) only after consent for its folder,
+its command with all arguments and variables, and the bytes of the program and of the files among the arguments; what a script imports is not seen. Consent is kept in $AFMID_TRUST, or
+`afmid/trust` in $XDG_DATA_HOME or ~/.local/share, and ends when one of these changes. --allow-plugins starts them once without it.",
+    },
     help(&["plugin"], &["afmid plugin check -- python3 savgol.py"]),
     help(&["plugin", "check"], &["afmid plugin check -- python3 savgol.py", "afmid plugin check --timeout 300 --json -- octave-cli --quiet envelope.m"]),
     help(&["stages"], &["afmid stages", "afmid stages model.pem", "afmid stages model.pem --json"]),

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::threads;
+use super::{AllowArgs, threads};
 
 /// What to compare.
 #[derive(Debug, Args)]
@@ -58,6 +58,9 @@ pub struct RerunArgs {
     /// Where stage results are kept, as for `run`.
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
+    /// Whether plugins may start.
+    #[command(flatten)]
+    pub plugins: AllowArgs,
     /// As JSON, alone on stdout.
     #[arg(long)]
     pub json: bool,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{ConfigArgs, SetsArgs};
+use super::{AllowArgs, ConfigArgs, SetsArgs};
 use crate::batch::slurm::{Field, Passed};
 
 /// Which kind of cluster.
@@ -54,6 +54,9 @@ pub struct SlurmArgs {
     /// Any other option of sbatch, for both jobs: --sbatch=--nice=100.
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
     pub sbatch: Vec<Passed>,
+    /// Whether plugins may start.
+    #[command(flatten)]
+    pub plugins: AllowArgs,
     /// Send both jobs with sbatch.
     #[arg(long)]
     pub send: bool,

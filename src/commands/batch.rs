@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use afmid_pipeline::{Plan, Registry};
+use afmid_pipeline::Plan;
+use afmid_pipeline::graph::Stages;
 use serde_json::json;
 
 use super::load::load;
@@ -21,16 +22,16 @@ use crate::progress::Sets;
 use crate::show::pretty;
 
 /// Runs a config on every data set. One that fails stops no other; then the exit code is 3.
-pub fn run(args: &BatchArgs, registry: &Registry) -> Result<(), Failure> {
+pub fn run(args: &BatchArgs, stages: &dyn Stages) -> Result<(), Failure> {
     let clock = Instant::now();
     let sets = data_sets(&args.sets)?;
-    let whole = whole(&args.config, registry)?;
+    let whole = whole(&args.config, stages)?;
     let folder = args.output.clone().unwrap_or_else(|| default_output(whole.name()).with_extension(""));
     let ledger = ledger(&folder)?;
     // a shard writes none: whoever collects does
     let tables = args.shard.is_none().then(|| Tables::open(&folder, BATCH)).transpose()?;
     let own = |set: &&DataSet| args.shard.is_none_or(|shard| shard.holds(&set.name));
-    let done = computed(args, &planned(&args.config, sets.iter().filter(own), registry)?, &ledger)?;
+    let done = computed(args, &planned(&args.config, sets.iter().filter(own), stages)?, &ledger)?;
     let entries: Vec<Entry> = done.iter().map(|done| done.entry.clone()).collect();
     let title = Title { name: whole.name(), seed: whole.seed(), config: whole.config_text(), program: PROGRAM };
     let table = tables.map(|tables| tables.write_batch(&title, &entries)).transpose()?;
@@ -45,8 +46,8 @@ pub fn run(args: &BatchArgs, registry: &Registry) -> Result<(), Failure> {
 }
 
 /// The plan of the config alone. Errors, usage: what is wrong with it; it has no stage whose files a batch can replace.
-pub fn whole(config: &ConfigArgs, registry: &Registry) -> Result<Plan, Failure> {
-    let whole = load(&config.config, &config.set, registry)?;
+pub fn whole(config: &ConfigArgs, stages: &dyn Stages) -> Result<Plan, Failure> {
+    let whole = load(&config.config, &config.set, stages)?;
     if whole.node("records").is_none() {
         let help = "a batch replaces `records.files`: give the stage that reads the recordings the id `records`";
         return Err(Failure::usage("the config has no stage `records`", Some(help.to_owned())));
@@ -86,11 +87,11 @@ pub fn data_sets(args: &SetsArgs) -> Result<Vec<DataSet>, Failure> {
 pub fn planned<'a>(
     config: &ConfigArgs,
     sets: impl Iterator<Item = &'a DataSet>,
-    registry: &Registry,
+    stages: &dyn Stages,
 ) -> Result<Vec<(&'a DataSet, Plan)>, Failure> {
     sets.map(|set| {
         let arguments: Vec<String> = config.set.iter().cloned().chain(set.arguments()).collect();
-        let plan = load(&config.config, &arguments, registry)?;
+        let plan = load(&config.config, &arguments, stages)?;
         refuse(&plan, "a batch runs one set of parameters on each data set")?;
         Ok((set, plan))
     })

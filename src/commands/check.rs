@@ -3,27 +3,30 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::config::Origin;
-use afmid_pipeline::{Plan, Problem, Registry, graph};
+use afmid_pipeline::graph::{self, Stages};
+use afmid_pipeline::{Node, Plan, Problem};
 use serde_json::{Value, json};
 
 use super::load::{load, read};
+use crate::batch::shell::quoted;
 use crate::failure::{Failure, Message};
 use crate::output::{print, report};
 use crate::show::pretty;
 
 /// Checks every config before it gives up.
-pub fn run(configs: &[PathBuf], as_json: bool, registry: &Registry) -> Result<(), Failure> {
+pub fn run(configs: &[PathBuf], as_json: bool, stages: &dyn Stages) -> Result<(), Failure> {
     if as_json {
-        return told(configs, registry);
+        return told(configs, stages);
     }
     let (mut wrong, mut printed) = (0, Ok(()));
     for config in configs {
-        match load(config, &[], registry) {
+        match load(config, &[], stages) {
             // the verdict counts, whether anybody reads on or not
             Ok(plan) if printed.is_ok() => {
                 let points =
                     plan.points().map(|count| format!(", every point of a sweep of {count}")).unwrap_or_default();
-                printed = print(&format!("{}: right, {} stages{points}\n", config.display(), plan.nodes.len()));
+                let right = format!("{}: right, {} stages{points}\n", config.display(), plan.nodes.len());
+                printed = print(&(right + &not_checked(&plan)));
             }
             Ok(_) => {}
             Err(failure) => {
@@ -36,17 +39,17 @@ pub fn run(configs: &[PathBuf], as_json: bool, registry: &Registry) -> Result<()
 }
 
 /// The verdict on all configs as JSON. Errors: a config is wrong, which is said on stdout; one cannot be read.
-fn told(configs: &[PathBuf], registry: &Registry) -> Result<(), Failure> {
+fn told(configs: &[PathBuf], stages: &dyn Stages) -> Result<(), Failure> {
     let (mut all, mut wrong) = (Vec::new(), false);
     for config in configs {
         let text = read(config)?;
-        let planned = graph::load(&config.display().to_string(), &text, &[], registry);
+        let planned = graph::load(&config.display().to_string(), &text, &[], stages);
         wrong |= planned.is_err();
         all.push(match planned {
             Ok(plan) => right(config, &plan),
             Err(problems) => {
                 let problems: Vec<Value> = problems.iter().map(|one| problem(&text, one)).collect();
-                json!({ "config": config.display().to_string(), "right": false, "problems": problems })
+                json!({ "config": config.display().to_string(), "right": false, "ports_not_checked": [], "problems": problems })
             }
         });
     }
@@ -55,8 +58,27 @@ fn told(configs: &[PathBuf], registry: &Registry) -> Result<(), Failure> {
 }
 
 fn right(config: &Path, plan: &Plan) -> Value {
-    let stages: Vec<&str> = plan.nodes.iter().map(|node| node.id.as_str()).collect();
-    json!({ "config": config.display().to_string(), "right": true, "stages": stages, "points": plan.points(), "problems": [] })
+    let ids = |nodes: &mut dyn Iterator<Item = &Node>| nodes.map(|node| node.id.clone()).collect::<Vec<String>>();
+    json!({
+        "config": config.display().to_string(),
+        "right": true,
+        "stages": ids(&mut plan.nodes.iter()),
+        "ports_not_checked": ids(&mut plan.not_described()),
+        "points": plan.points(),
+        "problems": [],
+    })
+}
+
+/// What could not be checked without starting plugins: a line per stage, none if all was.
+pub fn not_checked(plan: &Plan) -> String {
+    let config = quoted(&plan.config.file);
+    let note = |node: &Node| {
+        format!(
+            "note: stage {} ({}): ports not checked; `afmid trust {config}` asks the plugin what they are\n",
+            node.id, node.uses
+        )
+    };
+    plan.not_described().map(note).collect()
 }
 
 /// A problem with its place: line and column count from 1, columns in characters.

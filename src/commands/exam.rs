@@ -5,9 +5,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use afmid_pipeline::cache::Cache;
 use afmid_pipeline::files::{FilledFolder, LIST};
+use afmid_pipeline::graph::Stages;
 use afmid_pipeline::runner::{Options, Quiet, run as run_plan};
 use afmid_pipeline::stage::NoProgress;
-use afmid_pipeline::{Artifact, Context, Ports, Registry, Stage};
+use afmid_pipeline::{Artifact, Context, Ports, Stage};
 use afmid_stages::causes::catalogue;
 use afmid_stages::exam::{Draw, Judged, Kind, Score, draw, judge};
 use serde_json::Value;
@@ -24,8 +25,8 @@ const STAGE: &str = "diagnosis";
 const SUMMARY: &str = "summary";
 
 /// Runs an exam and prints its score.
-pub fn run(args: &ExamArgs, registry: &Registry) -> Result<(), Failure> {
-    let score = score(args, registry)?;
+pub fn run(args: &ExamArgs, stages: &dyn Stages) -> Result<(), Failure> {
+    let score = score(args, stages)?;
     if args.json {
         let text = serde_json::to_string_pretty(&score).map_err(|error| Failure::failed(error, None))?;
         return print(&(text + "\n"));
@@ -33,8 +34,8 @@ pub fn run(args: &ExamArgs, registry: &Registry) -> Result<(), Failure> {
     print(&score.text())
 }
 
-fn score(args: &ExamArgs, registry: &Registry) -> Result<Score, Failure> {
-    let plan = load(&args.config.config, &args.config.set, registry)?;
+fn score(args: &ExamArgs, stages: &dyn Stages) -> Result<Score, Failure> {
+    let plan = load(&args.config.config, &args.config.set, stages)?;
     refuse(&plan, "an exam judges one set of parameters")?;
     for id in ["records", STAGE] {
         if plan.node(id).is_none() {
@@ -50,7 +51,7 @@ fn score(args: &ExamArgs, registry: &Registry) -> Result<Score, Failure> {
             say(&format!("seed {seed}: no cause of the catalogue can be hidden in this lever at its limit\n"));
             continue;
         };
-        let one = sit(&drawn, args, registry, &folder.0)?;
+        let one = sit(&drawn, args, stages, &folder.0)?;
         say(&told(&one));
         judged.push(one);
     }
@@ -75,9 +76,9 @@ fn told(one: &Judged) -> String {
 }
 
 /// Writes an archive, has the config diagnose it, judges the JSON; the files are removed.
-fn sit(drawn: &Draw, args: &ExamArgs, registry: &Registry, scratch: &Path) -> Result<Judged, Failure> {
+fn sit(drawn: &Draw, args: &ExamArgs, stages: &dyn Stages, scratch: &Path) -> Result<Judged, Failure> {
     let base = scratch.join(drawn.seed.to_string());
-    let json = archive(drawn, &base).and_then(|()| diagnosed(drawn, args, registry, &base));
+    let json = archive(drawn, &base).and_then(|()| diagnosed(drawn, args, stages, &base));
     let (judged, json) = match json {
         Ok(json) => (judge(drawn, Some(&json)), json),
         Err(Sitting::Config(failure)) => return Err(failure),
@@ -135,14 +136,14 @@ fn archive(drawn: &Draw, base: &Path) -> Result<(), Sitting> {
     Ok(())
 }
 
-fn diagnosed(drawn: &Draw, args: &ExamArgs, registry: &Registry, base: &Path) -> Result<Value, Sitting> {
+fn diagnosed(drawn: &Draw, args: &ExamArgs, stages: &dyn Stages, base: &Path) -> Result<Value, Sitting> {
     let poles: Vec<String> = drawn.nominal_poles_hz.iter().map(|pole| format!("{pole:?}")).collect();
     let mut set = args.config.set.clone();
     set.push(format!("records.files=[{:?}]", base.join(OUT).join("*.h5").display().to_string()));
     set.push("records.channel='/deflection'".to_owned());
     set.push(format!("{STAGE}.detector_poles_hz=[{}]", poles.join(", ")));
     set.push(format!("{STAGE}.without={:?}", drawn.without));
-    let plan = load(&args.config.config, &set, registry).map_err(Sitting::Config)?;
+    let plan = load(&args.config.config, &set, stages).map_err(Sitting::Config)?;
     let cache = Cache::open(&base.join("cache"));
     let options = Options {
         base: plan.config.base().to_owned(),

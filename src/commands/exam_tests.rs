@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::*;
-use crate::cli::ConfigArgs;
+use crate::cli::{AllowArgs, ConfigArgs};
 
 /// Answers without looking.
 ///
@@ -71,7 +71,10 @@ fn exam(config: &str, seeds: u64, only: Option<ExamKind>) -> Result<Score, Failu
     std::fs::write(&path, config).unwrap();
     let registry = crate::registry().unwrap().with(&[Entry::of::<StandIn>()]).unwrap();
     let config = ConfigArgs { config: path, set: Vec::new() };
-    score(&ExamArgs { config, seeds, first_seed: 2, only, keep: None, json: false }, &registry)
+    score(
+        &ExamArgs { config, seeds, first_seed: 2, only, keep: None, plugins: AllowArgs::default(), json: false },
+        &registry,
+    )
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! `afmid explain`: which stages would run, and why.
 
 use afmid_pipeline::cache::{Cache, arithmetic};
+use afmid_pipeline::graph::Stages;
 use afmid_pipeline::runner::{Decision, Explanation, Surroundings, explain};
-use afmid_pipeline::{InputFiles, Plan, Registry};
+use afmid_pipeline::{InputFiles, Node, Plan};
 use serde_json::{Value, json};
 
 use super::load::load;
@@ -17,8 +18,8 @@ use crate::sweep::point;
 const MOST: usize = 8;
 
 /// Says on stdout what a run would do with each stage.
-pub fn run(args: &ExplainArgs, registry: &Registry) -> Result<(), Failure> {
-    let plan = load(&args.config.config, &args.config.set, registry)?;
+pub fn run(args: &ExplainArgs, stages: &dyn Stages) -> Result<(), Failure> {
+    let plan = load(&args.config.config, &args.config.set, stages)?;
     let cache = open_cache(args.cache.as_deref());
     let (files, arithmetic) = (cache.input_files(false), arithmetic());
     let with = Explained { cache: &cache, files: &files, arithmetic: &arithmetic };
@@ -31,7 +32,20 @@ pub fn run(args: &ExplainArgs, registry: &Registry) -> Result<(), Failure> {
     }
     let mut table = vec![["stage", "would", "because", "key"].map(str::to_owned).to_vec()];
     rows.iter().for_each(|row| table.extend(as_text(row)));
-    print(&grid(&table))
+    print(&(grid(&table) + &unseen(&plan)))
+}
+
+/// What keys do not see, for people; nothing where they see all.
+fn unseen(plan: &Plan) -> String {
+    let note = |node: &Node| format!("note: stage {} ({}): {UNSEEN}\n", node.id, node.uses);
+    plan.nodes.iter().filter(|node| is_plugin(&node.uses)).map(note).collect()
+}
+
+/// What keys of plugins do not see.
+const UNSEEN: &str = "the key holds its program, all arguments, the variables of [plugins] and the files among them; what these import is not seen";
+
+fn is_plugin(uses: &str) -> bool {
+    uses.starts_with("exec:")
 }
 
 /// What plans are explained with.
@@ -82,7 +96,7 @@ fn points(plan: &Plan, count: usize, with: &Explained, json: bool) -> Result<(),
             table.push(row);
         }
     }
-    print(&grid(&table))
+    print(&(grid(&table) + &unseen(plan)))
 }
 
 /// Points that share a stage's result.
@@ -159,6 +173,7 @@ fn as_json(row: &Explanation) -> Value {
         "would": would,
         "because": reasons(row).join("; "),
         "key": row.key,
+        "unseen": is_plugin(&row.uses).then_some(UNSEEN),
         "compared_with": nearest,
         "changes": changes.collect::<Vec<_>>(),
     })

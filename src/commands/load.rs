@@ -2,21 +2,22 @@
 
 use std::path::Path;
 
-use afmid_pipeline::{Plan, Registry, graph};
+use afmid_pipeline::Plan;
+use afmid_pipeline::graph::{self, Stages};
 
 use crate::diagnostic::render;
 use crate::failure::{Failure, Message};
 
 /// Reads a config, applies `--set` arguments and plans it. Errors: the file cannot be read; everything that is wrong with it.
-pub fn load(path: &Path, set: &[String], registry: &Registry) -> Result<Plan, Failure> {
+pub fn load(path: &Path, set: &[String], stages: &dyn Stages) -> Result<Plan, Failure> {
     let file = path.display().to_string();
     let text = read(path)?;
-    plan_text(&file, &text, set, registry)
+    plan_text(&file, &text, set, stages)
 }
 
 /// Plans a config from its text; `file` is what messages call it. Errors: everything that is wrong with it.
-pub fn plan_text(file: &str, text: &str, set: &[String], registry: &Registry) -> Result<Plan, Failure> {
-    graph::load(file, text, set, registry)
+pub fn plan_text(file: &str, text: &str, set: &[String], stages: &dyn Stages) -> Result<Plan, Failure> {
+    graph::load(file, text, set, stages)
         .map_err(|problems| Failure::Usage(Message::Rendered(render(file, text, &problems))))
 }
 

@@ -66,7 +66,10 @@ fn new_stage(args: &NewStageArgs) -> Result<(), Failure> {
             let next = format!("cargo test\n  cargo run -- run {name}.toml");
             (rust(name, &clone.ok_or_else(missing)?), next)
         }
-        _ => (python(name), format!("afmid plugin check -- python3 {name}.py\n  afmid run {name}.toml")),
+        _ => (
+            python(name),
+            format!("afmid plugin check -- python3 {name}.py\n  afmid trust {name}.toml\n  afmid run {name}.toml"),
+        ),
     };
     let failed =
         |error: std::io::Error| Failure::failed(format!("{} cannot be written: {error}", folder.display()), None);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use afmid_pipeline::plugin::{Check, check};
+use afmid_pipeline::plugin::{Check, Plugins, check};
 use serde_json::json;
 
 use crate::cli::PluginCommand;
@@ -11,9 +11,9 @@ use crate::output::print;
 use crate::show::pretty;
 
 /// Runs `afmid plugin check`. Errors: something did not pass.
-pub fn run(what: &PluginCommand) -> Result<(), Failure> {
+pub fn run(what: &PluginCommand, plugins: &Plugins) -> Result<(), Failure> {
     let PluginCommand::Check { timeout, json, command } = what;
-    let checks = check(command, Path::new("."), *timeout);
+    let checks = check(plugins, command, Path::new("."), *timeout);
     print(&if *json { as_json(&checks)? } else { text(&checks) })?;
     // what was printed says all
     let passed = checks.iter().all(|check| check.outcome.is_ok());

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::graph::{self, Stages};
 use afmid_pipeline::store::ResultFile;
 use afmid_pipeline::store::write_result;
-use afmid_pipeline::{Plan, Registry, SourceFile, graph};
+use afmid_pipeline::{Plan, SourceFile};
 use serde_json::{Value, json};
 
 use super::diff::open;
@@ -25,14 +26,14 @@ use crate::show::{number, pretty};
 const MOST: usize = 20;
 
 /// Repeats a run and compares.
-pub fn run(args: &RerunArgs, registry: &Registry) -> Result<(), Failure> {
+pub fn run(args: &RerunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     let file = open(&args.result)?;
     let finder = Finder::new(&file.run().info, &args.data);
     require_inputs(&file, &finder)?;
     let scratch = tempfile::tempdir()
         .map_err(|error| Failure::failed(format!("no temporary folder can be made: {error}"), None))?;
     let base = base(&file.run().info);
-    let (plan, writers) = plan(&file, &base, &finder, scratch.path(), registry)?;
+    let (plan, writers) = plan(&file, &base, &finder, scratch.path(), stages)?;
     let output = args.output.clone().unwrap_or_else(|| scratch.path().join("repeated.h5"));
     prepare(&output, Target::Result, &inputs(args, &file, &finder))?;
     let cache = open_cache(args.cache.as_deref());
@@ -71,12 +72,12 @@ fn plan(
     base: &Path,
     finder: &Finder,
     scratch: &Path,
-    registry: &Registry,
+    stages: &dyn Stages,
 ) -> Result<(Plan, Vec<Writer>), Failure> {
     let run = file.run();
     let name = config_path(&run.info).display().to_string();
     let load = |sets: &[String]| {
-        graph::load(&name, &run.config, sets, registry)
+        graph::load(&name, &run.config, sets, stages)
             .map_err(|problems| Failure::Usage(Message::Rendered(render(&name, &run.config, &problems))))
     };
     let plan = load(&run.overrides)?;

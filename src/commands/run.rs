@@ -3,8 +3,8 @@
 use std::num::NonZeroU16;
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::Registry;
 use afmid_pipeline::cache::Cache;
+use afmid_pipeline::graph::Stages;
 use afmid_pipeline::runner::{Failed, Options, RunError, run as run_plan, run_to_file};
 use afmid_pipeline::{Plan, RunResult};
 use serde_json::{Value, json};
@@ -22,8 +22,8 @@ use crate::show::pretty;
 pub const PROGRAM: &str = concat!("afmid ", env!("CARGO_PKG_VERSION"));
 
 /// Runs a config and writes its result file.
-pub fn run(args: &RunArgs, registry: &Registry) -> Result<(), Failure> {
-    let plan = load(&args.config.config, &args.config.set, registry)?;
+pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
+    let plan = load(&args.config.config, &args.config.set, stages)?;
     if let Some(count) = plan.points() {
         return sweep::run(&plan, count, args);
     }

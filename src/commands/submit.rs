@@ -9,14 +9,18 @@ use std::process::Command;
 
 use afmid_pipeline::Registry;
 use afmid_pipeline::files::FilledFolder;
+use afmid_pipeline::plugin::{AllStages, Candidate};
 use serde_json::json;
 
 use super::batch::{data_sets, ledger, planned, whole};
+use super::consent;
 use super::run::cache_folder;
 use crate::batch::dataset::DataSet;
 use crate::batch::manifest;
 use crate::batch::shard::Shard;
-use crate::batch::slurm::{ARRAY, COLLECT, CONFIG, DEPENDENCY, FOLDER, Jobs, LOG, MANIFEST, Resources, SUBMIT, job_id};
+use crate::batch::slurm::{
+    AGREED, ARRAY, COLLECT, CONFIG, DEPENDENCY, FOLDER, Jobs, LOG, MANIFEST, Resources, SUBMIT, job_id,
+};
 use crate::cli::{SlurmArgs, SubmitTo};
 use crate::failure::Failure;
 use crate::output::{print, say};
@@ -34,8 +38,12 @@ pub fn run(to: &SubmitTo, registry: &Registry) -> Result<(), Failure> {
 
 fn slurm(args: &SlurmArgs, registry: &Registry) -> Result<(), Failure> {
     let sets = data_sets(&args.sets)?;
-    let plan = whole(&args.config, registry)?;
-    planned(&args.config, sets.iter(), registry)?;
+    // nothing is started here: the jobs do that, and only what is agreed to
+    let nothing = consent::none();
+    let stages = AllStages { registry, plugins: &nothing };
+    let plan = whole(&args.config, &stages)?;
+    let agreed = consent::agreed(&args.plugins, &plan.config)?;
+    planned(&args.config, sets.iter(), &stages)?;
     let shards: BTreeSet<u64> = sets.iter().map(|set| Shard::of(&set.name, args.shards.into()).index()).collect();
     let filled: Vec<u64> = shards.into_iter().collect();
     let (folder, cache) = (absolute(&args.output)?, absolute(&cache_folder(args.cache.as_deref()))?);
@@ -59,6 +67,7 @@ fn slurm(args: &SlurmArgs, registry: &Registry) -> Result<(), Failure> {
         environment: &environment,
         set: &args.config.set,
         retry_failed: args.retry_failed,
+        plugins: !agreed.is_empty(),
         data_sets: sets.len(),
         shards: args.shards.get(),
         filled: &filled,
@@ -72,7 +81,7 @@ fn slurm(args: &SlurmArgs, registry: &Registry) -> Result<(), Failure> {
         },
     };
     let here = folder.join(FOLDER);
-    write(&here, &jobs, &sets, plan.config_text())?;
+    write(&here, &jobs, &sets, plan.config_text(), &agreed)?;
     let sent = if args.send { Some(send(&here)?) } else { None };
     print(&told(args.json, &here, &jobs, sent.as_ref())?)
 }
@@ -83,7 +92,7 @@ fn absolute(path: &Path) -> Result<PathBuf, Failure> {
         .map_err(|error| Failure::failed(format!("the working directory cannot be found: {error}"), None))
 }
 
-fn write(here: &Path, jobs: &Jobs, sets: &[DataSet], config: &str) -> Result<(), Failure> {
+fn write(here: &Path, jobs: &Jobs, sets: &[DataSet], config: &str, agreed: &[Candidate]) -> Result<(), Failure> {
     let failed = |error: &dyn std::fmt::Display| Failure::failed(format!("the jobs cannot be written: {error}"), None);
     std::fs::create_dir_all(here.join(LOG)).map_err(|error| failed(&error))?;
     let manifest = manifest::write(sets).map_err(|error| failed(&error))?;
@@ -96,6 +105,7 @@ fn write(here: &Path, jobs: &Jobs, sets: &[DataSet], config: &str) -> Result<(),
     for (name, text) in [
         (MANIFEST, manifest.as_str()),
         (CONFIG, config),
+        (AGREED, &consent::seals(agreed)),
         (ARRAY, &jobs.array()),
         (COLLECT, &jobs.collect()),
         (SUBMIT, &jobs.submit()),

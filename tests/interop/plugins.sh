@@ -18,7 +18,7 @@ cd "$root/examples/plugins"
 "$afmid" plugin check --timeout 120 -- octave-cli --no-init-file --no-history --quiet envelope.m
 "$afmid" plugin check --timeout 120 -- python3 vector_fit.py
 for name in envelope vector_fit; do
-    "$afmid" run "$name.toml" --set "archive.out='$scratch/archive-$name'" --cache "$scratch/cache" -o "$scratch/$name.h5"
+    "$afmid" run "$name.toml" --allow-plugins --set "archive.out='$scratch/archive-$name'" --cache "$scratch/cache" -o "$scratch/$name.h5"
     "$afmid" show "$scratch/$name.h5" "$name"
 done
 # the two estimators see the same smoothed response and the same record: they agree far within their own errors

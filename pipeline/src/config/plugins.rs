@@ -1,5 +1,6 @@
 //! The `[plugins]` table: commands of the stages that run as processes of their own.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use toml::Spanned;
@@ -16,6 +17,8 @@ pub struct PluginDecl {
     pub name: String,
     /// The program and its arguments; relative paths are taken from the config's folder.
     pub command: Vec<String>,
+    /// Variables of its environment, beside those that the program itself has; by name.
+    pub environment: BTreeMap<String, String>,
     /// How long one request may take, in seconds.
     pub timeout_s: f64,
     /// Bytes of its name.
@@ -30,7 +33,7 @@ pub const DEFAULT_TIMEOUT_S: f64 = 600.0;
 /// A week: more is a slip.
 const MOST_TIMEOUT_S: f64 = 604_800.0;
 
-const KEYS: [&str; 2] = ["command", "timeout_s"];
+const KEYS: [&str; 3] = ["command", "environment", "timeout_s"];
 
 const FORM: &str =
     "write `NAME = \"python3 my_stage.py\"` or `NAME = { command = [\"python3\", \"my_stage.py\"], timeout_s = 600 }`";
@@ -72,12 +75,13 @@ fn plugin(
     value: &Spanned<DeValue<'_>>,
     problems: &mut Vec<Problem>,
 ) -> Result<PluginDecl, Problem> {
-    let (mut timeout_s, mut line) = (DEFAULT_TIMEOUT_S, Some(value));
+    let (mut timeout_s, mut environment, mut line) = (DEFAULT_TIMEOUT_S, BTreeMap::new(), Some(value));
     if let Some(long) = value.get_ref().as_table() {
         line = long.get("command");
         for (key, value) in long {
             match key.get_ref().as_ref() {
                 "command" => {}
+                "environment" => environment = variables(name, value)?,
                 "timeout_s" => timeout_s = timeout(name, value)?,
                 other => problems.push(unknown(name, other, key.span())),
             }
@@ -88,7 +92,7 @@ fn plugin(
         return Err(lacks.help(FORM));
     };
     let command = command(name, line)?;
-    Ok(PluginDecl { name: name.to_owned(), command, timeout_s, key_span, command_span: line.span() })
+    Ok(PluginDecl { name: name.to_owned(), command, environment, timeout_s, key_span, command_span: line.span() })
 }
 
 fn unknown(name: &str, key: &str, span: Range<usize>) -> Problem {
@@ -107,6 +111,27 @@ fn timeout(name: &str, value: &Spanned<DeValue<'_>>) -> Result<f64, Problem> {
         let message = format!("`timeout_s` of plugin `{name}`: found {found}, wanted seconds above 0, at most a week");
         Problem::new(message, value.span(), "not a time limit")
     })
+}
+
+fn variables(name: &str, value: &Spanned<DeValue<'_>>) -> Result<BTreeMap<String, String>, Problem> {
+    let wrong = |what: String, span: Range<usize>| {
+        Problem::new(format!("`environment` of plugin `{name}`: {what}"), span, "no variable")
+            .help("write `environment = { OMP_NUM_THREADS = \"1\" }`: names, and texts without a NUL")
+    };
+    let Some(table) = value.get_ref().as_table() else {
+        return Err(wrong(format!("found {}, wanted a table", found(value.get_ref())), value.span()));
+    };
+    let variable = |(key, value): (&Spanned<_>, &Spanned<DeValue<'_>>)| {
+        let name: &std::borrow::Cow<'_, str> = key.get_ref();
+        if name.is_empty() || name.contains(['=', '\0']) {
+            return Err(wrong(format!("`{name}` cannot be the name of a variable"), key.span()));
+        }
+        match value.get_ref().as_str().filter(|text| !text.contains('\0')) {
+            Some(text) => Ok((name.to_string(), text.to_owned())),
+            None => Err(wrong(format!("`{name}`: found {}, wanted text", found(value.get_ref())), value.span())),
+        }
+    };
+    table.iter().map(variable).collect()
 }
 
 fn command(name: &str, value: &Spanned<DeValue<'_>>) -> Result<Vec<String>, Problem> {

@@ -15,7 +15,5 @@ pub(crate) use known_hashes::KnownHashes;
 pub use mark::{MARK, has_mark, marked, states_mark};
 pub(crate) use replace::{Replacement, replace_unsynced};
 pub use replace::{probe, replace_file, replace_with};
-#[cfg(test)]
-pub(crate) use temporary::host;
-pub(crate) use temporary::{TemporaryName, stale, temporary_path};
+pub(crate) use temporary::{TemporaryName, host, stale, temporary_path};
 pub use temporary::{sweep, sweep_beside};

@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::{order, sweep, wiring};
+use super::{Stages, order, sweep, wiring};
 use crate::config::{Config, Problem, StageDecl, instantiate, nearest};
-use crate::plugin;
-use crate::stage::{DynStage, Entry, Registry};
+use crate::stage::{DynStage, Entry};
 
 /// A checked graph: what the runner runs. Cloning is cheap: stages are shared.
 #[derive(Clone)]
@@ -66,6 +65,11 @@ impl Plan {
     pub fn node(&self, id: &str) -> Option<&Node> {
         self.nodes.iter().find(|node| node.id == id)
     }
+
+    /// The nodes whose ports nobody knows yet: plugins that were never asked to describe themselves. Their wires are not checked, and they do not run.
+    pub fn not_described(&self) -> impl Iterator<Item = &Node> {
+        self.nodes.iter().filter(|node| !node.entry.is_described())
+    }
 }
 
 impl std::fmt::Debug for Plan {
@@ -86,19 +90,19 @@ impl std::fmt::Debug for Node {
     }
 }
 
-/// Reads a config, applies `--set` arguments and plans it. Errors: everything that can be wrong without opening data, at once,
+/// Reads a config, applies `--set` arguments and plans it with the stages that `stages` knows, such as a registry. Errors: everything that can be wrong without opening data, at once,
 /// in the order of the text.
-pub fn load(file: &str, text: &str, arguments: &[String], registry: &Registry) -> Result<Plan, Vec<Problem>> {
+pub fn load(file: &str, text: &str, arguments: &[String], stages: &dyn Stages) -> Result<Plan, Vec<Problem>> {
     let (config, mut problems, usable) = Config::read(file, text, arguments);
-    let plan = if usable { try_plan(config, registry, &mut problems) } else { None };
+    let plan = if usable { try_plan(config, stages, &mut problems) } else { None };
     settle(plan, problems, arguments)
 }
 
 /// Plans a config: stages, parameters, wires, cycles. Errors: all that is wrong, at once, in the order of the text.
-pub fn plan(config: Config, registry: &Registry) -> Result<Plan, Vec<Problem>> {
+pub fn plan(config: Config, stages: &dyn Stages) -> Result<Plan, Vec<Problem>> {
     let mut problems = Vec::new();
     let arguments = config.overrides.clone();
-    let plan = try_plan(config, registry, &mut problems);
+    let plan = try_plan(config, stages, &mut problems);
     settle(plan, problems, &arguments)
 }
 
@@ -110,9 +114,8 @@ fn settle(plan: Option<Plan>, mut problems: Vec<Problem>, arguments: &[String]) 
     }
 }
 
-fn try_plan(config: Config, registry: &Registry, problems: &mut Vec<Problem>) -> Option<Plan> {
-    let entries: Vec<Option<Entry>> =
-        config.stages.iter().map(|stage| find(stage, &config, registry, problems)).collect();
+fn try_plan(config: Config, known: &dyn Stages, problems: &mut Vec<Problem>) -> Option<Plan> {
+    let entries: Vec<Option<Entry>> = config.stages.iter().map(|stage| find(stage, &config, known, problems)).collect();
     let stages: Vec<_> = config
         .stages
         .iter()
@@ -141,15 +144,16 @@ fn try_plan(config: Config, registry: &Registry, problems: &mut Vec<Problem>) ->
     Some(Plan { nodes, config })
 }
 
-fn find(decl: &StageDecl, config: &Config, registry: &Registry, problems: &mut Vec<Problem>) -> Option<Entry> {
+fn find(decl: &StageDecl, config: &Config, known: &dyn Stages, problems: &mut Vec<Problem>) -> Option<Entry> {
     if decl.uses.is_empty() {
         return None;
     }
+    let registry = known.registry();
     if let Some(entry) = registry.find(&decl.uses) {
         return Some(*entry);
     }
     let found = match decl.uses.strip_prefix("exec:") {
-        Some(name) => plugin::entry(decl, name, &config.plugins, config.base()),
+        Some(name) => known.process(decl, name, config),
         None => {
             let nearest = nearest(&decl.uses, registry.entries().iter().map(|entry| entry.spec.name));
             let help = match nearest {

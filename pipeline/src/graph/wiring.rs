@@ -37,6 +37,9 @@ pub(super) fn connect(decls: &[StageDecl], entries: &[Option<Entry>], problems: 
         .collect()
 }
 
+/// Stands for an output that cannot be told before a plugin has described itself.
+const NOT_KNOWN: &str = "?";
+
 struct Board<'a> {
     decls: &'a [StageDecl],
     entries: &'a [Option<Entry>],
@@ -56,7 +59,7 @@ impl Board<'_> {
         let mut wires = Vec::new();
         for port in ports {
             match decl.inputs.iter().find(|input| input.port == port.name) {
-                Some(input) => match self.resolve(decl, input, port) {
+                Some(input) => match self.resolve((decl, entry), input, port) {
                     Ok(wire) => wires.extend(wire),
                     Err(problem) => problems.push(problem),
                 },
@@ -68,7 +71,12 @@ impl Board<'_> {
     }
 
     /// The output that an input names; nothing if that was said already (its stage is unknown, the wire is none).
-    fn resolve(&self, reader: &StageDecl, input: &Input, port: &PortSpec) -> Result<Option<Wire>, Problem> {
+    fn resolve(
+        &self,
+        (reader, own): (&StageDecl, &Entry),
+        input: &Input,
+        port: &PortSpec,
+    ) -> Result<Option<Wire>, Problem> {
         if input.target.is_empty() {
             return Ok(None);
         }
@@ -86,19 +94,27 @@ impl Board<'_> {
         };
         let Some(entry) = &self.entries[node] else { return Ok(None) };
         let outputs = entry.spec.outputs;
+        let made = |output| Ok(Some(Wire { port: port.name, node, output, span: input.target_span.clone() }));
+        // nothing is known of its outputs but the names that the config gives them
+        if !entry.is_described() {
+            let named = output.and_then(|name| outputs.iter().find(|output| output.name == name));
+            return made(named.map_or(NOT_KNOWN, |output| output.name));
+        }
+        let takes_any = !own.is_described();
         let chosen = match output {
             Some(name) => outputs.iter().find(|output| output.name == name).ok_or_else(|| {
                 let help = did_you_mean(name, "output", outputs.iter().map(|output| output.name));
                 wrong(format!("stage `{id}` (`{}`) has no output `{name}`", entry.spec.name), "unknown port").help(help)
             })?,
+            None if takes_any => return made(if let [one] = outputs { one.name } else { NOT_KNOWN }),
             None => sole(id, outputs, port).map_err(|(message, label, help)| wrong(message, label).maybe_help(help))?,
         };
-        if !fits(chosen, port) {
+        if !takes_any && !fits(chosen, port) {
             let message =
                 format!("`{id}.{}` is {}, input `{}` wants {}", chosen.name, kind(chosen), port.name, kind(port));
             return Err(wrong(message, "does not fit").maybe_help(self.fitting_help(reader, port)));
         }
-        Ok(Some(Wire { port: port.name, node, output: chosen.name, span: input.target_span.clone() }))
+        made(chosen.name)
     }
 
     fn missing(&self, decl: &StageDecl, entry: &Entry, port: &PortSpec) -> Problem {
@@ -122,7 +138,7 @@ impl Board<'_> {
         let other = |decl: &StageDecl| !decl.id.is_empty() && decl.id != reader.id;
         let stages = self.decls.iter().zip(self.entries).filter(|(decl, _)| other(decl));
         stages
-            .filter_map(|(decl, entry)| Some((decl, entry.as_ref()?)))
+            .filter_map(|(decl, entry)| Some((decl, entry.as_ref().filter(|entry| entry.is_described())?)))
             .flat_map(|(decl, entry)| {
                 let outputs = entry.spec.outputs.iter().filter(|output| fits(output, port));
                 outputs.map(|output| format!("{}.{}", decl.id, output.name))

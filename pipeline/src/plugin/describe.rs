@@ -1,10 +1,8 @@
 //! What a plugin says of itself, checked and made a row of the registry.
 
-use serde_json::Value;
-
 use super::error::PluginError;
 use super::exchange::Wanted;
-use super::message::{Description, ExampleDescription, Handshake, PortDescription, ShapeName};
+use super::message::{Description, ExampleDescription, Introduction, PortDescription, ShapeName};
 use super::schema::Schema;
 use crate::outcome::PortSpec;
 use crate::stage::{Caching, Spec};
@@ -31,9 +29,10 @@ impl Plugin {
 const HELP: &str = "docs/plugins.md says what a description holds";
 
 /// Checks a description. Errors: the first thing that is wrong with it.
-pub(super) fn describe(name: &str, shaken: &Handshake, answer: Value) -> Result<Plugin, PluginError> {
+pub(super) fn describe(name: &str, introduction: &Introduction) -> Result<Plugin, PluginError> {
+    let Introduction { handshake: shaken, description: answer } = introduction;
     let wrong = |what: String| PluginError::new(format!("describes itself wrongly: {what}"), HELP);
-    let description: Description = serde_path_to_error::deserialize(&answer)
+    let description: Description = serde_path_to_error::deserialize(answer)
         .map_err(|error| wrong(format!("at `{}`: {}", error.path(), error.inner())))?;
     let own = (&description.name, &description.version);
     if own != (&shaken.name, &shaken.version) {
@@ -95,6 +94,6 @@ fn specs(ports: &[PortDescription]) -> &'static [PortSpec] {
 
 /// Text that lives as long as the program, as the texts of built-in stages do: the registry, plans, wires and errors refer to it without
 /// owning it. It is made once per plugin and process (descriptions are kept, see [`super::row`]), some hundred bytes each.
-fn leak(text: &str) -> &'static str {
+pub(super) fn leak(text: &str) -> &'static str {
     String::leak(text.to_owned())
 }

@@ -36,7 +36,7 @@ impl PluginError {
     }
 
     /// In one text, the end of stderr included.
-    pub(super) fn told(&self, name: &str) -> String {
+    pub fn told(&self, name: &str) -> String {
         let lines: Vec<&str> = self.log.lines().collect();
         let first = lines.len().saturating_sub(SHOWN_LINES);
         let mut text = format!("the plugin `{name}` {}", self.what);

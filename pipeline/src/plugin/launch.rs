@@ -1,5 +1,6 @@
 //! How a plugin is started: which program, with which arguments, where.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -15,6 +16,8 @@ pub struct Launch {
     pub(super) program: PathBuf,
     /// Its arguments.
     pub(super) arguments: Vec<String>,
+    /// Variables of its environment, beside those that this program has.
+    pub(super) environment: BTreeMap<String, String>,
     /// The folder that it runs in: the config's.
     pub(super) folder: PathBuf,
     /// How long a request may take.
@@ -41,19 +44,21 @@ impl Launch {
             let what = format!("cannot be started: there is no program `{}`", command[0]);
             PluginError::new(what, "name a program on the PATH, or a path from the config's folder with a `/` in it")
         })?;
-        Ok(Self { name: name.to_owned(), program, arguments, folder, timeout })
+        Ok(Self { name: name.to_owned(), program, arguments, environment: BTreeMap::new(), folder, timeout })
     }
 
     /// From `[plugins]` of a config.
     pub(super) fn declared(decl: &PluginDecl, folder: &Path) -> Result<Self, PluginError> {
-        Self::command(&decl.name, &decl.command, folder, decl.timeout_s)
+        let launch = Self::command(&decl.name, &decl.command, folder, decl.timeout_s)?;
+        Ok(Self { environment: decl.environment.clone(), ..launch })
     }
 
     /// `afmid-stage-NAME` on the PATH, if it is there.
     pub(super) fn installed(name: &str, folder: &Path) -> Option<Self> {
         let program = on_path(&program_name(name))?;
         let (folder, timeout) = (folder.canonicalize().ok()?, Duration::from_secs_f64(DEFAULT_TIMEOUT_S));
-        Some(Self { name: name.to_owned(), program, arguments: Vec::new(), folder, timeout })
+        let (arguments, environment) = (Vec::new(), BTreeMap::new());
+        Some(Self { name: name.to_owned(), program, arguments, environment, folder, timeout })
     }
 
     /// How long it may take from the start to its description.
@@ -72,6 +77,8 @@ fn on_path(program: &str) -> Option<PathBuf> {
 }
 
 fn executable(path: PathBuf) -> Option<PathBuf> {
+    // the PATH may hold relative folders, and the plugin runs elsewhere
+    let path = std::path::absolute(path).ok()?;
     let metadata = std::fs::metadata(&path).ok().filter(std::fs::Metadata::is_file)?;
     #[cfg(unix)]
     {

@@ -9,7 +9,7 @@ use crate::artifact::Attribute;
 
 /// The first line of a plugin. Frozen: whatever becomes of the protocol, this line stays, so that two versions can tell each other who
 /// they are. Keys that are not known are ignored here, and here alone.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Handshake {
     /// Always 1.
     pub(super) afmid_stage: u64,
@@ -19,10 +19,18 @@ pub(super) struct Handshake {
     pub(super) version: String,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Range {
     pub(super) min: u64,
     pub(super) max: u64,
+}
+
+/// What a plugin said of itself, as it said it: what is remembered with consent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Introduction {
+    pub(super) handshake: Handshake,
+    /// The answer to `describe`.
+    pub(super) description: Value,
 }
 
 /// A line after the handshake: progress, or the answer.

@@ -1,21 +1,20 @@
 //! Stages in any language: processes that speak newline-delimited JSON on stdio. `docs/plugins.md` is their specification.
 //!
 //! ```text
-//! [plugins] or PATH -> Launch -> Process (handshake, describe) -> Plugin (a row without a type) -> run, run, run ...
+//! [plugins] or PATH -> Candidate (consent?) -> Process (handshake, describe) -> Plugin (a row without a type) -> run, run, run ...
 //! ```
 //!
-//! A process is started once per worker and reused over items. Nothing that it does is trusted: lines are bounded, times are limited, what it
+//! Nothing starts without consent for command, folder and the bytes of its files. A process is started once per worker and reused over items. Nothing that it does is trusted: lines are bounded, times are limited, what it
 //! made is checked before it is stored, and whatever goes wrong is an error that names the plugin.
 
 mod conformance;
+mod consent;
 mod describe;
 mod error;
 mod exchange;
-mod fingerprint;
 mod launch;
-mod lines;
-mod log;
 mod message;
+mod plugins;
 mod pool;
 mod process;
 mod row;
@@ -24,9 +23,11 @@ mod session;
 mod stage;
 
 pub use conformance::{Check, check};
+pub use consent::{Ask, Candidate, MadeOf, Rule, Trust, Trusted, is_seal};
+pub use error::PluginError;
 pub use launch::Launch;
-pub use pool::shut_down;
-pub(crate) use row::entry;
+pub use plugins::{AllStages, Described, Plugins};
+pub use process::{Host, host_main};
 
 /// The versions of the protocol that this program speaks.
 const PROTOCOL: std::ops::RangeInclusive<u64> = 1..=1;

@@ -1,97 +1,50 @@
-//! From `uses = "exec:NAME"` to a row of the registry.
+//! Rows of the registry that plugins stand behind: those that have described themselves, and those that nobody may ask yet.
 
-use std::path::Path;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use schemars::SchemaGenerator;
+use serde_json::{Value, json};
 
-use super::describe::Plugin;
-use super::error::PluginError;
-use super::fingerprint::{Fingerprint, fingerprint};
-use super::launch::{Launch, program_name};
-use super::session::Session;
+use super::consent::Candidate;
+use super::describe::{Plugin, leak};
+use super::pool::Pool;
+use super::schema;
 use super::stage::PluginStage;
-use super::{pool, schema};
-use crate::config::{PluginDecl, Problem, StageDecl, did_you_mean, is_plugin_name, plugin_names};
-use crate::stage::{DynStage, Entry, Example, Maker, ParamError};
+use crate::artifact::Shape;
+use crate::config::{Config, StageDecl};
+use crate::error::StageError;
+use crate::outcome::{PortSpec, Ports};
+use crate::stage::{Caching, Context, DynStage, Entry, Example, Maker, ParamError, Spec};
+
+/// What to do about a plugin that nobody has agreed to.
+pub(super) const CONSENT: &str = "`afmid trust CONFIG` lists what it would run, and remembers that you agree; `--allow-plugins` allows it for one command";
 
 /// A plugin with its command: what makes its stages.
 #[derive(Debug)]
 pub(super) struct Row {
-    pub(super) launch: Launch,
-    pub(super) fingerprint: Fingerprint,
+    pub(super) candidate: Candidate,
     pub(super) plugin: Plugin,
+    pub(super) pool: Arc<Pool>,
+    /// Whether there is consent to start it: a row may come from what it once said.
+    pub(super) may_start: bool,
+}
+
+impl Row {
+    /// It lives as long as the program: an [`Entry`] is a reference, for plugins as for built-in stages.
+    pub(super) fn leak(self) -> &'static Self {
+        Box::leak(Box::new(self))
+    }
+
+    /// The row of the registry.
+    pub(super) fn entry(&'static self) -> Entry {
+        Entry::made_by(&self.plugin.spec, Box::leak(Box::new(Shelf(self))))
+    }
 }
 
 /// Where a row is found: its stages refer to it.
 #[derive(Debug)]
 struct Shelf(&'static Row);
-
-/// Rows by what they were made from. They live as long as the program: an [`Entry`] is a reference, for plugins as for built-in stages. A row
-/// is made once per plugin and process; a script that changes while the program runs makes another one.
-type Slot = Arc<OnceLock<Result<&'static Shelf, PluginError>>>;
-static ROWS: Mutex<Vec<(Launch, Fingerprint, Slot)>> = Mutex::new(Vec::new());
-
-/// The row of a stage that uses a plugin. Errors: there is none of this name; it does not start or describe itself.
-pub(crate) fn entry(decl: &StageDecl, name: &str, plugins: &[PluginDecl], base: &Path) -> Result<Entry, Problem> {
-    let declared = plugins.iter().find(|plugin| plugin.name == name);
-    let wrong = |error: PluginError| {
-        let span = declared.map_or(decl.uses_span.clone(), |plugin| plugin.command_span.clone());
-        Problem::new(error.told(name), span, "this plugin").help(error.help)
-    };
-    let launch = match declared {
-        Some(plugin) => Launch::declared(plugin, base).map_err(wrong)?,
-        None if !is_plugin_name(name) => {
-            let help = "names are of lowercase letters, digits, `-` and `_`, and begin with a letter";
-            let message = format!("{}: `{name}` cannot be the name of a plugin", decl.title());
-            return Err(Problem::new(message, decl.uses_span.clone(), "not a name").help(help));
-        }
-        None => Launch::installed(name, base).ok_or_else(|| missing(decl, name, plugins))?,
-    };
-    let row = row(&launch).map_err(wrong)?;
-    Ok(Entry::made_by(&row.0.plugin.spec, row))
-}
-
-fn missing(decl: &StageDecl, name: &str, plugins: &[PluginDecl]) -> Problem {
-    let program = program_name(name);
-    let message =
-        format!("{}: there is no plugin `{name}`: neither in [plugins] nor as `{program}` on the PATH", decl.title());
-    let help = match crate::config::nearest(name, plugin_names(plugins)) {
-        Some(_) => did_you_mean(name, "plugin", plugin_names(plugins)),
-        None => format!("add `{name} = \"python3 my_stage.py\"` to [plugins], or install `{program}`"),
-    };
-    Problem::new(message, decl.uses_span.clone(), "unknown plugin").help(help)
-}
-
-fn row(launch: &Launch) -> Result<&'static Shelf, PluginError> {
-    let fingerprint = fingerprint(launch)?;
-    let slot = slot(launch, &fingerprint);
-    // described outside the lock, once however many threads ask
-    slot.get_or_init(|| made(launch, &fingerprint)).clone()
-}
-
-fn slot(launch: &Launch, fingerprint: &Fingerprint) -> Slot {
-    let mut rows = ROWS.lock().unwrap_or_else(PoisonError::into_inner);
-    let same = |(other, print, slot): &&(Launch, Fingerprint, Slot)| {
-        // one that failed is asked again: it may have been the machine
-        other == launch && print == fingerprint && !slot.get().is_some_and(Result::is_err)
-    };
-    if let Some((_, _, slot)) = rows.iter().find(same) {
-        return Arc::clone(slot);
-    }
-    let slot = Slot::default();
-    rows.push((launch.clone(), fingerprint.clone(), Arc::clone(&slot)));
-    slot
-}
-
-fn made(launch: &Launch, fingerprint: &Fingerprint) -> Result<&'static Shelf, PluginError> {
-    let mut session: Session = pool::take(launch, fingerprint)?;
-    let plugin = session.describe()?;
-    session.take_log();
-    pool::put(session);
-    let row: &Row = Box::leak(Box::new(Row { launch: launch.clone(), fingerprint: fingerprint.clone(), plugin }));
-    Ok(Box::leak(Box::new(Shelf(row))))
-}
 
 impl Maker for Shelf {
     fn parse(&self, params: toml::Table) -> Result<Box<dyn DynStage>, ParamError> {
@@ -109,5 +62,108 @@ impl Maker for Shelf {
 
     fn manual(&self) -> String {
         self.0.plugin.schema.manual()
+    }
+}
+
+/// A plugin that has not described itself: its ports are those that the config names.
+#[derive(Debug, Clone)]
+pub(super) struct NotDescribed {
+    spec: &'static Spec,
+    name: String,
+}
+
+impl NotDescribed {
+    /// The row of a stage that uses it. Like that of a described one, it lives as long as the program.
+    pub(super) fn entry(decl: &StageDecl, name: &str, config: &Config) -> Entry {
+        let wired = decl.inputs.iter().map(|input| input.port.as_str());
+        let taken = config.stages.iter().flat_map(|stage| &stage.inputs).filter_map(|input| {
+            let (id, output) = input.target.split_once('.')?;
+            (id == decl.id).then_some(output)
+        });
+        let spec = Spec {
+            name: leak(&format!("exec:{name}")),
+            version: 1,
+            summary: "a plugin that has not described itself",
+            inputs: ports(wired),
+            outputs: ports(taken),
+            caching: Caching::Stored,
+            seeded: false,
+            source: "",
+        };
+        let own = Self { spec: Box::leak(Box::new(spec)), name: name.to_owned() };
+        Entry::made_by(own.spec, Box::leak(Box::new(own)))
+    }
+
+    fn error(&self) -> StageError {
+        let problem = format!("the plugin `{}` has not described itself: nobody has agreed to start it", self.name);
+        StageError::new(problem).help(CONSENT)
+    }
+}
+
+/// Ports of which nothing but the name is known: the shape stands for any.
+fn ports<'a>(names: impl Iterator<Item = &'a str>) -> &'static [PortSpec] {
+    let mut names: Vec<&str> = names.collect();
+    names.sort_unstable();
+    names.dedup();
+    let port = |name: &&str| PortSpec { name: leak(name), shape: Shape::Document, tag: "", optional: true, doc: "" };
+    Vec::leak(names.iter().map(port).collect())
+}
+
+impl Maker for NotDescribed {
+    fn parse(&self, params: toml::Table) -> Result<Box<dyn DynStage>, ParamError> {
+        Ok(Box::new(Unknown { row: self.clone(), params: schema::json(params) }))
+    }
+
+    fn schema(&self, _generator: &mut SchemaGenerator) -> schemars::Schema {
+        schemars::Schema::try_from(json!({ "type": "object" })).unwrap_or_default()
+    }
+
+    fn examples(&self) -> Vec<Example> {
+        Vec::new()
+    }
+
+    fn manual(&self) -> String {
+        "its parameters are not known before it has described itself".to_owned()
+    }
+
+    fn is_described(&self) -> bool {
+        false
+    }
+}
+
+/// A stage of a plugin that has not described itself, with the parameters that the config gives: it can be shown, and nothing else.
+struct Unknown {
+    row: NotDescribed,
+    params: Value,
+}
+
+impl DynStage for Unknown {
+    fn spec(&self) -> &'static Spec {
+        self.row.spec
+    }
+
+    fn params(&self) -> Result<Value, StageError> {
+        Ok(self.params.clone())
+    }
+
+    fn check(&self) -> Result<(), StageError> {
+        Ok(())
+    }
+
+    /// Which of its parameters name files is not known: no key can be made.
+    fn sources(&self, _base: &Path) -> Result<Vec<PathBuf>, StageError> {
+        Err(self.row.error())
+    }
+
+    fn depends_on(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn location_params(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    fn run(&self, _inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
+        Err(self.row.error())
     }
 }

@@ -7,19 +7,18 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::PROTOCOL;
-use super::describe::{self, Plugin};
+use super::consent::Candidate;
 use super::error::PluginError;
-use super::fingerprint::{Fingerprint, fingerprint};
 use super::launch::Launch;
-use super::lines::shown;
-use super::message::{Handshake, Progress, Reply};
-use super::process::Process;
+use super::message::{Handshake, Introduction, Progress, Reply};
+use super::pool::Pool;
+use super::process::{FOLDER, Process, shown};
+use crate::files::host;
 
 /// A plugin that was started and has introduced itself, with a folder for what is exchanged.
 #[derive(Debug)]
 pub(super) struct Session {
-    pub(super) launch: Launch,
-    pub(super) fingerprint: Fingerprint,
+    pub(super) candidate: Candidate,
     pub(super) handshake: Handshake,
     protocol: u64,
     process: Process,
@@ -32,30 +31,41 @@ const FORM: &str =
     r#"the first line is {"afmid_stage": 1, "protocol": {"min": 1, "max": 1}, "name": "...", "version": "..."}"#;
 
 impl Session {
-    /// Starts a plugin and reads its handshake. Errors: it does not start, says something else, or speaks another protocol.
-    pub(super) fn start(launch: &Launch) -> Result<Self, PluginError> {
-        let fingerprint = fingerprint(launch)?;
-        let folder = tempfile::Builder::new().prefix("afmid-plugin-").tempdir().map_err(|error| {
+    /// Starts a plugin and reads its handshake. Errors: it is not what the candidate says; it does not start, says something else, or speaks another
+    /// protocol.
+    pub(super) fn start(candidate: &Candidate, pool: &Pool) -> Result<Self, PluginError> {
+        candidate.check_unchanged(&pool.hashes)?;
+        let launch = &candidate.launch;
+        let none = |error: std::io::Error| {
             let what = format!("needs a temporary folder, and none can be made: {error}");
             PluginError::new(what, "check TMPDIR and the space on its disk")
-        })?;
-        let mut process = Process::start(launch)?;
+        };
+        let prefix = format!("{FOLDER}{}.{}.", host(), std::process::id());
+        let folder = tempfile::Builder::new().prefix(&prefix).tempdir().map_err(none)?;
+        let temporary = folder.path().join("tmp");
+        std::fs::create_dir(&temporary).map_err(none)?;
+        let mut process = Process::start(launch, pool.host.as_ref(), folder.path(), &temporary)?;
         let deadline = Instant::now() + launch.start_timeout();
         let greeted = process.receive(deadline, "before its handshake").and_then(|line| handshake(&line));
-        match greeted {
+        // what was started is what was hashed only if nothing has changed since
+        match greeted.and_then(|greeted| candidate.check_unchanged(&pool.hashes).map(|()| greeted)) {
             Ok((handshake, protocol)) => {
-                let launch = launch.clone();
-                Ok(Self { launch, fingerprint, handshake, protocol, process, folder, requests: 0 })
+                let candidate = candidate.clone();
+                Ok(Self { candidate, handshake, protocol, process, folder, requests: 0 })
             }
             Err(error) => Err(PluginError { log: process.kill(), ..error }),
         }
     }
 
-    /// Asks what it is. Errors: as [`Session::request`]; a description that is not one.
-    pub(super) fn describe(&mut self) -> Result<Plugin, PluginError> {
+    pub(super) fn launch(&self) -> &Launch {
+        &self.candidate.launch
+    }
+
+    /// Asks what it is. Errors: as [`Session::request`].
+    pub(super) fn introduction(&mut self) -> Result<Introduction, PluginError> {
         let params = json!({ "protocol": self.protocol });
-        let answer = self.request("describe", &params, self.launch.start_timeout(), &mut |_| {})?;
-        describe::describe(&self.launch.name, &self.handshake, answer)
+        let description = self.request("describe", &params, self.launch().start_timeout(), &mut |_| {})?;
+        Ok(Introduction { handshake: self.handshake.clone(), description })
     }
 
     /// Sends a request and waits for its answer. Errors: the plugin says that it cannot (then it can be asked again), or anything else than the
@@ -81,10 +91,7 @@ impl Session {
         timeout: Duration,
         progress: &mut dyn FnMut(Progress),
     ) -> Result<Value, PluginError> {
-        if let Some(line) = self.unasked(Duration::ZERO) {
-            let what = format!("wrote to stdout without being asked: {line}");
-            return Err(PluginError::new(what, "stdout is for the protocol alone: write everything else to stderr"));
-        }
+        self.check_quiet()?;
         self.requests += 1;
         let id = self.requests;
         self.process.send(&json!({ "id": id, "method": method, "params": params }).to_string());
@@ -109,6 +116,13 @@ impl Session {
                 }
             }
         }
+    }
+
+    /// Sees that it has written nothing since its last answer. Errors: it has.
+    pub(super) fn check_quiet(&self) -> Result<(), PluginError> {
+        let Some(line) = self.unasked(Duration::ZERO) else { return Ok(()) };
+        let what = format!("wrote to stdout without being asked: {line}");
+        Err(PluginError::new(what, "stdout is for the protocol alone: write everything else to stderr"))
     }
 
     /// A line that nobody asked for, if there is one within `wait`.

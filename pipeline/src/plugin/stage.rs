@@ -7,8 +7,7 @@ use serde_json::{Value, json};
 use super::error::PluginError;
 use super::exchange::{give, take};
 use super::message::{Made, Progress};
-use super::pool;
-use super::row::Row;
+use super::row::{CONSENT, Row};
 use super::session::Session;
 use crate::error::StageError;
 use crate::outcome::Ports;
@@ -43,7 +42,7 @@ impl DynStage for PluginStage {
 
     fn depends_on(&self) -> Vec<String> {
         let own = std::iter::once(self.row.plugin.identity.clone());
-        own.chain(self.row.fingerprint.iter().cloned()).collect()
+        own.chain(self.row.candidate.key_parts()).collect()
     }
 
     fn location_params(&self) -> &'static [&'static str] {
@@ -51,22 +50,29 @@ impl DynStage for PluginStage {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let launch = &self.row.launch;
-        let mut session = pool::take(launch, &self.row.fingerprint).map_err(|error| error.of(&launch.name))?;
+        let (name, pool) = (self.row.candidate.name(), &self.row.pool);
+        if !self.row.may_start {
+            return Err(
+                StageError::new(format!("the plugin `{name}` may not be started by this command")).help(CONSENT)
+            );
+        }
+        let mut session = pool.take(&self.row.candidate).map_err(|error| error.of(name))?;
         let ran = run(&mut session, self.row, &self.params, inputs, cx);
+        // with an answer in hand: what comes after it is not the plugin's to say
+        let ran = ran.and_then(|outputs| session.check_quiet().map(|()| outputs));
         cx.log(&session.take_log());
         match ran {
             Ok(outputs) => {
-                pool::put(session);
+                pool.put(session);
                 Ok(outputs)
             }
             Err(error) => {
                 if error.alive {
-                    pool::put(session);
+                    pool.put(session);
                 } else {
                     session.kill();
                 }
-                Err(error.of(&launch.name))
+                Err(error.of(name))
             }
         }
     }
@@ -106,7 +112,7 @@ pub(super) fn run(
         (before..done).take(1 << 20).for_each(|_| cx.tick());
         seen = Some(Progress { done, total });
     };
-    let answer = session.request("run", &request, row.launch.timeout, &mut progress)?;
+    let answer = session.request("run", &request, row.candidate.launch.timeout, &mut progress)?;
     let outputs = outputs(row, answer, made.path(), cx);
     // it answered in order: what it made is wrong, and the next item may be right
     outputs.map_err(|what| PluginError::new(what, "mend the plugin; `afmid plugin check` tries it alone").alive())

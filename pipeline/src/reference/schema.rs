@@ -138,6 +138,10 @@ fn plugins() -> Value {
         "required": ["command"],
         "properties": {
             "command": command,
+            "environment": {
+                "description": "Variables of its environment; they are part of the cache key.", "type": "object",
+                "propertyNames": { "pattern": "^[^=]+$" }, "additionalProperties": { "type": "string" }
+            },
             "timeout_s": {
                 "description": "How long one request may take.", "type": "number", "exclusiveMinimum": 0, "maximum": 604_800,
                 "default": DEFAULT_TIMEOUT_S

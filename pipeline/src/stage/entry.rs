@@ -79,6 +79,10 @@ pub trait Maker: Send + Sync {
     fn examples(&self) -> Vec<Example>;
     /// Where its parameters are listed, for the help of errors.
     fn manual(&self) -> String;
+    /// Whether ports and parameters are known. Those of a plugin are not before it has described itself.
+    fn is_described(&self) -> bool {
+        true
+    }
 }
 
 /// A row of the registry: everything that configs, docs, lists and tests need to know of a stage.
@@ -119,6 +123,11 @@ impl Entry {
     /// See [`Maker::examples`].
     pub fn examples(&self) -> Vec<Example> {
         self.maker.examples()
+    }
+
+    /// Whether ports and parameters are known: see [`Maker::is_described`].
+    pub fn is_described(&self) -> bool {
+        self.maker.is_described()
     }
 
     /// See [`Maker::manual`].

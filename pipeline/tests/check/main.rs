@@ -9,6 +9,7 @@ mod sweep;
 
 use afmid_pipeline::Problem;
 use afmid_pipeline::config::Origin;
+use afmid_pipeline::plugin::{AllStages, Plugins};
 
 /// The text under the caret.
 fn marked<'a>(text: &'a str, problem: &'a Problem) -> &'a str {
@@ -29,7 +30,8 @@ fn lines(text: &str, problems: &[Problem]) -> Vec<String> {
 /// What planning this text with these `--set` arguments finds wrong.
 fn wrong(text: &str, arguments: &[&str]) -> Vec<String> {
     let arguments: Vec<String> = arguments.iter().map(|&argument| argument.to_owned()).collect();
-    match afmid_pipeline::graph::load("test.toml", text, &arguments, &stages::registry()) {
+    let all = AllStages { registry: &stages::registry(), plugins: &Plugins::none() };
+    match afmid_pipeline::graph::load("test.toml", text, &arguments, &all) {
         Ok(_) => Vec::new(),
         Err(problems) => lines(text, &problems),
     }

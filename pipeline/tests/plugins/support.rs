@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::cache::Cache;
+use afmid_pipeline::plugin::{AllStages, Plugins, Rule};
 use afmid_pipeline::recording::{
     Codes, InputFiles, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native,
 };
@@ -41,8 +42,14 @@ pub fn registry() -> Registry {
     Registry::new().with(&[Entry::of::<All>()]).expect("one name")
 }
 
+/// Plans with plugins that may all start. Their processes wait for the run: they end with the test.
 pub fn plan(folder: &Path, text: &str) -> Result<Plan, Vec<Problem>> {
-    graph::load(&folder.join("config.toml").display().to_string(), text, &[], &registry())
+    plan_with(folder, text, Box::leak(Box::new(Plugins::new(Rule::All, None))))
+}
+
+pub fn plan_with(folder: &Path, text: &str, plugins: &Plugins) -> Result<Plan, Vec<Problem>> {
+    let file = folder.join("config.toml").display().to_string();
+    graph::load(&file, text, &[], &AllStages { registry: &registry(), plugins })
 }
 
 pub fn execute(folder: &Path, plan: &Plan) -> Result<RunResult, Vec<RunError>> {

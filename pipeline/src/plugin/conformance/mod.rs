@@ -5,7 +5,9 @@ mod steps;
 
 use std::path::Path;
 
+use super::consent::Candidate;
 use super::launch::Launch;
+use super::plugins::Plugins;
 
 /// One thing that was tried.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,12 +18,14 @@ pub struct Check {
     pub outcome: Result<String, String>,
 }
 
-/// Tries a plugin, from its start to its end. What cannot be tried because of an earlier failure is not listed.
-pub fn check(command: &[String], folder: &Path, timeout_s: f64) -> Vec<Check> {
+/// Tries a plugin, from its start to its end: whoever types its command agrees to it. What cannot be tried because of an earlier failure is not listed.
+pub fn check(plugins: &Plugins, command: &[String], folder: &Path, timeout_s: f64) -> Vec<Check> {
     let name = command.last().map_or("plugin", |word| word.rsplit('/').next().unwrap_or(word));
     let mut steps = steps::Steps::default();
-    match Launch::command(name, command, folder, timeout_s) {
-        Ok(launch) => steps.all(&launch),
+    let pool = plugins.pool();
+    let candidate = Launch::command(name, command, folder, timeout_s);
+    match candidate.and_then(|launch| Candidate::new(launch, &pool.hashes)) {
+        Ok(candidate) => steps.all(&candidate, pool),
         Err(error) => steps.wrong("it starts", &error),
     }
     steps.checks

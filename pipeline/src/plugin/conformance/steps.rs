@@ -1,6 +1,7 @@
 //! The steps of the conformance test, in order.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -9,10 +10,11 @@ use super::Check;
 use super::generated::{Trial, trials};
 use crate::outcome::Ports;
 use crate::outcome::difference;
-use crate::plugin::describe::Plugin;
+use crate::plugin::consent::Candidate;
+use crate::plugin::describe::{Plugin, describe};
 use crate::plugin::error::PluginError;
 use crate::plugin::exchange::{give, shape_name};
-use crate::plugin::launch::Launch;
+use crate::plugin::pool::Pool;
 use crate::plugin::row::Row;
 use crate::plugin::session::Session;
 use crate::plugin::stage::run;
@@ -55,12 +57,11 @@ impl Steps {
     }
 
     /// Everything, from the start to the end.
-    pub(super) fn all(&mut self, launch: &Launch) {
-        launch.name.clone_into(&mut self.name);
-        let Some(mut session) = self.step("it starts with the handshake", started(launch)) else { return };
+    pub(super) fn all(&mut self, candidate: &Candidate, pool: &Arc<Pool>) {
+        candidate.name().clone_into(&mut self.name);
+        let Some(mut session) = self.step("it starts with the handshake", started(candidate, pool)) else { return };
         let Some(plugin) = self.step("it describes itself", described(&mut session)) else { return };
-        let row: &Row =
-            Box::leak(Box::new(Row { launch: launch.clone(), fingerprint: session.fingerprint.clone(), plugin }));
+        let row: &Row = Row { candidate: candidate.clone(), plugin, pool: Arc::clone(pool), may_start: true }.leak();
         if self.step("it answers an unknown method with an error", unknown_method(&mut session)).is_none() {
             return;
         }
@@ -92,22 +93,26 @@ impl Steps {
         }
         self.step("it writes nothing but answers to stdout", quiet(&session));
         self.step("it ends on `shutdown`", ended(&mut session, true));
-        self.step("it ends when its input ends", Session::start(launch).and_then(|mut other| ended(&mut other, false)));
+        self.step(
+            "it ends when its input ends",
+            Session::start(candidate, pool).and_then(|mut other| ended(&mut other, false)),
+        );
     }
 }
 
 type Seen<T> = Result<(T, String), PluginError>;
 
-fn started(launch: &Launch) -> Seen<Session> {
+fn started(candidate: &Candidate, pool: &Pool) -> Seen<Session> {
     let clock = Instant::now();
-    let session = Session::start(launch)?;
+    let session = Session::start(candidate, pool)?;
     let (name, version) = (&session.handshake.name, &session.handshake.version);
     let seen = format!("{name} {version}, after {:.2} s", clock.elapsed().as_secs_f64());
     Ok((session, seen))
 }
 
 fn described(session: &mut Session) -> Seen<Plugin> {
-    let plugin = session.describe()?;
+    let introduction = session.introduction()?;
+    let plugin = describe(&session.launch().name, &introduction)?;
     let port = |port: &crate::outcome::PortSpec| format!("{} ({})", port.name, shape_name(port.shape));
     let list = |ports: &[crate::outcome::PortSpec]| ports.iter().map(port).collect::<Vec<_>>().join(", ");
     let seen = format!("{} -> {}; {}", list(plugin.spec.inputs), list(plugin.spec.outputs), plugin.schema.manual());
@@ -116,7 +121,7 @@ fn described(session: &mut Session) -> Seen<Plugin> {
 
 /// A request that must be refused, and nothing else.
 fn refused(session: &mut Session, method: &str, params: &Value, what: &str, help: &str) -> Seen<()> {
-    match session.request(method, params, session.launch.timeout, &mut |_| {}) {
+    match session.request(method, params, session.launch().timeout, &mut |_| {}) {
         Ok(_) => Err(PluginError::new(format!("accepts {what}"), help)),
         Err(error) if error.alive => Ok(((), error.what)),
         Err(error) => Err(error),
@@ -151,7 +156,9 @@ fn request(row: &Row, parameters: Value, inputs: &Ports, given: &Path, made: &Pa
     let inputs =
         give(inputs, given).map_err(|error| PluginError::new(format!("gets no inputs: {error}"), "check TMPDIR"))?;
     let seed = row.plugin.spec.seeded.then_some(1);
-    Ok(json!({ "parameters": parameters, "seed": seed, "base": row.launch.folder, "inputs": inputs, "output": made }))
+    Ok(
+        json!({ "parameters": parameters, "seed": seed, "base": row.candidate.folder(), "inputs": inputs, "output": made }),
+    )
 }
 
 fn resolved(row: &Row, trial: &Trial) -> Result<Value, PluginError> {
@@ -163,7 +170,7 @@ fn resolved(row: &Row, trial: &Trial) -> Result<Value, PluginError> {
 }
 
 fn once(session: &mut Session, row: &Row, trial: &Trial) -> Result<Ports, PluginError> {
-    let context = Context::new(&row.launch.folder, 1, &NoProgress);
+    let context = Context::new(row.candidate.folder(), 1, &NoProgress);
     let ran = run(session, row, &resolved(row, trial)?, &trial.inputs, &context);
     ran.map_err(|error| match row.plugin.examples.is_empty() {
         true => PluginError {
@@ -187,8 +194,8 @@ fn repeated(session: &mut Session, row: &Row, trial: &Trial, before: &Ports) -> 
 }
 
 fn anew(row: &Row, trial: &Trial, before: &Ports) -> Seen<()> {
-    let mut session = Session::start(&row.launch)?;
-    session.describe()?;
+    let mut session = Session::start(&row.candidate, &row.pool)?;
+    session.introduction()?;
     let outputs = once(&mut session, row, trial)?;
     same(row, before, &outputs)
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5::{Dataset, File, H5Type};
 
+use super::links::refuse_links;
 use crate::error::StoreError;
 use crate::hdf5_files::read;
 use crate::plugin::message::Numbers;
@@ -84,14 +85,24 @@ impl<'a> Numeric<'a> {
 
 /// Opens an output file. Errors: there is none, it is too large, or it is not HDF5.
 fn open(path: &Path) -> Result<File, String> {
+    use std::os::unix::fs::MetadataExt;
     let size = match std::fs::symlink_metadata(path) {
+        Ok(metadata) if metadata.is_symlink() => {
+            return Err("is in a file that is a link, wanted the file itself".to_owned());
+        }
+        // another name of it may lie anywhere
+        Ok(metadata) if metadata.is_file() && metadata.nlink() > 1 => {
+            return Err("is in a file that has another name too, wanted one of its own".to_owned());
+        }
         Ok(metadata) if metadata.is_file() => metadata.len(),
         _ => return Err("is in a file that was not written".to_owned()),
     };
     if size > MOST_BYTES {
         return Err(format!("is in a file of {size} bytes, wanted at most {MOST_BYTES}"));
     }
-    read::open_file(path).map_err(|error| format!("is in a file that cannot be read: {}", error.problem))
+    let file = read::open_file(path).map_err(|error| format!("is in a file that cannot be read: {}", error.problem))?;
+    refuse_links(&file).map_err(|error| format!("is in a file that {}", error.problem))?;
+    Ok(file)
 }
 
 fn values(dataset: &Dataset) -> Result<Found, StoreError> {

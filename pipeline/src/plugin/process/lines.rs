@@ -45,7 +45,7 @@ pub(super) fn read_lines(stream: impl Read, most: usize, mut each: impl FnMut(Li
 }
 
 /// The beginning of a line, for messages.
-pub(super) fn shown(bytes: &[u8]) -> String {
+pub(in crate::plugin) fn shown(bytes: &[u8]) -> String {
     const MOST: usize = 120;
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * MOST)]);
     let mut short: String = text.chars().take(MOST).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();

@@ -2,35 +2,53 @@
 
 use std::io::Write;
 use std::os::fd::OwnedFd;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
-use super::error::PluginError;
-use super::launch::Launch;
+use super::Host;
 use super::lines::{self, Line, MOST_BYTES, read_lines};
 use super::log::Log;
+use crate::plugin::error::PluginError;
+use crate::plugin::launch::Launch;
 
 /// How long a process may take to end after it was asked to.
 const GRACE: Duration = Duration::from_secs(3);
 
+/// Lines that wait to be read, each of at most [`MOST_BYTES`]; beside them one that is being read. A plugin that says more waits until it is heard.
+const MOST_LINES: usize = 1;
+
 /// A running plugin. Dropping it ends the process and everything that it started in its group.
 #[derive(Debug)]
-pub(super) struct Process {
+pub(in crate::plugin) struct Process {
     child: Child,
     requests: Option<Sender<Vec<u8>>>,
     lines: Receiver<Line>,
     log: Log,
+    hosted: bool,
     ended: bool,
 }
 
 impl Process {
-    /// Starts it in a process group of its own. Errors: the system refuses.
-    pub(super) fn start(launch: &Launch) -> Result<Self, PluginError> {
-        let mut command = Command::new(&launch.program);
-        command.args(&launch.arguments).current_dir(&launch.folder);
+    /// Starts it in a process group of its own, under a host if there is one; `folder` is that of the exchange. Errors: the system refuses.
+    pub(in crate::plugin) fn start(
+        launch: &Launch,
+        host: Option<&Host>,
+        folder: &Path,
+        temporary: &Path,
+    ) -> Result<Self, PluginError> {
+        let mut command = match host {
+            Some(host) => host.command(&launch.program, &launch.arguments, folder),
+            None => {
+                let mut command = Command::new(&launch.program);
+                command.args(&launch.arguments);
+                command
+            }
+        };
+        // its temporary files go with the folder, unless the config names another place
+        command.env("TMPDIR", temporary).envs(&launch.environment).current_dir(&launch.folder);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let failed = |error: std::io::Error| {
             let what = format!("cannot be started: {}: {error}", launch.program.display());
@@ -38,12 +56,12 @@ impl Process {
         };
         let mut child = command.spawn().map_err(failed)?;
         let (input, output, errors) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let ((requests, to_write), (found, lines)) = (mpsc::channel::<Vec<u8>>(), mpsc::channel());
+        let ((requests, to_write), (found, lines)) = (mpsc::channel::<Vec<u8>>(), mpsc::sync_channel(MOST_LINES));
         let (log, follow) = match errors.map(|errors| Log::of(OwnedFd::from(errors).into())).transpose() {
             Ok(Some((log, follow))) => (log, Some(follow)),
             Ok(None) => (Log::default(), None),
             Err(error) => {
-                kill_group(&mut child);
+                kill(&mut child, host.is_some());
                 return Err(failed(error));
             }
         };
@@ -64,7 +82,7 @@ impl Process {
             }),
             spawn("stderr", move || follow.into_iter().for_each(|follow| follow())),
         ];
-        let process = Self { child, requests: Some(requests), lines, log, ended: false };
+        let process = Self { child, requests: Some(requests), lines, log, hosted: host.is_some(), ended: false };
         match threads.into_iter().find_map(Result::err) {
             Some(error) => Err(failed(error)),
             None => Ok(process),
@@ -72,14 +90,14 @@ impl Process {
     }
 
     /// Sends a line. A process that is gone is noticed when its answer is waited for.
-    pub(super) fn send(&self, line: &str) {
+    pub(in crate::plugin) fn send(&self, line: &str) {
         if let Some(requests) = &self.requests {
             let _ = requests.send(format!("{line}\n").into_bytes());
         }
     }
 
     /// The next line. Errors: it does not come in time, the process ends, it is no text or too long.
-    pub(super) fn receive(&mut self, deadline: Instant, doing: &str) -> Result<String, PluginError> {
+    pub(in crate::plugin) fn receive(&mut self, deadline: Instant, doing: &str) -> Result<String, PluginError> {
         let wait = deadline.saturating_duration_since(Instant::now());
         let told = lines::shown;
         match self.lines.recv_timeout(wait) {
@@ -109,7 +127,7 @@ impl Process {
     }
 
     /// A line that came unasked for, if there is one within `wait`.
-    pub(super) fn unasked(&self, wait: Duration) -> Option<String> {
+    pub(in crate::plugin) fn unasked(&self, wait: Duration) -> Option<String> {
         match self.lines.recv_timeout(wait).ok()? {
             Line::Text(line) => Some(lines::shown(line.as_bytes())),
             Line::NotText(line) | Line::TooLong(line) | Line::CutShort(line) => Some(line),
@@ -117,18 +135,18 @@ impl Process {
     }
 
     /// What it wrote to stderr since it was asked last.
-    pub(super) fn take_log(&self) -> String {
+    pub(in crate::plugin) fn take_log(&self) -> String {
         self.log.take()
     }
 
     /// Kills the process and its group, and returns its last words.
-    pub(super) fn kill(&mut self) -> String {
+    pub(in crate::plugin) fn kill(&mut self) -> String {
         self.end(Duration::ZERO);
         self.log.take_last()
     }
 
     /// Closes its input and waits for its end: whether it ended by itself, and how.
-    pub(super) fn close(&mut self, wait: Duration) -> Result<String, PluginError> {
+    pub(in crate::plugin) fn close(&mut self, wait: Duration) -> Result<String, PluginError> {
         self.requests = None;
         if self.wait(wait) {
             let status = self.status();
@@ -141,7 +159,7 @@ impl Process {
     }
 
     /// No more requests: what `shutdown` does for many at once, before it waits.
-    pub(super) fn close_input(&mut self) {
+    pub(in crate::plugin) fn close_input(&mut self) {
         self.requests = None;
     }
 
@@ -151,7 +169,7 @@ impl Process {
         }
         self.requests = None;
         self.wait(wait);
-        kill_group(&mut self.child);
+        kill(&mut self.child, self.hosted);
         // reaped: no zombie stays
         let _ = self.child.wait();
     }
@@ -188,10 +206,14 @@ fn spawn(pipe: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()
     std::thread::Builder::new().name(format!("plugin {pipe}")).spawn(work).map(drop)
 }
 
-/// Kills the process and what it started, as far as that stayed in its group.
-fn kill_group(child: &mut Child) {
-    #[cfg(unix)]
+/// Kills the process and what it started: all of it under a host, else as far as it stayed in its group.
+fn kill(child: &mut Child, hosted: bool) {
     if let Some(group) = i32::try_from(child.id()).ok().and_then(rustix::process::Pid::from_raw) {
+        // before the host, which knows what belongs to it. A number that was waited for may be another's.
+        #[cfg(target_os = "linux")]
+        if hosted && matches!(child.try_wait(), Ok(None)) {
+            super::descendants::kill_descendants(group);
+        }
         // an error means that nothing is left to kill
         let _ = rustix::process::kill_process_group(group, rustix::process::Signal::KILL);
     }

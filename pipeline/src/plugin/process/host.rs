@@ -1,0 +1,193 @@
+//! The process between this program and a plugin: it ends all that the plugin has started, whatever ends this program.
+//!
+//! ```text
+//! program -> PROGRAM __plugin-host PID FOLDER COMMAND... -> PROGRAM __plugin-start PID COMMAND... = the plugin
+//! ```
+//!
+//! The host adopts what the plugin's processes leave behind, waits for the end of the plugin and for that of the program, kills what is left, and removes
+//! the folder of the exchange where the program no longer can. The last step lets the plugin die with its host, and becomes the plugin.
+
+use std::ffi::{OsStr, OsString};
+use std::fs::File;
+use std::os::fd::OwnedFd;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::process::{
+    Pid, PidfdFlags, Signal, WaitOptions, WaitStatus, getpid, getppid, kill_process, pidfd_open, set_child_subreaper,
+    set_parent_process_death_signal, wait,
+};
+
+use super::descendants::kill_descendants;
+
+const HOST: &str = "__plugin-host";
+const START: &str = "__plugin-start";
+
+/// A program that calls [`host_main`] at its beginning, and so can stand between this one and a plugin.
+#[derive(Debug, Clone)]
+pub struct Host {
+    program: PathBuf,
+}
+
+impl Host {
+    /// This program itself, even when its file has been replaced meanwhile. None: the system does not say where it is.
+    pub fn this_program() -> Option<Self> {
+        let own = PathBuf::from("/proc/self/exe");
+        own.exists().then_some(Self { program: own })
+    }
+
+    /// The command that starts a plugin under it; `folder` is that of the exchange.
+    pub(super) fn command(&self, plugin: &Path, arguments: &[String], folder: &Path) -> Command {
+        let mut command = Command::new(&self.program);
+        command
+            .arg0("plugin-host")
+            .arg(HOST)
+            .arg(std::process::id().to_string())
+            .arg(folder)
+            .arg(plugin)
+            .args(arguments);
+        command
+    }
+}
+
+/// What `main` of a program does first: if it was started to host a plugin it does that, and the exit code is returned. Otherwise nothing.
+pub fn host_main() -> Option<ExitCode> {
+    let mut arguments = std::env::args_os().skip(1);
+    let what = arguments.next()?;
+    let (is_host, is_start) = (what == OsStr::new(HOST), what == OsStr::new(START));
+    if !is_host && !is_start {
+        return None;
+    }
+    let parent = arguments.next().and_then(|text| Pid::from_raw(text.to_str()?.parse().ok()?));
+    let rest: Vec<OsString> = arguments.collect();
+    Some(match (parent, rest.as_slice()) {
+        (Some(parent), [folder, command @ ..]) if is_host && !command.is_empty() => {
+            host(parent, Path::new(folder), command)
+        }
+        (Some(parent), [program, arguments @ ..]) if is_start => start(parent, program, arguments),
+        _ => ExitCode::from(2),
+    })
+}
+
+fn host(parent: Pid, folder: &Path, command: &[OsString]) -> ExitCode {
+    // where the system refuses, what leaves the plugin's group and outlives its parent is not found
+    let _ = set_child_subreaper(Some(getpid()));
+    let program = Program { parent, held: pidfd_open(parent, PidfdFlags::empty()).ok() };
+    if !program.has_ended(Duration::ZERO) {
+        let own = getpid().as_raw_nonzero().to_string();
+        match Command::new("/proc/self/exe").arg0("plugin-start").arg(START).arg(own).args(command).spawn() {
+            Ok(child) => {
+                let plugin = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+                return hosted(plugin, program, folder);
+            }
+            Err(error) => told(command.first(), &error),
+        }
+    }
+    ExitCode::from(127)
+}
+
+fn hosted(plugin: Option<Pid>, program: Program, folder: &Path) -> ExitCode {
+    // the plugin alone holds the pipes: their ends are seen when it ends or closes them
+    if let Ok(nothing) = File::options().read(true).write(true).open("/dev/null") {
+        let _ = rustix::stdio::dup2_stdin(&nothing);
+        let _ = rustix::stdio::dup2_stdout(&nothing);
+        let _ = rustix::stdio::dup2_stderr(&nothing);
+    }
+    let (program, folder) = (std::sync::Arc::new(program), folder.to_owned());
+    let (watched, of_watch) = (std::sync::Arc::clone(&program), folder.clone());
+    let watch = std::thread::Builder::new().spawn(move || {
+        while !watched.has_ended(Duration::from_secs(3600)) {}
+        kill_descendants(getpid());
+        remove(&of_watch);
+        std::process::exit(1);
+    });
+    // who cannot watch starts nothing
+    if watch.is_err() {
+        kill_descendants(getpid());
+    }
+    let status = reaped(plugin);
+    kill_descendants(getpid());
+    // a plugin that ends because the program is gone may be faster than the system is in telling it
+    if program.has_ended(Duration::from_millis(20)) {
+        remove(&folder);
+    }
+    ended_as(status)
+}
+
+/// Waits for the plugin, and for whatever else ends meanwhile.
+fn reaped(plugin: Option<Pid>) -> Option<WaitStatus> {
+    loop {
+        match wait(WaitOptions::empty()) {
+            Ok(Some((pid, status))) if Some(pid) == plugin => return Some(status),
+            Ok(_) | Err(rustix::io::Errno::INTR) => {}
+            Err(_) => return None,
+        }
+    }
+}
+
+/// Ends as the plugin did, for whoever waits.
+fn ended_as(status: Option<WaitStatus>) -> ExitCode {
+    let Some(status) = status else { return ExitCode::FAILURE };
+    if let Some(signal) = status.terminating_signal() {
+        // a signal that ended the plugin ends this process too, or is caught by its runtime
+        if let Some(signal) = Signal::from_named_raw(signal) {
+            let _ = kill_process(getpid(), signal);
+        }
+        return ExitCode::from(u8::try_from(128 + signal).unwrap_or(1));
+    }
+    ExitCode::from(status.exit_status().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
+}
+
+/// The program that has started this host.
+#[derive(Debug)]
+struct Program {
+    parent: Pid,
+    held: Option<OwnedFd>,
+}
+
+impl Program {
+    /// Whether it has ended, or does within `wait`.
+    fn has_ended(&self, wait: Duration) -> bool {
+        // what was opened may be a later process of the same number: the parent is asked for as well
+        if getppid() != Some(self.parent) {
+            return true;
+        }
+        let Some(held) = &self.held else {
+            // without a handle: looked at now and then
+            std::thread::sleep(wait.min(Duration::from_millis(100)));
+            return getppid() != Some(self.parent);
+        };
+        let limit = Timespec { tv_sec: wait.as_secs() as i64, tv_nsec: i64::from(wait.subsec_nanos()) };
+        let waited = poll(&mut [PollFd::new(held, PollFlags::IN)], Some(&limit));
+        matches!(waited, Ok(1..)) || getppid() != Some(self.parent)
+    }
+}
+
+/// Removes the folder of the exchange, and nothing of another name.
+fn remove(folder: &Path) {
+    let own = folder.file_name().is_some_and(|name| name.to_string_lossy().starts_with(super::FOLDER));
+    if own && std::fs::symlink_metadata(folder).is_ok_and(|metadata| metadata.is_dir()) {
+        // what cannot be removed is swept later
+        let _ = std::fs::remove_dir_all(folder);
+    }
+}
+
+fn start(host: Pid, program: &OsStr, arguments: &[OsString]) -> ExitCode {
+    // it stays with what this process becomes; where the system refuses, the host's own end is not seen
+    let _ = set_parent_process_death_signal(Some(Signal::KILL));
+    if getppid() == Some(host) {
+        let error = Command::new(program).args(arguments).exec();
+        told(Some(&program.to_owned()), &error);
+    }
+    ExitCode::from(127)
+}
+
+/// On stderr, which the program shows.
+fn told(program: Option<&OsString>, error: &std::io::Error) {
+    use std::io::Write;
+    let program = program.map(|program| program.to_string_lossy().into_owned()).unwrap_or_default();
+    let _ = writeln!(std::io::stderr(), "{program} cannot be started: {error}");
+}

@@ -1,0 +1,24 @@
+//! Where no process can be made the parent of what others leave behind: plugins run in a process group, and no more.
+
+use std::path::Path;
+use std::process::{Command, ExitCode};
+
+/// A program that stands between this one and a plugin: there is none on this system.
+#[derive(Debug, Clone)]
+pub struct Host(std::convert::Infallible);
+
+impl Host {
+    /// None on this system.
+    pub fn this_program() -> Option<Self> {
+        None
+    }
+
+    pub(super) fn command(&self, _plugin: &Path, _arguments: &[String], _folder: &Path) -> Command {
+        match self.0 {}
+    }
+}
+
+/// Nothing on this system.
+pub fn host_main() -> Option<ExitCode> {
+    None
+}
