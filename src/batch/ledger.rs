@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::files::replace_with;
+use afmid_pipeline::files::{read_regular, replace_with, sweep};
 use serde::{Deserialize, Serialize};
 
 use super::harvest::Harvest;
@@ -24,6 +24,9 @@ pub struct Entry {
     /// What the run found.
     pub found: Harvest,
 }
+
+/// The largest entry that is read.
+const MOST_BYTES: u64 = 64 << 20;
 
 /// The layout that this version writes.
 const VERSION: u32 = 1;
@@ -54,9 +57,10 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// In the folder of results. Errors: its own folder cannot be made.
+    /// In the folder of results, where what killed runs left is removed. Errors: its own folder cannot be made.
     pub fn open(folder: &Path) -> std::io::Result<Self> {
         std::fs::create_dir_all(folder.join("ledger"))?;
+        sweep(folder, ".");
         Ok(Self { folder: folder.to_owned() })
     }
 
@@ -71,7 +75,7 @@ impl Ledger {
 
     /// What became of a data set; none if nothing is known, or what is there is damaged or of another layout: then it is run again.
     pub fn read(&self, name: &str) -> Option<Entry> {
-        let entry: Entry = serde_json::from_slice(&std::fs::read(self.place(name)).ok()?).ok()?;
+        let entry: Entry = serde_json::from_slice(&read_regular(&self.place(name), MOST_BYTES).ok()?).ok()?;
         (entry.version == VERSION && entry.name == name).then_some(entry)
     }
 

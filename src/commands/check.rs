@@ -7,6 +7,7 @@ use afmid_pipeline::{Plan, Problem, Registry, graph};
 use serde_json::{Value, json};
 
 use super::load::{load, read};
+use crate::diagnostic::MOST_PROBLEMS;
 use crate::failure::{Failure, Message};
 use crate::output::print;
 use crate::show::pretty;
@@ -45,8 +46,9 @@ fn told(configs: &[PathBuf], registry: &Registry) -> Result<(), Failure> {
         all.push(match planned {
             Ok(plan) => right(config, &plan),
             Err(problems) => {
-                let problems: Vec<Value> = problems.iter().map(|one| problem(&text, one)).collect();
-                json!({ "config": config.display().to_string(), "right": false, "problems": problems })
+                let more = problems.len().saturating_sub(MOST_PROBLEMS);
+                let told: Vec<Value> = problems.iter().take(MOST_PROBLEMS).map(|one| problem(&text, one)).collect();
+                json!({ "config": config.display().to_string(), "right": false, "problems": told, "more_problems": more })
             }
         });
     }
@@ -56,7 +58,7 @@ fn told(configs: &[PathBuf], registry: &Registry) -> Result<(), Failure> {
 
 fn right(config: &Path, plan: &Plan) -> Value {
     let stages: Vec<&str> = plan.nodes.iter().map(|node| node.id.as_str()).collect();
-    json!({ "config": config.display().to_string(), "right": true, "stages": stages, "points": plan.points(), "problems": [] })
+    json!({ "config": config.display().to_string(), "right": true, "stages": stages, "points": plan.points(), "problems": [], "more_problems": 0 })
 }
 
 /// A problem with its place: line and column count from 1, columns in characters.

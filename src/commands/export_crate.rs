@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::files::replace_with;
+use afmid_pipeline::files::{open_regular, replace_with};
 use serde_json::{Value, json};
 
 use super::diff::open;
@@ -104,7 +104,7 @@ fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
     if same(from).is_some() && same(from) == same(to) {
         return Ok(());
     }
-    replaced(to, |temporary| fs::copy(from, temporary).map(|_| ()))
+    replaced(to, |temporary| std::io::copy(&mut open_regular(from)?, &mut fs::File::create(temporary)?).map(|_| ()))
 }
 
 fn replaced(path: &Path, fill: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<(), Failure> {

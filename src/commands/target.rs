@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::files::probe;
+use afmid_pipeline::files::{open_regular, probe, sweep_beside};
 use afmid_pipeline::store::{FileKind, file_kind};
 
 use crate::export::is_exported;
@@ -67,6 +67,7 @@ pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Fail
         return Err(usage(format!("{shown} is a folder, wanted a file"), ANOTHER));
     }
     make_folder(path)?;
+    sweep_beside(path);
     probe(path).map_err(|error| match error.kind() {
         ErrorKind::InvalidFilename => {
             usage(format!("{shown} cannot be written: its name is too long ({error})"), ANOTHER)
@@ -115,7 +116,7 @@ fn existing(path: &Path, metadata: &Metadata, target: Target, inputs: &[Input]) 
 /// As much of a file as tells an exported model.
 fn head(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
-    fs::File::open(path)?.take(128).read_to_end(&mut head)?;
+    open_regular(path)?.take(128).read_to_end(&mut head)?;
     Ok(head)
 }
 

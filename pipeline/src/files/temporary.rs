@@ -78,7 +78,7 @@ fn dead(pid: u32) -> bool {
     processes.join("self").exists() && !processes.join(pid.to_string()).exists()
 }
 
-/// Sweeps what killed runs left beside a result file.
-pub(crate) fn sweep_beside(path: &Path) {
+/// Sweeps what killed runs left beside a result file. The whole folder is listed: once per command, not per file.
+pub fn sweep_beside(path: &Path) {
     sweep(folder_of(path), &format!(".{}.", file_name(path)));
 }

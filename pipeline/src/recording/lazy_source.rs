@@ -47,7 +47,7 @@ impl LazySource {
         if let Some(source) = self.native.get() {
             return Ok(source);
         }
-        let source = super::native::open_source(self.files.chunks(), &self.path, &self.location)?;
+        let source = super::native::open_source(&self.files, &self.path, &self.location)?;
         if source.file_size != self.file_size || source.samples != self.samples {
             return Err(self.error("the file is not the one that was recorded: its size differs"));
         }

@@ -8,6 +8,8 @@ use super::chunk::{ChunkFilter, undo_filters};
 use super::chunk_cache::ChunkCache;
 use super::{FormatError, Raw, Source};
 use crate::error::StageError;
+use crate::files::open_regular;
+use crate::hdf5_files::Vetted;
 use crate::hdf5_files::read::open_file;
 use afmid_formats::Number;
 
@@ -46,6 +48,7 @@ pub(super) struct ChunkPlace {
 #[derive(Debug)]
 pub(super) struct Hdf5Source {
     pub(super) path: PathBuf,
+    pub(super) vetted: Vetted,
     pub(super) file_size: u64,
     pub(super) location: String,
     pub(super) samples: usize,
@@ -102,7 +105,7 @@ impl Hdf5Source {
 
     fn open(&self) -> Result<File, StageError> {
         let fail = |error: std::io::Error| self.error(format!("the file cannot be read: {error}"));
-        let file = File::open(&self.path).map_err(fail)?;
+        let file = open_regular(&self.path).map_err(fail)?;
         let size = file.metadata().map_err(fail)?.len();
         if size != self.file_size {
             return Err(self
@@ -165,7 +168,7 @@ impl Hdf5Source {
     }
 
     fn read_slice<T: hdf5::H5Type>(&self, from: usize, to: usize) -> Result<Vec<T>, StageError> {
-        let file = open_file(&self.path)?;
+        let file = open_file(&self.path, &self.vetted)?;
         let fail = |error: hdf5::Error| self.error(format!("samples {from} to {to} cannot be read: {error}"));
         let dataset = file.dataset(&self.location).map_err(fail)?;
         Ok(dataset.read_slice_1d::<T, _>(from..to).map_err(fail)?.into_raw_vec_and_offset().0)

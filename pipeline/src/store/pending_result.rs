@@ -6,7 +6,7 @@ use std::path::Path;
 use super::result_file::{ResultWriter, RunHead};
 use super::seal::seal;
 use crate::error::StoreError;
-use crate::files::{Replacement, sweep_beside};
+use crate::files::Replacement;
 use crate::outcome::{RunInfo, RunResult, StageRecord};
 
 /// Writes a run's result file, whole or not at all, and removes what killed runs left beside it.
@@ -41,7 +41,6 @@ const SHARE: u64 = 1 << 20;
 impl PendingResult {
     /// Begins the file beside `path`. Errors: as [`write_result`].
     pub(crate) fn new(path: &Path, run: &RunHead) -> Result<Self, StoreError> {
-        sweep_beside(path);
         let replacement = Replacement::new(path)?;
         match ResultWriter::new(replacement.temporary(), run) {
             Ok(writer) => Ok(Self { writer, replacement, sent: 0 }),

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
-use hdf5::{Dataset, File, H5Type};
+use hdf5::{Dataset, H5Type};
 
 use crate::error::StoreError;
-use crate::hdf5_files::read;
+use crate::hdf5_files::read::{self, Node, Opened};
+use crate::hdf5_files::vet;
 use crate::plugin::message::Numbers;
 
 /// The largest output file, and the most bytes of numbers taken from one answer.
@@ -15,7 +16,7 @@ const MOST_BYTES: u64 = 2 << 30;
 /// An output file, opened when the first path is looked up.
 pub(super) struct Numeric<'a> {
     path: &'a Path,
-    file: Option<File>,
+    file: Option<Node>,
     bytes_left: u64,
 }
 
@@ -67,7 +68,7 @@ impl<'a> Numeric<'a> {
             Some(file) => file,
             None => self.file.insert(open(self.path)?),
         };
-        let dataset = file.dataset(path).map_err(|_| "is not in the output file".to_owned())?;
+        let dataset = read::dataset(file, path).map_err(|_| "is not in the output file".to_owned())?;
         let found = dataset.shape();
         // axes of length 1 are not told apart: Octave has no arrays of one dimension
         let long = |shape: &[usize]| shape.iter().copied().filter(|&length| length != 1).collect::<Vec<usize>>();
@@ -83,7 +84,7 @@ impl<'a> Numeric<'a> {
 }
 
 /// Opens an output file. Errors: there is none, it is too large, or it is not HDF5.
-fn open(path: &Path) -> Result<File, String> {
+fn open(path: &Path) -> Result<Node, String> {
     let size = match std::fs::symlink_metadata(path) {
         Ok(metadata) if metadata.is_file() => metadata.len(),
         _ => return Err("is in a file that was not written".to_owned()),
@@ -91,10 +92,11 @@ fn open(path: &Path) -> Result<File, String> {
     if size > MOST_BYTES {
         return Err(format!("is in a file of {size} bytes, wanted at most {MOST_BYTES}"));
     }
-    read::open_file(path).map_err(|error| format!("is in a file that cannot be read: {}", error.problem))
+    let open = || vet(path).and_then(|vetted| Ok(read::open_file(path, &vetted)?.root()));
+    open().map_err(|error| format!("is in a file that cannot be read: {}", error.problem))
 }
 
-fn values(dataset: &Dataset) -> Result<Found, StoreError> {
+fn values(dataset: &Opened<Dataset>) -> Result<Found, StoreError> {
     use IntSize::{U1, U2, U4, U8};
     Ok(match read::descriptor(dataset)? {
         TypeDescriptor::Float(FloatSize::U4) => Found::Real(raw::<f32, _>(dataset, f64::from)?),
@@ -112,8 +114,9 @@ fn values(dataset: &Dataset) -> Result<Found, StoreError> {
     })
 }
 
-fn raw<T: H5Type + Copy, U>(dataset: &Dataset, of: impl Fn(T) -> U) -> Result<Vec<U>, StoreError> {
-    read::check_size(dataset, size_of::<T>())?;
+fn raw<T: H5Type + Copy, U>(dataset: &Opened<Dataset>, of: impl Fn(T) -> U) -> Result<Vec<U>, StoreError> {
+    // some languages compress what they write
+    read::check_samples(dataset, size_of::<T>(), dataset.allowance())?;
     let values = dataset.read_raw::<T>()?;
     Ok(values.into_iter().map(of).collect())
 }

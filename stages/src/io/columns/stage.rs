@@ -1,7 +1,9 @@
 //! The stage `io.columns`.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::files::open_regular;
 use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -137,9 +139,13 @@ impl Stage for Columns {
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let path = self.path(cx.base());
         let place = |error: String| StageError::new(format!("{}: {error}", path.display()));
-        let bytes = std::fs::read(&path).map_err(|error| place(error.to_string()))?;
+        let mut bytes = Vec::new();
+        let read = open_regular(&path).and_then(|mut file| file.read_to_end(&mut bytes));
+        read.map_err(|error| place(error.to_string()))?;
         let table = read_columns(&self.file, &bytes, self.separator).map_err(|error| place(error.to_string()))?;
+        drop(bytes);
         let series = Series::new(self, &table)?;
+        drop(table);
         let (pair, summary) = series.split(self)?;
         series.warnings().into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new().with(&PAIR, pair).with(&SUMMARY, summary))
