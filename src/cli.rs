@@ -50,7 +50,7 @@ pub enum Command {
         #[command(subcommand)]
         what: New,
     },
-    /// Check configs: everything that can be wrong without opening data, all errors at once.
+    /// Check configs: everything that can be wrong without opening data, all errors at once, the first hundred printed.
     Check {
         /// The configs.
         #[arg(required = true, value_name = "CONFIG")]
@@ -162,7 +162,7 @@ pub enum Command {
 /// A config and what changes it.
 #[derive(Debug, Args)]
 pub struct ConfigArgs {
-    /// The config.
+    /// The config, TOML of at most 16 MiB.
     pub config: PathBuf,
     /// Set a parameter (or `pipeline.seed`); VALUE is TOML, so text needs quotes of its own.
     #[arg(long = "set", value_name = "ID.PARAM=VALUE")]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::files::{replace_with, sweep};
+use afmid_pipeline::files::{read_regular, replace_with, sweep};
 use serde::{Deserialize, Serialize};
 
 use super::harvest::Harvest;
@@ -27,6 +27,8 @@ pub struct Entry {
 
 /// How every entry begins.
 const HEAD: &[u8] = b"{\n  \"version\": ";
+/// The largest entry that is read.
+const MOST_BYTES: u64 = 64 << 20;
 
 /// The layout that this version writes.
 const VERSION: u32 = 1;
@@ -76,7 +78,7 @@ impl Ledger {
 
     /// What became of a data set; none if nothing is known, or what is there is damaged or of another layout: then it is run again.
     pub fn read(&self, name: &str) -> Option<Entry> {
-        let entry: Entry = serde_json::from_slice(&std::fs::read(self.place(name)).ok()?).ok()?;
+        let entry: Entry = serde_json::from_slice(&read_regular(&self.place(name), MOST_BYTES).ok()?).ok()?;
         (entry.version == VERSION && entry.name == name).then_some(entry)
     }
 

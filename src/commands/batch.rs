@@ -1,9 +1,11 @@
 //! `afmid batch`: one run per data set, a ledger of them, one table.
 
+use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use afmid_pipeline::Plan;
+use afmid_pipeline::files::read_regular;
 use afmid_pipeline::graph::Stages;
 use serde_json::json;
 
@@ -55,6 +57,9 @@ pub fn whole(config: &ConfigArgs, stages: &dyn Stages) -> Result<Plan, Failure> 
     Ok(whole)
 }
 
+/// The largest manifest: millions of data sets.
+const MOST_MANIFEST_BYTES: u64 = 1 << 30;
+
 /// All that were named. Errors, usage: everything that is wrong with them.
 pub fn data_sets(args: &SetsArgs) -> Result<Vec<DataSet>, Failure> {
     let (mut sets, mut problems) = (Vec::new(), Vec::new());
@@ -63,7 +68,9 @@ pub fn data_sets(args: &SetsArgs) -> Result<Vec<DataSet>, Failure> {
     }
     for file in &args.manifest {
         let shown = file.display().to_string();
-        match std::fs::read_to_string(file) {
+        let text = read_regular(file, MOST_MANIFEST_BYTES)
+            .and_then(|bytes| String::from_utf8(bytes).map_err(|error| Error::new(ErrorKind::InvalidData, error)));
+        match text {
             Err(error) => problems.push(format!("the manifest {shown} cannot be read: {error}")),
             Ok(text) => match manifest::read(&shown, &text) {
                 Ok(more) => sets.extend(more),

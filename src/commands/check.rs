@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::load::{load, read};
 use crate::batch::shell::quoted;
+use crate::diagnostic::MOST_PROBLEMS;
 use crate::failure::{Failure, Message};
 use crate::output::{print, report};
 use crate::show::pretty;
@@ -48,8 +49,9 @@ fn told(configs: &[PathBuf], stages: &dyn Stages) -> Result<(), Failure> {
         all.push(match planned {
             Ok(plan) => right(config, &plan),
             Err(problems) => {
-                let problems: Vec<Value> = problems.iter().map(|one| problem(&text, one)).collect();
-                json!({ "config": config.display().to_string(), "right": false, "ports_not_checked": [], "problems": problems })
+                let more = problems.len().saturating_sub(MOST_PROBLEMS);
+                let told: Vec<Value> = problems.iter().take(MOST_PROBLEMS).map(|one| problem(&text, one)).collect();
+                json!({ "config": config.display().to_string(), "right": false, "ports_not_checked": [], "problems": told, "more_problems": more })
             }
         });
     }
@@ -66,6 +68,7 @@ fn right(config: &Path, plan: &Plan) -> Value {
         "ports_not_checked": ids(&mut plan.not_described()),
         "points": plan.points(),
         "problems": [],
+        "more_problems": 0,
     })
 }
 

@@ -1,5 +1,7 @@
 //! `afmid explain`: which stages would run, and why.
 
+use std::collections::HashMap;
+
 use afmid_pipeline::cache::{Cache, arithmetic};
 use afmid_pipeline::graph::Stages;
 use afmid_pipeline::runner::{Decision, Explanation, Surroundings, explain};
@@ -65,14 +67,19 @@ impl Explained<'_> {
 /// What a run of a sweep would do: a stage has a row per group of points that share its result.
 fn points(plan: &Plan, count: usize, with: &Explained, json: bool) -> Result<(), Failure> {
     let mut groups: Vec<Vec<Group>> = plan.nodes.iter().map(|_| Vec::new()).collect();
+    let mut places: HashMap<(usize, Option<String>, String), usize> = HashMap::new();
     for index in 0..count {
         let point = plan.point(index).map_err(|problems| {
             Failure::failed(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "), None)
         })?;
-        for (row, groups) in with.rows(&point).into_iter().zip(&mut groups) {
-            match groups.iter_mut().find(|group| group.row.key == row.key && group.row.decision == row.decision) {
+        for (node, (row, groups)) in with.rows(&point).into_iter().zip(&mut groups).enumerate() {
+            let key = (node, row.key.clone(), format!("{:?}", row.decision));
+            match places.get(&key).and_then(|place| groups.get_mut(*place)) {
                 Some(group) => group.points.push(index),
-                None => groups.push(Group { row, points: vec![index] }),
+                None => {
+                    places.insert(key, groups.len());
+                    groups.push(Group { row, points: vec![index] });
+                }
             }
         }
     }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::error::StoreError;
-use afmid_pipeline::files::{FilledFolder, LIST};
+use afmid_pipeline::files::{FilledFolder, LIST, open_regular};
 use serde_json::{Value, json};
 
 use super::diff::open;
@@ -124,7 +124,7 @@ impl Held {
         if same(from).is_some() && same(from) == same(&to) {
             return Ok(());
         }
-        let copied = |temporary: &Path| fs::copy(from, temporary).map(|_| ());
+        let copied = |temporary: &Path| std::io::copy(&mut open_regular(from)?, &mut fs::File::create(temporary)?).map(|_| ());
         self.folder.replace_with(name, |_| self.earlier, copied).map_err(failed)
     }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use afmid_pipeline::Plan;
+use afmid_pipeline::files::read_regular;
 use afmid_pipeline::graph::{self, Stages};
 
 use crate::diagnostic::render;
@@ -21,9 +22,12 @@ pub fn plan_text(file: &str, text: &str, set: &[String], stages: &dyn Stages) ->
         .map_err(|problems| Failure::Usage(Message::Rendered(render(file, text, &problems))))
 }
 
-/// The text of a config. Errors: the file cannot be read, or is no text.
+/// The largest config: a hundred thousand stages.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// The text of a config. Errors: the file cannot be read, is no regular one, has more than 16 MiB, or is no text.
 pub fn read(path: &Path) -> Result<String, Failure> {
-    let bytes = std::fs::read(path)
+    let bytes = read_regular(path, MOST_BYTES)
         .map_err(|error| Failure::usage(format!("the config {} cannot be read: {error}", path.display()), None))?;
     String::from_utf8(bytes).map_err(|error| {
         let place = error.utf8_error().valid_up_to();

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::files::{has_mark, probe, states_mark, sweep_beside};
+use afmid_pipeline::files::{has_mark, open_regular, probe, states_mark, sweep_beside};
 use afmid_pipeline::store::{FileKind, Written, file_kind, written};
 
 use crate::export::is_exported;
@@ -139,7 +139,7 @@ fn existing(path: &Path, metadata: &Metadata, target: Target, inputs: &[Input]) 
 /// As much of a file as tells a page or an exported model.
 fn head(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
-    fs::File::open(path)?.take(1 << 13).read_to_end(&mut head)?;
+    open_regular(path)?.take(1 << 13).read_to_end(&mut head)?;
     Ok(head)
 }
 

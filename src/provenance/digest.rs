@@ -1,9 +1,9 @@
 //! SHA-256 of files, as repositories and their tools check it.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use afmid_pipeline::files::open_regular;
 use sha2::{Digest, Sha256};
 
 /// SHA-256 of a file's bytes.
@@ -12,7 +12,7 @@ pub struct Sha(Vec<u8>);
 impl Sha {
     /// Streams a file. Errors: it cannot be read.
     pub fn of_file(path: &Path) -> std::io::Result<Self> {
-        let mut file = File::open(path)?;
+        let mut file = open_regular(path)?;
         let (mut hasher, mut buffer) = (Sha256::new(), vec![0; 1 << 18]);
         loop {
             match file.read(&mut buffer)? {

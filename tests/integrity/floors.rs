@@ -20,7 +20,7 @@ const CRATES: [Crate; 4] = [
         name: "afmid-formats",
         src: "pipeline/formats/src",
         floors: &[
-            &["fail", "number", "text", "calendar", "rate", "lanes"],
+            &["budget", "fail", "number", "text", "calendar", "rate", "lanes", "regular"],
             &["pinned"],
             &["inflating", "opened", "raw"],
             &["packed"],

@@ -1,1 +1,110 @@
 //! FIFOs, devices, sizes of configs, numbers of problems.
+
+use std::fs;
+use std::os::unix::net::UnixListener;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use super::common::{command, config};
+
+/// No command waits: opening a FIFO would, for ever.
+fn ends(folder: &Path, arguments: &[&str]) -> Output {
+    let mut child = command(folder, arguments);
+    let mut child =
+        child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("afmid starts");
+    let clock = Instant::now();
+    while child.try_wait().expect("the child is there").is_none() {
+        if clock.elapsed() > Duration::from_secs(20) {
+            child.kill().expect("it can be stopped");
+            panic!("afmid {arguments:?} does not end");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.wait_with_output().expect("it has ended")
+}
+
+#[test]
+fn what_is_no_regular_file_is_refused_before_it_is_opened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let made = Command::new("mkfifo").arg(folder.path().join("fifo")).status().expect("mkfifo is there");
+    assert!(made.success());
+    let _socket = UnixListener::bind(folder.path().join("socket")).expect("a socket");
+    std::os::unix::fs::symlink("fifo", folder.path().join("link")).expect("a link");
+    fs::write(folder.path().join("data.toml"), "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\nparams = { files = [\"x.h5\"] }\n").expect("a config");
+    for odd in ["fifo", "socket", "link", "/dev/zero"] {
+        let columns = format!(
+            "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\nparams = {{ file = {odd:?}, sample_rate_hz = 1.0 }}\n"
+        );
+        fs::write(folder.path().join("columns.toml"), columns).expect("a config");
+        let commands: &[&[&str]] = &[
+            &["inspect", odd],
+            &["show", odd],
+            &["report", odd, "-o", "page.html"],
+            &["diff", odd, odd],
+            &["trace", odd],
+            &["rerun", odd],
+            &["check", odd],
+            &["check", "--json", odd],
+            &["graph", odd],
+            &["explain", odd, "--cache", "cache"],
+            &["run", odd, "-o", "a.h5", "--cache", "cache"],
+            &["run", "data.toml", odd, "-o", "a.h5", "--cache", "cache"],
+            &["run", "columns.toml", "-o", "a.h5", "--cache", "cache"],
+            &["batch", "data.toml", "--manifest", odd, "-o", "batch", "--cache", "cache"],
+            &["new", "pipeline", odd, "-o", "new.toml"],
+        ];
+        for arguments in commands {
+            let Output { status, stderr, .. } = ends(folder.path(), arguments);
+            let told = String::from_utf8_lossy(&stderr);
+            assert!(matches!(status.code(), Some(1 | 2)), "afmid {arguments:?}: {status}\n{told}");
+        }
+        let told = ends(folder.path(), &["check", odd]);
+        let told = String::from_utf8_lossy(&told.stderr).into_owned();
+        assert!(told.contains("a regular file was wanted"), "{told}");
+    }
+}
+
+#[test]
+fn a_ledger_entry_that_is_a_fifo_is_no_entry() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::create_dir_all(folder.path().join("out/ledger")).expect("a folder");
+    fs::create_dir(folder.path().join("set")).expect("a folder");
+    let made = Command::new("mkfifo").arg(folder.path().join("out/ledger/set.json")).status().expect("mkfifo is there");
+    assert!(made.success());
+    let config = config("free-lever.toml");
+    let Output { status, .. } =
+        ends(folder.path(), &["batch", &config, "set", "-o", "out", "--collect", "--cache", "cache"]);
+    assert_eq!(status.code(), Some(3));
+}
+
+#[test]
+fn a_config_has_at_most_16_mib() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let head = "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"a\"\nuses = \"io.columns\"\nparams = { file = \"x\" }\n# ";
+    let with = |bytes: usize| {
+        fs::write(folder.path().join("a.toml"), head.to_owned() + &"x".repeat(bytes - head.len())).expect("a config");
+        let Output { status, stderr, .. } = ends(folder.path(), &["check", "a.toml"]);
+        (status.code(), String::from_utf8_lossy(&stderr).into_owned())
+    };
+    assert_eq!(with(16 << 20).0, Some(0));
+    let (code, told) = with((16 << 20) + 1);
+    assert!(code == Some(2) && told.contains("more than the 16777216 bytes"), "{told}");
+}
+
+#[test]
+fn at_most_a_hundred_problems_are_printed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let stages: String = (0..1234).map(|n| format!("[[stage]]\nid = \"a{n}\"\nuses = \"io.nothing\"\n")).collect();
+    fs::write(folder.path().join("a.toml"), format!("[pipeline]\nname = \"a\"\nseed = 1\n{stages}")).expect("a config");
+    let told = ends(folder.path(), &["check", "a.toml"]);
+    let text = String::from_utf8_lossy(&told.stderr).into_owned();
+    assert_eq!(text.matches("there is no stage named").count(), 100);
+    assert!(text.contains("and 1134 more") && text.contains("1234 problems"), "{}", &text[text.len() - 300..]);
+    // the last one is told at its line
+    assert!(text.contains("[a.toml:303:8]"), "{text}");
+    let told = ends(folder.path(), &["check", "--json", "a.toml"]);
+    let json: serde_json::Value = serde_json::from_slice(&told.stdout).expect("JSON");
+    assert_eq!(json[0]["problems"].as_array().map(Vec::len), Some(100));
+    assert_eq!(json[0]["more_problems"], 1134);
+}

@@ -5,7 +5,6 @@ use crate::number::Number;
 use crate::packed::Packed;
 use crate::pinned::{Pinned, read_at, stretch_end};
 use crate::{FormatError, Raw, Source};
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -73,8 +72,14 @@ impl Source for Grid {
                 let file = file.reopen()?;
                 return self.number.read(count, self.big_endian, |bytes| read_at(&file, at, bytes));
             }
-            Store::File(file) => self.spread_bytes(&file.reopen()?, at, count)?,
-            Store::Packed(packed) => self.packed_bytes(&packed.bytes()?, at, count)?,
+            Store::File(file) => {
+                let file = file.reopen()?;
+                self.spread_bytes(at, count, |at, block| read_at(&file, at, block))?
+            }
+            Store::Packed(packed) if self.step == self.number.bytes() => {
+                return self.number.read(count, self.big_endian, |bytes| packed.read(at, bytes));
+            }
+            Store::Packed(packed) => self.spread_bytes(at, count, |at, block| packed.read(at, block))?,
         };
         Ok(self.number.decode(&bytes, self.big_endian))
     }
@@ -86,7 +91,7 @@ impl Source for Grid {
     fn kept_bytes(&self) -> u64 {
         match &self.store {
             Store::File(_) => 0,
-            Store::Packed(packed) => packed.inflated_bytes(),
+            Store::Packed(packed) => packed.kept_bytes(),
         }
     }
 }
@@ -104,7 +109,12 @@ impl Source for Backwards {
 
 impl Grid {
     /// Of numbers that do not lie side by side.
-    fn spread_bytes(&self, file: &File, at: u64, count: usize) -> Result<Vec<u8>, FormatError> {
+    fn spread_bytes(
+        &self,
+        at: u64,
+        count: usize,
+        mut read: impl FnMut(u64, &mut [u8]) -> Result<(), FormatError>,
+    ) -> Result<Vec<u8>, FormatError> {
         let size = self.number.bytes();
         let at_once = if self.step > FAR_BYTES { 1 } else { (BLOCK_BYTES / self.step).max(1) as usize };
         let mut bytes = Vec::with_capacity(count * size as usize);
@@ -113,22 +123,10 @@ impl Grid {
         while done < count {
             let some = at_once.min(count - done);
             block.resize(((some as u64 - 1) * self.step + size) as usize, 0);
-            read_at(file, at + done as u64 * self.step, &mut block)?;
+            read(at + done as u64 * self.step, &mut block)?;
             self.pick(&block, &mut bytes);
             done += some;
         }
-        Ok(bytes)
-    }
-
-    fn packed_bytes(&self, all: &[u8], at: u64, count: usize) -> Result<Vec<u8>, FormatError> {
-        let size = self.number.bytes();
-        let length = (count as u64 - 1).saturating_mul(self.step).saturating_add(size);
-        let range = usize::try_from(at).ok().zip(at.checked_add(length).and_then(|end| usize::try_from(end).ok()));
-        let stretch = range.and_then(|(from, to)| all.get(from..to)).ok_or_else(|| {
-            fail::plain(format!("the inflated data have {} bytes, more were wanted", all.len()), fail::COPY_AGAIN)
-        })?;
-        let mut bytes = Vec::with_capacity(count * size as usize);
-        self.pick(stretch, &mut bytes);
         Ok(bytes)
     }
 

@@ -13,6 +13,7 @@ const PIECE_BYTES: u64 = 1 << 16;
 pub(crate) const MOST_FOR_ONE_BYTE: u64 = 1032;
 
 /// A decoder of the bytes `at..end` of a file. Unlike `flate2`'s readers it knows a stream that stops early from one that ends.
+#[derive(Debug)]
 pub(crate) struct Inflating {
     file: File,
     at: u64,

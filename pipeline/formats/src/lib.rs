@@ -4,6 +4,7 @@
 //! any stretch of these. Nothing here knows physics, HDF5 or the rest of afmid.
 
 mod archive;
+mod budget;
 mod calendar;
 mod fail;
 mod grid;
@@ -23,6 +24,7 @@ mod rate;
 mod raw;
 pub mod raw_binary;
 mod registry;
+mod regular;
 pub mod tdms;
 mod text;
 pub mod text_table;
@@ -31,6 +33,7 @@ pub mod uff;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use budget::most_inflated;
 pub use grid::numbers_in_file;
 pub use lanes::Lanes;
 pub use number::Number;
@@ -38,6 +41,7 @@ pub use rate::{Clue, agreed_rate, rate_in};
 pub use raw::Raw;
 pub use raw_binary::{RawBinary, SampleType};
 pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};
+pub use regular::{open_regular, read_regular};
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
 ///

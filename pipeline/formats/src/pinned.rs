@@ -1,10 +1,14 @@
 //! A file that must stay as it was when it was opened.
 
+use crate::budget::most_inflated;
 use crate::fail;
+use crate::regular::open_regular;
 use crate::{FormatError, Raw};
 use std::fs::{File, Metadata};
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A file's path, size and state when it was opened. Holds no open file.
 #[derive(Debug, Clone)]
@@ -12,6 +16,8 @@ pub(crate) struct Pinned {
     path: PathBuf,
     bytes: u64,
     state: State,
+    /// What its compressed data may still come to. Clones share it.
+    inflatable: Arc<AtomicU64>,
 }
 
 /// Device, inode, times of modification and of the last change: what tells that it is the same file, unchanged.
@@ -26,17 +32,20 @@ impl Pinned {
     /// Opens a file for the first time.
     pub(crate) fn open(path: &Path) -> Result<(Self, File), FormatError> {
         let cannot = |e| fail::plain(format!("the file cannot be opened: {e}"), "check its path and permissions");
-        let file = File::open(path).map_err(cannot)?;
+        let file = open_regular(path).map_err(cannot)?;
         let about = file.metadata().map_err(cannot)?;
-        if !about.is_file() {
-            return Err(fail::plain("this is a folder or device, a file was wanted", "name the file itself"));
-        }
-        Ok((Self { path: path.to_owned(), bytes: about.len(), state: state(&about) }, file))
+        let inflatable = Arc::new(AtomicU64::new(most_inflated(about.len())));
+        Ok((Self { path: path.to_owned(), bytes: about.len(), state: state(&about), inflatable }, file))
     }
 
     /// Size in bytes.
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes
+    }
+
+    /// Takes the inflated bytes of a part of it into account; whether all so far are within [`most_inflated`].
+    pub(crate) fn may_inflate(&self, bytes: u64) -> bool {
+        self.inflatable.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(bytes)).is_ok()
     }
 
     /// Opens it once more. Errors: gone, or changed by now.

@@ -1,6 +1,6 @@
 //! The cache's folder.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
@@ -9,7 +9,7 @@ use super::names::{Kind, STAMPS, kind_of};
 use super::origin::Origin;
 use super::pending_stage::PendingStage;
 use crate::error::StoreError;
-use crate::files::sweep;
+use crate::files::{open_regular, sweep};
 use crate::outcome::StageResult;
 use crate::recording::InputFiles;
 use crate::store::{StageIdentity, read_stage};
@@ -146,5 +146,5 @@ impl Cache {
 /// A result's time of modification is that of its last use: times of access are switched off on many machines. Where a file may only be
 /// read the time stays: the cache works all the same, it only forgets in another order.
 fn mark_used(path: &Path) {
-    let _ = File::open(path).and_then(|file| file.set_modified(SystemTime::now()));
+    let _ = open_regular(path).and_then(|file| file.set_modified(SystemTime::now()));
 }

@@ -4,14 +4,16 @@
 //! without opening results. It is written before the result and not synced: whoever finds it missing or cut short knows less, nothing
 //! else.
 
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::error::StoreError;
-use crate::files::replace_unsynced;
+use crate::files::{read_regular, replace_unsynced};
+
+/// The largest that is read: of a stage with a million files.
+const MOST_BYTES: u64 = 256 << 20;
 
 /// The parts of a result's key, and who made it first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -48,7 +50,7 @@ pub struct Origin {
 }
 
 /// A file that a stage read.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct OriginFile {
     /// Its name without folders.
     pub name: String,
@@ -83,6 +85,6 @@ impl Origin {
 
     /// Reads one; none if it is missing, cut short or of another layout.
     pub(super) fn read(path: &Path) -> Option<Self> {
-        serde_json::from_slice(&fs::read(path).ok()?).ok()
+        serde_json::from_slice(&read_regular(path, MOST_BYTES).ok()?).ok()
     }
 }

@@ -6,6 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::problem::Problem;
+use super::suggest::MOST_HELPED;
 
 /// A parsed document and its problems. `usable` is false if the syntax is so broken that further checks would mislead.
 pub(super) struct Document<'a> {
@@ -24,13 +25,16 @@ pub(super) fn parse<'a>(text: &'a str, problems: &mut Vec<Problem>) -> Document<
     // behind broken syntax the parser sees tables where there are none: keys that seem to be given twice mostly are not
     let broken = errors.iter().filter(|error| error.message() != DUPLICATE);
     let broken = broken.map(|error| error.span().unwrap_or_default().start).min().unwrap_or(text.len());
+    let mut looked_up = 0;
     for error in errors {
         let span = error.span().unwrap_or_default();
         if error.message() == DUPLICATE {
             if span.start > broken {
                 continue;
             }
-            problems.push(duplicate(text, &root, span));
+            // every stage is looked at for each: the first ones, which are printed, are told better
+            looked_up += 1;
+            problems.push(duplicate(text, &root, span, looked_up <= MOST_HELPED));
         } else {
             usable = false;
             problems.push(syntax(text, error.message(), span));
@@ -50,9 +54,9 @@ fn syntax(text: &str, message: &str, span: Range<usize>) -> Problem {
 }
 
 /// A key that is given twice; within `inputs`, a port that is wired twice.
-fn duplicate(text: &str, root: &DeTable<'_>, span: Range<usize>) -> Problem {
+fn duplicate(text: &str, root: &DeTable<'_>, span: Range<usize>, look_up: bool) -> Problem {
     let key = text.get(span.clone()).unwrap_or_default();
-    let stages = root.get("stage").and_then(|stages| stages.get_ref().as_array());
+    let stages = root.get("stage").filter(|_| look_up).and_then(|stages| stages.get_ref().as_array());
     let is_input = stages.into_iter().flatten().filter_map(|stage| stage.get_ref().get("inputs")).any(|inputs| {
         let own = inputs.span();
         own.contains(&span.start) || entries_after_header(inputs).any(|entry| within(text, own.end, entry, &span))

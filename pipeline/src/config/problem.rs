@@ -56,7 +56,7 @@ impl Problem {
 
     /// Brings problems into reading order: the config from top to bottom, then the arguments. Equal ones are kept once.
     pub(crate) fn sort(problems: &mut Vec<Problem>, arguments: &[String]) {
-        problems.sort_by_key(|problem| {
+        problems.sort_by_cached_key(|problem| {
             let rank = match &problem.origin {
                 Origin::Config => 0,
                 Origin::Argument(text) => 1 + arguments.iter().take_while(|argument| *argument != text).count(),

@@ -1,5 +1,11 @@
 //! "Did you mean": the nearest of the names that exist.
 
+/// Problems of one kind that come with a look at all that there is: more are not printed, and each would take time in proportion to the config.
+pub(crate) const MOST_HELPED: usize = 200;
+
+/// Names that are listed; more are counted.
+const MOST_LISTED: usize = 40;
+
 /// The candidate nearest to a word, if one is near: a misspelling of up to a third of its letters, another case, `-` for `_`, or
 /// the last part of a dotted name.
 ///
@@ -36,9 +42,11 @@ pub(crate) fn did_you_mean<'a>(word: &str, what: &str, candidates: impl Iterator
     }
 }
 
-/// Names in backquotes, separated by commas.
-pub(crate) fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+/// Names in backquotes, separated by commas, the first forty.
+pub(crate) fn list<'a>(names: impl Iterator<Item = &'a str> + Clone) -> String {
+    let more = names.clone().skip(MOST_LISTED).count();
+    let listed = names.take(MOST_LISTED).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    if more == 0 { listed } else { format!("{listed} and {more} more") }
 }
 
 /// Whether a key that is missing is there under a misspelt name: then that is said already.

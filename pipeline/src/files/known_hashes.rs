@@ -7,10 +7,13 @@ use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-use super::{FileState, replace_unsynced};
+use super::{FileState, read_regular, replace_unsynced};
 
 /// Begins every entry; another layout gets another number.
 const TITLE: &str = "afmid stamp 2";
+
+/// The largest entry that is read.
+const MOST_BYTES: u64 = 1 << 16;
 
 /// A folder of entries: one per file, under the hash of its absolute path.
 #[derive(Debug, Clone)]
@@ -35,7 +38,7 @@ impl KnownHashes {
         if self.fresh {
             return None;
         }
-        let text = fs::read_to_string(self.place(path)).ok()?;
+        let text = String::from_utf8(read_regular(&self.place(path), MOST_BYTES).ok()?).ok()?;
         let (body, hash) = text.trim_end().rsplit_once('\n')?;
         if blake3::hash(body.as_bytes()).to_hex().as_str() != hash {
             return None;

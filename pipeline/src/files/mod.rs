@@ -9,6 +9,7 @@ mod mark;
 mod replace;
 mod temporary;
 
+pub use afmid_formats::{open_regular, read_regular};
 pub(crate) use file_state::FileState;
 pub use filled_folder::{FilledFolder, LIST};
 pub(crate) use known_hashes::KnownHashes;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::{Stages, order, sweep, wiring};
-use crate::config::{Config, Problem, StageDecl, instantiate, nearest};
+use crate::config::{Config, MOST_HELPED, Problem, StageDecl, instantiate, nearest};
 use crate::stage::{DynStage, Entry};
 
 /// A checked graph: what the runner runs. Cloning is cheap: stages are shared.
@@ -115,7 +115,9 @@ fn settle(plan: Option<Plan>, mut problems: Vec<Problem>, arguments: &[String]) 
 }
 
 fn try_plan(config: Config, known: &dyn Stages, problems: &mut Vec<Problem>) -> Option<Plan> {
-    let entries: Vec<Option<Entry>> = config.stages.iter().map(|stage| find(stage, &config, known, problems)).collect();
+    let mut unknown = 0;
+    let entries: Vec<Option<Entry>> =
+        config.stages.iter().map(|stage| find(stage, &config, known, &mut unknown, problems)).collect();
     let stages: Vec<_> = config
         .stages
         .iter()
@@ -131,20 +133,30 @@ fn try_plan(config: Config, known: &dyn Stages, problems: &mut Vec<Problem>) -> 
     sweep::check(&config, &entries, problems);
     let wires = wiring::connect(&config.stages, &entries, problems);
     let order = order::topological(&config.stages, &wires, problems)?;
-    let place = |index: usize| order.iter().position(|&other| other == index);
+    let mut places = vec![None; order.len()];
+    order.iter().enumerate().for_each(|(place, &index)| places[index] = Some(place));
     let mut parts: Vec<_> = stages.into_iter().zip(wires).map(Some).collect();
     let mut nodes = Vec::with_capacity(order.len());
     for &index in &order {
         let (stage, wires) = parts.get_mut(index)?.take()?;
         let (stage, params) = stage?;
         let (decl, entry) = (&config.stages[index], entries[index]?);
-        let inputs = wires.iter().filter_map(|wire| Some(Wire { node: place(wire.node)?, ..wire.wire() })).collect();
+        let inputs = wires
+            .iter()
+            .filter_map(|wire| Some(Wire { node: *places.get(wire.node)?.as_ref()?, ..wire.wire() }))
+            .collect();
         nodes.push(Node { id: decl.id.clone(), uses: decl.uses.clone(), entry, stage: stage.into(), params, inputs });
     }
     Some(Plan { nodes, config })
 }
 
-fn find(decl: &StageDecl, config: &Config, known: &dyn Stages, problems: &mut Vec<Problem>) -> Option<Entry> {
+fn find(
+    decl: &StageDecl,
+    config: &Config,
+    known: &dyn Stages,
+    unknown: &mut usize,
+    problems: &mut Vec<Problem>,
+) -> Option<Entry> {
     if decl.uses.is_empty() {
         return None;
     }
@@ -155,7 +167,10 @@ fn find(decl: &StageDecl, config: &Config, known: &dyn Stages, problems: &mut Ve
     let found = match decl.uses.strip_prefix("exec:") {
         Some(name) => known.process(decl, name, config),
         None => {
-            let nearest = nearest(&decl.uses, registry.entries().iter().map(|entry| entry.spec.name));
+            *unknown += 1;
+            // the first ones, which are printed, are told better
+            let names = registry.entries().iter().map(|entry| entry.spec.name).filter(|_| *unknown <= MOST_HELPED);
+            let nearest = nearest(&decl.uses, names);
             let help = match nearest {
                 Some(name) => format!("did you mean `{name}`?"),
                 None => "`afmid stages` lists all stages".to_owned(),

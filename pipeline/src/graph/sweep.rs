@@ -1,5 +1,8 @@
 //! The points of a sweep: every value checked before anything runs, every point a plan of its own.
 
+use std::collections::HashSet;
+use std::ops::Range;
+
 use serde_json::Value;
 
 use super::plan::Plan;
@@ -8,6 +11,10 @@ use crate::stage::Entry;
 
 /// Makes every swept stage with every combination of its own parameters. The first one is the config's and was checked with it.
 pub(super) fn check(config: &Config, entries: &[Option<Entry>], problems: &mut Vec<Problem>) {
+    if config.sweep.is_empty() {
+        return;
+    }
+    let mut told: Told = problems.iter().map(|problem| (problem.message.clone(), problem.span.clone())).collect();
     for (decl, entry) in config.stages.iter().zip(entries) {
         let own: Vec<&Swept> = config.sweep.iter().filter(|swept| swept.stage() == decl.id).collect();
         let Some(entry) = entry.as_ref().filter(|_| decl.params_read && !own.is_empty()) else { continue };
@@ -19,17 +26,19 @@ pub(super) fn check(config: &Config, entries: &[Option<Entry>], problems: &mut V
             let applied =
                 values.filter_map(|(swept, value)| swept.values.get(value).cloned()).try_for_each(|set| alone.set(set));
             if let (Ok(()), Some(decl)) = (applied, alone.stages.first()) {
-                tell(instantiate(decl, entry).err().into_iter().flatten(), problems);
+                tell(instantiate(decl, entry).err().into_iter().flatten(), &mut told, problems);
             }
         }
     }
 }
 
+/// Messages with their places.
+type Told = HashSet<(String, Range<usize>)>;
+
 /// What is wrong with one value is wrong in all its combinations with others: it is told once.
-fn tell(wrong: impl Iterator<Item = Problem>, problems: &mut Vec<Problem>) {
+fn tell(wrong: impl Iterator<Item = Problem>, told: &mut Told, problems: &mut Vec<Problem>) {
     for problem in wrong {
-        let same = |told: &Problem| (&told.message, &told.span) == (&problem.message, &problem.span);
-        if !problems.iter().any(same) {
+        if told.insert((problem.message.clone(), problem.span.clone())) {
             problems.push(problem);
         }
     }

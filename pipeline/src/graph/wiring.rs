@@ -1,9 +1,11 @@
 //! Wires: which output goes into which input.
 
+use std::cell::Cell;
+use std::collections::HashMap;
 use std::ops::Range;
 
 use super::plan;
-use crate::config::{Input, Problem, StageDecl, did_you_mean, list, nearest};
+use crate::config::{Input, MOST_HELPED, Problem, StageDecl, did_you_mean, list, nearest};
 use crate::outcome::PortSpec;
 use crate::stage::Entry;
 
@@ -26,7 +28,12 @@ impl Wire {
 /// The wires of every stage, in the order of its input ports. What cannot be connected is a problem; nothing is said of stages
 /// that could not be looked up.
 pub(super) fn connect(decls: &[StageDecl], entries: &[Option<Entry>], problems: &mut Vec<Problem>) -> Vec<Vec<Wire>> {
-    let board = Board { decls, entries };
+    // of two stages with one id, which was told, the first
+    let mut places = HashMap::with_capacity(decls.len());
+    decls.iter().enumerate().for_each(|(place, decl)| {
+        places.entry(decl.id.as_str()).or_insert(place);
+    });
+    let board = Board { decls, entries, places, helped: Cell::new(0) };
     decls
         .iter()
         .zip(entries)
@@ -43,9 +50,19 @@ const NOT_KNOWN: &str = "?";
 struct Board<'a> {
     decls: &'a [StageDecl],
     entries: &'a [Option<Entry>],
+    /// Of the stages, by their ids.
+    places: HashMap<&'a str, usize>,
+    /// Problems that came with a look at all stages.
+    helped: Cell<usize>,
 }
 
 impl Board<'_> {
+    /// Whether a problem comes with a look at all stages: the first ones do.
+    fn helps(&self) -> bool {
+        self.helped.set(self.helped.get() + 1);
+        self.helped.get() <= MOST_HELPED
+    }
+
     fn inputs(&self, decl: &StageDecl, entry: &Entry, problems: &mut Vec<Problem>) -> Vec<Wire> {
         let ports = entry.spec.inputs;
         let names = || ports.iter().map(|port| port.name);
@@ -85,12 +102,11 @@ impl Board<'_> {
             None => (input.target.as_str(), None),
         };
         let wrong = |message: String, label: &str| Problem::new(message, input.target_span.clone(), label);
-        let Some(node) = self.decls.iter().position(|decl| decl.id == id) else {
+        let Some(&node) = self.places.get(id) else {
             let ids = self.decls.iter().map(|decl| decl.id.as_str()).filter(|id| !id.is_empty());
-            let help = did_you_mean(id, "stage", ids);
-            return Err(
-                wrong(format!("input `{}`: there is no stage with the id `{id}`", port.name), "unknown id").help(help)
-            );
+            let help = self.helps().then(|| did_you_mean(id, "stage", ids));
+            return Err(wrong(format!("input `{}`: there is no stage with the id `{id}`", port.name), "unknown id")
+                .maybe_help(help));
         };
         let Some(entry) = &self.entries[node] else { return Ok(None) };
         let outputs = entry.spec.outputs;
@@ -120,6 +136,9 @@ impl Board<'_> {
     fn missing(&self, decl: &StageDecl, entry: &Entry, port: &PortSpec) -> Problem {
         let message = format!("input `{}` of {} (`{}`) is not wired", port.name, decl.title(), entry.spec.name);
         let label = format!("lacks `{}`", port.name);
+        if !self.helps() {
+            return Problem::new(message, decl.inputs_span.clone(), label);
+        }
         let help = match self.fitting(decl, port).as_slice() {
             [] => format!("it wants {} ({}); no stage of this config makes one", kind(port), port.doc),
             [one] => format!("write `inputs = {{ {} = \"{one}\" }}`", port.name),
@@ -129,7 +148,7 @@ impl Board<'_> {
     }
 
     fn fitting_help(&self, reader: &StageDecl, port: &PortSpec) -> Option<String> {
-        let fitting = self.fitting(reader, port);
+        let fitting = if self.helps() { self.fitting(reader, port) } else { Vec::new() };
         (!fitting.is_empty()).then(|| format!("these fit: {}", list(fitting.iter().map(String::as_str))))
     }
 

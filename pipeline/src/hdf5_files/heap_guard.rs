@@ -1,20 +1,32 @@
-//! A guard against one kind of damage that keeps the HDF5 library busy for ever.
+//! A guard against damage that keeps the HDF5 library busy for ever, or makes it read a stretch of a file many times over.
 //!
 //! Texts of variable length lie in global heap collections. The library walks a collection object by object, and object 0 (the free
 //! space) takes as many bytes as it states: with 0 bytes stated the walk never ends (HDF5 2.0, H5HGcache.c). Collections have no
-//! checksum, so foreign files are looked through before they are opened.
+//! checksum and may overlap, so that a small file can hold thousands of large ones. Files of others are looked through before they are opened.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::path::Path;
 use std::sync::LazyLock;
 
 use memchr::arch::all::packedpair::HeuristicFrequencyRank;
 use memchr::memmem::{Finder, FinderBuilder};
 
+use crate::error::{Result, StoreError};
+
 /// Signature, version and reserved bytes of a collection.
 const SIGNATURE: [u8; 8] = *b"GCOL\x01\0\0\0";
-/// Bytes of a collection's header, and of an object's: with lengths of 8 bytes, which every library of the last decades writes.
-const HEADER: usize = 16;
-/// No collection of the texts of a record's attributes is larger; larger ones are walked this far.
-const LARGEST: usize = 1 << 18;
+/// Bytes of a collection's header, and of an object's, whatever the length of lengths.
+const HEADER: u64 = 16;
+/// The library refuses smaller collections.
+const SMALLEST: u64 = 4096;
+/// What a file begins with, at byte 0, 512, 1024, 2048, ...
+const FILE_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+/// The first place behind the beginning where a file's signature may lie.
+const USER_BLOCK: u64 = 512;
+/// Collections lie side by side: together they cannot take more than the file, and a little for bytes that only look like one.
+const MOST_OVERLAP: u64 = 2;
+const SPARE: u64 = 1 << 20;
 
 /// Finds the signature. It is looked for by its first two bytes: of two neighbours one is the high byte of a sample of two bytes, and most converters
 /// never make it. The general guess, by how frequent bytes are in texts and programs, takes two low bytes and stops all the time.
@@ -30,135 +42,324 @@ impl HeuristicFrequencyRank for Neighbours {
     }
 }
 
-/// Looks for collections while a file streams by.
-#[derive(Debug, Default)]
+/// What was found in a file that the library can be let at: nobody else can make one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Vetted {
+    pub(super) file_bytes: u64,
+    /// Bytes of the largest object of a heap: no single text is larger.
+    pub(super) largest_text: u64,
+}
+
+/// Why the library must not be let at a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// It would walk for ever.
+    Endless,
+    /// It would read the same bytes over and over.
+    Overlapping,
+    /// Lengths of neither 2, 4 nor 8 bytes.
+    OddLengths,
+}
+
+impl Refusal {
+    const ALL: [Self; 3] = [Self::Endless, Self::Overlapping, Self::OddLengths];
+
+    /// For people.
+    pub(crate) fn text(self) -> &'static str {
+        match self {
+            Self::Endless => "damaged: a heap collection of the HDF5 file never ends",
+            Self::Overlapping => "damaged: the heap collections of the HDF5 file lie over one another",
+            Self::OddLengths => "damaged: the HDF5 file states lengths of neither 2, 4 nor 8 bytes",
+        }
+    }
+}
+
+/// What a pass through a file found, in a word or two that can be kept.
+pub(crate) fn finding_text(finding: &std::result::Result<Vetted, Refusal>) -> String {
+    match finding {
+        Ok(vetted) => format!("{} {}", vetted.file_bytes, vetted.largest_text),
+        Err(refusal) => format!("{refusal:?}"),
+    }
+}
+
+/// What [`finding_text`] wrote; none if it is something else.
+pub(crate) fn parse_finding(text: &str) -> Option<std::result::Result<Vetted, Refusal>> {
+    if let Some(refusal) = Refusal::ALL.into_iter().find(|refusal| format!("{refusal:?}") == text) {
+        return Some(Err(refusal));
+    }
+    let (file_bytes, largest_text) = text.split_once(' ')?;
+    Some(Ok(Vetted { file_bytes: file_bytes.parse().ok()?, largest_text: largest_text.parse().ok()? }))
+}
+
+/// Looks through a whole file. Errors: it cannot be read; the library must not be let at it.
+pub(crate) fn vet(path: &Path) -> Result<Vetted> {
+    use std::io::Read;
+    let io = |error: std::io::Error| StoreError::io("cannot be read", path, &error);
+    let mut file = crate::files::open_regular(path).map_err(io)?;
+    let mut guard = HeapGuard::new(file.metadata().map_err(io)?.len());
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer).map_err(io)? {
+            0 => return guard.finish().map_err(|refusal| StoreError::new(refusal.text()).file(path)),
+            count => guard.update(&buffer[..count]),
+        }
+    }
+}
+
+/// Walks a file's heap collections while the file streams by.
+#[derive(Debug)]
 pub(crate) struct HeapGuard {
-    /// The end of what has streamed by, as long as a collection might begin or continue in it.
-    kept: Vec<u8>,
-    /// Whether one has begun in it.
-    begun: bool,
-    endless: bool,
+    file_bytes: u64,
+    /// Bytes that have streamed by, and the last of them.
+    streamed: u64,
+    tail: Vec<u8>,
+    /// Where the file's signature is looked for next; none once it was found.
+    signature_at: Option<u64>,
+    /// Bytes of a length.
+    length_bytes: usize,
+    /// The next place of a walk first.
+    walks: BinaryHeap<Reverse<Walk>>,
+    /// Bytes of all collections.
+    claimed: u64,
+    largest_text: u64,
+    refusal: Option<Refusal>,
+}
+
+/// A walk through a collection: where its next header lies, and where it ends (none before its own header was read).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Walk {
+    next: u64,
+    end: Option<u64>,
 }
 
 impl HeapGuard {
-    /// Takes the next stretch of the file; copies next to nothing of it as long as no collection begins.
+    /// For a file of this many bytes.
+    pub(crate) fn new(file_bytes: u64) -> Self {
+        Self {
+            file_bytes,
+            streamed: 0,
+            tail: Vec::new(),
+            signature_at: Some(0),
+            length_bytes: 8,
+            walks: BinaryHeap::new(),
+            claimed: 0,
+            largest_text: 0,
+            refusal: None,
+        }
+    }
+
+    /// Takes the next stretch of the file; copies next to nothing of it.
     pub(crate) fn update(&mut self, bytes: &[u8]) {
-        let head = if self.begun { bytes.len() } else { bytes.len().min(BORDER) };
-        self.kept.extend_from_slice(&bytes[..head]);
-        if !self.begun {
-            self.begun = begins(&self.kept) || begins(bytes);
-            if !self.begun {
-                self.keep_border(&bytes[head..]);
-                return;
+        let window = Window { begin: self.streamed, tail: &std::mem::take(&mut self.tail), bytes };
+        self.look_for_file(&window);
+        let last = window.tail.len().saturating_sub(BORDER);
+        let border = [&window.tail[last..], &bytes[..bytes.len().min(BORDER)]].concat();
+        let before = window.begin - (window.tail.len() - last) as u64;
+        self.begin_walks(&border, before);
+        self.begin_walks(bytes, window.begin);
+        self.walk(&window);
+        self.tail = window.last();
+        self.streamed = window.end();
+    }
+
+    /// Whether the library can be let at the file.
+    pub(crate) fn finish(self) -> std::result::Result<Vetted, Refusal> {
+        match self.refusal {
+            Some(refusal) => Err(refusal),
+            None => Ok(Vetted { file_bytes: self.file_bytes, largest_text: self.largest_text }),
+        }
+    }
+
+    fn refuse(&mut self, refusal: Refusal) {
+        self.refusal.get_or_insert(refusal);
+        self.walks.clear();
+    }
+
+    /// The length of lengths, from the first signature of a file.
+    fn look_for_file(&mut self, window: &Window) {
+        while let Some(at) = self.signature_at.filter(|at| at + HEADER <= window.end()) {
+            let head = window.header(at);
+            if !head.starts_with(FILE_SIGNATURE) {
+                self.signature_at = Some((2 * at).max(USER_BLOCK));
+                continue;
             }
-            self.kept.extend_from_slice(&bytes[head..]);
-        }
-        let complete = self.kept.len().saturating_sub(LARGEST);
-        self.scan(complete);
-        self.kept.drain(..complete);
-        self.begun = begins(&self.kept);
-        if !self.begun {
-            self.keep_border(&[]);
+            self.signature_at = None;
+            // versions 0 and 1 state four other versions first
+            let length = usize::from(if head[8] < 2 { head[14] } else { head[10] });
+            if matches!(length, 2 | 4 | 8) {
+                self.length_bytes = length;
+            } else {
+                self.refuse(Refusal::OddLengths);
+            }
         }
     }
 
-    /// Whether the library would walk for ever.
-    pub(crate) fn finish(mut self) -> bool {
-        self.scan(self.kept.len());
-        self.endless
-    }
-
-    /// Keeps the last bytes of what is kept and what follows: a signature may begin in them.
-    fn keep_border(&mut self, rest: &[u8]) {
-        self.kept.extend_from_slice(&rest[rest.len().saturating_sub(BORDER)..]);
-        self.kept.drain(..self.kept.len().saturating_sub(BORDER));
-    }
-
-    fn scan(&mut self, until: usize) {
-        let end = self.kept.len().min(until + BORDER);
-        for place in FINDER.find_iter(&self.kept[..end]) {
-            self.endless |= walk_is_endless(&self.kept[place..]);
+    fn begin_walks(&mut self, bytes: &[u8], at: u64) {
+        if self.refusal.is_none() {
+            self.walks
+                .extend(FINDER.find_iter(bytes).map(|place| Reverse(Walk { next: at + place as u64, end: None })));
         }
+    }
+
+    /// Goes on with every walk as far as the window reaches.
+    fn walk(&mut self, window: &Window) {
+        while let Some(&Reverse(walk)) = self.walks.peek()
+            && walk.next + HEADER <= window.end()
+        {
+            self.walks.pop();
+            if let Some(walk) = self.step(walk, &window.header(walk.next)) {
+                self.walks.push(Reverse(walk));
+            }
+        }
+    }
+
+    /// One step, as the library does it; none where it stops.
+    fn step(&mut self, walk: Walk, header: &[u8; HEADER as usize]) -> Option<Walk> {
+        let length = header[8..8 + self.length_bytes].iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte));
+        let Some(end) = walk.end else {
+            let end = walk.next.checked_add(length).filter(|&end| length >= SMALLEST && end <= self.file_bytes)?;
+            self.claimed = self.claimed.saturating_add(length);
+            if self.claimed > self.file_bytes.saturating_mul(MOST_OVERLAP).saturating_add(SPARE) {
+                self.refuse(Refusal::Overlapping);
+                return None;
+            }
+            return Some(Walk { next: walk.next + HEADER, end: Some(end) });
+        };
+        let is_free_space = header[0] == 0 && header[1] == 0;
+        // rounded up to multiples of 8, with the library's own overflow
+        let taken = if is_free_space { length } else { (length.wrapping_add(7) & !7).wrapping_add(HEADER) };
+        if taken == 0 {
+            self.refuse(Refusal::Endless);
+            return None;
+        }
+        let next = walk.next.checked_add(taken).filter(|&next| next <= end)?;
+        if !is_free_space {
+            self.largest_text = self.largest_text.max(length);
+        }
+        // the library takes what is left for free space where no header fits in
+        Some(Walk { next, end: walk.end }).filter(|walk| walk.next + HEADER <= end)
     }
 }
 
 /// Bytes of a signature before its last.
 const BORDER: usize = SIGNATURE.len() - 1;
 
-fn begins(bytes: &[u8]) -> bool {
-    FINDER.find(bytes).is_some()
+/// The stretch that streams by, and the end of what came before it.
+struct Window<'a> {
+    begin: u64,
+    tail: &'a [u8],
+    bytes: &'a [u8],
 }
 
-/// Walks one collection as the library does.
-fn walk_is_endless(collection: &[u8]) -> bool {
-    let Some(size) = length_at(collection, 8) else { return false };
-    let size = size.min(collection.len());
-    let mut place = HEADER;
-    while place + HEADER <= size {
-        let Some(object) = length_at(collection, place + 8) else { return false };
-        let is_free_space = collection[place] == 0 && collection[place + 1] == 0;
-        let taken = if is_free_space {
-            object
-        } else {
-            // rounded up to multiples of 8, with the library's own overflow
-            object.wrapping_add(7) / 8 * 8 + HEADER
-        };
-        if taken == 0 {
-            return true;
-        }
-        let Some(next) = place.checked_add(taken) else { return false };
-        place = next;
+impl Window<'_> {
+    fn end(&self) -> u64 {
+        self.begin + self.bytes.len() as u64
     }
-    false
-}
 
-fn length_at(bytes: &[u8], place: usize) -> Option<usize> {
-    let bytes = bytes.get(place..place + 8)?;
-    usize::try_from(u64::from_le_bytes(bytes.try_into().ok()?)).ok()
+    /// The header at a place that lies in the window, with the bytes before it; zeros where it does not.
+    fn header(&self, at: u64) -> [u8; HEADER as usize] {
+        let start = self.begin - self.tail.len() as u64;
+        let mut header = [0; HEADER as usize];
+        if let Some(place) = at.checked_sub(self.begin) {
+            let found = self.bytes.get(place as usize..).and_then(|bytes| bytes.first_chunk());
+            header = found.copied().unwrap_or(header);
+        } else if let Some(place) = at.checked_sub(start) {
+            let bytes = self.tail.iter().chain(self.bytes).skip(place as usize);
+            header.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+        }
+        header
+    }
+
+    /// What the next window needs of this one.
+    fn last(&self) -> Vec<u8> {
+        let most = HEADER as usize;
+        let from_tail = self.tail.len().saturating_sub(most.saturating_sub(self.bytes.len()));
+        [&self.tail[from_tail..], &self.bytes[self.bytes.len().saturating_sub(most)..]].concat()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn collection(objects: &[(u16, u64)]) -> Vec<u8> {
+    fn collection(objects: &[(u16, u64)], size: usize) -> Vec<u8> {
         let mut bytes = SIGNATURE.to_vec();
-        bytes.extend(4096_u64.to_le_bytes());
+        bytes.extend((size as u64).to_le_bytes());
         for &(index, size) in objects {
             bytes.extend(index.to_le_bytes());
             bytes.extend([0; 6]);
             bytes.extend(size.to_le_bytes());
-            if index > 0 {
+            if (1..1 << 32).contains(&size) && index > 0 {
                 bytes.resize(bytes.len() + size.div_ceil(8) as usize * 8, b'x');
             }
         }
-        bytes.resize(4096, 0);
+        bytes.resize(size, 0);
         bytes
     }
 
-    fn endless(bytes: &[u8], step: usize) -> bool {
-        let mut guard = HeapGuard::default();
+    fn looked_at(bytes: &[u8], step: usize) -> std::result::Result<Vetted, Refusal> {
+        let mut guard = HeapGuard::new(bytes.len() as u64);
         bytes.chunks(step).for_each(|bytes| guard.update(bytes));
         guard.finish()
     }
 
     #[test]
-    fn free_space_of_no_size_is_found_wherever_it_lies() {
-        let rest = 4096 - 16 - (16 + 8) - (16 + 16);
-        let whole = collection(&[(1, 3), (2, 12), (0, rest)]);
-        let broken = collection(&[(1, 3), (2, 12), (0, 0)]);
-        for offset in [0, 1, 77, LARGEST - 5, 2 * LARGEST] {
-            let around = |bytes: &[u8]| [vec![0; offset], bytes.to_vec(), vec![7; 3000]].concat();
-            for step in [3, 5000, 1 << 18] {
-                assert!(!endless(&around(&whole), step), "{offset} {step}");
-                assert!(endless(&around(&broken), step), "{offset} {step}");
+    fn what_takes_no_bytes_is_found_wherever_it_lies() {
+        let (large, rest) = (600_000_u64, 4096 - 16 - (16 + 8) - (16 + 16));
+        let cases = [
+            (collection(&[(1, 3), (2, 12), (0, rest)], 4096), Ok(12)),
+            (collection(&[(1, 3), (2, 12), (0, 0)], 4096), Err(Refusal::Endless)),
+            // 2^64 - 16 bytes and their header: the sum overflows to none
+            (collection(&[(1, 3), (2, 16_u64.wrapping_neg())], 4096), Err(Refusal::Endless)),
+            (collection(&[(1, large), (0, 0)], 700_000), Err(Refusal::Endless)),
+            (collection(&[(1, large), (0, 700_000 - 16 - 16 - large)], 700_000), Ok(large)),
+            (SIGNATURE.to_vec(), Ok(0)),
+            ([SIGNATURE.as_slice(), &[0xff; 100]].concat(), Ok(0)),
+        ];
+        for offset in [0, 1, 77, 70_000] {
+            for (bytes, expected) in &cases {
+                let around = [vec![0; offset], bytes.clone(), vec![7; 3000]].concat();
+                for step in [3, 5000, 1 << 18] {
+                    let found = looked_at(&around, step).map(|vetted| vetted.largest_text);
+                    assert_eq!(found, *expected, "{offset} {step}");
+                }
             }
         }
     }
 
     #[test]
-    fn the_signature_alone_is_no_damage() {
-        assert!(!endless(b"GCOL\x01\0\0\0", 3));
-        assert!(!endless(&[SIGNATURE.as_slice(), &[0xff; 100]].concat(), 50));
+    fn collections_over_one_another_are_found() {
+        let inner = collection(&[(0, 4096 - 16)], 4096);
+        let apart = inner.repeat(600);
+        assert!(looked_at(&apart, 5000).is_ok());
+        // every 16 bytes one begins that ends with the file
+        let bytes = 16 * 6000;
+        let over: Vec<u8> = (0..6000_u64)
+            .flat_map(|index| [SIGNATURE.to_vec(), (bytes - 16 * index).to_le_bytes().to_vec()].concat())
+            .collect();
+        assert_eq!(looked_at(&over, 5000), Err(Refusal::Overlapping));
+    }
+
+    #[test]
+    fn lengths_are_as_long_as_the_file_says() {
+        let free = collection(&[(0, 0xff_0000_0000)], 4096);
+        for (length, at, expected) in
+            [(4_u8, 0, Err(Refusal::Endless)), (8, 512, Ok(())), (16, 0, Err(Refusal::OddLengths))]
+        {
+            let mut file = vec![0; at];
+            file.extend(FILE_SIGNATURE);
+            file.extend([2, 8, length, 0, 0, 0, 0, 0]);
+            file.extend(&free);
+            assert_eq!(looked_at(&file, 100).map(drop), expected, "{length}");
+        }
+    }
+
+    #[test]
+    fn findings_are_kept_as_text() {
+        let vetted = Vetted { file_bytes: 17, largest_text: 4 };
+        for finding in [Ok(vetted), Err(Refusal::Endless), Err(Refusal::Overlapping), Err(Refusal::OddLengths)] {
+            assert_eq!(parse_finding(&finding_text(&finding)), Some(finding));
+        }
+        assert!(parse_finding("whole").is_none() && parse_finding("1").is_none());
     }
 }

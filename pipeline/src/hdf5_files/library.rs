@@ -4,20 +4,21 @@
 //! took (docs/performance.md). Here they are made once. All unsafe code of this package is in this file.
 #![allow(unsafe_code)]
 
-use std::ffi::{CString, c_char, c_int};
+use std::ffi::{CString, c_char, c_int, c_void};
 use std::sync::OnceLock;
 
 use hdf5::plist::link_create::CharEncoding;
 use hdf5::plist::{DatasetCreate, LinkCreate};
-use hdf5::types::{CompoundField, CompoundType, TypeDescriptor};
-use hdf5::{Dataset, Dataspace, Datatype, Group, H5Type, Location, ObjectReference1, ReferencedObject};
-use hdf5_sys::h5a::{H5Aclose, H5Acreate2, H5Awrite};
-use hdf5_sys::h5d::{H5Dcreate2, H5Dwrite};
+use hdf5::types::{CompoundField, CompoundType, TypeDescriptor, VarLenUnicode};
+use hdf5::{Container, Dataset, Dataspace, Datatype, Group, H5Type, Location, ObjectReference1, ReferencedObject};
+use hdf5_sys::h5a::{H5Aclose, H5Acreate2, H5Aread, H5Awrite};
+use hdf5_sys::h5d::{H5Dcreate2, H5Dread, H5Dwrite};
 use hdf5_sys::h5g::H5Gcreate2;
-use hdf5_sys::h5i::hid_t;
+use hdf5_sys::h5i::{H5I_type_t, H5Iget_type, hid_t};
 use hdf5_sys::h5o::H5O_type_t;
 use hdf5_sys::h5p::{H5P_CLS_GROUP_CREATE, H5P_DEFAULT, H5Pcreate, H5Pset_obj_track_times};
 use hdf5_sys::h5s::H5S_ALL;
+use hdf5_sys::h5t::{H5T_bkg_t, H5T_cdata_t, H5T_class_t, H5T_cmd_t, H5T_pers_t, H5Tcreate, H5Tget_size, H5Tregister};
 
 unsafe extern "C" {
     // the high-level part of the library has no wrapper
@@ -46,6 +47,79 @@ fn kit() -> hdf5::Result<&'static Kit> {
     let link = LinkCreate::build().create_intermediate_group(true).char_encoding(CharEncoding::Utf8).finish()?;
     let dataset = DatasetCreate::build().obj_track_times(false).finish()?;
     Ok(KIT.get_or_init(|| Kit { link, dataset, group }))
+}
+
+/// Whether it is an attribute, not a dataset.
+pub(crate) fn is_attribute(container: &Container) -> bool {
+    // SAFETY: the handle is live; the call looks at it alone; the lock is held.
+    hdf5::sync::sync(|| unsafe { H5Iget_type(container.id()) == H5I_type_t::H5I_ATTR })
+}
+
+/// A reference to a text in a heap: the text's length, the heap's place (8 bytes), its number there.
+pub(crate) const REFERENCE_BYTES: usize = 16;
+
+/// The lengths of `count` texts of variable length, as their references state them. Reading the texts would ask for as much memory before the
+/// library looks whether there are any. Errors: the library refuses; references of another size than of files with addresses of 8 bytes.
+pub(crate) fn text_lengths(container: &Container, count: usize) -> hdf5::Result<Vec<u32>> {
+    let raw = raw_reference()?;
+    let size = count.checked_mul(REFERENCE_BYTES).ok_or("too many texts")?;
+    let mut bytes = vec![0_u8; size];
+    let into = bytes.as_mut_ptr().cast();
+    let attribute = is_attribute(container);
+    // SAFETY: the handles are live; `count` is the number of elements in the container, each of which becomes one of `raw`'s 16 bytes, for which there is
+    // room; the lock is held.
+    hdf5::sync::sync(|| unsafe {
+        if attribute {
+            checked(H5Aread(container.id(), raw, into).into())
+        } else {
+            checked(H5Dread(container.id(), raw, H5S_ALL, H5S_ALL, H5P_DEFAULT, into).into())
+        }
+    })?;
+    let length = |[a, b, c, d, ..]: &[u8; REFERENCE_BYTES]| u32::from_le_bytes([*a, *b, *c, *d]);
+    Ok(bytes.as_chunks().0.iter().map(length).collect())
+}
+
+/// The type that texts of variable length are read as where their references are wanted: 16 bytes that mean nothing.
+fn raw_reference() -> hdf5::Result<hid_t> {
+    static RAW: OnceLock<hid_t> = OnceLock::new();
+    if let Some(&raw) = RAW.get() {
+        return Ok(raw);
+    }
+    let text = Datatype::from_type::<VarLenUnicode>()?;
+    // SAFETY: the types are live and the name ends with a NUL; the function lives as long as the program; the lock is held.
+    let raw = hdf5::sync::sync(|| unsafe {
+        let raw = checked(H5Tcreate(H5T_class_t::H5T_OPAQUE, REFERENCE_BYTES))?;
+        checked(
+            H5Tregister(H5T_pers_t::H5T_PERS_SOFT, c"afmid-reference".as_ptr(), text.id(), raw, Some(as_it_is)).into(),
+        )?;
+        Ok::<hid_t, hdf5::Error>(raw)
+    })?;
+    Ok(*RAW.get_or_init(|| raw))
+}
+
+/// The conversion of a reference to its bytes, which stay where they are.
+extern "C" fn as_it_is(
+    from: hid_t,
+    to: hid_t,
+    about: *mut H5T_cdata_t,
+    _count: usize,
+    _stride: usize,
+    _background_stride: usize,
+    _buffer: *mut c_void,
+    _background: *mut c_void,
+    _transfer: hid_t,
+) -> c_int {
+    // SAFETY: the library gives live types and a pointer to its own description of the conversion, or none; it holds its lock.
+    unsafe {
+        let Some(about) = about.as_mut() else { return -1 };
+        if about.command == H5T_cmd_t::H5T_CONV_INIT {
+            about.need_bkg = H5T_bkg_t::H5T_BKG_NO;
+            if H5Tget_size(from) != REFERENCE_BYTES || H5Tget_size(to) != REFERENCE_BYTES {
+                return -1;
+            }
+        }
+        0
+    }
 }
 
 /// A new group. Errors: the library refuses.

@@ -7,6 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Chunks that are kept per thread: two channels of two records in turn.
 const PER_THREAD: usize = 4;
 
+/// Bytes of all that are kept, and of the largest that is.
+const MOST_BYTES: usize = 128 << 20;
+const LARGEST: usize = 32 << 20;
+
 /// Source and chunk.
 type Key = (u64, usize);
 
@@ -34,7 +38,16 @@ impl ChunkCache {
         }
         // inflated outside the lock
         let bytes = Arc::new(load()?);
+        if bytes.len() > LARGEST {
+            return Ok(bytes);
+        }
         let mut chunks = lock();
+        let mut left = MOST_BYTES - bytes.len();
+        chunks.retain(|(_, kept)| {
+            let fits = kept.len() <= left;
+            left = left.saturating_sub(kept.len());
+            fits
+        });
         chunks.truncate(PER_THREAD * rayon::current_num_threads() - 1);
         chunks.push_front((key, Arc::clone(&bytes)));
         Ok(bytes)

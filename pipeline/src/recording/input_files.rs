@@ -9,8 +9,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::chunk_cache::ChunkCache;
 use super::opened_files::OpenedFiles;
 use crate::error::StageError;
-use crate::files::{FileState, KnownHashes};
-use crate::hdf5_files::HeapGuard;
+use crate::files::{FileState, KnownHashes, open_regular};
+use crate::hdf5_files::{HeapGuard, Refusal, Vetted, finding_text, parse_finding};
 
 /// The files that a program reads. A value that is passed to whatever reads: cloning is cheap, and clones share what they know.
 ///
@@ -35,11 +35,21 @@ struct Inner {
 
 /// What one pass through a file found.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Inspected {
+pub(super) struct Inspected {
     /// BLAKE3 hash of its bytes, in hexadecimal.
-    pub(crate) blake3: String,
+    pub(super) blake3: String,
     /// See [`HeapGuard`].
-    pub(super) endless: bool,
+    finding: Result<Vetted, Refusal>,
+}
+
+/// An HDF5 file that the library can be let at.
+#[derive(Debug, Clone)]
+pub(super) struct HashedHdf5 {
+    /// BLAKE3 hash of its bytes, in hexadecimal.
+    pub(super) blake3: String,
+    /// The state in which it was looked through.
+    pub(super) state: FileState,
+    pub(super) vetted: Vetted,
 }
 
 /// A file in the state in which it was hashed.
@@ -80,19 +90,19 @@ impl InputFiles {
     /// A whole file, for what is small. The bytes are those that have the file's hash. Errors: as [`InputFiles::hash`].
     pub fn read(&self, path: &Path) -> Result<Vec<u8>, StageError> {
         let wanted = self.hash(path)?;
-        let bytes = std::fs::read(path).map_err(|error| unreadable(path, &error))?;
+        let bytes = read_regular(path, u64::MAX).map_err(|error| unreadable(path, &error))?;
         if blake3::hash(&bytes).to_hex().as_str() == wanted { Ok(bytes) } else { Err(changed(path)) }
     }
 
     /// What one pass through a file that the HDF5 library is to open found, and the state that the file had.
     ///
     /// Errors: as [`InputFiles::hash`]; damage that the library does not survive.
-    pub(super) fn inspect_hdf5(&self, path: &Path) -> Result<(FileState, Inspected), StageError> {
+    pub(super) fn inspect_hdf5(&self, path: &Path) -> Result<HashedHdf5, StageError> {
         let (state, inspected) = self.inspect(path)?;
-        if inspected.endless {
-            return Err(StageError::new("damaged: a heap collection of the HDF5 file never ends").at(path));
+        match inspected.finding {
+            Ok(vetted) => Ok(HashedHdf5 { blake3: inspected.blake3, state, vetted }),
+            Err(refusal) => Err(StageError::new(refusal.text()).at(path)),
         }
-        Ok((state, inspected))
     }
 
     pub(super) fn opened(&self) -> &OpenedFiles {
@@ -103,9 +113,10 @@ impl InputFiles {
         &self.0.chunks
     }
 
+    /// The state that the file had, and what one pass through it found. Errors: as [`InputFiles::hash`].
     pub(super) fn inspect(&self, path: &Path) -> Result<(FileState, Inspected), StageError> {
         let fail = |error: std::io::Error| unreadable(path, &error);
-        let mut file = File::open(path).map_err(fail)?;
+        let mut file = open_regular(path).map_err(fail)?;
         let state = FileState::of(&file).map_err(fail)?;
         let key = std::path::absolute(path).map_err(fail)?;
         let known = |map: &HashMap<PathBuf, (FileState, Inspected)>| {
@@ -190,29 +201,25 @@ fn changed(path: &Path) -> StageError {
 
 impl Inspected {
     fn line(&self) -> String {
-        format!("{} {}", self.blake3, if self.endless { "endless" } else { "whole" })
+        format!("{} {}", self.blake3, finding_text(&self.finding))
     }
 
     fn parse(line: &str) -> Option<Self> {
-        let (blake3, endless) = line.split_once(' ')?;
+        let (blake3, finding) = line.split_once(' ')?;
         let is_hash = blake3.len() == 64 && blake3.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
-        let endless = match endless {
-            "whole" => false,
-            "endless" => true,
-            _ => return None,
-        };
-        is_hash.then(|| Self { blake3: blake3.to_owned(), endless })
+        let finding = parse_finding(finding)?;
+        is_hash.then(|| Self { blake3: blake3.to_owned(), finding })
     }
 }
 
 /// Hashes a file and looks for damage that the HDF5 library does not survive.
 fn pass(file: &mut File) -> std::io::Result<Inspected> {
-    let (mut hasher, mut guard) = (blake3::Hasher::new(), HeapGuard::default());
+    let (mut hasher, mut guard) = (blake3::Hasher::new(), HeapGuard::new(file.metadata()?.len()));
     let mut buffer = vec![0; 1 << 16];
     loop {
         let count = file.read(&mut buffer)?;
         if count == 0 {
-            return Ok(Inspected { blake3: hasher.finalize().to_hex().to_string(), endless: guard.finish() });
+            return Ok(Inspected { blake3: hasher.finalize().to_hex().to_string(), finding: guard.finish() });
         }
         hasher.update(&buffer[..count]);
         guard.update(&buffer[..count]);

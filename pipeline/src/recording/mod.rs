@@ -34,7 +34,7 @@ pub use native::{Wanted, open_native};
 pub use series::{read_number_attribute, read_series};
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native, write_native_in};
 
-pub use afmid_formats::{Contents, FormatError, FoundChannel, Raw, RawBinary, Source, formats};
+pub use afmid_formats::{Contents, FormatError, FoundChannel, Raw, RawBinary, Source, formats, most_inflated};
 pub use contents::open_contents;
 pub use how::{How, Reading};
 pub use open::{Opened, open_records, recognised};

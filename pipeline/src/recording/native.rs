@@ -12,12 +12,12 @@ use hdf5::{Dataset, File, Group, Location};
 
 use super::chunk::ChunkFilter;
 use super::chunk_cache::ChunkCache;
-use super::input_files::{InputFiles, Inspected, require_state};
+use super::input_files::{HashedHdf5, InputFiles, require_same, require_state};
 use super::source::{ChunkPlace, Hdf5Source, Place};
 use super::{Channel, Reading, Record};
 use crate::error::StageError;
 use crate::files::FileState;
-use crate::hdf5_files::read::{check_size, open_file, read_texts};
+use crate::hdf5_files::read::{Allowance, Opened, check_samples, open_file, read_texts};
 
 /// A channel to look for in a record.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,25 +39,25 @@ pub struct Wanted<'a> {
 /// Errors: no file, not HDF5, cut short, damaged; an attribute or a required channel is missing or of another type.
 pub fn open_native(files: &InputFiles, path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
     let inspected = files.inspect_hdf5(path)?;
-    hdf5::sync::sync(|| read_record(files, &open_file(path)?, path, wanted, inspected))
+    hdf5::sync::sync(|| read_record(files, &open_file(path, &inspected.vetted)?, path, wanted, &inspected))
 }
 
 /// As [`open_native`] if the file is a native record: HDF5 that states a sample rate, whatever its channels. None: it is another file, or damaged.
 pub(super) fn open_if_native(files: &InputFiles, path: &Path, wanted: &[Wanted]) -> Result<Option<Record>, StageError> {
     let Ok(inspected) = files.inspect_hdf5(path) else { return Ok(None) };
     // one turn for all calls of the library: threads that open a file each would otherwise wait for one another some fifty times
-    hdf5::sync::sync(|| match open_file(path) {
-        Ok(file) if states_rate(&file) => read_record(files, &file, path, wanted, inspected).map(Some),
+    hdf5::sync::sync(|| match open_file(path, &inspected.vetted) {
+        Ok(file) if states_rate(&file) => read_record(files, &file, path, wanted, &inspected).map(Some),
         _ => Ok(None),
     })
 }
 
 fn read_record(
     files: &InputFiles,
-    file: &File,
+    file: &Opened<File>,
     path: &Path,
     wanted: &[Wanted],
-    (state, inspected): (FileState, Inspected),
+    inspected: &HashedHdf5,
 ) -> Result<Record, StageError> {
     let sample_rate_hz = number_attribute(file, "/", "sample_rate_hz").map_err(|error| {
         error
@@ -70,19 +70,21 @@ fn read_record(
     let mut channels = Vec::with_capacity(wanted.len());
     for channel in wanted {
         if let Some(dataset) = find(file, path, channel)? {
-            channels
-                .push(open_channel(files.chunks(), &dataset, (path, state), channel).map_err(|error| error.at(path))?);
+            channels.push(
+                open_channel(files.chunks(), file, &dataset, (path, inspected), channel)
+                    .map_err(|error| error.at(path))?,
+            );
         }
     }
     // the library opened it by name
-    require_state(path, &state)?;
+    require_state(path, &inspected.state)?;
     Ok(Record {
         name: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         path: path.to_owned(),
-        size: state.size(),
-        blake3: inspected.blake3,
+        size: inspected.state.size(),
+        blake3: inspected.blake3.clone(),
         sample_rate_hz,
-        started_at: text_attribute(file, "started_at").unwrap_or_default(),
+        started_at: text_attribute(file, "started_at", file.allowance()).unwrap_or_default(),
         first_sample: 0,
         reading: Reading::default(),
         channels,
@@ -92,7 +94,8 @@ fn read_record(
 /// Whether a file is a native record, as [`open_if_native`] has it.
 pub(crate) fn is_native(files: &InputFiles, path: &Path) -> bool {
     // damage that keeps the library busy for ever is looked for first
-    files.inspect_hdf5(path).is_ok() && hdf5::sync::sync(|| open_file(path).is_ok_and(|file| states_rate(&file)))
+    let Ok(HashedHdf5 { vetted, .. }) = files.inspect_hdf5(path) else { return false };
+    hdf5::sync::sync(|| open_file(path, &vetted).is_ok_and(|file| states_rate(&file)))
 }
 
 fn states_rate(file: &File) -> bool {
@@ -132,13 +135,14 @@ fn datasets(file: &File) -> Vec<String> {
 
 fn open_channel(
     chunks: &ChunkCache,
+    file: &Opened<File>,
     dataset: &Dataset,
-    file: (&Path, FileState),
+    hashed: (&Path, &HashedHdf5),
     wanted: &Wanted,
 ) -> Result<Channel, StageError> {
-    let location = wanted.location;
-    let source = describe(chunks, dataset, file, location)?;
-    let unit = text_attribute(dataset, "units").ok_or_else(|| {
+    let (location, allowance) = (wanted.location, file.allowance());
+    let source = describe(chunks, allowance, dataset, hashed, location)?;
+    let unit = text_attribute(dataset, "units", allowance).ok_or_else(|| {
         StageError::new(format!("{location}: the attribute `units` is missing"))
             .help("state the unit of stored * scale_factor + add_offset, such as `V`")
     })?;
@@ -157,7 +161,7 @@ fn open_channel(
         location: location.to_owned(),
         samples: source.samples,
         unit,
-        long_name: text_attribute(dataset, "long_name").unwrap_or_default(),
+        long_name: text_attribute(dataset, "long_name", allowance).unwrap_or_default(),
         scale_factor,
         add_offset,
         fill_code: fill.map(|name| number_attribute(dataset, location, name)).transpose()?,
@@ -167,15 +171,18 @@ fn open_channel(
 
 /// Opens one dataset of a file in this state as a source of samples. Errors: as [`open_native`]; the file is in another state.
 pub(super) fn open_source(
-    chunks: &ChunkCache,
+    files: &InputFiles,
     path: &Path,
     state: FileState,
     location: &str,
 ) -> Result<Hdf5Source, StageError> {
-    let file = open_file(path)?;
+    let hashed = files.inspect_hdf5(path)?;
+    require_same(path, &hashed.state, &state)?;
+    let file = open_file(path, &hashed.vetted)?;
     let dataset =
         file.dataset(location).map_err(|_| StageError::new(format!("there is no channel `{location}`")).at(path))?;
-    let source = describe(chunks, &dataset, (path, state), location).map_err(|error| error.at(path))?;
+    let source = describe(files.chunks(), file.allowance(), &dataset, (path, &hashed), location)
+        .map_err(|error| error.at(path))?;
     // the library opened it by name
     require_state(path, &state)?;
     Ok(source)
@@ -183,8 +190,9 @@ pub(super) fn open_source(
 
 fn describe(
     chunks: &ChunkCache,
+    allowance: &Allowance,
     dataset: &Dataset,
-    (path, state): (&Path, FileState),
+    (path, hashed): (&Path, &HashedHdf5),
     location: &str,
 ) -> Result<Hdf5Source, StageError> {
     let fail = |problem: String| StageError::new(format!("{location}: {problem}"));
@@ -201,13 +209,14 @@ fn describe(
         fail(format!("the samples are {found}, wanted int8 to int32, uint8 to uint32, float32 or float64"))
             .help("store the converter's codes as int16 with scale_factor and add_offset")
     })?;
-    check_size(dataset, kind.bytes() as usize).map_err(|error| fail(error.problem))?;
+    check_samples(dataset, kind.bytes() as usize, allowance).map_err(|error| fail(error.problem))?;
     let big_endian = matches!(dtype.byte_order(), ByteOrder::BigEndian);
     check_filters(dataset).map_err(|error| fail(error.problem).help(error.help.unwrap_or_default()))?;
-    let place = locate(dataset, kind, samples, state.size()).map_err(fail)?;
+    let place = locate(dataset, kind, samples, hashed.state.size()).map_err(fail)?;
     Ok(Hdf5Source {
         path: path.to_owned(),
-        state,
+        state: hashed.state,
+        vetted: hashed.vetted,
         location: location.to_owned(),
         samples,
         kind,
@@ -278,7 +287,11 @@ fn locate(dataset: &Dataset, kind: Number, samples: usize, file_size: u64) -> Re
             let Some(&[length]) = creation.chunk().as_deref().filter(|chunk| chunk.len() == 1) else {
                 return Err("damaged: the chunks have another rank than the dataset".to_owned());
             };
-            let Some(chunks) = chunk_places(dataset, length, samples) else { return Ok(Place::Library) };
+            let bytes = (length as u64).saturating_mul(kind.bytes());
+            if bytes > MOST_CHUNK_BYTES {
+                return Err(format!("stored in chunks of {bytes} bytes, wanted at most {MOST_CHUNK_BYTES} each"));
+            }
+            let Some(chunks) = chunk_places(dataset, length, samples, file_size) else { return Ok(Place::Library) };
             for chunk in &chunks {
                 inside(chunk.offset, chunk.bytes as u64)?;
                 // deflate shrinks by at most 1032 to 1
@@ -303,15 +316,24 @@ fn known_filters(filters: &[Filter]) -> Option<Vec<ChunkFilter>> {
         .collect()
 }
 
+/// Chunks are inflated whole.
+const MOST_CHUNK_BYTES: u64 = 128 << 20;
+
 /// The places of all chunks, in order; none if one was never written (it reads as the fill value).
-fn chunk_places(dataset: &Dataset, length: usize, samples: usize) -> Option<Vec<ChunkPlace>> {
+fn chunk_places(dataset: &Dataset, length: usize, samples: usize, file_size: u64) -> Option<Vec<ChunkPlace>> {
     let count = samples.checked_div(length)? + usize::from(!samples.is_multiple_of(length));
-    // every chunk takes an entry in the file: a larger count is a damaged header
-    if dataset.num_chunks()? != count {
+    // every chunk takes an entry of 8 bytes and more in the file: a larger count is a damaged header
+    if count as u64 > file_size / 8 {
         return None;
     }
     let mut places = vec![None; count];
+    let mut seen = 0;
     let visited = dataset.chunks_visit(|chunk| {
+        // a tree of chunks that leads to the same branch again and again has no end
+        seen += 1;
+        if seen > count {
+            return 1;
+        }
         let index = chunk.offset.first().map(|&first| first as usize / length);
         if let Some(place) = index.and_then(|index| places.get_mut(index)) {
             *place =
@@ -319,7 +341,7 @@ fn chunk_places(dataset: &Dataset, length: usize, samples: usize) -> Option<Vec<
         }
         0
     });
-    visited.ok()?;
+    visited.ok().filter(|()| seen == count)?;
     places.into_iter().collect()
 }
 
@@ -328,9 +350,9 @@ pub(super) fn has_attribute(owner: &Location, name: &str) -> bool {
 }
 
 /// A text attribute of any kind; none if it is missing or not text.
-pub(super) fn text_attribute(owner: &Location, name: &str) -> Option<String> {
+pub(super) fn text_attribute(owner: &Location, name: &str, allowance: &Allowance) -> Option<String> {
     let attribute = owner.attr(name).ok()?;
-    read_texts(&attribute).ok()?.into_iter().next()
+    read_texts(&attribute, allowance).ok()?.into_iter().next()
 }
 
 /// A number of any type in an attribute with one value.

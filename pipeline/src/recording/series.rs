@@ -16,12 +16,12 @@ const LONGEST: usize = 1 << 26;
 /// Errors: no file, not HDF5, damaged; no such dataset, not one-dimensional, not numbers, longer than 2^26 values.
 pub fn read_series(files: &InputFiles, path: &Path, location: &str) -> Result<Vec<f64>, StageError> {
     use super::Source;
-    let (state, _) = files.inspect_hdf5(path)?;
+    let state = files.inspect_hdf5(path)?.state;
     let optional = |name: &str, otherwise: f64| -> Result<f64, StageError> {
-        Ok(read_number_attribute(path, location, name)?.unwrap_or(otherwise))
+        Ok(read_number_attribute(files, path, location, name)?.unwrap_or(otherwise))
     };
     let (scale, offset) = (optional("scale_factor", 1.0)?, optional("add_offset", 0.0)?);
-    let source: Hdf5Source = open_source(files.chunks(), path, state, location)?;
+    let source: Hdf5Source = open_source(files, path, state, location)?;
     if source.samples > LONGEST {
         let problem = format!("{location} has {} values, wanted at most {LONGEST}", source.samples);
         return Err(StageError::new(problem).at(path));
@@ -33,8 +33,13 @@ pub fn read_series(files: &InputFiles, path: &Path, location: &str) -> Result<Ve
 /// A single number in an attribute of a dataset, or of the file (`/`); none where there is no such attribute.
 ///
 /// Errors: no file, no such dataset, an attribute that is not one number.
-pub fn read_number_attribute(path: &Path, location: &str, name: &str) -> Result<Option<f64>, StageError> {
-    let file = open_file(path)?;
+pub fn read_number_attribute(
+    files: &InputFiles,
+    path: &Path,
+    location: &str,
+    name: &str,
+) -> Result<Option<f64>, StageError> {
+    let file = open_file(path, &files.inspect_hdf5(path)?.vetted)?;
     let found = if location == "/" {
         has_attribute(&file, name).then(|| number_attribute(&file, location, name)).transpose()
     } else {

@@ -9,7 +9,8 @@ use super::chunk_cache::ChunkCache;
 use super::input_files::{require_same, require_state};
 use super::{FormatError, Raw, Source};
 use crate::error::StageError;
-use crate::files::FileState;
+use crate::files::{FileState, open_regular};
+use crate::hdf5_files::Vetted;
 use crate::hdf5_files::read::open_file;
 use afmid_formats::Number;
 
@@ -50,6 +51,7 @@ pub(super) struct Hdf5Source {
     pub(super) path: PathBuf,
     /// The state in which it was opened: every read sees that it is still in it.
     pub(super) state: FileState,
+    pub(super) vetted: Vetted,
     pub(super) location: String,
     pub(super) samples: usize,
     pub(super) kind: Number,
@@ -105,7 +107,7 @@ impl Hdf5Source {
 
     fn open(&self) -> Result<File, StageError> {
         let fail = |error: std::io::Error| self.error(format!("the file cannot be read: {error}"));
-        let file = File::open(&self.path).map_err(fail)?;
+        let file = open_regular(&self.path).map_err(fail)?;
         let now = FileState::of(&file).map_err(fail)?;
         require_same(&self.path, &now, &self.state)
             .map_err(|error| StageError { problem: format!("{}: {}", self.location, error.problem), ..error })?;
@@ -165,7 +167,7 @@ impl Hdf5Source {
     }
 
     fn read_slice<T: hdf5::H5Type>(&self, from: usize, to: usize) -> Result<Vec<T>, StageError> {
-        let file = open_file(&self.path)?;
+        let file = open_file(&self.path, &self.vetted)?;
         let fail = |error: hdf5::Error| self.error(format!("samples {from} to {to} cannot be read: {error}"));
         let dataset = file.dataset(&self.location).map_err(fail)?;
         let samples = dataset.read_slice_1d::<T, _>(from..to).map_err(fail)?.into_raw_vec_and_offset().0;

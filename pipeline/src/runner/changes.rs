@@ -1,5 +1,7 @@
 //! What differs between the origins of two results of one stage.
 
+use std::collections::{HashMap, HashSet};
+
 use serde_json::Value;
 
 use crate::cache::{Origin, OriginFile, OriginInput};
@@ -120,15 +122,20 @@ fn parameters(was: &Origin, is: &Origin, found: &mut Vec<Change>) {
 
 fn files(was: &[OriginFile], is: &[OriginFile], found: &mut Vec<Change>) {
     let before = found.len();
-    let named = |files: &[OriginFile], name: &str| files.iter().find(|file| file.name == name).cloned();
-    for file in was.iter().filter(|file| !is.contains(file)) {
-        let now = named(is, &file.name).filter(|other| !was.contains(other));
-        found.push(Change::File { name: file.name.clone(), was: Some(file.clone()), is: now });
+    let (old, new): (HashSet<&OriginFile>, HashSet<&OriginFile>) = (was.iter().collect(), is.iter().collect());
+    // of several of one name the first
+    let mut named: HashMap<&str, &OriginFile> = HashMap::new();
+    is.iter().rev().for_each(|file| {
+        named.insert(&file.name, file);
+    });
+    let mut told: HashSet<&OriginFile> = HashSet::new();
+    for file in was.iter().filter(|file| !new.contains(file)) {
+        let now = named.get(file.name.as_str()).copied().filter(|other| !old.contains(other));
+        told.extend(now);
+        found.push(Change::File { name: file.name.clone(), was: Some(file.clone()), is: now.cloned() });
     }
-    for file in is.iter().filter(|file| !was.contains(file)) {
-        let told =
-            found[before..].iter().any(|change| matches!(change, Change::File { is: Some(is), .. } if is == file));
-        if !told {
+    for file in is.iter().filter(|file| !old.contains(file)) {
+        if told.insert(file) {
             found.push(Change::File { name: file.name.clone(), was: None, is: Some(file.clone()) });
         }
     }

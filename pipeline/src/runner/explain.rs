@@ -1,5 +1,7 @@
 //! What a run would do with each stage, and why.
 
+use std::cmp::Reverse;
+use std::collections::HashMap;
 use std::time::SystemTime;
 
 use super::changes::{Change, changes};
@@ -49,7 +51,7 @@ pub struct Nearest {
 pub fn explain(plan: &Plan, around: &Surroundings, cache: &Cache) -> Vec<Explanation> {
     let mut origins: Vec<Option<Origin>> = Vec::new();
     let mut rows = Vec::new();
-    let mut earlier: Option<Vec<(Origin, SystemTime)>> = None;
+    let mut earlier: Option<Earlier> = None;
     for node in &plan.nodes {
         let planned = plan_node(plan, node, around, &|index| origins.get(index).and_then(Option::as_ref));
         let (origin, decision) = match planned {
@@ -63,7 +65,7 @@ pub fn explain(plan: &Plan, around: &Surroundings, cache: &Cache) -> Vec<Explana
         let nearest = origin
             .as_ref()
             .filter(|_| decision == Decision::Run)
-            .and_then(|origin| nearest(origin, earlier.get_or_insert_with(|| cache.origins()), cache));
+            .and_then(|origin| nearest(origin, earlier.get_or_insert_with(|| Earlier::of(cache.origins())), cache));
         let key = origin.as_ref().map(|origin| origin.key.clone());
         rows.push(Explanation { id: node.id.clone(), uses: node.uses.clone(), key, decision, nearest });
         origins.push(origin);
@@ -79,17 +81,50 @@ fn decide(node: &Node, key: &str, cache: &Cache) -> Decision {
     }
 }
 
-/// The earlier result of the same stage that is most like it: of the same id and pipeline if there is one, with the fewest changes, last used.
-fn nearest(origin: &Origin, earlier: &[(Origin, SystemTime)], cache: &Cache) -> Option<Nearest> {
+/// Earlier results, each list with the last used first.
+#[derive(Default)]
+struct Earlier {
+    all: Vec<(Origin, SystemTime)>,
+    /// By the stage's name, pipeline and id.
+    same: HashMap<(String, String, String), Vec<usize>>,
+    /// By the stage's name.
+    stage: HashMap<String, Vec<usize>>,
+}
+
+/// Earlier results that a stage is compared with, the last used ones: each comparison takes time in proportion to the files.
+const MOST_COMPARED: usize = 32;
+
+impl Earlier {
+    fn of(mut all: Vec<(Origin, SystemTime)>) -> Self {
+        all.sort_by(|a, b| (Reverse(a.1), &a.0.key).cmp(&(Reverse(b.1), &b.0.key)));
+        let mut earlier = Self::default();
+        for (place, (origin, _)) in all.iter().enumerate() {
+            let Origin { uses, pipeline, id, .. } = origin;
+            earlier.same.entry((uses.clone(), pipeline.clone(), id.clone())).or_default().push(place);
+            earlier.stage.entry(uses.clone()).or_default().push(place);
+        }
+        Self { all, ..earlier }
+    }
+
+    /// Those that may be nearest: of the same id and pipeline if there is one.
+    fn candidates(&self, origin: &Origin) -> impl Iterator<Item = &(Origin, SystemTime)> {
+        let same = self.same.get(&(origin.uses.clone(), origin.pipeline.clone(), origin.id.clone()));
+        let places = same.or_else(|| self.stage.get(&origin.uses)).map_or(&[][..], Vec::as_slice);
+        places.iter().take(MOST_COMPARED).filter_map(|&place| self.all.get(place))
+    }
+}
+
+/// The earlier result of the same stage that is most like it: of the same id and pipeline if there is one, with the fewest changes, last used; of
+/// many the last used [`MOST_COMPARED`] are looked at.
+fn nearest(origin: &Origin, earlier: &Earlier, cache: &Cache) -> Option<Nearest> {
     if let Some(gone) = cache.origin(&origin.key) {
         return Some(Nearest { origin: gone, changes: Vec::new() });
     }
-    let same_stage = earlier.iter().filter(|(other, _)| other.uses == origin.uses);
-    same_stage
+    earlier
+        .candidates(origin)
         .map(|(other, used)| {
             let changes = changes(other, origin);
-            let elsewhere = (&other.pipeline, &other.id) != (&origin.pipeline, &origin.id);
-            ((elsewhere, changes.len(), std::cmp::Reverse(*used)), other, changes)
+            ((changes.len(), Reverse(*used)), other, changes)
         })
         .min_by(|a, b| (&a.0, &a.1.key).cmp(&(&b.0, &b.1.key)))
         .map(|(_, other, changes)| Nearest { origin: other.clone(), changes })

@@ -12,6 +12,7 @@ use super::rows::{Backing, read_rows, write_rows};
 use crate::artifact::{Array, Axis, Values, Variable};
 use crate::error::{Result, StoreError};
 use crate::hdf5_files::Scales;
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -142,7 +143,7 @@ fn write_signal(group: &Group, array: &Array) -> Result<()> {
 }
 
 /// Reads what [`write_array`] wrote; with a `backing`, large variables over two axes stay in the file. Errors: damaged, or of another layout.
-pub(super) fn read_array(group: &Group, backing: Option<&Backing>) -> Result<Array> {
+pub(super) fn read_array(group: &Node, backing: Option<&Backing>) -> Result<Array> {
     let layout: Layout = read_layout(group)?;
     let mut array = Array { attributes: read_attributes(group, &layout.attributes)?, ..Array::default() };
     for name in &layout.axes {
@@ -178,7 +179,7 @@ pub(super) fn read_array(group: &Group, backing: Option<&Backing>) -> Result<Arr
     Ok(array)
 }
 
-fn description(group: &Group, name: &str) -> Result<(String, String)> {
+fn description(group: &Node, name: &str) -> Result<(String, String)> {
     let dataset = read::dataset(group, name)?;
     Ok((read::text_attribute(&dataset, "units")?, read::text_attribute(&dataset, "long_name")?))
 }

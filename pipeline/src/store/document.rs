@@ -4,6 +4,7 @@ use hdf5::Group;
 
 use crate::artifact::Document;
 use crate::error::{Result, StoreError};
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 
 /// The field of NXnote that holds the text.
@@ -19,7 +20,7 @@ pub(super) fn write_document(parent: &Group, name: &str, document: &Document) ->
 }
 
 /// Reads what [`write_document`] wrote. Errors: damaged, not JSON.
-pub(super) fn read_document(group: &Group) -> Result<Document> {
+pub(super) fn read_document(group: &Node) -> Result<Document> {
     let text = read::text(group, JSON)?;
     serde_json::from_str(&text)
         .map(Document)

@@ -1,12 +1,12 @@
 //! What a file is, as far as its first bytes tell: for messages, and before a file is replaced.
 
 use std::fmt;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use super::format::FORMAT;
 use super::seal::has_seal;
+use crate::files::open_regular;
 use crate::recording::{InputFiles, is_native};
 
 /// What a file is.
@@ -76,7 +76,7 @@ fn own(path: &Path, head: &[u8]) -> std::io::Result<bool> {
 }
 
 fn head(path: &Path) -> std::io::Result<Vec<u8>> {
-    let file = File::open(path)?;
+    let file = open_regular(path)?;
     let mut head = Vec::with_capacity(file.metadata()?.len().min(HEAD) as usize);
     file.take(HEAD).read_to_end(&mut head)?;
     Ok(head)

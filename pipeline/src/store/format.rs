@@ -1,8 +1,9 @@
 //! What kind of file it is, and of which version.
 
-use hdf5::{File, Group};
+use hdf5::Group;
 
 use crate::error::{Result, StoreError};
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 
 /// Version of the layout of stage and result files; part of every cache key.
@@ -18,7 +19,7 @@ pub(super) fn write_format(root: &Group, format: &str) -> Result<()> {
 }
 
 /// Errors: another kind of file, or another version.
-pub(super) fn check_format(file: &File, wanted: &str) -> Result<()> {
+pub(super) fn check_format(file: &Node, wanted: &str) -> Result<()> {
     let found = read::text_attribute(file, FORMAT).map_err(|_| {
         StoreError::new(format!("HDF5, but not an afmid {wanted} file: it has no `{FORMAT}` attribute"))
     })?;

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::artifact::Attribute;
 use crate::error::{Result, StoreError};
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 
 /// The attribute that holds a layout.
@@ -41,7 +42,7 @@ pub(super) fn write_layout<T: Serialize>(owner: &Location, layout: &T) -> Result
     write::text_attribute(owner, LAYOUT, &text)
 }
 
-pub(super) fn read_layout<T: DeserializeOwned>(owner: &Location) -> Result<T> {
+pub(super) fn read_layout<T: DeserializeOwned>(owner: &Node) -> Result<T> {
     let text = read::text_attribute(owner, LAYOUT)?;
     serde_json::from_str(&text)
         .map_err(|error| StoreError::new(format!("another layout than this version's: {error}")).at(owner.name()))
@@ -69,7 +70,7 @@ pub(super) fn write_attributes(
         .collect()
 }
 
-pub(super) fn read_attributes(group: &Group, stored: &[StoredAttribute]) -> Result<BTreeMap<String, Attribute>> {
+pub(super) fn read_attributes(group: &Node, stored: &[StoredAttribute]) -> Result<BTreeMap<String, Attribute>> {
     stored
         .iter()
         .map(|attribute| {

@@ -1,5 +1,7 @@
 //! Names of groups: stage ids and ports, as far as NeXus allows.
 
+use std::collections::HashSet;
+
 /// What a result file keeps under its entry beside the stages: configs refuse these ids, so that a stage's group has its name.
 pub const RESERVED_STAGE_IDS: [&str; 4] = ["pipeline", "run", "title", "definition"];
 
@@ -10,12 +12,13 @@ pub(super) const TAKEN_BY_STAGE: [&str; 5] = ["provenance", "program", "version"
 /// names are equal and none is taken.
 pub(super) fn group_names<'a>(ids: impl Iterator<Item = &'a str>, taken: &[&str]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
+    let mut used: HashSet<String> = taken.iter().map(|&name| name.to_owned()).collect();
     for id in ids {
         let mut name: String = id.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         if name.is_empty() {
             name.push('_');
         }
-        while names.contains(&name) || taken.contains(&name.as_str()) {
+        while !used.insert(name.clone()) {
             name.push('_');
         }
         names.push(name);

@@ -13,6 +13,7 @@ use super::state_space::{read_state_space, write_state_space};
 use super::table::{read_table, write_table};
 use crate::artifact::{Artifact, Shape};
 use crate::error::{Result, StoreError};
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 use crate::outcome::Ports;
 use crate::recording::InputFiles;
@@ -62,7 +63,7 @@ pub struct PortSummary {
 }
 
 /// The artifacts under `parent`, in order. Errors: damaged.
-pub(super) fn list_ports(parent: &Group) -> Result<Vec<PortSummary>> {
+pub(super) fn list_ports(parent: &Node) -> Result<Vec<PortSummary>> {
     let text = read::text_attribute(parent, PORTS)?;
     let stored: Vec<StoredPort> = serde_json::from_str(&text)
         .map_err(|error| StoreError::new(format!("the list of ports: {error}")).at(parent.name()))?;
@@ -71,7 +72,7 @@ pub(super) fn list_ports(parent: &Group) -> Result<Vec<PortSummary>> {
     stored.into_iter().map(summary).collect()
 }
 
-fn shape(parent: &Group, name: &str) -> Result<Shape> {
+fn shape(parent: &Node, name: &str) -> Result<Shape> {
     [Shape::Recording, Shape::Array, Shape::Table, Shape::StateSpace, Shape::Document]
         .into_iter()
         .find(|shape| shape.name() == name)
@@ -80,7 +81,7 @@ fn shape(parent: &Group, name: &str) -> Result<Shape> {
 
 /// Reads one artifact; with a `backing`, large arrays stay in the file. Errors: it is missing or damaged.
 pub(super) fn read_port(
-    parent: &Group,
+    parent: &Node,
     port: &PortSummary,
     files: &InputFiles,
     backing: Option<&Backing>,
@@ -96,7 +97,7 @@ pub(super) fn read_port(
 }
 
 /// Reads all artifacts, in order, as [`read_port`]. Errors: one is missing or damaged.
-pub(super) fn read_ports(parent: &Group, files: &InputFiles, backing: Option<&Backing>) -> Result<Ports> {
+pub(super) fn read_ports(parent: &Node, files: &InputFiles, backing: Option<&Backing>) -> Result<Ports> {
     let mut ports = Ports::new();
     for port in list_ports(parent)? {
         ports.insert(&port.name, read_port(parent, &port, files, backing)?);

@@ -8,6 +8,7 @@ use hdf5::Group;
 use super::table::{read_table, write_table};
 use crate::artifact::Table;
 use crate::error::{Result, StoreError};
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::write;
 use crate::recording::{Channel, InputFiles, LazySource, Reading, Record, Recording};
 
@@ -82,7 +83,7 @@ fn reading(json: &str) -> std::result::Result<Reading, crate::StageError> {
 }
 
 /// Reads what [`write_recording`] wrote; the samples are looked for in the record files when they are asked for.
-pub(super) fn read_recording(group: &Group, input_files: &InputFiles) -> Result<Recording> {
+pub(super) fn read_recording(group: &Node, input_files: &InputFiles) -> Result<Recording> {
     let files = read_table(&crate::hdf5_files::read::group(group, "records")?)?;
     let channels = read_table(&crate::hdf5_files::read::group(group, "channels")?)?;
     let wrap = |error: crate::StageError| StoreError::new(error.to_string()).at(group.name());

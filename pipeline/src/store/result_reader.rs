@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hdf5::{File, Group};
+use hdf5::File;
 
 use super::format::check_format;
 use super::ports::{PortSummary, list_ports, read_port, read_ports};
@@ -11,7 +11,8 @@ use super::run_info::read_run_info;
 use super::seal::check_seal;
 use crate::artifact::Artifact;
 use crate::error::{Result, StoreError};
-use crate::hdf5_files::read;
+use crate::hdf5_files::Vetted;
+use crate::hdf5_files::read::{self, Apart, Node, Opened};
 use crate::outcome::{Ports, RunInfo, RunResult, SourceFile, StageRecord, StageResult};
 use crate::recording::InputFiles;
 
@@ -30,7 +31,7 @@ pub struct StageSummary {
 #[derive(Debug)]
 pub struct ResultFile {
     path: PathBuf,
-    file: File,
+    file: Opened<File>,
     /// The run without its stages.
     run: RunResult,
     stages: Vec<StageSummary>,
@@ -43,16 +44,19 @@ impl ResultFile {
     ///
     /// Errors: not a result file, damaged or altered since it was written, another version.
     pub fn open(path: &Path) -> std::result::Result<Self, StoreError> {
-        check_seal(path)?;
-        Self::open_file(path).map_err(|error| error.file(path))
+        let vetted = check_seal(path)?;
+        Self::open_file(path, &vetted).map_err(|error| error.file(path))
     }
 
-    fn open_file(path: &Path) -> Result<Self> {
-        let file = read::open_file(path)?;
-        check_format(&file, KIND)?;
-        let entry = read::group(&file, ENTRY)?;
+    fn open_file(path: &Path, vetted: &Vetted) -> Result<Self> {
+        let file = read::open_file(path, vetted)?;
+        let root = file.root();
+        check_format(&root, KIND)?;
+        let entry = read::group(&root, ENTRY)?;
         let (run, ids) = read_pipeline(&entry)?;
-        let stages = ids.iter().map(|(id, group)| read_summary(&entry, id, group)).collect::<Result<_>>()?;
+        let mut apart = Apart::default();
+        let stages =
+            ids.iter().map(|(id, group)| read_summary(&entry, id, group, &mut apart)).collect::<Result<_>>()?;
         Ok(Self { path: path.to_owned(), file, run, stages, files: InputFiles::new() })
     }
 
@@ -87,21 +91,21 @@ impl ResultFile {
             let have: Vec<&str> = stage.ports.iter().map(|port| port.name.as_str()).collect();
             fail(format!("stage `{id}` has no output `{port}`; it has: {}", have.join(", ")))
         })?;
-        self.process(stage)
+        self.process(&self.file.root(), stage)
             .and_then(|process| read_port(&process, found, &self.files, None))
             .map_err(|error| error.file(&self.path))
     }
 
-    fn process(&self, stage: &StageSummary) -> Result<Group> {
-        read::group(&read::group(&self.file, ENTRY)?, &stage.group)
+    fn process(&self, root: &Node, stage: &StageSummary) -> Result<Node> {
+        read::group(&read::group(root, ENTRY)?, &stage.group)
     }
 
     /// The whole run with all artifacts. Errors: one is damaged.
     pub fn read(&self) -> std::result::Result<RunResult, StoreError> {
-        let mut run = self.run.clone();
+        let (mut run, root) = (self.run.clone(), self.file.root());
         for summary in &self.stages {
             let mut record = summary.record.clone();
-            let outputs = self.process(summary).and_then(|process| read_ports(&process, &self.files, None));
+            let outputs = self.process(&root, summary).and_then(|process| read_ports(&process, &self.files, None));
             record.result.outputs = outputs.map_err(|error| error.file(&self.path))?;
             run.stages.push(record);
         }
@@ -115,7 +119,7 @@ pub fn read_result(path: &Path) -> std::result::Result<RunResult, StoreError> {
 }
 
 /// The run, and its stages as (id, group).
-fn read_pipeline(entry: &Group) -> Result<(RunResult, Vec<(String, String)>)> {
+fn read_pipeline(entry: &Node) -> Result<(RunResult, Vec<(String, String)>)> {
     let group = read::group(entry, PIPELINE)?;
     let run = RunResult {
         name: read::text(&group, "name")?,
@@ -133,8 +137,9 @@ fn read_pipeline(entry: &Group) -> Result<(RunResult, Vec<(String, String)>)> {
     Ok((run, ids.into_iter().zip(groups).collect()))
 }
 
-fn read_summary(entry: &Group, id: &str, group_name: &str) -> Result<StageSummary> {
+fn read_summary(entry: &Node, id: &str, group_name: &str, apart: &mut Apart) -> Result<StageSummary> {
     let process = read::group(entry, group_name)?;
+    apart.add(&process)?;
     let group = read::group(&process, PROVENANCE)?;
     let params = serde_json::from_str(&read::text(&group, "params")?)
         .map_err(|error| StoreError::new(format!("the parameters are not JSON: {error}")).at(group.name()))?;
@@ -165,5 +170,7 @@ fn read_summary(entry: &Group, id: &str, group_name: &str) -> Result<StageSummar
             .collect(),
         result: StageResult { outputs: Ports::new(), warnings: read::texts(&group, "warnings")? },
     };
-    Ok(StageSummary { record, group: group_name.to_owned(), ports: list_ports(&process)? })
+    let ports = list_ports(&process)?;
+    ports.iter().try_for_each(|port| apart.add(&read::group(&process, &port.group)?))?;
+    Ok(StageSummary { record, group: group_name.to_owned(), ports })
 }

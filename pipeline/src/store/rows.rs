@@ -12,6 +12,8 @@ use hdf5::{Dataset, Group};
 use ndarray::{ArrayView2, s};
 
 use crate::error::{Result, StoreError};
+use crate::files::open_regular;
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 use crate::rows::{RowSource, Scratch, StoredRows, in_blocks};
 
@@ -41,7 +43,7 @@ pub(super) struct Backing {
 
 impl Backing {
     pub(super) fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|error| StoreError::io("cannot be opened", path, &error))?;
+        let file = open_regular(path).map_err(|error| StoreError::io("cannot be opened", path, &error))?;
         Ok(Self { file, path: path.to_owned() })
     }
 
@@ -53,7 +55,7 @@ impl Backing {
 }
 
 /// A variable over two axes as rows in its file; none if it is small enough for memory, or cannot be read that way. Errors: damaged.
-pub(super) fn read_rows(parent: &Group, name: &str, backing: &Backing) -> Result<Option<StoredRows>> {
+pub(super) fn read_rows(parent: &Node, name: &str, backing: &Backing) -> Result<Option<StoredRows>> {
     let dataset = read::dataset(parent, name)?;
     let [rows, row_length] = dataset.shape()[..] else { return Ok(None) };
     let bytes = rows.saturating_mul(row_length).saturating_mul(size_of::<f64>());
@@ -62,7 +64,8 @@ pub(super) fn read_rows(parent: &Group, name: &str, backing: &Backing) -> Result
     if bytes <= Scratch::default().limit_bytes() || !plain || !backing.is_current() {
         return Ok(None);
     }
-    read::check_size(&dataset, size_of::<f64>()).map_err(|error| error.at(write::path_of(parent, name)))?;
+    read::check_samples(&dataset, size_of::<f64>(), dataset.allowance())
+        .map_err(|error| error.at(write::path_of(parent, name)))?;
     // none for what is chunked, that is, for what this program does not write
     let Some(offset) = dataset.offset() else { return Ok(None) };
     let file =

@@ -3,6 +3,7 @@
 use hdf5::Group;
 
 use crate::error::{Result, StoreError};
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 use crate::outcome::RunInfo;
 
@@ -36,7 +37,7 @@ pub(super) fn write_run_info(parent: &Group, name: &str, info: &RunInfo) -> Resu
     Ok(())
 }
 
-pub(super) fn read_run_info(parent: &Group, name: &str) -> Result<RunInfo> {
+pub(super) fn read_run_info(parent: &Node, name: &str) -> Result<RunInfo> {
     let group = read::group(parent, name)?;
     let names = read::texts(&group, "stage")?;
     let seconds: Vec<f64> = read::numbers(&group, "stage_seconds")?;

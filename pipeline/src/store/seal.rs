@@ -9,7 +9,8 @@ use std::path::Path;
 
 use super::file_kind::{FileKind, file_kind};
 use crate::error::{Result, StoreError};
-use crate::hdf5_files::HeapGuard;
+use crate::files::open_regular;
+use crate::hdf5_files::{HeapGuard, Vetted};
 
 pub(super) const MAGIC: &str = "\nafmid seal, BLAKE3 of all bytes before this line: ";
 const HASH_LENGTH: u64 = 64;
@@ -30,10 +31,10 @@ pub(crate) fn seal(path: &Path) -> Result<()> {
     seal().map_err(|error| StoreError::io("cannot be sealed", path, &error))
 }
 
-/// Errors: no file, no seal, or one that does not fit.
-pub(super) fn check_seal(path: &Path) -> Result<()> {
+/// What was found on the way for the HDF5 library. Errors: no file, no seal, or one that does not fit; damage that the library does not survive.
+pub(super) fn check_seal(path: &Path) -> Result<Vetted> {
     let io = |error: std::io::Error| StoreError::io("cannot be read", path, &error);
-    let mut file = File::open(path).map_err(io)?;
+    let mut file = open_regular(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();
     let broken = |problem: &str| {
         Err(StoreError::new(problem).file(path).help("make it again: run the pipeline that it comes from"))
@@ -44,15 +45,12 @@ pub(super) fn check_seal(path: &Path) -> Result<()> {
             other => Err(StoreError::new(format!("not a file of afmid's: it is {other}")).file(path)),
         };
     };
-    let mut guard = HeapGuard::default();
+    let mut guard = HeapGuard::new(size);
     let hash = hash_start(&mut file, body, |bytes| guard.update(bytes)).map_err(io)?;
     if last != format!("{MAGIC}{hash}\n") {
         return broken("damaged or altered: its bytes do not have the hash that its last line states");
     }
-    if guard.finish() {
-        return broken("damaged: a heap collection of the HDF5 file never ends");
-    }
-    Ok(())
+    guard.finish().or_else(|refusal| broken(refusal.text()))
 }
 
 /// What a file says of itself in its last line.
@@ -76,7 +74,7 @@ pub(super) fn look_at_seal(path: &Path) -> std::io::Result<Seal> {
 
 /// Whether a file ends in a seal, whether it fits or not. Errors: it cannot be read.
 pub(super) fn has_seal(path: &Path) -> std::io::Result<bool> {
-    let mut file = File::open(path)?;
+    let mut file = open_regular(path)?;
     let size = file.metadata()?.len();
     Ok(last_line(&mut file, size)?.is_some())
 }

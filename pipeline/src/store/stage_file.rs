@@ -9,7 +9,8 @@ use super::ports::{list_ports, read_ports, write_ports};
 use super::rows::Backing;
 use super::seal::{check_seal, seal};
 use crate::error::{Result, StoreError};
-use crate::hdf5_files::{read, write};
+use crate::hdf5_files::read::Node;
+use crate::hdf5_files::{Vetted, read, write};
 use crate::outcome::{PortSpec, StageResult};
 use crate::recording::InputFiles;
 
@@ -70,21 +71,21 @@ pub fn read_stage(
     identity: &StageIdentity,
     files: &InputFiles,
 ) -> std::result::Result<StageResult, StoreError> {
-    check_seal(path)?;
-    read_hdf5(path, identity, files).map_err(|error| error.file(path))
+    let vetted = check_seal(path)?;
+    read_hdf5(path, &vetted, identity, files).map_err(|error| error.file(path))
 }
 
-fn read_hdf5(path: &Path, identity: &StageIdentity, files: &InputFiles) -> Result<StageResult> {
+fn read_hdf5(path: &Path, vetted: &Vetted, identity: &StageIdentity, files: &InputFiles) -> Result<StageResult> {
     let backing = Backing::open(path)?;
-    let file = read::open_file(path)?;
-    check_format(&file, KIND)?;
-    check_identity(&file, identity)?;
-    let warnings = read::texts(&file, WARNINGS)?;
-    Ok(StageResult { outputs: read_ports(&read::group(&file, GROUP)?, files, Some(&backing))?, warnings })
+    let root = read::open_file(path, vetted)?.root();
+    check_format(&root, KIND)?;
+    check_identity(&root, identity)?;
+    let warnings = read::texts(&root, WARNINGS)?;
+    Ok(StageResult { outputs: read_ports(&read::group(&root, GROUP)?, files, Some(&backing))?, warnings })
 }
 
 /// Errors: the file is the result of another stage, another version or other inputs; its ports are not the declared ones.
-fn check_identity(file: &File, identity: &StageIdentity) -> Result<()> {
+fn check_identity(file: &Node, identity: &StageIdentity) -> Result<()> {
     let differs = |what: &str, found: &dyn std::fmt::Display, wanted: &dyn std::fmt::Display| {
         StoreError::new(format!("holds another result: its {what} is {found}, wanted {wanted}"))
     };

@@ -7,6 +7,7 @@ use super::layout::{StoredAttribute, read_attributes, read_layout, write_attribu
 use crate::artifact::{Matrix, StateSpace};
 use crate::error::{Result, StoreError};
 use crate::hdf5_files::Scales;
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -73,7 +74,7 @@ fn matrices(model: &StateSpace) -> [(&'static str, [&'static str; 2], &Matrix); 
 }
 
 /// Reads what [`write_state_space`] wrote. Errors: damaged, or of another layout.
-pub(super) fn read_state_space(group: &Group) -> Result<StateSpace> {
+pub(super) fn read_state_space(group: &Node) -> Result<StateSpace> {
     let layout: Layout = read_layout(group)?;
     Ok(StateSpace {
         a: matrix(group, "A")?,
@@ -91,7 +92,7 @@ pub(super) fn read_state_space(group: &Group) -> Result<StateSpace> {
     })
 }
 
-fn matrix(group: &Group, name: &str) -> Result<Matrix> {
+fn matrix(group: &Node, name: &str) -> Result<Matrix> {
     let values: Vec<f64> = read::numbers(group, name)?;
     match *read::dataset(group, name)?.get_shape()? {
         [rows, columns] if rows.checked_mul(columns) == Some(values.len()) => Ok(Matrix { rows, columns, values }),

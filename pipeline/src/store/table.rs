@@ -9,6 +9,7 @@ use super::layout::{StoredAttribute, read_attributes, read_layout, write_attribu
 use crate::artifact::{Column, ColumnValues, Table};
 use crate::error::{Result, StoreError};
 use crate::hdf5_files::Scales;
+use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -88,7 +89,7 @@ fn write_column(group: &Group, column: &Column) -> Result<(Dataset, Kind)> {
 }
 
 /// Reads what [`write_table`] wrote. Errors: damaged, or of another layout.
-pub(super) fn read_table(group: &Group) -> Result<Table> {
+pub(super) fn read_table(group: &Node) -> Result<Table> {
     let layout: Layout = read_layout(group)?;
     let mut table = Table { attributes: read_attributes(group, &layout.attributes)?, ..Table::default() };
     for StoredColumn { name, kind } in layout.columns {

@@ -1,5 +1,6 @@
 //! Files by pattern.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::StageError;
@@ -17,7 +18,7 @@ use super::natural_order::natural_order;
 /// A pattern that is none, a folder that cannot be read, or one without a match: with the pattern, the folder that was looked
 /// at, and what is there.
 pub fn matching_files(patterns: &[String], base: &Path) -> Result<Vec<PathBuf>, StageError> {
-    let mut files: Vec<PathBuf> = Vec::new();
+    let (mut files, mut seen): (Vec<PathBuf>, HashSet<PathBuf>) = Default::default();
     for pattern in patterns {
         let mut matches = matches_of(pattern, base)?;
         if matches.is_empty() {
@@ -25,7 +26,7 @@ pub fn matching_files(patterns: &[String], base: &Path) -> Result<Vec<PathBuf>, 
         }
         matches.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
         for file in matches {
-            if !files.contains(&file) {
+            if seen.insert(file.clone()) {
                 files.push(file);
             }
         }

@@ -1,5 +1,6 @@
 //! The stage `io.records`.
 
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::{How, Opened, RawBinary, Reading, Wanted, open_records};
@@ -225,24 +226,27 @@ const MOST_REMARKS: usize = 20;
 
 /// What the readers remark, each kind once: the first of it, and in how many files. Remarks that differ in numbers alone are of one kind.
 fn said_once(opened: &[Opened]) -> Vec<String> {
-    let mut kinds: Vec<(String, String, usize)> = Vec::new();
+    let mut kinds: Vec<(String, usize)> = Vec::new();
+    let mut places: HashMap<String, usize> = HashMap::new();
     for file in opened {
         let name = file.records.first().map_or("", |record| &record.name);
-        let mut seen: Vec<String> = Vec::new();
+        let mut seen = HashSet::new();
         for remark in &file.remarks {
             let kind = remark.replace(|letter: char| letter.is_ascii_digit(), "#");
-            if seen.contains(&kind) {
+            if !seen.insert(kind.clone()) {
                 continue;
             }
-            seen.push(kind.clone());
-            match kinds.iter_mut().find(|(have, ..)| *have == kind) {
-                Some((.., files)) => *files += 1,
-                None => kinds.push((kind, format!("{name}: {remark}"), 1)),
+            match places.get(&kind).and_then(|place| kinds.get_mut(*place)) {
+                Some((_, files)) => *files += 1,
+                None => {
+                    places.insert(kind, kinds.len());
+                    kinds.push((format!("{name}: {remark}"), 1));
+                }
             }
         }
     }
     let unsaid = kinds.len().saturating_sub(MOST_REMARKS);
-    let told = |(_, first, files): (String, String, usize)| match files {
+    let told = |(first, files): (String, usize)| match files {
         1 => first,
         _ => format!("{first} (the like in {files} files)"),
     };

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{read_number_attribute, read_series};
+use afmid_pipeline::recording::{InputFiles, read_number_attribute, read_series};
 use afmid_pipeline::{Array, Axis, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -121,7 +121,7 @@ impl Stage for Spectrum {
         let (f, p) = (read_series(cx.files(), path, &self.frequency)?, read_series(cx.files(), path, &self.density)?);
         let averages = match self.averages {
             Some(averages) => averages,
-            None => self.stored_averages(path)?,
+            None => self.stored_averages(cx.files(), path)?,
         };
         check_spectrum(&f, &p).map_err(|error| error.at(path))?;
         let highest = self.highest_hz.unwrap_or(f64::INFINITY);
@@ -140,10 +140,10 @@ impl Stage for Spectrum {
 }
 
 impl Spectrum {
-    fn stored_averages(&self, path: &Path) -> Result<f64, StageError> {
+    fn stored_averages(&self, files: &InputFiles, path: &Path) -> Result<f64, StageError> {
         const NAME: &str = "n_avg";
         for location in [self.density.as_str(), "/"] {
-            match read_number_attribute(path, location, NAME)? {
+            match read_number_attribute(files, path, location, NAME)? {
                 Some(n) if n.is_finite() && n >= 1.0 => return Ok(n),
                 Some(n) => {
                     return Err(StageError::new(format!("{location}: `{NAME}` is {n}, wanted 1 or more")).at(path));

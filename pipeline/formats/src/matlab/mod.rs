@@ -10,8 +10,8 @@
 //! structs, `/c{2}` of a cell array. Single numbers are remarks, as are texts; the sampling rate comes from a single number with
 //! a usual name (`fs`, `dt`, `Tinterval`, ...) in the same struct or, failing that, around it.
 //!
-//! A compressed variable is inflated to its end when the file is opened, so that damage shows (if it takes more than 16 MiB in the
-//! file: when it is first read), and inflated once more and kept when one of its channels is read.
+//! A compressed variable of at most 64 MiB is inflated to its end when the file is opened, so that damage shows, and once more and kept when one of
+//! its channels is read; a longer one is inflated by stream. All of a file may come to 64 MiB, or to 32 times the file.
 //!
 //! Version 7.3 is HDF5: it is recognised here so that it can be said, so ask an HDF5 reader before this one.
 

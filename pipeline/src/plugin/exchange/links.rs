@@ -4,7 +4,6 @@ use hdf5::plist::dataset_create::Layout;
 use hdf5::{Dataset, File, Group, IndexType, IterationOrder, LinkType, LocationType};
 
 use crate::error::StoreError;
-use crate::hdf5_files::read;
 
 /// Objects of one file that are looked at, and how deep groups lie in each other: a file of numbers needs a few.
 const MOST_OBJECTS: usize = 100_000;
@@ -13,7 +12,7 @@ const MOST_DEPTH: usize = 32;
 /// Sees that a file holds nothing but groups and datasets of its own. Errors: a soft or external link, data in other files, too many objects.
 pub(super) fn refuse_links(file: &File) -> Result<(), StoreError> {
     let mut left = MOST_OBJECTS;
-    group(&read::group(file, "/")?, 0, &mut left)
+    group(file, 0, &mut left)
 }
 
 fn group(own: &Group, depth: usize, left: &mut usize) -> Result<(), StoreError> {
@@ -27,8 +26,8 @@ fn group(own: &Group, depth: usize, left: &mut usize) -> Result<(), StoreError> 
             return Err(wrong(format!("holds the link {path}: wanted datasets, and no links")));
         }
         match own.loc_type_by_name(&name)? {
-            LocationType::Group => group(&read::group(own, &name)?, depth + 1, left)?,
-            LocationType::Dataset => dataset(&read::dataset(own, &name)?, &path)?,
+            LocationType::Group => group(&own.group(&name)?, depth + 1, left)?,
+            LocationType::Dataset => dataset(&own.dataset(&name)?, &path)?,
             // a type leads nowhere
             _ => {}
         }

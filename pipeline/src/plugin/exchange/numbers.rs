@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
-use hdf5::{Dataset, File, H5Type};
+use hdf5::{Dataset, H5Type};
 
 use super::links::refuse_links;
 use crate::error::StoreError;
-use crate::hdf5_files::read;
+use crate::hdf5_files::read::{self, Node, Opened};
+use crate::hdf5_files::vet;
 use crate::plugin::message::Numbers;
 
 /// The largest output file, and the most bytes of numbers taken from one answer.
@@ -16,7 +17,7 @@ const MOST_BYTES: u64 = 2 << 30;
 /// An output file, opened when the first path is looked up.
 pub(super) struct Numeric<'a> {
     path: &'a Path,
-    file: Option<File>,
+    file: Option<Node>,
     bytes_left: u64,
 }
 
@@ -68,7 +69,7 @@ impl<'a> Numeric<'a> {
             Some(file) => file,
             None => self.file.insert(open(self.path)?),
         };
-        let dataset = file.dataset(path).map_err(|_| "is not in the output file".to_owned())?;
+        let dataset = read::dataset(file, path).map_err(|_| "is not in the output file".to_owned())?;
         let found = dataset.shape();
         // axes of length 1 are not told apart: Octave has no arrays of one dimension
         let long = |shape: &[usize]| shape.iter().copied().filter(|&length| length != 1).collect::<Vec<usize>>();
@@ -84,7 +85,7 @@ impl<'a> Numeric<'a> {
 }
 
 /// Opens an output file. Errors: there is none, it is too large, or it is not HDF5.
-fn open(path: &Path) -> Result<File, String> {
+fn open(path: &Path) -> Result<Node, String> {
     use std::os::unix::fs::MetadataExt;
     let size = match std::fs::symlink_metadata(path) {
         Ok(metadata) if metadata.is_symlink() => {
@@ -100,12 +101,13 @@ fn open(path: &Path) -> Result<File, String> {
     if size > MOST_BYTES {
         return Err(format!("is in a file of {size} bytes, wanted at most {MOST_BYTES}"));
     }
-    let file = read::open_file(path).map_err(|error| format!("is in a file that cannot be read: {}", error.problem))?;
+    let unreadable = |error: StoreError| format!("is in a file that cannot be read: {}", error.problem);
+    let file = vet(path).and_then(|vetted| read::open_file(path, &vetted)).map_err(unreadable)?;
     refuse_links(&file).map_err(|error| format!("is in a file that {}", error.problem))?;
-    Ok(file)
+    Ok(file.root())
 }
 
-fn values(dataset: &Dataset) -> Result<Found, StoreError> {
+fn values(dataset: &Opened<Dataset>) -> Result<Found, StoreError> {
     use IntSize::{U1, U2, U4, U8};
     Ok(match read::descriptor(dataset)? {
         TypeDescriptor::Float(FloatSize::U4) => Found::Real(raw::<f32, _>(dataset, f64::from)?),
@@ -123,8 +125,9 @@ fn values(dataset: &Dataset) -> Result<Found, StoreError> {
     })
 }
 
-fn raw<T: H5Type + Copy, U>(dataset: &Dataset, of: impl Fn(T) -> U) -> Result<Vec<U>, StoreError> {
-    read::check_size(dataset, size_of::<T>())?;
+fn raw<T: H5Type + Copy, U>(dataset: &Opened<Dataset>, of: impl Fn(T) -> U) -> Result<Vec<U>, StoreError> {
+    // some languages compress what they write
+    read::check_samples(dataset, size_of::<T>(), dataset.allowance())?;
     let values = dataset.read_raw::<T>()?;
     Ok(values.into_iter().map(of).collect())
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use afmid_formats::{FormatError, Number, Raw, Source, numbers_in_file};
+use afmid_formats::{FormatError, Number, Raw, Source, most_inflated, numbers_in_file};
 use hdf5::dataset::Layout;
 use hdf5::datatype::ByteOrder;
 use hdf5::{H5Type, Selection};
@@ -12,20 +12,22 @@ use ndarray::Ix1;
 use super::walk::Found;
 use crate::error::StageError;
 use crate::files::FileState;
+use crate::hdf5_files::Vetted;
 use crate::hdf5_files::read::open_file;
-use crate::recording::input_files::require_state;
+use crate::recording::input_files::{HashedHdf5, require_state};
 
 /// Samples read at once through the library, under its global lock: short enough to let others in between.
 const SLICE: usize = 1 << 16;
 
-/// Deflate shrinks by at most 1032 to 1; a chunk that claims to hold more is damaged.
-const MOST_COMPRESSION: u64 = 1100;
+/// The library inflates a chunk at once.
+const MOST_CHUNK_BYTES: u64 = 128 << 20;
 
 /// A dataset of one or two dimensions.
 #[derive(Debug)]
 pub(super) struct Matrix {
     path: PathBuf,
     state: FileState,
+    vetted: Vetted,
     location: String,
     /// Length of its last axis, and whether it has another.
     columns: usize,
@@ -49,24 +51,25 @@ impl Matrix {
     /// Errors: damaged; a chunk larger than the file allows.
     pub(super) fn of(
         found: &Found,
-        (path, state): (&Path, FileState),
+        (path, hashed): (&Path, &HashedHdf5),
         shape: &[usize],
         number: Number,
     ) -> Result<Self, StageError> {
         let hdf5 = |error: hdf5::Error| StageError::new(format!("damaged: {error}"));
         let creation = found.dataset.dcpl().map_err(hdf5)?;
-        let file_size = state.size();
+        let file_size = hashed.state.size();
         let chunk = creation.chunk().unwrap_or_default();
         let chunk_bytes = chunk.iter().fold(number.bytes(), |product, &size| product.saturating_mul(size as u64));
-        if !chunk.is_empty() && chunk_bytes > file_size.saturating_mul(MOST_COMPRESSION) {
+        if !chunk.is_empty() && chunk_bytes > MOST_CHUNK_BYTES.min(most_inflated(file_size)) {
             return Err(StageError::new(format!(
-                "damaged: chunks of the shape {chunk:?} in a file of {file_size} bytes"
+                "stored in chunks of the shape {chunk:?}, wanted at most {MOST_CHUNK_BYTES} bytes each, and not more than the file can hold"
             )));
         }
         let contiguous = matches!(creation.layout(), Layout::Contiguous);
         Ok(Self {
             path: path.to_owned(),
-            state,
+            state: hashed.state,
+            vetted: hashed.vetted,
             location: found.location.clone(),
             columns: shape.last().copied().unwrap_or(1),
             flat: shape.len() == 1,
@@ -88,7 +91,7 @@ impl Matrix {
         let mut samples = Vec::with_capacity(to - from);
         for start in (from..to).step_by(SLICE) {
             // opened for each slice: no handle stays open, and others get in between
-            let dataset = open_file(&self.path)?.dataset(&self.location).map_err(fail)?;
+            let dataset = open_file(&self.path, &self.vetted)?.dataset(&self.location).map_err(fail)?;
             let slice = dataset.read_slice::<T, _, Ix1>(selection(start, to.min(start + SLICE))).map_err(fail)?;
             samples.extend(slice);
         }

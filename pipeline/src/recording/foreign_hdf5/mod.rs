@@ -37,15 +37,16 @@ const MOST_REMARKS: usize = 100;
 
 /// Lists what a file holds. Errors: it cannot be read, is cut short, or is damaged beyond its list of datasets.
 pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageError> {
-    let (state, _) = files.inspect_hdf5(path)?;
-    let file = open_file(path)?;
+    let hashed = files.inspect_hdf5(path)?;
+    let file = open_file(path, &hashed.vetted)?;
+    let allowance = file.allowance();
     let matlab = starts_like_matlab(path);
     let mut remarks = Vec::new();
     let mut scopes = Scopes::default();
     scopes.attributes(&file, "");
     let mut variables = Vec::new();
     for found in walk::datasets(&file, &mut scopes, &mut remarks) {
-        match Variable::of(&found, matlab) {
+        match Variable::of(&found, matlab, allowance) {
             Ok(Variable::Single(value)) => {
                 scopes.number(&found.group, &found.name, &found.location, value);
                 remarks.push(format!("{} is the single number {value}, no channel", found.location));
@@ -62,7 +63,8 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
             remarks.push(format!("{} is left out: its {} channels are too many", found.location, series.lanes()));
             continue;
         }
-        match series.channels(files.chunks(), found, (path, state), rate, if matlab { 1 } else { 0 }, &mut remarks) {
+        match series.channels((files, path, &hashed), found, allowance, rate, if matlab { 1 } else { 0 }, &mut remarks)
+        {
             Ok(more) => channels.extend(more),
             Err(error) => remarks.push(format!("{} is left out: {}", found.location, error.problem)),
         }
@@ -72,9 +74,9 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
         remarks.truncate(MOST_REMARKS);
         remarks.push(format!("{unsaid} more remarks of this kind"));
     }
-    let started_at = ["started_at", "start_time"].into_iter().find_map(|name| text_attribute(&file, name));
+    let started_at = ["started_at", "start_time"].into_iter().find_map(|name| text_attribute(&file, name, allowance));
     // the library opened it by name
-    require_state(path, &state)?;
+    require_state(path, &hashed.state)?;
     let format = if matlab { "MATLAB 7.3 MAT-file (HDF5)" } else { "HDF5 file" };
     Ok(Contents { format: format.to_owned(), started_at: started_at.unwrap_or_default(), channels, remarks })
 }

@@ -6,6 +6,7 @@ use afmid_formats::{Clue, agreed_rate, rate_in};
 use hdf5::Location;
 
 use super::walk::Found;
+use crate::hdf5_files::read::attribute_names;
 use crate::recording::native::number_attribute;
 
 /// More statements of a rate are ignored: a damaged file could make millions.
@@ -49,7 +50,7 @@ impl Scopes {
 
 /// What the attributes of an object say of a rate.
 fn clues(object: &Location, path: &str) -> Vec<Clue> {
-    let names = object.attr_names().unwrap_or_default();
+    let names = attribute_names(object);
     let clue = |name: &String| {
         // only attributes that are named like a rate are read
         Clue::of(name, "", 0.0)?;

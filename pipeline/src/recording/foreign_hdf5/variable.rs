@@ -9,9 +9,9 @@ use hdf5::types::{IntSize, TypeDescriptor};
 use super::matrix::{Lane, Matrix};
 use super::walk::Found;
 use crate::error::StageError;
-use crate::files::FileState;
-use crate::hdf5_files::read::check_size;
-use crate::recording::chunk_cache::ChunkCache;
+use crate::hdf5_files::read::{Allowance, check_samples};
+use crate::recording::InputFiles;
+use crate::recording::input_files::HashedHdf5;
 use crate::recording::native::{
     check_filters, has_attribute, number_attribute, open_source, sample_type, text_attribute,
 };
@@ -36,7 +36,7 @@ pub(super) struct Series {
 
 impl Variable {
     /// Errors: why it is no channel.
-    pub(super) fn of(found: &Found, matlab: bool) -> Result<Self, String> {
+    pub(super) fn of(found: &Found, matlab: bool, allowance: &Allowance) -> Result<Self, String> {
         let dataset = &found.dataset;
         let shape = dataset.get_shape().map_err(|error| format!("damaged: {error}"))?;
         let descriptor = dataset.dtype().and_then(|dtype| dtype.to_descriptor());
@@ -47,9 +47,9 @@ impl Variable {
             )
         })?;
         if matlab {
-            no_matlab_text(found)?;
+            no_matlab_text(found, allowance)?;
         }
-        check_size(dataset, number.bytes() as usize).map_err(|error| error.problem)?;
+        check_samples(dataset, number.bytes() as usize, allowance).map_err(|error| error.problem)?;
         check_filters(dataset).map_err(|error| error.problem)?;
         if shape.iter().all(|&size| size == 1) {
             let value = dataset.read_raw::<f64>().map_err(|error| format!("damaged: {error}"))?;
@@ -66,8 +66,8 @@ impl Variable {
 }
 
 /// MATLAB stores texts as numbers, and says so in an attribute.
-fn no_matlab_text(found: &Found) -> Result<(), String> {
-    match text_attribute(&found.dataset, "MATLAB_class").as_deref() {
+fn no_matlab_text(found: &Found, allowance: &Allowance) -> Result<(), String> {
+    match text_attribute(&found.dataset, "MATLAB_class", allowance).as_deref() {
         Some("char") => Err("it is a text".to_owned()),
         Some(class @ ("cell" | "struct" | "function_handle")) => Err(format!("it is a {class} of MATLAB's")),
         _ if has_attribute(&found.dataset, "MATLAB_empty") => Err("it is empty".to_owned()),
@@ -93,9 +93,9 @@ impl Series {
     /// The channels. Errors: the samples cannot be found in the file; a scale that is none.
     pub(super) fn channels(
         &self,
-        chunks: &ChunkCache,
+        file: (&InputFiles, &Path, &HashedHdf5),
         found: &Found,
-        (path, state): (&Path, FileState),
+        allowance: &Allowance,
         sample_rate_hz: Option<f64>,
         base: usize,
         remarks: &mut Vec<String>,
@@ -109,7 +109,9 @@ impl Series {
             remarks
                 .push(format!("{location}: its {count} columns of {samples} samples, not its rows, are the channels"));
         }
-        let text = |names: &[&str]| names.iter().find_map(|name| text_attribute(dataset, name)).unwrap_or_default();
+        let text =
+            |names: &[&str]| names.iter().find_map(|name| text_attribute(dataset, name, allowance)).unwrap_or_default();
+        let (unit, long_name) = (text(&["units", "unit"]), text(&["long_name", "quantity"]));
         let optional =
             |name: &str| has_attribute(dataset, name).then(|| number_attribute(dataset, location, name)).transpose();
         let scale_factor = optional("scale_factor")?.unwrap_or(1.0);
@@ -121,12 +123,12 @@ impl Series {
             return Err(StageError::new(problem));
         }
         let fill_code = optional("_FillValue")?.map_or_else(|| optional("missing_value"), |code| Ok(Some(code)))?;
-        let sources = self.sources(chunks, found, (path, state), base)?;
+        let sources = self.sources(file, found, base)?;
         let channel = |(index, source): Indexed| FoundChannel {
             location: format!("{location}{index}"),
             samples: self.lanes.samples,
-            unit: text(&["units", "unit"]),
-            long_name: text(&["long_name", "quantity"]),
+            unit: unit.clone(),
+            long_name: long_name.clone(),
             sample_rate_hz,
             scale_factor,
             add_offset,
@@ -141,15 +143,14 @@ impl Series {
     /// A source for each lane: the fast reader of native records for one dimension of its types.
     fn sources(
         &self,
-        chunks: &ChunkCache,
+        (files, path, hashed): (&InputFiles, &Path, &HashedHdf5),
         found: &Found,
-        (path, state): (&Path, FileState),
         base: usize,
     ) -> Result<Vec<Indexed>, StageError> {
         if self.shape.len() == 1 && !self.number.may_be_rounded() {
-            return Ok(vec![(String::new(), Arc::new(open_source(chunks, path, state, &found.location)?))]);
+            return Ok(vec![(String::new(), Arc::new(open_source(files, path, hashed.state, &found.location)?))]);
         }
-        let matrix = Arc::new(Matrix::of(found, (path, state), &self.shape, self.number)?);
+        let matrix = Arc::new(Matrix::of(found, (path, hashed), &self.shape, self.number)?);
         let lane = |(index, first): (String, u64)| {
             let lane = Lane::new(&matrix, first, self.lanes.step, self.lanes.samples);
             lane.source().map(|source| (index, source))

@@ -50,8 +50,10 @@ impl Walk<'_> {
         let listed = group.iter_visit_default(|name, link| {
             match link.link_type {
                 LinkType::Hard if names.len() < most => names.push(name.to_owned()),
-                LinkType::Hard => {}
-                LinkType::Soft | LinkType::External => self.links += 1,
+                // more than are looked at: a damaged index may have no end
+                LinkType::Hard => return Err("only the first members are listed".into()),
+                LinkType::Soft | LinkType::External if self.links < most => self.links += 1,
+                LinkType::Soft | LinkType::External => return Err("only the first links are counted".into()),
             }
             Ok(())
         });

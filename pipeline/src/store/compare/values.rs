@@ -3,10 +3,11 @@
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5::{Container, H5Type};
 
+use super::Pair;
 use super::document;
 use super::numbers::Numbers;
 use crate::error::{Result, StoreError};
-use crate::hdf5_files::read;
+use crate::hdf5_files::read::{self, Allowance};
 
 /// What differs between two datasets.
 pub(super) struct Found {
@@ -22,18 +23,18 @@ pub(super) struct Values {
 
 /// What differs between two containers of one type and shape. Errors: they cannot be read, or are of a type that this store never writes.
 pub(super) fn differing(
-    a: &Container,
-    b: &Container,
+    pair: &Pair,
     kind: &TypeDescriptor,
     errors: &dyn Fn() -> Option<Vec<f64>>,
 ) -> Result<Option<Found>> {
-    match (read_numbers(a)?, read_numbers(b)?) {
+    let Pair { a, b, allowances: [of_a, of_b] } = pair;
+    match (read_numbers(a, of_a)?, read_numbers(b, of_b)?) {
         (Some(left), Some(right)) => Ok(numbers(&left, &right, errors)),
         _ => match kind {
             TypeDescriptor::VarLenAscii
             | TypeDescriptor::VarLenUnicode
             | TypeDescriptor::FixedAscii(_)
-            | TypeDescriptor::FixedUnicode(_) => Ok(texts(&read::read_texts(a)?, &read::read_texts(b)?)),
+            | TypeDescriptor::FixedUnicode(_) => Ok(texts(&read::read_texts(a, of_a)?, &read::read_texts(b, of_b)?)),
             other => Err(StoreError::new(format!("values of type {other} cannot be compared"))),
         },
     }
@@ -68,9 +69,10 @@ fn texts(left: &[String], right: &[String]) -> Option<Found> {
 }
 
 /// The numbers of a container; none if it holds something else. Errors: damaged.
-pub(super) fn read_numbers(container: &Container) -> Result<Option<Values>> {
+pub(super) fn read_numbers(container: &Container, allowance: &Allowance) -> Result<Option<Values>> {
     use TypeDescriptor as T;
-    match read::descriptor(container)? {
+    let container = (container, allowance);
+    match read::descriptor(container.0)? {
         T::Float(FloatSize::U8) => values::<f64>(container, f64::to_bits, |value| value),
         T::Float(FloatSize::U4) => values::<f32>(container, |value| u64::from(value.to_bits()), f64::from),
         T::Integer(IntSize::U1) => values::<i8>(container, |value| i64::from(value) as u64, f64::from),
@@ -85,8 +87,12 @@ pub(super) fn read_numbers(container: &Container) -> Result<Option<Values>> {
     }
 }
 
-fn values<T: H5Type + Copy>(container: &Container, bits: fn(T) -> u64, number: fn(T) -> f64) -> Result<Option<Values>> {
-    read::check_size(container, size_of::<T>())?;
+fn values<T: H5Type + Copy>(
+    (container, allowance): (&Container, &Allowance),
+    bits: fn(T) -> u64,
+    number: fn(T) -> f64,
+) -> Result<Option<Values>> {
+    read::check_size(container, size_of::<T>(), allowance)?;
     let raw = container.read_raw::<T>()?;
     Ok(Some(Values {
         bits: raw.iter().map(|&value| bits(value)).collect(),

@@ -2,6 +2,7 @@
 
 use std::io::Read;
 
+use afmid_pipeline::recording::most_inflated;
 use flate2::read::ZlibDecoder;
 
 use super::table::{ColumnError, ColumnTable, NamedColumn};
@@ -9,9 +10,6 @@ use super::table::{ColumnError, ColumnTable, NamedColumn};
 const HEADER: usize = 128;
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
-/// Unpacked bytes of one variable: a table of 64 million samples; more is taken for damage.
-const MOST_BYTES: u64 = 1 << 29;
-
 /// Reads all real two-dimensional matrices: a vector is one column of the variable's name, a matrix `x` of k columns is `x:1` to `x:k`.
 ///
 /// # Method
@@ -20,7 +18,9 @@ const MOST_BYTES: u64 = 1 << 29;
 /// # Shapes
 /// A row vector counts as a column. Columns of different variables may differ in length.
 /// # Errors
-/// Version 4 or 7.3; a file that is cut short or contradicts itself; no matrix at all.
+/// Version 4 or 7.3; a file that is cut short or contradicts itself; unpacked variables of more than 64 MiB and 32 times the file, or numbers of half
+/// of that;
+/// no matrix at all.
 /// # Source
 /// MathWorks, MAT-File Format, chapter 1 (Level 5 MAT-file format).
 pub fn read_mat(bytes: &[u8]) -> Result<ColumnTable, ColumnError> {
@@ -36,15 +36,19 @@ pub fn read_mat(bytes: &[u8]) -> Result<ColumnTable, ColumnError> {
     };
     let mut table = ColumnTable::default();
     let mut elements = Elements { bytes, at: HEADER, big };
+    let most = most_inflated(bytes.len() as u64);
+    // the numbers are kept some five times until they are stored
+    let (mut packed_left, mut values_left) = (most, most / 2);
     while let Some(element) = elements.next()? {
         match element.kind {
             COMPRESSED => {
-                let unpacked = inflate(&element)?;
+                let unpacked = inflate(&element, packed_left)?;
+                packed_left -= unpacked.len() as u64;
                 if let Some(inner) = (Elements { bytes: &unpacked, at: 0, big }).next()? {
-                    read_element(&inner, big, &mut table)?;
+                    read_element(&inner, big, &mut values_left, &mut table)?;
                 }
             }
-            _ => read_element(&element, big, &mut table)?,
+            _ => read_element(&element, big, &mut values_left, &mut table)?,
         }
     }
     if table.columns.is_empty() {
@@ -54,14 +58,17 @@ pub fn read_mat(bytes: &[u8]) -> Result<ColumnTable, ColumnError> {
     Ok(table)
 }
 
-fn inflate(element: &Element<'_>) -> Result<Vec<u8>, ColumnError> {
+/// Errors: damaged; more than `most` bytes.
+fn inflate(element: &Element<'_>, most: u64) -> Result<Vec<u8>, ColumnError> {
     let mut unpacked = Vec::new();
-    match ZlibDecoder::new(element.data).take(MOST_BYTES + 1).read_to_end(&mut unpacked) {
-        Ok(count) if count as u64 <= MOST_BYTES => Ok(unpacked),
-        Ok(_) => Err(ColumnError::Damaged { at: element.at, what: "a variable unpacks to more than 512 MB" }),
+    match ZlibDecoder::new(element.data).take(most + 1).read_to_end(&mut unpacked) {
+        Ok(count) if count as u64 <= most => Ok(unpacked),
+        Ok(_) => Err(ColumnError::Damaged { at: element.at, what: TOO_LARGE }),
         Err(_) => Err(ColumnError::Damaged { at: element.at, what: "a compressed variable cannot be unpacked" }),
     }
 }
+
+const TOO_LARGE: &str = "variables unpack to far more than the file has; wanted at most 64 MiB or 32 times the file (half of that in numbers)";
 
 /// A data element: its type, where it stands, its bytes.
 struct Element<'a> {
@@ -105,7 +112,12 @@ impl<'a> Elements<'a> {
     }
 }
 
-fn read_element(element: &Element<'_>, big: bool, table: &mut ColumnTable) -> Result<(), ColumnError> {
+fn read_element(
+    element: &Element<'_>,
+    big: bool,
+    values_left: &mut u64,
+    table: &mut ColumnTable,
+) -> Result<(), ColumnError> {
     if element.kind != MATRIX {
         return Ok(());
     }
@@ -133,16 +145,20 @@ fn read_element(element: &Element<'_>, big: bool, table: &mut ColumnTable) -> Re
         return Ok(());
     }
     let real = part("a matrix without values")?;
+    // one number takes a byte at least
+    let bytes = 8.0 * sizes.iter().product::<f64>().min(real.data.len() as f64);
+    *values_left = values_left.checked_sub(bytes as u64).ok_or(damaged(TOO_LARGE))?;
     let values = numbers(&real, big).ok_or(damaged("values of an unknown type"))?;
     let (rows, columns) = (sizes[0] as usize, sizes[1] as usize);
     if rows.checked_mul(columns) != Some(values.len()) {
         return Err(damaged("a matrix with more or fewer values than its dimensions"));
     }
-    let column = |name: String, values: &[f64]| NamedColumn { name, values: values.to_vec(), text: None };
+    let column = |name: String, values: Vec<f64>| NamedColumn { name, values, text: None };
     if rows == 1 || columns == 1 {
-        table.columns.push(column(name, &values));
+        table.columns.push(column(name, values));
     } else if rows > 0 {
-        let all = values.chunks(rows).enumerate().map(|(i, values)| column(format!("{name}:{}", i + 1), values));
+        let all =
+            values.chunks(rows).enumerate().map(|(i, values)| column(format!("{name}:{}", i + 1), values.to_vec()));
         table.columns.extend(all);
     }
     Ok(())

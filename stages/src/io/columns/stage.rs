@@ -139,7 +139,9 @@ impl Stage for Columns {
         let place = |error: String| StageError::new(format!("{}: {error}", path.display()));
         let bytes = cx.files().read(&path)?;
         let table = read_columns(&self.file, &bytes, self.separator).map_err(|error| place(error.to_string()))?;
+        drop(bytes);
         let series = Series::new(self, &table)?;
+        drop(table);
         let (pair, summary) = series.split(self)?;
         series.warnings().into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new().with(&PAIR, pair).with(&SUMMARY, summary))

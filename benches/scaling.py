@@ -1,0 +1,130 @@
+#!/usr/bin/env python3
+"""Times commands of afmid at several numbers of items, and prints how the time grows.
+
+    benches/scaling.py [target/release/afmid] [MOST]
+
+Makes small raw records, stages and ledgers in a temporary folder with Python's standard library alone. Of each command the shortest of three
+runs counts. The exponent is the slope of log(time without that of an empty job) over log(items) from the second smallest size on.
+"""
+
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else "target/release/afmid")
+MOST = int(sys.argv[2]) if len(sys.argv) > 2 else 32000
+SIZES = [size for size in (1000, 2000, 4000, 8000, 16000, 32000, 64000, 128000) if size <= MOST]
+HEAD = '[pipeline]\nname = "a"\nseed = 1\n'
+RAW = 'format = "raw", raw = { sample = "int16" }, channel = "/channel[0]", sample_rate_hz = 1e6, unit = "V"'
+CENSUS = '[[stage]]\nid = "census"\nuses = "io.census"\ninputs = { records = "records.records" }\n'
+CACHE = ["--cache", "cache"]
+
+
+def write(folder, name, text):
+    path = os.path.join(folder, name)
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def raw_records(folder, count):
+    os.makedirs(os.path.join(folder, "raw"))
+    for number in range(count):
+        with open(os.path.join(folder, f"raw/r{number}.bin"), "wb") as file:
+            file.write(number.to_bytes(4, "little") * 4)
+
+
+def records(folder, count):
+    raw_records(folder, count)
+    stage = f'[[stage]]\nid = "records"\nuses = "io.records"\nparams = {{ files = ["raw/*.bin"], {RAW} }}\n'
+    write(folder, "a.toml", HEAD + stage + CENSUS)
+
+
+def stages(folder, count):
+    source = '[[stage]]\nid = "r"\nuses = "io.records"\nparams = { files = ["x"] }\n'
+    wired = '[[stage]]\nid = "c{}"\nuses = "io.census"\ninputs = {{ records = "r.records" }}\n'
+    write(folder, "a.toml", HEAD + source + "".join(wired.format(n) for n in range(count)))
+
+
+def faulty(folder, count):
+    wired = '[[stage]]\nid = "c{}"\nuses = "io.census"\ninputs = {{ records = "no{}" }}\n'
+    write(folder, "a.toml", HEAD + "".join(wired.format(n, n) for n in range(count)))
+
+
+def stock(folder, count):
+    stages(folder, 1)
+    for number in range(count):
+        key = f"{number:064x}"
+        write(folder, f"cache/{key}.h5", "x")
+        write(folder, f"cache/{key}.json", "{}")
+
+
+def data_sets(folder, count):
+    raw_records(folder, count)
+    stage = f'[[stage]]\nid = "records"\nuses = "io.records"\nparams = {{ files = ["raw/r0.bin"], {RAW} }}\n'
+    write(folder, "a.toml", HEAD + stage + CENSUS)
+    lines = (json.dumps({"name": f"s{n}", "files": [os.path.join(folder, f"raw/r{n}.bin")]}) + "\n" for n in range(count))
+    write(folder, "sets.jsonl", "".join(lines))
+
+
+BATCH = ["batch", "a.toml", "--manifest", "sets.jsonl", "-o", "out", *CACHE]
+# what is measured: makes the items, what runs before, the command, runs, and the most items (a batch writes and syncs a result for each)
+CASES = [
+    ("explain, files of one pattern", records, None, ["explain", "a.toml", *CACHE], 3, MOST),
+    ("run, files of one pattern, two stages", records, None, ["run", "a.toml", "-o", "a.h5", *CACHE], 3, MOST),
+    ("check, right stages", stages, None, ["check", "a.toml"], 3, MOST),
+    ("check, faulty stages", faulty, None, ["check", "a.toml"], 3, MOST),
+    ("gc, results", stock, None, ["gc", "--dry-run", "--older-than", "1d", *CACHE], 3, MOST),
+    ("batch, first, data sets", data_sets, None, BATCH, 1, 8000),
+    ("batch again, every data set in its ledger", data_sets, BATCH, BATCH, 3, 8000),
+    ("batch --collect", data_sets, BATCH, [*BATCH, "--collect"], 3, 8000),
+]
+
+
+def run(folder, arguments):
+    clock = time.monotonic()
+    ended = subprocess.run([PROGRAM, *arguments], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    seconds = time.monotonic() - clock
+    if ended.returncode not in (0, 2, 3):
+        sys.exit(f"afmid {arguments}: exit code {ended.returncode}")
+    return seconds
+
+
+def measured(make, before, arguments, runs, count):
+    folder = tempfile.mkdtemp(prefix="afmid-scaling-")
+    try:
+        make(folder, count)
+        if before:
+            run(folder, before)
+        return min(run(folder, arguments) for _ in range(runs))
+    finally:
+        shutil.rmtree(folder)
+
+
+def slope(points):
+    xs, ys = [math.log(x) for x, _ in points], [math.log(y) for _, y in points]
+    mean_x, mean_y = sum(xs) / len(xs), sum(ys) / len(ys)
+    spread = sum((x - mean_x) ** 2 for x in xs)
+    if spread == 0:
+        return math.nan
+    return sum((x - mean_x) * (y - mean_y) for x, y in zip(xs, ys)) / spread
+
+
+def main():
+    print("| command, items | " + " | ".join(map(str, SIZES)) + " | exponent |")
+    print("|---|" + "---|" * (len(SIZES) + 1))
+    for name, make, before, arguments, runs, most in CASES:
+        empty = measured(make, before, arguments, runs, 1)
+        sizes = [size for size in SIZES if size <= most]
+        times = [measured(make, before, arguments, runs, size) for size in sizes]
+        exponent = slope([(size, max(seconds - empty, 1e-4)) for size, seconds in zip(sizes, times)][1:] or [(1, 1)])
+        cells = [f"{seconds:.2f} s" for seconds in times] + ["-"] * (len(SIZES) - len(sizes))
+        print(f"| {name} | " + " | ".join(cells) + f" | {exponent:.2f} |", flush=True)
+
+
+main()
