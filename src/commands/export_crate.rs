@@ -124,7 +124,8 @@ impl Held {
         if same(from).is_some() && same(from) == same(&to) {
             return Ok(());
         }
-        let copied = |temporary: &Path| std::io::copy(&mut open_regular(from)?, &mut fs::File::create(temporary)?).map(|_| ());
+        let copied =
+            |temporary: &Path| std::io::copy(&mut open_regular(from)?, &mut fs::File::create(temporary)?).map(|_| ());
         self.folder.replace_with(name, |_| self.earlier, copied).map_err(failed)
     }
 }

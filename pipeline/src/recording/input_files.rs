@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::chunk_cache::ChunkCache;
 use super::opened_files::OpenedFiles;
 use crate::error::StageError;
-use crate::files::{FileState, KnownHashes, open_regular};
+use crate::files::{FileState, KnownHashes, open_regular, read_regular};
 use crate::hdf5_files::{HeapGuard, Refusal, Vetted, finding_text, parse_finding};
 
 /// The files that a program reads. A value that is passed to whatever reads: cloning is cheap, and clones share what they know.

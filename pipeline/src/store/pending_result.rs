@@ -6,7 +6,7 @@ use std::path::Path;
 use super::result_file::{ResultWriter, RunHead};
 use super::seal::seal;
 use crate::error::StoreError;
-use crate::files::Replacement;
+use crate::files::{Replacement, sweep_beside};
 use crate::outcome::{RunInfo, RunResult, StageRecord};
 
 /// Writes a run's result file, whole or not at all, and removes what killed runs left beside it.
