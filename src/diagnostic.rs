@@ -1,5 +1,6 @@
 //! Problems of configs, with the source, a caret and help.
 
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::io::IsTerminal;
 
@@ -7,15 +8,16 @@ use afmid_pipeline::Problem;
 use afmid_pipeline::config::Origin;
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 
-/// Renders all problems of a config for stderr, in colour if a person looks at it.
+use crate::printable::printable;
+
+/// Renders all problems of a config for stderr, printable, in colour if a person looks at it and nothing in the config acts on the terminal.
 pub fn render(file: &str, text: &str, problems: &[Problem]) -> String {
     let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    render_with(
-        file,
-        text,
-        problems,
-        if colour { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() },
-    )
+    let plain = render_with(file, text, problems, GraphicalTheme::unicode_nocolor());
+    match printable(&plain) {
+        Cow::Borrowed(_) if colour => render_with(file, text, problems, GraphicalTheme::unicode()),
+        shown => shown.into_owned(),
+    }
 }
 
 fn render_with(file: &str, text: &str, problems: &[Problem], theme: GraphicalTheme) -> String {

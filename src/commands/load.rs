@@ -17,7 +17,7 @@ pub fn load(path: &Path, set: &[String], registry: &Registry) -> Result<Plan, Fa
 /// Plans a config from its text; `file` is what messages call it. Errors: everything that is wrong with it.
 pub fn plan_text(file: &str, text: &str, set: &[String], registry: &Registry) -> Result<Plan, Failure> {
     graph::load(file, text, set, registry)
-        .map_err(|problems| Failure::Usage(Message::Rendered(render(file, text, &problems))))
+        .map_err(|problems| Failure::Usage(Message::Styled(render(file, text, &problems))))
 }
 
 /// The text of a config. Errors: the file cannot be read, or is no text.

@@ -7,6 +7,7 @@
 //! A process is started once per worker and reused over items. Nothing that it does is trusted: lines are bounded, times are limited, what it
 //! made is checked before it is stored, and whatever goes wrong is an error that names the plugin.
 
+mod children;
 mod conformance;
 mod describe;
 mod error;
@@ -23,6 +24,7 @@ mod schema;
 mod session;
 mod stage;
 
+pub use children::kill_children;
 pub use conformance::{Check, check};
 pub use launch::Launch;
 pub use pool::shut_down;

@@ -14,6 +14,7 @@ use super::launch::Launch;
 use super::lines::shown;
 use super::message::{Handshake, Progress, Reply};
 use super::process::Process;
+use crate::files::temporary_folder;
 
 /// A plugin that was started and has introduced itself, with a folder for what is exchanged.
 #[derive(Debug)]
@@ -35,7 +36,7 @@ impl Session {
     /// Starts a plugin and reads its handshake. Errors: it does not start, says something else, or speaks another protocol.
     pub(super) fn start(launch: &Launch) -> Result<Self, PluginError> {
         let fingerprint = fingerprint(launch)?;
-        let folder = tempfile::Builder::new().prefix("afmid-plugin-").tempdir().map_err(|error| {
+        let folder = temporary_folder("plugin").map_err(|error| {
             let what = format!("needs a temporary folder, and none can be made: {error}");
             PluginError::new(what, "check TMPDIR and the space on its disk")
         })?;
