@@ -13,6 +13,7 @@ test-deps: deps .tools/readers
 # Simulates an archive, runs the paper's pipeline on it, writes result and report, prints the modes; the last table has them beside the truth.
 demo: deps
 	cargo build --release --locked
+	mkdir -p results
 	./target/release/afmid run configs/simulate-demo.toml -o results/simulate-demo.h5
 	./target/release/afmid run configs/paper.toml -o results/paper.h5
 	./target/release/afmid report results/paper.h5 -o results/paper.html

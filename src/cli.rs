@@ -214,7 +214,7 @@ pub struct RunArgs {
     /// The config and what changes it.
     #[command(flatten)]
     pub config: ConfigArgs,
-    /// The result file; of a config with [sweep], the folder of the results [default: the pipeline's name, in the working directory].
+    /// The result file, in a folder that is there; of a config with [sweep], the folder of the results [default: the pipeline's name, in the working directory].
     #[arg(short, long, value_name = "OUT.h5")]
     pub output: Option<PathBuf>,
     /// Threads [default: one per processor]; results don't depend on it.
@@ -244,7 +244,7 @@ fn threads(text: &str) -> Result<NonZeroU16, String> {
 pub struct ReportArgs {
     /// The result file.
     pub result: PathBuf,
-    /// The page [default: the result file's name with `.html`, in the working directory].
+    /// The page, in a folder that is there [default: the result file's name with `.html`, in the working directory].
     #[arg(short, long, value_name = "REPORT.html")]
     pub output: Option<PathBuf>,
     /// Also write every figure as an SVG file into this folder.

@@ -1,5 +1,6 @@
 //! Problems of configs, with the source, a caret and help.
 
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::io::IsTerminal;
 use std::sync::Arc;
@@ -11,18 +12,20 @@ use miette::{
     NamedSource, Report, SourceCode, SourceSpan, SpanContents,
 };
 
+use crate::printable::printable;
+
 /// More problems are counted: who mends a hundred checks again.
 pub const MOST_PROBLEMS: usize = 100;
 
-/// Renders the problems of a config for stderr, the first hundred, in colour if a person looks at it.
+/// Renders the first hundred problems of a config for stderr, printable, in colour if a person looks at it and nothing in the config acts on the
+/// terminal.
 pub fn render(file: &str, text: &str, problems: &[Problem]) -> String {
     let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    render_with(
-        file,
-        text,
-        problems,
-        if colour { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() },
-    )
+    let plain = render_with(file, text, problems, GraphicalTheme::unicode_nocolor());
+    match printable(&plain) {
+        Cow::Borrowed(_) if colour => render_with(file, text, problems, GraphicalTheme::unicode()),
+        shown => shown.into_owned(),
+    }
 }
 
 fn render_with(file: &str, text: &str, problems: &[Problem], theme: GraphicalTheme) -> String {

@@ -2,6 +2,8 @@
 
 use std::fmt::Display;
 
+use crate::printable::printable;
+
 /// How a command ends when it does not succeed.
 #[derive(Debug)]
 pub enum Failure {
@@ -11,6 +13,8 @@ pub enum Failure {
     Failed(Message),
     /// Some data sets of a batch failed, the others did not: exit code 3.
     Partly(Message),
+    /// A signal was caught: exit code 128 and its number.
+    Interrupted(i32),
     /// Whoever read stdout has seen enough (`afmid schema | head`): the quiet end, exit code 0.
     Closed,
 }
@@ -22,6 +26,8 @@ pub enum Message {
     Line(String, Option<String>),
     /// Rendered already.
     Rendered(String),
+    /// Rendered already, in colour perhaps; what comes from files in it is printable.
+    Styled(String),
 }
 
 impl Failure {
@@ -34,4 +40,32 @@ impl Failure {
     pub fn failed(message: impl Display, help: Option<String>) -> Self {
         Self::Failed(Message::Line(message.to_string(), help))
     }
+
+    /// What goes to stderr, printable, and the exit code.
+    pub fn told(self) -> (String, u8) {
+        let (message, code) = match self {
+            Self::Usage(message) => (message, 2),
+            Self::Failed(message) => (message, 1),
+            Self::Partly(message) => (message, 3),
+            Self::Interrupted(signal) => {
+                let code = u8::try_from(128 + signal).unwrap_or(1);
+                return (format!("interrupted by {}: what was finished is kept\n", name(signal)), code);
+            }
+            Self::Closed => return (String::new(), 0),
+        };
+        let text = match message {
+            Message::Line(line, help) => {
+                let help = help.map(|help| format!("  help: {help}\n")).unwrap_or_default();
+                format!("error: {line}\n{help}")
+            }
+            Message::Rendered(text) => text,
+            Message::Styled(text) => return (text, code),
+        };
+        (printable(&text).into_owned(), code)
+    }
+}
+
+/// Of the two signals that commands listen to.
+fn name(signal: i32) -> &'static str {
+    if signal == signal_hook::consts::SIGINT { "SIGINT" } else { "SIGTERM" }
 }

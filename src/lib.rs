@@ -11,7 +11,9 @@ mod doctor;
 mod export;
 mod failure;
 mod inspect;
+mod interrupt;
 mod output;
+mod printable;
 mod progress;
 mod provenance;
 mod relative;
@@ -28,6 +30,7 @@ use afmid_pipeline::stage::DoubleName;
 use clap::FromArgMatches;
 
 use failure::{Failure, Message};
+use printable::printable;
 
 /// The built-in stages: add your own with [`Registry::with`]. Errors: two of one name.
 pub fn registry() -> Result<Registry, DoubleName> {
@@ -39,12 +42,16 @@ pub fn main(registry: &Registry) -> ExitCode {
     if let Some(code) = afmid_pipeline::plugin::host_main() {
         return code;
     }
+    if let Err(error) = interrupt::listen() {
+        // a signal ends the program as the system does it
+        output::say(&format!("warning: signals cannot be caught: {error}\n"));
+    }
     let parsed = cli::command().try_get_matches().and_then(|matches| cli::Cli::from_arg_matches(&matches));
-    match parsed {
+    let done = match parsed {
         Ok(cli) => commands::dispatch(cli.command, registry),
         Err(error) => told(&error),
-    }
-    .map_or_else(output::report, |()| ExitCode::SUCCESS)
+    };
+    interrupt::check().and(done).map_or_else(output::report, |()| ExitCode::SUCCESS)
 }
 
 /// How a program ends whose stages do not make a registry.
@@ -52,14 +59,15 @@ pub fn fail(error: &DoubleName) -> ExitCode {
     output::report(Failure::failed(error, None))
 }
 
-/// Help and version go to stdout, mistakes to stderr, in colour if a person looks at them.
+/// Help and version go to stdout, mistakes to stderr, in colour if a person looks at them and nothing that they typed acts on the terminal.
 fn told(error: &clap::Error) -> Result<(), Failure> {
-    let text = |terminal: bool| {
-        let colour = terminal && std::env::var_os("NO_COLOR").is_none();
-        if colour { error.render().ansi().to_string() } else { error.render().to_string() }
+    let plain = error.render().to_string();
+    let styled = |terminal: bool| {
+        let colour = terminal && std::env::var_os("NO_COLOR").is_none() && printable(&plain) == plain;
+        if colour { error.render().ansi().to_string() } else { printable(&plain).into_owned() }
     };
     if error.use_stderr() {
-        return Err(Failure::Usage(Message::Rendered(text(std::io::stderr().is_terminal()))));
+        return Err(Failure::Usage(Message::Styled(styled(std::io::stderr().is_terminal()))));
     }
-    output::print(&text(std::io::stdout().is_terminal()))
+    output::print_styled(&styled(std::io::stdout().is_terminal()))
 }

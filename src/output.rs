@@ -1,12 +1,18 @@
-//! All that goes to stdout and stderr.
+//! All that goes to stdout and stderr, none of it raw.
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-use crate::failure::{Failure, Message};
+use crate::failure::Failure;
+use crate::printable::printable;
 
 /// Prints on stdout and sees that it arrives. Errors: nobody reads any more ([`Failure::Closed`]); the device is full.
 pub fn print(text: &str) -> Result<(), Failure> {
+    print_styled(&printable(text))
+}
+
+/// The same of text in colour, with nothing of a file's in it that is not printable.
+pub fn print_styled(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     let written = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
     written.map_err(|error| match error.kind() {
@@ -18,26 +24,21 @@ pub fn print(text: &str) -> Result<(), Failure> {
     })
 }
 
+/// How a command ends that does not succeed: said on stderr, with its exit code.
+pub fn report(failure: Failure) -> ExitCode {
+    let (text, code) = failure.told();
+    say_styled(&text);
+    ExitCode::from(code)
+}
+
 /// Says something on stderr, in one call, so that lines of several threads don't mix. If stderr takes nothing, there is nowhere left to say so:
 /// the exit code still tells.
 pub fn say(text: &str) {
-    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+    say_styled(&printable(text));
 }
 
-/// Says on stderr how a command failed, and gives the exit code.
-pub fn report(failure: Failure) -> ExitCode {
-    let (message, code) = match failure {
-        Failure::Usage(message) => (message, 2),
-        Failure::Failed(message) => (message, 1),
-        Failure::Partly(message) => (message, 3),
-        Failure::Closed => return ExitCode::SUCCESS,
-    };
-    match message {
-        Message::Line(line, help) => {
-            let help = help.map(|help| format!("  help: {help}\n")).unwrap_or_default();
-            say(&format!("error: {line}\n{help}"));
-        }
-        Message::Rendered(text) => say(&text),
+fn say_styled(text: &str) {
+    if !text.is_empty() {
+        let _ = std::io::stderr().lock().write_all(text.as_bytes());
     }
-    ExitCode::from(code)
 }

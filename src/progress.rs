@@ -4,7 +4,9 @@ use std::io::IsTerminal;
 use std::time::Duration;
 
 use crate::batch::work::Done;
+use crate::interrupt;
 use crate::output::say;
+use crate::printable::printable;
 use afmid_pipeline::runner::Observer;
 use afmid_pipeline::stage::{NoProgress, Progress};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -26,7 +28,7 @@ impl Sets {
             let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {per_sec} {eta} left");
             let bar = ProgressBar::new(count as u64);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar.set_prefix(what.to_owned());
+            bar.set_prefix(printable(what).into_owned());
             bar
         });
         Self { bar }
@@ -59,6 +61,10 @@ impl Drop for Sets {
 struct Lines;
 
 impl Observer for Lines {
+    fn is_stopped(&self) -> bool {
+        interrupt::caught().is_some()
+    }
+
     fn begin(&self, _id: &str) -> Box<dyn Progress + '_> {
         Box::new(NoProgress)
     }
@@ -73,11 +79,15 @@ struct Bars {
 }
 
 impl Observer for Bars {
+    fn is_stopped(&self) -> bool {
+        interrupt::caught().is_some()
+    }
+
     fn begin(&self, id: &str) -> Box<dyn Progress + '_> {
         let bar = self.bars.add(ProgressBar::no_length());
         let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {elapsed}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_prefix(id.to_owned());
+        bar.set_prefix(printable(id).into_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
         Box::new(Bar { bars: &self.bars, bar })
     }

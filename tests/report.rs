@@ -53,10 +53,10 @@ fn a_result_becomes_one_page_and_its_figures_files() {
     let page = std::fs::read_to_string(folder.join("waves.html")).expect("a page");
     assert!(page.starts_with("<!DOCTYPE html>") && page.contains("a &lt;warning&gt;") && page.contains("a sine"));
 
-    let output = report(folder, &["waves.h5", "-o", "again.html", "--figures", "pictures/svg"]);
+    let output = report(folder, &["waves.h5", "-o", "again.html", "--figures", "pictures"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(std::fs::read_to_string(folder.join("again.html")).expect("a page"), page, "same result, same page");
-    let figure = std::fs::read_to_string(folder.join("pictures/svg/stage-sine--wave.svg")).expect("a figure");
+    let figure = std::fs::read_to_string(folder.join("pictures/stage-sine--wave.svg")).expect("a figure");
     assert!(figure.starts_with("<?xml") && figure.contains("<svg "));
     let left: Vec<_> =
         std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").file_name()).collect();
@@ -78,6 +78,8 @@ fn what_cannot_be_reported_is_said_with_the_exit_code() {
         (&["waves.h5", "-o", "waves.h5"], 2, "would replace the result file"),
         (&["text.h5"], 2, "text.h5 is a text file, wanted a result file"),
         (&["waves.h5", "-o", "no/such/folder.html"], 2, "the folder no/such does not exist"),
+        (&["waves.h5", "-o", "no/page.html"], 2, "the folder no does not exist"),
+        (&["waves.h5", "-o", "x.html", "--figures", "no/such"], 2, "the folder no does not exist"),
         (&["waves.h5", "-o", "other-name.h5"], 2, "would replace the result file"),
         (&["waves.h5", "-o", "text.h5"], 2, "only a page that `afmid report` wrote is replaced"),
         (&["waves.h5", "-o", "/dev/null"], 2, "is a device"),

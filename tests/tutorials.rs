@@ -41,7 +41,6 @@ fn every_command_of_the_tutorials_runs() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
     copy(&Path::new(ROOT).join("configs"), &here.join("configs"));
-    std::fs::create_dir(here.join("results")).expect("a folder");
     let program = Path::new(env!("CARGO_BIN_EXE_afmid")).parent().expect("a folder");
     // the python3 of `make test-deps` comes first
     let python = Path::new(ROOT).join(".tools/bin");

@@ -192,12 +192,13 @@ fn result(title: &Title<'_>, uses: &str, outputs: Ports) -> RunResult {
     }
 }
 
-/// Comma-separated, a header line, unknown numbers empty, numbers to the last bit.
+/// Comma-separated, a header line, unknown numbers empty, numbers to the last bit. Text that a spreadsheet would take for a formula gets an
+/// apostrophe before it.
 fn csv(path: &Path, table: &Table) -> std::io::Result<()> {
     let mut writer = csv::Writer::from_path(path).map_err(std::io::Error::other)?;
     let line =
         |writer: &mut csv::Writer<_>, fields: Vec<String>| writer.write_record(fields).map_err(std::io::Error::other);
-    line(&mut writer, table.columns.iter().map(|column| column.name.clone()).collect())?;
+    line(&mut writer, table.columns.iter().map(|column| cell(&column.name)).collect())?;
     for row in 0..table.rows() {
         line(&mut writer, table.columns.iter().map(|column| field(&column.values, row)).collect())?;
     }
@@ -209,7 +210,28 @@ fn field(values: &ColumnValues, row: usize) -> String {
         ColumnValues::Real(values) => values.get(row).filter(|value| value.is_finite()).map(f64::to_string),
         ColumnValues::Integer(values) => values.get(row).map(i64::to_string),
         ColumnValues::Flag(values) => values.get(row).map(bool::to_string),
-        ColumnValues::Text(values) => values.get(row).cloned(),
+        ColumnValues::Text(values) => values.get(row).map(|text| cell(text)),
     }
     .unwrap_or_default()
+}
+
+/// Text that is no formula to a spreadsheet: one that begins as a formula, and is no number, gets an apostrophe.
+fn cell(text: &str) -> String {
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
+    if formula { format!("'{text}") } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::cell;
+
+    #[test]
+    fn a_spreadsheet_finds_no_formula() {
+        for text in ["=1+1", "+SUM(A1)", "-2+3", "@x", "\t=1", "\r=1", "-"] {
+            assert_eq!(cell(text), format!("'{text}"));
+        }
+        for text in ["", "a=b", "-2.5", "+3e4", "'=1", "lever-1"] {
+            assert_eq!(cell(text), text);
+        }
+    }
 }

@@ -8,12 +8,13 @@ use std::time::{Duration, Instant};
 
 use afmid_pipeline::InputFiles;
 use afmid_pipeline::cache::Cache;
-use afmid_pipeline::runner::{Failed, Options, Quiet, RunError, RunKey, Surroundings, run_key, run_to_file};
+use afmid_pipeline::runner::{Failed, Options, RunError, RunKey, Surroundings, run_key, run_to_file};
 use afmid_pipeline::store::{FileKind, Written, written};
 use afmid_pipeline::{Plan, SourceFile};
 
 use super::harvest::{harvest, numbers};
 use super::ledger::{Entry, Ledger};
+use crate::interrupt::{self, Silent};
 use crate::provenance::repeat::writers;
 
 /// What all runs of a batch have in common.
@@ -63,6 +64,10 @@ impl Work<'_> {
         }
         match self.ran(name, plan, base, (&key, &sources)) {
             Ok((entry, stages)) => self.kept(entry, clock, stages),
+            // nothing is known of it: the ledger stays as it was
+            Err(error) if interrupt::caught().is_some() => {
+                Done { entry: Entry::failed(name, Some(key), error), took: Some(clock.elapsed()), stages: (0, 0) }
+            }
             Err(error) => match self.elsewhere(name, &key) {
                 Some(entry) => Done { entry, took: Some(clock.elapsed()), stages: (0, 0) },
                 None => self.kept(Entry::failed(name, Some(key), error), clock, (0, 0)),
@@ -117,7 +122,7 @@ impl Work<'_> {
             fresh: self.fresh,
             program: self.program.to_owned(),
             overrides: plan.config.overrides.clone(),
-            observer: &Quiet,
+            observer: &Silent,
         };
         let result = run_to_file(plan, &options, &path).map_err(|failed| match failed {
             Failed::Stages(errors) => told(&errors),
@@ -147,7 +152,7 @@ impl Work<'_> {
     }
 }
 
-/// Does all of them, at most `threads` at once whatever their number, each on the present rayon pool; `watch` is told of every end.
+/// Does all of them, or those before an interruption, at most `threads` at once whatever their number, each on the present rayon pool; `watch` is told of every end.
 /// The order of what comes back is that of `sets`.
 pub fn all<T: Sync>(
     sets: &[T],
@@ -162,9 +167,13 @@ pub fn all<T: Sync>(
             scope.spawn(|| {
                 while let Some((index, set)) =
                     Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|i| Some((i, sets.get(i)?)))
+                    && interrupt::caught().is_none()
                 {
                     let done = one(set);
-                    watch(&done);
+                    // what was interrupted has not failed
+                    if done.entry.is_done() || interrupt::caught().is_none() {
+                        watch(&done);
+                    }
                     finished.lock().unwrap_or_else(PoisonError::into_inner).push((index, done));
                 }
             });

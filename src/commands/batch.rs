@@ -10,8 +10,9 @@ use afmid_pipeline::graph::Stages;
 use serde_json::json;
 
 use super::load::load;
-use super::run::{PROGRAM, default_output, open_cache};
+use super::run::{PROGRAM, default_output, open_cache, warn, written_folders};
 use super::sweep::refuse;
+use super::target::make_folder;
 use crate::batch::dataset::{DataSet, sorted};
 use crate::batch::ledger::{Entry, Ledger};
 use crate::batch::manifest;
@@ -19,6 +20,7 @@ use crate::batch::summary::{BATCH, Tables, Title};
 use crate::batch::work::{Done, Work, all};
 use crate::cli::{BatchArgs, ConfigArgs, SetsArgs};
 use crate::failure::{Failure, Message};
+use crate::interrupt;
 use crate::output::print;
 use crate::progress::Sets;
 use crate::show::pretty;
@@ -105,8 +107,10 @@ pub fn planned<'a>(
     .collect()
 }
 
-/// The ledger of a folder of results. Errors, usage: it cannot be made.
+/// The ledger of a folder of results, which is made if only that is missing. Errors, usage: it cannot be made.
 pub fn ledger(folder: &Path) -> Result<Ledger, Failure> {
+    make_folder(folder)?;
+    interrupt::writes_in(&folder.join("ledger"));
     Ledger::open(folder).map_err(|error| {
         let help = "give another folder with -o".to_owned();
         Failure::usage(format!("the folder {} cannot be made: {error}", folder.display()), Some(help))
@@ -128,12 +132,17 @@ fn computed(args: &BatchArgs, sets: &[(&DataSet, Plan)], ledger: &Ledger) -> Res
         retry_failed: args.retry_failed,
         as_run: false,
     };
-    let progress = Sets::new("data sets", sets.len());
+    sets.iter().for_each(|(_, plan)| written_folders(plan));
+    let (progress, run) = (Sets::new("data sets", sets.len()), interrupt::Run::begin());
     let one = |(set, plan): &(&DataSet, Plan)| match args.collect {
         true => work.found(&set.name, plan),
         false => pool.install(|| work.one(&set.name, plan)),
     };
-    Ok(all(sets, pool.current_num_threads(), one, |done| progress.ended(done)))
+    let done = all(sets, pool.current_num_threads(), one, |done| progress.ended(done));
+    drop((progress, run));
+    warn(&cache);
+    interrupt::check()?;
+    Ok(done)
 }
 
 fn told(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock: Instant) -> Result<String, Failure> {

@@ -2,15 +2,15 @@
 
 use afmid_pipeline::config::nearest;
 use afmid_stages::causes::{as_json, catalogue, find, page};
-use serde_json::Value;
 
 use crate::failure::Failure;
 use crate::output::print;
+use crate::show::pretty;
 
 /// Lists all causes, or prints the page of one.
 pub fn run(name: Option<&str>, json: bool) -> Result<(), Failure> {
     let Some(name) = name else {
-        return print(&if json { pretty(&catalogue().into_iter().map(as_json).collect())? } else { list() });
+        return print(&if json { pretty(&catalogue().into_iter().map(as_json).collect::<Vec<_>>())? } else { list() });
     };
     let Some(cause) = find(name) else {
         let nearest = nearest(name, catalogue().iter().map(|cause| cause.about().id));
@@ -25,8 +25,4 @@ fn list() -> String {
     let all = catalogue();
     let width = all.iter().map(|cause| cause.about().id.len()).max().unwrap_or(0);
     all.iter().map(|cause| cause.about()).map(|about| format!("{:width$}  {}\n", about.id, about.physics)).collect()
-}
-
-fn pretty(value: &Value) -> Result<String, Failure> {
-    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(|error| Failure::failed(error, None))
 }

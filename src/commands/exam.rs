@@ -1,12 +1,11 @@
 //! `afmid exam`: hides causes in simulated recordings and judges what a config says of them.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use afmid_pipeline::cache::Cache;
-use afmid_pipeline::files::{FilledFolder, LIST};
+use afmid_pipeline::files::{FilledFolder, LIST, sweep_folders, temporary_folder};
 use afmid_pipeline::graph::Stages;
-use afmid_pipeline::runner::{Options, Quiet, run as run_plan};
+use afmid_pipeline::runner::{Options, run as run_plan};
 use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Artifact, Context, Ports, Stage};
 use afmid_stages::causes::catalogue;
@@ -15,9 +14,13 @@ use serde_json::Value;
 
 use super::load::load;
 use super::sweep::refuse;
+use super::target::require_folder;
 use crate::cli::{ExamArgs, ExamKind};
 use crate::failure::Failure;
+use crate::interrupt::{self, Silent};
 use crate::output::{print, say};
+use crate::relative::folder_of;
+use crate::show::pretty;
 
 /// The stage whose JSON is judged.
 const STAGE: &str = "diagnosis";
@@ -28,8 +31,7 @@ const SUMMARY: &str = "summary";
 pub fn run(args: &ExamArgs, stages: &dyn Stages) -> Result<(), Failure> {
     let score = score(args, stages)?;
     if args.json {
-        let text = serde_json::to_string_pretty(&score).map_err(|error| Failure::failed(error, None))?;
-        return print(&(text + "\n"));
+        return print(&pretty(&score)?);
     }
     print(&score.text())
 }
@@ -44,14 +46,19 @@ fn score(args: &ExamArgs, stages: &dyn Stages) -> Result<Score, Failure> {
             return Err(Failure::usage(format!("the config has no stage `{id}`"), Some(help.to_owned())));
         }
     }
-    let folder = Scratch::new()?;
+    args.keep.as_deref().map_or(Ok(()), |folder| require_folder(folder_of(folder)))?;
+    sweep_folders();
+    let folder = temporary_folder("exam")
+        .map_err(|error| Failure::failed(format!("no temporary folder can be made: {error}"), None))?;
+    let _run = interrupt::Run::begin();
     let mut judged = Vec::new();
     for seed in args.first_seed..args.first_seed.saturating_add(args.seeds) {
         let Some(drawn) = draw(seed, args.only.map(kind), &catalogue()) else {
             say(&format!("seed {seed}: no cause of the catalogue can be hidden in this lever at its limit\n"));
             continue;
         };
-        let one = sit(&drawn, args, stages, &folder.0)?;
+        let one = sit(&drawn, args, stages, folder.path())?;
+        interrupt::check()?;
         say(&told(&one));
         judged.push(one);
     }
@@ -79,6 +86,7 @@ fn told(one: &Judged) -> String {
 fn sit(drawn: &Draw, args: &ExamArgs, stages: &dyn Stages, scratch: &Path) -> Result<Judged, Failure> {
     let base = scratch.join(drawn.seed.to_string());
     let json = archive(drawn, &base).and_then(|()| diagnosed(drawn, args, stages, &base));
+    interrupt::check()?;
     let (judged, json) = match json {
         Ok(json) => (judge(drawn, Some(&json)), json),
         Err(Sitting::Config(failure)) => return Err(failure),
@@ -152,7 +160,7 @@ fn diagnosed(drawn: &Draw, args: &ExamArgs, stages: &dyn Stages, base: &Path) ->
         fresh: true,
         program: concat!("afmid ", env!("CARGO_PKG_VERSION")).to_owned(),
         overrides: plan.config.overrides.clone(),
-        observer: &Quiet,
+        observer: &Silent,
     };
     let result = run_plan(&plan, &options)
         .map_err(|errors| Sitting::Run(errors.iter().map(ToString::to_string).collect::<Vec<String>>().join("; ")))?;
@@ -164,31 +172,6 @@ fn diagnosed(drawn: &Draw, args: &ExamArgs, stages: &dyn Stages, base: &Path) ->
 }
 
 /// Exams of this process so far: each has a folder of its own.
-static NUMBER: AtomicUsize = AtomicUsize::new(0);
-
-/// A folder of its own below the system's temporary one, removed at the end.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new() -> Result<Self, Failure> {
-        let folder = std::env::temp_dir().join(format!(
-            "afmid-exam-{}-{}",
-            std::process::id(),
-            NUMBER.fetch_add(1, Ordering::Relaxed)
-        ));
-        std::fs::create_dir_all(&folder).map_err(|error| {
-            Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
-        })?;
-        Ok(Self(folder))
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        // what cannot be removed is the system's to clean
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
 
 #[cfg(test)]
 #[path = "exam_tests.rs"]

@@ -1,6 +1,7 @@
 //! `afmid export-crate`: a run as a Process Run RO-Crate.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::error::StoreError;
@@ -8,17 +9,20 @@ use afmid_pipeline::files::{FilledFolder, LIST, open_regular};
 use serde_json::{Value, json};
 
 use super::diff::open;
+use super::target::{make_folder, require_folder};
 use crate::cli::CrateArgs;
 use crate::failure::Failure;
 use crate::output::print;
 use crate::provenance::files::{Finder, Now};
 use crate::provenance::research_object::{CONFIG, CrateInput, METADATA, Stated, inputs, metadata, result_name};
+use crate::relative::folder_of;
 use crate::show::pretty;
 
 /// Writes a crate and says what is in it.
 pub fn run(args: &CrateArgs) -> Result<(), Failure> {
     let file = open(&args.result)?;
     let folder = args.output.clone().unwrap_or_else(|| default_output(&args.result));
+    require_crate(&folder)?;
     let finder = Finder::new(&file.run().info, &args.data);
     let find = |source: &_| match finder.find(source) {
         Now::Same(path) => Some(path),
@@ -76,17 +80,16 @@ fn text(metadata: &Value) -> Result<String, Failure> {
     serde_json::to_string_pretty(metadata).map(|text| text + "\n").map_err(|error| Failure::failed(error, None))
 }
 
-/// Makes the crate's folder. Errors, usage: it is a file; it holds something and is no crate.
-fn make_folder(folder: &Path) -> Result<(), Failure> {
-    let shown = folder.display();
-    let another = || Some("give another place with -o".to_owned());
+/// Sees to it that a folder may become a crate. Errors, usage: it is a file; the folder above it is not there; it holds something and is no crate.
+fn require_crate(folder: &Path) -> Result<(), Failure> {
     match fs::read_dir(folder).map(|mut entries| entries.next().is_some()) {
-        Ok(true) if ![METADATA, LIST].iter().any(|name| folder.join(name).is_file()) => {
-            Err(Failure::usage(format!("{shown} holds other things than a crate: only a crate is replaced"), another()))
-        }
+        Ok(true) if ![METADATA, LIST].iter().any(|name| folder.join(name).is_file()) => Err(Failure::usage(
+            format!("{} holds other things than a crate: only a crate is replaced", folder.display()),
+            Some("give another place with -o".to_owned()),
+        )),
         Ok(_) => Ok(()),
-        Err(_) => fs::create_dir(folder)
-            .map_err(|error| Failure::usage(format!("the folder {shown} cannot be made: {error}"), another())),
+        Err(error) if error.kind() == ErrorKind::NotFound => require_folder(folder_of(folder)),
+        Err(_) => require_folder(folder),
     }
 }
 

@@ -4,11 +4,13 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use afmid_pipeline::cache::{Freed, Gone, Limits, Sort, Why, free};
+use afmid_pipeline::files::sweep_folders;
 use serde_json::{Value, json};
 
 use super::run::cache_folder;
 use crate::cli::GcArgs;
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::output::print;
 use crate::show::{pretty, size};
 
@@ -19,6 +21,8 @@ const IDLE_DAYS: u64 = 30;
 pub fn run(args: &GcArgs) -> Result<(), Failure> {
     let folder = cache_folder(args.cache.as_deref());
     let limits = Limits { older_than: args.older_than, max_bytes: args.max_size };
+    interrupt::writes_in(&folder);
+    sweep_folders();
     let freed = free(&folder, &limits, args.dry_run).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let told = if args.json { pretty(&as_json(args, &folder, &freed))? } else { as_text(args, &folder, &freed) };
     print(&told)?;

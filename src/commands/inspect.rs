@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use crate::failure::Failure;
 use crate::inspect::{Inspected, Outcome, file_text, folder_text, inspect, inspected_json};
 use crate::output::print;
+use crate::show::pretty;
 
 /// Looks at files, and at the files of folders. Errors: some could not be read; all are told before.
 pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
@@ -24,8 +25,7 @@ pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
     }
     if as_json {
         let files: Vec<Value> = looked.iter().map(inspected_json).collect();
-        let text = serde_json::to_string_pretty(&json!({ "files": files }));
-        print(&(text.map_err(|error| Failure::failed(error, None))? + "\n"))?;
+        print(&pretty(&json!({ "files": files }))?)?;
     }
     let refused = looked.iter().filter(|inspected| matches!(inspected.outcome, Outcome::Refused { .. })).count();
     match refused {

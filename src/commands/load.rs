@@ -19,7 +19,7 @@ pub fn load(path: &Path, set: &[String], stages: &dyn Stages) -> Result<Plan, Fa
 /// Plans a config from its text; `file` is what messages call it. Errors: everything that is wrong with it.
 pub fn plan_text(file: &str, text: &str, set: &[String], stages: &dyn Stages) -> Result<Plan, Failure> {
     graph::load(file, text, set, stages)
-        .map_err(|problems| Failure::Usage(Message::Rendered(render(file, text, &problems))))
+        .map_err(|problems| Failure::Usage(Message::Styled(render(file, text, &problems))))
 }
 
 /// The largest config: a hundred thousand stages.

@@ -7,6 +7,7 @@ use afmid_pipeline::files::replace_with;
 use serde_json::json;
 
 use super::load::plan_text;
+use super::target::require_folder;
 use crate::cli::{New, NewPipelineArgs, NewStageArgs};
 use crate::failure::Failure;
 use crate::output::print;
@@ -31,6 +32,7 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
         let help = "choose another file with -o, or remove it".to_owned();
         return Err(Failure::usage(format!("{} is there already", output.display()), Some(help)));
     }
+    require_folder(folder_of(&output))?;
     let wanted =
         Wanted { goal: args.goal, channel: args.channel.as_deref(), rate_hz: args.rate, unit: args.unit.as_deref() };
     let text = pipeline(&source, wanted, folder_of(&output)).map_err(usage)?;
@@ -57,6 +59,7 @@ fn new_stage(args: &NewStageArgs) -> Result<(), Failure> {
         let help = "choose another folder with -o, or remove it".to_owned();
         return Err(Failure::usage(format!("{} is there already", folder.display()), Some(help)));
     }
+    require_folder(folder_of(&folder))?;
     let (files, next) = match &args.sources {
         Some(sources) if args.rust => {
             let clone =

@@ -10,7 +10,7 @@ use afmid_pipeline::store::read_result;
 use serde_json::json;
 
 use super::open::require_result;
-use super::target::{Target, prepare};
+use super::target::{Target, make_folder, prepare};
 use crate::cli::ReportArgs;
 use crate::failure::Failure;
 use crate::output::print;
@@ -23,6 +23,7 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     require_result(&args.result)?;
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.result));
     prepare(&output, Target::Page, &[("the result file", args.result.clone())])?;
+    args.figures.as_deref().map_or(Ok(()), make_folder)?;
     let run = read_result(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let (results, page) = (folder_of(&args.result), folder_of(&output));
     let page = report(&run, &|name| beside(results, page, name)).map_err(|error| Failure::failed(error, None))?;
@@ -60,11 +61,8 @@ struct Figures {
 }
 
 impl Figures {
-    /// Draws them; nothing is written yet. Errors: the folder cannot be made; a file of others lies in it.
+    /// Draws them; nothing is written yet. Errors: a file of others lies in it.
     fn new(folder: &Path, run: &RunResult, png: bool) -> Result<Self, Failure> {
-        fs::create_dir_all(folder).map_err(|error| {
-            Failure::failed(format!("the folder {} cannot be made: {error}", folder.display()), None)
-        })?;
         let painter = png.then(Painter::new);
         let mut files = Vec::new();
         for (name, text) in figures(run) {

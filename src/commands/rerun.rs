@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::files::temporary_folder;
 use afmid_pipeline::graph::{self, Stages};
 use afmid_pipeline::store::ResultFile;
 use afmid_pipeline::store::write_result;
@@ -9,12 +10,12 @@ use afmid_pipeline::{Plan, SourceFile};
 use serde_json::{Value, json};
 
 use super::diff::open;
-use super::run::{Computation, PROGRAM, compute, open_cache};
+use super::run::{Computation, PROGRAM, compute, open_cache, warn};
 use super::target::{Input, Target, prepare};
 use crate::cli::RerunArgs;
 use crate::diagnostic::render;
 use crate::failure::{Failure, Message};
-use crate::output::{print, say};
+use crate::output::print;
 use crate::provenance::diff::Diff;
 use crate::provenance::differences::results_text;
 use crate::provenance::files::{Finder, Now};
@@ -30,7 +31,7 @@ pub fn run(args: &RerunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     let file = open(&args.result)?;
     let finder = Finder::new(&file.run().info, &args.data);
     require_inputs(&file, &finder)?;
-    let scratch = tempfile::tempdir()
+    let scratch = temporary_folder("rerun")
         .map_err(|error| Failure::failed(format!("no temporary folder can be made: {error}"), None))?;
     let base = base(&file.run().info);
     let (plan, writers) = plan(&file, &base, &finder, scratch.path(), stages)?;
@@ -41,7 +42,7 @@ pub fn run(args: &RerunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     let mut repeated =
         compute(&plan, &Computation { base: &base, cache: &cache, fresh: !args.reuse, jobs: args.jobs, overrides });
     repeated.iter_mut().for_each(|repeated| writers.iter().for_each(|writer| writer.put_back(repeated)));
-    cache.take_notes().iter().for_each(|note| say(&format!("note: {note}\n")));
+    warn(&cache);
     let failed = |error: &afmid_pipeline::error::StoreError| Failure::failed(error, error.help.clone());
     write_result(&output, &repeated?).map_err(|error| failed(&error))?;
     let diff = Diff::of(&file, &open(&output)?).map_err(|error| failed(&error))?;
@@ -78,7 +79,7 @@ fn plan(
     let name = config_path(&run.info).display().to_string();
     let load = |sets: &[String]| {
         graph::load(&name, &run.config, sets, stages)
-            .map_err(|problems| Failure::Usage(Message::Rendered(render(&name, &run.config, &problems))))
+            .map_err(|problems| Failure::Usage(Message::Styled(render(&name, &run.config, &problems))))
     };
     let plan = load(&run.overrides)?;
     let writers = writers(&plan, base, scratch);

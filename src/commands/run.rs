@@ -4,6 +4,7 @@ use std::num::NonZeroU16;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::cache::Cache;
+use afmid_pipeline::files::sweep_folders;
 use afmid_pipeline::graph::Stages;
 use afmid_pipeline::runner::{Failed, Options, RunError, run as run_plan, run_to_file};
 use afmid_pipeline::{Plan, RunResult};
@@ -14,8 +15,10 @@ use super::sweep;
 use super::target::{Input, Target, prepare};
 use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
+use crate::interrupt;
 use crate::output::{print, say};
 use crate::progress::observer;
+use crate::relative::folder_of;
 use crate::show::pretty;
 
 /// The program and its version, as results state it.
@@ -37,10 +40,10 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
         jobs: args.jobs,
         overrides: &plan.config.overrides,
     };
+    written_folders(&plan);
     let result = computation.run(|options| run_to_file(&plan, options, &output));
-    for note in cache.take_notes() {
-        say(&format!("note: {note}\n"));
-    }
+    warn(&cache);
+    interrupt::check()?;
     let result = result?.map_err(|failed| match failed {
         Failed::Stages(errors) => stages_failed(&errors),
         Failed::File(error) => Failure::failed(&error, error.help.clone()),
@@ -51,9 +54,29 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     print(&format!("{}: {}\n", output.display(), told(&result)))
 }
 
-/// The cache that was asked for, or the user's.
+/// The cache that was asked for, or the user's. What killed processes left in it and in the system's folder for temporary files is removed.
 pub fn open_cache(folder: Option<&Path>) -> Cache {
-    Cache::open(&cache_folder(folder))
+    let folder = cache_folder(folder);
+    interrupt::writes_in(&folder);
+    interrupt::writes_in(&folder.join("stamps"));
+    sweep_folders();
+    Cache::open(&folder)
+}
+
+/// The stages that write files (`simulate.afm`) do it in the folder that a parameter names, or beside the file that it names.
+pub fn written_folders(plan: &Plan) {
+    for node in &plan.nodes {
+        for place in node.stage.location_params().iter().filter_map(|name| node.params.get(name)?.as_str()) {
+            let place = plan.config.base().join(place);
+            interrupt::writes_in(folder_of(&place));
+            interrupt::writes_in(&place);
+        }
+    }
+}
+
+/// Says what is wrong with a cache: a run goes on to its result all the same.
+pub fn warn(cache: &Cache) {
+    cache.take_notes().iter().for_each(|note| say(&format!("warning: {note}\n")));
 }
 
 /// The folder of the cache that was asked for, or the user's.
@@ -78,7 +101,7 @@ pub struct Computation<'a> {
 impl Computation<'_> {
     /// Runs `work` on its threads, with progress on stderr. Errors: there are no threads.
     fn run<T: Send>(&self, work: impl FnOnce(&Options<'_>) -> T + Send) -> Result<T, Failure> {
-        let observer = observer();
+        let (observer, _run) = (observer(), interrupt::Run::begin());
         let options = Options {
             base: self.base.to_owned(),
             cache: self.cache,
@@ -98,7 +121,10 @@ impl Computation<'_> {
 
 /// Computes a plan with progress on stderr. Errors: those of its stages.
 pub fn compute(plan: &Plan, how: &Computation) -> Result<RunResult, Failure> {
-    how.run(|options| run_plan(plan, options))?.map_err(|errors| stages_failed(&errors))
+    written_folders(plan);
+    let result = how.run(|options| run_plan(plan, options))?;
+    interrupt::check()?;
+    result.map_err(|errors| stages_failed(&errors))
 }
 
 fn stages_failed(errors: &[RunError]) -> Failure {

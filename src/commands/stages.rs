@@ -16,7 +16,7 @@ use crate::show::pretty;
 pub fn run(name: Option<&str>, as_json: bool, registry: &Registry) -> Result<(), Failure> {
     let Some(name) = name else {
         if as_json {
-            return print(&pretty(&registry.entries().iter().map(described).collect())?);
+            return print(&pretty(&registry.entries().iter().map(described).collect::<Vec<_>>())?);
         }
         let width = registry.entries().iter().map(|entry| entry.spec.name.len()).max().unwrap_or(0);
         let line = |entry: &Entry| format!("{:width$}  {}\n", entry.spec.name, entry.spec.summary);

@@ -6,13 +6,15 @@ use std::time::Instant;
 use afmid_pipeline::{Artifact, Plan};
 use serde_json::{Value, json};
 
-use super::run::{PROGRAM, default_output, open_cache};
+use super::batch::ledger;
+use super::run::{PROGRAM, default_output, open_cache, warn, written_folders};
 use crate::batch::ledger::{Entry, Ledger};
 use crate::batch::summary::{SWEEP, Tables, Title};
 use crate::batch::work::{Done, Work, all};
 use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
-use crate::output::{print, say};
+use crate::interrupt;
+use crate::output::print;
 use crate::progress::Sets;
 use crate::show::{artifact_text, pretty};
 use crate::sweep::point::{self, Point};
@@ -22,10 +24,7 @@ use crate::sweep::table::{shown, table};
 pub fn run(plan: &Plan, count: usize, args: &RunArgs) -> Result<(), Failure> {
     let clock = Instant::now();
     let folder = folder(plan, args)?;
-    let ledger = Ledger::open(&folder).map_err(|error| {
-        let help = "give another folder with -o".to_owned();
-        Failure::usage(format!("the folder {} cannot be made: {error}", folder.display()), Some(help))
-    })?;
+    let ledger = ledger(&folder)?;
     let tables = Tables::open(&folder, SWEEP)?;
     let points = computed(plan, count, args, &ledger)?;
     let title = Title { name: plan.name(), seed: plan.seed(), config: plan.config_text(), program: PROGRAM };
@@ -77,7 +76,8 @@ fn computed(plan: &Plan, count: usize, args: &RunArgs, ledger: &Ledger) -> Resul
         retry_failed: true,
         as_run: true,
     };
-    let progress = Sets::new("points", count);
+    written_folders(plan);
+    let (progress, run) = (Sets::new("points", count), interrupt::Run::begin());
     let one = |&index: &usize| match plan.point(index) {
         Ok(point) => pool.install(|| work.one(&point::name(index), &point)),
         Err(problems) => {
@@ -88,7 +88,9 @@ fn computed(plan: &Plan, count: usize, args: &RunArgs, ledger: &Ledger) -> Resul
     let indices: Vec<usize> = (0..count).collect();
     // one at a time: two at once would both compute what they share
     let done = all(&indices, 1, one, |done| progress.ended(done));
-    cache.take_notes().iter().for_each(|note| say(&format!("note: {note}\n")));
+    drop((progress, run));
+    warn(&cache);
+    interrupt::check()?;
     Ok((0..).zip(done).map(|(index, done)| Point { values: plan.values(index), done }).collect())
 }
 

@@ -8,8 +8,11 @@ use std::path::{Path, PathBuf};
 use afmid_pipeline::files::{has_mark, open_regular, probe, states_mark, sweep_beside};
 use afmid_pipeline::store::{FileKind, Written, file_kind, written};
 
+use crate::batch::shell::quoted;
 use crate::export::is_exported;
 use crate::failure::Failure;
+use crate::interrupt;
+use crate::relative::folder_of;
 use crate::report::is_page;
 
 /// What is to be written.
@@ -66,10 +69,9 @@ impl Target {
 /// An input of the command, and what it is to it.
 pub type Input = (&'static str, PathBuf);
 
-/// Sees to it, before anything runs, that `path` can be written and that nothing is lost by it. Makes its folder if only that is missing, and removes what
-/// killed commands left beside it.
+/// Sees to it, before anything runs, that `path` can be written and that nothing is lost by it. Removes what killed commands left beside it.
 ///
-/// Errors, all usage: it is an input; it exists and is no regular file, or a file of another kind; its folder cannot be made or written.
+/// Errors, all usage: it is an input; it exists and is no regular file, or a file of another kind; its folder is not there or cannot be written.
 pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Failure> {
     let shown = path.display();
     match fs::metadata(path) {
@@ -88,18 +90,16 @@ pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Fail
     if path.file_name().is_none() {
         return Err(usage(format!("{shown} is a folder, wanted a file"), ANOTHER));
     }
-    make_folder(path)?;
+    require_folder(folder_of(path))?;
+    interrupt::writes_in(folder_of(path));
     sweep_beside(path);
     probe(path).map_err(|error| match error.kind() {
         ErrorKind::InvalidFilename => {
             usage(format!("{shown} cannot be written: its name is too long ({error})"), ANOTHER)
         }
         _ => {
-            let folder = folder(path).unwrap_or(Path::new("."));
-            usage(
-                format!("{shown} cannot be written: no file can be made in its folder {} ({error})", folder.display()),
-                ANOTHER,
-            )
+            let folder = folder_of(path).display();
+            usage(format!("{shown} cannot be written: no file can be made in its folder {folder} ({error})"), ANOTHER)
         }
     })
 }
@@ -153,31 +153,49 @@ fn odd(metadata: &Metadata) -> &'static str {
         "a pipe"
     } else if kind.is_socket() {
         "a socket"
+    } else if kind.is_file() {
+        "a file"
     } else {
         "no regular file"
     }
 }
 
-fn folder(path: &Path) -> Option<&Path> {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty())
+/// Sees to it that a file can be made in a folder as far as the folder goes: one that is missing is most likely a misspelt path.
+///
+/// Errors, usage: it is not there, or no folder.
+pub fn require_folder(folder: &Path) -> Result<(), Failure> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    let shown = folder.display();
+    Err(match fs::metadata(folder) {
+        Ok(metadata) => usage(format!("{shown} is {}, wanted a folder", odd(&metadata)), ANOTHER),
+        Err(error) if error.kind() == ErrorKind::NotADirectory => {
+            usage(format!("{shown} cannot be a folder: what lies above it is none ({error})"), ANOTHER)
+        }
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            usage(format!("the folder {shown} cannot be looked at: {error}"), ANOTHER)
+        }
+        Err(_) => {
+            let help = format!("make it first (mkdir -p {}), or {ANOTHER}", quoted(folder));
+            usage(format!("the folder {shown} does not exist"), &help)
+        }
+    })
 }
 
-/// One level only: more missing folders are most likely a misspelt path.
-fn make_folder(path: &Path) -> Result<(), Failure> {
-    let Some(folder) = folder(path) else { return Ok(()) };
+/// A folder that a command fills (the results of a batch, figures), made if only that is missing. Errors, usage: the folder above it is not
+/// there; it cannot be made; it is a file.
+pub fn make_folder(folder: &Path) -> Result<(), Failure> {
+    interrupt::writes_in(folder);
+    if folder.is_dir() {
+        return Ok(());
+    }
+    require_folder(folder_of(folder))?;
     match fs::create_dir(folder) {
         Ok(()) => Ok(()),
+        // another process was faster
         Err(_) if folder.is_dir() => Ok(()),
-        Err(error) => {
-            let shown = folder.display();
-            Err(match error.kind() {
-                ErrorKind::NotFound => usage(
-                    format!("the folder {shown} does not exist, nor does the one above it"),
-                    "make it first, or give another place with -o",
-                ),
-                ErrorKind::AlreadyExists => usage(format!("{shown} is a file, wanted a folder"), ANOTHER),
-                _ => usage(format!("the folder {shown} cannot be made: {error}"), ANOTHER),
-            })
-        }
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => require_folder(folder),
+        Err(error) => Err(usage(format!("the folder {} cannot be made: {error}", folder.display()), ANOTHER)),
     }
 }

@@ -1,9 +1,11 @@
 //! Assembles the page.
 
+use std::borrow::Cow;
+
 use afmid_pipeline::files::marked;
 use afmid_pipeline::{Document, Recording, RunResult};
-use minijinja::Environment;
-use minijinja::value::Serde;
+use minijinja::value::{Serde, Value as Text};
+use minijinja::{Environment, Output, State, escape_formatter};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -16,6 +18,7 @@ use super::number::{bytes, duration, quantity, with_error};
 use super::palette;
 use super::paper::{self, Drawn};
 use super::view::{Fact, Head, Picture, Section, StageView, TableView, Tile};
+use crate::printable::printable;
 
 /// Bytes that the figures of the sections, and of the stages, may take together, so that the page stays under 5 MB.
 const SECTION_FIGURES: usize = 2_500_000;
@@ -65,6 +68,7 @@ pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportE
         .map(|stage| (stage.id.clone(), stage.result.warnings.clone()))
         .collect();
     let mut environment = Environment::new();
+    environment.set_formatter(shown_text);
     environment.add_template("report.html", include_str!("template.html"))?;
     let page = Page {
         name: &run.name,
@@ -92,6 +96,14 @@ pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportE
 /// Whether a file that begins with these bytes is a page of [`report`]: pages of earlier versions bear no mark.
 pub(crate) fn is_page(head: &[u8]) -> bool {
     String::from_utf8_lossy(head).contains("<meta name=\"generator\" content=\"afmid")
+}
+
+/// As text of the page, escaped; what acts on a page instead of being seen (controls, marks of direction) as printable escapes.
+fn shown_text(out: &mut Output, state: &mut State, value: &Text) -> Result<(), minijinja::Error> {
+    match value.as_str().filter(|_| !value.is_safe()).map(printable) {
+        Some(Cow::Owned(text)) => escape_formatter(out, state, &Text::from(text)),
+        _ => escape_formatter(out, state, value),
+    }
 }
 
 /// A batch's own; or the diagnosis first, where there is one: it is what the run was for.

@@ -67,9 +67,10 @@ const CRATES: [Crate; 4] = [
         name: "afmid",
         src: "src",
         floors: &[
-            &["failure", "diagnostic", "relative", "export"],
+            &["printable", "relative", "export"],
+            &["failure", "diagnostic"],
             &["output"],
-            &["show"],
+            &["interrupt", "show"],
             &["provenance", "inspect", "doctor"],
             &["batch"],
             &["cli", "progress", "sweep", "report"],

@@ -1,1 +1,184 @@
-//! Kills at random moments leave whole files or none.
+//! Kills at random moments leave whole files or none, and nothing beside them after the next run or `gc`.
+
+use std::path::Path;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use super::common::{config, files, sets, simulated};
+use super::leftovers::Place;
+
+/// xorshift: the same moments every time, as far as the machine is equally fast.
+struct Random(u64);
+
+impl Random {
+    /// From 0 to 1.
+    fn share(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// How long a command takes that nobody kills.
+fn whole(place: &Place, arguments: &[&str]) -> Duration {
+    let clock = Instant::now();
+    let output = place.command(arguments).output().expect("afmid starts");
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    clock.elapsed()
+}
+
+/// Kills a command at a moment between its start and a little after its usual end. Whether it had not ended before.
+fn kill(place: &Place, arguments: &[&str], usual: Duration, random: &mut Random) -> bool {
+    let mut command = place.command(arguments);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("afmid starts");
+    std::thread::sleep(usual.mul_f64(1.1 * random.share()));
+    // SIGKILL; it may have ended by itself
+    let _ = child.kill();
+    child.wait().expect("it is gone").code().is_none()
+}
+
+/// A file is not there, or has the datasets of another.
+fn assert_whole_or_none(file: &Path, like: &Path) {
+    if file.exists() {
+        assert_eq!(afmid_pipeline::store::compare(like, file).expect("a whole result"), [], "{}", file.display());
+    }
+}
+
+/// The next run has swept what it writes, `gc` the cache.
+fn assert_nothing_left(place: &Place) {
+    whole(place, &["gc"]);
+    assert_eq!(place.leftovers(), Vec::<std::path::PathBuf>::new());
+}
+
+#[test]
+fn a_killed_run_loses_nothing_that_was_finished() {
+    let place = Place::new();
+    let archive = simulated(place.folder(), "archive", 4, 9);
+    let (config, set) = (config("free-lever.toml"), files(&archive.folder));
+    let run = |result: &str, more: &[&str]| {
+        let arguments = [&["run", &config, "--set", &set, "-o", result][..], more].concat();
+        arguments.into_iter().map(str::to_owned).collect::<Vec<String>>()
+    };
+    let reference = run("whole.h5", &["--cache", "other"]);
+    let reference: Vec<&str> = reference.iter().map(String::as_str).collect();
+    let usual = whole(&place, &reference);
+    let (mut random, mut killed, mut most_reused) = (Random(0x2545_f491_4f6c_dd1d), 0, 0);
+    for round in 0..30 {
+        // every tenth round starts from an empty cache, so that kills hit all stages
+        if round % 10 == 0 {
+            std::fs::remove_dir_all(place.path("cache")).expect("removed");
+        }
+        let result = format!("r{round}.h5");
+        let arguments = run(&result, &[]);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        killed += usize::from(kill(&place, &arguments, usual, &mut random));
+        assert_whole_or_none(&place.path(&result), &place.path("whole.h5"));
+        let told = place.command(&["explain", &config, "--set", &set]).output().expect("afmid starts");
+        let told = String::from_utf8_lossy(&told.stdout).into_owned();
+        most_reused = most_reused.max(told.lines().filter(|line| line.contains("reuse")).count());
+    }
+    assert!(killed > 0, "no kill came before the end of a run: the test showed nothing");
+    assert!(most_reused > 0, "no finished stage was ever kept");
+    // the next runs complete from what is there
+    for round in 0..30 {
+        let result = format!("r{round}.h5");
+        let arguments = run(&result, &[]);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        if !place.path(&result).exists() || round == 29 {
+            whole(&place, &arguments);
+        }
+        assert_whole_or_none(&place.path(&result), &place.path("whole.h5"));
+    }
+    println!("{killed} of 30 runs of the lean pipeline killed before their end");
+    assert_nothing_left(&place);
+}
+
+/// 170 more, over everything that writes, on records that take milliseconds.
+#[test]
+fn nothing_that_writes_leaves_a_broken_file_when_it_is_killed() {
+    let place = Place::new();
+    std::fs::write(place.path("census.toml"), sets::CENSUS).expect("a config");
+    let swept = format!("{}\n[sweep]\ncensus.min_bandwidth_share = [0.01, 0.02, 0.03, 0.04]\n", sets::CENSUS);
+    std::fs::write(place.path("swept.toml"), swept).expect("a config");
+    (0..6).for_each(|set| sets::write_set(&place.path(&format!("set-{set}")), set, 3000));
+    let here = "records.files=['set-0']";
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut killed = [0; 5];
+
+    // run: fresh, so that each has everything to write
+    let run = ["run", "census.toml", "--set", here, "-o", "run.h5", "--fresh"];
+    let usual = whole(&place, &run);
+    std::fs::rename(place.path("run.h5"), place.path("whole.h5")).expect("renamed");
+    for _ in 0..60 {
+        let _ = std::fs::remove_file(place.path("run.h5"));
+        killed[0] += usize::from(kill(&place, &run, usual, &mut random));
+        assert_whole_or_none(&place.path("run.h5"), &place.path("whole.h5"));
+    }
+    whole(&place, &run);
+
+    // batch: each goes on where the last was killed, until all are done; then anew
+    let sets: Vec<String> = (0..6).map(|set| format!("set-{set}")).collect();
+    let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+    let batch = |out: &'static str| [&["batch", "census.toml", "-o", out, "--fresh"][..], &sets].concat();
+    let usual = whole(&place, &batch("whole"));
+    for _ in 0..40 {
+        killed[1] += usize::from(kill(&place, &batch("out"), usual, &mut random));
+        for set in &sets {
+            let (result, entry) = (format!("out/{set}.h5"), place.path(&format!("out/ledger/{set}.json")));
+            assert_whole_or_none(&place.path(&result), &place.path(&format!("whole/{set}.h5")));
+            if let Ok(text) = std::fs::read_to_string(&entry) {
+                let entry: serde_json::Value = serde_json::from_str(&text).expect("a whole entry");
+                assert!(entry["error"].is_null(), "{text}");
+            }
+        }
+        for table in ["summary.h5", "summary.csv", "summary.parquet", "trends.csv"] {
+            let [made, like] = ["out", "whole"].map(|folder| std::fs::read(place.path(folder).join(table)).ok());
+            assert!(made.is_none() || made == like, "{table} is broken");
+        }
+    }
+    whole(&place, &batch("out"));
+
+    // sweep
+    let sweep = |out: &'static str| ["run", "swept.toml", "--set", here, "-o", out, "--fresh"];
+    let usual = whole(&place, &sweep("points"));
+    std::fs::rename(place.path("points"), place.path("whole-points")).expect("renamed");
+    for _ in 0..30 {
+        killed[2] += usize::from(kill(&place, &sweep("points"), usual, &mut random));
+        for name in (1..=4).map(|point| format!("point_{point:05}.h5")).chain(["summary.h5".to_owned()]) {
+            assert_whole_or_none(&place.path("points").join(&name), &place.path("whole-points").join(&name));
+        }
+    }
+    whole(&place, &sweep("points"));
+
+    // report: the same page every time
+    let report = ["report", "whole/summary.h5", "-o", "page.html", "--figures", "figures"];
+    let usual = whole(&place, &report);
+    let page = std::fs::read(place.path("page.html")).expect("a page");
+    for _ in 0..25 {
+        let _ = std::fs::remove_file(place.path("page.html"));
+        killed[3] += usize::from(kill(&place, &report, usual, &mut random));
+        assert!(std::fs::read(place.path("page.html")).map_or(true, |made| made == page), "half a page");
+    }
+    whole(&place, &report);
+
+    // gc: whatever it has freed, what is left is whole
+    let gc = ["gc", "--older-than", "0s"];
+    whole(&place, &run);
+    let usual = whole(&place, &gc);
+    for _ in 0..15 {
+        whole(&place, &run);
+        killed[4] += usize::from(kill(&place, &gc, usual, &mut random));
+        let next =
+            place.command(&["run", "census.toml", "--set", here, "-o", "run.h5"]).output().expect("afmid starts");
+        let told = String::from_utf8_lossy(&next.stderr).into_owned();
+        assert!(next.status.success() && !told.contains("warning"), "{told}");
+        assert_whole_or_none(&place.path("run.h5"), &place.path("whole.h5"));
+    }
+    let [runs, batches, sweeps, reports, gcs] = killed;
+    println!(
+        "killed before their end: {runs} of 60 runs, {batches} of 40 batches, {sweeps} of 30 sweeps, {reports} of 25 reports, {gcs} of 15 gc"
+    );
+    assert!(killed.iter().sum::<usize>() > 50, "{killed:?}: most had ended, the test shows little");
+    assert_nothing_left(&place);
+}

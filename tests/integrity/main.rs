@@ -14,6 +14,7 @@ mod inputs;
 mod interrupts;
 mod keys;
 mod kills;
+mod leftovers;
 mod limits;
 mod ownership;
 mod paths;

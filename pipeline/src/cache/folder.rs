@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
 use super::names::{Kind, STAMPS, kind_of};
@@ -18,18 +18,25 @@ use crate::store::{StageIdentity, read_stage};
 #[derive(Debug)]
 pub struct Cache {
     folder: PathBuf,
-    notes: Mutex<Vec<String>>,
+    notes: Mutex<Notes>,
+}
+
+#[derive(Debug, Default)]
+struct Notes {
+    texts: Vec<String>,
+    /// It was said that results are not kept.
+    unkept: bool,
 }
 
 impl Cache {
     /// Opens the cache in `folder`, makes the folder if it is missing, and removes what killed runs left.
     ///
-    /// Where the folder cannot be made, nothing is found and nothing kept, and [`Cache::take_notes`] says so: a run goes on to its result.
+    /// Where the folder cannot be made, nothing is found and nothing kept, and [`Cache::take_notes`] says so, once: a run goes on to its result.
     pub fn open(folder: &Path) -> Self {
         let cache = Self { folder: folder.to_owned(), notes: Mutex::default() };
         match cache.make_folder() {
             Ok(()) => [folder, &folder.join(STAMPS)].into_iter().for_each(sweep),
-            Err(error) => cache.note(format!("nothing is kept: {error}")),
+            Err(error) => cache.unkept(&error),
         }
         cache
     }
@@ -40,9 +47,8 @@ impl Cache {
     }
 
     fn make_folder(&self) -> Result<(), StoreError> {
-        fs::create_dir_all(&self.folder).map_err(|error| {
-            StoreError::io("the cache folder cannot be made", &self.folder, &error).help("choose another with --cache")
-        })
+        fs::create_dir_all(&self.folder)
+            .map_err(|error| StoreError::io("its folder cannot be made", &self.folder, &error))
     }
 
     /// The folder.
@@ -105,11 +111,11 @@ impl Cache {
         result: &StageResult,
     ) -> Result<PendingStage, StoreError> {
         self.make_folder()?;
-        // only explanations need it: a run does not fail for it
-        if let Err(error) = origin.write(&self.origin_path(&origin.key)) {
-            self.note(format!("where a result comes from was not kept: {error}"));
-        }
-        PendingStage::write(&self.path(&origin.key), identity, result)
+        let explained = origin.write(&self.origin_path(&origin.key));
+        let pending = PendingStage::write(&self.path(&origin.key), identity, result)?;
+        // only explanations need the origin: the result is kept without
+        explained.unwrap_or_else(|error| self.unkept(&error));
+        Ok(pending)
     }
 
     /// The origin of the result with this key, whether the result is still there or not.
@@ -133,13 +139,30 @@ impl Cache {
     }
 
     /// Something that the user should know.
-    pub(crate) fn note(&self, note: String) {
-        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note);
+    fn note(&self, note: String) {
+        self.notes().texts.push(note);
     }
 
-    /// Notes about damaged files since the last call.
+    /// A result that is not kept costs the next run its time, and this one nothing. What stops one stops the others as a rule (a full disk, a
+    /// folder that may only be read): the first is told, and no more.
+    pub(crate) fn unkept(&self, error: &StoreError) {
+        let mut notes = self.notes();
+        if !std::mem::replace(&mut notes.unkept, true) {
+            let folder = self.folder.display();
+            notes.texts.push(format!(
+                "the cache {folder} cannot be written, the next run computes again what this one does not keep: {error}\n  \
+                 help: make room or choose another with --cache"
+            ));
+        }
+    }
+
+    /// What the user should know of damaged files and of results that are not kept, since the last call.
     pub fn take_notes(&self) -> Vec<String> {
-        std::mem::take(&mut self.notes.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut self.notes().texts)
+    }
+
+    fn notes(&self) -> MutexGuard<'_, Notes> {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -6,6 +6,7 @@ mod filled_folder;
 pub(crate) mod fixture;
 mod known_hashes;
 mod mark;
+mod own;
 mod replace;
 mod temporary;
 
@@ -14,6 +15,7 @@ pub(crate) use file_state::FileState;
 pub use filled_folder::{FilledFolder, LIST};
 pub(crate) use known_hashes::KnownHashes;
 pub use mark::{MARK, has_mark, marked, states_mark};
+pub use own::{sweep_folders, sweep_own, temporary_folder};
 pub(crate) use replace::{Replacement, replace_unsynced};
 pub use replace::{probe, replace_file, replace_with};
 pub(crate) use temporary::{TemporaryName, host, stale, temporary_path};

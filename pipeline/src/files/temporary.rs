@@ -81,6 +81,11 @@ impl<'a> TemporaryName<'a> {
         (is_host && !target.is_empty()).then_some(Self { target, host, pid, started })
     }
 
+    /// Whether this process is its owner.
+    pub(super) fn is_own(&self) -> bool {
+        self.host == host() && self.pid == std::process::id()
+    }
+
     /// Whether its owner is known to live, or to be gone; none if nothing tells.
     fn lives(&self) -> Option<bool> {
         if self.host != host() {

@@ -7,6 +7,7 @@
 //! Nothing starts without consent for command, folder and the bytes of its files. A process is started once per worker and reused over items. Nothing that it does is trusted: lines are bounded, times are limited, what it
 //! made is checked before it is stored, and whatever goes wrong is an error that names the plugin.
 
+mod children;
 mod conformance;
 mod consent;
 mod describe;
@@ -22,6 +23,7 @@ mod schema;
 mod session;
 mod stage;
 
+pub use children::kill_children;
 pub use conformance::{Check, check};
 pub use consent::{Ask, Candidate, MadeOf, Rule, Trust, Trusted, is_seal};
 pub use error::PluginError;

@@ -12,8 +12,8 @@ use super::error::PluginError;
 use super::launch::Launch;
 use super::message::{Handshake, Introduction, Progress, Reply};
 use super::pool::Pool;
-use super::process::{FOLDER, Process, shown};
-use crate::files::host;
+use super::process::{Process, shown};
+use crate::files::temporary_folder;
 
 /// A plugin that was started and has introduced itself, with a folder for what is exchanged.
 #[derive(Debug)]
@@ -40,8 +40,7 @@ impl Session {
             let what = format!("needs a temporary folder, and none can be made: {error}");
             PluginError::new(what, "check TMPDIR and the space on its disk")
         };
-        let prefix = format!("{FOLDER}{}.{}.", host(), std::process::id());
-        let folder = tempfile::Builder::new().prefix(&prefix).tempdir().map_err(none)?;
+        let folder = temporary_folder("plugin").map_err(none)?;
         let temporary = folder.path().join("tmp");
         std::fs::create_dir(&temporary).map_err(none)?;
         let mut process = Process::start(launch, pool.host.as_ref(), folder.path(), &temporary)?;

@@ -41,25 +41,41 @@ impl Scratch {
         &self.beside
     }
 
-    /// A new file without a name: it goes with its last handle, also in a kill. Errors: the folder cannot be made or written.
+    /// A new file without a name: it goes with its last handle, also in a kill. Errors: no folder can be made or written.
     pub(crate) fn file(&self) -> Result<File, StageError> {
-        let path = temporary_path(&self.beside);
         // a cache that cannot be written stops no run
-        let elsewhere = temporary_path(&std::env::temp_dir().join(TITLE));
-        unnamed(&path).or_else(|error| unnamed(&elsewhere).map_err(|_| error)).map_err(|error| {
+        let made = unnamed(&self.beside).or_else(|error| self.elsewhere().map_err(|_| error));
+        made.map_err(|error| {
             StageError::new(format!("a temporary file for rows of events cannot be made: {error}"))
-                .at(path.parent().unwrap_or(&path))
-                .help("choose another folder with --cache")
+                .at(self.beside.parent().unwrap_or(&self.beside))
+                .help("choose another folder with --cache, or set TMPDIR")
         })
+    }
+
+    /// The same in the system's folder for temporary files. Errors: that cannot be written either.
+    pub(crate) fn elsewhere(&self) -> std::io::Result<File> {
+        unnamed(&std::env::temp_dir().join(TITLE))
     }
 }
 
-/// A new file at a path where nothing lies, without its name.
-fn unnamed(path: &Path) -> std::io::Result<File> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder)?;
+/// A new file without a name in the folder of `beside`.
+fn unnamed(beside: &Path) -> std::io::Result<File> {
+    let path = temporary_path(beside);
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let mut options = OpenOptions::new();
+    options.read(true).write(true);
+    #[cfg(target_os = "linux")]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        let nameless = i32::try_from(rustix::fs::OFlags::TMPFILE.bits());
+        let made = nameless.map(|flag| options.clone().custom_flags(flag).mode(0o600).open(folder));
+        if let Ok(Ok(file)) = made {
+            return Ok(file);
+        }
     }
-    let file = OpenOptions::new().read(true).write(true).create_new(true).open(path)?;
+    // not every file system has files that never had a name
+    let file = options.create_new(true).open(&path)?;
     // a kill between these two leaves an empty file, which the next sweep takes
     fs::remove_file(path)?;
     Ok(file)

@@ -26,6 +26,10 @@ pub trait Observer: Send + Sync {
     fn begin(&self, id: &str) -> Box<dyn Progress + '_>;
     /// A stage has ended, or its result came from the cache.
     fn end(&self, id: &str, cached: bool, took: Duration, warnings: &[String]);
+    /// Whether no further stage shall begin: the run fails, what has succeeded is kept.
+    fn is_stopped(&self) -> bool {
+        false
+    }
 }
 
 /// Nobody watches.
@@ -181,6 +185,9 @@ fn step(
     made: &mpsc::Sender<Made>,
 ) -> Result<Finished, StageError> {
     let (clock, node) = (Instant::now(), &plan.nodes[index]);
+    if options.observer.is_stopped() {
+        return Err(StageError::new("was not run: the run was stopped"));
+    }
     let upstream = |index: usize| board.done(index).map(|finished| &finished.origin);
     let planned = plan_node(plan, node, around, &upstream)?;
     let spec = node.stage.spec();

@@ -58,7 +58,7 @@ pub(super) fn keep(
                         // the other end lives until this one goes
                         let _ = written.send(Unsynced::Stage(file));
                     }
-                    Err(error) => unkept(cache, &error),
+                    Err(error) => cache.unkept(&error),
                 }
             }
             if let Some(Ok(_)) = result {
@@ -83,16 +83,11 @@ pub(super) fn keep(
     result
 }
 
-/// A result that is not kept costs the next run its time, and this one nothing.
-fn unkept(cache: &Cache, error: &StoreError) {
-    cache.note(format!("a stage's result is not kept, the next run computes it again: {error}"));
-}
-
 /// Sends files to the disk and puts those of stages in their places.
 fn finish(written: Receiver<Unsynced>, cache: &Cache) {
     for unsynced in written {
         match unsynced {
-            Unsynced::Stage(file) => file.finish().unwrap_or_else(|error| unkept(cache, &error)),
+            Unsynced::Stage(file) => file.finish().unwrap_or_else(|error| cache.unkept(&error)),
             // the end of the file is waited for in any case, and says what is wrong
             Unsynced::Share(file) => drop(file.sync_data()),
         }

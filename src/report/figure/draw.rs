@@ -7,6 +7,7 @@ use super::decimate::decimate;
 use super::layout::Panel;
 use super::mark::{Band, Ellipse, Line, Mark, Marker, Points, Rule, Stroke};
 use super::svg::{escape, px};
+use crate::printable::printable;
 
 /// Where a panel's plot area lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,7 +106,7 @@ fn open(out: &mut String, panel: &Panel, map: &Map) {
         };
         let unit = if axis.style == TickStyle::Prefixed { &axis.unit } else { &resolved.unit };
         serde_json::json!({
-            "label": axis.label, "unit": unit, "factor": resolved.factor, "style": style, "bare": axis.hide_labels,
+            "label": printable(&axis.label), "unit": printable(unit), "factor": resolved.factor, "style": style, "bare": axis.hide_labels,
             "log": resolved.log, "low": resolved.low, "high": resolved.high,
         })
     };
