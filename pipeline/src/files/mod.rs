@@ -18,5 +18,7 @@ pub use mark::{MARK, has_mark, marked, states_mark};
 pub use own::{sweep_folders, sweep_own, temporary_folder};
 pub(crate) use replace::{Replacement, replace_unsynced};
 pub use replace::{probe, replace_file, replace_with};
-pub(crate) use temporary::{TemporaryName, host, stale, temporary_path};
+#[cfg(test)]
+pub(crate) use temporary::host;
+pub(crate) use temporary::{TemporaryName, stale, temporary_path};
 pub use temporary::{sweep, sweep_beside};
