@@ -1,8 +1,11 @@
 # The two commands: `make demo` runs the main job, `make test` passes the tests.
-.PHONY: deps test-deps demo test test-interop test-slurm lint book
+.PHONY: deps test-deps demo test test-interop test-slurm lint book fuzz
 
 CMAKE_VERSION = 3.31.6
 MDBOOK_VERSION = 0.5.4
+CARGO_FUZZ_VERSION = 0.13.2
+# how long `make fuzz` runs each target
+SECONDS = 60
 
 # What a plain `cargo build --release` needs beside cargo and a C compiler.
 deps: .tools/bin/cmake
@@ -38,6 +41,7 @@ test-slurm: deps .tools/snakemake/installed
 
 lint: deps
 	cargo fmt --all --check
+	cargo fmt --manifest-path fuzz/Cargo.toml --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 
@@ -47,6 +51,13 @@ book: .tools/mdbook/bin/mdbook
 
 .tools/mdbook/bin/mdbook:
 	cargo install --quiet --locked --root .tools/mdbook --no-default-features --features search --version $(MDBOOK_VERSION) mdbook
+
+# Every fuzz target for SECONDS s each, from the corpus in fuzz/corpus; prints a table, fails if something is found. Needs g++ (docs/reliability.md).
+fuzz: deps .tools/cargo-fuzz/bin/cargo-fuzz
+	fuzz/run.sh $(SECONDS)
+
+.tools/cargo-fuzz/bin/cargo-fuzz:
+	cargo install --quiet --locked --root .tools/cargo-fuzz --version $(CARGO_FUZZ_VERSION) cargo-fuzz
 
 # HDF5 is built from source and wants CMake >= 3.26; PyPI's is newer than many systems'.
 .tools/bin/cmake:

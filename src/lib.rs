@@ -27,6 +27,8 @@ use afmid_pipeline::Registry;
 use afmid_pipeline::stage::DoubleName;
 use clap::FromArgMatches;
 
+#[doc(hidden)]
+pub use commands::doors;
 use failure::{Failure, Message};
 
 /// The built-in stages: add your own with [`Registry::with`]. Errors: two of one name.

@@ -7,6 +7,7 @@ mod completions;
 mod diff;
 mod docs;
 mod doctor;
+pub mod doors;
 mod exam;
 mod explain;
 mod export;

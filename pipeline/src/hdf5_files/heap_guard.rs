@@ -94,14 +94,14 @@ fn walk_is_endless(collection: &[u8]) -> bool {
     let Some(size) = length_at(collection, 8) else { return false };
     let size = size.min(collection.len());
     let mut place = HEADER;
-    while place + HEADER <= size {
+    while place.checked_add(HEADER).is_some_and(|end| end <= size) {
         let Some(object) = length_at(collection, place + 8) else { return false };
         let is_free_space = collection[place] == 0 && collection[place + 1] == 0;
         let taken = if is_free_space {
             object
         } else {
             // rounded up to multiples of 8, with the library's own overflow
-            object.wrapping_add(7) / 8 * 8 + HEADER
+            (object.wrapping_add(7) / 8 * 8).wrapping_add(HEADER)
         };
         if taken == 0 {
             return true;

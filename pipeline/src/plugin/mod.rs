@@ -12,6 +12,7 @@ mod describe;
 mod error;
 mod exchange;
 mod fingerprint;
+mod hearing;
 mod launch;
 mod lines;
 mod log;
@@ -24,6 +25,8 @@ mod session;
 mod stage;
 
 pub use conformance::{Check, check};
+#[doc(hidden)]
+pub use hearing::hear;
 pub use launch::Launch;
 pub use pool::shut_down;
 pub(crate) use row::entry;
