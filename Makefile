@@ -1,8 +1,13 @@
 # The two commands: `make demo` runs the main job, `make test` passes the tests.
-.PHONY: deps test-deps demo test test-interop test-slurm lint book
+.PHONY: deps test-deps demo test test-interop test-slurm lint book fuzz deny sbom
 
 CMAKE_VERSION = 3.31.6
 MDBOOK_VERSION = 0.5.4
+CARGO_FUZZ_VERSION = 0.13.2
+CARGO_DENY_VERSION = 0.20.2
+CARGO_CYCLONEDX_VERSION = 0.5.9
+# how long `make fuzz` runs each target
+SECONDS = 60
 
 # What a plain `cargo build --release` needs beside cargo and a C compiler.
 deps: .tools/bin/cmake
@@ -39,6 +44,7 @@ test-slurm: deps .tools/snakemake/installed
 
 lint: deps
 	cargo fmt --all --check
+	cargo fmt --manifest-path fuzz/Cargo.toml --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 
@@ -48,6 +54,36 @@ book: .tools/mdbook/bin/mdbook
 
 .tools/mdbook/bin/mdbook:
 	cargo install --quiet --locked --root .tools/mdbook --no-default-features --features search --version $(MDBOOK_VERSION) mdbook
+
+# Every fuzz target for SECONDS s each, from the corpus in fuzz/corpus; prints a table, fails if something is found. Needs g++ (docs/reliability.md).
+fuzz: deps .tools/cargo-fuzz/bin/cargo-fuzz
+	fuzz/run.sh $(SECONDS)
+
+.tools/cargo-fuzz/bin/cargo-fuzz:
+	cargo install --quiet --locked --root .tools/cargo-fuzz --version $(CARGO_FUZZ_VERSION) cargo-fuzz
+
+# Licences, duplicates and sources of all that is compiled (deny.toml), and known vulnerabilities where their database can be fetched.
+deny: .tools/cargo-deny/bin/cargo-deny
+	.tools/cargo-deny/bin/cargo-deny --locked check --hide-inclusion-graph licenses bans sources
+	@if .tools/cargo-deny/bin/cargo-deny fetch db; then \
+	    .tools/cargo-deny/bin/cargo-deny --locked check --disable-fetch advisories; \
+	else \
+	    echo "NOT CHECKED: known vulnerabilities. Their database (github.com/RustSec/advisory-db) cannot be fetched from here; run \`make deny\` where it can."; \
+	fi
+
+.tools/cargo-deny/bin/cargo-deny:
+	cargo install --quiet --locked --root .tools/cargo-deny --version $(CARGO_DENY_VERSION) cargo-deny
+
+# What the program is made of, as CycloneDX: results/afmid.cdx.json.
+sbom: .tools/cargo-cyclonedx/bin/cargo-cyclonedx
+	mkdir -p results
+	.tools/cargo-cyclonedx/bin/cargo-cyclonedx cyclonedx --format json --spec-version 1.5 --describe binaries --no-build-deps --override-filename afmid.cdx
+	mv afmid.cdx.json results/afmid.cdx.json
+	rm -f pipeline/afmid.cdx.json pipeline/formats/afmid.cdx.json stages/afmid.cdx.json
+	@echo results/afmid.cdx.json
+
+.tools/cargo-cyclonedx/bin/cargo-cyclonedx:
+	cargo install --quiet --locked --root .tools/cargo-cyclonedx --version $(CARGO_CYCLONEDX_VERSION) cargo-cyclonedx
 
 # HDF5 is built from source and wants CMake >= 3.26; PyPI's is newer than many systems'.
 .tools/bin/cmake:

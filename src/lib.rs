@@ -29,6 +29,8 @@ use afmid_pipeline::Registry;
 use afmid_pipeline::stage::DoubleName;
 use clap::FromArgMatches;
 
+#[doc(hidden)]
+pub use commands::doors;
 use failure::{Failure, Message};
 use printable::printable;
 

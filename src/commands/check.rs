@@ -85,7 +85,7 @@ pub fn not_checked(plan: &Plan) -> String {
 }
 
 /// A problem with its place: line and column count from 1, columns in characters.
-fn problem(text: &str, problem: &Problem) -> Value {
+pub fn problem(text: &str, problem: &Problem) -> Value {
     let (argument, text) = match &problem.origin {
         Origin::Config => (None, text),
         Origin::Argument(argument) => (Some(argument), argument.as_str()),

@@ -12,13 +12,14 @@ use crate::failure::Failure;
 use crate::output::print;
 
 /// Pages of the book that are written by hand: title and file.
-const CHAPTERS: [(&str, &str); 12] = [
+const CHAPTERS: [(&str, &str); 13] = [
     ("The paper, figure by figure", "paper.md"),
     ("Diagnosis", "diagnosis.md"),
     ("Archives", "archives.md"),
     ("Models for other programs", "export.md"),
     ("Accuracy", "accuracy.md"),
     ("Performance", "performance.md"),
+    ("Reliability", "reliability.md"),
     ("Conventions", "conventions.md"),
     ("Glossary", "glossary.md"),
     ("Architecture", "architecture.md"),

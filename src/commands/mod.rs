@@ -8,6 +8,7 @@ mod consent;
 mod diff;
 mod docs;
 mod doctor;
+pub mod doors;
 mod exam;
 mod explain;
 mod export;

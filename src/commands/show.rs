@@ -42,7 +42,8 @@ fn artifact(file: &ResultFile, id: &str, port: &str) -> Result<Artifact, Failure
     file.artifact(id, port).map_err(|error| Failure::failed(&error, error.help.clone()))
 }
 
-fn stage_text(file: &ResultFile, stage: &StageSummary) -> Result<String, Failure> {
+/// A stage with all its artifacts. Errors: one is damaged.
+pub fn stage_text(file: &ResultFile, stage: &StageSummary) -> Result<String, Failure> {
     let mut text = stage_head(&stage.record);
     for port in &stage.ports {
         let artifact = artifact(file, &stage.record.id, &port.name)?;

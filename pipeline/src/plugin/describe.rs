@@ -1,8 +1,9 @@
 //! What a plugin says of itself, checked and made a row of the registry.
 
+use serde_json::Value;
+
 use super::error::PluginError;
-use super::exchange::Wanted;
-use super::message::{Description, ExampleDescription, Introduction, PortDescription, ShapeName};
+use super::message::{Description, ExampleDescription, Handshake, Introduction, PortDescription, ShapeName};
 use super::schema::Schema;
 use crate::outcome::PortSpec;
 use crate::stage::{Caching, Spec};
@@ -15,22 +16,31 @@ pub(super) struct Plugin {
     pub(super) identity: String,
     pub(super) schema: Schema,
     pub(super) examples: Vec<ExampleDescription>,
-    outputs: Vec<PortDescription>,
-}
-
-impl Plugin {
-    /// What an output may hold; none if it is not declared.
-    pub(super) fn wanted(&self, output: &str) -> Option<Wanted> {
-        let port = self.outputs.iter().find(|port| port.name == output)?;
-        Some(Wanted { shape: port.shape.into(), finite: port.finite })
-    }
+    /// What it makes.
+    pub(super) outputs: Vec<PortDescription>,
 }
 
 const HELP: &str = "docs/plugins.md says what a description holds";
 
-/// Checks a description. Errors: the first thing that is wrong with it.
+/// A plugin of what it says of itself. Errors: as [`checked`].
 pub(super) fn describe(name: &str, introduction: &Introduction) -> Result<Plugin, PluginError> {
-    let Introduction { handshake: shaken, description: answer } = introduction;
+    let (description, schema) = checked(&introduction.handshake, &introduction.description)?;
+    let spec = Spec {
+        name: leak(&format!("exec:{name}")),
+        version: 1,
+        summary: leak(description.summary.trim()),
+        inputs: specs(&description.inputs),
+        outputs: specs(&description.outputs),
+        caching: if description.deterministic { Caching::Stored } else { Caching::Always },
+        seeded: description.seeded,
+        source: leak(&description.source),
+    };
+    let identity = format!("plugin {} {}", description.name, description.version);
+    Ok(Plugin { spec, identity, schema, examples: description.examples, outputs: description.outputs })
+}
+
+/// Checks a description. Errors: the first thing that is wrong with it.
+pub(super) fn checked(shaken: &Handshake, answer: &Value) -> Result<(Description, Schema), PluginError> {
     let wrong = |what: String| PluginError::new(format!("describes itself wrongly: {what}"), HELP);
     let description: Description = serde_path_to_error::deserialize(answer)
         .map_err(|error| wrong(format!("at `{}`: {}", error.path(), error.inner())))?;
@@ -52,18 +62,7 @@ pub(super) fn describe(name: &str, introduction: &Introduction) -> Result<Plugin
         return Err(wrong(format!("output `{}` is a recording: plugins read recordings and make none", port.name)));
     }
     let schema = Schema::new(&description.parameters).map_err(|what| wrong(format!("`parameters`: {what}")))?;
-    let spec = Spec {
-        name: leak(&format!("exec:{name}")),
-        version: 1,
-        summary: leak(description.summary.trim()),
-        inputs: specs(&description.inputs),
-        outputs: specs(&description.outputs),
-        caching: if description.deterministic { Caching::Stored } else { Caching::Always },
-        seeded: description.seeded,
-        source: leak(&description.source),
-    };
-    let identity = format!("plugin {} {}", description.name, description.version);
-    Ok(Plugin { spec, identity, schema, examples: description.examples, outputs: description.outputs })
+    Ok((description, schema))
 }
 
 fn ports(what: &str, ports: &[PortDescription]) -> Result<(), String> {

@@ -13,6 +13,7 @@ mod consent;
 mod describe;
 mod error;
 mod exchange;
+mod hearing;
 mod launch;
 mod message;
 mod plugins;
@@ -27,6 +28,8 @@ pub use children::kill_children;
 pub use conformance::{Check, check};
 pub use consent::{Ask, Candidate, MadeOf, Rule, Trust, Trusted, is_seal};
 pub use error::PluginError;
+#[doc(hidden)]
+pub use hearing::hear;
 pub use launch::Launch;
 pub use plugins::{AllStages, Described, Plugins};
 pub use process::{Host, host_main};

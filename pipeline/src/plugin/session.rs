@@ -175,7 +175,8 @@ impl Drop for Exchange {
     }
 }
 
-fn handshake(line: &str) -> Result<(Handshake, u64), PluginError> {
+/// The first line. Errors: it is something else, or of a plugin that speaks no version of the protocol that is known here.
+pub(super) fn handshake(line: &str) -> Result<(Handshake, u64), PluginError> {
     let found = || shown(line.as_bytes());
     let handshake: Handshake = serde_json::from_str(line)
         .map_err(|error| PluginError::new(format!("does not begin with a handshake: {} ({error})", found()), FORM))?;
@@ -201,7 +202,8 @@ fn handshake(line: &str) -> Result<(Handshake, u64), PluginError> {
     Ok((handshake, common))
 }
 
-fn reply(line: &str, id: u64, doing: &str) -> Result<Reply, PluginError> {
+/// A line after it. Errors: it is no message, or not about the request `id`.
+pub(super) fn reply(line: &str, id: u64, doing: &str) -> Result<Reply, PluginError> {
     let found = || shown(line.as_bytes());
     let help = "stdout is for the protocol alone, one JSON message a line: write everything else to stderr";
     let reply: Reply = serde_json::from_str(line).map_err(|error| {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::error::PluginError;
-use super::exchange::{give, take};
-use super::message::{Made, Progress};
+use super::exchange::{Wanted, give, take};
+use super::message::{Made, PortDescription, Progress};
 use super::row::{CONSENT, Row};
 use super::session::Session;
 use crate::error::StageError;
@@ -113,31 +113,37 @@ pub(super) fn run(
         seen = Some(Progress { done, total });
     };
     let answer = session.request("run", &request, row.candidate.launch.timeout, &mut progress)?;
-    let outputs = outputs(row, answer, made.path(), cx);
     // it answered in order: what it made is wrong, and the next item may be right
-    outputs.map_err(|what| PluginError::new(what, "mend the plugin; `afmid plugin check` tries it alone").alive())
+    let wrong = |what| PluginError::new(what, "mend the plugin; `afmid plugin check` tries it alone").alive();
+    let (outputs, warnings) = outputs(&row.plugin.outputs, answer, made.path()).map_err(wrong)?;
+    warnings.into_iter().for_each(|warning| cx.warn(warning));
+    Ok(outputs)
 }
 
-fn outputs(row: &Row, answer: Value, file: &Path, cx: &Context) -> Result<Ports, String> {
+/// What an answer to `run` and the file that goes with it hold, and its warnings. Errors: it is not laid out so, or not as declared.
+pub(super) fn outputs(
+    declared: &[PortDescription],
+    answer: Value,
+    file: &Path,
+) -> Result<(Ports, Vec<String>), String> {
     let made: Made = serde_path_to_error::deserialize(&answer).map_err(|error| {
         format!("answered `run` with something else than outputs: at `{}`: {}", error.path(), error.inner())
     })?;
-    let declared = row.plugin.spec.outputs;
-    if let Some(other) = made.outputs.keys().find(|name| !declared.iter().any(|port| port.name == name.as_str())) {
+    if let Some(other) = made.outputs.keys().find(|name| !declared.iter().any(|port| port.name == **name)) {
         return Err(format!("made the output `{other}`, which it does not declare"));
     }
     let mut ports = Ports::new();
     for port in declared {
-        match (made.outputs.get(port.name), row.plugin.wanted(port.name)) {
-            (Some(sent), Some(wanted)) => {
+        let wanted = Wanted { shape: port.shape.into(), finite: port.finite };
+        match made.outputs.get(&port.name) {
+            Some(sent) => {
                 let artifact = take(sent, file, wanted)
                     .map_err(|wrong| format!("made a wrong output: `{}` {wrong}", port.name))?;
-                ports.insert(port.name, artifact);
+                ports.insert(&port.name, artifact);
             }
-            _ if port.optional => {}
-            _ => return Err(format!("did not make the output `{}`, which it declares", port.name)),
+            None if port.optional => {}
+            None => return Err(format!("did not make the output `{}`, which it declares", port.name)),
         }
     }
-    made.warnings.into_iter().for_each(|warning| cx.warn(warning));
-    Ok(ports)
+    Ok((ports, made.warnings))
 }

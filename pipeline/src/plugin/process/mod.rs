@@ -12,7 +12,7 @@ mod running;
 
 #[cfg(target_os = "linux")]
 pub use host::{Host, host_main};
-pub(super) use lines::shown;
+pub(super) use lines::{Line, read_lines, shown};
 #[cfg(not(target_os = "linux"))]
 pub use no_host::{Host, host_main};
 pub(super) use running::Process;
