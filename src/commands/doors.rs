@@ -112,8 +112,8 @@ fn message(failure: Failure) -> String {
     match failure {
         Failure::Usage(message) | Failure::Failed(message) | Failure::Partly(message) => match message {
             Message::Line(line, help) => format!("{line} {}", help.unwrap_or_default()),
-            Message::Rendered(text) => text,
+            Message::Rendered(text) | Message::Styled(text) => text,
         },
-        Failure::Closed => String::new(),
+        Failure::Interrupted(_) | Failure::Closed => String::new(),
     }
 }

@@ -7,7 +7,7 @@ pub(super) const MOST_BYTES: usize = 16 << 20;
 
 /// What comes out of a plugin.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Line {
+pub(in crate::plugin) enum Line {
     /// A line without its end.
     Text(String),
     /// A line that is no UTF-8, as far as it can be shown.
@@ -19,7 +19,7 @@ pub(super) enum Line {
 }
 
 /// Calls `each` with every line, until it says no, the stream ends, or a line is too long.
-pub(super) fn read_lines(stream: impl Read, most: usize, mut each: impl FnMut(Line) -> bool) {
+pub(in crate::plugin) fn read_lines(stream: impl Read, most: usize, mut each: impl FnMut(Line) -> bool) {
     let mut reader = BufReader::with_capacity(1 << 16, stream);
     loop {
         let mut bytes = Vec::new();
