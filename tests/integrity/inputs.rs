@@ -48,9 +48,10 @@ fn disturbed(prepare: impl Fn(&Path), change: impl Fn(&Path), restore: impl Fn(&
     let here = scratch.path();
     prepare(here);
     let truth = truth(here);
-    std::thread::sleep(SETTLED);
     let mut failed = 0;
     for round in 0..12 {
+        // only then is a stamp kept, which says that the run has hashed its files
+        std::thread::sleep(SETTLED);
         let (result, cache) = (format!("r{round}.h5"), format!("cache-{round}"));
         let child = begun(here, &result, &cache);
         let (code, told) = while_running(child, || {

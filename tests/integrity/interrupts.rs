@@ -24,7 +24,9 @@ fn assert_tidy(place: &Place) {
 /// A simulation of more records than anybody waits for.
 fn simulation(place: &Place) -> Child {
     let (config, out) = (config("simulate-demo.toml"), format!("archive.out='{}'", place.path("archive").display()));
-    let arguments = ["run", &config, "--set", &out, "--set", "archive.records=2000", "-o", "simulated.h5"];
+    let counts = ["records", "snap_offs", "snap_ins"].map(|name| format!("archive.{name}=2000"));
+    let mut arguments = vec!["run", &config, "-o", "simulated.h5", "--set", &out];
+    counts.iter().for_each(|count| arguments.extend(["--set", count]));
     let mut child = start(place.command(&arguments));
     assert!(wait_until(&mut child, || count(&place.path("archive"), ".h5") > 0), "it ended");
     child

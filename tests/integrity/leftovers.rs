@@ -38,7 +38,7 @@ impl Place {
     pub fn leftovers(&self) -> Vec<PathBuf> {
         let temporary = |path: &PathBuf| {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            name.ends_with(".tmp") || path.starts_with(self.path("tmp"))
+            name.ends_with(".tmp") || (path.starts_with(self.path("tmp")) && *path != self.path("tmp"))
         };
         below(self.folder()).into_iter().filter(temporary).collect()
     }

@@ -132,6 +132,7 @@ fn results_pages_models_and_figures_replace_their_own_kind_only_and_none_that_wa
     assert!(refused(here, &["run", CONFIG, "-o", "mine.h5", "--cache", "cache"]).contains("a native record"));
     kept(here, "page.html", &["report", "out.h5", "-o", "page.html"]);
     kept(here, "again.h5", &["rerun", "out.h5", "-o", "again.h5", "--cache", "cache"]);
+    afmid(here, &["export-crate", "out.h5", "-o", "crate", "--with-data"]);
     kept(here, "crate/config.toml", &["export-crate", "out.h5", "-o", "crate", "--with-data"]);
     kept(here, "crate/inputs/r0.h5", &["export-crate", "out.h5", "-o", "crate", "--with-data"]);
     kept(here, "man/afmid-run.1", &["man", "man"]);
@@ -181,7 +182,7 @@ fn batches_and_sweeps_keep_tables_results_and_ledgers_of_others() {
         refused(here, &["batch", CONFIG, "archive", "-o", "points", "--cache", "cache"])
             .contains("no table of a batch")
     );
-    let submit = ["submit", "slurm", CONFIG, "archive", "-o", "jobs", "--cache", "cache"];
+    let submit = ["submit", "slurm", CONFIG, "archive", "--shards", "1", "-o", "jobs", "--cache", "cache"];
     for place in ["submit.sh", "manifest.jsonl", "config.toml"] {
         kept(here, &format!("jobs/slurm/{place}"), &submit);
     }

@@ -120,7 +120,9 @@ fn names_units_and_paths_of_recordings_are_shown_and_not_obeyed() {
     told(&place, &["run", &config, "-o", &output, "--json"], "\\u202e");
     for arguments in [&["show", &output][..], &["show", &output, "records"], &["show", &output, "census"]] {
         told(&place, arguments, shown);
-        told(&place, &[arguments, &["--json"]].concat(), "\\u202e");
+        // numbers alone are in the census's
+        let named = if arguments.contains(&"census") { "" } else { "\\u202e" };
+        told(&place, &[arguments, &["--json"]].concat(), named);
     }
     told(&place, &["trace", &output, "census.records"], "");
     told(&place, &["diff", &output, &output], "");
