@@ -6,7 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::problem::Problem;
-use super::suggest::MOST_HELPED;
+use super::suggest::most_helped;
 
 /// A parsed document and its problems. `usable` is false if the syntax is so broken that further checks would mislead.
 pub(super) struct Document<'a> {
@@ -25,7 +25,8 @@ pub(super) fn parse<'a>(text: &'a str, problems: &mut Vec<Problem>) -> Document<
     // behind broken syntax the parser sees tables where there are none: keys that seem to be given twice mostly are not
     let broken = errors.iter().filter(|error| error.message() != DUPLICATE);
     let broken = broken.map(|error| error.span().unwrap_or_default().start).min().unwrap_or(text.len());
-    let mut looked_up = 0;
+    let stages = root.get("stage").and_then(|stages| stages.get_ref().as_array()).map_or(0, |stages| stages.len());
+    let (mut looked_up, helped) = (0, most_helped(stages));
     for error in errors {
         let span = error.span().unwrap_or_default();
         if error.message() == DUPLICATE {
@@ -34,7 +35,7 @@ pub(super) fn parse<'a>(text: &'a str, problems: &mut Vec<Problem>) -> Document<
             }
             // every stage is looked at for each: the first ones, which are printed, are told better
             looked_up += 1;
-            problems.push(duplicate(text, &root, span, looked_up <= MOST_HELPED));
+            problems.push(duplicate(text, &root, span, looked_up <= helped));
         } else {
             usable = false;
             problems.push(syntax(text, error.message(), span));

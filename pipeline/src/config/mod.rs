@@ -27,6 +27,6 @@ pub use problem::{Origin, Problem};
 pub use read::Config;
 pub use stage::{Input, StageDecl};
 pub use suggest::nearest;
-pub(crate) use suggest::{MOST_HELPED, did_you_mean, list};
+pub(crate) use suggest::{did_you_mean, list, most_helped};
 pub use sweep::Swept;
 pub(crate) use sweep::point;

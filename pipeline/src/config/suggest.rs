@@ -1,7 +1,10 @@
 //! "Did you mean": the nearest of the names that exist.
 
-/// Problems of one kind that come with a look at all that there is: more are not printed, and each would take time in proportion to the config.
-pub(crate) const MOST_HELPED: usize = 200;
+/// Problems of one kind that come with a look at all `items` that there are: each looks at all of them, a million in sum, and more than a hundred problems
+/// are not printed.
+pub(crate) fn most_helped(items: usize) -> usize {
+    (1_000_000 / items.max(1)).clamp(10, 200)
+}
 
 /// Names that are listed; more are counted.
 const MOST_LISTED: usize = 40;

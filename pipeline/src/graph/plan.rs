@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::{Stages, order, sweep, wiring};
-use crate::config::{Config, MOST_HELPED, Problem, StageDecl, instantiate, nearest};
+use crate::config::{Config, Problem, StageDecl, instantiate, most_helped, nearest};
 use crate::stage::{DynStage, Entry};
 
 /// A checked graph: what the runner runs. Cloning is cheap: stages are shared.
@@ -169,7 +169,11 @@ fn find(
         None => {
             *unknown += 1;
             // the first ones, which are printed, are told better
-            let names = registry.entries().iter().map(|entry| entry.spec.name).filter(|_| *unknown <= MOST_HELPED);
+            let names = registry
+                .entries()
+                .iter()
+                .map(|entry| entry.spec.name)
+                .filter(|_| *unknown <= most_helped(registry.entries().len()));
             let nearest = nearest(&decl.uses, names);
             let help = match nearest {
                 Some(name) => format!("did you mean `{name}`?"),

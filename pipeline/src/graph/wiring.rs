@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use super::plan;
-use crate::config::{Input, MOST_HELPED, Problem, StageDecl, did_you_mean, list, nearest};
+use crate::config::{Input, Problem, StageDecl, did_you_mean, list, most_helped, nearest};
 use crate::outcome::PortSpec;
 use crate::stage::Entry;
 
@@ -60,7 +60,7 @@ impl Board<'_> {
     /// Whether a problem comes with a look at all stages: the first ones do.
     fn helps(&self) -> bool {
         self.helped.set(self.helped.get() + 1);
-        self.helped.get() <= MOST_HELPED
+        self.helped.get() <= most_helped(self.decls.len())
     }
 
     fn inputs(&self, decl: &StageDecl, entry: &Entry, problems: &mut Vec<Problem>) -> Vec<Wire> {
