@@ -76,10 +76,10 @@ deny: .tools/cargo-deny/bin/cargo-deny
 
 # What the program is made of, as CycloneDX: results/afmid.cdx.json.
 sbom: .tools/cargo-cyclonedx/bin/cargo-cyclonedx
+	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) .tools/cargo-cyclonedx/bin/cargo-cyclonedx cyclonedx --format json --spec-version 1.5 --describe binaries --no-build-deps
 	mkdir -p results
-	.tools/cargo-cyclonedx/bin/cargo-cyclonedx cyclonedx --format json --spec-version 1.5 --describe binaries --no-build-deps --override-filename afmid.cdx
-	mv afmid.cdx.json results/afmid.cdx.json
-	rm -f pipeline/afmid.cdx.json pipeline/formats/afmid.cdx.json stages/afmid.cdx.json
+	sed 's|file://$(CURDIR)|file:///afmid|g' afmid_bin.cdx.json > results/afmid.cdx.json
+	rm afmid_bin.cdx.json
 	@echo results/afmid.cdx.json
 
 .tools/cargo-cyclonedx/bin/cargo-cyclonedx:

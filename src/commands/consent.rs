@@ -109,6 +109,9 @@ pub fn listing(candidate: &Candidate) -> String {
     for (name, value) in candidate.environment() {
         text.push_str(&format!("  with  {name}={}\n", quoted(value)));
     }
+    if !candidate.is_confined() {
+        text.push_str("  free  it may write anywhere and use the network: `confined = false`\n");
+    }
     for file in candidate.files() {
         text.push_str(&format!("  file  {} blake3:{}\n", quoted(&file.path), file.blake3));
     }

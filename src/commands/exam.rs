@@ -171,8 +171,6 @@ fn diagnosed(drawn: &Draw, args: &ExamArgs, stages: &dyn Stages, base: &Path) ->
     }
 }
 
-/// Exams of this process so far: each has a folder of its own.
-
 #[cfg(test)]
 #[path = "exam_tests.rs"]
 mod tests;

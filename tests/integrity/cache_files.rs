@@ -145,7 +145,7 @@ fn mutate(files: &mut [(PathBuf, Vec<u8>)], random: &mut ChaCha8Rng) -> String {
         }
         6 => {
             let cut = at.min(length - SEAL.len() - 65);
-            files[one].1 = sealed(&files[one].1[..cut].to_vec());
+            files[one].1 = sealed(&files[one].1[..cut]);
             format!("{this}: cut at {cut}, sealed")
         }
         7 => {

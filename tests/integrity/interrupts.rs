@@ -148,10 +148,11 @@ fn a_signal_that_was_ignored_stays_so() {
 fn the_process_of_a_plugin_goes_with_it() {
     let place = Place::new();
     // says who it is and nothing else
-    let script = "echo $$ >pid.part; mv pid.part pid; exec sleep 1000";
+    let script = "cd $TMPDIR; echo $$ >pid.part; mv pid.part pid; exec sleep 1000";
     let mut child = start(place.command(&["plugin", "check", "--", "sh", "-c", script]));
-    assert!(wait_until(&mut child, || place.path("pid").exists()), "it ended");
-    let pid = std::fs::read_to_string(place.path("pid")).expect("its number");
+    let said = || super::leftovers::below(&place.path("tmp")).into_iter().find(|path| path.ends_with("pid"));
+    assert!(wait_until(&mut child, || said().is_some()), "it ended");
+    let pid = std::fs::read_to_string(said().expect("it is there")).expect("its number");
     signal(&child, "INT");
     let (code, told) = end(child);
     assert_eq!(code, Some(130), "{told}");

@@ -1,6 +1,8 @@
 //! Strangers' files: opening never executes, executing asks.
 
+use std::cell::Cell;
 use std::fs;
+use std::net::{TcpListener, UdpSocket};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -12,7 +14,9 @@ use super::common::ROOT;
 
 /// What a plugin of the tests is: Python without any package.
 const HEAD: &str = r#"import json, os, subprocess, sys, time
-open("started", "a").write("x")
+import socket
+socket.socket(socket.AF_INET, socket.SOCK_DGRAM).sendto(b"x", ("127.0.0.1", PORT))
+HERE = os.environ["TMPDIR"]
 DESCRIPTION = {
     "name": "stranger", "version": "1", "summary": "does what the test wants",
     "inputs": [{"name": "table", "shape": "table", "optional": True}], "outputs": [{"name": "out", "shape": "array"}],
@@ -52,6 +56,9 @@ const CONFIG: &str = "[pipeline]\nname = \"strange\"\n[plugins]\nmine = \"python
 /// A project that somebody sent, and folders of the user's own.
 struct Project {
     scratch: tempfile::TempDir,
+    /// Where the plugin says that it was started: it can write nothing that outlives it.
+    port: UdpSocket,
+    started: Cell<usize>,
 }
 
 impl Project {
@@ -61,10 +68,17 @@ impl Project {
         for folder in ["project", "temporary"] {
             fs::create_dir(scratch.path().join(folder)).expect("a folder");
         }
-        let own = Self { scratch };
-        own.put("mine.py", &format!("{HEAD}{changed}{TAIL}"));
+        let port = UdpSocket::bind("127.0.0.1:0").expect("a port");
+        port.set_nonblocking(true).expect("a port");
+        let own = Self { scratch, port, started: Cell::new(0) };
+        own.put("mine.py", &own.plugin(changed));
         own.put("c.toml", CONFIG);
         own
+    }
+
+    fn plugin(&self, changed: &str) -> String {
+        let port = self.port.local_addr().expect("an address").port().to_string();
+        format!("{HEAD}{changed}{TAIL}").replace("PORT", &port)
     }
 
     fn folder(&self) -> PathBuf {
@@ -112,7 +126,11 @@ impl Project {
 
     /// How often the plugin was started so far.
     fn starts(&self) -> usize {
-        fs::read(self.folder().join("started")).map_or(0, |marks| marks.len())
+        let mut one = [0];
+        while self.port.recv(&mut one).is_ok() {
+            self.started.set(self.started.get() + 1);
+        }
+        self.started.get()
     }
 }
 
@@ -124,7 +142,8 @@ fn all(output: &Output) -> String {
 fn what_only_looks_starts_nothing() {
     let project = Project::new("");
     project.told(&["run", "c.toml", "--allow-plugins", "-o", "r.h5"]);
-    fs::remove_file(project.folder().join("started")).expect("it was started");
+    let before = project.starts();
+    assert!(before > 0, "it was started");
     for arguments in [
         &["check", "c.toml"][..],
         &["check", "c.toml", "--json"],
@@ -148,7 +167,7 @@ fn what_only_looks_starts_nothing() {
         // whether there is something to trace is not the question
         let output = project.run(arguments);
         assert!(matches!(output.status.code(), Some(0..=2)), "{arguments:?}: {}", all(&output));
-        assert_eq!(project.starts(), 0, "{arguments:?} started a plugin");
+        assert_eq!(project.starts(), before, "{arguments:?} started a plugin");
     }
 }
 
@@ -162,7 +181,8 @@ fn nothing_starts_before_consent_and_the_error_says_how_to_give_it() {
     );
     project.put("b.toml", &records);
     project.told(&["run", "c.toml", "--allow-plugins", "-o", "r.h5"]);
-    fs::remove_file(project.folder().join("started")).expect("it was started");
+    let before = project.starts();
+    assert!(before > 0, "it was started");
     for arguments in [
         &["run", "c.toml", "-o", "a.h5"][..],
         &["batch", "b.toml", "set", "-o", "sets"],
@@ -176,7 +196,7 @@ fn nothing_starts_before_consent_and_the_error_says_how_to_give_it() {
         for word in ["afmid trust", "--allow-plugins", "python3 mine.py", "`mine`"] {
             assert!(told.contains(word), "{arguments:?} lacks {word}: {told}");
         }
-        assert_eq!(project.starts(), 0, "{arguments:?} started a plugin");
+        assert_eq!(project.starts(), before, "{arguments:?} started a plugin");
     }
     assert!(!project.folder().join("a.h5").exists());
 }
@@ -327,7 +347,7 @@ fn jobs_of_a_submission_get_the_plugins_that_were_agreed_to_and_no_others() {
 
 #[test]
 fn links_in_and_to_an_output_file_are_refused() {
-    let secret = "import h5py\nsecret = os.path.join(os.getcwd(), 'secret.h5')\nwith h5py.File(secret, 'w') as f: f['v'] = [1.5, 2.5, 3.5]\n";
+    let secret = "import h5py\nsecret = os.path.join(HERE, 'secret.h5')\nwith h5py.File(secret, 'w') as f: f['v'] = [1.5, 2.5, 3.5]\n";
     let answer = |write: &str| {
         format!("{secret}def run(params):\n    path = params['output']\n{write}\n    return made('/v')\n")
     };
@@ -345,7 +365,7 @@ fn links_in_and_to_an_output_file_are_refused() {
         ),
         (
             "storage",
-            "    open('raw', 'wb').write(bytes(24))\n    with h5py.File(path, 'w') as f: f.create_dataset('v', (3,), 'f8', external=[(os.path.abspath('raw'), 0, 24)])",
+            "    raw = os.path.join(HERE, 'raw')\n    open(raw, 'wb').write(bytes(24))\n    with h5py.File(path, 'w') as f: f.create_dataset('v', (3,), 'f8', external=[(raw, 0, 24)])",
             "another file",
         ),
         (
@@ -382,8 +402,7 @@ fn what_a_plugin_says_unasked_is_an_error_and_takes_no_memory() {
     // a gigabyte, while a second plugin gives the first time
     let flood = "def after():\n    line = 'x' * (1 << 20)\n    for _ in range(1 << 10): print(line, flush=True)\n";
     let project = Project::new(flood);
-    let slow = format!("{HEAD}def run(params):\n    time.sleep(2)\n    return made([1, 2, 3])\n{TAIL}");
-    project.put("slow.py", &slow);
+    project.put("slow.py", &project.plugin("def run(params):\n    time.sleep(2)\n    return made([1, 2, 3])\n"));
     project.put(
         "c.toml",
         &(CONFIG.replace("[[stage]]", "slow = \"python3 slow.py\"\n[[stage]]")
@@ -407,14 +426,13 @@ fn what_a_plugin_says_unasked_is_an_error_and_takes_no_memory() {
     assert!(most > 0 && most < 256 << 20, "{most} bytes");
 }
 
-/// The processes that a plugin wrote down, as they live.
-fn living(pids: &Path) -> Vec<String> {
+/// The processes of these numbers that live.
+fn living(pids: &str) -> Vec<String> {
     let alive = |pid: &&str| {
         let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
         stat.rsplit_once(')').is_some_and(|(_, rest)| !rest.trim_start().starts_with(['Z', 'X']))
     };
-    let text = fs::read_to_string(pids).unwrap_or_default();
-    text.split_whitespace().filter(alive).map(str::to_owned).collect()
+    pids.split_whitespace().filter(alive).map(str::to_owned).collect()
 }
 
 fn wait_until(what: &str, is_so: impl Fn() -> bool) {
@@ -431,10 +449,10 @@ const DEAF: &str = r#"import signal
 def run(params):
     for name in ("SIGTERM", "SIGHUP", "SIGINT", "SIGPIPE"): signal.signal(getattr(signal, name), signal.SIG_IGN)
     child = subprocess.Popen(["sleep", "600"])
+    os.chdir(HERE)
     daemon = subprocess.Popen(["sh", "-c", "setsid sh -c 'echo $$ >daemon; exec sleep 600' </dev/null >/dev/null 2>&1 &"])
     daemon.wait()
     while not os.path.exists("daemon") or not open("daemon").read().strip(): time.sleep(0.01)
-    open(os.path.join(os.environ["TMPDIR"], "left"), "w").write("x")
     open("pids.tmp", "w").write(f"{os.getpid()} {child.pid} {open('daemon').read()}")
     os.rename("pids.tmp", "pids")
     time.sleep(600)
@@ -444,7 +462,7 @@ def run(params):
 fn plugins_and_their_daemons_die_with_the_program_and_leave_nothing() {
     for end in ["kill -9", "time limit"] {
         let project = Project::new(DEAF);
-        let limit = if end == "time limit" { "2" } else { "600" };
+        let limit = if end == "time limit" { "5" } else { "600" };
         let command = format!("{{ command = \"python3 mine.py\", timeout_s = {limit} }}");
         project.put("c.toml", &CONFIG.replace("\"python3 mine.py\"", &command));
         let run = || -> Child {
@@ -452,8 +470,12 @@ fn plugins_and_their_daemons_die_with_the_program_and_leave_nothing() {
             command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("afmid starts")
         };
         let mut child = run();
-        let pids = project.folder().join("pids");
-        wait_until("the plugin did not begin", || pids.exists());
+        let pids = || {
+            let folders = fs::read_dir(project.temporary()).expect("the folder").flatten();
+            folders.filter_map(|folder| fs::read_to_string(folder.path().join("tmp/pids")).ok()).next()
+        };
+        wait_until("the plugin did not begin", || pids().is_some());
+        let pids = pids().expect("its numbers");
         if end == "kill -9" {
             assert_eq!(living(&pids).len(), 3);
             child.kill().expect("it is killed");
@@ -463,4 +485,70 @@ fn plugins_and_their_daemons_die_with_the_program_and_leave_nothing() {
         let left = || fs::read_dir(project.temporary()).expect("the folder").count();
         wait_until(&format!("{end}: something is left in the temporary folder"), || left() == 0);
     }
+}
+
+/// Tries what a plugin may not do, and says what was possible.
+const BOLD: &str = r#"
+def tried(what):
+    try:
+        what()
+        return True
+    except OSError:
+        return False
+def run(params):
+    done = {
+        "config": tried(lambda: open("c.toml", "a").close()),
+        "beside": tried(lambda: open("beside", "w").write("x")),
+        "home": tried(lambda: open(os.path.expanduser("~/afmid-was-here"), "w").close()),
+        "moved": tried(lambda: os.rename("moved", os.path.join(HERE, "moved"))),
+        "child": subprocess.call(["sh", "-c", "echo x >child 2>/dev/null"], stderr=subprocess.DEVNULL) == 0,
+        "tcp": tried(lambda: socket.create_connection(("127.0.0.1", LISTENER), 5).close()),
+        "temporary": tried(lambda: open(os.path.join(HERE, "mine"), "w").write("x")),
+        "null": tried(lambda: open("/dev/null", "w").write("x")),
+    }
+    print(json.dumps(done), file=sys.stderr, flush=True)
+    return made([float(done[name]) for name in ("config", "tcp", "temporary")])
+"#;
+
+#[test]
+fn a_plugin_writes_to_its_own_folder_alone_and_what_is_not_enforced_is_in_the_result() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = listener.local_addr().expect("an address").port().to_string();
+    let project = Project::new(&BOLD.replace("LISTENER", &port));
+    let log = |config: &str| {
+        let mut run = project.command(&["run", config, "--allow-plugins", "-o", "a.h5"]);
+        let output = run.env("HOME", project.temporary()).output().expect("afmid starts");
+        assert!(output.status.success(), "{}", all(&output));
+        let read =
+            "import h5py, sys; r = h5py.File('a.h5')['entry/run']; print('\\n'.join(t.decode() for t in r['log'][()]))";
+        let python = Path::new(ROOT).join(".tools/bin/python3");
+        let read =
+            Command::new(python).args(["-c", read]).current_dir(project.folder()).output().expect("python starts");
+        String::from_utf8(read.stdout).expect("text")
+    };
+    let possible = |log: &str| -> Value {
+        serde_json::from_str(log.lines().find(|line| line.starts_with('{')).unwrap_or_else(|| panic!("{log}")))
+            .expect("JSON")
+    };
+    project.put("moved", "x");
+    let confined = log("c.toml");
+    let found = possible(&confined);
+    // a kernel that cannot enforce something says so in the result; here and in CI it can
+    if !confined.contains("not enforced") {
+        let wanted = json!({
+            "config": false, "beside": false, "home": false, "moved": false, "child": false, "tcp": false, "temporary": true, "null": true,
+        });
+        assert_eq!(found, wanted);
+        assert!(project.folder().join("moved").exists() && !project.folder().join("child").exists());
+    }
+    let free = CONFIG.replace("\"python3 mine.py\"", "{ command = \"python3 mine.py --free\", confined = false }");
+    project.put("free.toml", &free);
+    let told = log("free.toml");
+    assert!(told.contains("[afmid] not enforced: where it writes, TCP"), "{told}");
+    assert_eq!((&possible(&told)["beside"], &possible(&told)["tcp"]), (&json!(true), &json!(true)));
+    project.put("free.toml", &free.replace("--free", ""));
+    let listed = project.told(&["trust", "free.toml"]);
+    assert!(listed.contains("it may write anywhere"), "{listed}");
+    project.put("free.toml", &free.replace("--free", "").replace("confined = false", "confined = true"));
+    assert_eq!(project.run(&["run", "free.toml", "-o", "b.h5"]).status.code(), Some(2), "that is another plugin");
 }

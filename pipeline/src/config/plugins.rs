@@ -19,6 +19,8 @@ pub struct PluginDecl {
     pub command: Vec<String>,
     /// Variables of its environment, beside those that the program itself has; by name.
     pub environment: BTreeMap<String, String>,
+    /// Whether it may write to its own temporary folder alone, and use no TCP.
+    pub confined: bool,
     /// How long one request may take, in seconds.
     pub timeout_s: f64,
     /// Bytes of its name.
@@ -33,7 +35,7 @@ pub const DEFAULT_TIMEOUT_S: f64 = 600.0;
 /// A week: more is a slip.
 const MOST_TIMEOUT_S: f64 = 604_800.0;
 
-const KEYS: [&str; 3] = ["command", "environment", "timeout_s"];
+const KEYS: [&str; 4] = ["command", "confined", "environment", "timeout_s"];
 
 const FORM: &str =
     "write `NAME = \"python3 my_stage.py\"` or `NAME = { command = [\"python3\", \"my_stage.py\"], timeout_s = 600 }`";
@@ -75,12 +77,14 @@ fn plugin(
     value: &Spanned<DeValue<'_>>,
     problems: &mut Vec<Problem>,
 ) -> Result<PluginDecl, Problem> {
+    let mut confined = true;
     let (mut timeout_s, mut environment, mut line) = (DEFAULT_TIMEOUT_S, BTreeMap::new(), Some(value));
     if let Some(long) = value.get_ref().as_table() {
         line = long.get("command");
         for (key, value) in long {
             match key.get_ref().as_ref() {
                 "command" => {}
+                "confined" => confined = flag(name, value)?,
                 "environment" => environment = variables(name, value)?,
                 "timeout_s" => timeout_s = timeout(name, value)?,
                 other => problems.push(unknown(name, other, key.span())),
@@ -92,7 +96,15 @@ fn plugin(
         return Err(lacks.help(FORM));
     };
     let command = command(name, line)?;
-    Ok(PluginDecl { name: name.to_owned(), command, environment, timeout_s, key_span, command_span: line.span() })
+    Ok(PluginDecl {
+        name: name.to_owned(),
+        command,
+        environment,
+        confined,
+        timeout_s,
+        key_span,
+        command_span: line.span(),
+    })
 }
 
 fn unknown(name: &str, key: &str, span: Range<usize>) -> Problem {
@@ -110,6 +122,13 @@ fn timeout(name: &str, value: &Spanned<DeValue<'_>>) -> Result<f64, Problem> {
         let found = found(value.get_ref());
         let message = format!("`timeout_s` of plugin `{name}`: found {found}, wanted seconds above 0, at most a week");
         Problem::new(message, value.span(), "not a time limit")
+    })
+}
+
+fn flag(name: &str, value: &Spanned<DeValue<'_>>) -> Result<bool, Problem> {
+    value.get_ref().as_bool().ok_or_else(|| {
+        let message = format!("`confined` of plugin `{name}`: found {}, wanted true or false", found(value.get_ref()));
+        Problem::new(message, value.span(), "no flag")
     })
 }
 

@@ -226,7 +226,7 @@ mod tests {
     fn odd_names_and_half_lines_come_back() {
         let folder = Folder::new("lines");
         let own = FilledFolder::open(&folder.0).unwrap();
-        fs::write(folder.file(LIST), &"0123456789abcdef".repeat(2)).unwrap();
+        fs::write(folder.file(LIST), "0123456789abcdef".repeat(2)).unwrap();
         for name in ["a  b", "a\\n", "ä\n"] {
             own.write(name, nobody, name.as_bytes()).unwrap();
         }

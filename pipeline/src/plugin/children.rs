@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use super::process::kill_descendants;
+
 /// Kills every process that this one has started in a group of its own, with the group: plugins, whoever holds them. For a program that ends at
 /// once.
 pub fn kill_children() {
@@ -12,8 +14,9 @@ pub fn kill_children() {
         if parent_and_group(&stat).is_none_or(|(parent, group)| parent != own || group != pid) {
             continue;
         }
-        #[cfg(unix)]
         if let Some(group) = rustix::process::Pid::from_raw(pid) {
+            // what has left the group is known as long as the host lives
+            kill_descendants(group);
             // an error means that nothing is left to kill
             let _ = rustix::process::kill_process_group(group, rustix::process::Signal::KILL);
         }

@@ -20,6 +20,8 @@ pub struct Launch {
     pub(super) environment: BTreeMap<String, String>,
     /// The folder that it runs in: the config's.
     pub(super) folder: PathBuf,
+    /// Whether it may write to its own folder alone, and use no TCP.
+    pub(super) confined: bool,
     /// How long a request may take.
     pub(super) timeout: Duration,
 }
@@ -44,13 +46,21 @@ impl Launch {
             let what = format!("cannot be started: there is no program `{}`", command[0]);
             PluginError::new(what, "name a program on the PATH, or a path from the config's folder with a `/` in it")
         })?;
-        Ok(Self { name: name.to_owned(), program, arguments, environment: BTreeMap::new(), folder, timeout })
+        Ok(Self {
+            name: name.to_owned(),
+            program,
+            arguments,
+            environment: BTreeMap::new(),
+            folder,
+            confined: true,
+            timeout,
+        })
     }
 
     /// From `[plugins]` of a config.
     pub(super) fn declared(decl: &PluginDecl, folder: &Path) -> Result<Self, PluginError> {
         let launch = Self::command(&decl.name, &decl.command, folder, decl.timeout_s)?;
-        Ok(Self { environment: decl.environment.clone(), ..launch })
+        Ok(Self { environment: decl.environment.clone(), confined: decl.confined, ..launch })
     }
 
     /// `afmid-stage-NAME` on the PATH, if it is there.
@@ -58,7 +68,7 @@ impl Launch {
         let program = on_path(&program_name(name))?;
         let (folder, timeout) = (folder.canonicalize().ok()?, Duration::from_secs_f64(DEFAULT_TIMEOUT_S));
         let (arguments, environment) = (Vec::new(), BTreeMap::new());
-        Some(Self { name: name.to_owned(), program, arguments, environment, folder, timeout })
+        Some(Self { name: name.to_owned(), program, arguments, environment, folder, confined: true, timeout })
     }
 
     /// How long it may take from the start to its description.

@@ -12,7 +12,7 @@ use super::error::PluginError;
 use super::launch::Launch;
 use super::message::{Handshake, Introduction, Progress, Reply};
 use super::pool::Pool;
-use super::process::{Process, shown};
+use super::process::{Process, not_enforced, shown};
 use crate::files::temporary_folder;
 
 /// A plugin that was started and has introduced itself, with a folder for what is exchanged.
@@ -20,6 +20,8 @@ use crate::files::temporary_folder;
 pub(super) struct Session {
     pub(super) candidate: Candidate,
     pub(super) handshake: Handshake,
+    /// What it could do beyond what it may, as far as nobody enforces it; none if all is enforced.
+    pub(super) not_enforced: Option<String>,
     protocol: u64,
     process: Process,
     folder: TempDir,
@@ -50,7 +52,12 @@ impl Session {
         match greeted.and_then(|greeted| candidate.check_unchanged(&pool.hashes).map(|()| greeted)) {
             Ok((handshake, protocol)) => {
                 let candidate = candidate.clone();
-                Ok(Self { candidate, handshake, protocol, process, folder, requests: 0 })
+                let not_enforced = match pool.host {
+                    Some(_) if candidate.is_confined() => not_enforced(),
+                    Some(_) => Some("where it writes, TCP: its config says `confined = false`".to_owned()),
+                    None => Some("where it writes, TCP: this program starts plugins without a host".to_owned()),
+                };
+                Ok(Self { candidate, handshake, not_enforced, protocol, process, folder, requests: 0 })
             }
             Err(error) => Err(PluginError { log: process.kill(), ..error }),
         }

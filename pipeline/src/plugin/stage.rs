@@ -60,6 +60,9 @@ impl DynStage for PluginStage {
         let ran = run(&mut session, self.row, &self.params, inputs, cx);
         // with an answer in hand: what comes after it is not the plugin's to say
         let ran = ran.and_then(|outputs| session.check_quiet().map(|()| outputs));
+        if let Some(what) = &session.not_enforced {
+            cx.log(&format!("[afmid] not enforced: {what}\n"));
+        }
         cx.log(&session.take_log());
         match ran {
             Ok(outputs) => {

@@ -138,6 +138,9 @@ fn plugins() -> Value {
         "required": ["command"],
         "properties": {
             "command": command,
+            "confined": {
+                "description": "Whether it may write to its own temporary folder alone, and use no TCP (Linux).", "type": "boolean", "default": true
+            },
             "environment": {
                 "description": "Variables of its environment; they are part of the cache key.", "type": "object",
                 "propertyNames": { "pattern": "^[^=]+$" }, "additionalProperties": { "type": "string" }

@@ -242,7 +242,7 @@ fn a_stage_whose_recording_changes_meanwhile_fails_also_where_the_recording_come
             let folder = folder();
             if stored {
                 assert_eq!(
-                    ran(&folder, &stages("nothing").split("[[stage]]\nid = \"s\"").next().unwrap_or_default()).1,
+                    ran(&folder, stages("nothing").split("[[stage]]\nid = \"s\"").next().unwrap_or_default()).1,
                     1
                 );
             }

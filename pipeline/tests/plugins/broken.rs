@@ -34,7 +34,7 @@ const BROKEN: [(&str, &str); 20] = [
 
 fn tried(name: &str) -> Vec<(String, Result<String, String>)> {
     let command = [python(), script(name)];
-    let checks = check(&Plugins::new(Rule::All, None), &command, Path::new("."), 4.0);
+    let checks = check(&Plugins::new(Rule::All, None), &command, Path::new("."), 10.0);
     checks.into_iter().map(|check| (check.name.to_owned(), check.outcome)).collect()
 }
 

@@ -66,6 +66,9 @@ fn a_process_is_reused_and_what_it_says_is_kept() {
     let [one, two] = ["one", "two"].map(|id| about(&run, id)["pid"].clone());
     assert_eq!(one, two);
     let said: Vec<(&str, &str)> = run.info.logs.iter().map(|(id, text)| (id.as_str(), text.trim())).collect();
-    assert_eq!(said, [("one", "this goes to stderr"), ("two", "this goes to stderr")]);
+    assert_eq!(said.iter().map(|(id, _)| *id).collect::<Vec<_>>(), ["one", "two"]);
+    // this test has no host that would confine it
+    let told = |text: &str| text.starts_with("[afmid] not enforced") && text.ends_with("\nthis goes to stderr");
+    assert!(said.iter().all(|(_, text)| told(text)), "{said:?}");
     assert!(run.stages.iter().all(|stage| stage.result.warnings == ["it was loud"]));
 }

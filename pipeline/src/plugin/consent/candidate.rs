@@ -57,6 +57,11 @@ impl Candidate {
         &self.launch.folder
     }
 
+    /// Whether it may write to its own temporary folder alone, and use no TCP, where the system enforces that.
+    pub fn is_confined(&self) -> bool {
+        self.launch.confined
+    }
+
     /// The program, then the files among its arguments.
     pub fn files(&self) -> &[MadeOf] {
         &self.files
@@ -78,6 +83,7 @@ impl Candidate {
             part(name.as_bytes());
             part(value.as_bytes());
         }
+        part(&[u8::from(self.is_confined())]);
         for file in &self.files {
             part(file.path.as_os_str().as_bytes());
             part(file.blake3.as_bytes());

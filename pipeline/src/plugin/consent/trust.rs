@@ -42,6 +42,8 @@ pub struct Trusted {
     pub environment: BTreeMap<String, String>,
     /// The folder that it runs in.
     pub folder: String,
+    /// See [`Candidate::is_confined`].
+    pub confined: bool,
     /// BLAKE3 hashes of the files, by path.
     pub files: BTreeMap<String, String>,
     /// When (UTC, ISO 8601).
@@ -114,6 +116,7 @@ impl Trust {
             arguments: candidate.arguments().to_vec(),
             environment: candidate.environment().clone(),
             folder: path(candidate.folder()),
+            confined: candidate.is_confined(),
             files: candidate.files().iter().map(|file| (path(&file.path), file.blake3.clone())).collect(),
             agreed_at: jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
             introduction: introduction.clone(),

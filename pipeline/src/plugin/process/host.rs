@@ -1,11 +1,11 @@
 //! The process between this program and a plugin: it ends all that the plugin has started, whatever ends this program.
 //!
 //! ```text
-//! program -> PROGRAM __plugin-host PID FOLDER COMMAND... -> PROGRAM __plugin-start PID COMMAND... = the plugin
+//! program -> PROGRAM __plugin-host PID FOLDER HOW COMMAND... -> PROGRAM __plugin-start PID FOLDER HOW COMMAND... = the plugin
 //! ```
 //!
 //! The host adopts what the plugin's processes leave behind, waits for the end of the plugin and for that of the program, kills what is left, and removes
-//! the folder of the exchange where the program no longer can. The last step lets the plugin die with its host, and becomes the plugin.
+//! the folder of the exchange where the program no longer can. The last step lets the plugin die with its host, confines it, and becomes the plugin.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -21,10 +21,16 @@ use rustix::process::{
     set_parent_process_death_signal, wait,
 };
 
+use super::confinement::confine;
 use super::descendants::kill_descendants;
+use crate::plugin::launch::Launch;
 
 const HOST: &str = "__plugin-host";
 const START: &str = "__plugin-start";
+
+/// How a plugin is started.
+const CONFINED: &str = "confined";
+const FREE: &str = "free";
 
 /// A program that calls [`host_main`] at its beginning, and so can stand between this one and a plugin.
 #[derive(Debug, Clone)]
@@ -40,15 +46,16 @@ impl Host {
     }
 
     /// The command that starts a plugin under it; `folder` is that of the exchange.
-    pub(super) fn command(&self, plugin: &Path, arguments: &[String], folder: &Path) -> Command {
+    pub(super) fn command(&self, launch: &Launch, folder: &Path) -> Command {
         let mut command = Command::new(&self.program);
         command
             .arg0("plugin-host")
             .arg(HOST)
             .arg(std::process::id().to_string())
             .arg(folder)
-            .arg(plugin)
-            .args(arguments);
+            .arg(if launch.confined { CONFINED } else { FREE })
+            .arg(&launch.program)
+            .args(&launch.arguments);
         command
     }
 }
@@ -64,10 +71,13 @@ pub fn host_main() -> Option<ExitCode> {
     let parent = arguments.next().and_then(|text| Pid::from_raw(text.to_str()?.parse().ok()?));
     let rest: Vec<OsString> = arguments.collect();
     Some(match (parent, rest.as_slice()) {
-        (Some(parent), [folder, command @ ..]) if is_host && !command.is_empty() => {
+        (Some(parent), [folder, command @ ..]) if is_host && command.len() > 1 => {
             host(parent, Path::new(folder), command)
         }
-        (Some(parent), [program, arguments @ ..]) if is_start => start(parent, program, arguments),
+        (Some(parent), [folder, how, program, arguments @ ..]) if is_start => {
+            let confined = how == OsStr::new(CONFINED);
+            start(parent, confined.then_some(Path::new(folder)), program, arguments)
+        }
         _ => ExitCode::from(2),
     })
 }
@@ -78,12 +88,13 @@ fn host(parent: Pid, folder: &Path, command: &[OsString]) -> ExitCode {
     let program = Program { parent, held: pidfd_open(parent, PidfdFlags::empty()).ok() };
     if !program.has_ended(Duration::ZERO) {
         let own = getpid().as_raw_nonzero().to_string();
-        match Command::new("/proc/self/exe").arg0("plugin-start").arg(START).arg(own).args(command).spawn() {
+        match Command::new("/proc/self/exe").arg0("plugin-start").arg(START).arg(own).arg(folder).args(command).spawn()
+        {
             Ok(child) => {
                 let plugin = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
                 return hosted(plugin, program, folder);
             }
-            Err(error) => told(command.first(), &error),
+            Err(error) => told(command.get(1), &error),
         }
     }
     ExitCode::from(127)
@@ -175,10 +186,18 @@ fn remove(folder: &Path) {
     }
 }
 
-fn start(host: Pid, program: &OsStr, arguments: &[OsString]) -> ExitCode {
+/// Becomes the plugin, which may write to `confined` alone if there is such a folder.
+fn start(host: Pid, confined: Option<&Path>, program: &OsStr, arguments: &[OsString]) -> ExitCode {
     // it stays with what this process becomes; where the system refuses, the host's own end is not seen
     let _ = set_parent_process_death_signal(Some(Signal::KILL));
     if getppid() == Some(host) {
+        if let Some(Err(error)) = confined.map(confine) {
+            told(
+                Some(&program.to_owned()),
+                &format!("it cannot be confined ({error}): see `confined` in docs/plugins.md"),
+            );
+            return ExitCode::from(127);
+        }
         let error = Command::new(program).args(arguments).exec();
         told(Some(&program.to_owned()), &error);
     }
@@ -186,7 +205,7 @@ fn start(host: Pid, program: &OsStr, arguments: &[OsString]) -> ExitCode {
 }
 
 /// On stderr, which the program shows.
-fn told(program: Option<&OsString>, error: &std::io::Error) {
+fn told(program: Option<&OsString>, error: &dyn std::fmt::Display) {
     use std::io::Write;
     let program = program.map(|program| program.to_string_lossy().into_owned()).unwrap_or_default();
     let _ = writeln!(std::io::stderr(), "{program} cannot be started: {error}");

@@ -3,6 +3,10 @@
 use std::path::Path;
 use std::process::{Command, ExitCode};
 
+use rustix::process::Pid;
+
+use crate::plugin::launch::Launch;
+
 /// A program that stands between this one and a plugin: there is none on this system.
 #[derive(Debug, Clone)]
 pub struct Host(std::convert::Infallible);
@@ -13,7 +17,7 @@ impl Host {
         None
     }
 
-    pub(super) fn command(&self, _plugin: &Path, _arguments: &[String], _folder: &Path) -> Command {
+    pub(super) fn command(&self, _launch: &Launch, _folder: &Path) -> Command {
         match self.0 {}
     }
 }
@@ -21,4 +25,12 @@ impl Host {
 /// Nothing on this system.
 pub fn host_main() -> Option<ExitCode> {
     None
+}
+
+/// What leaves its group is not found on this system.
+pub(in crate::plugin) fn kill_descendants(_root: Pid) {}
+
+/// Nothing is enforced on this system.
+pub(in crate::plugin) fn not_enforced() -> Option<String> {
+    Some("where it writes, TCP: only Linux confines it".to_owned())
 }

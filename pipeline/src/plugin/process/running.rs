@@ -39,7 +39,7 @@ impl Process {
         temporary: &Path,
     ) -> Result<Self, PluginError> {
         let mut command = match host {
-            Some(host) => host.command(&launch.program, &launch.arguments, folder),
+            Some(host) => host.command(launch, folder),
             None => {
                 let mut command = Command::new(&launch.program);
                 command.args(&launch.arguments);
