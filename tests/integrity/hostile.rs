@@ -40,7 +40,7 @@ fn bounded(folder: &Path, arguments: &[&str]) {
 }
 
 /// Every command that takes a file, on a file.
-fn every_command(folder: &Path, file: &Path) {
+pub fn every_command(folder: &Path, file: &Path) {
     let shown = file.display().to_string();
     let text = |name: &str, text: String| fs::write(folder.join(name), text).expect("a config is written");
     let config = |stage: &str| format!("[pipeline]\nname = \"a\"\nseed = 1\n\n[[stage]]\nid = \"records\"\n{stage}\n");

@@ -11,6 +11,7 @@ mod entrances;
 mod faults;
 mod floors;
 mod hostile;
+mod hostile_hdf5;
 mod inputs;
 mod interrupts;
 mod keys;

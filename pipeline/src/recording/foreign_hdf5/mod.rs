@@ -20,7 +20,7 @@ mod walk;
 
 use std::path::Path;
 
-use afmid_formats::Contents;
+use afmid_formats::{Contents, most_inflated};
 
 use super::input_files::{InputFiles, require_state};
 use super::native::text_attribute;
@@ -45,13 +45,23 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
     let mut scopes = Scopes::default();
     scopes.attributes(&file, "");
     let mut variables = Vec::new();
+    // each may be within the bounds that all of them exceed
+    let (mut bytes, most_bytes) = (0_u64, most_inflated(hashed.state.size()));
     for found in walk::datasets(&file, &mut scopes, &mut remarks) {
         match Variable::of(&found, matlab, allowance) {
             Ok(Variable::Single(value)) => {
                 scopes.number(&found.group, &found.name, &found.location, value);
                 remarks.push(format!("{} is the single number {value}, no channel", found.location));
             }
-            Ok(Variable::Series(series)) => variables.push((found, series)),
+            Ok(Variable::Series(series)) if bytes.saturating_add(series.bytes()) > most_bytes => remarks.push(format!(
+                "{} is left out: with it the samples come to more than {most_bytes} bytes, the most that is read of a file of {}",
+                found.location,
+                hashed.state.size()
+            )),
+            Ok(Variable::Series(series)) => {
+                bytes += series.bytes();
+                variables.push((found, series));
+            }
             Err(why) => remarks.push(format!("{} is left out: {why}", found.location)),
         }
     }

@@ -90,6 +90,11 @@ impl Series {
         self.lanes.count()
     }
 
+    /// What its samples take when they are read.
+    pub(super) fn bytes(&self) -> u64 {
+        self.shape.iter().fold(self.number.bytes(), |product, &size| product.saturating_mul(size as u64))
+    }
+
     /// The channels. Errors: the samples cannot be found in the file; a scale that is none.
     pub(super) fn channels(
         &self,

@@ -1,13 +1,15 @@
 //! All datasets of a file.
 
+use std::collections::HashMap;
+
 use hdf5::{Dataset, Group, LinkType, LocationType};
 
 use super::scope::Scopes;
 
-/// Deeper groups are a loop of hard links.
+/// No recorder nests its groups as deep.
 const DEEPEST: usize = 32;
 
-/// More objects are no recording; a loop of hard links would give them, too.
+/// More objects are no recording.
 const MOST_OBJECTS: usize = 20_000;
 
 /// A dataset and where it lies.
@@ -23,7 +25,8 @@ pub(super) struct Found {
 
 /// Datasets of a file, in the order of their names, group by group; attributes of groups go to `scopes`.
 pub(super) fn datasets(file: &Group, scopes: &mut Scopes, remarks: &mut Vec<String>) -> Vec<Found> {
-    let mut walk = Walk { scopes, remarks, found: Vec::new(), objects: 0, links: 0 };
+    let mut walk = Walk { scopes, remarks, found: Vec::new(), seen: HashMap::new(), objects: 0, links: 0 };
+    walk.is_new(file, "/");
     walk.group(file, "", 0);
     if walk.links > 0 {
         let links = walk.links;
@@ -39,6 +42,8 @@ struct Walk<'a> {
     scopes: &'a mut Scopes,
     remarks: &'a mut Vec<String>,
     found: Vec<Found>,
+    /// Groups that are listed, by what the library tells them apart with, and where: several hard links may lead to one, in circles too.
+    seen: HashMap<String, String>,
     objects: usize,
     links: usize,
 }
@@ -84,6 +89,9 @@ impl Walk<'_> {
             },
             Ok(LocationType::Group) if depth < DEEPEST => match group.group(&name) {
                 Ok(inner) => {
+                    if !self.is_new(&inner, &location) {
+                        return;
+                    }
                     self.scopes.attributes(&inner, &location);
                     self.group(&inner, &location, depth + 1);
                 }
@@ -93,5 +101,22 @@ impl Walk<'_> {
             Ok(_) => {}
             Err(error) => self.remarks.push(format!("{location} cannot be opened: {error}")),
         }
+    }
+
+    /// Whether a group is met for the first time; if not, a remark says where it is listed.
+    fn is_new(&mut self, group: &Group, location: &str) -> bool {
+        let token = match group.loc_info() {
+            Ok(info) => format!("{:?}", info.token),
+            Err(error) => {
+                self.remarks.push(format!("{location} cannot be opened: {error}"));
+                return false;
+            }
+        };
+        if let Some(first) = self.seen.get(&token) {
+            self.remarks.push(format!("{location} is another name of {first}, where its members are listed"));
+            return false;
+        }
+        self.seen.insert(token, location.to_owned());
+        true
     }
 }

@@ -1,0 +1,100 @@
+//! HDF5 files of strangers whose structure does harm: what inflates to much, circles, depth, one object under many names, very many attributes.
+
+use std::fs;
+use std::path::Path;
+
+use hdf5::{File, Group};
+
+use super::common::{afmid, command};
+use super::hostile::every_command;
+
+/// A file with a small measurement in `/x`, and what else `more` puts there.
+fn file(path: &Path, more: impl FnOnce(&File) -> hdf5::Result<()>) {
+    let file = File::create(path).expect("a file");
+    let samples: Vec<f64> = (0..2000).map(|n| f64::from(n % 7)).collect();
+    file.new_dataset_builder().with_data(&samples).create("x").expect("a dataset");
+    more(&file).expect("it is written");
+}
+
+/// Zeros that take a thousandth of their room, in chunks.
+fn zeros(group: &Group, name: &str, samples: usize, chunk: usize) -> hdf5::Result<()> {
+    let dataset = group.new_dataset::<i8>().chunk(chunk).deflate(1).shape(samples).create(name)?;
+    let block = vec![0_i8; chunk];
+    (0..samples).step_by(chunk).try_for_each(|at| dataset.write_slice(&block, at..at + chunk))
+}
+
+#[test]
+fn hdf5_files_that_inflate_to_much_are_bounded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path().join("bomb.h5");
+    let mib = 1 << 20;
+    for (name, count, samples, chunk) in [
+        ("one dataset in small chunks", 1, 2048 * mib, 4 * mib),
+        ("one dataset of one chunk", 1, 700 * mib, 700 * mib),
+        ("many datasets, each within the bounds", 40, 60 * mib, 4 * mib),
+    ] {
+        println!("{name}");
+        file(&here, |file| {
+            file.unlink("x")?;
+            zeros(file, "x", samples, chunk)?;
+            (1..count).try_for_each(|n| zeros(file, &format!("x{n}"), samples, chunk))
+        });
+        assert!(fs::metadata(&here).expect("a file").len() < 32 << 20);
+        every_command(folder.path(), &here);
+        fs::remove_file(&here).expect("removed");
+    }
+}
+
+#[test]
+fn hdf5_files_of_odd_structure_are_bounded_and_their_measurement_is_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path().join("odd.h5");
+    type Make = fn(&File) -> hdf5::Result<()>;
+    let odd: [(&str, Make); 5] = [
+        ("a group that holds itself, twice", |file| {
+            let group = file.create_group("circle")?;
+            group.link_hard("/circle", "again")?;
+            group.link_hard("/", "root")
+        }),
+        ("groups in groups", |file| {
+            let mut group = file.create_group("deep")?;
+            for _ in 0..5000 {
+                group = group.create_group("g")?;
+            }
+            Ok(())
+        }),
+        ("forks: a million million paths to forty groups", |file| {
+            file.create_group("fork0")?;
+            for n in 1..40 {
+                let group = file.create_group(&format!("fork{n}"))?;
+                let below = format!("/fork{}", n - 1);
+                group.link_hard(&below, "left")?;
+                group.link_hard(&below, "right")?;
+            }
+            Ok(())
+        }),
+        ("one dataset under very many names", |file| {
+            (0..50_000).try_for_each(|n| file.link_hard("/x", &format!("name{n}")))
+        }),
+        ("very many attributes", |file| {
+            let dataset = file.dataset("x")?;
+            (0..5000).try_for_each(|n| {
+                dataset.new_attr::<f64>().create(format!("a{n}").as_str())?.write_scalar(&f64::from(n))
+            })
+        }),
+    ];
+    for (name, make) in odd {
+        println!("{name}");
+        file(&here, make);
+        every_command(folder.path(), &here);
+        let output = command(folder.path(), &["inspect", "odd.h5"]).output().expect("afmid starts");
+        let shown = String::from_utf8_lossy(&output.stdout).into_owned();
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        let refused = output.status.code() == Some(2) && error.contains("odd.h5") && error.contains("help: ");
+        assert!((output.status.success() && shown.contains("2000")) || refused, "{name}: {shown}{error}");
+        fs::remove_file(&here).expect("removed");
+    }
+    // what is not odd
+    file(&here, |_| Ok(()));
+    assert!(afmid(folder.path(), &["inspect", "odd.h5"]).contains("2000"));
+}
