@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use afmid_pipeline::Config;
-use afmid_pipeline::plugin::{Candidate, Described, Plugins, Trust, Trusted};
+use afmid_pipeline::plugin::{Candidate, Described, MadeOf, Plugins, Trust, Trusted};
+use afmid_pipeline::{Config, Problem};
 use serde_json::{Value, json};
 
 use super::consent::{all, end, listing, trust};
@@ -27,17 +27,25 @@ pub fn run(args: &TrustArgs) -> Result<(), Failure> {
     let plugins = all();
     let mut rows = Vec::new();
     for config in &args.configs {
-        let candidates = candidates(config, &plugins)?;
-        if candidates.is_empty() && !args.json {
+        let (parsed, text) = parsed(config)?;
+        let found = match (args.revoke, plugins.candidates(&parsed)) {
+            (false, Err(problems)) => return Err(usage(config, &text, &problems)),
+            (true, found) => {
+                let rows = revoked(&trust, config, &parsed, &found.unwrap_or_default())?;
+                if !args.json {
+                    rows.iter().try_for_each(|row| print(&row.text()))?;
+                }
+                rows
+            }
+            (false, Ok(candidates)) => {
+                let agreed = |candidate: &Candidate| agreed(&plugins, candidate, args.json);
+                candidates.iter().map(agreed).collect::<Result<Vec<Row>, Failure>>()?
+            }
+        };
+        if found.is_empty() && !args.json {
             print(&format!("{}: its stages start no plugin\n", config.display()))?;
         }
-        for candidate in candidates {
-            let row = if args.revoke { revoked(&trust, &candidate)? } else { agreed(&plugins, &candidate, args.json)? };
-            if !args.json {
-                print(&row.text())?;
-            }
-            rows.push(row);
-        }
+        rows.extend(found);
     }
     end(&plugins)?;
     if args.json {
@@ -49,15 +57,23 @@ pub fn run(args: &TrustArgs) -> Result<(), Failure> {
     if failed { Err(Failure::Failed(Message::Rendered(String::new()))) } else { Ok(()) }
 }
 
-/// The plugins of a config. Errors, usage: what is wrong with it; a plugin that is not there.
-fn candidates(config: &Path, plugins: &Plugins) -> Result<Vec<Candidate>, Failure> {
-    let (file, text) = (config.display().to_string(), read(config)?);
-    let found = Config::parse(&file, &text, &[]).and_then(|config| plugins.candidates(&config));
-    found.map_err(|problems| Failure::Usage(Message::Rendered(render(&file, &text, &problems))))
+/// A config and its text. Errors, usage: what is wrong with it.
+fn parsed(config: &Path) -> Result<(Config, String), Failure> {
+    let text = read(config)?;
+    match Config::parse(&config.display().to_string(), &text, &[]) {
+        Ok(parsed) => Ok((parsed, text)),
+        Err(problems) => Err(usage(config, &text, &problems)),
+    }
+}
+
+fn usage(config: &Path, text: &str, problems: &[Problem]) -> Failure {
+    Failure::Usage(Message::Rendered(render(&config.display().to_string(), text, problems)))
 }
 
 struct Row {
-    candidate: Candidate,
+    name: String,
+    /// None of one that is there no more.
+    candidate: Option<Candidate>,
     outcome: Outcome,
 }
 
@@ -76,20 +92,42 @@ fn agreed(plugins: &Plugins, candidate: &Candidate, json: bool) -> Result<Row, F
         Ok(described) => Outcome::Trusted(described),
         Err(error) => Outcome::Failed(format!("{}\n  help: {}", error.told(candidate.name()), error.help)),
     };
-    Ok(Row { candidate: candidate.clone(), outcome })
+    let row = Row { name: candidate.name().to_owned(), candidate: Some(candidate.clone()), outcome };
+    if !json {
+        print(&row.text())?;
+    }
+    Ok(row)
 }
 
-/// Takes back consent for the plugin as it is and as it was: what ran under this name in this folder.
-fn revoked(trust: &Trust, candidate: &Candidate) -> Result<Row, Failure> {
-    let folder = candidate.folder().display().to_string();
-    let (mut count, seal) = (0, candidate.seal());
-    let own =
-        |trusted: &Trusted| (trusted.name == candidate.name() && trusted.folder == folder) || trusted.seal == seal;
-    for trusted in trust.list().iter().filter(|trusted| own(trusted)) {
-        let gone = trust.revoke(&trusted.seal).map_err(|error| Failure::failed(&error, error.help.clone()))?;
-        count += usize::from(gone);
+/// Takes back consent for the plugins of a config, as they are and as they were: what ran under these names in its folder, whether it is still there or
+/// not, and what is the same under another name.
+fn revoked(trust: &Trust, config: &Path, parsed: &Config, found: &[Candidate]) -> Result<Vec<Row>, Failure> {
+    let folder = match config.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned()).display().to_string();
+    let mut names: Vec<&str> = Vec::new();
+    for name in parsed.stages.iter().filter_map(|stage| stage.uses.strip_prefix("exec:")) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
     }
-    Ok(Row { candidate: candidate.clone(), outcome: Outcome::Revoked(count) })
+    let revoked = |name: &str| {
+        let candidate = found.iter().find(|candidate| candidate.name() == name);
+        let seal = candidate.map(Candidate::seal);
+        let own = |trusted: &Trusted| {
+            (trusted.name == name && trusted.folder == folder) || Some(&trusted.seal) == seal.as_ref()
+        };
+        let mut count = 0;
+        for trusted in trust.list().iter().filter(|trusted| own(trusted)) {
+            let gone = trust.revoke(&trusted.seal).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+            count += usize::from(gone);
+        }
+        Ok(Row { name: name.to_owned(), candidate: candidate.cloned(), outcome: Outcome::Revoked(count) })
+    };
+    let rows = names.into_iter().map(revoked).collect::<Result<Vec<Row>, Failure>>()?;
+    Ok(rows)
 }
 
 impl Row {
@@ -103,15 +141,18 @@ impl Row {
                     list(outputs)
                 )
             }
-            Outcome::Revoked(0) => format!("plugin {}: nobody had agreed to it\n", self.candidate.name()),
-            Outcome::Revoked(_) => format!("plugin {}: trusted no more\n", self.candidate.name()),
+            Outcome::Revoked(0) => format!("plugin {}: nobody had agreed to it\n", self.name),
+            Outcome::Revoked(_) => format!("plugin {}: trusted no more\n", self.name),
             Outcome::Failed(error) => format!("not trusted: {error}\n"),
         }
     }
 
     fn json(&self) -> Value {
-        let candidate = &self.candidate;
-        let files = candidate.files().iter();
+        let candidate = self.candidate.as_ref();
+        let files = |candidate: &Candidate| {
+            let file = |file: &MadeOf| json!({ "path": file.path.display().to_string(), "blake3": file.blake3 });
+            candidate.files().iter().map(file).collect::<Vec<_>>()
+        };
         let described = match &self.outcome {
             Outcome::Trusted(described) => json!({
                 "name": described.name,
@@ -123,14 +164,14 @@ impl Row {
             _ => Value::Null,
         };
         json!({
-            "name": candidate.name(),
-            "program": candidate.program().display().to_string(),
-            "arguments": candidate.arguments(),
-            "environment": candidate.environment(),
-            "folder": candidate.folder().display().to_string(),
-            "confined": candidate.is_confined(),
-            "files": files.map(|file| json!({ "path": file.path.display().to_string(), "blake3": file.blake3 })).collect::<Vec<_>>(),
-            "seal": candidate.seal(),
+            "name": self.name,
+            "program": candidate.map(|candidate| candidate.program().display().to_string()),
+            "arguments": candidate.map(Candidate::arguments),
+            "environment": candidate.map(Candidate::environment),
+            "folder": candidate.map(|candidate| candidate.folder().display().to_string()),
+            "confined": candidate.map(Candidate::is_confined),
+            "files": candidate.map(files),
+            "seal": candidate.map(Candidate::seal),
             "trusted": matches!(self.outcome, Outcome::Trusted(_)),
             "described": described,
             "error": if let Outcome::Failed(error) = &self.outcome { Some(error) } else { None },

@@ -235,6 +235,13 @@ fn ports_are_checked_after_consent_and_without_starting_anything() {
     assert_eq!(list["plugins"][0]["identity"], "stranger 1", "{list}");
     project.told(&["trust", "--revoke", "c.toml"]);
     assert_eq!(project.run(&["run", "c.toml", "-o", "a.h5"]).status.code(), Some(2));
+
+    // what is there no more can be revoked, too
+    project.told(&["trust", "c.toml"]);
+    project.put("c.toml", &CONFIG.replace("python3 mine.py", "./gone mine.py"));
+    let revoked = project.json(&["trust", "--revoke", "c.toml", "--json"]);
+    assert_eq!(revoked["plugins"][0]["program"], serde_json::Value::Null, "{revoked}");
+    assert_eq!(project.json(&["trust", "--list", "--json"])["plugins"], json!([]));
 }
 
 #[test]
