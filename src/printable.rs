@@ -27,6 +27,11 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(shown).collect())
 }
 
+/// The same of what is one line, such as a name or a cell: ends of lines and tabulators are escapes, too. A name could otherwise add lines of its own.
+pub fn one_line(text: &str) -> String {
+    printable(text).replace('\n', "\\n").replace('\t', "\\t")
+}
+
 /// JSON with the escapes of JSON for the same characters, which it may hold in its strings alone. (Below a blank it has escapes already.)
 pub fn printable_json(json: &str) -> Cow<'_, str> {
     if !json.contains(acts) {
@@ -49,6 +54,11 @@ mod tests {
         for plain in ["", "\u{b5}m, \u{3b1}\n\tx", "\u{65e5}\u{672c} \u{1f600} \u{2026} \u{2060}"] {
             assert!(matches!(printable(plain), Cow::Borrowed(same) if same == plain));
         }
+    }
+
+    #[test]
+    fn a_name_stays_one_line() {
+        assert_eq!(one_line("a\r\nverdict: right\t1\u{1b}"), "a\\nverdict: right\\t1\\x1b");
     }
 
     #[test]

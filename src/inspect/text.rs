@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::channel::Channel;
 use super::file::{Holdings, Inspected, Outcome};
+use crate::printable::one_line;
 use crate::show::{grid, number};
 
 /// Channels shown of one file, and remarks.
@@ -12,21 +13,21 @@ const MOST_ROWS: usize = 40;
 /// One file in full.
 pub fn file_text(inspected: &Inspected) -> String {
     let size = inspected.size_bytes.map_or(String::new(), |bytes| format!(", {bytes} bytes"));
-    let file = inspected.file.display();
+    let file = one_line(&inspected.file.display().to_string());
     match &inspected.outcome {
         Outcome::Own => format!("{file}{size}\n  a result of afmid's, no recording: `afmid show` shows it\n"),
         Outcome::Refused { problem, help } => {
             let help = help.as_ref().map(|help| format!("  help: {help}\n")).unwrap_or_default();
-            format!("{file}{size}\n  refused: {problem}\n{help}")
+            format!("{file}{size}\n  refused: {}\n{help}", one_line(problem))
         }
         Outcome::Read(holdings) => format!("{file}{size}\n{}", holdings_text(holdings)),
     }
 }
 
 fn holdings_text(holdings: &Holdings) -> String {
-    let mut text = format!("  {}\n", holdings.format);
+    let mut text = format!("  {}\n", one_line(&holdings.format));
     if !holdings.started_at.is_empty() {
-        text += &format!("  started {}\n", holdings.started_at);
+        text += &format!("  started {}\n", one_line(&holdings.started_at));
     }
     if !holdings.channels.is_empty() {
         let header = ["channel", "samples", "rate/Hz", "unit", "stored as", "gaps", "least", "largest"];
@@ -35,12 +36,12 @@ fn holdings_text(holdings: &Holdings) -> String {
         text.extend(grid(&rows).lines().map(|line| format!("  {line}\n")));
         text += &more(holdings.channels.len(), "channels");
     }
-    text.extend(holdings.remarks.iter().take(MOST_ROWS).map(|remark| format!("  note: {remark}\n")));
+    text.extend(holdings.remarks.iter().take(MOST_ROWS).map(|remark| format!("  note: {}\n", one_line(remark))));
     text += &more(holdings.remarks.len(), "notes");
     let verdict = &holdings.ringdown;
     let channel = verdict.channel.and_then(|index| holdings.channels.get(index));
     let of = channel.map(|channel| format!("{}: ", channel.location)).unwrap_or_default();
-    text += &format!("  ringdown: {}; {of}{}\n", verdict.answer.word(), verdict.reason);
+    text += &format!("  ringdown: {}; {}\n", verdict.answer.word(), one_line(&format!("{of}{}", verdict.reason)));
     if let Some(stage) = &holdings.stage {
         text += "\n";
         text.extend(stage.lines().map(|line| if line.is_empty() { "\n".to_owned() } else { format!("    {line}\n") }));
@@ -76,7 +77,7 @@ pub fn folder_text(folder: &Path, files: &[Inspected]) -> String {
     let header = ["file", "format", "channels", "samples", "rate/Hz", "ringdown", "reason"];
     let rows = files.iter().map(|inspected| line(folder, inspected));
     let rows: Vec<Vec<String>> = std::iter::once(header.map(str::to_owned).to_vec()).chain(rows).collect();
-    format!("{}\n{}", folder.display(), grid(&rows))
+    format!("{}\n{}", one_line(&folder.display().to_string()), grid(&rows))
 }
 
 fn line(folder: &Path, inspected: &Inspected) -> Vec<String> {

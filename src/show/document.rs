@@ -4,6 +4,7 @@ use serde_json::{Map, Value};
 
 use super::grid::narrow_grid;
 use super::number::{number, std_name, with_std};
+use crate::printable::one_line;
 
 /// Characters in a table's line that most windows show.
 const WIDEST: usize = 110;
@@ -24,7 +25,7 @@ fn write_object(entries: &Map<String, Value>, depth: usize, text: &mut String) {
     for (name, value) in entries.iter().filter(|(name, _)| !partners.contains(&name.as_str())) {
         match std_name(name, names()).and_then(|std| entries.get(std)) {
             Some(std) if value.is_number() => {
-                text.push_str(&format!("{}{name}: {}\n", indent(depth), uncertain(value, std)));
+                text.push_str(&format!("{}{}: {}\n", indent(depth), one_line(name), uncertain(value, std)));
             }
             _ => write_value(name, value, depth, text),
         }
@@ -32,7 +33,7 @@ fn write_object(entries: &Map<String, Value>, depth: usize, text: &mut String) {
 }
 
 fn write_value(name: &str, value: &Value, depth: usize, text: &mut String) {
-    let head = if name.is_empty() { indent(depth) } else { format!("{}{name}: ", indent(depth)) };
+    let head = if name.is_empty() { indent(depth) } else { format!("{}{}: ", indent(depth), one_line(name)) };
     match value {
         Value::Object(entries) if !entries.is_empty() => {
             text.push_str(&format!("{}\n", head.trim_end()));
@@ -95,7 +96,7 @@ fn scalar_text(value: &Value) -> String {
         Value::Bool(flag) => if *flag { "yes" } else { "no" }.to_owned(),
         Value::Number(value) if value.is_f64() => number(value.as_f64().unwrap_or(f64::NAN)),
         Value::Number(value) => value.to_string(),
-        Value::String(text) => text.clone(),
+        Value::String(text) => one_line(text),
         Value::Array(values) if !values.is_empty() => values.iter().map(scalar_text).collect::<Vec<_>>().join(", "),
         Value::Array(_) | Value::Object(_) => "none".to_owned(),
     }

@@ -1,5 +1,7 @@
 //! Aligned columns.
 
+use crate::printable::one_line;
+
 /// Rows of cells as aligned columns, two blanks apart; columns of numbers are aligned to the right. The first row is the header.
 pub fn grid(rows: &[Vec<String>]) -> String {
     aligned(rows, 1)
@@ -35,7 +37,7 @@ fn fold(name: &str, most: usize) -> Vec<String> {
 
 fn aligned(rows: &[Vec<String>], head: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let cell = |row: &[String], column: usize| row.get(column).cloned().unwrap_or_default();
+    let cell = |row: &[String], column: usize| row.get(column).map_or_else(String::new, |cell| one_line(cell));
     let widths: Vec<usize> = (0..columns)
         .map(|column| rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0))
         .collect();

@@ -5,6 +5,7 @@ use afmid_pipeline::store::{PortSummary, ResultFile, StageSummary};
 use serde_json::{Value, json};
 
 use super::grid::grid;
+use crate::printable::one_line;
 
 /// The run, its stages with their artifacts, and all warnings.
 pub fn overview_text(file: &ResultFile) -> String {
@@ -32,7 +33,7 @@ pub fn overview_text(file: &ResultFile) -> String {
 
 fn warnings(stage: &StageSummary) -> Vec<String> {
     let record = &stage.record;
-    record.result.warnings.iter().map(|warning| format!("  {}: {warning}\n", record.id)).collect()
+    record.result.warnings.iter().map(|warning| format!("  {}: {}\n", record.id, one_line(warning))).collect()
 }
 
 /// The same for scripts.

@@ -84,6 +84,29 @@ fn census(files: &str) -> String {
     )
 }
 
+/// A line's end in a name adds no line of its own to a table or a list.
+#[test]
+fn a_name_of_two_lines_stays_one() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("set")).expect("a folder");
+    let name = "r\nFAKE  ringdown: yes.h5";
+    record(&place.path("set").join(name));
+    let text = "time,a\rFAKE (V)\n0,1\n1e-6,2\n2e-6,3\n";
+    std::fs::write(place.path("set").join("t\nFAKE.csv"), text).expect("a table");
+    let config = census(&escaped("set/r*.h5"));
+    std::fs::write(place.path("c.toml"), config).expect("a config");
+    place.command(&["run", "c.toml", "-o", "out.h5"]).status().expect("afmid starts");
+    let record = format!("set/{name}");
+    for arguments in
+        [&["inspect", "set"][..], &["inspect", &record], &["show", "out.h5"], &["show", "out.h5", "records"]]
+    {
+        let output = place.command(arguments).output().expect("afmid starts");
+        let shown = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success() && !shown.is_empty(), "{arguments:?}: {shown}");
+        assert!(!shown.lines().any(|line| line.trim_start().starts_with("FAKE")), "{arguments:?}: {shown}");
+    }
+}
+
 #[test]
 fn names_units_and_paths_of_recordings_are_shown_and_not_obeyed() {
     let place = Place::new();
