@@ -1,6 +1,7 @@
 //! A pipeline that takes milliseconds, on records that are written here.
 
 use std::fs::{self, File};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::SourceFile;
@@ -113,8 +114,9 @@ pub fn hash(path: &Path) -> String {
 /// Writes other bytes into a file in place and sets its time of modification back: `cp` and `touch -r`.
 pub fn overwrite_unseen(path: &Path, bytes: &[u8]) {
     let modified = fs::metadata(path).and_then(|metadata| metadata.modified()).expect("a time");
-    fs::write(path, bytes).expect("written");
-    File::options().write(true).open(path).and_then(|file| file.set_modified(modified)).expect("a time set back");
+    // in place: a file that is cut short for a moment fails any reader, one of other bytes only who looks
+    let mut file = File::options().write(true).open(path).expect("a file");
+    file.write_all(bytes).and_then(|()| file.set_modified(modified)).expect("written, and the time set back");
 }
 
 /// The bytes with one sample in the middle that is another.
