@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Times commands of afmid at several numbers of items, and prints how the time grows.
 
-    benches/scaling.py [target/release/afmid] [MOST]
+    benches/scaling.py [target/release/afmid] [MOST] [WORD...]
 
-Makes small raw records, stages and ledgers in a temporary folder with Python's standard library alone. Of each command the shortest of three
-runs counts. The exponent is the slope of log(time without that of an empty job) over log(items) from the second smallest size on.
+Makes small raw records, stages and ledgers in a temporary folder with Python's standard library alone, for the commands whose line holds one of the
+words. Of each command the shortest of several runs counts: until they took 2 s together, three at least. The exponent is the slope of log(time without
+that of an empty job) over log(items) from the second smallest size on; the second one is of the processor's time in the program itself (user), without
+the system's for files and memory, over sizes where that is 20 ms and more.
 """
 
 import json
@@ -18,6 +20,7 @@ import time
 
 PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else "target/release/afmid")
 MOST = int(sys.argv[2]) if len(sys.argv) > 2 else 32000
+WORDS = sys.argv[3:]
 SIZES = [size for size in (1000, 2000, 4000, 8000, 16000, 32000, 64000, 128000) if size <= MOST]
 HEAD = '[pipeline]\nname = "a"\nseed = 1\n'
 RAW = 'format = "raw", raw = { sample = "int16" }, channel = "/channel[0]", sample_rate_hz = 1e6, unit = "V"'
@@ -88,11 +91,13 @@ CASES = [
 
 def run(folder, arguments):
     clock = time.monotonic()
-    ended = subprocess.run([PROGRAM, *arguments], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen([PROGRAM, *arguments], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
     seconds = time.monotonic() - clock
-    if ended.returncode not in (0, 2, 3):
-        sys.exit(f"afmid {arguments}: exit code {ended.returncode}")
-    return seconds
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode not in (0, 2, 3):
+        sys.exit(f"afmid {arguments}: exit code {process.returncode}")
+    return seconds, usage.ru_utime
 
 
 def measured(make, before, arguments, runs, count):
@@ -101,30 +106,36 @@ def measured(make, before, arguments, runs, count):
         make(folder, count)
         if before:
             run(folder, before)
-        return min(run(folder, arguments) for _ in range(runs))
+        times = [run(folder, arguments) for _ in range(runs)]
+        while runs > 1 and sum(seconds for seconds, _ in times) < 2 and len(times) < 50:
+            times.append(run(folder, arguments))
+        return [min(column) for column in zip(*times)]
     finally:
         shutil.rmtree(folder)
 
 
 def slope(points):
+    if len(points) < 2:
+        return math.nan
     xs, ys = [math.log(x) for x, _ in points], [math.log(y) for _, y in points]
     mean_x, mean_y = sum(xs) / len(xs), sum(ys) / len(ys)
     spread = sum((x - mean_x) ** 2 for x in xs)
-    if spread == 0:
-        return math.nan
     return sum((x - mean_x) * (y - mean_y) for x, y in zip(xs, ys)) / spread
 
 
 def main():
-    print("| command, items | " + " | ".join(map(str, SIZES)) + " | exponent |")
-    print("|---|" + "---|" * (len(SIZES) + 1))
+    print("| command, items | " + " | ".join(map(str, SIZES)) + " | exponent | of user time |")
+    print("|---|" + "---|" * (len(SIZES) + 2))
     for name, make, before, arguments, runs, most in CASES:
-        empty = measured(make, before, arguments, runs, 1)
+        if WORDS and not any(word in name for word in WORDS):
+            continue
+        empty, empty_user = measured(make, before, arguments, runs, 1)
         sizes = [size for size in SIZES if size <= most]
         times = [measured(make, before, arguments, runs, size) for size in sizes]
-        exponent = slope([(size, max(seconds - empty, 1e-4)) for size, seconds in zip(sizes, times)][1:] or [(1, 1)])
-        cells = [f"{seconds:.2f} s" for seconds in times] + ["-"] * (len(SIZES) - len(sizes))
-        print(f"| {name} | " + " | ".join(cells) + f" | {exponent:.2f} |", flush=True)
+        wall = slope([(size, max(seconds - empty, 1e-4)) for size, (seconds, _) in zip(sizes, times)][1:])
+        user = slope([(size, used - empty_user) for size, (_, used) in zip(sizes, times) if used - empty_user >= 0.02])
+        cells = [f"{seconds:.3f} s" for seconds, _ in times] + ["-"] * (len(SIZES) - len(sizes))
+        print(f"| {name} | " + " | ".join(cells) + f" | {wall:.2f} | {user:.2f} |", flush=True)
 
 
 main()

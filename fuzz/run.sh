@@ -30,6 +30,9 @@ export TMPDIR=$scratch
 # (a request for more than there can be is answered as by any allocator: with nothing)
 export ASAN_OPTIONS=allocator_may_return_null=1:quarantine_size_mb=16:allocator_release_to_os_interval_ms=500
 
+# what the HDF5 library leaks on damaged files, each with its reason
+export LSAN_OPTIONS=suppressions=$PWD/fuzz/leaks.txt:print_suppressions=0
+
 status=0
 printf '%-14s %12s %10s %8s %8s %8s %8s\n' target executions coverage crashes leaks "time-outs" memory
 for target in "$@"; do

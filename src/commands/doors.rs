@@ -3,7 +3,6 @@
 
 use std::path::Path;
 
-use afmid_pipeline::config::Config;
 use afmid_pipeline::graph::{self, Format};
 use afmid_pipeline::store::{ResultFile, read_result};
 use afmid_pipeline::{InputFiles, Registry};
@@ -24,22 +23,16 @@ use crate::show::{overview_json, overview_text, pretty, stage_json};
 
 const CONFIG: &str = "config.toml";
 
-/// All that `check` and `graph` say of a config with `--set` arguments, for people and for scripts. Starts no process: a config with a plugin is
-/// parsed and not planned.
+/// All that `check` and `graph` say of a config with `--set` arguments, for people and for scripts. A registry starts no process.
 pub fn say_of_config(text: &str, set: &[String], registry: &Registry) -> String {
-    let problems = match Config::parse(CONFIG, text, set) {
-        Ok(config) if config.stages.iter().any(|stage| stage.uses.starts_with("exec:")) => return String::new(),
-        // which stages there are is not known, but these letters would have to be among them, in full or escaped
-        Err(problems) if text.contains("exec:") || text.contains('\\') => problems,
-        _ => match graph::load(CONFIG, text, set, registry) {
-            Ok(plan) => {
-                let last = plan.points().and_then(|points| points.checked_sub(1));
-                let swept = last.map(|last| format!("{:?}", plan.values(last))).unwrap_or_default();
-                let drawn = [Format::Text, Format::Mermaid, Format::Dot].map(|format| plan.render(format));
-                return drawn.concat() + &swept;
-            }
-            Err(problems) => problems,
-        },
+    let problems = match graph::load(CONFIG, text, set, registry) {
+        Ok(plan) => {
+            let last = plan.points().and_then(|points| points.checked_sub(1));
+            let swept = last.map(|last| format!("{:?}", plan.values(last))).unwrap_or_default();
+            let drawn = [Format::Text, Format::Mermaid, Format::Dot].map(|format| plan.render(format));
+            return drawn.concat() + &swept;
+        }
+        Err(problems) => problems,
     };
     let told: Vec<Value> = problems.iter().map(|problem| check::problem(text, problem)).collect();
     render(CONFIG, text, &problems) + &Value::Array(told).to_string()
