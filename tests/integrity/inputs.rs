@@ -1,7 +1,7 @@
 //! Input files that change while a run reads them, and what is remembered of them between runs.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::time::Duration;
 
@@ -127,6 +127,17 @@ fn other_bytes_of_the_same_size_and_time_are_stated_as_they_are() {
     assert!(told.contains("r1.h5") && told.contains("other bytes"), "{told}");
 }
 
+/// A folder after a run on one record: its hash, and the stamp that remembers it.
+fn remembered() -> (tempfile::TempDir, String, PathBuf) {
+    let scratch = folder(1, 20_000);
+    let here = scratch.path();
+    std::thread::sleep(SETTLED);
+    assert_eq!(run(here, "a.h5", "cache", &[]).code, Some(0));
+    let right = hash(&here.join("archive/r0.h5"));
+    let stamp = fs::read_dir(here.join("cache/stamps")).expect("stamps").next().expect("one").expect("one").path();
+    (scratch, right, stamp)
+}
+
 /// A stamp's lines but the last, which is the hash of these.
 fn sealed(body: &str) -> String {
     format!("{body}\n{}\n", blake3::hash(body.as_bytes()).to_hex())
@@ -134,12 +145,8 @@ fn sealed(body: &str) -> String {
 
 #[test]
 fn fresh_hashes_again_whatever_a_stamp_says() {
-    let scratch = folder(1, 20_000);
+    let (scratch, right, stamp) = remembered();
     let here = scratch.path();
-    std::thread::sleep(SETTLED);
-    assert_eq!(run(here, "a.h5", "cache", &[]).code, Some(0));
-    let right = hash(&here.join("archive/r0.h5"));
-    let stamp = fs::read_dir(here.join("cache/stamps")).expect("stamps").next().expect("one").expect("one").path();
     let text = fs::read_to_string(&stamp).expect("text");
     let body = text.trim_end().rsplit_once('\n').expect("a last line").0;
     // of the same state, with a hash that fits: only who can write the cache can make it
@@ -152,12 +159,8 @@ fn fresh_hashes_again_whatever_a_stamp_says() {
 
 #[test]
 fn a_damaged_stamp_is_never_believed() {
-    let scratch = folder(1, 20_000);
+    let (scratch, right, stamp) = remembered();
     let here = scratch.path();
-    std::thread::sleep(SETTLED);
-    assert_eq!(run(here, "a.h5", "cache", &[]).code, Some(0));
-    let right = hash(&here.join("archive/r0.h5"));
-    let stamp = fs::read_dir(here.join("cache/stamps")).expect("stamps").next().expect("one").expect("one").path();
     let whole = fs::read(&stamp).expect("bytes");
     let keys = cached(&here.join("cache"), "h5");
     // every byte is tried by the unit test of the stamps; each of these is a whole run
