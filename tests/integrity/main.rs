@@ -10,6 +10,7 @@ mod earlier_results;
 mod entrances;
 mod faults;
 mod floors;
+mod handles;
 mod hostile;
 mod hostile_hdf5;
 mod inputs;

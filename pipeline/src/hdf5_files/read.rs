@@ -112,7 +112,8 @@ pub(crate) fn open_file(path: &Path, vetted: &Vetted) -> Result<Opened<File>> {
         return Err(StoreError::new(problem).file(path).help("wait until nothing writes to it"));
     }
     let file = File::with_options()
-        .with_fapl(|access| access.fclose_degree(FileCloseDegree::Semi).file_locking(false))
+        // closed with the last of its objects (`Semi` would leave it open for ever where the file goes out of scope before a dataset)
+        .with_fapl(|access| access.fclose_degree(FileCloseDegree::Weak).file_locking(false))
         .open(path)
         .map_err(|error| {
             let text = error.to_string();
