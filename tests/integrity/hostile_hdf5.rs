@@ -2,10 +2,11 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use hdf5::{File, Group};
 
-use super::common::{afmid, command};
+use super::common::{ROOT, afmid, command};
 use super::hostile::every_command;
 
 /// A file with a small measurement in `/x`, and what else `more` puts there.
@@ -97,4 +98,64 @@ fn hdf5_files_of_odd_structure_are_bounded_and_their_measurement_is_found() {
     // what is not odd
     file(&here, |_| Ok(()));
     assert!(afmid(folder.path(), &["inspect", "odd.h5"]).contains("2000"));
+}
+
+/// Native records, and files of other programs, whose samples lie in another file.
+const ELSEWHERE: &str = r#"
+import h5py, numpy as np, os, sys
+with h5py.File("source.h5", "w") as file:
+    file["x"] = np.arange(2000.0)
+np.arange(2000.0).tofile("raw.bin")
+os.mkfifo("fifo")
+def virtual(file, source):
+    layout = h5py.VirtualLayout(shape=(2000,), dtype="f8")
+    layout[:] = h5py.VirtualSource(source, "x", shape=(2000,))
+    return file.create_virtual_dataset("x", layout)
+def external(file, source):
+    return file.create_dataset("x", (2000,), dtype="f8", external=[(source, 0, 16000)])
+for native in (True, False):
+    for name, make in {
+        "virtual": lambda file: virtual(file, "source.h5"),
+        "virtual_fifo": lambda file: virtual(file, "fifo"),
+        "external": lambda file: external(file, "raw.bin"),
+        "external_fifo": lambda file: external(file, "fifo"),
+        "link": lambda file: file.__setitem__("x", h5py.ExternalLink("source.h5", "/x")),
+        "link_fifo": lambda file: file.__setitem__("x", h5py.ExternalLink("fifo", "/x")),
+    }.items():
+        with h5py.File(f"{'native' if native else 'other'}_{name}.h5", "w") as file:
+            made = make(file)
+            if native:
+                file.attrs["sample_rate_hz"] = 1e6
+                if made is not None:
+                    made.attrs["units"] = "V"
+"#;
+
+#[test]
+fn samples_in_other_files_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    let python = Path::new(ROOT).join(".tools/bin/python3");
+    let made = Command::new(python).current_dir(here).args(["-c", ELSEWHERE]).status().expect("python3 starts");
+    assert!(made.success());
+    let mut names: Vec<String> = fs::read_dir(here)
+        .expect("a folder")
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.starts_with("native_") || name.starts_with("other_"))
+        .collect();
+    names.sort();
+    assert_eq!(names.len(), 12);
+    for name in names {
+        let path = here.join(&name);
+        every_command(here, &path);
+        let output = command(here, &["run", "records.toml", "-o", "a.h5", "--cache", "cache"]).output();
+        let output = output.expect("afmid starts");
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{name}: {error}");
+        assert!(error.contains(&name) && error.contains("help: "), "{name}: {error}");
+        assert!(
+            name.contains("link") || error.contains("another file") || name.starts_with("other"),
+            "{name}: {error}"
+        );
+        assert!(!here.join("a.h5").exists());
+    }
 }

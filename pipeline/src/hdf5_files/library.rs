@@ -15,6 +15,7 @@ use hdf5_sys::h5a::{H5Aclose, H5Acreate2, H5Aread, H5Awrite};
 use hdf5_sys::h5d::{H5Dcreate2, H5Dread, H5Dwrite};
 use hdf5_sys::h5g::H5Gcreate2;
 use hdf5_sys::h5i::{H5I_type_t, H5Iget_type, hid_t};
+use hdf5_sys::h5l::{H5L_type_t, H5Lunregister};
 use hdf5_sys::h5o::H5O_type_t;
 use hdf5_sys::h5p::{H5P_CLS_GROUP_CREATE, H5P_DEFAULT, H5Pcreate, H5Pset_obj_track_times};
 use hdf5_sys::h5s::H5S_ALL;
@@ -47,6 +48,21 @@ fn kit() -> hdf5::Result<&'static Kit> {
     let link = LinkCreate::build().create_intermediate_group(true).char_encoding(CharEncoding::Utf8).finish()?;
     let dataset = DatasetCreate::build().obj_track_times(false).finish()?;
     Ok(KIT.get_or_init(|| Kit { link, dataset, group }))
+}
+
+/// From now on the library follows no external link, in no file: they would lead to any file that this process may read. Errors: it refuses.
+pub(crate) fn follow_no_external_links() -> hdf5::Result<()> {
+    static DONE: OnceLock<()> = OnceLock::new();
+    if DONE.get().is_none() {
+        // SAFETY: no handle is passed; the class of links is the library's own; the lock is held, and who comes second finds it done.
+        hdf5::sync::sync(|| match DONE.get() {
+            Some(()) => Ok(0),
+            None => unsafe { checked(H5Lunregister(H5L_type_t::H5L_TYPE_EXTERNAL).into()) }.inspect(|_| {
+                let _ = DONE.set(());
+            }),
+        })?;
+    }
+    Ok(())
 }
 
 /// Whether it is an attribute, not a dataset.

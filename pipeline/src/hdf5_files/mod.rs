@@ -3,6 +3,7 @@
 mod dimension_scale;
 mod heap_guard;
 mod library;
+pub(crate) mod links;
 pub(crate) mod read;
 pub(crate) mod write;
 

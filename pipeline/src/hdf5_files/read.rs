@@ -15,7 +15,8 @@ use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor, VarLenAscii, VarLenU
 use hdf5::{Container, Dataset, File, Group, H5Type, Location};
 
 use super::heap_guard::Vetted;
-use super::library;
+use super::library::{self, follow_no_external_links};
+use super::links::require_own_values;
 use super::write::path_of;
 use crate::error::{Result, StoreError};
 use crate::files::open_regular;
@@ -111,6 +112,7 @@ pub(crate) fn open_file(path: &Path, vetted: &Vetted) -> Result<Opened<File>> {
         let problem = format!("the file has {size} bytes, it had {} when it was looked through", vetted.file_bytes);
         return Err(StoreError::new(problem).file(path).help("wait until nothing writes to it"));
     }
+    follow_no_external_links()?;
     let file = File::with_options()
         // closed with the last of its objects (`Semi` would leave it open for ever where the file goes out of scope before a dataset)
         .with_fapl(|access| access.fclose_degree(FileCloseDegree::Weak).file_locking(false))
@@ -184,6 +186,7 @@ pub(crate) fn group(parent: &Node, name: &str) -> Result<Node> {
 
 pub(crate) fn dataset(parent: &Node, name: &str) -> Result<Opened<Dataset>> {
     let found = parent.dataset(name).map_err(|_| missing("dataset", parent, name))?;
+    require_own_values(&found).map_err(|error| error.at(path_of(parent, name)))?;
     Ok(parent.with(found))
 }
 

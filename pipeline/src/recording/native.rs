@@ -17,6 +17,7 @@ use super::source::{ChunkPlace, Hdf5Source, Place};
 use super::{Channel, Reading, Record};
 use crate::error::StageError;
 use crate::files::FileState;
+use crate::hdf5_files::links::require_own_values;
 use crate::hdf5_files::read::{Allowance, Opened, check_samples, open_file, read_texts};
 
 /// A channel to look for in a record.
@@ -104,7 +105,10 @@ fn states_rate(file: &File) -> bool {
 
 pub(super) fn find(file: &File, path: &Path, wanted: &Wanted) -> Result<Option<Dataset>, StageError> {
     match file.dataset(wanted.location) {
-        Ok(dataset) => Ok(Some(dataset)),
+        Ok(dataset) => {
+            require_own(&dataset, wanted.location).map_err(|error| error.at(path))?;
+            Ok(Some(dataset))
+        }
         Err(_) if !wanted.required && !file.link_exists(wanted.location) => Ok(None),
         Err(_) => {
             let have = datasets(file);
@@ -119,6 +123,14 @@ pub(super) fn find(file: &File, path: &Path, wanted: &Wanted) -> Result<Option<D
                 .help("set `channel` to one of them"))
         }
     }
+}
+
+/// Errors: the values lie in another file, whose bytes nobody would hash.
+fn require_own(dataset: &Dataset, location: &str) -> Result<(), StageError> {
+    require_own_values(dataset).map_err(|error| {
+        let problem = format!("{location} is a dataset {}", error.problem);
+        StageError::new(problem).help(error.help.unwrap_or_default())
+    })
 }
 
 /// Paths of the datasets of a file, two levels deep: for messages.
@@ -181,6 +193,7 @@ pub(super) fn open_source(
     let file = open_file(path, &hashed.vetted)?;
     let dataset =
         file.dataset(location).map_err(|_| StageError::new(format!("there is no channel `{location}`")).at(path))?;
+    require_own(&dataset, location).map_err(|error| error.at(path))?;
     let source = describe(files.chunks(), file.allowance(), &dataset, (path, &hashed), location)
         .map_err(|error| error.at(path))?;
     // the library opened it by name

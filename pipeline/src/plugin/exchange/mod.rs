@@ -4,7 +4,6 @@
 //! all). So a file holds nothing else, and the line says what each dataset is.
 
 mod give;
-mod links;
 mod numbers;
 mod take;
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5::{Dataset, H5Type};
 
-use super::links::refuse_links;
 use crate::error::StoreError;
+use crate::hdf5_files::links::refuse_links;
 use crate::hdf5_files::read::{self, Node, Opened};
 use crate::hdf5_files::vet;
 use crate::plugin::message::Numbers;

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use hdf5::{Dataset, Group, LinkType, LocationType};
 
 use super::scope::Scopes;
+use crate::hdf5_files::links::require_own_values;
 
 /// No recorder nests its groups as deep.
 const DEEPEST: usize = 32;
@@ -84,7 +85,12 @@ impl Walk<'_> {
         }
         match group.loc_type_by_name(&name) {
             Ok(LocationType::Dataset) => match group.dataset(&name) {
-                Ok(dataset) => self.found.push(Found { dataset, location, group: path.to_owned(), name }),
+                Ok(dataset) => match require_own_values(&dataset) {
+                    Ok(()) => self.found.push(Found { dataset, location, group: path.to_owned(), name }),
+                    Err(error) => {
+                        self.remarks.push(format!("{location} is left out: it is a dataset {}", error.problem));
+                    }
+                },
                 Err(error) => self.remarks.push(format!("{location} cannot be opened: {error}")),
             },
             Ok(LocationType::Group) if depth < DEEPEST => match group.group(&name) {

@@ -1,4 +1,5 @@
-//! Output files that lead out of themselves are refused: a link may name any file that this program can read.
+//! What leads out of a file is refused: a link, or a dataset whose values lie elsewhere, may name any file that this program can read; its bytes would be
+//! no part of a hash, and one that never ends would be read for ever. External links are followed nowhere (see `library`).
 
 use hdf5::plist::dataset_create::Layout;
 use hdf5::{Dataset, File, Group, IndexType, IterationOrder, LinkType, LocationType};
@@ -10,7 +11,7 @@ const MOST_OBJECTS: usize = 100_000;
 const MOST_DEPTH: usize = 32;
 
 /// Sees that a file holds nothing but groups and datasets of its own. Errors: a soft or external link, data in other files, too many objects.
-pub(super) fn refuse_links(file: &File) -> Result<(), StoreError> {
+pub(crate) fn refuse_links(file: &File) -> Result<(), StoreError> {
     let mut left = MOST_OBJECTS;
     group(file, 0, &mut left)
 }
@@ -27,7 +28,8 @@ fn group(own: &Group, depth: usize, left: &mut usize) -> Result<(), StoreError> 
         }
         match own.loc_type_by_name(&name)? {
             LocationType::Group => group(&own.group(&name)?, depth + 1, left)?,
-            LocationType::Dataset => dataset(&own.dataset(&name)?, &path)?,
+            LocationType::Dataset => require_own_values(&own.dataset(&name)?)
+                .map_err(|error| wrong(format!("holds the dataset {path}, {}", error.problem)))?,
             // a type leads nowhere
             _ => {}
         }
@@ -35,12 +37,12 @@ fn group(own: &Group, depth: usize, left: &mut usize) -> Result<(), StoreError> 
     Ok(())
 }
 
-fn dataset(own: &Dataset, path: &str) -> Result<(), StoreError> {
-    let how = own.dcpl()?;
+/// Sees that a dataset has its values in the file itself; nothing else may be asked of it before. Errors: it is virtual, or has external files.
+pub(crate) fn require_own_values(dataset: &Dataset) -> Result<(), StoreError> {
+    let how = dataset.dcpl()?;
     if how.layout() == Layout::Virtual || !how.get_external()?.is_empty() {
-        return Err(wrong(format!(
-            "holds the dataset {path}, whose values lie in another file: wanted them in this one"
-        )));
+        let help = "copy them into one file: h5repack does, or h5py with f.create_dataset(name, data=dataset[...])";
+        return Err(wrong("whose values lie in another file: wanted them in this one".to_owned()).help(help));
     }
     Ok(())
 }
