@@ -30,8 +30,7 @@ impl Target {
     /// Why what lies at the path must stay, in words that follow its name; none: it may be replaced. An empty file holds nothing that could be lost: a
     /// script may have made it to reserve the name.
     ///
-    /// Results, pages and models state the hash of what was written; pages and models of earlier versions are known by how they begin. Errors: it cannot
-    /// be read.
+    /// Results, pages and models state the hash of what was written. Errors: it cannot be read.
     fn in_the_way(self, path: &Path) -> std::io::Result<Option<String>> {
         let kind = file_kind(path)?;
         if kind == FileKind::Empty {
@@ -47,12 +46,17 @@ impl Target {
                 let head = head(path)?;
                 let looks =
                     if self == Self::Page { kind == FileKind::Html && is_page(&head) } else { is_exported(&head) };
-                (looks, looks && states_mark(path)? && !has_mark(path)?)
+                (looks, looks && !has_mark(path)?)
             }
         };
         Ok(match (own, changed) {
             (true, false) => None,
-            (true, true) => Some("was changed since afmid wrote it: it is not replaced".to_owned()),
+            (true, true) if self == Self::Result || states_mark(path)? => {
+                Some("was changed since afmid wrote it: it is not replaced".to_owned())
+            }
+            (true, true) => {
+                Some("states no hash of what was written, as those of earlier versions: it is not replaced".to_owned())
+            }
             (false, _) => Some(format!("is {kind}: only {} is replaced", self.wanted())),
         })
     }
@@ -128,6 +132,12 @@ fn existing(path: &Path, metadata: &Metadata, target: Target, inputs: &[Input]) 
     let found =
         target.in_the_way(path).map_err(|error| usage(format!("{shown} cannot be looked at: {error}"), ANOTHER))?;
     match found {
+        None if path.is_symlink() => Err(usage(
+            format!(
+                "{shown} is a symbolic link: a new file would take its place, not that of the file that it leads to"
+            ),
+            "give the name of the file itself with -o, or remove the link first",
+        )),
         None => Ok(()),
         Some(found) => Err(usage(
             format!("{shown} exists and {found}"),

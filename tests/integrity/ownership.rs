@@ -112,6 +112,9 @@ fn a_simulation_keeps_the_measurements_of_its_folder() {
     fs::write(&truth, "my notes").expect("written");
     assert!(refused(here, &arguments).contains("truth.json"));
     fs::write(&truth, text).expect("written");
+    // a name with a dot in it keeps all of it
+    afmid(here, &["run", "sim.toml", "-o", "t.h5", "--cache", "cache", "--set", "archive.out='lever.2005'"]);
+    assert!(here.join("lever.2005.truth.json").exists());
     // another archive over the own one, of a version that kept no list too
     afmid(here, &[&arguments[..], &["--set", "archive.seed=6"]].concat());
     fs::remove_file(here.join("simulated/.afmid-files")).expect("the list");
@@ -152,6 +155,43 @@ fn results_pages_models_and_figures_replace_their_own_kind_only_and_none_that_wa
     }
     fs::write(here.join("new.toml"), "mine").expect("written");
     refused(here, &["new", "pipeline", "archive", "-o", "new.toml"]);
+    // a page whose mark is gone may have been edited
+    let page = fs::read_to_string(here.join("page.html")).expect("a page");
+    let at = page.rfind("afmid BLAKE3 ").expect("its mark");
+    fs::write(here.join("page.html"), format!("{}{}", &page[..at], &page[at + 13..])).expect("written");
+    assert!(refused(here, &["report", "out.h5", "-o", "page.html"]).contains("states no hash"));
+    // the name of a link
+    std::os::unix::fs::symlink("out.h5", here.join("link.h5")).expect("a link");
+    assert!(refused(here, &["run", CONFIG, "-o", "link.h5", "--cache", "cache"]).contains("symbolic link"));
+}
+
+#[test]
+fn a_file_that_appears_while_a_run_goes_on_stays() {
+    let scratch = folder(1, 4_000_000);
+    let here = scratch.path();
+    for before in [None, Some("earlier")] {
+        let place = here.join("out.h5");
+        let _ = fs::remove_file(&place);
+        if before.is_some() {
+            afmid(here, &["run", CONFIG, "-o", "out.h5", "--cache", "cache"]);
+        }
+        let mut command = command(here, &["run", CONFIG, "-o", "out.h5", "--fresh", "--cache", "cache"]);
+        let child = command.stderr(std::process::Stdio::piped()).spawn().expect("afmid starts");
+        let begun = || {
+            let entries = fs::read_dir(here).expect("the folder").flatten();
+            entries.filter_map(|entry| entry.file_name().into_string().ok()).any(|name| name.starts_with(".out.h5."))
+        };
+        let clock = std::time::Instant::now();
+        while !begun() && clock.elapsed() < Duration::from_secs(30) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        fs::write(&place, "my notes").expect("written");
+        let output = child.wait_with_output().expect("it ends");
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{before:?}: {error}");
+        assert!(error.contains("out.h5") && error.contains("meanwhile"), "{before:?}: {error}");
+        assert_eq!(fs::read_to_string(&place).expect("the notes"), "my notes");
+    }
 }
 
 #[test]

@@ -43,7 +43,7 @@ const SHARE: u64 = 1 << 20;
 impl PendingResult {
     /// Begins the file beside `path`. Errors: as [`write_result`].
     pub(crate) fn new(path: &Path, run: &RunHead) -> Result<Self, StoreError> {
-        let replacement = Replacement::new(path)?;
+        let replacement = Replacement::of_what_is_there(path)?;
         match ResultWriter::new(replacement.temporary(), run) {
             Ok(writer) => Ok(Self { writer, replacement, sent: 0 }),
             Err(error) => Err(replacement.named(error)),

@@ -410,7 +410,7 @@ fn prepare(folder: &Path, names: &[String]) -> Result<FilledFolder, StageError> 
         }
     }
     let filled = FilledFolder::open(folder)?;
-    sweep_beside(&folder.with_extension("truth.json"));
+    sweep_beside(&folder.join(truth_name(folder)));
     let own = |error: StoreError| StageError::from(error).help("choose another `out`, or remove the file");
     let numbered: Vec<(usize, &String)> = names.iter().enumerate().collect();
     numbered
@@ -423,8 +423,8 @@ fn prepare(folder: &Path, names: &[String]) -> Result<FilledFolder, StageError> 
 
 /// The file of the truth, seen from the folder of the records.
 fn truth_name(folder: &Path) -> String {
-    let name = folder.with_extension("truth.json");
-    format!("../{}", name.file_name().unwrap_or_default().to_string_lossy())
+    let name = folder.file_name().unwrap_or_default();
+    format!("../{}.truth.json", name.to_string_lossy())
 }
 
 /// Whether a file is the truth of an archive, by what it holds.
