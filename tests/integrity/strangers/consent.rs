@@ -199,6 +199,22 @@ fn a_changed_file_command_folder_or_variable_asks_again() {
 }
 
 #[test]
+fn a_folder_that_python_runs_belongs_to_consent_and_key() {
+    let project = Project::new("");
+    fs::create_dir(project.folder().join("package")).expect("a folder");
+    project.put("package/__main__.py", &project.plugin(""));
+    project.put("package/part.py", "x = 1\n");
+    project.put("p.toml", &CONFIG.replace("mine.py", "package"));
+    let listed = project.told(&["trust", "p.toml"]);
+    assert!(listed.contains("package/__main__.py blake3:") && listed.contains("package/part.py blake3:"), "{listed}");
+    let runs = || project.run(&["run", "p.toml", "-o", "a.h5"]).status.code();
+    assert_eq!((runs(), runs()), (Some(0), Some(0)));
+    project.put("package/part.py", "x = 2\n");
+    let before = project.starts();
+    assert_eq!((runs(), project.starts()), (Some(2), before), "a part of it is another");
+}
+
+#[test]
 fn damaged_consent_is_none_and_lies_with_the_user_alone() {
     let project = Project::new("");
     project.told(&["trust", "c.toml"]);

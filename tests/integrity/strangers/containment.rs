@@ -171,6 +171,7 @@ def run(params):
         "tcp": tried(lambda: socket.create_connection(("127.0.0.1", LISTENER), 5).close()),
         "temporary": tried(lambda: open(os.path.join(HERE, "mine"), "w").write("x")),
         "null": tried(lambda: open("/dev/null", "w").write("x")),
+        "signal": tried(lambda: os.kill(os.getppid(), 0)),
     }
     print(json.dumps(done), file=sys.stderr, flush=True)
     return made([float(done[name]) for name in ("config", "tcp", "temporary")])
@@ -203,6 +204,7 @@ fn a_plugin_writes_to_its_own_folder_alone_and_what_is_not_enforced_is_in_the_re
     if !confined.contains("not enforced") {
         let wanted = json!({
             "config": false, "beside": false, "home": false, "moved": false, "child": false, "tcp": false, "temporary": true, "null": true,
+            "signal": false,
         });
         assert_eq!(found, wanted);
         assert!(project.folder().join("moved").exists() && !project.folder().join("child").exists());

@@ -27,9 +27,16 @@ pub struct MadeOf {
 impl Candidate {
     /// Hashes the program and the files among its arguments. Errors: one cannot be read.
     pub(in crate::plugin) fn new(launch: Launch, hashes: &InputFiles) -> Result<Self, PluginError> {
-        let named = launch.arguments.iter().filter_map(|argument| file(&launch.folder, argument));
-        let files = std::iter::once(launch.program.clone()).chain(named).map(|path| hashed(path, hashes));
-        Ok(Self { files: files.collect::<Result<_, _>>()?, launch })
+        let mut paths = vec![launch.program.clone()];
+        for path in launch.arguments.iter().filter_map(|argument| named(&launch.folder, argument)) {
+            if path.is_dir() {
+                files_below(&path, &mut paths)?;
+            } else {
+                paths.push(path);
+            }
+        }
+        let files = paths.into_iter().map(|path| hashed(path, hashes)).collect::<Result<_, _>>()?;
+        Ok(Self { files, launch })
     }
 
     /// The name that configs call it by: NAME of `exec:NAME`.
@@ -124,11 +131,43 @@ fn plain(c: char) -> bool {
     c.is_alphanumeric() || "/._-+,:@%=".contains(c)
 }
 
-/// The file that an argument names, as it is or after its `=`.
-fn file(folder: &Path, argument: &str) -> Option<PathBuf> {
+/// The file that an argument names, as it is or after its `=`, or the folder that Python would run: one with a `__main__.py`.
+fn named(folder: &Path, argument: &str) -> Option<PathBuf> {
     let value = argument.split_once('=').map(|(_, value)| value);
-    let named = std::iter::once(argument).chain(value).filter(|name| !name.is_empty());
-    named.map(|name| folder.join(name)).find(|path| path.is_file())
+    let names = std::iter::once(argument).chain(value).filter(|name| !name.is_empty());
+    names.map(|name| folder.join(name)).find(|path| path.is_file() || path.join("__main__.py").is_file())
+}
+
+/// Files of a plugin's folder: more is no program.
+const MOST_FILES: usize = 1000;
+
+/// The files of a folder that is run, by name, but for what the interpreter keeps there. Errors: too many; one cannot be
+/// listed.
+fn files_below(folder: &Path, into: &mut Vec<PathBuf>) -> Result<(), PluginError> {
+    let failed = |error: std::io::Error| {
+        PluginError::new(
+            format!("names the folder {}, which cannot be listed: {error}", folder.display()),
+            "its files are part of the cache key, and of what is agreed to",
+        )
+    };
+    let mut entries = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        entries.push(entry.map_err(failed)?);
+    }
+    entries.sort_by_key(std::fs::DirEntry::file_name);
+    for entry in entries {
+        let (path, kind) = (entry.path(), entry.file_type().map_err(failed)?);
+        if kind.is_dir() && entry.file_name() != "__pycache__" {
+            files_below(&path, into)?;
+        } else if path.is_file() {
+            into.push(path);
+        }
+        if into.len() > MOST_FILES {
+            let what = format!("names a folder of more than {MOST_FILES} files, {}", folder.display());
+            return Err(PluginError::new(what, "keep its data elsewhere"));
+        }
+    }
+    Ok(())
 }
 
 fn hashed(path: PathBuf, hashes: &InputFiles) -> Result<MadeOf, PluginError> {
