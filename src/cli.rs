@@ -162,7 +162,7 @@ pub enum Command {
 /// A config and what changes it.
 #[derive(Debug, Args)]
 pub struct ConfigArgs {
-    /// The config, TOML of at most 16 MiB.
+    /// The config, TOML of at most 8 MiB.
     pub config: PathBuf,
     /// Set a parameter (or `pipeline.seed`); VALUE is TOML, so text needs quotes of its own.
     #[arg(long = "set", value_name = "ID.PARAM=VALUE")]

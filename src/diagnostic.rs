@@ -12,7 +12,7 @@ use miette::{
     NamedSource, Report, SourceCode, SourceSpan, SpanContents,
 };
 
-use crate::printable::printable;
+use crate::printable::{one_line, printable};
 
 /// More problems are counted: who mends a hundred checks again.
 pub const MOST_PROBLEMS: usize = 100;
@@ -20,6 +20,7 @@ pub const MOST_PROBLEMS: usize = 100;
 /// Renders the first hundred problems of a config for stderr, printable, in colour if a person looks at it and nothing in the config acts on the
 /// terminal.
 pub fn render(file: &str, text: &str, problems: &[Problem]) -> String {
+    let file = &one_line(file);
     let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let plain = render_with(file, text, problems, GraphicalTheme::unicode_nocolor());
     match printable(&plain) {
@@ -36,7 +37,7 @@ fn render_with(file: &str, text: &str, problems: &[Problem], theme: GraphicalThe
         let report = report(file, &lines, problem);
         if handler.render_report(&mut out, report.as_ref()).is_err() {
             // a source that cannot be shown: the message alone
-            let _ = writeln!(out, "error: {problem}");
+            let _ = writeln!(out, "error: {}", one_line(&problem.to_string()));
         }
         out.push('\n');
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use crate::printable::printable;
+use crate::printable::{help_line, message, one_line, printable};
 
 /// How a command ends when it does not succeed.
 #[derive(Debug)]
@@ -24,6 +24,8 @@ pub enum Failure {
 pub enum Message {
     /// A line, prefixed with `error:`, and what to do.
     Line(String, Option<String>),
+    /// The same with lines between the two.
+    Listed(String, Vec<String>, Option<String>),
     /// Rendered already.
     Rendered(String),
     /// Rendered already, in colour perhaps; what comes from files in it is printable.
@@ -43,7 +45,7 @@ impl Failure {
 
     /// What goes to stderr, printable, and the exit code.
     pub fn told(self) -> (String, u8) {
-        let (message, code) = match self {
+        let (what, code) = match self {
             Self::Usage(message) => (message, 2),
             Self::Failed(message) => (message, 1),
             Self::Partly(message) => (message, 3),
@@ -53,10 +55,12 @@ impl Failure {
             }
             Self::Closed => return (String::new(), 0),
         };
-        let text = match message {
-            Message::Line(line, help) => {
-                let help = help.map(|help| format!("  help: {help}\n")).unwrap_or_default();
-                format!("error: {line}\n{help}")
+        let with = |help: Option<String>| help.as_deref().map(help_line).unwrap_or_default();
+        let text = match what {
+            Message::Line(line, help) => format!("error: {}\n{}", message(&line), with(help)),
+            Message::Listed(line, list, help) => {
+                let list: String = list.iter().map(|entry| one_line(entry) + "\n").collect();
+                format!("error: {}\n{list}{}", message(&line), with(help))
             }
             Message::Rendered(text) => text,
             Message::Styled(text) => return (text, code),
@@ -65,7 +69,7 @@ impl Failure {
     }
 }
 
-/// Of the two signals that commands listen to.
+/// As the system calls it.
 fn name(signal: i32) -> &'static str {
-    if signal == signal_hook::consts::SIGINT { "SIGINT" } else { "SIGTERM" }
+    signal_hook::low_level::signal_name(signal).unwrap_or("a signal")
 }

@@ -1,4 +1,5 @@
-//! SIGINT and SIGTERM: a command tidies up and ends with 130 or 143; a second signal ends it at once.
+//! SIGINT, SIGTERM, and SIGHUP and SIGQUIT of a terminal: a command tidies up and ends with 128 and the signal's number (130, 143, 129, 131); a second
+//! signal ends it at once.
 //!
 //! A run looks at [`caught`] before each of its stages and ends by itself, what has succeeded kept in the cache. What takes longer than [`GRACE`], or
 //! does not look, is ended from here: processes are killed, what the command has under way in the folders that it named ([`writes_in`]) is removed.
@@ -12,7 +13,7 @@ use afmid_pipeline::files::sweep_own;
 use afmid_pipeline::plugin::kill_children;
 use afmid_pipeline::runner::Observer;
 use afmid_pipeline::stage::{NoProgress, Progress};
-use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ};
 use signal_hook::iterator::Signals;
 use signal_hook::{flag, low_level};
 
@@ -44,7 +45,8 @@ struct State {
 pub fn listen() -> std::io::Result<()> {
     flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     let ignored = ignored();
-    let wanted: Vec<i32> = [SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0).collect();
+    let all = [SIGINT, SIGTERM, SIGHUP, SIGQUIT];
+    let wanted: Vec<i32> = all.into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0).collect();
     let again = Arc::new(AtomicBool::new(false));
     for &signal in &wanted {
         flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&again))?;

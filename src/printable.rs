@@ -5,6 +5,7 @@
 //! `output`, everything on a page through it in `report`.
 
 use std::borrow::Cow;
+use std::path::Path;
 
 /// Whether a character acts instead of being seen: controls but for the line's end and the tabulator, marks and overrides of direction,
 /// separators of lines and paragraphs.
@@ -30,6 +31,28 @@ pub fn printable(text: &str) -> Cow<'_, str> {
 /// The same of what is one line, such as a name or a cell: ends of lines and tabulators are escapes, too. A name could otherwise add lines of its own.
 pub fn one_line(text: &str) -> String {
     printable(text).replace('\n', "\\n").replace('\t', "\\t")
+}
+
+/// A file's name in a line.
+pub fn shown(path: &Path) -> String {
+    one_line(&path.display().to_string())
+}
+
+/// What stands before the lines that a plugin wrote to stderr.
+const STDERR: &str = "; its stderr ends with:\n";
+
+/// A message: one line, and below it what a plugin wrote to stderr, if the message ends with that, each line of it
+/// set off.
+pub fn message(text: &str) -> String {
+    let Some((first, lines)) = text.split_once(STDERR) else { return one_line(text.trim_end()) };
+    let line = |line: &str| format!("\n    {}", one_line(line.strip_prefix("  ").unwrap_or(line)));
+    one_line(first) + STDERR.trim_end() + &lines.lines().map(line).collect::<String>()
+}
+
+/// The line below a message that says what to do. Lines of its own are set off below it.
+pub fn help_line(help: &str) -> String {
+    let lines: Vec<String> = help.trim_end().lines().map(one_line).collect();
+    format!("  help: {}\n", lines.join("\n        "))
 }
 
 /// JSON with the escapes of JSON for the same characters, which it may hold in its strings alone. (Below a blank it has escapes already.)
@@ -59,6 +82,15 @@ mod tests {
     #[test]
     fn a_name_stays_one_line() {
         assert_eq!(one_line("a\r\nverdict: right\t1\u{1b}"), "a\\nverdict: right\\t1\\x1b");
+    }
+
+    #[test]
+    fn a_message_has_no_lines_of_a_name_s() {
+        assert_eq!(message("a\nerror: b\n"), "a\\nerror: b");
+        let plugin = "the plugin `a\nb` ended; its stderr ends with:\n  Traceback:\nerror: x";
+        let wanted = "the plugin `a\\nb` ended; its stderr ends with:\n    Traceback:\n    error: x";
+        assert_eq!(message(plugin), wanted);
+        assert_eq!(help_line("one\ntwo"), "  help: one\n        two\n");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::batch::work::Done;
 use crate::interrupt;
 use crate::output::say;
-use crate::printable::printable;
+use crate::printable::one_line;
 use afmid_pipeline::runner::Observer;
 use afmid_pipeline::stage::{NoProgress, Progress};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -28,7 +28,7 @@ impl Sets {
             let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {per_sec} {eta} left");
             let bar = ProgressBar::new(count as u64);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar.set_prefix(printable(what).into_owned());
+            bar.set_prefix(one_line(what));
             bar
         });
         Self { bar }
@@ -39,7 +39,7 @@ impl Sets {
         let entry = &done.entry;
         let line = done.took.map(|took| {
             let what = if entry.is_done() { "done" } else { "failed" };
-            format!("{}: {what}, {:.2} s\n", entry.name, took.as_secs_f64())
+            format!("{}: {what}, {:.2} s\n", one_line(&entry.name), took.as_secs_f64())
         });
         match (&self.bar, line) {
             (Some(bar), line) => {
@@ -87,7 +87,7 @@ impl Observer for Bars {
         let bar = self.bars.add(ProgressBar::no_length());
         let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {elapsed}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_prefix(printable(id).into_owned());
+        bar.set_prefix(one_line(id));
         bar.enable_steady_tick(Duration::from_millis(200));
         Box::new(Bar { bars: &self.bars, bar })
     }
@@ -121,6 +121,6 @@ impl Drop for Bar<'_> {
 
 fn lines(id: &str, cached: bool, took: Duration, warnings: &[String]) -> String {
     let what = if cached { "reused".to_owned() } else { format!("{:.2} s", took.as_secs_f64()) };
-    let warnings: String = warnings.iter().map(|warning| format!("  warning: {warning}\n")).collect();
-    format!("{id}: {what}\n{warnings}")
+    let warnings: String = warnings.iter().map(|warning| format!("  warning: {}\n", one_line(warning))).collect();
+    format!("{}: {what}\n{warnings}", one_line(id))
 }

@@ -1,7 +1,7 @@
 //! `afmid batch`: one run per data set, a ledger of them, one table.
 
 use std::io::{Error, ErrorKind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use afmid_pipeline::Plan;
@@ -22,6 +22,7 @@ use crate::cli::{BatchArgs, ConfigArgs, SetsArgs};
 use crate::failure::{Failure, Message};
 use crate::interrupt;
 use crate::output::print;
+use crate::printable::{message, one_line, shown};
 use crate::progress::Sets;
 use crate::show::pretty;
 
@@ -88,7 +89,7 @@ pub fn data_sets(args: &SetsArgs) -> Result<Vec<DataSet>, Failure> {
         Ok(_) => {}
         Err(more) => problems.extend(more),
     }
-    let lines: String = problems.iter().map(|problem| format!("error: {problem}\n")).collect();
+    let lines: String = problems.iter().map(|problem| format!("error: {}\n", message(problem))).collect();
     Err(Failure::Usage(Message::Rendered(lines)))
 }
 
@@ -161,18 +162,20 @@ fn told(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock: I
     }
     let mut text: String = failed
         .iter()
-        .map(|entry| format!("{} failed: {}\n", entry.name, entry.error.as_deref().unwrap_or_default().trim_end()))
+        .map(|entry| {
+            format!("{} failed: {}\n", one_line(&entry.name), message(entry.error.as_deref().unwrap_or_default()))
+        })
         .collect();
     let (count, seconds) = (done.len(), clock.elapsed().as_secs_f64());
     let sets = if count == 1 { "data set" } else { "data sets" };
     text.push_str(&format!(
         "{}: {count} {sets} in {seconds:.2} s, {ran} run, {} as they were, {} failed\n",
-        folder.display(),
+        shown(folder),
         count - ran,
         failed.len()
     ));
     if let Some(table) = table {
-        text.push_str(&format!("summary: {} (.csv, .parquet), trends.csv\n", PathBuf::from(table).display()));
+        text.push_str(&format!("summary: {} (.csv, .parquet), trends.csv\n", shown(table)));
     }
     Ok(text)
 }

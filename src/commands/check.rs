@@ -12,6 +12,7 @@ use crate::batch::shell::quoted;
 use crate::diagnostic::MOST_PROBLEMS;
 use crate::failure::{Failure, Message};
 use crate::output::{print, report};
+use crate::printable::{one_line, shown};
 use crate::show::pretty;
 
 /// Checks every config before it gives up.
@@ -26,7 +27,7 @@ pub fn run(configs: &[PathBuf], as_json: bool, stages: &dyn Stages) -> Result<()
             Ok(plan) if printed.is_ok() => {
                 let points =
                     plan.points().map(|count| format!(", every point of a sweep of {count}")).unwrap_or_default();
-                let right = format!("{}: right, {} stages{points}\n", config.display(), plan.nodes.len());
+                let right = format!("{}: right, {} stages{points}\n", shown(config), plan.nodes.len());
                 printed = print(&(right + &not_checked(&plan)));
             }
             Ok(_) => {}
@@ -78,7 +79,8 @@ pub fn not_checked(plan: &Plan) -> String {
     let note = |node: &Node| {
         format!(
             "note: stage {} ({}): ports not checked; `afmid trust {config}` asks the plugin what they are\n",
-            node.id, node.uses
+            one_line(&node.id),
+            one_line(&node.uses)
         )
     };
     plan.not_described().map(note).collect()

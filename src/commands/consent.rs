@@ -12,6 +12,7 @@ use crate::cli::AllowArgs;
 use crate::diagnostic::render;
 use crate::failure::{Failure, Message};
 use crate::output::say;
+use crate::printable::one_line;
 
 /// For commands that start nothing: what plugins are is known as far as it is remembered.
 pub fn none() -> Plugins {
@@ -43,7 +44,7 @@ pub fn plugins(allow: &AllowArgs, agreed: Option<&Path>) -> Result<Plugins, Fail
 /// Ends what was started, and says what was noted. Errors: a plugin wrote something that nobody had asked for.
 pub fn end(plugins: &Plugins) -> Result<(), Failure> {
     let wrong = plugins.shut_down();
-    plugins.take_notes().iter().for_each(|note| say(&format!("note: {note}\n")));
+    plugins.take_notes().iter().for_each(|note| say(&format!("note: {}\n", one_line(note))));
     if wrong.is_empty() {
         return Ok(());
     }
@@ -60,12 +61,13 @@ pub fn agreed(allow: &AllowArgs, config: &Config) -> Result<Vec<Candidate>, Fail
     match candidates.iter().find(|candidate| !plugins.may_start(candidate)) {
         None => Ok(candidates),
         Some(candidate) => {
-            let message = format!("the plugin `{}` is not agreed to:\n{}", candidate.name(), listing(candidate));
+            let message = format!("the plugin `{}` is not agreed to:", candidate.name());
+            let list = listing(candidate).lines().map(str::to_owned).collect();
             let help = format!(
                 "`afmid trust {}` lists what its plugins would run, and remembers that you agree; `--allow-plugins` allows it for this submission",
                 quoted(&config.file)
             );
-            Err(Failure::usage(message.trim_end(), Some(help)))
+            Err(Failure::Usage(Message::Listed(message, list, Some(help))))
         }
     }
 }
@@ -104,10 +106,14 @@ fn read(file: &Path) -> Result<BTreeSet<String>, Failure> {
 pub fn listing(candidate: &Candidate) -> String {
     let words: Vec<String> =
         std::iter::once(quoted(candidate.program())).chain(candidate.arguments().iter().map(quoted)).collect();
-    let mut text =
-        format!("plugin {}\n  runs  {}\n  in    {}\n", candidate.name(), words.join(" "), quoted(candidate.folder()));
+    let mut text = format!(
+        "plugin {}\n  runs  {}\n  in    {}\n",
+        one_line(candidate.name()),
+        words.join(" "),
+        quoted(candidate.folder())
+    );
     for (name, value) in candidate.environment() {
-        text.push_str(&format!("  with  {name}={}\n", quoted(value)));
+        text.push_str(&format!("  with  {}={}\n", one_line(name), quoted(value)));
     }
     if !candidate.is_confined() {
         text.push_str("  free  it may write anywhere and use the network: `confined = false`\n");

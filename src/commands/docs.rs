@@ -1,15 +1,18 @@
 //! `afmid docs`: the generated documentation, written or compared.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use afmid_pipeline::Registry;
+use afmid_pipeline::error::StoreError;
+use afmid_pipeline::files::{FilledFolder, read_regular};
 use afmid_pipeline::reference::files;
 use afmid_stages::causes::{catalogue, index, page};
 
 use super::schema;
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::shown;
 
 /// Pages of the book that are written by hand: title and file.
 const CHAPTERS: [(&str, &str); 13] = [
@@ -56,65 +59,119 @@ const TUTORIALS: [(&str, &str); 4] = [
     ("My own stage", "stage.md"),
 ];
 
-/// Writes `FOLDER/stages/*.md`, `FOLDER/causes/*.md`, `FOLDER/SUMMARY.md` and `FOLDER/pipeline.schema.json`, or says what would change. Pages of what is gone are removed.
+/// The largest page that is compared.
+const MOST_BYTES: u64 = 64 << 20;
+
+/// Writes `FOLDER/stages/*.md`, `FOLDER/causes/*.md`, `FOLDER/SUMMARY.md` and `FOLDER/pipeline.schema.json`, or says
+/// what would change. What was written is in the folder's list of files: nothing else is replaced. Pages of what is gone
+/// are removed if they are as they were written.
 pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failure> {
-    let stages = folder.join("stages");
-    let pages = files(registry).map_err(|error| Failure::failed(error, None))?;
-    let mut wanted: Vec<(PathBuf, String)> = pages.into_iter().map(|(name, text)| (stages.join(name), text)).collect();
-    let causes = folder.join("causes");
-    let all = catalogue();
-    wanted.push((causes.join("README.md"), index(&all)));
-    wanted.extend(all.iter().map(|cause| (causes.join(format!("{}.md", cause.about().id)), page(*cause))));
-    wanted.push((folder.join("SUMMARY.md"), contents(registry)));
-    wanted.push((folder.join("pipeline.schema.json"), schema::text(registry)?));
-    let mut stale = stale(&stages, &wanted);
-    stale.extend(self::stale(&causes, &wanted));
-    let changed: Vec<&(PathBuf, String)> =
-        wanted.iter().filter(|(path, text)| fs::read_to_string(path).ok().as_ref() != Some(text)).collect();
+    update(folder, check, &wanted(registry)?)
+}
+
+fn update(folder: &Path, check: bool, wanted: &[(String, String)]) -> Result<(), Failure> {
+    let filled = FilledFolder::open(folder).map_err(failed)?;
+    let path = |name: &str| folder.join(name);
+    let same = |name: &str, text: &str| read_regular(&path(name), MOST_BYTES).is_ok_and(|now| now == text.as_bytes());
+    let changed: Vec<&(String, String)> = wanted.iter().filter(|(name, text)| !same(name, text)).collect();
+    let stale = stale(&filled, wanted);
     if check {
         let names: Vec<String> =
-            changed.iter().map(|(path, _)| path).chain(&stale).map(|path| path.display().to_string()).collect();
+            changed.iter().map(|(name, _)| name).chain(&stale).map(|name| path(name).display().to_string()).collect();
         if names.is_empty() {
             return Ok(());
         }
         let help = "write them with `cargo run -- docs`".to_owned();
         return Err(Failure::failed(format!("the generated documentation is old: {}", names.join(", ")), Some(help)));
     }
-    let known = folder.join("pipeline.schema.json");
-    if let Some((there, _)) = changed.iter().find(|(path, _)| path.exists()).filter(|_| !known.is_file()) {
-        let problem = format!("{} exists, and {} holds no book of afmid's", there.display(), folder.display());
-        return Err(Failure::usage(
-            problem,
-            Some("give the folder of afmid's documentation, or an empty one".to_owned()),
-        ));
-    }
-    if let Some(there) = stale.first().filter(|_| !known.is_file()) {
-        let problem = format!("{} is no page of afmid's, and would be removed", there.display());
-        return Err(Failure::usage(
-            problem,
-            Some("give the folder of afmid's documentation, or an empty one".to_owned()),
-        ));
-    }
-    let fail = |path: &Path, error| Failure::failed(format!("{} cannot be written: {error}", path.display()), None);
-    for folder in [&stages, &causes] {
-        fs::create_dir_all(folder).map_err(|error| fail(folder, error))?;
+    // all of them first: nothing is written where one is another's
+    changed.iter().try_for_each(|(name, _)| filled.require_own(name, nobody)).map_err(failed)?;
+    for folder in FOLDERS.map(path) {
+        fs::create_dir_all(&folder).map_err(|error| cannot("written", &folder, &error))?;
     }
     let mut done = String::new();
-    for (path, text) in changed {
-        fs::write(path, text).map_err(|error| fail(path, error))?;
-        done.push_str(&format!("wrote {}\n", path.display()));
+    for (name, text) in changed {
+        filled.write(name, nobody, text.as_bytes()).map_err(failed)?;
+        done.push_str(&format!("wrote {}\n", shown(&path(name))));
     }
-    for path in stale {
-        fs::remove_file(&path).map_err(|error| fail(&path, error))?;
-        done.push_str(&format!("removed {}\n", path.display()));
+    for path in stale.iter().map(|name| path(name)) {
+        fs::remove_file(&path).map_err(|error| cannot("removed", &path, &error))?;
+        done.push_str(&format!("removed {}\n", shown(&path)));
     }
     print(&done)
 }
 
-/// Pages that no stage or cause has any more.
-fn stale(folder: &Path, wanted: &[(PathBuf, String)]) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut stale: Vec<PathBuf> = entries.filter(|path| wanted.iter().all(|(wanted, _)| wanted != path)).collect();
+/// Folders that hold generated pages alone.
+const FOLDERS: [&str; 2] = ["stages", "causes"];
+
+/// All files by their names in the folder. Errors: a page cannot be made.
+fn wanted(registry: &Registry) -> Result<Vec<(String, String)>, Failure> {
+    let pages = files(registry).map_err(|error| Failure::failed(error, None))?;
+    let mut wanted: Vec<(String, String)> =
+        pages.into_iter().map(|(name, text)| (format!("stages/{name}"), text)).collect();
+    let all = catalogue();
+    wanted.push(("causes/README.md".to_owned(), index(&all)));
+    wanted.extend(all.iter().map(|cause| (format!("causes/{}.md", cause.about().id), page(*cause))));
+    wanted.push(("SUMMARY.md".to_owned(), contents(registry)));
+    wanted.push(("pipeline.schema.json".to_owned(), schema::text(registry)?));
+    Ok(wanted)
+}
+
+/// Every version that wrote pages lists them.
+fn nobody(_: &Path) -> bool {
+    false
+}
+
+fn failed(error: StoreError) -> Failure {
+    Failure::failed(&error, error.help.clone())
+}
+
+fn cannot(what: &str, path: &Path, error: &std::io::Error) -> Failure {
+    Failure::failed(format!("{} cannot be {what}: {error}", path.display()), None)
+}
+
+/// Pages that no stage or cause has any more, and that are as they were written here.
+fn stale(filled: &FilledFolder, wanted: &[(String, String)]) -> Vec<String> {
+    let mut stale = Vec::new();
+    for inner in FOLDERS {
+        let entries = fs::read_dir(filled.folder().join(inner)).into_iter().flatten().flatten();
+        // an empty file is nobody's, as far as the list goes
+        let full =
+            entries.filter(|entry| entry.metadata().is_ok_and(|metadata| metadata.is_file() && metadata.len() > 0));
+        let names = full.filter_map(|entry| Some(format!("{inner}/{}", entry.file_name().to_str()?)));
+        let gone = names.filter(|name| wanted.iter().all(|(wanted, _)| wanted != name));
+        stale.extend(gone.filter(|name| filled.require_own(name, nobody).is_ok()));
+    }
     stale.sort();
     stale
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_of_others_are_neither_replaced_nor_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let wanted = ["stages/a.md", "causes/b.md", "SUMMARY.md"].map(|name| (name.to_owned(), format!("page {name}")));
+        let update = |check: bool| update(folder.path(), check, &wanted);
+        update(false).unwrap();
+        assert!(update(true).is_ok());
+        let filled = FilledFolder::open(folder.path()).unwrap();
+        filled.write("stages/gone.md", nobody, b"a page of a stage that is gone").unwrap();
+        filled.write("stages/a.md", nobody, b"of an earlier version").unwrap();
+        fs::write(at("stages/mine.md"), "mine").unwrap();
+        fs::write(at("causes/empty.md"), "").unwrap();
+        assert!(update(true).is_err());
+        update(false).unwrap();
+        assert!(!at("stages/gone.md").exists() && at("stages/mine.md").exists() && at("causes/empty.md").exists());
+        assert_eq!(fs::read_to_string(at("stages/a.md")).unwrap(), "page stages/a.md");
+        fs::write(at("SUMMARY.md"), "mine").unwrap();
+        fs::remove_file(at("causes/b.md")).unwrap();
+        let (text, _) = update(false).unwrap_err().told();
+        assert!(text.contains("SUMMARY.md") && text.contains("not replaced"), "{text}");
+        assert_eq!(fs::read(at("SUMMARY.md")).unwrap(), b"mine");
+        assert!(!at("causes/b.md").exists(), "nothing is written where one file is another's");
+    }
 }

@@ -8,6 +8,7 @@ use crate::cli::DoctorArgs;
 use crate::doctor::{Finding, State, examine};
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::one_line;
 use crate::show::pretty;
 
 /// Looks at everything and says how it stands. Errors: something without which a run fails.
@@ -30,8 +31,12 @@ fn as_text(findings: &[Finding]) -> String {
                 State::Warning => "! ",
                 State::Bad => "x ",
             };
-            let help = finding.help.as_ref().map(|help| format!("  {:width$}  help: {help}\n", "")).unwrap_or_default();
-            format!("{mark}{:width$}  {}\n{help}", finding.what, finding.found)
+            let help = finding
+                .help
+                .as_ref()
+                .map(|help| format!("  {:width$}  help: {}\n", "", one_line(help)))
+                .unwrap_or_default();
+            format!("{mark}{:width$}  {}\n{help}", finding.what, one_line(&finding.found))
         })
         .collect()
 }

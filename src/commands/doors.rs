@@ -105,6 +105,7 @@ fn message(failure: Failure) -> String {
     match failure {
         Failure::Usage(message) | Failure::Failed(message) | Failure::Partly(message) => match message {
             Message::Line(line, help) => format!("{line} {}", help.unwrap_or_default()),
+            Message::Listed(line, list, help) => format!("{line} {} {}", list.join(" "), help.unwrap_or_default()),
             Message::Rendered(text) | Message::Styled(text) => text,
         },
         Failure::Interrupted(_) | Failure::Closed => String::new(),

@@ -19,6 +19,7 @@ use crate::cli::{ExamArgs, ExamKind};
 use crate::failure::Failure;
 use crate::interrupt::{self, Silent};
 use crate::output::{print, say};
+use crate::printable;
 use crate::relative::folder_of;
 use crate::show::pretty;
 
@@ -79,7 +80,8 @@ fn told(one: &Judged) -> String {
         one.planted.iter().map(|planted| format!("{} {:.1}x", planted.id, planted.times_limit())).collect();
     let hidden = if hidden.is_empty() { "nothing".to_owned() } else { hidden.join(" + ") };
     let mark = if one.right { "right" } else { "WRONG" };
-    format!("seed {}: {hidden} -> {} {} ({mark})\n", one.seed, one.said.verdict, one.said.named.join(" + "))
+    let said = format!("seed {}: {hidden} -> {} {} ({mark})", one.seed, one.said.verdict, one.said.named.join(" + "));
+    printable::one_line(&said) + "\n"
 }
 
 /// Writes an archive, has the config diagnose it, judges the JSON; the files are removed.
@@ -91,7 +93,7 @@ fn sit(drawn: &Draw, args: &ExamArgs, stages: &dyn Stages, scratch: &Path) -> Re
         Ok(json) => (judge(drawn, Some(&json)), json),
         Err(Sitting::Config(failure)) => return Err(failure),
         Err(Sitting::Run(message)) => {
-            say(&format!("seed {}: {message}\n", drawn.seed));
+            say(&format!("seed {}: {}\n", drawn.seed, printable::message(&message)));
             (judge(drawn, None), Value::Null)
         }
     };

@@ -13,6 +13,7 @@ use super::run::{PROGRAM, open_cache};
 use crate::cli::ExplainArgs;
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::one_line;
 use crate::show::{change_json, change_text, grid, pretty};
 use crate::sweep::point;
 
@@ -39,7 +40,7 @@ pub fn run(args: &ExplainArgs, stages: &dyn Stages) -> Result<(), Failure> {
 
 /// What keys do not see, for people; nothing where they see all.
 fn unseen(plan: &Plan) -> String {
-    let note = |node: &Node| format!("note: stage {} ({}): {UNSEEN}\n", node.id, node.uses);
+    let note = |node: &Node| format!("note: stage {} ({}): {UNSEEN}\n", one_line(&node.id), one_line(&node.uses));
     plan.nodes.iter().filter(|node| is_plugin(&node.uses)).map(note).collect()
 }
 

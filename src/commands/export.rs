@@ -16,6 +16,7 @@ use crate::cli::{ExportArgs, ModelFormat};
 use crate::export::{ExportedModel, Origin, model_json, model_mat, units};
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::shown;
 use crate::show::pretty;
 
 /// What is exported if nothing is said: the stage that fits all events in every shipped config.
@@ -37,7 +38,7 @@ pub fn run(args: &ExportArgs) -> Result<(), Failure> {
     if args.json {
         return print(&pretty(&json!({ "file": output.display().to_string(), "stage": id, "port": port }))?);
     }
-    print(&format!("{}\n", output.display()))
+    print(&(shown(&output) + "\n"))
 }
 
 fn exported(file: &ResultFile, id: &str, port: &str) -> Result<ExportedModel, Failure> {

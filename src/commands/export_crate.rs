@@ -13,6 +13,7 @@ use super::target::{make_folder, require_folder};
 use crate::cli::CrateArgs;
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::shown;
 use crate::provenance::files::{Finder, Now};
 use crate::provenance::research_object::{CONFIG, CrateInput, METADATA, Stated, inputs, metadata, result_name};
 use crate::relative::folder_of;
@@ -68,7 +69,7 @@ fn told(folder: &Path, inputs: &[CrateInput], gone: usize) -> String {
         _ => "by their hashes",
     };
     let missing = if gone == 0 { String::new() } else { format!(", {gone} of them not there any more") };
-    format!("{}: result, config, {} inputs {how}{missing}\n", folder.display(), inputs.len())
+    format!("{}: result, config, {} inputs {how}{missing}\n", shown(folder), inputs.len())
 }
 
 /// `NAME-crate` in the working directory.

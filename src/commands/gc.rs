@@ -12,6 +12,7 @@ use crate::cli::GcArgs;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::print;
+use crate::printable::shown;
 use crate::show::{pretty, size};
 
 /// How long results lie idle that are told about where no limit is given.
@@ -42,7 +43,7 @@ fn idle(freed: &Freed) -> (usize, u64) {
 fn as_text(args: &GcArgs, folder: &Path, freed: &Freed) -> String {
     let (results, bytes) = freed.left.total(Sort::Result);
     let (stamps, stamp_bytes) = freed.left.total(Sort::Stamp);
-    let mut text = format!("cache {}\n", folder.display());
+    let mut text = format!("cache {}\n", shown(folder));
     for why in [Why::Leftover, Why::Old, Why::Size] {
         let of: Vec<&Gone> = freed.gone.iter().filter(|gone| gone.why == why).collect();
         if !of.is_empty() {

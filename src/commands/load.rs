@@ -23,9 +23,9 @@ pub fn plan_text(file: &str, text: &str, set: &[String], stages: &dyn Stages) ->
 }
 
 /// The largest config: a hundred thousand stages.
-const MOST_BYTES: u64 = 16 << 20;
+const MOST_BYTES: u64 = 8 << 20;
 
-/// The text of a config. Errors: the file cannot be read, is no regular one, has more than 16 MiB, or is no text.
+/// The text of a config. Errors: the file cannot be read, is no regular one, has more than 8 MiB, or is no text.
 pub fn read(path: &Path) -> Result<String, Failure> {
     let bytes = read_regular(path, MOST_BYTES)
         .map_err(|error| Failure::usage(format!("the config {} cannot be read: {error}", path.display()), None))?;

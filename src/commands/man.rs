@@ -9,6 +9,7 @@ use clap_mangen::Man;
 use crate::cli::command;
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::shown;
 
 /// Prints the main page, or writes `afmid.1`, `afmid-run.1` and so on into a folder.
 pub fn run(folder: Option<&Path>) -> Result<(), Failure> {
@@ -27,7 +28,7 @@ pub fn run(folder: Option<&Path>) -> Result<(), Failure> {
         let written = filled.write(name, earlier, text.as_bytes());
         written.map_err(|error| Failure::failed(&error, error.help.clone()))?;
     }
-    print(&format!("{}: {} pages\n", folder.display(), pages.len()))
+    print(&format!("{}: {} pages\n", shown(folder), pages.len()))
 }
 
 /// Pages of a command and of all below it: file name and text.

@@ -11,6 +11,7 @@ use super::target::require_folder;
 use crate::cli::{New, NewPipelineArgs, NewStageArgs};
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::shown;
 use crate::relative::folder_of;
 use crate::scaffold::{Wanted, look, pipeline, python, rust};
 use crate::show::pretty;
@@ -85,5 +86,5 @@ fn new_stage(args: &NewStageArgs) -> Result<(), Failure> {
     if args.json {
         return print(&pretty(&json!({ "folder": folder.display().to_string(), "files": written }))?);
     }
-    print(&format!("{}\n  cd {0}\n  {next}\n", folder.display()))
+    print(&format!("{}\n  cd {0}\n  {next}\n", shown(&folder)))
 }

@@ -1,7 +1,9 @@
 //! From a result file's name to the file.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
+use afmid_pipeline::files::open_regular;
 use afmid_pipeline::recording::recognised;
 use afmid_pipeline::store::{FileKind, file_kind};
 
@@ -13,9 +15,13 @@ pub fn require_result(path: &Path) -> Result<(), Failure> {
     if path.is_dir() {
         return Err(Failure::usage(format!("{shown} is a folder, wanted a result file"), None));
     }
-    if !path.is_file() {
+    if let Err(error) = open_regular(path) {
+        let message = match error.kind() {
+            ErrorKind::NotFound | ErrorKind::NotADirectory => format!("there is no file {shown}"),
+            _ => format!("{shown} cannot be read: {error}"),
+        };
         let help = "a result is made by `afmid run CONFIG -o OUT.h5`".to_owned();
-        return Err(Failure::usage(format!("there is no file {shown}"), Some(help)));
+        return Err(Failure::usage(message, Some(help)));
     }
     let kind = file_kind(path).map_err(|error| Failure::usage(format!("{shown} cannot be read: {error}"), None))?;
     let help = match kind {

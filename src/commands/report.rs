@@ -14,6 +14,7 @@ use super::target::{Target, make_folder, prepare};
 use crate::cli::ReportArgs;
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::one_line;
 use crate::relative::{address, folder_of, relative};
 use crate::report::{Painter, figures, report};
 use crate::show::pretty;
@@ -35,7 +36,7 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
         return print(&pretty(&json!({ "page": output.display().to_string(), "figures": figures }))?);
     }
     let all = std::iter::once(output.display().to_string()).chain(figures);
-    print(&all.map(|path| path + "\n").collect::<String>())
+    print(&all.map(|path| one_line(&path) + "\n").collect::<String>())
 }
 
 /// The address of a data set's page, if it has one, or else of its result.

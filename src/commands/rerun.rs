@@ -16,6 +16,7 @@ use crate::cli::RerunArgs;
 use crate::diagnostic::render;
 use crate::failure::{Failure, Message};
 use crate::output::print;
+use crate::printable::{one_line, shown};
 use crate::provenance::diff::Diff;
 use crate::provenance::differences::results_text;
 use crate::provenance::files::{Finder, Now};
@@ -57,14 +58,15 @@ pub fn run(args: &RerunArgs, stages: &dyn Stages) -> Result<(), Failure> {
 fn require_inputs(file: &ResultFile, finder: &Finder) -> Result<(), Failure> {
     let unfit = unfit(file, finder);
     let Some(total) = Some(unfit.len()).filter(|&total| total > 0) else { return Ok(()) };
-    let line = |(source, now): &(SourceFile, Now)| format!("  {}: {}\n", source.path, now.text());
-    let mut list: String = unfit.iter().take(MOST).map(line).collect();
+    let line = |(source, now): &(SourceFile, Now)| format!("  {}: {}", source.path, now.text());
+    let mut list: Vec<String> = unfit.iter().take(MOST).map(line).collect();
     if total > MOST {
-        list.push_str(&format!("  ... and {} more\n", total - MOST));
+        list.push(format!("  ... and {} more", total - MOST));
     }
     let what = if total == 1 { "1 file that it read is" } else { &format!("{total} files that it read are") };
-    let message = format!("{}: {what} not there with the same bytes:\n{}", file.path().display(), list.trim_end());
-    Err(Failure::failed(message, Some("nothing was run; `--data FOLDER` looks there by name and hash".to_owned())))
+    let message = format!("{}: {what} not there with the same bytes:", file.path().display());
+    let help = "nothing was run; `--data FOLDER` looks there by name and hash".to_owned();
+    Err(Failure::Failed(Message::Listed(message, list, Some(help))))
 }
 
 /// The plan of the stored config, reading the files where they are now, and its stages that write. Errors, usage: this program cannot run it any more.
@@ -128,13 +130,13 @@ impl Told<'_> {
     }
 
     fn text(&self) -> String {
-        let (path, outputs) = (self.file.path().display(), self.outputs());
+        let (path, outputs) = (shown(self.file.path()), self.outputs());
         let mut text = String::new();
         if self.file.run().program != PROGRAM {
-            text.push_str(&format!("made by {}, repeated by {PROGRAM}\n", self.file.run().program));
+            text.push_str(&format!("made by {}, repeated by {PROGRAM}\n", one_line(&self.file.run().program)));
         }
         for (id, then, now) in self.versions() {
-            text.push_str(&format!("stage {id}: version {now} here, it was {then}\n"));
+            text.push_str(&format!("stage {}: version {now} here, it was {then}\n", one_line(id)));
         }
         let rows = results(self.diff);
         let stages = self.plan.nodes.len();
@@ -153,7 +155,7 @@ impl Told<'_> {
         for stage in &self.diff.stages {
             let of: Vec<_> = rows.iter().filter(|(id, _)| *id == stage.id).map(|(_, result)| *result).collect();
             if !of.is_empty() {
-                text.push_str(&format!("stage {}\n{}", stage.id, results_text(&of)));
+                text.push_str(&format!("stage {}\n{}", one_line(&stage.id), results_text(&of)));
             }
         }
         text

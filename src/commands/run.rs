@@ -17,6 +17,7 @@ use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
 use crate::interrupt;
 use crate::output::{print, say};
+use crate::printable::{help_line, message, one_line, shown};
 use crate::progress::observer;
 use crate::relative::folder_of;
 use crate::show::pretty;
@@ -51,7 +52,7 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     if args.json {
         return print(&pretty(&as_json(&output, &result))?);
     }
-    print(&format!("{}: {}\n", output.display(), told(&result)))
+    print(&format!("{}: {}\n", shown(&output), told(&result)))
 }
 
 /// The cache that was asked for, or the user's. What killed processes left in it and in the system's folder for temporary files is removed.
@@ -76,7 +77,7 @@ pub fn written_folders(plan: &Plan) {
 
 /// Says what is wrong with a cache: a run goes on to its result all the same.
 pub fn warn(cache: &Cache) {
-    cache.take_notes().iter().for_each(|note| say(&format!("warning: {note}\n")));
+    cache.take_notes().iter().for_each(|note| say(&format!("warning: {}\n", one_line(note))));
 }
 
 /// The folder of the cache that was asked for, or the user's.
@@ -128,8 +129,9 @@ pub fn compute(plan: &Plan, how: &Computation) -> Result<RunResult, Failure> {
 }
 
 fn stages_failed(errors: &[RunError]) -> Failure {
-    let help = |error: &RunError| error.error.help.as_ref().map(|help| format!("  help: {help}\n")).unwrap_or_default();
-    Failure::Failed(Message::Rendered(errors.iter().map(|error| format!("error: {error}\n{}", help(error))).collect()))
+    let help = |error: &RunError| error.error.help.as_deref().map(help_line).unwrap_or_default();
+    let one = |error: &RunError| format!("error: {}\n{}", message(&error.to_string()), help(error));
+    Failure::Failed(Message::Rendered(errors.iter().map(one).collect()))
 }
 
 /// How many stages were reused.

@@ -9,6 +9,7 @@ use afmid_pipeline::store::{ResultFile, StageSummary};
 use super::open::require_result;
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::one_line;
 use crate::show::{artifact_text, overview_json, overview_text, pretty, stage_head, stage_json};
 
 /// Shows a result file, or one of its stages, as text or as JSON.
@@ -47,7 +48,7 @@ pub fn stage_text(file: &ResultFile, stage: &StageSummary) -> Result<String, Fai
     let mut text = stage_head(&stage.record);
     for port in &stage.ports {
         let artifact = artifact(file, &stage.record.id, &port.name)?;
-        text.push_str(&format!("\n{} ({})\n{}", port.name, port.shape.name(), artifact_text(&artifact)));
+        text.push_str(&format!("\n{} ({})\n{}", one_line(&port.name), port.shape.name(), artifact_text(&artifact)));
     }
     Ok(text)
 }

@@ -22,8 +22,9 @@ use crate::batch::slurm::{
     AGREED, ARRAY, COLLECT, CONFIG, DEPENDENCY, FOLDER, Jobs, LOG, MANIFEST, Resources, SUBMIT, job_id,
 };
 use crate::cli::{SlurmArgs, SubmitTo};
-use crate::failure::Failure;
+use crate::failure::{Failure, Message};
 use crate::output::{print, say};
+use crate::printable::shown;
 use crate::show::pretty;
 
 /// Variables that configs refer to: a job gets those of its submission, whatever the site hands on.
@@ -158,10 +159,10 @@ fn sbatch(here: &Path, arguments: &[String]) -> Result<String, Failure> {
             here.display()
         );
         let said = [stderr.trim(), stdout.trim()].join("\n");
-        return Err(Failure::failed(
-            format!("sbatch refused {script} ({}): {}", output.status, said.trim()),
-            Some(help),
-        ));
+        let mut lines = said.trim().lines();
+        let message = format!("sbatch refused {script} ({}): {}", output.status, lines.next().unwrap_or_default());
+        let list = lines.map(|line| format!("  {line}")).collect();
+        return Err(Failure::Failed(Message::Listed(message, list, Some(help))));
     }
     say(&stderr);
     job_id(&stdout).ok_or_else(|| {
@@ -188,7 +189,7 @@ fn told(json: bool, here: &Path, jobs: &Jobs, sent: Option<&Sent>) -> Result<Str
         }));
     }
     let shards = if jobs.shards == 1 { "shard" } else { "shards" };
-    let mut text = format!("{}: {} data sets in {} {shards}", here.display(), jobs.data_sets, jobs.shards);
+    let mut text = format!("{}: {} data sets in {} {shards}", shown(here), jobs.data_sets, jobs.shards);
     if jobs.filled.len() < jobs.shards as usize {
         text.push_str(&format!(", {} of them without any, left out", jobs.shards as usize - jobs.filled.len()));
     }

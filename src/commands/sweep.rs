@@ -15,6 +15,7 @@ use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
 use crate::interrupt;
 use crate::output::print;
+use crate::printable::{self, message, one_line};
 use crate::progress::Sets;
 use crate::show::{artifact_text, pretty};
 use crate::sweep::point::{self, Point};
@@ -120,19 +121,19 @@ impl Told<'_> {
         let mut text = artifact_text(&Artifact::Table(shown(self.points).into()));
         for point in self.failed() {
             let (entry, values) = (&point.done.entry, point.told());
-            let error = entry.error.as_deref().unwrap_or_default().trim_end();
-            text.push_str(&format!("{} ({values}) failed: {error}\n", entry.name));
+            let error = message(entry.error.as_deref().unwrap_or_default());
+            text.push_str(&format!("{} ({}) failed: {error}\n", entry.name, one_line(&values)));
         }
         let (count, ran, (stages, reused)) = (self.points.len(), self.ran(), self.stages());
         text.push_str(&format!(
             "{}: {count} point{} in {:.2} s, {ran} run ({stages} stages, {reused} reused), {} as they were, {} failed\n",
-            self.folder.display(),
+            printable::shown(self.folder),
             if count == 1 { "" } else { "s" },
             clock.elapsed().as_secs_f64(),
             count - ran,
             self.failed().count(),
         ));
-        text.push_str(&format!("summary: {} (.csv, .parquet)\n", self.summary.display()));
+        text.push_str(&format!("summary: {} (.csv, .parquet)\n", printable::shown(self.summary)));
         text
     }
 

@@ -8,6 +8,7 @@ use super::show::find;
 use crate::cli::TraceArgs;
 use crate::failure::Failure;
 use crate::output::print;
+use crate::printable::{one_line, shown};
 use crate::provenance::files::Finder;
 use crate::provenance::located::{Dataset, Located, Lost, locate};
 use crate::provenance::path::parse;
@@ -38,24 +39,22 @@ fn head(file: &ResultFile, located: &Located) -> String {
         (Value::Number(number), Some(std)) => with_std(number.as_f64().unwrap_or(f64::NAN), std),
         (value, _) => shortened(&value.to_string()),
     };
-    let mut text = format!("{} = {value}\n", located.path);
-    text.push_str(&format!("in {}: {}\n", file.path().display(), place(&located.place)));
+    let mut text = format!("{} = {value}\n", one_line(&located.path));
+    text.push_str(&format!("in {}: {}\n", shown(file.path()), place(&located.place)));
     for other in &located.also {
         text.push_str(&format!("the same number: {}\n", place(other)));
     }
     let sets: String = run.overrides.iter().map(|set| format!(" --set {set}")).collect();
     let config = if run.info.config_file.is_empty() { "its config" } else { &run.info.config_file };
-    text.push_str(&format!(
-        "{} ran `{}` (seed {}) from {config}{sets}, {}\n\n",
-        run.program, run.name, run.seed, run.info.started_at
-    ));
-    text
+    let ran =
+        format!("{} ran `{}` (seed {}) from {config}{sets}, {}", run.program, run.name, run.seed, run.info.started_at);
+    text + &one_line(&ran) + "\n\n"
 }
 
 fn place(place: &Dataset) -> String {
     let index: String = place.index.iter().map(|index| format!("[{index}]")).collect();
     let pointer = place.pointer.as_ref().map(|pointer| format!(" at {pointer}")).unwrap_or_default();
-    format!("{}{index}{pointer}", place.dataset)
+    one_line(&format!("{}{index}{pointer}", place.dataset))
 }
 
 fn shortened(text: &str) -> String {

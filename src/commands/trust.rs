@@ -12,6 +12,7 @@ use crate::cli::TrustArgs;
 use crate::diagnostic::render;
 use crate::failure::{Failure, Message};
 use crate::output::print;
+use crate::printable::{help_line, message, one_line, shown};
 use crate::show::pretty;
 
 /// Lists, agrees, or takes it back.
@@ -43,7 +44,7 @@ pub fn run(args: &TrustArgs) -> Result<(), Failure> {
             }
         };
         if found.is_empty() && !args.json {
-            print(&format!("{}: its stages start no plugin\n", config.display()))?;
+            print(&format!("{}: its stages start no plugin\n", shown(config)))?;
         }
         rows.extend(found);
     }
@@ -53,7 +54,7 @@ pub fn run(args: &TrustArgs) -> Result<(), Failure> {
         print(&pretty(&json!({ "folder": trust.folder().display().to_string(), "plugins": rows }))?)?;
     }
     // what was printed says all
-    let failed = rows.iter().any(|row| matches!(row.outcome, Outcome::Failed(_)));
+    let failed = rows.iter().any(|row| matches!(row.outcome, Outcome::Failed(..)));
     if failed { Err(Failure::Failed(Message::Rendered(String::new()))) } else { Ok(()) }
 }
 
@@ -80,7 +81,8 @@ struct Row {
 enum Outcome {
     Trusted(Described),
     Revoked(usize),
-    Failed(String),
+    /// What is wrong, and what to do.
+    Failed(String, String),
 }
 
 /// Errors: stdout cannot be written.
@@ -90,7 +92,7 @@ fn agreed(plugins: &Plugins, candidate: &Candidate, json: bool) -> Result<Row, F
     }
     let outcome = match plugins.agree(candidate) {
         Ok(described) => Outcome::Trusted(described),
-        Err(error) => Outcome::Failed(format!("{}\n  help: {}", error.told(candidate.name()), error.help)),
+        Err(error) => Outcome::Failed(error.told(candidate.name()), error.help),
     };
     let row = Row { name: candidate.name().to_owned(), candidate: Some(candidate.clone()), outcome };
     if !json {
@@ -134,16 +136,19 @@ impl Row {
     fn text(&self) -> String {
         match &self.outcome {
             Outcome::Trusted(Described { name, version, summary, inputs, outputs }) => {
-                let list = |names: &[String]| if names.is_empty() { "nothing".to_owned() } else { names.join(", ") };
+                let list = |names: &[String]| {
+                    if names.is_empty() { "nothing".to_owned() } else { one_line(&names.join(", ")) }
+                };
+                let (name, version, summary) = (one_line(name), one_line(&version.to_string()), one_line(summary));
                 format!(
                     "  is    {name} {version}: {summary}\n  takes {}\n  makes {}\ntrusted, as long as nothing of this changes; what its files import is not seen\n",
                     list(inputs),
                     list(outputs)
                 )
             }
-            Outcome::Revoked(0) => format!("plugin {}: nobody had agreed to it\n", self.name),
-            Outcome::Revoked(_) => format!("plugin {}: trusted no more\n", self.name),
-            Outcome::Failed(error) => format!("not trusted: {error}\n"),
+            Outcome::Revoked(0) => format!("plugin {}: nobody had agreed to it\n", one_line(&self.name)),
+            Outcome::Revoked(_) => format!("plugin {}: trusted no more\n", one_line(&self.name)),
+            Outcome::Failed(error, help) => format!("not trusted: {}\n{}", message(error), help_line(help)),
         }
     }
 
@@ -174,7 +179,10 @@ impl Row {
             "seal": candidate.map(Candidate::seal),
             "trusted": matches!(self.outcome, Outcome::Trusted(_)),
             "described": described,
-            "error": if let Outcome::Failed(error) = &self.outcome { Some(error) } else { None },
+            "error": match &self.outcome {
+                Outcome::Failed(error, help) => Some(format!("{error}\n  help: {help}")),
+                _ => None,
+            },
         })
     }
 }
@@ -203,14 +211,15 @@ fn list(trust: &Trust, as_json: bool) -> Result<(), Failure> {
     let row = |trusted: &Trusted| {
         let words = std::iter::once(&trusted.program).chain(&trusted.arguments).map(crate::batch::shell::quoted);
         let (name, version) = trusted.identity();
+        let (name, version) = (one_line(name), one_line(version));
         format!(
             "plugin {} ({name} {version}), {}\n  runs  {}\n  in    {}\n",
-            trusted.name,
-            trusted.agreed_at,
+            one_line(&trusted.name),
+            one_line(&trusted.agreed_at),
             words.collect::<Vec<_>>().join(" "),
-            trusted.folder
+            one_line(&trusted.folder)
         )
     };
-    let end = format!("{} trusted, in {}\n", all.len(), trust.folder().display());
+    let end = format!("{} trusted, in {}\n", all.len(), shown(trust.folder()));
     print(&(all.iter().map(row).collect::<String>() + &end))
 }

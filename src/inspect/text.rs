@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::channel::Channel;
 use super::file::{Holdings, Inspected, Outcome};
-use crate::printable::one_line;
+use crate::printable::{help_line, one_line};
 use crate::show::{grid, number};
 
 /// Channels shown of one file, and remarks.
@@ -17,7 +17,7 @@ pub fn file_text(inspected: &Inspected) -> String {
     match &inspected.outcome {
         Outcome::Own => format!("{file}{size}\n  a result of afmid's, no recording: `afmid show` shows it\n"),
         Outcome::Refused { problem, help } => {
-            let help = help.as_ref().map(|help| format!("  help: {help}\n")).unwrap_or_default();
+            let help = help.as_deref().map(help_line).unwrap_or_default();
             format!("{file}{size}\n  refused: {}\n{help}", one_line(problem))
         }
         Outcome::Read(holdings) => format!("{file}{size}\n{}", holdings_text(holdings)),

@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::diff::{Diff, Files, Lines, Pair, ResultDiff, StageDiff};
+use crate::printable::one_line;
 use crate::show::{grid, number};
 
 /// Datasets that are told of one stage; `--json` has all.
@@ -10,7 +11,7 @@ const MOST: usize = 40;
 
 /// Differences as text, the first file on the left.
 pub fn diff_text(diff: &Diff) -> String {
-    let (a, b) = (&diff.a, &diff.b);
+    let (a, b) = (one_line(&diff.a), one_line(&diff.b));
     if diff.equal {
         return format!("{a} and {b} are equal\n");
     }
@@ -18,17 +19,17 @@ pub fn diff_text(diff: &Diff) -> String {
     let mut text = format!("{a} and {b} differ{results}\n");
     pairs(&diff.run, "", &mut text);
     lines("config", &diff.config, &mut text);
-    diff.stages_only_in_a.iter().for_each(|id| text.push_str(&format!("stage {id}: only in {a}\n")));
-    diff.stages_only_in_b.iter().for_each(|id| text.push_str(&format!("stage {id}: only in {b}\n")));
+    diff.stages_only_in_a.iter().for_each(|id| text.push_str(&format!("stage {}: only in {a}\n", one_line(id))));
+    diff.stages_only_in_b.iter().for_each(|id| text.push_str(&format!("stage {}: only in {b}\n", one_line(id))));
     diff.stages.iter().for_each(|stage| stage_text(stage, &mut text));
     for other in &diff.other {
-        text.push_str(&format!("{}: {}\n", other.place, other.what));
+        text.push_str(&format!("{}: {}\n", one_line(&other.place), one_line(&other.what)));
     }
     text
 }
 
 fn stage_text(stage: &StageDiff, text: &mut String) {
-    text.push_str(&format!("stage {}\n", stage.id));
+    text.push_str(&format!("stage {}\n", one_line(&stage.id)));
     pairs(&stage.stage, "  ", text);
     pairs(&stage.parameters, "  parameter ", text);
     pairs(&stage.inputs, "  input ", text);
@@ -48,7 +49,7 @@ fn stage_text(stage: &StageDiff, text: &mut String) {
 fn pairs(pairs: &[Pair], head: &str, text: &mut String) {
     let side = |value: &Value| if value.is_null() { "none".to_owned() } else { value.to_string() };
     for pair in pairs {
-        text.push_str(&format!("{head}{}: {} | {}\n", pair.name, side(&pair.a), side(&pair.b)));
+        text.push_str(&format!("{head}{}: {} | {}\n", one_line(&pair.name), side(&pair.a), side(&pair.b)));
     }
 }
 
@@ -58,19 +59,20 @@ fn lines(head: &str, lines: &Lines, text: &mut String) {
     }
     text.push_str(&format!("{head}:\n"));
     let indent = " ".repeat(head.len() - head.trim_start().len());
-    lines.lines_only_in_a.iter().for_each(|line| text.push_str(&format!("{indent}  - {line}\n")));
-    lines.lines_only_in_b.iter().for_each(|line| text.push_str(&format!("{indent}  + {line}\n")));
+    lines.lines_only_in_a.iter().for_each(|line| text.push_str(&format!("{indent}  - {}\n", one_line(line))));
+    lines.lines_only_in_b.iter().for_each(|line| text.push_str(&format!("{indent}  + {}\n", one_line(line))));
     if lines.lines_only_in_a.is_empty() && lines.lines_only_in_b.is_empty() {
         text.push_str(&format!("{indent}  the same lines in another order\n"));
     }
 }
 
 fn files(files: &Files, text: &mut String) {
-    files.only_in_a.iter().for_each(|name| text.push_str(&format!("  - file {name}\n")));
-    files.only_in_b.iter().for_each(|name| text.push_str(&format!("  + file {name}\n")));
+    files.only_in_a.iter().for_each(|name| text.push_str(&format!("  - file {}\n", one_line(name))));
+    files.only_in_b.iter().for_each(|name| text.push_str(&format!("  + file {}\n", one_line(name))));
     for pair in &files.other_bytes {
         let short = |value: &Value| value.as_str().unwrap_or_default().chars().take(16).collect::<String>();
-        text.push_str(&format!("  file {}: other bytes, {} | {}\n", pair.name, short(&pair.a), short(&pair.b)));
+        let (name, a, b) = (one_line(&pair.name), short(&pair.a), short(&pair.b));
+        text.push_str(&format!("  file {name}: other bytes, {a} | {b}\n"));
     }
     match files.moved {
         0 => {}

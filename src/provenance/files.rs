@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::InputFiles;
+use afmid_pipeline::files::open_regular;
 use afmid_pipeline::{RunInfo, SourceFile};
 
 use super::diff::file_name;
@@ -85,8 +86,11 @@ impl Finder {
 
 fn look(path: &Path, file: &SourceFile) -> Now {
     let Ok(metadata) = fs::metadata(path) else { return Now::Missing };
-    if !metadata.is_file() {
+    if metadata.is_dir() {
         return Now::Missing;
+    }
+    if !metadata.is_file() {
+        return open_regular(path).map_or_else(|error| Now::Unreadable(error.to_string()), |_| Now::Missing);
     }
     if metadata.len() != file.size {
         return Now::Other(path.to_owned());

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::diff::file_name;
 use super::files::{Finder, Now};
+use crate::printable::one_line;
 
 /// Characters in a line of parameters.
 const WIDEST: usize = 110;
@@ -28,7 +29,7 @@ impl<'a> Tree<'a> {
     /// `lead` is what stands before the first line, `indent` before the others.
     fn stage(&mut self, record: &'a StageRecord, lead: &str, indent: &str) {
         let key: String = record.key.chars().take(16).collect();
-        let head = format!("{} ({} version {}, key {key})", record.id, record.uses, record.version);
+        let head = one_line(&format!("{} ({} version {}, key {key})", record.id, record.uses, record.version));
         if self.told.contains(&record.id.as_str()) {
             self.text.push_str(&format!("{lead}{head}: see above\n"));
             return;
@@ -38,16 +39,16 @@ impl<'a> Tree<'a> {
         let last = record.wires.is_empty() && record.sources.is_empty();
         let bar = if last { "   " } else { "│  " };
         for line in parameters(record) {
-            self.text.push_str(&format!("{indent}{bar}{line}\n"));
+            self.text.push_str(&format!("{indent}{bar}{}\n", one_line(&line)));
         }
         let count = record.wires.len() + record.sources.len();
         let mark = |index: usize| if index + 1 == count { ("└─ ", "   ") } else { ("├─ ", "│  ") };
         for (index, (port, from, output)) in record.wires.iter().enumerate() {
             let (branch, below) = mark(index);
-            let lead = format!("{indent}{branch}{port} <- {output} of ");
+            let lead = format!("{indent}{branch}{} <- {} of ", one_line(port), one_line(output));
             match self.file.stage(from) {
                 Some(stage) => self.stage(&stage.record, &lead, &format!("{indent}{below}")),
-                None => self.text.push_str(&format!("{lead}{from}: not in this file\n")),
+                None => self.text.push_str(&format!("{lead}{}: not in this file\n", one_line(from))),
             }
         }
         for (index, source) in record.sources.iter().enumerate() {
@@ -60,7 +61,7 @@ impl<'a> Tree<'a> {
 
 fn file_line(file: &SourceFile, now: &Now) -> String {
     let hash: String = file.blake3.chars().take(16).collect();
-    format!("file {}, {} bytes, BLAKE3 {hash}...: {}", file.path, file.size, now.text())
+    one_line(&format!("file {}, {} bytes, BLAKE3 {hash}...: {}", file.path, file.size, now.text()))
 }
 
 /// Parameters and seed in lines of no more than [`WIDEST`] characters, where words allow it.

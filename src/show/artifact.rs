@@ -7,7 +7,9 @@ use afmid_pipeline::{Array, Artifact, Attribute, Column, Recording, StateSpace, 
 
 use super::document::document_text;
 use super::grid::grid;
-use super::number::{number, std_name, with_std};
+use super::number::{number, with_std};
+use super::partners::Partners;
+use crate::printable::one_line;
 
 /// Rows of a table that are shown; `--json` has all.
 const ROWS: usize = 200;
@@ -94,17 +96,21 @@ fn range(values: &Values) -> (String, String) {
 }
 
 fn table_text(table: &Table) -> String {
-    let names = || table.columns.iter().map(|column| column.name.as_str());
-    let partner = |column: &Column| std_name(&column.name, names()).and_then(|name| table.column(name).ok());
-    let partners: Vec<&str> = table.columns.iter().filter_map(partner).map(|std| std.name.as_str()).collect();
-    let shown: Vec<&Column> = table.columns.iter().filter(|column| !partners.contains(&column.name.as_str())).collect();
-    let head = |column: &&Column| match column.unit.as_str() {
+    let partners = Partners::of(table.columns.iter().map(|column| column.name.as_str()));
+    let partner = |column: &Column| partners.std(&column.name).and_then(|name| table.column(name).ok());
+    let shown: Vec<(&Column, Option<&Column>)> = table
+        .columns
+        .iter()
+        .filter(|column| !partners.is_std(&column.name))
+        .map(|column| (column, partner(column)))
+        .collect();
+    let head = |(column, _): &(&Column, Option<&Column>)| match column.unit.as_str() {
         "" | "1" => column.name.clone(),
         unit => format!("{} [{unit}]", column.name),
     };
     let mut rows: Vec<Vec<String>> = vec![shown.iter().map(head).collect()];
     for row in 0..table.rows().min(ROWS) {
-        rows.push(shown.iter().map(|column| cell(column, partner(column), row)).collect());
+        rows.push(shown.iter().map(|(column, std)| cell(column, *std, row)).collect());
     }
     let mut text = grid(&rows);
     if table.rows() > ROWS {
@@ -144,20 +150,18 @@ fn model_text(model: &StateSpace) -> String {
 }
 
 fn attributes_text(attributes: &BTreeMap<String, Attribute>) -> String {
-    let names: Vec<&str> = attributes.keys().map(String::as_str).collect();
-    let std_of = |name: &str| std_name(name, names.iter().copied());
-    let partners: Vec<&str> = names.iter().filter_map(|name| std_of(name)).collect();
-    let shown = attributes.iter().filter(|(name, _)| !partners.contains(&name.as_str()));
+    let partners = Partners::of(attributes.keys().map(String::as_str));
+    let shown = attributes.iter().filter(|(name, _)| !partners.is_std(name));
     let line = |(name, value): (&String, &Attribute)| {
-        let std = std_of(name).and_then(|std| attributes.get(std)).and_then(Attribute::as_f64);
+        let std = partners.std(name).and_then(|std| attributes.get(std)).and_then(Attribute::as_f64);
         let text = match (value, std) {
             (Attribute::Real(value), Some(std)) => with_std(*value, std),
             (Attribute::Real(value), None) => number(*value),
             (Attribute::Integer(value), _) => value.to_string(),
             (Attribute::Flag(flag), _) => yes_or_no(*flag).to_owned(),
-            (Attribute::Text(text), _) => text.clone(),
+            (Attribute::Text(text), _) => one_line(text),
         };
-        format!("  {name} = {text}\n")
+        format!("  {} = {text}\n", one_line(name))
     };
     shown.map(line).collect()
 }

@@ -2,8 +2,10 @@
 
 use serde_json::{Map, Value};
 
+use super::columns::columns;
 use super::grid::narrow_grid;
-use super::number::{number, std_name, with_std};
+use super::number::{number, with_std};
+use super::partners::Partners;
 use crate::printable::one_line;
 
 /// Characters in a table's line that most windows show.
@@ -20,10 +22,9 @@ pub fn document_text(value: &Value) -> String {
 }
 
 fn write_object(entries: &Map<String, Value>, depth: usize, text: &mut String) {
-    let names = || entries.keys().map(String::as_str);
-    let partners: Vec<&str> = names().filter_map(|name| std_name(name, names())).collect();
-    for (name, value) in entries.iter().filter(|(name, _)| !partners.contains(&name.as_str())) {
-        match std_name(name, names()).and_then(|std| entries.get(std)) {
+    let partners = Partners::of(entries.keys().map(String::as_str));
+    for (name, value) in entries.iter().filter(|(name, _)| !partners.is_std(name)) {
+        match partners.std(name).and_then(|std| entries.get(std)) {
             Some(std) if value.is_number() => {
                 text.push_str(&format!("{}{}: {}\n", indent(depth), one_line(name), uncertain(value, std)));
             }
@@ -39,16 +40,19 @@ fn write_value(name: &str, value: &Value, depth: usize, text: &mut String) {
             text.push_str(&format!("{}\n", head.trim_end()));
             write_object(entries, depth + 1, text);
         }
-        Value::Array(values) if !values.is_empty() && values.iter().all(flat) => {
-            text.push_str(&format!("{}\n", head.trim_end()));
-            for line in narrow_grid(&table(values), WIDEST).lines() {
-                text.push_str(&format!("{}{line}\n", indent(depth + 1)));
-            }
-        }
         Value::Array(values) if values.iter().any(|value| value.is_object() || value.is_array()) => {
             text.push_str(&format!("{}\n", head.trim_end()));
-            for (index, value) in values.iter().enumerate() {
-                write_value(&format!("[{index}]"), value, depth + 1, text);
+            match table(values) {
+                Some(rows) => {
+                    for line in narrow_grid(&rows, WIDEST).lines() {
+                        text.push_str(&format!("{}{line}\n", indent(depth + 1)));
+                    }
+                }
+                None => {
+                    for (index, value) in values.iter().enumerate() {
+                        write_value(&format!("[{index}]"), value, depth + 1, text);
+                    }
+                }
             }
         }
         scalar => text.push_str(&format!("{head}{}\n", scalar_text(scalar))),
@@ -65,25 +69,26 @@ fn flat(value: &Value) -> bool {
     value.as_object().is_some_and(|entries| !entries.is_empty() && entries.values().all(simple))
 }
 
-fn table(values: &[Value]) -> Vec<Vec<String>> {
-    let mut names: Vec<&str> = Vec::new();
-    for name in values.iter().filter_map(Value::as_object).flat_map(Map::keys) {
-        if !names.contains(&name.as_str()) {
-            names.push(name);
-        }
+/// The rows of a list of flat objects, names first. None of another list, and of one that would make far more cells than
+/// it has values.
+fn table(values: &[Value]) -> Option<Vec<Vec<String>>> {
+    if !values.iter().all(flat) {
+        return None;
     }
-    let std_of = |name: &str| std_name(name, names.iter().copied());
-    let partners: Vec<&str> = names.iter().filter_map(|name| std_of(name)).collect();
-    let shown: Vec<&str> = names.iter().copied().filter(|name| !partners.contains(name)).collect();
-    let mut rows: Vec<Vec<String>> = vec![shown.iter().map(|name| (*name).to_owned()).collect()];
-    for value in values {
-        let cell = |name: &&str| match std_of(name) {
-            Some(std) if value[*name].is_number() => uncertain(&value[*name], &value[std]),
-            _ => value.get(*name).map_or(String::new(), scalar_text),
+    let objects: Vec<&Map<String, Value>> = values.iter().filter_map(Value::as_object).collect();
+    let names = columns(&objects)?;
+    let partners = Partners::of(names.iter().copied());
+    let shown: Vec<(&str, Option<&str>)> =
+        names.iter().filter(|name| !partners.is_std(name)).map(|name| (*name, partners.std(name))).collect();
+    let mut rows: Vec<Vec<String>> = vec![shown.iter().map(|(name, _)| (*name).to_owned()).collect()];
+    for object in objects {
+        let cell = |(name, std): &(&str, Option<&str>)| match (object.get(*name), std) {
+            (Some(value), Some(std)) if value.is_number() => uncertain(value, object.get(*std).unwrap_or(&Value::Null)),
+            (value, _) => value.map_or(String::new(), scalar_text),
         };
         rows.push(shown.iter().map(cell).collect());
     }
-    rows
+    Some(rows)
 }
 
 fn uncertain(value: &Value, std: &Value) -> String {
@@ -108,7 +113,7 @@ fn indent(depth: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
+    use serde_json::{Value, json};
 
     use super::document_text;
 
@@ -142,5 +147,20 @@ nested:
 names: x, y
 ";
         assert_eq!(document_text(&document), expected);
+    }
+
+    #[test]
+    fn many_keys_take_no_longer_than_many_values() {
+        // quadratic, each of these takes minutes
+        let own: Vec<Value> = (0..50_000).map(|k| json!({ format!("a{k}"): k })).collect();
+        let text = document_text(&json!({ "modes": own }));
+        assert!(text.starts_with("modes:\n  [0]:\n    a0: 0\n  [1]:\n    a1: 1\n"), "{}", &text[..80]);
+        assert_eq!(text.lines().count(), 100_001);
+        let pairs = (0..50_000).flat_map(|k| [(format!("k{k}"), json!(2.0)), (format!("k{k}_std"), json!(0.1))]);
+        let text = document_text(&Value::Object(pairs.collect()));
+        assert!(text.starts_with("k0: 2.00(10)\n"), "{}", &text[..80]);
+        assert_eq!(text.lines().count(), 50_000);
+        let one: Vec<Value> = vec![Value::Object((0..90_000).map(|k| (format!("k{k}_std"), json!(k))).collect())];
+        assert_eq!(document_text(&Value::Array(one)).lines().count(), 4);
     }
 }

@@ -35,19 +35,38 @@ fn fold(name: &str, most: usize) -> Vec<String> {
     lines
 }
 
+/// Characters of a table that are few whatever is in its cells.
+const FEW: usize = 1 << 20;
+
+/// Aligned columns may take so many times the characters that are in their cells.
+const MOST_TIMES: usize = 16;
+
 fn aligned(rows: &[Vec<String>], head: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let cell = |row: &[String], column: usize| row.get(column).map_or_else(String::new, |cell| one_line(cell));
-    let widths: Vec<usize> = (0..columns)
-        .map(|column| rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0))
-        .collect();
-    let right: Vec<bool> =
-        (0..columns).map(|column| column_is_numeric(rows.iter().skip(head).map(|row| cell(row, column)))).collect();
+    let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(|cell| one_line(cell)).collect()).collect();
+    let (mut widths, mut characters) = (vec![0; columns], 0);
+    for row in &rows {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            let count = cell.chars().count();
+            characters += count;
+            *width = count.max(*width);
+        }
+    }
+    let cell = |row: &[String], column: usize| row.get(column).cloned().unwrap_or_default();
+    let below = |column: usize| rows.iter().skip(head).map(move |row| row.get(column).map_or("", String::as_str));
+    let right: Vec<bool> = (0..columns).map(|column| column_is_numeric(below(column))).collect();
+    // one very wide cell among many rows: its column would be blanks for the most part
+    let area = widths.iter().sum::<usize>().saturating_mul(rows.len());
+    if area > FEW.saturating_add(characters.saturating_mul(MOST_TIMES)) {
+        widths.fill(0);
+    }
     let mut text = String::new();
-    for row in rows {
+    for row in &rows {
         let cells = widths.iter().zip(&right).enumerate().map(|(column, (&width, &right))| {
             let value = cell(row, column);
-            if right { format!("{value:>width$}") } else { format!("{value:<width$}") }
+            // no format width: that panics above 65535
+            let blanks = " ".repeat(width.saturating_sub(value.chars().count()));
+            if right { blanks + &value } else { value + &blanks }
         });
         let line = cells.collect::<Vec<_>>().join("  ");
         text.push_str(line.trim_end());
@@ -56,8 +75,8 @@ fn aligned(rows: &[Vec<String>], head: usize) -> String {
     text
 }
 
-fn column_is_numeric(mut cells: impl Iterator<Item = String> + Clone) -> bool {
-    cells.clone().any(|cell| !cell.is_empty()) && cells.all(|cell| numeric(&cell))
+fn column_is_numeric<'a>(mut cells: impl Iterator<Item = &'a str> + Clone) -> bool {
+    cells.clone().any(|cell| !cell.is_empty()) && cells.all(numeric)
 }
 
 fn numeric(cell: &str) -> bool {
@@ -79,5 +98,18 @@ mod tests {
     fn words_go_left_and_numbers_right() {
         let rows = [["name", "x"], ["a", "1.5"], ["long one", "-12"]].map(|row| row.map(str::to_owned).to_vec());
         assert_eq!(grid(&rows), "name        x\na         1.5\nlong one  -12\n");
+    }
+
+    #[test]
+    fn cells_of_any_width_are_aligned_where_that_is_no_waste() {
+        let wide = "x".repeat(70_000);
+        let rows = |count: usize| -> Vec<Vec<String>> {
+            let first = std::iter::once(vec![wide.clone(), "1".to_owned()]);
+            first.chain((1..count).map(|k| vec![k.to_string(), k.to_string()])).collect()
+        };
+        let few = grid(&rows(3));
+        assert!(few.lines().all(|line| line.chars().count() == 70_003), "{} characters", few.len());
+        let many = grid(&rows(100_000));
+        assert!(many.len() < 2_000_000 && many.ends_with("\n99999  99999\n"), "{} characters", many.len());
     }
 }

@@ -2,17 +2,20 @@
 
 mod artifact;
 mod change;
+mod columns;
 mod document;
 mod grid;
 mod json;
 mod number;
 mod overview;
+mod partners;
 mod pretty;
 mod size;
 mod stage;
 
 pub use artifact::artifact_text;
 pub use change::{change_json, change_text};
+pub use columns::columns;
 pub use grid::grid;
 pub use json::artifact_json;
 pub use number::{number, with_std};

@@ -1,7 +1,5 @@
 //! Numbers for people.
 
-pub use afmid_pipeline::artifact::std_name;
-
 /// A number with six significant digits; what is unknown (NaN) is `-`.
 pub fn number(value: f64) -> String {
     if value.is_nan() {

@@ -11,9 +11,10 @@ use crate::printable::one_line;
 pub fn overview_text(file: &ResultFile) -> String {
     let run = file.run();
     let info = &run.info;
-    let mut text = format!("{} (seed {}), {}", run.name, run.seed, run.program);
+    let mut text = format!("{} (seed {}), {}", one_line(&run.name), run.seed, one_line(&run.program));
     if !info.started_at.is_empty() {
-        let (when, seconds, host, threads) = (&info.started_at, info.seconds, &info.host, info.threads);
+        let (when, seconds, host, threads) =
+            (one_line(&info.started_at), info.seconds, one_line(&info.host), info.threads);
         text.push_str(&format!(", {when}, {seconds:.2} s on {threads} threads of {host}"));
     }
     text.push_str("\n\n");
@@ -33,7 +34,12 @@ pub fn overview_text(file: &ResultFile) -> String {
 
 fn warnings(stage: &StageSummary) -> Vec<String> {
     let record = &stage.record;
-    record.result.warnings.iter().map(|warning| format!("  {}: {}\n", record.id, one_line(warning))).collect()
+    record
+        .result
+        .warnings
+        .iter()
+        .map(|warning| format!("  {}: {}\n", one_line(&record.id), one_line(warning)))
+        .collect()
 }
 
 /// The same for scripts.
@@ -61,12 +67,12 @@ pub fn overview_json(file: &ResultFile) -> Value {
 
 /// What a stage was, before its artifacts: name, version, wires, warnings.
 pub fn stage_head(record: &StageRecord) -> String {
-    let mut text = format!("{}: {} version {}\n", record.id, record.uses, record.version);
+    let mut text = format!("{}: {} version {}\n", one_line(&record.id), one_line(&record.uses), record.version);
     for (port, stage, output) in &record.wires {
-        text.push_str(&format!("  {port} <- {stage}.{output}\n"));
+        text.push_str(&format!("  {}\n", one_line(&format!("{port} <- {stage}.{output}"))));
     }
     for warning in &record.result.warnings {
-        text.push_str(&format!("  warning: {warning}\n"));
+        text.push_str(&format!("  warning: {}\n", one_line(warning)));
     }
     text
 }

@@ -35,13 +35,16 @@ fn simulation(place: &Place) -> Child {
 #[test]
 fn a_stage_that_goes_on_is_ended_and_leaves_whole_files_only() {
     let place = Place::new();
-    let child = simulation(&place);
-    signal(&child, "TERM");
-    let (code, told) = end(child);
-    assert_eq!(code, Some(143), "{told}");
-    assert!(told.contains("interrupted by SIGTERM"), "{told}");
-    assert!(!place.path("simulated.h5").exists());
-    assert_tidy(&place);
+    for (name, wanted) in [("HUP", 129), ("QUIT", 131), ("TERM", 143)] {
+        let _ = std::fs::remove_dir_all(place.path("archive"));
+        let child = simulation(&place);
+        signal(&child, name);
+        let (code, stderr) = end(child);
+        assert_eq!(code, Some(wanted), "{stderr}");
+        assert!(stderr.contains(&format!("interrupted by SIG{name}")), "{stderr}");
+        assert!(!place.path("simulated.h5").exists());
+        assert_tidy(&place);
+    }
     let inspected = place.command(&["inspect", "archive"]).output().expect("afmid starts");
     assert!(inspected.status.success(), "{}", String::from_utf8_lossy(&inspected.stderr));
 }

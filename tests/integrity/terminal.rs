@@ -95,15 +95,41 @@ fn a_name_of_two_lines_stays_one() {
     std::fs::write(place.path("set").join("t\nFAKE.csv"), text).expect("a table");
     let config = census(&escaped("set/r*.h5"));
     std::fs::write(place.path("c.toml"), config).expect("a config");
-    place.command(&["run", "c.toml", "-o", "out.h5"]).status().expect("afmid starts");
     let record = format!("set/{name}");
-    for arguments in
-        [&["inspect", "set"][..], &["inspect", &record], &["show", "out.h5"], &["show", "out.h5", "records"]]
-    {
+    for arguments in [
+        &["run", "c.toml", "-o", "out.h5"][..],
+        &["check", "c.toml"],
+        &["inspect", "set"],
+        &["inspect", &record],
+        &["show", "out.h5"],
+        &["show", "out.h5", "records"],
+        &["trace", "out.h5", "census.records"],
+        &["rerun", "out.h5"],
+    ] {
         let output = place.command(arguments).output().expect("afmid starts");
-        let shown = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(output.status.success() && !shown.is_empty(), "{arguments:?}: {shown}");
-        assert!(!shown.lines().any(|line| line.trim_start().starts_with("FAKE")), "{arguments:?}: {shown}");
+        let [shown, said] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+        assert!(output.status.success() && !shown.is_empty(), "{arguments:?}: {shown}{said}");
+        let forged = |text: &str| text.lines().any(|line| line.trim_start().starts_with("FAKE"));
+        assert!(!forged(&shown) && !forged(&said), "{arguments:?}: {shown}{said}");
+    }
+    // what cannot be done is said in one line, too
+    std::fs::write(place.path(&record), "no record").expect("another file");
+    let odd = "nowhere\nFAKE.toml";
+    std::fs::write(place.path("two\nFAKE.toml"), "[pipeline]\n").expect("a config");
+    for arguments in [
+        &["run", "c.toml", "-o", "out.h5"][..],
+        &["trace", "out.h5", "census.records"],
+        &["rerun", "out.h5"],
+        &["check", odd],
+        &["check", "two\nFAKE.toml"],
+        &["show", odd],
+        &["batch", "c.toml", "-o", "out", odd],
+        &["run", "c.toml", "-o", "no\nFAKE/x.h5"],
+    ] {
+        let output = place.command(arguments).output().expect("afmid starts");
+        let all = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+        let forged = all.lines().any(|line| line.trim_start().starts_with("FAKE"));
+        assert!(!all.is_empty() && !forged, "{arguments:?}: {all}");
     }
 }
 

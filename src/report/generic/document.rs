@@ -1,10 +1,13 @@
 //! Documents as facts and tables.
 
+use std::collections::HashSet;
+
 use serde_json::{Map, Value};
 
 use super::ROWS;
 use crate::report::number::{UNKNOWN, integer, number, quantity};
 use crate::report::view::{Fact, Head, TableView};
+use crate::show::columns;
 
 /// Splits a JSON document into facts (`events.found` = 24) and, for lists of objects, tables.
 pub(crate) fn document_view(document: &Value) -> (Vec<Fact>, Vec<TableView>) {
@@ -42,19 +45,20 @@ fn quantity_text(name: &str, map: &Map<String, Value>) -> String {
     }
 }
 
-/// A table with a column for each key, in the order in which keys first appear.
+/// A table with a column for each key, in the order in which keys first appear; where few objects share a key, of one
+/// column with whole objects.
 fn objects(caption: &str, list: &[Value]) -> TableView {
     let empty = Map::new();
     let rows: Vec<&Map<String, Value>> = list.iter().map(|item| item.as_object().unwrap_or(&empty)).collect();
-    let mut keys: Vec<&String> = Vec::new();
-    for key in rows.iter().flat_map(|row| row.keys()) {
-        if !keys.contains(&key) {
-            keys.push(key);
-        }
-    }
-    let numeric =
-        |key: &str| rows.iter().all(|row| row.get(key).is_none_or(|value| value.is_number() || value.is_null()));
-    let heads = keys.iter().map(|key| Head { numeric: numeric(key), ..Head::text(key) }).collect();
+    let Some(keys) = columns(&rows) else {
+        let mut view = TableView::new(caption, vec![Head::text("entry")]);
+        view.rows.extend(list.iter().take(ROWS).map(|item| vec![scalar(item)]));
+        return view.truncated(ROWS, rows.len());
+    };
+    let worded = |(_, value): &(&String, &Value)| !value.is_number() && !value.is_null();
+    let words: HashSet<&str> =
+        rows.iter().flat_map(|row| row.iter()).filter(worded).map(|(key, _)| key.as_str()).collect();
+    let heads = keys.iter().map(|key| Head { numeric: !words.contains(key), ..Head::text(key) }).collect();
     let mut view = TableView::new(caption, heads);
     for row in rows.iter().take(ROWS) {
         view.rows.push(keys.iter().map(|key| row.get(*key).map_or_else(String::new, scalar)).collect());
@@ -140,6 +144,14 @@ mod tests {
         assert_eq!(tables[0].caption, "events.rejected");
         assert_eq!(tables[0].rows.len(), 2);
         assert_eq!(tables[0].heads.len(), 3);
+    }
+
+    #[test]
+    fn objects_that_share_no_keys_make_no_table_of_all_their_keys() {
+        let own: Vec<Value> = (0..50_000).map(|k| serde_json::json!({ format!("a{k}"): k })).collect();
+        let (_, tables) = document_view(&serde_json::json!({ "modes": own }));
+        assert_eq!((tables[0].heads.len(), tables[0].rows.len()), (1, ROWS));
+        assert_eq!(tables[0].rows[1], ["a1: 1"]);
     }
 
     #[test]
