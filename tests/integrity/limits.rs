@@ -79,7 +79,7 @@ fn a_ledger_entry_that_is_a_fifo_is_no_entry() {
 }
 
 #[test]
-fn a_config_has_at_most_16_mib() {
+fn a_config_has_at_most_8_mib() {
     let folder = tempfile::tempdir().expect("a folder");
     let head = "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"a\"\nuses = \"io.columns\"\nparams = { file = \"x\" }\n# ";
     let with = |bytes: usize| {
@@ -87,9 +87,9 @@ fn a_config_has_at_most_16_mib() {
         let Output { status, stderr, .. } = ends(folder.path(), &["check", "a.toml"]);
         (status.code(), String::from_utf8_lossy(&stderr).into_owned())
     };
-    assert_eq!(with(16 << 20).0, Some(0));
-    let (code, told) = with((16 << 20) + 1);
-    assert!(code == Some(2) && told.contains("more than the 16777216 bytes"), "{told}");
+    assert_eq!(with(8 << 20).0, Some(0));
+    let (code, told) = with((8 << 20) + 1);
+    assert!(code == Some(2) && told.contains("more than the 8388608 bytes"), "{told}");
 }
 
 #[test]

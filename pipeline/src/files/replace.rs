@@ -3,7 +3,6 @@
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use super::file_state::FileState;
 use super::temporary::{folder_of, temporary_path};
 use crate::error::StoreError;
 
@@ -23,8 +22,6 @@ pub fn replace_file(path: &Path, write: impl FnOnce(&Path) -> Result<(), StoreEr
 pub(crate) struct Replacement {
     path: PathBuf,
     temporary: PathBuf,
-    /// What lay there when it began, where that must not have changed.
-    before: Option<Option<FileState>>,
 }
 
 impl Replacement {
@@ -33,35 +30,14 @@ impl Replacement {
         if !folder_of(path).is_dir() {
             return Err(StoreError::new("its folder does not exist").file(path).help("make the folder first"));
         }
-        Ok(Self { path: path.to_owned(), temporary: temporary_path(path), before: None })
-    }
-
-    /// As [`Replacement::new`], for a file that takes long: it takes the place only of what lay there when it began, or of nothing.
-    pub(crate) fn of_what_is_there(path: &Path) -> Result<Self, StoreError> {
-        let mut new = Self::new(path)?;
-        new.before = Some(FileState::at(path).ok());
-        Ok(new)
-    }
-
-    /// Errors: another program wrote to the place meanwhile.
-    fn check_place(&self) -> Result<(), StoreError> {
-        match &self.before {
-            Some(before) if *before != FileState::at(&self.path).ok() => {
-                let problem = "was made or changed by another program meanwhile: it is not replaced";
-                Err(StoreError::new(problem)
-                    .file(&self.path)
-                    .help("run again with another output: what was computed is in the cache"))
-            }
-            _ => Ok(()),
-        }
+        Ok(Self { path: path.to_owned(), temporary: temporary_path(path) })
     }
 
     /// Takes the place, once it is `written` and synced. Errors: those of writing it; it cannot be renamed, or the folder not be synced.
     pub(crate) fn take(self, written: Result<(), StoreError>) -> Result<(), StoreError> {
-        let Self { path, temporary, .. } = &self;
+        let Self { path, temporary } = &self;
         let io = |doing: &str, error: &std::io::Error| StoreError::io(doing, path, error);
         written
-            .and_then(|()| self.check_place())
             .and_then(|()| fs::rename(temporary, path).map_err(|error| io("cannot be renamed", &error)))
             .map_err(|error| self.named(error))?;
         File::open(folder_of(path))
