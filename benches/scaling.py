@@ -95,13 +95,11 @@ CASES = [
 def run(folder, arguments):
     clock = time.monotonic()
     command = arguments if arguments[0] == "find" else [PROGRAM, *arguments]
-    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
+    ended = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     seconds = time.monotonic() - clock
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode not in (0, 2, 3):
-        sys.exit(f"afmid {arguments}: exit code {process.returncode}")
-    return seconds, usage.ru_utime
+    if ended.returncode not in (0, 2, 3):
+        sys.exit(f"{command}: exit code {ended.returncode}")
+    return seconds
 
 
 def measured(make, before, arguments, runs, count):
@@ -111,9 +109,9 @@ def measured(make, before, arguments, runs, count):
         if before:
             run(folder, before)
         times = [run(folder, arguments) for _ in range(runs)]
-        while runs > 1 and sum(seconds for seconds, _ in times) < 2 and len(times) < 50:
+        while runs > 1 and sum(times) < 2 and len(times) < 50:
             times.append(run(folder, arguments))
-        return [min(column) for column in zip(*times)]
+        return min(times)
     finally:
         shutil.rmtree(folder)
 
@@ -128,18 +126,17 @@ def slope(points):
 
 
 def main():
-    print("| command, items | " + " | ".join(map(str, SIZES)) + " | exponent | of user time |")
-    print("|---|" + "---|" * (len(SIZES) + 2))
+    print("| command, items | " + " | ".join(map(str, SIZES)) + " | exponent |")
+    print("|---|" + "---|" * (len(SIZES) + 1))
     for name, make, before, arguments, runs, most in CASES:
         if WORDS and not any(word in name for word in WORDS):
             continue
-        empty, empty_user = measured(make, before, arguments, runs, 1)
+        empty = measured(make, before, arguments, runs, 1)
         sizes = [size for size in SIZES if size <= most]
         times = [measured(make, before, arguments, runs, size) for size in sizes]
-        wall = slope([(size, max(seconds - empty, 1e-4)) for size, (seconds, _) in zip(sizes, times)][1:])
-        user = slope([(size, used - empty_user) for size, (_, used) in zip(sizes, times) if used - empty_user >= 0.02])
-        cells = [f"{seconds:.3f} s" for seconds, _ in times] + ["-"] * (len(SIZES) - len(sizes))
-        print(f"| {name} | " + " | ".join(cells) + f" | {wall:.2f} | {user:.2f} |", flush=True)
+        exponent = slope([(size, max(seconds - empty, 1e-4)) for size, seconds in zip(sizes, times)][1:])
+        cells = [f"{seconds:.3f} s" for seconds in times] + ["-"] * (len(SIZES) - len(sizes))
+        print(f"| {name} | " + " | ".join(cells) + f" | {exponent:.2f} |", flush=True)
 
 
 main()
