@@ -113,12 +113,18 @@ fn result(folder: &Path) -> Vec<u8> {
     fs::read(folder.join("a.h5")).expect("the result is there")
 }
 
-/// Seals bytes again, as whoever changes them can.
-fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
-    const MAGIC: &str = "\nafmid seal, BLAKE3 of all bytes before this line: ";
-    bytes.truncate(bytes.len() - MAGIC.len() - 65);
+const SEAL: &str = "\nafmid seal, BLAKE3 of all bytes before this line: ";
+
+/// The bytes without their seal.
+pub fn unsealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    bytes.truncate(bytes.len() - SEAL.len() - 65);
+    bytes
+}
+
+/// Bytes without a seal, with one: whoever changes a file can do so.
+pub fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let hash = blake3::hash(&bytes);
-    bytes.extend(format!("{MAGIC}{hash}\n").into_bytes());
+    bytes.extend(format!("{SEAL}{hash}\n").into_bytes());
     bytes
 }
 
@@ -176,7 +182,7 @@ fn results_that_were_sealed_again_are_bounded() {
     let damaged = |name: &str, damage: &dyn Fn(&mut Vec<u8>)| {
         let mut bytes = whole.clone();
         damage(&mut bytes);
-        fs::write(&file, sealed(bytes)).expect("it is written");
+        fs::write(&file, sealed(unsealed(bytes))).expect("it is written");
         println!("{name}");
         every_command(folder.path(), &file);
     };

@@ -7,7 +7,7 @@ use std::process::Command;
 use hdf5::{File, Group};
 
 use super::common::{ROOT, afmid, command};
-use super::hostile::every_command;
+use super::hostile::{every_command, sealed, unsealed};
 
 /// A file with a small measurement in `/x`, and what else `more` puts there.
 fn file(path: &Path, more: impl FnOnce(&File) -> hdf5::Result<()>) {
@@ -157,5 +157,55 @@ fn samples_in_other_files_are_refused() {
             "{name}: {error}"
         );
         assert!(!here.join("a.h5").exists());
+    }
+}
+
+/// Puts in the place of a dataset of a result one that leads elsewhere, as whoever seals it again can.
+const LED_ELSEWHERE: &str = r#"
+import h5py, numpy as np, sys
+with h5py.File("source.h5", "w") as file:
+    file["x"] = np.full(2000, 4242.25)
+np.full(2000, 4242.25).tofile("raw.bin")
+way, path = sys.argv[1:]
+with h5py.File(path, "r+") as file:
+    found = []
+    samples = lambda item: isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and item.ndim == 1
+    file.visititems(lambda name, item: found.append(name) if samples(item) and "welch" in name else None)
+    name, shape = found[0], file[found[0]].shape
+    print("/" + name, shape)
+    del file[name]
+    if way == "virtual":
+        layout = h5py.VirtualLayout(shape=shape, dtype="f8")
+        layout[:] = h5py.VirtualSource("source.h5", "x", shape=(2000,))[:shape[0]]
+        file.create_virtual_dataset(name, layout)
+    elif way == "external":
+        file.create_dataset(name, shape, dtype="f8", external=[("raw.bin", 0, 16000)])
+    else:
+        file[name] = h5py.ExternalLink("source.h5", "/x")
+"#;
+
+#[test]
+fn sealed_results_lead_to_no_other_file() {
+    let folder = super::small::folder(1, 20000);
+    let here = folder.path();
+    afmid(here, &["run", super::small::CONFIG, "-o", "whole.h5", "--cache", "cache"]);
+    let whole = fs::read(here.join("whole.h5")).expect("a result");
+    for way in ["virtual", "external", "link"] {
+        fs::write(here.join("led.h5"), unsealed(whole.clone())).expect("written");
+        let python = Path::new(ROOT).join(".tools/bin/python3");
+        let made = Command::new(python).current_dir(here).args(["-c", LED_ELSEWHERE, way, "led.h5"]).status();
+        assert!(made.expect("python3 starts").success());
+        let bytes = fs::read(here.join("led.h5")).expect("written");
+        fs::write(here.join("led.h5"), sealed(bytes)).expect("written");
+        every_command(here, &here.join("led.h5"));
+        for arguments in [&["show", "led.h5", "welch", "--json"][..], &["diff", "led.h5", "whole.h5"]] {
+            let output = command(here, arguments).output().expect("afmid starts");
+            let told = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+            println!("{way} {arguments:?}: {told}");
+            assert!(!told.contains("4242"), "{way}, {arguments:?}: {told}");
+        }
+        let diff = command(here, &["diff", "led.h5", "whole.h5"]).output().expect("afmid starts");
+        let told = String::from_utf8_lossy(&diff.stderr).into_owned();
+        assert!(diff.status.code() == Some(1) && told.contains("led.h5") && told.contains("density"), "{way}: {told}");
     }
 }

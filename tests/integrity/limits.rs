@@ -44,6 +44,8 @@ fn what_is_no_regular_file_is_refused_before_it_is_opened() {
             &["diff", odd, odd],
             &["trace", odd],
             &["rerun", odd],
+            &["export", odd, "data", "-o", "model.json"],
+            &["export-crate", odd, "-o", "crate"],
             &["check", odd],
             &["check", "--json", odd],
             &["graph", odd],

@@ -1,6 +1,8 @@
 //! What lies in a cache's folder, by the names and sizes of its files alone.
 
+use std::collections::HashMap;
 use std::fs::{self, DirEntry};
+use std::os::unix::fs::DirEntryExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -64,10 +66,12 @@ impl Stock {
             Err(error) => return Err(StoreError::io("the cache folder cannot be listed", folder, &error)),
         };
         let now = SystemTime::now();
-        let mut files: Vec<Stored> = entries.flatten().filter_map(|entry| stored(&entry, now)).collect();
+        let seen: HashMap<String, Seen> = in_order_of_inodes(entries).iter().filter_map(see).collect();
+        let mut files: Vec<Stored> =
+            seen.iter().filter_map(|(name, file)| stored(folder, name, file, &seen, now)).collect();
         // a missing folder of stamps is an empty one
-        let stamps = fs::read_dir(folder.join(STAMPS)).into_iter().flatten().flatten();
-        files.extend(stamps.filter_map(|entry| stamp(&entry)));
+        let stamps = fs::read_dir(folder.join(STAMPS)).ok().map(in_order_of_inodes).unwrap_or_default();
+        files.extend(stamps.iter().filter_map(stamp));
         files.sort_by(|a, b| (a.used, &a.path).cmp(&(b.used, &b.path)));
         Ok(Self { files })
     }
@@ -90,20 +94,40 @@ pub(super) fn age(then: SystemTime, now: SystemTime) -> Duration {
     now.duration_since(then).unwrap_or_default()
 }
 
-fn stored(entry: &DirEntry, now: SystemTime) -> Option<Stored> {
-    let (name, path) = (entry.file_name().to_string_lossy().into_owned(), entry.path());
+/// Size and last use of a file with a name that the cache gives.
+struct Seen {
+    bytes: u64,
+    used: SystemTime,
+}
+
+/// The order in which a file system keeps what it knows of its files: that of a folder's names costs a walk through all of it for each.
+fn in_order_of_inodes(entries: fs::ReadDir) -> Vec<DirEntry> {
+    let mut entries: Vec<DirEntry> = entries.flatten().collect();
+    entries.sort_unstable_by_key(DirEntry::ino);
+    entries
+}
+
+/// Each file is looked at once.
+fn see(entry: &DirEntry) -> Option<(String, Seen)> {
+    let name = entry.file_name().into_string().ok()?;
+    kind_of(&name)?;
     let metadata = entry.metadata().ok().filter(fs::Metadata::is_file)?;
     let used = metadata.modified().ok()?;
-    let (sort, bytes) = match kind_of(&name)? {
-        Kind::Result(_) => {
-            let origin = fs::metadata(path.with_extension("json")).map_or(0, |origin| origin.len());
-            (Sort::Result, metadata.len() + origin)
+    Some((name, Seen { bytes: metadata.len(), used }))
+}
+
+fn stored(folder: &Path, name: &str, file: &Seen, seen: &HashMap<String, Seen>, now: SystemTime) -> Option<Stored> {
+    let path = folder.join(name);
+    let (sort, bytes) = match kind_of(name)? {
+        Kind::Result(key) => {
+            let origin = seen.get(&format!("{key}.json")).map_or(0, |origin| origin.bytes);
+            (Sort::Result, file.bytes + origin)
         }
-        Kind::Origin(_) if path.with_extension("h5").exists() || age(used, now) < ORPHANED => return None,
+        Kind::Origin(key) if seen.contains_key(&format!("{key}.h5")) || age(file.used, now) < ORPHANED => return None,
         Kind::Temporary(temporary) if !stale(&path, &temporary) => return None,
-        Kind::Origin(_) | Kind::Temporary(_) => (Sort::Leftover, metadata.len()),
+        Kind::Origin(_) | Kind::Temporary(_) => (Sort::Leftover, file.bytes),
     };
-    Some(Stored { path, sort, bytes, used })
+    Some(Stored { path, sort, bytes, used: file.used })
 }
 
 fn stamp(entry: &DirEntry) -> Option<Stored> {

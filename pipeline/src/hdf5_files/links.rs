@@ -29,7 +29,7 @@ fn group(own: &Group, depth: usize, left: &mut usize) -> Result<(), StoreError> 
         match own.loc_type_by_name(&name)? {
             LocationType::Group => group(&own.group(&name)?, depth + 1, left)?,
             LocationType::Dataset => require_own_values(&own.dataset(&name)?)
-                .map_err(|error| wrong(format!("holds the dataset {path}, {}", error.problem)))?,
+                .map_err(|error| wrong(format!("holds the dataset {path}: {}", error.problem)))?,
             // a type leads nowhere
             _ => {}
         }
@@ -42,7 +42,7 @@ pub(crate) fn require_own_values(dataset: &Dataset) -> Result<(), StoreError> {
     let how = dataset.dcpl()?;
     if how.layout() == Layout::Virtual || !how.get_external()?.is_empty() {
         let help = "copy them into one file: h5repack does, or h5py with f.create_dataset(name, data=dataset[...])";
-        return Err(wrong("whose values lie in another file: wanted them in this one".to_owned()).help(help));
+        return Err(wrong("its values lie in another file: wanted them in this one".to_owned()).help(help));
     }
     Ok(())
 }

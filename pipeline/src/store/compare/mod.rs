@@ -76,19 +76,38 @@ impl Walk {
             let place = crate::hdf5_files::write::path_of(a, name);
             if right.binary_search(name).is_err() {
                 push(&mut self.found, &place, "only in the first file");
-            } else if let (Ok(x), Ok(y)) = (read::group(a, name), read::group(b, name)) {
-                self.groups(&x, &y, depth + 1)?;
-            } else if let (Ok(x), Ok(y)) = (read::dataset(a, name), read::dataset(b, name)) {
-                compare_attributes(&x, &y, &place, &mut self.found)?;
-                // the first file's errors; the second's where the first has none
-                let errors = || standard_errors(a, name, &left).or_else(|| standard_errors(b, name, &right));
-                let pair = Pair { a: &x, b: &y, allowances: [x.allowance(), y.allowance()] };
-                compare_values(&pair, &place, &errors, &mut self.found)?;
             } else {
-                push(&mut self.found, &place, "a group in one file, a dataset in the other");
+                self.members([a, b], name, &place, [&left, &right], depth)?;
             }
         }
         Ok(())
+    }
+
+    /// Compares what has one name in both groups, whose members are `names`.
+    fn members(
+        &mut self,
+        [a, b]: [&Node; 2],
+        name: &str,
+        place: &str,
+        names: [&[String]; 2],
+        depth: usize,
+    ) -> Result<()> {
+        match (read::group(a, name), read::group(b, name)) {
+            (Ok(x), Ok(y)) => self.groups(&x, &y, depth + 1),
+            (Err(_), Err(_)) => {
+                let (x, y) = (read::dataset(a, name)?, read::dataset(b, name)?);
+                compare_attributes(&x, &y, place, &mut self.found)?;
+                // the first file's errors; the second's where the first has none
+                let errors = || standard_errors(a, name, names[0]).or_else(|| standard_errors(b, name, names[1]));
+                let pair = Pair { a: &x, b: &y, allowances: [x.allowance(), y.allowance()] };
+                compare_values(&pair, place, &errors, &mut self.found)
+            }
+            (x, _) => {
+                read::dataset(if x.is_ok() { b } else { a }, name)?;
+                push(&mut self.found, place, "a group in one file, a dataset in the other");
+                Ok(())
+            }
+        }
     }
 }
 
