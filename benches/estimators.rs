@@ -6,19 +6,21 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::Duration;
 
-use afmid_stages::calibration::Welch;
-use afmid_stages::model::contact::{CoupledPoles, FreeLever, LOADED_BEAM_SHARES, contact_stiffness, coupled_poles};
-use afmid_stages::model::grey::{Before, GreyOptions, GreyStart, fit_grey};
-use afmid_stages::model::pem::{Experiment, PemOptions, refit};
-use afmid_stages::model::ringdown::{DecayOptions, Estimate, ModeEstimate, RingdownOptions, fit_decay, fit_ringdowns};
-use afmid_stages::model::stabilisation::{StabilisationCriteria, stabilisation};
-use afmid_stages::model::vector_fitting::{MeasuredResponse, VectorFitting, vector_fitting};
-use afmid_stages::model::{BootstrapSettings, Era, InstrumentalSubspace, ModelError, Subspace, Weight, bootstrap};
-use afmid_stages::spectrum::{
+use afmid_kernels::calibration::Welch;
+use afmid_kernels::contact::{CoupledPoles, FreeLever, LOADED_BEAM_SHARES, contact_stiffness, coupled_poles};
+use afmid_kernels::grey::{Before, GreyOptions, GreyStart, fit_grey};
+use afmid_kernels::model::ModelError;
+use afmid_kernels::pem::{Experiment, PemOptions, refit};
+use afmid_kernels::ringdown::{DecayOptions, Estimate, ModeEstimate, RingdownOptions, fit_decay, fit_ringdowns};
+use afmid_kernels::spectra::{
     AveragedDensity, Bins, EndTreatment, EnsembleResponseSettings, EtfeSettings, Intersample, RationalSettings,
     SeenThrough, ThermalFitSettings, TransferEstimate, difference, ensemble_response, etfe, local_rational,
     thermal_fit,
 };
+use afmid_kernels::stabilisation::{StabilisationCriteria, stabilisation};
+use afmid_kernels::subspace::{Era, InstrumentalSubspace, Subspace, Weight};
+use afmid_kernels::validation::{BootstrapSettings, bootstrap};
+use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFitting, vector_fitting};
 use criterion::{BenchmarkId, Criterion, SamplingMode};
 use num_complex::Complex64;
 

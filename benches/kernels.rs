@@ -5,10 +5,10 @@
 use std::hint::black_box;
 use std::time::Duration;
 
+use afmid_kernels::events::{AveragingSettings, CrossCorrelator, correlation_average};
+use afmid_kernels::pem::{Experiment, PemOptions, identify};
+use afmid_kernels::spectra::{EndTreatment, EtfeSettings, Intersample, difference, etfe};
 use afmid_stages::ensemble::{Rows, moments, scatter};
-use afmid_stages::events::{AveragingSettings, CrossCorrelator, correlation_average};
-use afmid_stages::model::pem::{Experiment, PemOptions, identify};
-use afmid_stages::spectrum::{EndTreatment, EtfeSettings, Intersample, difference, etfe};
 use criterion::{BenchmarkId, Criterion, SamplingMode};
 
 mod common;

@@ -7,7 +7,8 @@
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use afmid_stages::causes::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene, add};
+use afmid_kernels::effects::Effects;
+use afmid_stages::causes::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, add};
 
 /// The signal has another slope on either side of the spot's centre: `y = v + a |v|`.
 struct UnequalSegments;

@@ -441,7 +441,7 @@ fn every_command_that_help_texts_name_exists() {
     let commands: Vec<&str> =
         help.lines().filter_map(|line| line.strip_prefix("  ")?.split_whitespace().next()).collect();
     let mut sources =
-        vec![Path::new(ROOT).join("src"), Path::new(ROOT).join("stages/src"), Path::new(ROOT).join("pipeline/src")];
+        ["src", "stages/src", "stages/kernels/src", "pipeline/src"].map(|folder| Path::new(ROOT).join(folder)).to_vec();
     let mut seen = 0;
     while let Some(path) = sources.pop() {
         if path.is_dir() {

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use afmid_kernels::model::ModelError;
 use afmid_pipeline::{Attribute, Matrix, StateSpace};
-use afmid_stages::model::{ModelError, system_poles};
+use afmid_stages::model::system_poles;
 use serde::Serialize;
 
 use super::units::Units;

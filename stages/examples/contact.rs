@@ -6,12 +6,12 @@
 #[path = "accuracy/world.rs"]
 mod world;
 
-use afmid_stages::model::ModelError;
-use afmid_stages::model::contact::{
+use afmid_kernels::contact::{
     FreeLever, JointContact, JointOptions, LOADED_BEAM_SHARES, LawChoice, Ringing, coupled_poles, joint_contact,
 };
-use afmid_stages::model::ringdown::{Estimate, ModeEstimate, Ringdown, RingdownOptions, fit_ringdowns};
-use afmid_stages::simulate::{Adc, Drive, EventKind, ReadoutNoise, Sampling, TriangleRamp, simulate_motion};
+use afmid_kernels::model::ModelError;
+use afmid_kernels::ringdown::{Estimate, ModeEstimate, Ringdown, RingdownOptions, fit_ringdowns};
+use afmid_kernels::simulate::{Adc, Drive, EventKind, ReadoutNoise, Sampling, TriangleRamp, simulate_motion};
 use faer::c64;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

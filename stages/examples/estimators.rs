@@ -1,10 +1,12 @@
 //! Each estimator in a few lines, without any config: `cargo run -p afmid-stages --example estimators`.
 
-use afmid_stages::model::pem::{Experiment, PemOptions, identify};
-use afmid_stages::model::ringdown::{NoiseSource, RingdownOptions, fit_ringdowns};
-use afmid_stages::model::stabilisation::{StabilisationCriteria, stabilisation};
-use afmid_stages::model::vector_fitting::{MeasuredResponse, VectorFitting, vector_fitting};
-use afmid_stages::model::{Era, ModelError, Subspace};
+use afmid_kernels::model::ModelError;
+use afmid_kernels::modes::Root;
+use afmid_kernels::pem::{Experiment, PemOptions, identify};
+use afmid_kernels::ringdown::{NoiseSource, RingdownOptions, fit_ringdowns};
+use afmid_kernels::stabilisation::{StabilisationCriteria, stabilisation};
+use afmid_kernels::subspace::{Era, Subspace};
+use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFitting, vector_fitting};
 use num_complex::Complex64;
 
 /// A resonance at 50 kHz with Q = 40, sampled at 1 MS/s.
@@ -36,26 +38,23 @@ fn prediction_error_method() -> Result<(), ModelError> {
     let (u, y) = data();
     let options = PemOptions { order: 2, ..PemOptions::default() };
     let fit = identify(&[Experiment { input: &u, output: &y }], INTERVAL_S, &options)?;
-    let z = fit.model.sections[0].poles()[0];
-    println!(
-        "pem: {:.1} Hz, converged: {}",
-        z.ln().norm() / (std::f64::consts::TAU * INTERVAL_S),
-        fit.verdict.converged
-    );
+    let mode = fit.modes()?[0].root;
+    let (f, std, converged) = (mode.frequency_hz, mode.frequency_std_hz, fit.verdict.converged);
+    println!("pem: {f:.1} +- {std:.1} Hz, converged: {converged}");
     Ok(())
 }
 
 fn subspace() -> Result<(), ModelError> {
     let (u, y) = data();
     let z = Subspace::new(&u, &y, 60)?.poles(2)?[0];
-    println!("subspace: {:.1} Hz", z.ln().norm() / (std::f64::consts::TAU * INTERVAL_S));
+    println!("subspace: {:.1} Hz", Root::without_errors(z, INTERVAL_S).frequency_hz);
     Ok(())
 }
 
 fn free_decay() -> Result<(), ModelError> {
     let (_, y) = data();
     let z = Era::new(&y[200..], 60)?.poles(2)?[0];
-    println!("era: {:.1} Hz", z.ln().norm() / (std::f64::consts::TAU * INTERVAL_S));
+    println!("era: {:.1} Hz", Root::without_errors(z, INTERVAL_S).frequency_hz);
     Ok(())
 }
 

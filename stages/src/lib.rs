@@ -11,7 +11,6 @@ pub mod io;
 pub mod model;
 pub mod simulate;
 pub mod spectrum;
-pub mod statistics;
 
 use afmid_pipeline::stage::DoubleName;
 use afmid_pipeline::{Entry, Registry};
@@ -36,4 +35,5 @@ pub fn registry() -> Result<Registry, DoubleName> {
 }
 
 #[cfg(test)]
+#[path = "../kernels/src/fixture.rs"]
 pub(crate) mod fixture;

@@ -15,7 +15,7 @@ struct Crate {
     floors: &'static [&'static [&'static str]],
 }
 
-const CRATES: [Crate; 4] = [
+const CRATES: [Crate; 5] = [
     Crate {
         name: "afmid-formats",
         src: "pipeline/formats/src",
@@ -50,10 +50,20 @@ const CRATES: [Crate; 4] = [
         ],
     },
     Crate {
+        name: "afmid-kernels",
+        src: "stages/kernels/src",
+        floors: &[
+            &["fixture", "linear_algebra", "statistics", "effects"],
+            &["events", "calibration", "force", "model", "simulate"],
+            &["spectra", "modes", "ringdown", "subspace", "vector_fitting"],
+            &["contact", "pem"],
+            &["grey", "stabilisation", "validation"],
+        ],
+    },
+    Crate {
         name: "afmid-stages",
         src: "stages/src",
         floors: &[
-            &["statistics", "fixture"],
             &["io", "causes"],
             &["events", "simulate"],
             &["ensemble", "calibration"],

@@ -5,7 +5,7 @@
 use faer::{Mat, c64};
 
 use crate::world::{LSB_V, PINK_V, RATE_HZ, SENSITIVITY_V_PER_M, WHITE_V, closed_form, system};
-use afmid_stages::simulate::{PINK_LOWEST_HZ, Square};
+use afmid_kernels::simulate::{PINK_LOWEST_HZ, Square};
 
 /// Which motion the lever has at the release.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,10 +9,8 @@ mod bound;
 mod table;
 mod world;
 
-use afmid_stages::model::ModelError;
-use afmid_stages::model::ringdown::{
-    DecayOptions, ModeEstimate, NoiseSource, RingdownOptions, fit_decay, fit_ringdowns,
-};
+use afmid_kernels::model::ModelError;
+use afmid_kernels::ringdown::{DecayOptions, ModeEstimate, NoiseSource, RingdownOptions, fit_decay, fit_ringdowns};
 use bound::{Noise, Start, bound};
 use rayon::prelude::*;
 use std::time::Instant;

@@ -1,6 +1,6 @@
 //! The worlds that estimates are tested in: the paper's lever, released by the project's simulator or in closed form.
 
-use afmid_stages::simulate::{
+use afmid_kernels::simulate::{
     Adc, AfmSystem, Contact, Detector, Drive, EventKind, ModalLever, Mode, ReadoutNoise, Sampling, TriangleRamp,
     simulate_motion,
 };

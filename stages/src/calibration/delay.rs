@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::onset_delay::{OnsetRule, onset_delay};
 use super::reading::within;
+use afmid_kernels::calibration::{OnsetRule, onset_delay};
 
 /// What the averaged snap-off says about the delay, and what it cannot say.
 ///

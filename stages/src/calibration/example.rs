@@ -4,7 +4,8 @@ use afmid_pipeline::recording::Raw;
 use afmid_pipeline::{Ports, Recording, Shaped, StageError};
 
 use crate::io::{memory_channel, memory_record};
-use crate::simulate::{Afm, Archive, ArchiveLayout, Scatter, Target};
+use crate::simulate::Afm;
+use afmid_kernels::simulate::{Archive, ArchiveLayout, Scatter, Target};
 
 /// Two records of 0.12 s at 10 cycles per second, a snap-in and a snap-off in each.
 pub(super) fn records() -> Result<Ports, StageError> {

@@ -4,8 +4,8 @@ use afmid_pipeline::StageError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::free_stretches::FreeRule;
 use super::reading::within;
+use afmid_kernels::calibration::FreeRule;
 
 /// What counts as a free stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

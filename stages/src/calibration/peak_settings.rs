@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::reading::within;
-use super::thermal_peak::PeakSearch;
+use afmid_kernels::calibration::PeakSearch;
 
 /// Where the thermal peak is sought and how it is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

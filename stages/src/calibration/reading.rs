@@ -4,9 +4,7 @@ use std::ops::Range;
 
 use afmid_pipeline::{Record, StageError};
 
-use super::blocks::Blocks;
-use super::free_stretches::{FreeRule, FreeStretches, free_stretches};
-use super::welch::Welch;
+use afmid_kernels::calibration::{Blocks, FreeRule, FreeStretches, Welch, free_stretches};
 
 /// Blocks read at once.
 const BLOCKS_AT_ONCE: usize = 256;

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::contact_slope::{ContactSlope, SlopeStretch, contact_slope, contact_stretches};
 use super::free_rule::FreeSettings;
 use super::reading::{common_rate, read_blocks, read_free, within};
-use super::sensitivity_model::{Estimate, Sensitivity, SlopeGauge, sensitivity};
+use afmid_kernels::calibration::{
+    ContactSlope, Estimate, Sensitivity, SlopeGauge, SlopeStretch, contact_slope, contact_stretches, sensitivity,
+};
 
 /// Optical lever sensitivity from the slope of the deflection against the piezo while the tip is in contact.
 ///

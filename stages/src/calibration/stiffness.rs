@@ -11,10 +11,9 @@ use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
 use super::reading::{common_rate, push_free, read_blocks, read_free, within};
 use super::sensitivity::SensitivitySummary;
-use super::sensitivity_model::Estimate;
-use super::spring_constant::{SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, spring_constant};
-use super::thermal_peak::{ThermalPeak, thermal_peak};
-use super::welch::Welch;
+use afmid_kernels::calibration::{
+    Estimate, SpringConstant, ThermalGauge, ThermalPeak, UNIFORM_BEAM_FACTOR, Welch, spring_constant, thermal_peak,
+};
 
 /// Spring constant from the thermal motion of mode 1 in the free stretches.
 ///

@@ -11,9 +11,7 @@ use serde_json::{Value, json};
 use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
 use super::reading::{common_rate, push_free, read_blocks, read_free, within};
-use super::stability::{Stability, stability};
-use super::thermal_peak::{ThermalPeak, thermal_peak};
-use super::welch::{AveragedPeriodogram, Welch};
+use afmid_kernels::calibration::{AveragedPeriodogram, Stability, ThermalPeak, Welch, stability, thermal_peak};
 
 /// Noise control: thermal spectra of the free stretches record by record, to detect a change of the system.
 ///

@@ -1,6 +1,7 @@
 //! A readout that forgets its level.
 
-use super::{About, Cause, Domain, Effects, Identifiable, LinearSection, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::{Effects, LinearSection};
 
 /// `D = s / (s + w)`.
 pub struct AcCoupling;

@@ -1,6 +1,7 @@
 //! Events that are not aligned.
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// Onsets scatter.
 pub struct AlignmentJitter;

@@ -2,7 +2,8 @@
 
 use std::sync::{PoisonError, RwLock};
 
-use super::{CATALOGUE, Cause, Effects, Identifiable, Scene, within_limits};
+use super::{CATALOGUE, Cause, Identifiable, Scene, within_limits};
+use afmid_kernels::effects::Effects;
 
 static ADDED: RwLock<Vec<(&'static dyn Cause, u32)>> = RwLock::new(Vec::new());
 

@@ -1,6 +1,6 @@
 //! What a cause says of itself.
 
-use super::effects::Effects;
+use afmid_kernels::effects::Effects;
 
 /// Where a cause acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

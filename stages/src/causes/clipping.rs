@@ -1,6 +1,7 @@
 //! A converter or amplifier at its limits.
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// `v` limited on both sides.
 pub struct Clipping;

@@ -1,6 +1,7 @@
 //! A delay of the whole readout.
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// `exp(-s delay)`.
 pub struct ConstantDelay;

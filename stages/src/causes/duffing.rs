@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// `+ w^2 k3 q^3` on the first mode.
 pub struct Duffing;

@@ -1,6 +1,7 @@
 //! A resonance that the lever's model does not have.
 
-use super::{About, Cause, Domain, Effects, ExtraMode, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::{Effects, ExtraMode};
 
 /// One more pole pair.
 pub struct ExtraModeCause;

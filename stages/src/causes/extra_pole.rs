@@ -1,6 +1,7 @@
 //! One more roll-off of the electronics.
 
-use super::{About, Cause, Domain, Effects, Identifiable, LinearSection, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::{Effects, LinearSection};
 
 /// One more real pole.
 pub struct ExtraPole;

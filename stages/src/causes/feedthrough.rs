@@ -1,6 +1,7 @@
 //! Force that reaches the readout without the lever.
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// `d0 u` beside the modes.
 pub struct Feedthrough;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// A share of what lies within the zone is lost: `u - share clamp(u, -width, width)`.
 pub struct InputDeadZone;

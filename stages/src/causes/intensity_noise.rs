@@ -1,6 +1,7 @@
 //! A laser that flickers.
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// Noise that grows with the deflection.
 pub struct IntensityNoise;

@@ -1,6 +1,7 @@
 //! An input that does not run between its samples as assumed.
 
-use super::{About, Cause, Domain, Effects, Identifiable, Intersample, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::{Effects, Intersample};
 
 /// The baseline holds the input; `kind` 1: straight lines, 2: the band-limited signal.
 pub struct IntersampleCause;

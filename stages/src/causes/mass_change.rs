@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// All modes step at a place in the archive.
 pub struct MassChange;

@@ -1,6 +1,7 @@
 //! Samples that were never stored.
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// Time jumps inside a record.
 pub struct MissingSamples;

@@ -5,7 +5,6 @@
 
 mod catalogue;
 mod cause;
-mod effects;
 mod page;
 
 mod ac_coupling;
@@ -51,12 +50,12 @@ mod tether_tail;
 mod tip_sample_force;
 mod two_step_rupture;
 
-pub use catalogue::{CauseError, add, added, catalogue, find};
-pub use cause::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, within_limits};
-pub use effects::{
+pub use afmid_kernels::effects::{
     Added, DecayingLoad, Effects, ExtraMode, FrequencyChange, Instant, Intersample, LinearSection, ModalForce, Motion,
     RemainingLoad, StaticMap,
 };
+pub use catalogue::{CauseError, add, added, catalogue, find};
+pub use cause::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, within_limits};
 pub use page::{as_json, index, page};
 
 /// Every built-in cause; [`catalogue`] has those of others as well.

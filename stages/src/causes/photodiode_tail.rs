@@ -1,6 +1,7 @@
 //! Carriers that arrive late.
 
-use super::{About, Cause, Domain, Effects, Identifiable, LinearSection, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::{Effects, LinearSection};
 
 /// `D = (1 - a) + a / (1 + s tau)`.
 pub struct PhotodiodeTail;

@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// `y = q + amplitude cos(2 pi frequency t + phase)`.
 pub struct SpuriousLine;

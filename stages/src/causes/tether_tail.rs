@@ -2,7 +2,8 @@
 
 use faer::c64;
 
-use super::{About, Cause, DecayingLoad, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::{DecayingLoad, Effects};
 
 /// `u = -F p exp(-t / tau)` after the release.
 pub struct TetherTail;

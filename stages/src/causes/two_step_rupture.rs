@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Effects, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use afmid_kernels::effects::Effects;
 
 /// `u = -F p` for a while after the first rupture.
 pub struct TwoStepRupture;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use afmid_pipeline::{Array, Recording, StageError, Values};
 
 use super::release::{Cut, EventWindow};
-use crate::causes::Instant;
+use afmid_kernels::effects::Instant;
 
 /// Room on either side of a window, within which its onset may move.
 const MARGIN: usize = 64;

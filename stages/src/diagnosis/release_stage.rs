@@ -20,9 +20,9 @@ use super::release_model::lever_model;
 use super::release_story::{residual_array, tile_table};
 use super::verdict::Verdict;
 use crate::causes::{added, catalogue, find};
-use crate::events::EventKind;
 use crate::model::ModeNumber;
 use crate::simulate::LEVER_MODEL;
+use afmid_kernels::events::EventKind;
 
 /// Says what a linear lever and detector get wrong in snap-off events: names the causes, extends the model, measures the gain.
 ///

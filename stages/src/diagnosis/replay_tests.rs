@@ -9,9 +9,10 @@ use serde_json::Value;
 use super::release::{Cut, EventWindow};
 use super::replay::Replayer;
 use super::{ReleaseDiagnose, ReleaseReplay};
-use crate::causes::{Instant, find};
-use crate::simulate::{Afm, AfmOfModel, Cut as SimulatedCut, Hidden, Place};
-use crate::simulate::{LeverModel, MODEL};
+use crate::causes::find;
+use crate::simulate::{Afm, AfmOfModel, Hidden, LeverModel, MODEL};
+use afmid_kernels::effects::Instant;
+use afmid_kernels::simulate::{Cut as SimulatedCut, Place};
 
 const RECORDS: Port<Recording> = Port::new("records", "records", "records");
 const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "events");

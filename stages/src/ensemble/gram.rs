@@ -100,9 +100,9 @@ fn add_products(sums: &mut [f64], a: &[f64], b: &[Vec<f64>], piece: Range<usize>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ensemble::scatter::dot;
     use crate::ensemble::{Rows, moments};
     use crate::fixture::white_noise;
+    use afmid_kernels::linear_algebra::dot;
 
     #[test]
     fn blocks_and_lanes_give_the_bits_of_all_pairs_one_by_one() {

@@ -1,5 +1,6 @@
 //! What is left of each event when amplitude, offset and loading slopes are taken out: the noise.
 
+use afmid_kernels::linear_algebra::dot;
 use afmid_pipeline::rows::{RowSource, in_blocks};
 use rayon::prelude::*;
 
@@ -180,10 +181,6 @@ fn orthogonalise(columns: &mut Vec<Vec<f64>>, mut column: Vec<f64>) -> f64 {
     } else {
         0.0
     }
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Does the shape of the events change slowly over the archive?
 
+use afmid_kernels::linear_algebra::dot;
 use afmid_pipeline::rows::RowSource;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -9,7 +10,6 @@ use rayon::prelude::*;
 use super::gram::gram;
 use super::rows::all;
 use super::scatter::Remainders;
-use super::scatter::dot;
 use super::{EnsembleError, moments};
 
 /// How drift is looked for.

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Artifact, Context, Ports, Stage, Table};
 
-use super::curves::{Curve, LSB, RATE, quantised};
-use super::{Correlation, EventKind};
+use super::Correlation;
+use crate::events::curves::{Curve, LSB, RATE, quantised};
 use crate::io::{Records, memory_channel, memory_record};
+use afmid_kernels::events::EventKind;
 
 const SNAP_IN: u64 = 1;
 const SNAP_OFF: u64 = 2;

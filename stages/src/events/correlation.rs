@@ -7,12 +7,11 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::correlation_averaging::{Aligned, AveragingSettings, Misfit, correlation_average};
-use super::detection::EventKind;
 use super::extraction::{ExtractionSettings, extract};
 use super::listing::{Listed, ensemble_array, events_table, summary};
 use super::segments::{Searched, Segments, Stretch};
 use super::window::{WindowSettings, Windows, cut_windows, quality_outliers};
+use afmid_kernels::events::{Aligned, AveragingSettings, EventKind, Misfit, correlation_average};
 
 /// Finds snap-off or snap-to-contact events in records and aligns them by iterative correlation averaging.
 ///
@@ -286,7 +285,7 @@ impl Correlation {
 }
 
 fn middle(values: &[f64]) -> f64 {
-    crate::statistics::median(&mut values.to_vec())
+    afmid_kernels::statistics::median(&mut values.to_vec())
 }
 
 fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), StageError> {

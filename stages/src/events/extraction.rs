@@ -3,10 +3,10 @@
 use afmid_pipeline::recording::Raw;
 use afmid_pipeline::{Channel, StageError};
 
-use super::block_means::BlockMeans;
-use super::detection::{Candidate, Detection, DetectionSettings, Dismissal, EventKind, detect};
-use super::onset::first_sustained_departure;
-use super::saturation::saturated_samples;
+use afmid_kernels::events::{
+    BlockMeans, Candidate, Detection, DetectionSettings, Dismissal, EventKind, detect, first_sustained_departure,
+    saturated_samples,
+};
 
 /// What is cut out round each event.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,9 +3,9 @@
 use afmid_pipeline::{Array, Axis, Document, Record, StageError, Table, Values};
 use serde::Serialize;
 
-use super::detection::EventKind;
 use super::extraction::Refused;
 use super::window::EventWindow;
+use afmid_kernels::events::EventKind;
 
 /// An event of the ensemble with its record.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,9 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use afmid_pipeline::artifact::RowWriter;
 use afmid_pipeline::{StageError, Values};
 
-use super::correlation_averaging::AveragingSettings;
 use super::extraction::{Extraction, Found, Refused};
-use super::fractional_shift::REACH;
+use afmid_kernels::events::{AveragingSettings, REACH};
 
 /// A found event: its segment lies elsewhere.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,10 +5,8 @@ use afmid_pipeline::rows::{RowSource, in_blocks};
 use afmid_pipeline::{StageError, Values};
 use rayon::prelude::*;
 
-use super::correlation_averaging::Aligned;
-use super::fractional_shift::{REACH, fractional_shift};
-use super::onset::{baseline, first_sustained_departure};
-use crate::statistics::median_and_scale;
+use afmid_kernels::events::{Aligned, REACH, baseline, first_sustained_departure, fractional_shift};
+use afmid_kernels::statistics::median_and_scale;
 
 /// Samples that the onset of the average must be sustained for.
 const SUSTAINED: usize = 4;
@@ -79,7 +77,7 @@ pub struct Windows {
 /// # Units
 /// As the segments; positions in samples.
 /// # Accuracy
-/// Interpolation 5e-5 of the jump at the onset, 1e-6 elsewhere (see [`fractional_shift`](super::fractional_shift)); the onset
+/// Interpolation 5e-5 of the jump at the onset, 1e-6 elsewhere (see [`fractional_shift`](afmid_kernels::events::fractional_shift)); the onset
 /// is late by the samples that the signal stays within the average's noise, one to three, alike in all events.
 /// # Errors
 /// Segments that cannot be read, windows that cannot be written. Segments shorter than that are padded with their end values.
@@ -233,8 +231,8 @@ mod tests {
     use super::*;
     use afmid_pipeline::rows::{RowView, Scratch};
 
-    use crate::events::{AveragingSettings, correlation_average};
     use crate::fixture::{Lever, white_noise};
+    use afmid_kernels::events::{AveragingSettings, correlation_average};
 
     const AVERAGING: AveragingSettings = AveragingSettings {
         correlation_samples: 256,

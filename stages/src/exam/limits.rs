@@ -1,9 +1,11 @@
 //! The smallest strength of a cause that is worth hiding.
 
-use crate::causes::{Cause, Effects};
-use crate::model::ringdown::internals::Whitener;
-use crate::model::ringdown::{RingdownNoise, ThermalMode};
-use crate::simulate::{BOLTZMANN_J_PER_K, Cut, Microscope, Place};
+use crate::causes::Cause;
+use afmid_kernels::effects::Effects;
+use afmid_kernels::linear_algebra::dot;
+use afmid_kernels::ringdown::internals::Whitener;
+use afmid_kernels::ringdown::{RingdownNoise, ThermalMode};
+use afmid_kernels::simulate::{BOLTZMANN_J_PER_K, Cut, Microscope, Place};
 
 /// Expected gain of the log likelihood over the archive at the limit, after what numbers found anew in every record cost.
 pub const LIMIT_GAIN: f64 = 10.0;
@@ -258,7 +260,7 @@ type Perturbed<'a> = Box<dyn Fn(f64) -> Microscope + 'a>;
 fn perturbations(microscope: &Microscope) -> Vec<Perturbed<'_>> {
     let mut all: Vec<Perturbed<'_>> = Vec::new();
     for n in 0..microscope.lever.modes.len() {
-        let changed = move |change: fn(&mut crate::simulate::Mode, f64)| -> Perturbed<'_> {
+        let changed = move |change: fn(&mut afmid_kernels::simulate::Mode, f64)| -> Perturbed<'_> {
             Box::new(move |sign| {
                 let mut microscope = microscope.clone();
                 if let Some(mode) = microscope.lever.modes.get_mut(n) {
@@ -304,10 +306,6 @@ fn project_out(vector: &mut [f64], basis: &[Vec<f64>]) {
         let share = dot(vector, column);
         vector.iter_mut().zip(column).for_each(|(v, c)| *v -= share * c);
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

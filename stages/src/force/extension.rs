@@ -2,9 +2,9 @@
 
 use afmid_pipeline::{Matrix, StageError, StateSpace};
 
-use crate::causes::Effects;
-use crate::simulate::LeverModel;
-use crate::simulate::{Afm, AfmSystem};
+use crate::simulate::{Afm, LeverModel};
+use afmid_kernels::effects::Effects;
+use afmid_kernels::simulate::AfmSystem;
 
 /// Lever, detector and linear causes as a discrete model, maps of the detector to be inverted, and what is left as it is.
 pub(super) struct Extension {

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{Event, ExtrapolationSettings, Lines, Onset, OnsetSettings, ZeroLine, extrapolate, pair};
+use afmid_kernels::force::{Event, ExtrapolationSettings, Lines, Onset, OnsetSettings, ZeroLine, extrapolate, pair};
 
 /// Derives the force that acted from the averaged event: input and response of the identification.
 ///
@@ -35,23 +35,13 @@ pub struct Extrapolation {
     /// Share of the load by which the signal must leave the line to be the event, 0.001 to 0.9. Default: 0.1.
     pub sure_share: f64,
     /// Line without force: `linear` (offset and slope) or `constant`. Default: linear, since crosstalk of the piezo makes a slope.
-    pub zero_line: ZeroLineKind,
+    pub zero_line: ZeroLine,
     /// t0 in seconds after the ensemble's onset, moved to the next sample, instead of the largest causal one. Default: none.
     pub t0_s: Option<f64>,
     /// Spring constant in N/m, above 0, for a force in newtons; it comes before the calibration's. Default: none.
     pub stiffness_n_per_m: Option<f64>,
     /// Optical lever sensitivity in volts per metre of deflection, above 0; it comes before the calibration's. Default: none.
     pub sensitivity_v_per_m: Option<f64>,
-}
-
-/// Shape of the line without force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ZeroLineKind {
-    /// Offset and slope.
-    Linear,
-    /// Offset alone.
-    Constant,
 }
 
 impl Default for Extrapolation {
@@ -61,7 +51,7 @@ impl Default for Extrapolation {
             reach_s: 10e-6,
             departure_sigma: 4.0,
             sure_share: 0.1,
-            zero_line: ZeroLineKind::Linear,
+            zero_line: ZeroLine::Linear,
             t0_s: None,
             stiffness_n_per_m: None,
             sensitivity_v_per_m: None,
@@ -167,10 +157,7 @@ impl Extrapolation {
         let samples = |seconds: f64| (seconds * rate).ceil() as usize;
         ExtrapolationSettings {
             event,
-            zero_line: match self.zero_line {
-                ZeroLineKind::Linear => ZeroLine::Linear,
-                ZeroLineKind::Constant => ZeroLine::Constant,
-            },
+            zero_line: self.zero_line,
             guard: samples(self.guard_s),
             onset: OnsetSettings {
                 near,

@@ -9,13 +9,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::extension::Extension;
-use super::line::correlation_inflation;
-use super::{
-    ForcePrior, IdentifiedModel, Reconstruction as Kernel, ReconstructionSettings, Rise, Weighting, band_inflation,
-    fit_line, reconstruct, rise,
-};
 use crate::ensemble::{Rows, onset_sample};
 use crate::simulate::{LEVER_MODEL, LeverModel};
+use afmid_kernels::force::{
+    ForcePrior, IdentifiedModel, Reconstruction as Kernel, ReconstructionSettings, Rise, Weighting, band_inflation,
+    correlation_inflation, fit_line, reconstruct, rise,
+};
 
 /// Tip force against time, from single events and an identified model, with its error band.
 ///
@@ -47,7 +46,7 @@ pub struct Reconstruction {
     /// Numbers of the events, from 0; empty: all. Default: empty.
     pub events: Vec<usize>,
     /// How the force may move: `random-walk`, or `integrated-walk` for forces with smooth slopes. Default: random-walk, which commits least.
-    pub prior: PriorKind,
+    pub prior: ForcePrior,
     /// Seconds before and after the event in which the force may jump, 0 to 1e-3 each; both 0 for no jumps. Default: 2e-6 and 4e-6: what t0 may be off, and a rupture
     /// of some microseconds.
     pub transition_s: [f64; 2],
@@ -57,16 +56,6 @@ pub struct Reconstruction {
     pub sloped_line: bool,
     /// Seconds left out between the event and the line without force, 0 to 1. Default: 10e-6, as in `force.extrapolation`.
     pub guard_s: f64,
-}
-
-/// How the force may move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum PriorKind {
-    /// Independent steps.
-    RandomWalk,
-    /// Independent changes of slope.
-    IntegratedWalk,
 }
 
 /// Where the noise variance comes from.
@@ -83,7 +72,7 @@ impl Default for Reconstruction {
     fn default() -> Self {
         Self {
             events: Vec::new(),
-            prior: PriorKind::RandomWalk,
+            prior: ForcePrior::RandomWalk,
             transition_s: [2e-6, 4e-6],
             noise: NoiseSource::Estimated,
             sloped_line: false,
@@ -230,10 +219,7 @@ impl Reconstruction {
                 Some(model.innovation_variance * pair.number("count")?)
             }
         };
-        let prior = match self.prior {
-            PriorKind::RandomWalk => ForcePrior::RandomWalk,
-            PriorKind::IntegratedWalk => ForcePrior::IntegratedWalk,
-        };
+        let prior = self.prior;
         Ok(ReconstructionSettings { prior, transition, noise_variance })
     }
 

@@ -2,10 +2,10 @@
 
 use super::extension::Extension;
 use super::reconstruction::identified;
-use super::*;
-use crate::model::pem::{Experiment, Identified, PemOptions, identify};
-use crate::simulate::LeverModel;
-use crate::simulate::{Afm, Archive, ArchiveLayout, Hidden, Scatter, Target};
+use crate::simulate::{Afm, Hidden, LeverModel};
+use afmid_kernels::force::*;
+use afmid_kernels::pem::{Experiment, Identified, PemOptions, identify};
+use afmid_kernels::simulate::{Archive, ArchiveLayout, Scatter, Target};
 
 const SAMPLES: usize = 8192;
 const T0: usize = 1500;
@@ -38,7 +38,7 @@ fn world_of(afm: &Afm, seed: u64, records: usize) -> World {
     for number in 0..records {
         let record = archive.simulate_with(&microscope, number, &effects);
         for event in record.events.iter().filter(|e| e.counted && e.event.force_n < 0.0) {
-            let snap_off = matches!(event.event.kind, crate::simulate::EventKind::SnapOff);
+            let snap_off = matches!(event.event.kind, afmid_kernels::simulate::EventKind::SnapOff);
             let first = event.sample.floor() as usize + 1 - T0;
             if !snap_off || first + SAMPLES + 1 > record.deflection.len() {
                 continue;

@@ -231,7 +231,7 @@ fn summary(rows: &[Row], records: usize) -> Result<Document, StageError> {
         sentinels: sum(|found| found.sentinels),
         saturated: rows.iter().map(|row| saturated(&row.found)).sum(),
         saturated_records: names,
-        deflection_noise: Some(crate::statistics::median(&mut noise)).filter(|value| value.is_finite()),
+        deflection_noise: Some(afmid_kernels::statistics::median(&mut noise)).filter(|value| value.is_finite()),
     })
 }
 

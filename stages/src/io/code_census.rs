@@ -1,6 +1,6 @@
 //! What a channel's stored samples are, counted in one pass.
 
-use crate::statistics::median;
+use afmid_kernels::statistics::median;
 
 /// Samples in a stretch that the noise is taken from.
 const STRETCH: usize = 256;

@@ -1,57 +1,110 @@
-//! Eigensystem realization: poles from the shift invariance of a free decay.
+//! The stage `model.era`.
 
-use faer::{Mat, c64};
+use afmid_pipeline::{Caching, Context, Example, Ports, Spec, Stage, StageError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::error::{ModelError, finite};
-use super::instrumental::shift_invariant_poles;
-use super::orthogonal::Svd;
+use super::order::largest_gap;
+use super::pem::{DataSet, PAIR};
+use super::realised::{MODEL, Realised, SUMMARY};
+use super::series::PairSeries;
+use afmid_kernels::subspace::Era;
 
-/// The column space of a free decay's Hankel matrix.
+/// Estimates a state-space model from the free decay at the end of a record: eigensystem realization.
 ///
-/// # Model
-/// `y(t) = C A^t x0 + noise`, no input: a sum of damped exponentials. A rest that stays (an offset) is one more pole, at one.
-/// # Method
-/// Singular values of the Hankel matrix of `block_rows` rows; the strongest left vectors span the observability matrix; A by shift invariance.
-/// # Shapes
-/// y: N samples; singular values: at most `block_rows`.
-/// # Units
-/// Poles in the z plane.
-/// # Accuracy
-/// Exact without noise. With white noise above the Cramer-Rao bound, the less the more rows up to a third of N; damping is biased upwards by the noise's
-/// own energy. Start values.
-/// # Errors
-/// Values that are not finite, fewer than 2 `block_rows` samples, no convergence.
-/// # Source
-/// J. Juang and R. Pappa, J. Guidance 8 (1985) 620; S. Kung, 12th Asilomar Conf. (1978) 705.
-#[derive(Debug, Clone)]
-pub struct Era {
-    left: Mat<f64>,
-    singular_values: Vec<f64>,
+/// Model: where the force no longer changes, y(t) = C A^t x0 about a rest; before, x(t+Ts) = A x + B u, y = C x + D u.
+/// Method: the decay begins where the force last changes; its mean over the last tenth is the rest. Singular value decomposition of its Hankel matrix, A by shift
+/// invariance; B, D, initial state, offset and drift by least squares of the simulation over the whole record. Unstable poles are reflected.
+/// Shapes: as `model.pem`.
+/// Units: those of the pair.
+/// Accuracy: exact without noise; with white noise above the bound, the less the more rows up to a third of the decay. Damping is
+/// biased by the noise: a start value, or a check of `model.pem`.
+/// Errors: a decay shorter than twice the block rows, values that are missing or not finite, a response that is constant.
+/// Source: J. Juang and R. Pappa, J. Guidance 8 (1985) 620.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct EraEstimate {
+    /// Number of states, 1 to 40; 0: at the largest gap between the decay's singular values, up to 40. Default: 11, as in the paper.
+    pub order: usize,
+    /// Which data: `all`, `identification` or `verification`. Default: all.
+    pub set: DataSet,
+    /// Rows of the Hankel matrix, more than the order, 2 to 1000. Default: 300; many average the noise, a third of the decay is best.
+    pub block_rows: usize,
+    /// Seconds of the decay left out at its beginning, 0 or more. Default: 0.
+    pub skip_s: f64,
+    /// Estimate a constant offset of the response. Default: true.
+    pub offset: bool,
+    /// Estimate a linear drift of the response. Default: true; averaged records wander.
+    pub drift: bool,
 }
 
-impl Era {
-    /// Decomposes the Hankel matrix of `decay` with `block_rows` rows (at least 2).
-    pub fn new(decay: &[f64], block_rows: usize) -> Result<Self, ModelError> {
-        if block_rows < 2 {
-            return Err(ModelError::Parameter { name: "block_rows", found: block_rows as f64, wanted: "at least 2" });
+impl Default for EraEstimate {
+    fn default() -> Self {
+        Self { order: 11, set: DataSet::All, block_rows: 300, skip_s: 0.0, offset: true, drift: true }
+    }
+}
+
+impl Stage for EraEstimate {
+    const SPEC: Spec = Spec {
+        name: "model.era",
+        version: 4,
+        summary: "estimates a state-space model from a free decay: eigensystem realization",
+        inputs: &[PAIR.spec()],
+        outputs: &[MODEL.spec(), SUMMARY.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "J. Juang and R. Pappa, J. Guidance 8 (1985) 620",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        if self.order > 40 {
+            return Err(StageError::new(format!("`order` is {}, wanted 0 to 40", self.order)));
         }
-        if decay.len() < 2 * block_rows {
-            return Err(ModelError::TooShort { found: decay.len(), wanted: 2 * block_rows });
+        let least = (self.order + 1).max(2);
+        if !(least..=1000).contains(&self.block_rows) {
+            return Err(StageError::new(format!("`block_rows` is {}, wanted {least} to 1000", self.block_rows)));
         }
-        finite("output", decay)?;
-        let windows = decay.len() - block_rows + 1;
-        let hankel = Mat::from_fn(windows, block_rows, |t, j| decay[t + j]);
-        let svd = Svd::new(&hankel)?;
-        Ok(Self { left: svd.v, singular_values: svd.s })
+        if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
+            return Err(StageError::new(format!("`skip_s` is {}, wanted 0 or more", self.skip_s)));
+        }
+        Ok(())
     }
 
-    /// Singular values, descending: their fall shows the order.
-    pub fn singular_values(&self) -> &[f64] {
-        &self.singular_values
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let series = PairSeries::new(inputs.get(&PAIR)?, self.set, 0)?;
+        let decay = free_decay(&series, self.skip_s);
+        let era = Era::new(&decay, self.block_rows).map_err(|error| {
+            StageError::from_error(error)
+                .help("fewer `block_rows`, or a record that goes on longer after the force's last change")
+        })?;
+        let gap = largest_gap(era.singular_values(), 40.min(self.block_rows - 1));
+        let order = if self.order == 0 { gap } else { self.order };
+        let poles = era.poles(order).map_err(StageError::from_error)?;
+        let realised = Realised {
+            set: self.set,
+            first: 0,
+            offset: self.offset,
+            drift: self.drift,
+            singular_values: era.singular_values(),
+            choice: None,
+            gap: Some(gap),
+        };
+        realised.ports(&poles, &series, cx)
     }
 
-    /// The `order` poles, 1 to block rows - 1; noise may put them outside the unit circle.
-    pub fn poles(&self, order: usize) -> Result<Vec<c64>, ModelError> {
-        shift_invariant_poles(&self.left, order)
+    fn examples() -> Vec<Example> {
+        super::example::era()
     }
+}
+
+/// The response after the last change of any input, `skip_s` later, about its rest.
+pub(super) fn free_decay(series: &PairSeries, skip_s: f64) -> Vec<f64> {
+    let samples = series.output.len();
+    let last_change = |u: &[f64]| (1..u.len()).rev().find(|&k| u[k] != u[k - 1]).unwrap_or(0);
+    let begin = series.input.chunks_exact(samples).map(last_change).max().unwrap_or(0);
+    let begin = begin.saturating_add((skip_s * series.rate).ceil() as usize).min(samples);
+    let decay = &series.output[begin..];
+    let tail = &decay[decay.len() - decay.len() / 10..];
+    let rest = if tail.is_empty() { 0.0 } else { tail.iter().sum::<f64>() / tail.len() as f64 };
+    decay.iter().map(|y| y - rest).collect()
 }

@@ -2,13 +2,9 @@
 
 use afmid_pipeline::{Array, Axis, Context, Document, Example, Port, Ports, Stage, StageError, StateSpace, Table};
 
-use super::bootstrap_stage;
-use super::modes_stage;
 use super::order::Order;
-use super::pem_stage::{self, DataSet, Pem};
-use super::stabilisation_stage;
-use super::vector_fitting_stage;
-use super::zeros_stage;
+use super::pem::{self, DataSet, Pem};
+use super::{bootstrap, modes, stabilisation, vector_fitting, zeros};
 use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, release};
 use crate::spectrum::{Etfe, Window, WindowKind};
 
@@ -16,7 +12,7 @@ pub(super) fn pem() -> Vec<Example> {
     vec![Example {
         title: "One resonance, released",
         params: "order = 2",
-        inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
+        inputs: || Ok(Ports::new().with(&pem::PAIR, pair())),
         // noise-free: rounding alone
         expect: |outputs| the_resonance(outputs, 1e-9, 1e-7),
     }]
@@ -29,11 +25,11 @@ pub(super) fn grey() -> Vec<Example> {
         inputs: || {
             let pair = pair();
             let late = shifted(&pair)?;
-            Ok(Ports::new().with(&pem_stage::PAIR, late))
+            Ok(Ports::new().with(&pem::PAIR, late))
         },
         // noise-free: the search ends where the residual is rounding
         expect: |outputs| {
-            let summary = outputs.get(&pem_stage::SUMMARY).map_err(|error| error.to_string())?;
+            let summary = outputs.get(&pem::SUMMARY).map_err(|error| error.to_string())?;
             let mode = &summary.0["modes"][0];
             let number = |value: &serde_json::Value| value.as_f64().unwrap_or(f64::NAN);
             let (f, q) = (number(&mode["frequency_hz"]), number(&mode["quality_factor"]));
@@ -74,7 +70,7 @@ pub(super) fn subspace() -> Vec<Example> {
     vec![Example {
         title: "One resonance, released, without iteration",
         params: "order = 2",
-        inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
+        inputs: || Ok(Ports::new().with(&pem::PAIR, pair())),
         // noise-free: rounding, over a Hankel matrix of 60 rows
         expect: |outputs| the_resonance(outputs, 1e-8, 1e-6),
     }]
@@ -84,7 +80,7 @@ pub(super) fn era() -> Vec<Example> {
     vec![Example {
         title: "The free decay of one resonance",
         params: "order = 3\nblock_rows = 100",
-        inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
+        inputs: || Ok(Ports::new().with(&pem::PAIR, pair())),
         // the third pole takes what the decay's last tenth leaves of its rest
         expect: |outputs| the_resonance(outputs, 1e-8, 1e-6),
     }]
@@ -94,7 +90,7 @@ pub(super) fn vector_fitting() -> Vec<Example> {
     vec![Example {
         title: "One resonance, from its response",
         params: "order = 2",
-        inputs: || Ok(Ports::new().with(&vector_fitting_stage::TRANSFER, response()?)),
+        inputs: || Ok(Ports::new().with(&vector_fitting::TRANSFER, response()?)),
         // the response is exact but for rounding; the first pole may come after other pairs, of which order 2 has none
         expect: |outputs| the_resonance(outputs, 1e-9, 1e-7),
     }]
@@ -118,10 +114,10 @@ pub(super) fn stabilisation() -> Vec<Example> {
     vec![Example {
         title: "One resonance stays, whatever the order",
         params: "to_order = 8\nblock_rows = 60\nmethod = \"release\"",
-        inputs: || Ok(Ports::new().with(&pem_stage::PAIR, pair())),
+        inputs: || Ok(Ports::new().with(&pem::PAIR, pair())),
         expect: |outputs| {
-            let modes = outputs.get(&stabilisation_stage::MODES).map_err(|error| error.to_string())?;
-            let summary = outputs.get(&stabilisation_stage::SUMMARY).map_err(|error| error.to_string())?;
+            let modes = outputs.get(&stabilisation::MODES).map_err(|error| error.to_string())?;
+            let summary = outputs.get(&stabilisation::SUMMARY).map_err(|error| error.to_string())?;
             let f = modes.real("frequency_hz").map_err(|error| error.to_string())?;
             // noise-free: rounding, as for `model.subspace`
             if f.len() == 1 && (f[0] / FREQUENCY_HZ - 1.0).abs() < 1e-6 {
@@ -153,13 +149,10 @@ pub(super) fn bootstrap() -> Vec<Example> {
             .with("signal", "V", "signal", &["event", "time"], signal)
             .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
             .attribute("onset_sample", T0);
-            Ok(Ports::new()
-                .with(&bootstrap_stage::ENSEMBLE, ensemble)
-                .with(&pem_stage::PAIR, pair)
-                .with(&pem_stage::MODEL, model()?))
+            Ok(Ports::new().with(&bootstrap::ENSEMBLE, ensemble).with(&pem::PAIR, pair).with(&pem::MODEL, model()?))
         },
         expect: |outputs| {
-            let roots = outputs.get(&bootstrap_stage::ROOTS).map_err(|error| error.to_string())?;
+            let roots = outputs.get(&bootstrap::ROOTS).map_err(|error| error.to_string())?;
             let column = |name: &str| roots.real(name).map(|x| x.first().copied()).ok().flatten().unwrap_or(f64::NAN);
             let (f, low, high) = (column("frequency_hz"), column("frequency_low_hz"), column("frequency_high_hz"));
             // 1 mV over sqrt(12) against 0.9 V over 20 periods: some hertz; four half intervals
@@ -174,8 +167,8 @@ pub(super) fn bootstrap() -> Vec<Example> {
 
 /// Whether the model's first pair is the example's resonance.
 fn the_resonance(outputs: &Ports, frequency_tolerance: f64, quality_tolerance: f64) -> Result<String, String> {
-    let model = outputs.get(&pem_stage::MODEL).map_err(|error| error.to_string())?;
-    let (model, _) = modes_stage::innovations(model).map_err(|error| error.to_string())?;
+    let model = outputs.get(&pem::MODEL).map_err(|error| error.to_string())?;
+    let (model, _) = modes::innovations(model).map_err(|error| error.to_string())?;
     let Some(z) = model.sections.first().and_then(|section| section.poles().first().copied()) else {
         return Err("no pole".to_owned());
     };
@@ -192,11 +185,11 @@ pub(super) fn modes() -> Vec<Example> {
     vec![Example {
         title: "The mode of one resonance, beside a sweep",
         params: "reference_frequency_hz = [119.9e3]",
-        inputs: || Ok(Ports::new().with(&pem_stage::MODEL, model()?)),
+        inputs: || Ok(Ports::new().with(&pem::MODEL, model()?)),
         expect: |outputs| {
-            let modes = outputs.get(&modes_stage::MODES).map_err(|error| error.to_string())?;
+            let modes = outputs.get(&modes::MODES).map_err(|error| error.to_string())?;
             let f = modes.real("frequency_hz").map_err(|error| error.to_string())?;
-            let summary: &Document = outputs.get(&modes_stage::SUMMARY).map_err(|error| error.to_string())?;
+            let summary: &Document = outputs.get(&modes::SUMMARY).map_err(|error| error.to_string())?;
             let difference = summary.0["reference"][0]["frequency_difference"].as_f64().unwrap_or(f64::NAN);
             // the example's resonance is exact; the sweep is off by 0.1 kHz in 119.9
             if f.len() == 1 && (f[0] / FREQUENCY_HZ - 1.0).abs() < 1e-9 && (difference - 0.1 / 119.9).abs() < 1e-8 {
@@ -215,14 +208,14 @@ pub(super) fn zeros() -> Vec<Example> {
         inputs: || {
             let free = roots(&[(50e3, "pole"), (137e3, "zero"), (270e3, "pole")], 50.0);
             let coupled = roots(&[(137.3e3, "zero"), (157e3, "pole"), (334e3, "pole")], 100.0);
-            Ok(Ports::new().with(&zeros_stage::FREE, free).with(&zeros_stage::COUPLED, coupled))
+            Ok(Ports::new().with(&zeros::FREE, free).with(&zeros::COUPLED, coupled))
         },
         expect: |outputs| {
             let column = |port: &Port<Table>, name: &str| -> Result<Vec<f64>, StageError> {
                 Ok(outputs.get(port)?.real(name)?.to_vec())
             };
-            let errors = column(&zeros_stage::ZEROS, "combined_errors").map_err(|error| error.to_string())?;
-            let shifts = column(&zeros_stage::SHIFTS, "shift_hz").map_err(|error| error.to_string())?;
+            let errors = column(&zeros::ZEROS, "combined_errors").map_err(|error| error.to_string())?;
+            let shifts = column(&zeros::SHIFTS, "shift_hz").map_err(|error| error.to_string())?;
             // 300 Hz over sqrt(50^2 + 100^2) Hz
             if errors.len() == 1 && (errors[0] - 2.683).abs() < 1e-3 && (shifts[0] - 107e3).abs() < 1e-6 {
                 Ok(format!("The zero differs by {:.2} combined errors, the first pole moves by 107 kHz.", errors[0]))
@@ -256,8 +249,8 @@ fn pair() -> Array {
 fn model() -> Result<StateSpace, StageError> {
     let stage = Pem { order: Order::Fixed(2), ..Pem::default() };
     let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
-    let outputs = stage.run(&Ports::new().with(&pem_stage::PAIR, pair()), &cx)?;
-    Ok(outputs.get(&pem_stage::MODEL)?.clone())
+    let outputs = stage.run(&Ports::new().with(&pem::PAIR, pair()), &cx)?;
+    Ok(outputs.get(&pem::MODEL)?.clone())
 }
 
 /// A table as `model.modes` makes it, with one standard error for all.

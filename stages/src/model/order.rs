@@ -8,8 +8,10 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Value, json};
 
-use super::pem::{Experiment, Identified, NoiseModel, PemOptions, identify};
-use super::{ModelError, Nuisances, Subspace, simulate_held_out};
+use afmid_kernels::model::ModelError;
+use afmid_kernels::pem::{Experiment, Identified, NoiseModel, PemOptions, identify};
+use afmid_kernels::subspace::Subspace;
+use afmid_kernels::validation::{Nuisances, simulate_held_out};
 
 /// The order of a model: a number, or `"auto"`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -252,9 +254,9 @@ pub(super) fn simulated_percent(fit: &Identified, input: &[f64], output: &[f64],
 
 #[cfg(test)]
 mod tests {
-    use super::super::{InnovationsModel, Section};
     use super::*;
     use crate::fixture::white_noise;
+    use afmid_kernels::model::{InnovationsModel, Section};
 
     #[test]
     fn orders_are_numbers_or_auto() {

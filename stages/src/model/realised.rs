@@ -4,11 +4,11 @@ use afmid_pipeline::{Context, Document, Port, Ports, StageError, StateSpace};
 use faer::c64;
 use serde_json::{Value, json};
 
-use super::Nuisances;
 use super::order::{OrderChoice, simulated_percent};
-use super::pem::{Experiment, Identified, PemOptions, with_poles};
-use super::pem_stage::{DataSet, state_space};
+use super::pem::{DataSet, state_space};
 use super::series::PairSeries;
+use afmid_kernels::pem::{Experiment, Identified, PemOptions, with_poles};
+use afmid_kernels::validation::Nuisances;
 
 pub(super) const MODEL: Port<StateSpace> =
     Port::new("model", "model", "the model, with the covariance of its parameters");

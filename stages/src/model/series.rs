@@ -2,7 +2,7 @@
 
 use afmid_pipeline::{Array, StageError};
 
-use super::pem_stage::DataSet;
+use super::pem::DataSet;
 
 /// Inputs and output of one set, from a first sample on.
 pub(super) struct PairSeries {

@@ -1,17 +1,17 @@
 //! Poles of a state-space model, whatever its form.
 
+use afmid_kernels::linear_algebra::eigenvalues;
 use afmid_pipeline::StateSpace;
 use faer::{Mat, c64};
 
-use super::error::ModelError;
-use super::orthogonal::eigenvalues;
+use afmid_kernels::model::ModelError;
 
 /// Poles of a model: what anybody who has its A finds.
 ///
 /// # Model
 /// z with `det(A - zI) = 0`.
 /// # Method
-/// QR algorithm, without a model of the sections: [`super::modes::poles`] has their standard errors.
+/// QR algorithm, without a model of the sections: [`afmid_kernels::modes::poles`] has their standard errors.
 /// # Shapes
 /// n poles, conjugates next to each other, ascending in `|arg z|`, the upper one of a pair first.
 /// # Units

@@ -12,11 +12,11 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::archive::{Archive, ArchiveLayout};
 use super::hidden::{Hidden, effects};
-use super::recorder::{Microscope, PiezoMonitor, RecordedEvent, Scatter, SimulatedRecord};
-use super::truth::{Truth, counts, record_truth};
-use super::{Adc, Contact, Detector, ModalLever, Mode, ReadoutNoise, Target, TriangleRamp};
+use afmid_kernels::simulate::{
+    Adc, Archive, ArchiveLayout, Contact, Detector, Microscope, ModalLever, Mode, PiezoMonitor, ReadoutNoise,
+    RecordedEvent, Scatter, SimulatedRecord, Target, TriangleRamp, Truth, counts, record_truth,
+};
 
 /// Simulates force curves of an atomic force microscope in the time domain and writes them as native records.
 ///

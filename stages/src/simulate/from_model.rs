@@ -3,9 +3,8 @@
 use afmid_pipeline::StageError;
 
 use super::afm::Afm;
-use super::afm_system::BOLTZMANN_J_PER_K;
 use super::lever_model::{LeverModel, LinearPart};
-use super::readout_noise::PINK_LOWEST_HZ;
+use afmid_kernels::simulate::{BOLTZMANN_J_PER_K, PINK_LOWEST_HZ};
 
 impl Afm {
     /// These parameters with lever, detector and sample rate of a part of `model`.

@@ -7,7 +7,8 @@ use afmid_pipeline::config::nearest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::causes::{About, Cause, Domain, Effects, catalogue, find, within_limits};
+use crate::causes::{About, Cause, Domain, catalogue, find, within_limits};
+use afmid_kernels::effects::Effects;
 
 /// One value of a hidden cause.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

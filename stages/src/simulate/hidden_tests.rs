@@ -1,8 +1,8 @@
 //! What is hidden in the motion against closed forms and amplitude-frequency laws.
 
-use super::*;
-use crate::causes::{Effects, ExtraMode, LinearSection};
 use crate::fixture::Lever as ClosedForm;
+use afmid_kernels::effects::{Effects, ExtraMode, LinearSection};
+use afmid_kernels::simulate::*;
 use faer::c64;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -295,7 +295,7 @@ fn duffing_obeys_the_amplitude_frequency_law() {
 fn halving_the_step_changes_little_of_what_modal_forces_do() {
     let closed = ClosedForm::paper();
     let rig = rig(&closed);
-    let forces: [(&str, crate::causes::ModalForce); 3] = [
+    let forces: [(&str, afmid_kernels::effects::ModalForce); 3] = [
         ("stiffness", Arc::new(|m, a| a[0] -= m.omega[0].powi(2) * 0.01 * m.position[0].powi(3))),
         ("damping", Arc::new(|m, a| a[1] -= m.omega[1] * 2e-3 * m.velocity[1] * m.position[1].powi(2))),
         ("gap", Arc::new(|m, a| (0..4).for_each(|n| a[n] -= m.omega[n].powi(2) * 0.01 * (-m.gap / 0.1).exp()))),

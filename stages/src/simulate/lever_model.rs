@@ -7,7 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Hidden, effects};
-use crate::causes::{Effects, find};
+use crate::causes::find;
+use afmid_kernels::effects::Effects;
 
 /// Kind of the document port that carries a [`LeverModel`].
 pub const LEVER_MODEL: &str = "lever-model";

@@ -156,7 +156,7 @@ impl AfmOfModel {
 
 /// With a catch that the weakest load survives: a gap that half of it closes.
 fn caught(afm: Afm) -> Afm {
-    let weakest_n = afm.adhesion_n * (1.0 - super::ADHESION_CUT * afm.adhesion_scatter);
+    let weakest_n = afm.adhesion_n * (1.0 - afmid_kernels::simulate::ADHESION_CUT * afm.adhesion_scatter);
     let gap_m = (0.5 * weakest_n / afm.contact_stiffness_n_per_m).min(afm.snap_in_gap_m);
     Afm { snap_in_gap_m: gap_m, ..afm }
 }

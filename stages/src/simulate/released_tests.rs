@@ -1,8 +1,9 @@
 //! A release at a given instant against the closed form.
 
-use super::*;
-use crate::causes::{Effects, Instant};
+use super::Afm;
 use crate::fixture::Lever as ClosedForm;
+use afmid_kernels::effects::{Effects, Instant};
+use afmid_kernels::simulate::{Cut, Release};
 
 const AT: Instant = Instant { record: 0, place: 0.0, time_s: 0.0, piezo_m: 0.0 };
 const CUT: Cut = Cut { before: 16, samples: 4000 };

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::window::PAIR;
-use super::{EndTreatment, EtfeSettings, Intersample, etfe};
+use afmid_kernels::spectra::{EndTreatment, EtfeSettings, Intersample, etfe};
 
 /// Empirical transfer function estimate: the ratio of the transforms of response and force.
 ///
@@ -33,24 +33,14 @@ pub struct Etfe {
     /// Default: 0.05; such a bin holds less than 1/400 of its neighbours' information.
     pub vanishing_ratio: f64,
     /// What the force does between samples: `held` or `sampled` (no correction). Default: held, which is exact for a step at a sample.
-    pub intersample: IntersampleKind,
+    pub intersample: Intersample,
     /// Divide by the quasi-static gain found in the data. Default: true; it is one within the noise for a force in volts.
     pub normalise: bool,
 }
 
-/// The force between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum IntersampleKind {
-    /// Held until the next sample.
-    Held,
-    /// Known at the samples alone: nothing is corrected.
-    Sampled,
-}
-
 impl Default for Etfe {
     fn default() -> Self {
-        Self { bandwidth_hz: 1.2e6, vanishing_ratio: 0.05, intersample: IntersampleKind::Held, normalise: true }
+        Self { bandwidth_hz: 1.2e6, vanishing_ratio: 0.05, intersample: Intersample::Held, normalise: true }
     }
 }
 
@@ -94,10 +84,7 @@ impl Stage for Etfe {
             bandwidth_hz: self.bandwidth_hz,
             vanishing_ratio: self.vanishing_ratio,
             ends: if differenced { EndTreatment::Differenced } else { EndTreatment::Windowed },
-            intersample: match self.intersample {
-                IntersampleKind::Held => Intersample::Held,
-                IntersampleKind::Sampled => Intersample::Sampled,
-            },
+            intersample: self.intersample,
             normalise: self.normalise,
         };
         let found = etfe(pair.real("force")?, pair.real("response")?, pair.real("standard_error")?, settings)

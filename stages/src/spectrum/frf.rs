@@ -6,8 +6,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{EnsembleResponse, EnsembleResponseSettings, bin_frequencies, difference, ensemble_response};
 use crate::ensemble::{Rows, moments, onset_sample, scatter};
+use afmid_kernels::spectra::{
+    EnsembleResponse, EnsembleResponseSettings, bin_frequencies, difference, ensemble_response,
+};
 
 /// Frequency response of all events at once, with noise, timing and distortion told apart by their scatter.
 ///

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::window::PAIR;
-use super::{bin_frequencies, power_spectrum};
+use afmid_kernels::spectra::{bin_frequencies, power_spectrum};
 
 /// Periodograms of force and response: their power spectral densities, as a first look.
 ///

@@ -5,7 +5,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::etfe::ETFE;
-use super::{Bins, PolynomialSettings, RationalSettings, SuppressedLine, local_polynomial, local_rational};
+use afmid_kernels::spectra::{
+    Bins, PolynomialSettings, RationalSettings, SuppressedLine, local_polynomial, local_rational,
+};
 
 /// Smooths a transfer function by local models of real and imaginary parts.
 ///

@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{AveragedDensity, Fitted, SeenThrough, ThermalFit, ThermalFitSettings, thermal_fit};
 use crate::io::DENSITY;
+use afmid_kernels::spectra::{AveragedDensity, Fitted, SeenThrough, ThermalFit, ThermalFitSettings, thermal_fit};
 
 /// Fits a thermal spectrum: resonance, quality factor, level, white and 1/f noise.
 ///
@@ -246,7 +246,7 @@ fn fit_array(f: &[f64], p: &[f64], fit: &ThermalFit, unit: &str) -> Array {
 }
 
 fn lines_table(fit: &ThermalFit) -> Table {
-    let column = |of: fn(&super::FoundLine) -> f64| fit.lines.iter().map(of).collect::<Vec<f64>>();
+    let column = |of: fn(&afmid_kernels::spectra::FoundLine) -> f64| fit.lines.iter().map(of).collect::<Vec<f64>>();
     Table::new()
         .with("frequency_hz", "Hz", "highest bin of the line", column(|l| l.frequency_hz))
         .with("ratio", "1", "density over the fitted one", column(|l| l.ratio))

@@ -8,11 +8,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{RecordSpectrum, average_spectra};
 use crate::calibration::FreeSettings;
-use crate::calibration::Welch as Collector;
 use crate::calibration::reading::{common_rate, push_free, read_blocks, read_free, within};
 use crate::io::DENSITY;
+use afmid_kernels::calibration::Welch as Collector;
+use afmid_kernels::spectra::{RecordSpectrum, average_spectra};
 
 /// Power spectral density of all free stretches, with its uncertainty.
 ///

@@ -4,7 +4,7 @@ use afmid_pipeline::{Array, Caching, Context, Example, Port, Ports, Spec, Stage,
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Taper, difference, taper, taper_gains};
+use afmid_kernels::spectra::{Taper, difference, taper, taper_gains};
 
 /// Multiplies force and response by a window in time.
 ///

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{RecordEvent, RecordInput, RecordSummary, summarise};
-use crate::events::EventKind;
+use afmid_kernels::events::EventKind;
 
 /// Volts in a code of the converter.
 const CODE_V: f64 = 1e-3;

@@ -1,5 +1,7 @@
 //! Orthonormal columns that are projected out.
 
+use afmid_kernels::linear_algebra::dot;
+
 /// Orthonormal columns of equal length.
 ///
 /// # Method
@@ -70,10 +72,6 @@ pub(super) fn legendre(x: &[f64], span: (f64, f64), degree: usize) -> Vec<f64> {
         now
     };
     x.iter().map(|&x| at(x)).collect()
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 pub(super) fn norm(a: &[f64]) -> f64 {

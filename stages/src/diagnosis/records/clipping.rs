@@ -1,11 +1,11 @@
 //! Clipping: extreme values that pile up.
 
 use super::extremes::Tally;
-use super::replicates::binomial_tail;
 use super::segments::SegmentKind;
 use super::sign::{RecordSign, gain, value};
 use super::summary::RecordSummary;
 use super::yardstick::of_many;
+use afmid_kernels::statistics::binomial_tail;
 
 /// Largest share of the extreme code among itself and its fullest neighbour that a signal which merely turns there can have: a noise-free parabola
 /// dwells `sqrt(1)` in its last code and `sqrt(2) - 1` in the one before; noise only lowers it.

@@ -1,9 +1,11 @@
 //! The piezo's drive in the deflection: a slope of the free level against position.
 
+use afmid_kernels::statistics::student_two_sided;
+
 use super::free_level::{FEWEST_RECORDS, FreeLevel, FreeRecord, HeldOut};
 use super::fringe::fringe_held_out;
 use super::position::Candidate;
-use super::replicates::{Weighted, mean_and_error, student_two_sided, t_test, weighted_mean_and_error};
+use super::replicates::{Weighted, mean_and_error, t_test, weighted_mean_and_error};
 use super::segments::SegmentKind;
 use super::sign::{RecordSign, gain, value};
 use crate::diagnosis::RunnerUp;

@@ -1,14 +1,14 @@
 //! The level of the free lever, record by record: what depends on position, on time, on what went before.
 
+use afmid_kernels::linear_algebra::{dot, product};
 use faer::Mat;
 
-use super::basis::{Basis, dot, norm};
+use super::basis::{Basis, norm};
 use super::replicates::Weighted;
 use super::segments::SegmentKind;
 use super::slow_lines::SlowLine;
 use super::summary::RecordSummary;
-use crate::model::orthogonal::product;
-use crate::model::ringdown::internals::symmetric_inverse;
+use afmid_kernels::ringdown::internals::symmetric_inverse;
 
 /// Fewest records: replicates for a t test.
 pub(super) const FEWEST_RECORDS: usize = 4;

@@ -1,9 +1,9 @@
 //! A fringe: amplitude, wavelength and phase over all records.
 
+use afmid_kernels::linear_algebra::dot;
 use std::borrow::Borrow;
 use std::f64::consts::PI;
 
-use super::basis::dot;
 use super::free_level::FreeRecord;
 use super::replicates::jackknife;
 

@@ -134,7 +134,8 @@ impl<'a> Archive<'a> {
         let level = |spectra: &LineSpectra| {
             let mut bins: Vec<f64> = spectra.long.density.iter().map(|&d| f64::from(d)).collect();
             // median over mean of a chi-square variable of two degrees for each window (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931) 684)
-            crate::statistics::median(&mut bins) / (1.0 - 1.0 / (9.0 * spectra.long.windows.max(1) as f64)).powi(3)
+            afmid_kernels::statistics::median(&mut bins)
+                / (1.0 - 1.0 / (9.0 * spectra.long.windows.max(1) as f64)).powi(3)
         };
         let same = records.iter().filter(|record| key(record) == Some(commonest)).filter_map(|r| r.spectra.as_ref());
         let (spectra, levels): (Vec<_>, Vec<_>) =

@@ -1,11 +1,11 @@
 //! The free level against the piezo's position, as one looks at it: no shape assumed.
 
+use afmid_kernels::linear_algebra::product;
 use faer::Mat;
 
 use super::basis::span;
 use super::free_level::{FreeLevel, FreeRecord};
-use crate::model::orthogonal::product;
-use crate::model::ringdown::internals::symmetric_inverse;
+use afmid_kernels::ringdown::internals::symmetric_inverse;
 
 /// The free level where the piezo stood at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]

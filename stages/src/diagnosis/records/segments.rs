@@ -3,8 +3,8 @@
 use super::basis::{polynomials, span};
 use super::points::Points;
 use super::summary::RecordEvent;
-use crate::events::EventKind;
-use crate::statistics::median;
+use afmid_kernels::events::EventKind;
+use afmid_kernels::statistics::median;
 
 /// What a stretch is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

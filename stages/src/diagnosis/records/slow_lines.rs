@@ -6,7 +6,7 @@ use super::sign::{RecordSign, gain, value};
 use super::slow_regression::{Sine, SlowRecord};
 use super::summary::RecordSummary;
 use super::yardstick::{Yardstick, of_many};
-use crate::statistics::median;
+use afmid_kernels::statistics::median;
 
 /// Frequencies at most, half a resolution apart.
 const MOST_FREQUENCIES: usize = 400;

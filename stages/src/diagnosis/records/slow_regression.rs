@@ -1,8 +1,9 @@
 //! Sines in a whole record, with what the piezo's travel makes projected out.
 
+use afmid_kernels::linear_algebra::dot;
 use std::f64::consts::{PI, TAU};
 
-use super::basis::{Basis, dot, norm, polynomials};
+use super::basis::{Basis, norm, polynomials};
 use super::segments::SegmentKind;
 use super::summary::RecordSummary;
 

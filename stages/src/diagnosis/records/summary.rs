@@ -5,7 +5,7 @@ use super::extremes::{Extremes, extremes};
 use super::points::points;
 use super::segments::{Segment, SegmentKind, segment, stretches};
 use super::spectra::{LineSpectra, line_spectra};
-use crate::events::EventKind;
+use afmid_kernels::events::EventKind;
 
 /// Fewest samples of a record.
 pub(super) const FEWEST_SAMPLES: usize = 256;

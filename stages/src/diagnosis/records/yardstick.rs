@@ -1,7 +1,6 @@
 //! How far the ratio of a power to its neighbours strays where nothing is: taken from all the other frequencies.
 
-use super::replicates::incomplete_beta;
-use crate::statistics::median_and_scale;
+use afmid_kernels::statistics::{incomplete_beta, median_and_scale};
 
 /// The law of a ratio of powers: a gamma variable of mean `mean` and shape `shape`, over an independent one of `neighbours` times that shape.
 ///

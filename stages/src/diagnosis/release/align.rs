@@ -8,8 +8,8 @@ use super::lever::{Lever, LeverMode};
 use super::problem::Problem;
 use super::state::State;
 use super::stepper::Pace;
-use crate::model::ModelError;
-use crate::model::ringdown::Exponential;
+use afmid_kernels::model::ModelError;
+use afmid_kernels::ringdown::Exponential;
 
 /// Least factor by which a cause is taken to weaken a mode.
 const SHRUNK: f64 = 0.03;

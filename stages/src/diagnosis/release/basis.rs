@@ -1,5 +1,6 @@
 //! The space in which the releases of levers near one lie, and places in it.
 
+use afmid_kernels::linear_algebra::product;
 use std::sync::Arc;
 
 use faer::{Mat, MatRef, c64};
@@ -8,9 +9,8 @@ use super::lever::Lever;
 use super::prepared::Directions;
 use super::problem::Problem;
 use super::window::Cut;
-use crate::model::orthogonal::product;
-use crate::model::ringdown::internals::{shared, weights};
-use crate::model::ringdown::{EventParameters, Exponential};
+use afmid_kernels::ringdown::internals::{shared, weights};
+use afmid_kernels::ringdown::{EventParameters, Exponential};
 
 /// An orthonormal basis of whitened releases near a lever.
 ///

@@ -7,8 +7,8 @@ use super::problem::Problem;
 use super::signals::Signals;
 use super::state::{Hold, Hypothesis, State};
 use super::stepper::{Pace, Release, differences};
-use crate::causes::Effects;
-use crate::model::ringdown::internals::{LANES, Whitener};
+use afmid_kernels::effects::Effects;
+use afmid_kernels::ringdown::internals::{LANES, Whitener};
 
 /// Relative step of a cause's parameter in a difference quotient, of its value or of a trial's.
 const STEP: f64 = 1e-3;

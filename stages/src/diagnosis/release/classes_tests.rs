@@ -8,9 +8,10 @@ use super::joint::Linear;
 use super::screen::Sensitivities;
 use super::search::scene;
 use super::*;
-use crate::causes::{CATALOGUE, Cause, Domain, Identifiable, Instant, Part, find};
-use crate::model::ringdown::internals::signal;
-use crate::model::ringdown::{EventParameters, RingdownNoise};
+use crate::causes::{CATALOGUE, Cause, Domain, Identifiable, Part, find};
+use afmid_kernels::effects::Instant;
+use afmid_kernels::ringdown::internals::signal;
+use afmid_kernels::ringdown::{EventParameters, RingdownNoise};
 
 const INTERVAL_S: f64 = 2e-7;
 const EVENTS: usize = 10;

@@ -1,7 +1,7 @@
 //! Whether events ask for frequencies of their own.
 
 use super::screen::Scores;
-use crate::calibration::chi_square_tail;
+use afmid_kernels::statistics::chi_square_tail;
 
 /// What the events' own frequencies would gain.
 ///

@@ -5,7 +5,7 @@ use faer::Mat;
 use super::problem::Problem;
 use super::screen::{Projection, Scores};
 use super::state::State;
-use crate::calibration::normal_two_sided;
+use afmid_kernels::statistics::normal_two_sided;
 
 /// By which power of the event's amplitude a named cause's strength changes, beyond its own law.
 ///
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
     use crate::causes::find;
     use crate::diagnosis::release::{Cut, Hypothesis, Lever, Prepared};
-    use crate::model::ringdown::{EventParameters, RingdownNoise};
+    use afmid_kernels::ringdown::{EventParameters, RingdownNoise};
 
     /// Exponents of a strength of 2e-3 that goes as that power of the amplitude, known to a tenth of itself in each event.
     fn exponents(amplitudes: &[f64], power: f64) -> Vec<Option<Exponent>> {

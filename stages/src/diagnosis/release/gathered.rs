@@ -11,7 +11,7 @@ use super::state::{Hold, State};
 use super::trials::{Trial, combination};
 use crate::causes::Cause;
 use crate::diagnosis::verdict::RunnerUp;
-use crate::model::ModelError;
+use afmid_kernels::model::ModelError;
 
 /// Puts one cause in the place of several named ones where it alone explains the events as well, parameters paid: `fits` holds the baseline, then one fit per name. Says
 /// whether one was put.

@@ -11,8 +11,8 @@ use super::normal::{Event, Normal};
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::{Hold, State};
-use crate::model::ModelError;
-use crate::model::ringdown::internals::{Whitener, symmetric_inverse};
+use afmid_kernels::model::ModelError;
+use afmid_kernels::ringdown::internals::{Whitener, symmetric_inverse};
 
 /// A finished fit.
 pub struct JointFit {

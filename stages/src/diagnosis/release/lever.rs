@@ -2,7 +2,7 @@
 
 use faer::c64;
 
-use crate::model::ringdown::Exponential;
+use afmid_kernels::ringdown::Exponential;
 
 /// One mode of the baseline.
 #[derive(Debug, Clone, Copy, PartialEq)]

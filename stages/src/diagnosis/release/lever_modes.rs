@@ -1,7 +1,7 @@
 //! Which resonances are the lever's own.
 
 use super::align::suggested;
-use crate::model::ringdown::Exponential;
+use afmid_kernels::ringdown::Exponential;
 
 /// Least quality factor of a mode: below it, an exponential stands for a drift or a tail.
 const LEAST_QUALITY: f64 = 3.0;
@@ -137,7 +137,7 @@ mod tests {
 
     use super::{Seen, in_order, lever_modes};
     use crate::diagnosis::release::{Lever, LeverMode};
-    use crate::model::ringdown::Exponential;
+    use afmid_kernels::ringdown::Exponential;
 
     /// Shares of the paper's lever.
     const PAPER: [(f64, f64); 4] = [(46.0, 0.9), (247.0, 0.075), (580.0, 0.02), (1050.0, 0.008)];

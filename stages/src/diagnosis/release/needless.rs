@@ -5,7 +5,7 @@ use super::joint::{JointFit, fit};
 use super::problem::Problem;
 use super::search::{Named, PENALTY};
 use super::state::{Hold, State};
-use crate::model::ModelError;
+use afmid_kernels::model::ModelError;
 
 /// A name is asked again where its parameters' error ellipsoid promises that it is missed by less than so many times what it must pay.
 const DOUBTFUL: f64 = 2.0;

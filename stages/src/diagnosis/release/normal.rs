@@ -1,5 +1,6 @@
 //! Normal equations of the joint fit, the events' own parameters eliminated.
 
+use afmid_kernels::linear_algebra::product;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -8,8 +9,7 @@ use super::change::{CrossedSlopes, Slopes};
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::{Hold, State, Step};
-use crate::model::orthogonal::product;
-use crate::model::ringdown::internals::symmetric_inverse;
+use afmid_kernels::ringdown::internals::symmetric_inverse;
 
 /// One event at one point.
 pub(super) struct Event<'a> {

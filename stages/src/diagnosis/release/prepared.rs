@@ -1,14 +1,14 @@
 //! What many fits to the same data need again.
 
+use afmid_kernels::linear_algebra::Qr;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use faer::Mat;
 
 use super::signals::Signals;
 use super::window::Cut;
-use crate::model::orthogonal::Qr;
-use crate::model::ringdown::Exponential;
-use crate::model::ringdown::internals::{Whitener, columns};
+use afmid_kernels::ringdown::Exponential;
+use afmid_kernels::ringdown::internals::{Whitener, columns};
 
 /// Whitening filter and the latest bases of a problem: the same numbers whether they are found here or made anew.
 #[derive(Default)]
@@ -83,7 +83,7 @@ mod tests {
     use faer::c64;
 
     use super::*;
-    use crate::model::ringdown::RingdownNoise;
+    use afmid_kernels::ringdown::RingdownNoise;
 
     #[test]
     fn the_same_basis_is_made_once_and_the_latest_are_kept() {

@@ -10,9 +10,9 @@ use super::signals::Signals;
 use super::state::State;
 use super::stepper::Release;
 use super::window::{Cut, EventWindow};
-use crate::model::ModelError;
-use crate::model::ringdown::internals::Whitener;
-use crate::model::ringdown::{EventParameters, RingdownNoise, ThermalMode};
+use afmid_kernels::model::ModelError;
+use afmid_kernels::ringdown::internals::Whitener;
+use afmid_kernels::ringdown::{EventParameters, RingdownNoise, ThermalMode};
 
 /// The data and what is known beforehand.
 pub struct Problem<'a> {

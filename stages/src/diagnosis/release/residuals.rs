@@ -6,8 +6,8 @@ use realfft::RealFftPlanner;
 use super::problem::Problem;
 use super::state::State;
 use super::stepper::{Pace, differences};
-use crate::calibration::chi_square_tail;
-use crate::model::ringdown::internals::{LANES, Whitener, signal};
+use afmid_kernels::ringdown::internals::{LANES, Whitener, signal};
+use afmid_kernels::statistics::chi_square_tail;
 
 /// Residuals of every event, V.
 pub fn residuals(problem: &Problem<'_>, state: &State, starts: &[usize]) -> Vec<Vec<f64>> {

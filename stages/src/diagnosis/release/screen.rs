@@ -1,5 +1,6 @@
 //! Score tests: which candidate's effect the residuals point at.
 
+use afmid_kernels::linear_algebra::{cholesky, product};
 use faer::Mat;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -16,11 +17,11 @@ use super::problem::Problem;
 use super::signals::Signals;
 use super::state::Hold;
 use super::stepper::Pace;
-use crate::calibration::normal_two_sided;
-use crate::causes::{Cause, Effects, Scene};
-use crate::model::ModelError;
-use crate::model::orthogonal::{cholesky, product};
-use crate::model::ringdown::internals::symmetric_inverse;
+use crate::causes::{Cause, Scene};
+use afmid_kernels::effects::Effects;
+use afmid_kernels::model::ModelError;
+use afmid_kernels::ringdown::internals::symmetric_inverse;
+use afmid_kernels::statistics::normal_two_sided;
 
 /// A candidate at one of its trial values.
 #[derive(Clone)]

@@ -9,7 +9,7 @@ use super::seeking::Seeking;
 use super::state::State;
 use crate::causes::{Cause, Domain, Identifiable, Part, Scene};
 use crate::diagnosis::verdict::{Gain, RunnerUp, Verdict};
-use crate::model::ModelError;
+use afmid_kernels::model::ModelError;
 
 /// How names are given.
 #[derive(Debug, Clone, PartialEq)]

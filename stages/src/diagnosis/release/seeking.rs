@@ -13,7 +13,7 @@ use super::state::{Hold, State};
 use super::trials::Trial;
 use crate::causes::Cause;
 use crate::diagnosis::verdict::RunnerUp;
-use crate::model::ModelError;
+use afmid_kernels::model::ModelError;
 
 /// Times that names may give way to others.
 const REPLACEMENTS: usize = 3;

@@ -3,7 +3,7 @@
 use faer::MatRef;
 use rayon::prelude::*;
 
-use crate::model::ringdown::internals::{LANES, Whitener};
+use afmid_kernels::ringdown::internals::{LANES, Whitener};
 
 /// Signals of equal length.
 #[derive(Debug, Clone)]

@@ -9,9 +9,9 @@ use super::silent_modes::silent_modes;
 use super::state::State;
 use super::thermal_peaks::{ThermalPeak, thermal_peaks};
 use super::window::{Cut, EventWindow};
-use crate::model::ModelError;
-use crate::model::ringdown::internals::{fit_all_that_rings, noise_of_stretches};
-use crate::model::ringdown::{
+use afmid_kernels::model::ModelError;
+use afmid_kernels::ringdown::internals::{fit_all_that_rings, noise_of_stretches};
+use afmid_kernels::ringdown::{
     EventParameters, Exponential, ModeEstimate, Ringdown, RingdownNoise, RingdownOptions, ThermalMode, fit_ringdowns,
 };
 

@@ -1,8 +1,9 @@
 //! What is fitted: lever, causes, and each event's own parameters.
 
 use super::lever::Lever;
-use crate::causes::{Cause, Effects};
-use crate::model::ringdown::EventParameters;
+use crate::causes::Cause;
+use afmid_kernels::effects::Effects;
+use afmid_kernels::ringdown::EventParameters;
 
 /// A cause with its present values.
 #[derive(Clone)]

@@ -1,5 +1,6 @@
 //! What either model leaves of each event, and the frequency that the event asks of the linear one.
 
+use afmid_kernels::linear_algebra::dot;
 use rayon::prelude::*;
 
 use super::joint::JointFit;
@@ -8,8 +9,8 @@ use super::problem::Problem;
 use super::residuals::residuals;
 use super::story_spectra::transform;
 use super::window::Cut;
-use crate::model::ringdown::EventParameters;
-use crate::model::ringdown::internals::signal;
+use afmid_kernels::ringdown::EventParameters;
+use afmid_kernels::ringdown::internals::signal;
 
 /// One event in numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,10 +100,6 @@ fn without(mut column: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
         column.iter_mut().zip(other).for_each(|(c, o)| *c -= share * o);
     }
     column
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn rms(values: &[f64]) -> f64 {

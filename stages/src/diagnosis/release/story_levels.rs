@@ -84,9 +84,9 @@ mod tests {
     use faer::Mat;
 
     use super::*;
-    use crate::causes::Instant;
     use crate::diagnosis::release::{Cut, EventWindow, Lever, Prepared, State};
-    use crate::model::ringdown::RingdownNoise;
+    use afmid_kernels::effects::Instant;
+    use afmid_kernels::ringdown::RingdownNoise;
 
     #[test]
     fn what_a_curved_output_leaves_is_seen_level_by_level() {

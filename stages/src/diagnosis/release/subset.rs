@@ -4,7 +4,7 @@ use super::joint::JointFit;
 use super::problem::Problem;
 use super::state::State;
 use super::window::{Cut, EventWindow};
-use crate::model::ringdown::EventParameters;
+use afmid_kernels::ringdown::EventParameters;
 
 /// Some of an archive's events by themselves.
 pub(super) struct Subset<'a> {
@@ -91,9 +91,9 @@ mod tests {
     use faer::Mat;
 
     use super::*;
-    use crate::causes::Instant;
     use crate::diagnosis::release::{Lever, LeverMode, Prepared};
-    use crate::model::ringdown::RingdownNoise;
+    use afmid_kernels::effects::Instant;
+    use afmid_kernels::ringdown::RingdownNoise;
 
     const INTERVAL_S: f64 = 2e-7;
 

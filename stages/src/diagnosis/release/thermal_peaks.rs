@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::calibration::gamma_tail;
-use crate::model::ringdown::internals::{hann, mean_periodogram};
+use afmid_kernels::ringdown::internals::{hann, mean_periodogram};
+use afmid_kernels::statistics::gamma_tail;
 
 /// A resonance that the lever's thermal motion shows.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! Events as the diagnosis takes them: raw samples round a release, never shifted by fractions.
 
-use crate::causes::Instant;
+use afmid_kernels::effects::Instant;
 
 /// One event with room to move its window.
 #[derive(Debug, Clone, PartialEq)]

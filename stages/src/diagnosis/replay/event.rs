@@ -3,10 +3,10 @@
 use afmid_pipeline::StageError;
 
 use super::fit::least_squares;
-use crate::causes::{Effects, Instant};
 use crate::diagnosis::release::{Cut, EventWindow};
-use crate::simulate::{Afm, Cut as SimulatedCut, Microscope, Release};
-use crate::simulate::{LeverModel, LinearPart};
+use crate::simulate::{Afm, LeverModel, LinearPart};
+use afmid_kernels::effects::{Effects, Instant};
+use afmid_kernels::simulate::{Cut as SimulatedCut, Microscope, Release};
 
 /// A microscope that simulates measured events again, with causes or without.
 pub struct Replayer {

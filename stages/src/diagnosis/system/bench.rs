@@ -4,7 +4,7 @@ use super::error::SystemError;
 use super::input::FineInput;
 use super::model::Model;
 use super::oscillator::{Span, free_run, motion};
-use crate::causes::{Effects, Intersample};
+use afmid_kernels::effects::{Effects, Intersample};
 
 /// A part of a record.
 #[derive(Debug, Clone, PartialEq, Eq)]

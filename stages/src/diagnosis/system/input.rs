@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::causes::{Intersample, StaticMap};
+use afmid_kernels::effects::{Intersample, StaticMap};
 
 /// Samples on either side that the band-limited signal is built from: what lies further away weighs less than 1e-4 up to 0.9 of the Nyquist frequency.
 const REACH: usize = 32;

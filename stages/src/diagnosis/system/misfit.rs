@@ -9,7 +9,7 @@ use super::blocks::{Blocks, Moments, paired};
 use super::fit::Fit;
 use super::linear_algebra::{Cholesky, dot};
 use super::screen::peaks;
-use crate::causes::{Effects, Intersample};
+use afmid_kernels::effects::{Effects, Intersample};
 
 /// Share of a residual that something systematic makes.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,6 @@ mod blocks;
 mod choice;
 mod diagnose;
 mod error;
-mod fisher;
 mod fit;
 mod input;
 mod linear_algebra;

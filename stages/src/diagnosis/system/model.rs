@@ -1,7 +1,8 @@
 //! An oscillator with named causes, as a vector of parameters.
 
 use super::oscillator::Oscillator;
-use crate::causes::{Cause, Effects};
+use crate::causes::Cause;
+use afmid_kernels::effects::Effects;
 
 /// A cause with its values.
 #[derive(Clone)]

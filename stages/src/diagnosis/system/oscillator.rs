@@ -1,7 +1,7 @@
 //! A driven oscillator with whatever causes add to it.
 
 use super::propagator::{Propagator, times};
-use crate::causes::{Effects, Instant, Motion};
+use afmid_kernels::effects::{Effects, Instant, Motion};
 
 /// `q'' + (w/Q) q' + w^2 q = w^2 g u(t) + forces of causes`.
 #[derive(Debug, Clone, Copy, PartialEq)]

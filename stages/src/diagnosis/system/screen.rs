@@ -5,12 +5,12 @@ use realfft::RealFftPlanner;
 
 use super::bench::Bench;
 use super::blocks::Blocks;
-use super::fisher::f_tail;
 use super::fit::Fit;
 use super::linear_algebra::{Cholesky, dot};
 use super::misfit::Floor;
 use super::model::Model;
 use crate::causes::{Cause, Scene};
+use afmid_kernels::statistics::f_tail;
 
 /// A stretch of the training part on which models are compared, with a fit to it and the floor beneath the fit.
 pub(super) struct Sample<'a> {

@@ -3,7 +3,7 @@
 use super::bench::{Bench, Part, Recorded};
 use super::model::Model;
 use super::validation::free_run_part;
-use crate::calibration::Welch;
+use afmid_kernels::calibration::Welch;
 
 /// Errors of the linear and of the extended model.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,8 +6,9 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::{Recorded, SystemOptions, diagnose_system};
-use crate::causes::{Effects, Instant, Intersample, Motion, find};
+use crate::causes::find;
 use crate::diagnosis::{Diagnosis, Verdict};
+use afmid_kernels::effects::{Effects, Instant, Intersample, Motion};
 
 const SAMPLES: usize = 4096;
 const RATE_HZ: f64 = 1000.0;

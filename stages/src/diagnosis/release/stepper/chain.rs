@@ -1,7 +1,7 @@
 //! The readout: lags in a row that follow signals on cubics.
 
 use super::super::lever::Lever;
-use crate::causes::Effects;
+use afmid_kernels::effects::Effects;
 
 /// A value and its rate.
 #[derive(Debug, Clone, Copy)]

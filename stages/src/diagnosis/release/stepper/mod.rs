@@ -1,9 +1,9 @@
 //! What causes change in one release, by an integrator of the diagnosis's own.
 
 use super::lever::Lever;
-use crate::causes::Effects;
-use crate::model::ringdown::EventParameters;
-use crate::model::ringdown::internals::signal;
+use afmid_kernels::effects::Effects;
+use afmid_kernels::ringdown::EventParameters;
+use afmid_kernels::ringdown::internals::signal;
 
 mod chain;
 mod ringing;
@@ -155,9 +155,10 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::causes::{LinearSection, find};
+    use crate::causes::find;
     use crate::diagnosis::release::LeverMode;
-    use crate::model::ringdown::internals::signal;
+    use afmid_kernels::effects::LinearSection;
+    use afmid_kernels::ringdown::internals::signal;
 
     fn lever() -> Lever {
         let modes = [(47e3, 50.0, 0.9), (250e3, 200.0, 0.08), (580e3, 450.0, 0.02)];

@@ -5,7 +5,7 @@ use faer::c64;
 use super::super::lever::Lever;
 use super::Release;
 use super::chain::Level;
-use crate::causes::{Effects, Motion};
+use afmid_kernels::effects::{Effects, Motion};
 
 /// Halvings of a step within which a jump of the load is located: to a ten-thousandth of a sample.
 const HALVINGS: usize = 13;

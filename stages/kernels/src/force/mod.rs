@@ -1,0 +1,19 @@
+//! The force that acted: the input of the identification.
+//!
+//! Nobody measures the force in the contact. At a rupture it is known all the same: before it the lever bends quasi-statically
+//! under the load, after it there is none. Both lines are extrapolated to the moment `t0`, and their difference is the input,
+//! in volts of static deflection, so that the quasi-static gain is one.
+
+mod error;
+mod extrapolate;
+mod line;
+mod onset;
+mod reconstruct;
+
+pub use error::ForceError;
+pub use extrapolate::{Event, ExtrapolationSettings, Lines, Pair, ZeroLine, extrapolate, pair};
+pub use line::{Line, Weighting, correlation_inflation, fit_line};
+pub use onset::{Onset, OnsetSettings, find_onset};
+pub use reconstruct::{
+    ForcePrior, IdentifiedModel, Reconstruction, ReconstructionSettings, Rise, band_inflation, reconstruct, rise,
+};

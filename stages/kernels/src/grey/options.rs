@@ -1,0 +1,141 @@
+//! What is fitted, and what is known beforehand.
+
+use super::hold::InputBetween;
+use crate::model::ModelError;
+use crate::pem::ResidualColour;
+use crate::ringdown::Knowledge;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A parameter of the grey form that something can be known of; modes ascend in frequency, everything is counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GreyQuantity {
+    /// `w / 2 pi` of a mode, Hz.
+    Frequency(usize),
+    /// Q of a mode.
+    QualityFactor(usize),
+    /// `p / 2 pi` of a real pole, Hz.
+    RealPole(usize),
+    /// Delay, s.
+    Delay,
+    /// Static gain of a mode from an input.
+    Gain {
+        /// The mode.
+        mode: usize,
+        /// The input.
+        input: usize,
+    },
+    /// Feedthrough `d0` from an input.
+    Feedthrough(usize),
+}
+
+/// A parameter and what is known of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GreyKnown {
+    /// Of what.
+    pub quantity: GreyQuantity,
+    /// What.
+    pub knowledge: Knowledge,
+}
+
+impl GreyKnown {
+    /// Errors: a number that cannot be.
+    pub fn check(&self) -> Result<(), ModelError> {
+        // gains may have any sign, a delay may be none, an oscillation has Q above 1/2
+        let floor = match self.quantity {
+            GreyQuantity::Gain { .. } | GreyQuantity::Feedthrough(_) => f64::NEG_INFINITY,
+            GreyQuantity::Delay => -f64::MIN_POSITIVE,
+            GreyQuantity::QualityFactor(_) => 0.5,
+            _ => 0.0,
+        };
+        let (fine, found) = match self.knowledge {
+            Knowledge::Free => (true, 0.0),
+            Knowledge::Fixed(value) => (value > floor && value.is_finite(), value),
+            Knowledge::Between(least, most) => (least > floor && least < most && most.is_finite(), least),
+            Knowledge::About(value, std) => (value > floor && value.is_finite() && std > 0.0 && std.is_finite(), value),
+        };
+        if fine {
+            return Ok(());
+        }
+        let wanted = "finite, frequencies above 0, a quality factor above 0.5, a delay of 0 or more, ascending bounds, a standard deviation above 0";
+        Err(ModelError::Parameter { name: "known", found, wanted })
+    }
+}
+
+/// What the system did before the first sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Before {
+    /// Anything: an initial state of its own is estimated for each experiment. The input is taken as what it is at the first sample; samples that hold
+    /// what was put in earlier (as many as the delay has) say nothing.
+    Anything,
+    /// It rested under its first input, for long.
+    Settled,
+    /// It rested without any input.
+    Rest,
+}
+
+/// Where the search begins.
+#[derive(Debug, Clone, PartialEq)]
+pub enum GreyStart {
+    /// At a subspace estimate.
+    Subspace,
+    /// At these modes, frequency in Hz and quality factor; as many as are fitted.
+    Modes(Vec<[f64; 2]>),
+    /// At these poles in the z plane, as other estimates give them; the modes that matter most are taken.
+    Poles(Vec<faer::c64>),
+}
+
+/// What is fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GreyOptions {
+    /// Modes, at least 1; default 4, the paper's.
+    pub modes: usize,
+    /// Real poles, default 1: further ones and the delay are hard to tell apart.
+    pub real_poles: usize,
+    /// Estimate the delay; default true. Otherwise it is what is known of it, or none.
+    pub delay: bool,
+    /// Estimate a feedthrough `d0` per input; default true.
+    pub feedthrough: bool,
+    /// Estimate an offset per experiment; default true.
+    pub offset: bool,
+    /// Estimate a linear drift per experiment; default false.
+    pub slope: bool,
+    /// Before the first sample; default anything.
+    pub before: Before,
+    /// The input between samples; default held.
+    pub between: InputBetween,
+    /// What is known beforehand; default nothing.
+    pub known: Vec<GreyKnown>,
+    /// Where the search begins; default at a subspace estimate.
+    pub start: GreyStart,
+    /// Rows of the subspace estimate's Hankel matrix; default 60.
+    pub block_rows: usize,
+    /// Starts that are refined, at least 1; default 3.
+    pub starts: usize,
+    /// Most steps of a search, at least 1; default 60.
+    pub max_iterations: usize,
+    /// Whether standard errors follow the residual's own spectrum; default so.
+    pub colour: ResidualColour,
+}
+
+impl Default for GreyOptions {
+    fn default() -> Self {
+        Self {
+            modes: 4,
+            real_poles: 1,
+            delay: true,
+            feedthrough: true,
+            offset: true,
+            slope: false,
+            before: Before::Anything,
+            between: InputBetween::Held,
+            known: Vec::new(),
+            start: GreyStart::Subspace,
+            block_rows: 60,
+            starts: 3,
+            max_iterations: 60,
+            colour: ResidualColour::Spectrum,
+        }
+    }
+}

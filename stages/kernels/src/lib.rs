@@ -1,0 +1,51 @@
+//! Kernels of afmid, for any program: slices in, plain structs out; no files, no pipeline, no clock, nothing that lives as long as the process.
+//!
+//! Front doors, each with its model, its cost and an example from data to numbers with errors:
+//!
+//! | module | from | to |
+//! |---|---|---|
+//! | [`ringdown`] | free decays of one or many events | frequencies, quality factors, amplitudes; at the Cramer-Rao bound |
+//! | [`pem`] | input and output | the innovations form of Eq. 8 with its covariance |
+//! | [`subspace`] | input and output, or a decay | poles, without a start |
+//! | [`grey`] | input and output, numbers that are known | modes with static shares, real poles, a delay |
+//! | [`spectra`] | records | ETFE, smoothed responses, power spectra, thermal fits |
+//! | [`contact`] | poles in contact and free | contact stiffness and damping |
+//! | [`simulate`] | a lever, a contact, a detector | records with their truth |
+//!
+//! From the ground up, each using only those before it:
+//! [`linear_algebra`], [`statistics`], [`effects`] - [`events`], [`calibration`], [`force`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`],
+//! [`subspace`], [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`].
+//!
+//! ```
+//! use afmid_kernels::statistics::{chi_square_tail, median_and_scale};
+//!
+//! // a chi-square of 18.3 with ten degrees of freedom is exceeded once in twenty times
+//! assert!((chi_square_tail(18.307, 10) - 0.05).abs() < 1e-5);
+//! // an outlier moves neither the centre nor the scale
+//! let (centre, scale) = median_and_scale(&mut [1.0, 2.0, 3.0, 4.0, 1e9]);
+//! assert!(centre == 3.0 && scale < 2.0);
+//! ```
+
+pub mod calibration;
+pub mod contact;
+pub mod effects;
+pub mod events;
+pub mod force;
+pub mod grey;
+pub mod linear_algebra;
+pub mod model;
+pub mod modes;
+pub mod pem;
+pub mod ringdown;
+pub mod simulate;
+pub mod spectra;
+pub mod stabilisation;
+pub mod statistics;
+pub mod subspace;
+pub mod validation;
+pub mod vector_fitting;
+
+pub use faer::{Mat, c64};
+
+#[cfg(test)]
+mod fixture;

@@ -1,0 +1,76 @@
+//! Ringdowns of several events, fitted jointly at the limit of their noise.
+//!
+//! ```
+//! use afmid_kernels::ringdown::{DecayOptions, NoiseSource, RingdownOptions, fit_decay, fit_ringdowns};
+//! // one damped cosine, sampled at 1 MS/s: 50 kHz, Q = 40
+//! let (w, a) = (std::f64::consts::TAU * 50e3, std::f64::consts::PI * 50e3 / 40.0);
+//! let y: Vec<f64> = (0..4096).map(|k| (-a * 1e-6 * k as f64).exp() * (w * 1e-6 * k as f64).cos() + 1e-4 * ((k * k) as f64).sin()).collect();
+//! let options = RingdownOptions { modes: 1, real_poles: 0, noise: NoiseSource::White, ..RingdownOptions::default() };
+//! let fit = fit_ringdowns(&[&y], &[], 1e-6, &options)?;
+//! let mode = fit.modes()[0];
+//! assert!((mode.quality_factor.value - 40.0).abs() < 5.0 * mode.quality_factor.std);
+//! // a single record in white noise needs less, and gets it in a fraction of the time
+//! let quick = fit_decay(&y, 1e-6, &DecayOptions { modes: 1, real_poles: 0, ..DecayOptions::default() })?;
+//! assert!((quick.modes()[0].frequency_hz.value - mode.frequency_hz.value).abs() < mode.frequency_hz.std);
+//! # Ok::<(), afmid_kernels::model::ModelError>(())
+//! ```
+
+mod absorbed;
+mod bootstrap;
+mod choice;
+#[cfg(test)]
+mod choice_tests;
+mod compressed;
+mod coordinates;
+mod decay;
+mod estimate;
+mod fit;
+mod fitted;
+mod freedom;
+mod gap_start;
+#[cfg(test)]
+mod gap_tests;
+mod gaps;
+mod guess;
+mod knowledge;
+#[cfg(test)]
+mod knowledge_tests;
+mod ladder;
+mod limits;
+mod modal_form;
+mod noise;
+mod noise_estimate;
+mod normal;
+mod options;
+mod projected;
+mod records;
+mod result;
+mod search;
+mod start;
+#[cfg(test)]
+mod tests;
+mod whitener;
+mod whittle;
+
+/// What the diagnosis shares with the fit: whitening, the basis, normal equations.
+#[doc(hidden)]
+pub mod internals {
+    pub use super::choice::fit_all_that_rings;
+    pub use super::coordinates::{pole_of, slopes};
+    pub use super::estimate::mode;
+    pub use super::modal_form::{columns, shared, signal, weights};
+    pub use super::noise_estimate::noise_of_stretches;
+    pub use super::normal::symmetric_inverse;
+    pub use super::whitener::{LANES, Whitener};
+    pub use super::whittle::{hann, mean_periodogram};
+}
+
+pub use choice::{CountedRingdown, HELD_OUT_EVENTS, ModeCount, fit_counted_ringdowns};
+pub use decay::{Decay, DecayOptions, fit_decay};
+pub use estimate::{Estimate, ModeEstimate, Ringdown, RingdownVerdict};
+pub use fit::fit_ringdowns;
+pub use knowledge::{Knowledge, Known, Quantity};
+pub use modal_form::{EventParameters, Exponential};
+pub use noise::{RingdownNoise, ThermalMode, Wander};
+pub use normal::Prior;
+pub use options::{NoiseSource, RingdownOptions};

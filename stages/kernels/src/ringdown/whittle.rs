@@ -1,0 +1,172 @@
+//! Noise variances from what the events' fits leave.
+
+use rayon::prelude::*;
+use realfft::RealFftPlanner;
+
+use super::noise::RingdownNoise;
+
+/// Hann taper of unit mean square.
+pub fn hann(samples: usize) -> Vec<f64> {
+    let scale = (8.0f64 / 3.0).sqrt();
+    (0..samples)
+        .map(|k| scale * 0.5 * (1.0 - (std::f64::consts::TAU * (k as f64 + 0.5) / samples as f64).cos()))
+        .collect()
+}
+
+/// Mean of the tapered periodograms `|FFT|^2 / N` of several signals, bins 0 to N/2.
+pub fn mean_periodogram(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f64> {
+    let mut sum = summed_periodograms(signals, taper);
+    sum.iter_mut().for_each(|p| *p /= signals.len().max(1) as f64);
+    sum
+}
+
+/// Sum of the tapered periodograms, in the signals' order.
+pub(super) fn summed_periodograms(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f64> {
+    let n = taper.len();
+    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let all: Vec<Vec<f64>> = signals
+        .par_iter()
+        .map(|signal| {
+            let mut tapered: Vec<f64> = signal.iter().zip(taper).map(|(v, w)| v * w).collect();
+            let mut spectrum = fft.make_output_vec();
+            // lengths are the plan's own: it cannot fail
+            if fft.process(&mut tapered, &mut spectrum).is_err() {
+                return vec![0.0; n / 2 + 1];
+            }
+            spectrum.iter().map(|s| s.norm_sqr() / n as f64).collect()
+        })
+        .collect();
+    let mut sum = vec![0.0; n / 2 + 1];
+    for one in all {
+        sum.iter_mut().zip(one).for_each(|(s, p)| *s += p);
+    }
+    sum
+}
+
+/// Expected tapered periodogram of each part of the noise at unit variance: parts x bins; `lag_weights`: [`autocorrelation`] of the taper, gaps cut out
+/// of it.
+///
+/// # Method
+/// Exact for the finite window: the Fourier transform of autocovariance times the taper's autocorrelation, folded to N.
+/// # Source
+/// A. M. Sykulski, S. C. Olhede, A. P. Guillaumin, J. M. Lilly, J. J. Early, Biometrika 106 (2019) 251.
+pub(super) fn expected_parts(noise: &RingdownNoise, interval_s: f64, lag_weights: &[f64]) -> Vec<Vec<f64>> {
+    let n = lag_weights.len();
+    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    (0..noise.parts())
+        .into_par_iter()
+        .map(|part| {
+            let at = |lag: usize| noise.unit_covariance(part, lag as f64 * interval_s) * lag_weights[lag];
+            let mut folded: Vec<f64> = (0..n).map(|lag| if lag == 0 { at(0) } else { at(lag) + at(n - lag) }).collect();
+            let mut spectrum = fft.make_output_vec();
+            if fft.process(&mut folded, &mut spectrum).is_err() {
+                return vec![0.0; n / 2 + 1];
+            }
+            spectrum.iter().map(|s| s.re.max(0.0)).collect()
+        })
+        .collect()
+}
+
+/// `sum_k w(k) w(k + lag) / N`.
+pub(super) fn autocorrelation(taper: &[f64]) -> Vec<f64> {
+    let n = taper.len();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let (forward, backward) = (planner.plan_fft_forward(2 * n), planner.plan_fft_inverse(2 * n));
+    let mut padded: Vec<f64> = taper.iter().copied().chain(std::iter::repeat_n(0.0, n)).collect();
+    let mut spectrum = forward.make_output_vec();
+    let mut lags = vec![0.0; 2 * n];
+    let done = forward.process(&mut padded, &mut spectrum).is_ok();
+    spectrum.iter_mut().for_each(|s| *s = num_complex::Complex64::new(s.norm_sqr(), 0.0));
+    if !done || backward.process(&mut spectrum, &mut lags).is_err() {
+        return vec![1.0; n];
+    }
+    lags.truncate(n);
+    lags.iter_mut().for_each(|lag| *lag /= (2 * n * n) as f64);
+    lags
+}
+
+/// Iterations of the scoring: five are usual.
+const ROUNDS: usize = 40;
+
+/// Variances whose expected periodogram has the largest Whittle likelihood; none negative.
+///
+/// `observed`: mean periodogram, what the fit has absorbed added. Bins from 1 on: the mean is the events' own offset.
+///
+/// # Method
+/// Fisher scoring: weighted non-negative least squares with weights `1 / level^2`, by cyclic coordinate descent, repeated.
+pub(super) fn variances(observed: &[f64], parts: &[Vec<f64>], start: &[f64]) -> Vec<f64> {
+    let mut values = start.to_vec();
+    let mut level = levels(parts, &values);
+    let mut likelihood = whittle(observed, &level);
+    for _ in 0..ROUNDS {
+        let (normal, right) = weighted(observed, parts, &level);
+        let target = non_negative(&normal, &right, &values);
+        let mut share = 1.0;
+        loop {
+            let trial: Vec<f64> = values.iter().zip(&target).map(|(v, t)| v + share * (t - v)).collect();
+            let trial_level = levels(parts, &trial);
+            let next = whittle(observed, &trial_level);
+            if next <= likelihood {
+                let gain = likelihood - next;
+                (values, level, likelihood) = (trial, trial_level, next);
+                if gain < 1e-9 * observed.len() as f64 {
+                    return values;
+                }
+                break;
+            }
+            share *= 0.5;
+            if share < 1e-6 {
+                return values;
+            }
+        }
+    }
+    values
+}
+
+fn levels(parts: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
+    let bins = parts.first().map_or(0, Vec::len);
+    (0..bins).map(|k| parts.iter().zip(values).map(|(p, v)| p[k] * v).sum::<f64>().max(f64::MIN_POSITIVE)).collect()
+}
+
+fn whittle(observed: &[f64], level: &[f64]) -> f64 {
+    observed.iter().zip(level).skip(1).map(|(o, l)| o.max(0.0) / l + l.ln()).sum()
+}
+
+fn weighted(observed: &[f64], parts: &[Vec<f64>], level: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let count = parts.len();
+    let (mut normal, mut right) = (vec![vec![0.0; count]; count], vec![0.0; count]);
+    for k in 1..observed.len() {
+        let weight = level[k].powi(-2);
+        for i in 0..count {
+            let scaled = parts[i][k] * weight;
+            right[i] += scaled * observed[k];
+            for j in 0..=i {
+                normal[i][j] += scaled * parts[j][k];
+            }
+        }
+    }
+    let full = (0..count).map(|i| (0..count).map(|j| normal[i.max(j)][i.min(j)]).collect()).collect();
+    (full, right)
+}
+
+/// `min x'Nx/2 - r'x`, `x >= 0`, by coordinate descent.
+fn non_negative(normal: &[Vec<f64>], right: &[f64], start: &[f64]) -> Vec<f64> {
+    let mut x = start.to_vec();
+    for _ in 0..2000 {
+        let mut change = 0.0_f64;
+        for i in 0..x.len() {
+            if normal[i][i] <= 0.0 {
+                continue;
+            }
+            let slope = right[i] - normal[i].iter().zip(&x).map(|(n, x)| n * x).sum::<f64>();
+            let next = (x[i] + slope / normal[i][i]).max(0.0);
+            change = change.max((next - x[i]).abs() * normal[i][i].sqrt());
+            x[i] = next;
+        }
+        let scale = x.iter().enumerate().map(|(i, x)| x * normal[i][i].sqrt()).fold(0.0, f64::max);
+        if change <= 1e-10 * scale {
+            break;
+        }
+    }
+    x
+}

@@ -1,0 +1,63 @@
+//! Parameter-free estimates: windows, periodograms, ETFE, smoothing.
+//!
+//! Sign and scale: `X_k = N^(-1/2) sum_n x_n exp(-i 2 pi k n / N)` at the bins `k f_s / N` from zero to half the sample rate.
+//! Undefined values are NaN.
+//!
+//! [`etfe`] divides transforms (Eqs. 5 to 7), [`local_rational`] and [`local_polynomial`] smooth it, [`power_spectrum`] and [`average_spectra`] are for noise,
+//! [`thermal_fit`] reads modes from it. A transform costs O(N log N), a local fit O(bins x neighbours).
+//!
+//! ```
+//! use afmid_kernels::spectra::{EndTreatment, EtfeSettings, Intersample, etfe};
+//! // y(t) = 0.9 y(t-1) + 0.1 u(t-1): static gain 1; a load that ends
+//! let u: Vec<f64> = (0..4096).map(|k| if k < 1000 { 1.0 } else { 0.0 }).collect();
+//! let mut y = vec![1.0; u.len()];
+//! for k in 1..u.len() {
+//!     y[k] = 0.9 * y[k - 1] + 0.1 * u[k - 1];
+//! }
+//! let settings = EtfeSettings {
+//!     sample_rate_hz: 1e6,
+//!     bandwidth_hz: 5e5,
+//!     vanishing_ratio: 1e-3,
+//!     ends: EndTreatment::Differenced,
+//!     intersample: Intersample::Sampled,
+//!     normalise: false,
+//! };
+//! let found = etfe(&u, &y, &vec![1e-4; u.len()], settings)?;
+//! // what still moves after the step counts a little
+//! assert!((found.static_gain - 1.0).abs() < 0.01, "{}", found.static_gain);
+//! for k in (8..2048).step_by(100) {
+//!     let z = num_complex::Complex64::from_polar(1.0, std::f64::consts::TAU * found.frequency_hz[k] / 1e6);
+//!     assert!((found.transfer[k] - 0.1 / (z - 0.9)).norm() < 3.0 * found.variance[k].sqrt());
+//! }
+//! # Ok::<(), afmid_kernels::spectra::SpectrumError>(())
+//! ```
+
+mod averaged;
+mod ensemble_response;
+mod error;
+mod fourier;
+mod fraction;
+mod lane_squares;
+mod lanes;
+mod least_squares;
+mod local_polynomial;
+mod local_rational;
+mod neighbours;
+mod power;
+mod ratio;
+mod seen_oscillator;
+mod taper;
+mod thermal_fit;
+
+pub use averaged::{AveragedSpectrum, RecordSpectrum, average_spectra};
+pub use ensemble_response::{EnsembleResponse, EnsembleResponseSettings, ensemble_response};
+pub use error::SpectrumError;
+pub use fourier::{bin_frequencies, transform};
+pub use local_polynomial::{PolynomialSettings, local_polynomial};
+pub use local_rational::{RationalSettings, local_rational};
+pub use neighbours::{Bins, Smoothed, SuppressedLine};
+pub use power::{PowerSpectrum, power_spectrum};
+pub use ratio::{EndTreatment, EtfeSettings, Intersample, TransferEstimate, difference, etfe};
+pub use seen_oscillator::SeenThrough;
+pub use taper::{Taper, TaperGains, taper, taper_gains};
+pub use thermal_fit::{AveragedDensity, Fitted, FoundLine, ThermalFit, ThermalFitSettings, thermal_fit};

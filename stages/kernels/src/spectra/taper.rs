@@ -1,0 +1,122 @@
+//! Windows in time.
+
+use std::f64::consts::PI;
+
+use crate::spectra::error::SpectrumError;
+
+/// A window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Taper {
+    /// Flat with cosine edges; `alpha` is the tapered share of the length, half of it at either end.
+    Tukey {
+        /// Zero (rectangular) to one (Hann).
+        alpha: f64,
+    },
+    /// All ones.
+    Rectangular,
+    /// Raised cosine.
+    Hann,
+}
+
+/// What a window does to amplitudes and powers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TaperGains {
+    /// Coherent gain: mean of the window, the factor on a sinusoid's amplitude.
+    pub coherent: f64,
+    /// Noise gain: mean of its square, the factor on the power of white noise.
+    pub noise: f64,
+    /// Noise-equivalent bandwidth in bins: noise gain over the square of the coherent one.
+    pub equivalent_bins: f64,
+}
+
+/// Values of a window of the given length.
+///
+/// # Model
+/// Tukey: `w = (1 + cos(pi (x - 1))) / 2` for `x = 2 k / (alpha (N - 1)) < 1` at the start, mirrored at the end, one between.
+/// Eq. 9 as printed has `1 + alpha` for `1 - alpha` in its limits and twice the taper's length under the cosine: at alpha = 0.1
+/// it would fall from 1 to 0.97 where the taper starts and end at 0.33. This is the window that it means.
+///
+/// # Shapes
+/// `[samples]`, symmetric.
+///
+/// # Units
+/// A number from zero to one.
+///
+/// # Errors
+/// `alpha` outside zero to one.
+///
+/// # Source
+/// Harris, Proc. IEEE 66 (1978) 51; Stark et al. 2005, Eq. 9.
+pub fn taper(kind: Taper, samples: usize) -> Result<Vec<f64>, SpectrumError> {
+    let alpha = match kind {
+        Taper::Rectangular => 0.0,
+        Taper::Hann => 1.0,
+        Taper::Tukey { alpha } => alpha,
+    };
+    if !(0.0..=1.0).contains(&alpha) {
+        return Err(SpectrumError::Setting { name: "alpha", got: alpha, wanted: "0 to 1" });
+    }
+    let edge = 0.5 * alpha * samples.saturating_sub(1) as f64;
+    let value = |k: usize| {
+        let x = k.min(samples - 1 - k) as f64;
+        if x >= edge { 1.0 } else { 0.5 * (1.0 + (PI * (x / edge - 1.0)).cos()) }
+    };
+    Ok((0..samples).map(value).collect())
+}
+
+/// Gains of a window; an empty one has none.
+pub fn taper_gains(window: &[f64]) -> TaperGains {
+    let n = window.len().max(1) as f64;
+    let coherent = window.iter().sum::<f64>() / n;
+    let noise = window.iter().map(|w| w * w).sum::<f64>() / n;
+    let equivalent_bins = if coherent > 0.0 { noise / (coherent * coherent) } else { 0.0 };
+    TaperGains { coherent, noise, equivalent_bins }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Eq. 9 letter by letter, `k` counted from the middle, the window reaching to `|k| = N`.
+    fn as_printed(k: f64, n: f64, alpha: f64) -> f64 {
+        if k <= 0.5 * n * (1.0 + alpha) {
+            1.0
+        } else {
+            0.5 * (1.0 + (PI * (k - 0.5 * n * (1.0 - alpha)) / (n * (1.0 - alpha))).cos())
+        }
+    }
+
+    #[test]
+    fn equation_nine_as_printed_jumps_and_ends_at_a_third() {
+        let (n, alpha) = (4096.0, 0.1);
+        let start = 0.5 * n * (1.0 + alpha);
+        // cos(pi / 9) and cos(11 pi / 18): three digits
+        assert!((as_printed(start + 1e-9, n, alpha) - 0.970).abs() < 5e-4);
+        assert!((as_printed(n, n, alpha) - 0.329).abs() < 5e-4);
+        let meant = taper(Taper::Tukey { alpha }, 8193).unwrap();
+        assert!(meant.windows(2).all(|w| (w[1] - w[0]).abs() < 0.004)); // steepest: pi/2 / 409.6 samples
+        assert!(meant[0].abs() < 1e-15 && meant[8192].abs() < 1e-15);
+        // the tapered share is alpha
+        let tapered = meant.iter().filter(|w| **w < 1.0).count() as f64 / 8193.0;
+        assert!((tapered - alpha).abs() < 2.0 / 8193.0);
+    }
+
+    #[test]
+    fn special_cases_and_gains() {
+        let hann = taper(Taper::Hann, 101).unwrap();
+        let same = taper(Taper::Tukey { alpha: 1.0 }, 101).unwrap();
+        assert_eq!(hann, same);
+        assert!((hann[25] - 0.5).abs() < 1e-15 && hann[50] == 1.0);
+        assert_eq!(taper(Taper::Tukey { alpha: 0.0 }, 5).unwrap(), vec![1.0; 5]);
+        let gains = taper_gains(&taper(Taper::Hann, 100_001).unwrap());
+        // 1/2, 3/8 and 3/2, but for the one sample that makes it symmetric
+        assert!((gains.coherent - 0.5).abs() < 1e-5 && (gains.noise - 0.375).abs() < 1e-5);
+        assert!((gains.equivalent_bins - 1.5).abs() < 3e-5);
+        let tukey = taper_gains(&taper(Taper::Tukey { alpha: 0.1 }, 100_001).unwrap());
+        // 1 - alpha / 2 and 1 - 5 alpha / 8
+        assert!((tukey.coherent - 0.95).abs() < 2e-5 && (tukey.noise - 0.9375).abs() < 2e-5);
+        assert_eq!(taper(Taper::Rectangular, 0).unwrap(), Vec::<f64>::new());
+        assert!(taper(Taper::Tukey { alpha: 1.1 }, 5).is_err());
+        assert!(taper(Taper::Tukey { alpha: f64::NAN }, 5).is_err());
+    }
+}

@@ -1,0 +1,162 @@
+//! Subspace identification with past inputs and outputs as instruments: N4SID, MOESP and CVA weights.
+
+use crate::linear_algebra::{Qr, Svd, eigenvalues, least_squares, product};
+use faer::{Mat, c64};
+
+use crate::model::{ModelError, finite};
+use crate::subspace::past_future::input_basis;
+
+/// How the future, predicted from the past, is weighted before its singular values are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weight {
+    /// Not at all: the oblique projection.
+    N4sid,
+    /// The future input's directions removed on the right.
+    Moesp,
+    /// Also scaled by the future output's covariance: canonical variates, least variance for white inputs.
+    Cva,
+}
+
+/// The observability matrix's column space, estimated from what the past says about the future.
+///
+/// # Model
+/// Innovations form, one output: `x(t+1) = A x + B u + K e`, `y = C x + D u + e`; an offset of y is allowed. The noise may be coloured.
+/// # Method
+/// QR of `[1; U_f]`, past `[U_p; Y_p]`, `Y_f`; singular value decomposition of the part of `Y_f` that the past explains, weighted; A by shift
+/// invariance, in the least-squares sense.
+/// # Shapes
+/// u, y: N samples, several inputs one after the other; singular values: `block_rows`.
+/// # Units
+/// Poles in the z plane; each signal is scaled to its peak first.
+/// # Accuracy
+/// Consistent as N and the block rows grow, if the input excites 2 `block_rows` rows: start values, some per cent from the likelihood's maximum.
+/// The weights differ in the metric alone in which the order is cut off: with noise below the weakest state, or a white input, N4SID and MOESP agree to a per cent, and CVA gains 4 to 10 %
+/// where the noise is coloured; a coloured input sets N4SID behind MOESP (60 seeds, test). Singular values always differ.
+/// # Errors
+/// Lengths, values that are not finite, fewer than `(4 + 2 inputs) block_rows` samples, no convergence of a decomposition.
+/// # Source
+/// P. Van Overschee and B. De Moor, Subspace Identification for Linear Systems (1996), chapter 4; L. Ljung (1999), section 10.6.
+#[derive(Debug, Clone)]
+pub struct InstrumentalSubspace {
+    left: Mat<f64>,
+    singular_values: Vec<f64>,
+}
+
+/// Directions below this share of the strongest are not excited: a thousand roundings of QR.
+const TOLERANCE: f64 = 1e-12;
+
+impl InstrumentalSubspace {
+    /// Estimates with `block_rows` rows of past and as many of future (at least 2).
+    pub fn new(u: &[f64], y: &[f64], block_rows: usize, weight: Weight) -> Result<Self, ModelError> {
+        let (samples, s) = (y.len(), block_rows);
+        let inputs = u.len() / samples.max(1);
+        if inputs == 0 || u.len() != inputs * samples {
+            return Err(ModelError::Length { what: "input", found: u.len(), wanted: samples });
+        }
+        if s < 2 {
+            return Err(ModelError::Parameter { name: "block_rows", found: s as f64, wanted: "at least 2" });
+        }
+        // as many windows as columns, at least
+        let wanted = (2 * inputs + 4) * s;
+        if samples < wanted {
+            return Err(ModelError::TooShort { found: samples, wanted });
+        }
+        finite("input", u)?;
+        finite("output", y)?;
+        let r = Qr::new(stacked(u, y, s)?).r();
+        let (all, past) = (r.ncols(), (inputs + 1) * s);
+        let future = all - past - s;
+        let block = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
+            Mat::from_fn(rows.len(), columns.len(), |i, j| r[(rows.start + i, columns.start + j)])
+        };
+        let (w, f) = (future..future + past, all - s..all);
+        let explained = Explained::new(&block(w.clone(), w.clone()), &block(w.clone(), f.clone()))?;
+        let (left, singular_values) = match weight {
+            Weight::Moesp => decomposed(&explained.projected)?,
+            Weight::N4sid => decomposed(&product(block(0..w.end, w).as_ref(), explained.coefficients.as_ref()))?,
+            Weight::Cva => canonical(&explained.projected, &block(future..all, f))?,
+        };
+        Ok(Self { left, singular_values })
+    }
+
+    /// Singular values, descending (CVA: canonical correlations): their fall shows the order.
+    pub fn singular_values(&self) -> &[f64] {
+        &self.singular_values
+    }
+
+    /// Poles of the model of order `order`, 1 to block rows - 1; they need not be stable.
+    pub fn poles(&self, order: usize) -> Result<Vec<c64>, ModelError> {
+        shift_invariant_poles(&self.left, order)
+    }
+}
+
+/// Poles from the first `order` columns of a basis of the observability matrix. Errors: order 0, or no fewer columns or rows than that.
+pub(super) fn shift_invariant_poles(basis: &Mat<f64>, order: usize) -> Result<Vec<c64>, ModelError> {
+    let rows = basis.nrows();
+    if order == 0 || order >= rows || order > basis.ncols() {
+        return Err(ModelError::Parameter { name: "order", found: order as f64, wanted: "1 to block rows - 1" });
+    }
+    let upper = basis.as_ref().get(..rows - 1, ..order).to_owned();
+    let lower = basis.as_ref().get(1.., ..order).to_owned();
+    Ok(eigenvalues(&least_squares(&upper, &lower, f64::EPSILON)?)?)
+}
+
+/// Future input directions, past, future output: windows x columns.
+fn stacked(u: &[f64], y: &[f64], s: usize) -> Result<Mat<f64>, ModelError> {
+    let samples = y.len();
+    let windows = samples - 2 * s + 1;
+    let later: Vec<f64> = u.chunks_exact(samples).flat_map(|u| u[s..].to_vec()).collect();
+    let basis = input_basis(&later, samples - s, s)?;
+    let signals: Vec<&[f64]> = u.chunks_exact(samples).chain([y]).collect();
+    let first = basis.ncols();
+    let mut stacked = Mat::zeros(windows, first + (signals.len() + 1) * s);
+    stacked.as_mut().get_mut(.., ..first).copy_from(&basis);
+    for (i, (signal, offset)) in signals.iter().map(|signal| (signal, 0)).chain([(&y, s)]).enumerate() {
+        let peak = signal.iter().fold(0.0_f64, |peak, x| peak.max(x.abs()));
+        let level = if peak > 0.0 { peak } else { 1.0 };
+        for j in 0..s {
+            let column = stacked.col_mut(first + i * s + j);
+            column.iter_mut().zip(&signal[offset + j..]).for_each(|(h, x)| *h = x / level);
+        }
+    }
+    Ok(stacked)
+}
+
+/// What the past explains of the future.
+struct Explained {
+    /// In orthonormal coordinates of the past: rank x rows of the future.
+    projected: Mat<f64>,
+    /// Coefficients on the past: past x rows of the future.
+    coefficients: Mat<f64>,
+}
+
+impl Explained {
+    /// From the triangle of the past and its part of the future.
+    fn new(past: &Mat<f64>, future: &Mat<f64>) -> Result<Self, ModelError> {
+        let svd = Svd::new(past)?;
+        let rank = svd.rank(TOLERANCE);
+        let projected = product(svd.u.as_ref().get(.., ..rank).transpose(), future.as_ref());
+        let scaled = Mat::from_fn(rank, future.ncols(), |i, j| projected[(i, j)] / svd.s[i]);
+        Ok(Self { projected, coefficients: product(svd.v.as_ref().get(.., ..rank), scaled.as_ref()) })
+    }
+}
+
+/// Right singular vectors, as columns, and singular values.
+fn decomposed(matrix: &Mat<f64>) -> Result<(Mat<f64>, Vec<f64>), ModelError> {
+    let svd = Svd::new(matrix)?;
+    Ok((svd.v, svd.s))
+}
+
+/// Scaled by the inverse root of the future's covariance `T^T T`, and back: canonical correlations.
+fn canonical(projected: &Mat<f64>, future: &Mat<f64>) -> Result<(Mat<f64>, Vec<f64>), ModelError> {
+    let root = Svd::new(&Qr::new(future.clone()).r())?;
+    // without noise some directions vanish: they must not be blown up
+    let least = root.s.first().copied().unwrap_or(0.0) * TOLERANCE.sqrt();
+    let scaled_by = |power: i32| {
+        let s = |k: usize| root.s[k].max(least).powi(power);
+        let half = Mat::from_fn(root.v.nrows(), root.v.ncols(), |i, k| root.v[(i, k)] * s(k));
+        product(half.as_ref(), root.v.transpose())
+    };
+    let svd = Svd::new(&product(projected.as_ref(), scaled_by(-1).as_ref()))?;
+    Ok((product(scaled_by(1).as_ref(), svd.v.as_ref()), svd.s))
+}

@@ -1,0 +1,43 @@
+//! Subspace identification: poles without a start, from singular value decompositions.
+//!
+//! | of | kernel | instruments |
+//! |---|---|---|
+//! | input and output, white output noise | [`Subspace`] (MOESP) | none |
+//! | input and output, any noise | [`InstrumentalSubspace`] (N4SID, MOESP, CVA) | the past |
+//! | a free decay | [`Era`] | none |
+//!
+//! # Cost
+//! For N samples and s block rows: O(N s) to form the products, O(s^3) to decompose them; O(N s^2) where the products keep too few digits and QR takes over.
+//!
+//! ```
+//! use afmid_kernels::modes::Root;
+//! use afmid_kernels::subspace::{Era, Subspace};
+//! // a resonance at 50 kHz with Q = 40, sampled at 1 MS/s; the input ends, the output rings, with noise
+//! let (w, a) = (std::f64::consts::TAU * 50e3 * 1e-6, std::f64::consts::PI * 50e3 / 40.0 * 1e-6);
+//! let (a1, a2) = (-2.0 * (-a).exp() * w.cos(), (-2.0 * a).exp());
+//! let u: Vec<f64> = (0..4096).map(|k| if k < 200 { 1.0 } else { 0.0 }).collect();
+//! let mut y = vec![0.0; u.len()];
+//! for k in 2..u.len() {
+//!     y[k] = -a1 * y[k - 1] - a2 * y[k - 2] + 0.1 * u[k - 1];
+//! }
+//! y.iter_mut().enumerate().for_each(|(k, y)| *y += 1e-4 * ((k * k) as f64).sin());
+//! let driven = Subspace::new(&u, &y, 60)?.poles(2)?[0];
+//! let decay = Era::new(&y[200..], 60)?.poles(2)?[0];
+//! for z in [driven, decay] {
+//!     let pole = Root::without_errors(z, 1e-6);
+//!     // start values: a tenth of a per cent
+//!     assert!((pole.frequency_hz / 50e3 - 1.0).abs() < 1e-3);
+//! }
+//! # Ok::<(), afmid_kernels::model::ModelError>(())
+//! ```
+mod era;
+mod instrumental;
+mod past_future;
+#[cfg(test)]
+mod start_tests;
+#[cfg(test)]
+mod weight_tests;
+
+pub use era::Era;
+pub use instrumental::{InstrumentalSubspace, Weight};
+pub use past_future::Subspace;

@@ -1,0 +1,163 @@
+//! Residual tests: is anything left that the model should have explained?
+
+use crate::linear_algebra::{Svd, TallQr};
+use faer::Mat;
+
+use crate::model::{ModelError, finite};
+use crate::statistics::chi_square_tail;
+
+/// A test statistic with its tail probability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestResult {
+    /// Chi-square distributed if the hypothesis holds.
+    pub statistic: f64,
+    /// Degrees of freedom.
+    pub freedom: usize,
+    /// Probability of a larger statistic if the hypothesis holds.
+    pub p_value: f64,
+}
+
+impl TestResult {
+    fn new(statistic: f64, freedom: usize) -> Self {
+        Self { statistic, freedom, p_value: chi_square_tail(statistic, freedom) }
+    }
+}
+
+/// Ljung-Box test of whiteness over `lags` lags, `fitted` noise parameters taken off the degrees of freedom.
+///
+/// # Model
+/// e white: `N (N + 2) sum_l r_l^2 / (N - l)` is chi-square with `lags - fitted` degrees of freedom.
+/// # Method
+/// Autocorrelations of e, its mean removed.
+/// # Shapes
+/// e: N samples, more than `lags`; `lags` more than `fitted`.
+/// # Units
+/// None.
+/// # Accuracy
+/// Asymptotic in N. With a rich record it rejects models that are good enough: a plain number, not a verdict.
+/// # Errors
+/// Too few samples or lags, a constant e, values that are not finite.
+/// # Source
+/// G. Ljung and G. Box, Biometrika 65 (1978) 297.
+pub fn whiteness(e: &[f64], lags: usize, fitted: usize) -> Result<TestResult, ModelError> {
+    finite("residual", e)?;
+    if lags <= fitted {
+        return Err(ModelError::Parameter {
+            name: "lags",
+            found: lags as f64,
+            wanted: "more than the fitted noise parameters",
+        });
+    }
+    if e.len() <= lags {
+        return Err(ModelError::TooShort { found: e.len(), wanted: lags + 1 });
+    }
+    let n = e.len() as f64;
+    let mean = e.iter().sum::<f64>() / n;
+    let power: f64 = e.iter().map(|e| (e - mean).powi(2)).sum();
+    if power <= 0.0 {
+        return Err(ModelError::ConstantOutput);
+    }
+    let statistic: f64 = (1..=lags)
+        .map(|lag| {
+            let r: f64 = e.iter().zip(&e[lag..]).map(|(x, y)| (x - mean) * (y - mean)).sum::<f64>() / power;
+            r * r / (n - lag as f64)
+        })
+        .sum();
+    Ok(TestResult::new(n * (n + 2.0) * statistic, lags - fitted))
+}
+
+/// Whether e still depends on the input: its projection on u and `lags` delays of u.
+///
+/// # Model
+/// e white and independent of u: the energy of the projection over the variance of e is chi-square with as many degrees of freedom as
+/// the delays of u span.
+/// # Method
+/// QR and rank of the delayed inputs, their means removed: a step spans few directions, and only those are counted.
+/// # Shapes
+/// u, e: N samples, more than twice `lags`.
+/// # Units
+/// None.
+/// # Accuracy
+/// Conservative: directions that the model's own fit has emptied are counted. Blind to what poles and gains absorb.
+/// # Errors
+/// Lengths, values that are not finite, too few samples, a constant e.
+/// # Source
+/// L. Ljung, System Identification (1999), section 16.6.
+pub fn input_dependence(u: &[f64], e: &[f64], lags: usize) -> Result<TestResult, ModelError> {
+    if u.len() != e.len() {
+        return Err(ModelError::Length { what: "input", found: u.len(), wanted: e.len() });
+    }
+    finite("input", u)?;
+    finite("residual", e)?;
+    if e.len() < 2 * lags + 2 {
+        return Err(ModelError::TooShort { found: e.len(), wanted: 2 * lags + 2 });
+    }
+    let rows = e.len() - lags;
+    let centred = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|value| value - mean).collect::<Vec<f64>>()
+    };
+    let target = centred(&e[lags..]);
+    let variance = target.iter().map(|e| e * e).sum::<f64>() / rows as f64;
+    if variance <= 0.0 {
+        return Err(ModelError::ConstantOutput);
+    }
+    let mut matrix = Mat::zeros(rows, lags + 2);
+    for lag in 0..=lags {
+        let column = centred(&u[lags - lag..lags - lag + rows]);
+        matrix.col_mut(lag).iter_mut().zip(&column).for_each(|(m, u)| *m = *u);
+    }
+    matrix.col_mut(lags + 1).iter_mut().zip(&target).for_each(|(m, e)| *m = *e);
+    let r = TallQr::triangle(matrix.as_ref());
+    let svd = Svd::new(&r.as_ref().get(..lags + 1, ..lags + 1).to_owned())?;
+    // directions 1e9 times weaker than the strongest are rounding of the means
+    let rank = if svd.s.first().is_some_and(|s| *s > 0.0) { svd.rank(1e-9) } else { 0 };
+    let statistic: f64 =
+        (0..rank).map(|k| (0..=lags).map(|i| svd.u[(i, k)] * r[(i, lags + 1)]).sum::<f64>().powi(2)).sum::<f64>()
+            / variance;
+    Ok(TestResult::new(statistic, rank))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::white_noise;
+
+    #[test]
+    fn p_values_of_white_noise_are_uniform() {
+        let u: Vec<f64> = (0..2000).map(|k| if k < 500 { -1.0 } else { 0.0 }).collect();
+        let (mut white, mut input) = (Vec::new(), Vec::new());
+        for seed in 0..100 {
+            let e = white_noise(2000, 1e-3, seed);
+            white.push(whiteness(&e, 25, 0).unwrap().p_value);
+            input.push(input_dependence(&u, &e, 10).unwrap().p_value);
+        }
+        for p in [white, input] {
+            let mean = p.iter().sum::<f64>() / 100.0;
+            // uniform: standard error of the mean 0.029, four of them
+            assert!((mean - 0.5).abs() < 0.12, "{mean}");
+        }
+    }
+
+    #[test]
+    fn colour_and_a_forgotten_response_are_seen() {
+        let noise = white_noise(2001, 1e-3, 1);
+        let coloured: Vec<f64> = noise.windows(2).map(|w| w[1] + 0.2 * w[0]).collect();
+        // correlation 0.19 at lag 1: 8.6 standard errors
+        assert!(whiteness(&coloured, 25, 0).unwrap().p_value < 1e-6);
+        let u: Vec<f64> = (0..2000).map(|k| if k < 500 { -1.0 } else { 0.0 }).collect();
+        let left: Vec<f64> = noise.iter().zip(&u).map(|(e, u)| e + 3e-4 * u).collect();
+        // a step of 0.3 standard deviations over 500 of 2000 samples: 5.8 standard errors
+        assert!(input_dependence(&u, &left, 10).unwrap().p_value < 1e-2);
+    }
+
+    #[test]
+    fn unusable_residuals_are_refused() {
+        assert!(whiteness(&[0.0; 50], 20, 0).is_err());
+        assert!(whiteness(&white_noise(50, 1.0, 1), 20, 20).is_err());
+        assert!(whiteness(&white_noise(10, 1.0, 1), 20, 0).is_err());
+        assert!(input_dependence(&[0.0; 10], &white_noise(50, 1.0, 1), 5).is_err());
+        // an input that never moves has nothing to depend on
+        assert_eq!(input_dependence(&[1.0; 50], &white_noise(50, 1.0, 1), 5).unwrap().freedom, 0);
+    }
+}

@@ -1,0 +1,269 @@
+//! The stage `model.contact`.
+
+mod output;
+mod reading;
+#[cfg(test)]
+mod tests;
+
+use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
+use faer::c64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use self::output::{contact_table, share_table, summary};
+use self::reading::ringing;
+use super::ringdown::POLES;
+use crate::calibration::StiffnessSummary;
+use crate::calibration::reading::within;
+use afmid_kernels::contact::{
+    FreeLever, JointContact, JointOptions, LOADED_BEAM_SHARES, LawChoice, Ringing, coupled_poles, joint_contact,
+};
+use afmid_kernels::ringdown::{Estimate, ModeEstimate};
+
+/// Stiffness and damping of the contact, contact resonances and tip shares, from the ringings of the free lever and of the lever on the surface.
+///
+/// Model: the free lever as its tip sees it is G(s) = (1/k) (sum_n c_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + 1 - sum_n c_n), as the detector sees it H(s) D(s),
+/// H with real gains in the place of the tip shares c_n, D a chain of real poles. The contact is kappa(s) = k_c + eta s + mu s^2. Poles of the coupled lever are
+/// where 1 + kappa G = 0; its response is H D / (1 + kappa G): zeros and detector are the free lever's. Both ringings follow a step of the tip's force.
+/// Method: generalised least squares of all poles and residues, each ringing with its full covariance, over contact, tip shares, free poles, gains and
+/// detector at once. Without residues, or where they do not fit (p below 0.01, a warning), poles alone.
+/// Shapes: `contact` by coupled pole, ascending; `shares` by free mode.
+/// Units: N/m, N s/m, kg, Hz.
+/// Accuracy: to first order in the errors; known stiffness, damping and shares recovered within their errors over 100 simulated archives (docs/accuracy.md).
+/// Bias: modes beyond the free lever's count as a static compliance only, of what the given shares leave of one; a second-order term below its
+/// threshold shifts shares and stiffness. A relative error of k is the same relative error of the contact.
+/// Errors: as many shares as free modes are wanted; no stiffness; poles that no linear contact on this lever gives; fewer poles than shares and contact
+/// ask for. Poles that disagree are a warning.
+/// Source: U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281; A. C. Aitken, Proc. R. Soc. Edinb. 55 (1936) 42.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ContactFit {
+    /// Static stiffness of the lever at its tip in N/m, above 0, where `stiffness` is not wired. Default: absent.
+    pub stiffness_n_per_m: Option<f64>,
+    /// Its relative standard error, 0 to 1, where `stiffness` is not wired. Default: 0, errors are then those of the ratio to k.
+    pub stiffness_error: f64,
+    /// What each free mode has of the tip's static compliance, ascending, above 0, their sum at most 1; the rest counts as static. Their sum is kept, each
+    /// is a start. Default: 0.9713, 0.0247, 0.0032, 0.0008, a beam loaded at its end.
+    pub tip_shares: Vec<f64>,
+    /// Relative standard error of each share but the first, which makes up for the others, 0 to 10; 0 takes them as they are. Default: absent, the data
+    /// alone say them; wanted where there are fewer coupled poles than shares.
+    pub tip_share_error: Option<f64>,
+    /// The contact's law: `spring-damper`, `second-order`, or `auto`, which takes the second where it lowers chi square by more than 9. Default: auto.
+    pub law: Law,
+    /// Coupled poles above this frequency in Hz are left out; above 0. Default: absent, all count.
+    pub max_frequency_hz: Option<f64>,
+}
+
+/// The contact's force by frequency.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// `k_c + eta s`.
+    SpringDamper,
+    /// `k_c + eta s + mu s^2`.
+    SecondOrder,
+    /// What the data ask for.
+    Auto,
+}
+
+impl Default for ContactFit {
+    fn default() -> Self {
+        Self {
+            stiffness_n_per_m: None,
+            stiffness_error: 0.0,
+            tip_shares: LOADED_BEAM_SHARES.to_vec(),
+            tip_share_error: None,
+            law: Law::Auto,
+            max_frequency_hz: None,
+        }
+    }
+}
+
+const FREE: Port<Table> = Port::new("free", "", "modes of the free lever: of `model.ringdown` or `model.modes`");
+const FREE_POLES: Port<Array> = Port::optional(
+    "free_poles",
+    "ringdown-poles",
+    "the same fit's poles and residues: what zeros and detector are known from",
+);
+const STIFFNESS: Port<Document> = Port::optional("stiffness", "stiffness", "the summary of `calibration.stiffness`");
+const CONTACT: Port<Table> =
+    Port::new("contact", "contact-poles", "contact resonances; what each says alone, and what it counts");
+const SHARES: Port<Table> = Port::new("shares", "tip-shares", "tip shares of the free modes");
+const SUMMARY: Port<Document> =
+    Port::new("summary", "summary", "the contact with its errors, shares, resonances, tests");
+
+/// Poles that agree give a smaller p-value once in a hundred archives.
+const DISAGREEMENT: f64 = 0.01;
+
+impl Stage for ContactFit {
+    const SPEC: Spec = Spec {
+        name: "model.contact",
+        version: 2,
+        summary: "contact stiffness, damping and resonances, sharing zeros and detector with the free lever",
+        inputs: &[FREE.spec(), FREE_POLES.spec(), POLES.spec(), STIFFNESS.spec()],
+        outputs: &[CONTACT.spec(), SHARES.spec(), SUMMARY.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        within("stiffness_n_per_m", self.stiffness_n_per_m.unwrap_or(1.0), 1e-6, 1e6)?;
+        within("stiffness_error", self.stiffness_error, 0.0, 1.0)?;
+        within("tip_share_error", self.tip_share_error.unwrap_or(1.0), 0.0, 10.0)?;
+        within("max_frequency_hz", self.max_frequency_hz.unwrap_or(1.0), 1e-6, 1e12)?;
+        for &share in &self.tip_shares {
+            within("tip_shares", share, 1e-12, 1.0)?;
+        }
+        // 1e-6: rounding of their decimal digits
+        within("sum of `tip_shares`", self.tip_shares.iter().sum(), 1e-12, 1.0 + 1e-6)
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let lever = self.lever(inputs.get(&FREE)?, inputs.find(&STIFFNESS)?)?;
+        let free = match inputs.find(&FREE_POLES)? {
+            Some(array) => ringing(array, f64::INFINITY)?,
+            None => Ringing::of_modes(&lever),
+        };
+        let most = self.max_frequency_hz.map_or(f64::INFINITY, |f| std::f64::consts::TAU * f);
+        let coupled = ringing(inputs.get(&POLES)?, most)?;
+        let contact = joint_contact(&lever, &free, &coupled, &self.options()).map_err(|error| {
+            StageError::from_error(error).help(
+                "look at the coupled modes: leave wrong ones out with `max_frequency_hz` or fit fewer `modes`; with fewer poles than shares give \
+                 `tip_share_error`",
+            )
+        })?;
+        warn(&contact, cx);
+        Ok(Ports::new()
+            .with(&CONTACT, contact_table(&contact))
+            .with(&SHARES, share_table(&contact, &lever, &self.tip_shares))
+            .with(&SUMMARY, summary(&contact, &lever)?))
+    }
+
+    fn examples() -> Vec<Example> {
+        vec![Example {
+            title: "Two poles of a lever on 60 N/m",
+            params: "stiffness_n_per_m = 3.8\ntip_shares = [0.97, 0.03]",
+            inputs: example_inputs,
+            expect: |outputs| {
+                let summary = &outputs.get(&SUMMARY).map_err(|error| error.to_string())?.0;
+                let number = |name: &str| summary[name].as_f64().unwrap_or(f64::NAN);
+                let (k, eta) = (number("contact_stiffness_n_per_m"), number("contact_damping_n_s_per_m"));
+                // noise-free: rounding
+                if (k / 60.0 - 1.0).abs() < 1e-9 && (eta / 8e-6 - 1.0).abs() < 1e-8 {
+                    Ok(format!("{k:.2} N/m +- {:.2}.", number("contact_stiffness_std_n_per_m")))
+                } else {
+                    Err(format!("{k} {eta}"))
+                }
+            },
+        }]
+    }
+}
+
+fn warn(contact: &JointContact, cx: &Context) {
+    // where poles alone disagree already, residues cannot say more
+    let disagree = contact.p_value < DISAGREEMENT;
+    if let Some(test) = contact.residues.filter(|test| !test.used && !disagree) {
+        cx.warn(format!(
+            "the residues are not those of a step of force at the tip (chi square {:.1} with {} degrees of freedom, p = {:.1e}): poles alone are used; \
+             the catch takes time, or the detector is not the free lever's",
+            test.chi_square, test.freedom, test.p_value
+        ));
+    }
+    if disagree {
+        cx.warn(format!(
+            "poles{} disagree on the contact: chi square {:.1} with {} degrees of freedom (p = {:.1e}); its errors are too small: missing modes, a \
+             nonlinear contact, or given shares that are wrong",
+            if contact.residues.is_some_and(|test| test.used) { " and residues" } else { "" },
+            contact.chi_square,
+            contact.freedom,
+            contact.p_value
+        ));
+    }
+    if let (Some(gain), Some(inertia)) = (contact.law_gain, contact.inertia_kg) {
+        cx.warn(format!(
+            "not a contact of spring and damper: a term of {:.2e} +- {:.1e} kg lowers chi square by {gain:.1}; {}",
+            inertia.value,
+            inertia.std,
+            if inertia.value < 0.0 {
+                "it stiffens with frequency, as one that relaxes or whose force comes late"
+            } else {
+                "it moves a mass"
+            }
+        ));
+    }
+    if contact.stiffness_n_per_m.value <= 0.0 || contact.damping_n_s_per_m.value < 0.0 {
+        cx.warn(format!(
+            "a contact of {:.3e} N/m and {:.3e} N s/m: not of a surface that only holds and damps",
+            contact.stiffness_n_per_m.value, contact.damping_n_s_per_m.value
+        ));
+    }
+}
+
+impl ContactFit {
+    fn options(&self) -> JointOptions {
+        let law = match self.law {
+            Law::SpringDamper => LawChoice::SpringDamper,
+            Law::SecondOrder => LawChoice::SecondOrder,
+            Law::Auto => LawChoice::Auto,
+        };
+        JointOptions { law, share_error: self.tip_share_error }
+    }
+
+    fn lever(&self, free: &Table, wired: Option<&Document>) -> Result<FreeLever, StageError> {
+        let stiffness = match (wired, self.stiffness_n_per_m) {
+            (Some(document), _) => {
+                let found = document.read::<StiffnessSummary>()?.stiffness_n_per_m;
+                Estimate { value: found.value, std: found.std }
+            }
+            (None, Some(value)) => Estimate { value, std: value * self.stiffness_error },
+            (None, None) => {
+                return Err(StageError::new(
+                    "no stiffness of the lever: neither `stiffness` is wired nor `stiffness_n_per_m` given",
+                )
+                .help("wire the summary of `calibration.stiffness`, or give the number"));
+            }
+        };
+        let (f, f_std) = (free.real("frequency_hz")?, free.real("frequency_std_hz")?);
+        let (q, q_std) = (free.real("quality_factor")?, free.real("quality_factor_std")?);
+        if f.len() != self.tip_shares.len() {
+            return Err(StageError::new(format!(
+                "the free lever has {} modes, `tip_shares` {} numbers",
+                f.len(),
+                self.tip_shares.len()
+            ))
+            .help("give one share for each mode"));
+        }
+        let estimate = |value: &[f64], std: &[f64], i: usize| Estimate { value: value[i], std: std[i] };
+        let modes = (0..f.len())
+            .map(|i| ModeEstimate { frequency_hz: estimate(f, f_std, i), quality_factor: estimate(q, q_std, i) })
+            .collect();
+        // shares with an error are the joint estimate's to count
+        FreeLever::new(stiffness, modes, self.tip_shares.clone(), 0.0).map_err(StageError::from_error)
+    }
+}
+
+/// A lever of two modes, and its exact poles on a contact of 60 N/m and 8e-6 N s/m.
+fn example_inputs() -> Result<Ports, StageError> {
+    let (f, q) = ([46.3e3, 247.4e3], [40.8, 193.2]);
+    let free = Table::new()
+        .with("frequency_hz", "Hz", "resonance frequency", f.to_vec())
+        .with("frequency_std_hz", "Hz", "its standard error", vec![0.1, 1.0])
+        .with("quality_factor", "1", "quality factor", q.to_vec())
+        .with("quality_factor_std", "1", "its standard error", vec![0.01, 0.1]);
+    let stage = ContactFit { stiffness_n_per_m: Some(3.8), tip_shares: vec![0.97, 0.03], ..ContactFit::default() };
+    let lever = stage.lever(&free, None)?;
+    let start = [c64::new(-3e4, 9.3e5), c64::new(-1e5, 2e6)];
+    let poles = coupled_poles(&lever, [60.0, 8e-6], &start).ok_or_else(|| StageError::new("no coupled poles"))?;
+    let axis = |name: &str| Axis::new(name, "1", "parts of the poles", vec![0.0, 1.0, 2.0, 3.0]);
+    let array = Array::over(vec![axis("parameter"), axis("other")])
+        .with("pole", "rad/s", "poles", &["parameter"], poles.iter().flat_map(|p| [p.re, p.im]).collect::<Vec<f64>>())
+        .with(
+            "covariance",
+            "rad^2/s^2",
+            "their covariance",
+            &["parameter", "other"],
+            (0..16).map(|i| if i % 5 == 0 { 1e4 } else { 0.0 }).collect::<Vec<f64>>(),
+        );
+    Ok(Ports::new().with(&FREE, free).with(&POLES, array))
+}

@@ -1,0 +1,371 @@
+//! The stage `model.grey`.
+
+mod known;
+mod tables;
+#[cfg(test)]
+mod tests;
+
+use afmid_pipeline::{
+    Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
+};
+use faer::c64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+pub use self::known::{GreyNumber, GreyNumberKind};
+use self::tables::{mode_table, named, parameter_table, static_gain, with_interval};
+use super::modes::innovations;
+use super::order::simulated_percent;
+use super::pem::{DataSet, MODEL, PAIR, RESIDUALS, SUMMARY, ending, state_space};
+use super::series::PairSeries;
+use afmid_kernels::grey::{Before, Grey, GreyHold, GreyOptions, GreyQuantity, GreyStart, InputBetween, fit_grey};
+use afmid_kernels::pem::{Experiment, Identified, ResidualColour};
+use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, whiteness};
+
+/// Fits modes, real poles, delay and feedthrough to force and response: the grey modal form.
+///
+/// Model: G(s) = exp(-s d) [sum g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + d0] prod p_k / (s + p_k); y = G u + offset + drift + e, with e unfiltered (output error). The
+/// delay may be any part of a sample; several inputs (`force` over `input` and time) have gains and d0 each and share the rest.
+/// Method: each partial fraction discretised in closed form for the force between its samples, delay included (modified z-transform); gains, d0, offset, drift and initial state by
+/// variable projection, the rest by Levenberg-Marquardt with analytic slopes. Starts from subspace estimates, given modes or the poles of the model on port `start`, and a grid of real
+/// poles and delays. Missing responses are left out.
+/// Shapes: `modes` by mode, `parameters` by parameter; `residual` and `prediction` (here the simulation) over time; `model` as of `model.pem`, with one or two poles at z = 0 for
+/// the delay.
+/// Units: Hz, seconds; gains in volts per volt where the force is given as static deflection.
+/// Accuracy: the Cramer-Rao bound in white noise, unbiased, 95 % intervals that hold (docs/accuracy.md); the errors follow the residual's own spectrum, but under thermal noise
+/// `model.ringdown` is more precise. A delay is told from a real pole by the shape of the first samples alone: the errors say how well. `model` is exact up to two samples of delay, beyond
+/// which whole samples are told as `dead_samples` and warned of.
+/// Errors: too few samples, values that are not finite, a response that is constant, fewer oscillations than `modes`, knowledge of what is not fitted. No convergence is a warning, and
+/// so is a number on a bound, whose error is unknown.
+/// Source: L. Ljung, System Identification, 1999, chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1; E. I. Jury, Theory and Application of the z-Transform Method, 1964.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct GreyEstimate {
+    /// Oscillating modes, 1 to 40. Default: 4, the paper's.
+    pub modes: usize,
+    /// Real poles of detector and electronics, 0 to 8. Default: 1; further ones and the delay take each other's place.
+    pub real_poles: usize,
+    /// Estimate a delay, or take what is `known` of it. Default: true; without it is none.
+    pub delay: bool,
+    /// Estimate what passes without any mode. Default: true: modes beyond the fitted ones act like that.
+    pub feedthrough: bool,
+    /// Which events: `all`, or one half (`identification`, `verification`). Default: all.
+    pub set: DataSet,
+    /// What the force does between its samples: `held` until the next, or `linear`. Default: held, exact for a step at a sample.
+    pub between: InputBetween,
+    /// Before the first sample the system was `settled` under its first force, at `rest` without any, or `anything` (an initial state is estimated). Default: anything;
+    /// settled says more where it is true, as before a release.
+    pub history: Before,
+    /// Estimate a constant offset of the response. Default: true.
+    pub offset: bool,
+    /// Estimate a linear drift of the response. Default: true; averaged records wander.
+    pub drift: bool,
+    /// Seconds before t0 that are used, above 0. Default: none, all of them.
+    pub before_s: Option<f64>,
+    /// What is known beforehand, such as `{ quantity = "delay_s", fixed = 1e-6 }`, `{ quantity = "gain", mode = 2, between = [0.0, 0.2] }` or
+    /// `{ quantity = "corner_hz", real_pole = 1, about = [1.3e6, 1e5] }`. Default: nothing.
+    pub known: Vec<GreyNumber>,
+    /// Modes to start from, `[frequency in Hz, quality factor]` each, as many as `modes`. Default: none, from the port `start` or from subspace estimates.
+    pub start_modes: Vec<[f64; 2]>,
+    /// Rows of the Hankel matrix of the start, six more than twice the modes and the real poles, at least, to 1000. Default: 60.
+    pub block_rows: usize,
+    /// Starts that are refined, 1 to 100. Default: 3.
+    pub starts: usize,
+    /// Most steps of a search, 1 to 10000. Default: 60; ten are usual.
+    pub max_iterations: usize,
+    /// Standard errors for `white` residuals or by the residual's own spectrum. Default: true, by the spectrum.
+    pub coloured: bool,
+}
+
+impl Default for GreyEstimate {
+    fn default() -> Self {
+        Self {
+            modes: 4,
+            real_poles: 1,
+            delay: true,
+            feedthrough: true,
+            set: DataSet::All,
+            between: InputBetween::Held,
+            history: Before::Anything,
+            offset: true,
+            drift: true,
+            before_s: None,
+            known: Vec::new(),
+            start_modes: Vec::new(),
+            block_rows: 60,
+            starts: 3,
+            max_iterations: 60,
+            coloured: true,
+        }
+    }
+}
+
+const START: Port<StateSpace> = Port::optional("start", "model", "a model whose poles the search starts from");
+const MODES: Port<Table> = Port::new("modes", "modes", "the modes, ascending as started");
+const PARAMETERS: Port<Table> =
+    Port::new("parameters", "grey-parameters", "all numbers of the grey form, with their errors");
+
+impl Stage for GreyEstimate {
+    const SPEC: Spec = Spec {
+        name: "model.grey",
+        version: 4,
+        summary: "fits modes, real poles, delay and feedthrough: the grey modal form",
+        inputs: &[PAIR.spec(), START.spec()],
+        outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec(), MODES.spec(), PARAMETERS.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "L. Ljung, System Identification, 1999; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        for (name, value, least, most) in [
+            ("modes", self.modes, 1, 40),
+            ("real_poles", self.real_poles, 0, 8),
+            ("block_rows", self.block_rows, 2 * self.modes + self.real_poles + 6, 1000),
+            ("starts", self.starts, 1, 100),
+            ("max_iterations", self.max_iterations, 1, 10_000),
+        ] {
+            if !(least..=most).contains(&value) {
+                return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
+            }
+        }
+        if let Some(before) = self.before_s.filter(|before| !(*before > 0.0 && before.is_finite())) {
+            return Err(StageError::new(format!("`before_s` is {before}, wanted above 0")));
+        }
+        if !self.start_modes.is_empty() && self.start_modes.len() != self.modes {
+            let found = self.start_modes.len();
+            return Err(StageError::new(format!(
+                "`start_modes` has {found}, wanted {} as `modes` says, or none",
+                self.modes
+            )));
+        }
+        if let Some([f, q]) =
+            self.start_modes.iter().find(|[f, q]| !(*f > 0.0 && *q > 0.5 && f.is_finite() && q.is_finite()))
+        {
+            return Err(StageError::new(format!(
+                "`start_modes` has [{f}, {q}], wanted a frequency above 0 and a quality factor above 0.5"
+            )));
+        }
+        self.check_known()
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let pair = inputs.get(&PAIR)?;
+        let rate = pair.number("sample_rate_hz")?;
+        let first = self.first_sample(pair, rate)?;
+        let series = PairSeries::new(pair, self.set, first)?;
+        let options = self.options(inputs.find(&START)?)?;
+        let experiment = Experiment { input: &series.input, output: &series.output };
+        let fit = fit_grey(&[experiment], 1.0 / rate, &options).map_err(StageError::from_error)?;
+        self.warn(&fit, series.output.len(), cx);
+        let identified = identified(&fit, &series)?;
+        let mut model = state_space(&identified, self.set, first)?;
+        model.attributes.insert("offset_fitted".to_owned(), self.offset.into());
+        model.attributes.insert("drift_fitted".to_owned(), self.drift.into());
+        model.attributes.insert("delay_s".to_owned(), fit.model.delay_s.into());
+        model.attributes.insert("dead_samples".to_owned(), fit.discrete.dead_samples.into());
+        if let Some(ambiguity) = pair.attributes.get("t0_ambiguity_s") {
+            model.attributes.insert("t0_ambiguity_s".to_owned(), ambiguity.clone());
+        }
+        let summary = self.summary(&fit, &identified, &series, first)?;
+        let residual = fit.experiments.first().map_or_else(Vec::new, |own| own.residual.clone());
+        let prediction = series.output.iter().zip(&residual).map(|(y, e)| y - e).collect::<Vec<f64>>();
+        let residuals = Array::over(vec![Axis::new("time", "s", "time since t0", series.time.clone())])
+            .with("residual", &series.unit, "response less simulation", &["time"], residual)
+            .with("prediction", &series.unit, "response simulated from the force", &["time"], prediction)
+            .attribute("sample_rate_hz", rate);
+        Ok(Ports::new()
+            .with(&MODEL, model)
+            .with(&RESIDUALS, residuals)
+            .with(&SUMMARY, summary)
+            .with(&MODES, mode_table(&fit))
+            .with(&PARAMETERS, parameter_table(&fit)))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::example::grey()
+    }
+}
+
+impl GreyEstimate {
+    fn check_known(&self) -> Result<(), StageError> {
+        let known = self.known.iter().map(GreyNumber::known).collect::<Result<Vec<_>, _>>()?;
+        for (i, entry) in known.iter().enumerate() {
+            let name = named(entry.quantity).0;
+            if known[..i].iter().any(|other| other.quantity == entry.quantity) {
+                return Err(StageError::new(format!("`known` has two entries for {name}")));
+            }
+            let there = match entry.quantity {
+                GreyQuantity::Frequency(n) | GreyQuantity::QualityFactor(n) | GreyQuantity::Gain { mode: n, .. } => {
+                    n < self.modes
+                }
+                GreyQuantity::RealPole(k) => k < self.real_poles,
+                GreyQuantity::Delay => self.delay,
+                GreyQuantity::Feedthrough(_) => self.feedthrough,
+            };
+            if !there {
+                return Err(StageError::new(format!("`known` names the {name}, which is not fitted")));
+            }
+            if let Err(error) = entry.check() {
+                return Err(StageError::new(format!("`known`, {name}: {error}")));
+            }
+        }
+        Ok(())
+    }
+
+    fn options(&self, start: Option<&StateSpace>) -> Result<GreyOptions, StageError> {
+        let start = match start {
+            _ if !self.start_modes.is_empty() => GreyStart::Modes(self.start_modes.clone()),
+            Some(model) => {
+                let (model, _) = innovations(model)?;
+                GreyStart::Poles(model.sections.iter().flat_map(|section| section.poles()).collect::<Vec<c64>>())
+            }
+            None => GreyStart::Subspace,
+        };
+        Ok(GreyOptions {
+            modes: self.modes,
+            real_poles: self.real_poles,
+            delay: self.delay,
+            feedthrough: self.feedthrough,
+            offset: self.offset,
+            slope: self.drift,
+            before: self.history,
+            between: self.between,
+            known: self.known.iter().map(GreyNumber::known).collect::<Result<_, _>>()?,
+            start,
+            block_rows: self.block_rows,
+            starts: self.starts,
+            max_iterations: self.max_iterations,
+            colour: if self.coloured { ResidualColour::Spectrum } else { ResidualColour::White },
+        })
+    }
+
+    fn first_sample(&self, pair: &Array, rate: f64) -> Result<usize, StageError> {
+        let Some(before) = self.before_s else { return Ok(0) };
+        let first = pair.number("t0_sample")? - (before * rate).ceil();
+        Ok(first.clamp(0.0, pair.axis("time")?.values.len() as f64) as usize)
+    }
+
+    fn warn(&self, fit: &Grey, samples: usize, cx: &Context) {
+        if !fit.verdict.converged {
+            cx.warn(format!(
+                "no minimum after {} steps: {:.2} standard errors to go; try other modes, real poles or starts",
+                fit.verdict.iterations,
+                fit.verdict.gradient * (samples as f64).sqrt(),
+            ));
+        }
+        for parameter in &fit.parameters {
+            let (name, unit) = named(parameter.quantity);
+            let value = parameter.estimate.value;
+            if parameter.hold == GreyHold::Bound {
+                cx.warn(format!("the {name} sits on a bound, at {value:.6e} {unit}: its error is unknown"));
+            } else if parameter.hold == GreyHold::Free && parameter.estimate.std.is_nan() {
+                cx.warn(format!("the data say nothing of the {name}: leave it out or give it"));
+            }
+        }
+        if fit.discrete.dead_samples > 0 {
+            cx.warn(format!(
+                "the model comes {} whole samples before the delay of {:.4e} s: shift the force by them before it is simulated",
+                fit.discrete.dead_samples, fit.model.delay_s
+            ));
+        }
+    }
+
+    fn summary(
+        &self,
+        fit: &Grey,
+        identified: &Identified,
+        series: &PairSeries,
+        first: usize,
+    ) -> Result<Document, StageError> {
+        let samples = series.output.len();
+        let residual = fit.experiments.first().map_or(&[][..], |own| own.residual.as_slice());
+        let present: Vec<usize> = (0..samples).filter(|&k| residual.get(k).is_some_and(|e| e.is_finite())).collect();
+        let measured: Vec<f64> = present.iter().map(|&k| series.output[k]).collect();
+        let simulated: Vec<f64> = present.iter().map(|&k| series.output[k] - residual[k]).collect();
+        let left: Vec<f64> = present.iter().map(|&k| residual[k]).collect();
+        let nuisances = Nuisances { offset: self.offset, slope: self.drift };
+        let shares = fit.static_shares(0);
+        let modes: Vec<Value> = fit
+            .modes()
+            .iter()
+            .zip(&shares)
+            .map(|(mode, share)| {
+                json!({
+                    "frequency_hz": mode.frequency_hz.value,
+                    "frequency_std_hz": mode.frequency_hz.std,
+                    "quality_factor": mode.quality_factor.value,
+                    "quality_factor_std": mode.quality_factor.std,
+                    "static_share": share.value,
+                    "static_share_std": share.std,
+                })
+            })
+            .collect();
+        let parameters: Vec<Value> = fit
+            .parameters
+            .iter()
+            .map(|p| {
+                let (name, unit) = named(p.quantity);
+                json!({ "name": name, "unit": unit, "estimate": with_interval(p.estimate) })
+            })
+            .collect();
+        let test = whiteness(&left, 25 + fit.parameters.len(), fit.parameters.len()).ok();
+        Document::new(&json!({
+            "modes": modes,
+            "parameters": parameters,
+            "delay_s": fit.parameter(GreyQuantity::Delay).map(with_interval),
+            "static_gain": with_interval(static_gain(fit)),
+            "set": self.set,
+            "samples": samples,
+            "used_samples": present.len(),
+            "first_sample": first,
+            "order": fit.discrete.model.order(),
+            "dead_samples": fit.discrete.dead_samples,
+            "converged": fit.verdict.converged,
+            "ending": ending(fit.verdict.ending),
+            "iterations": fit.verdict.iterations,
+            "gradient_standard_errors": fit.verdict.gradient * (present.len() as f64).sqrt(),
+            "numbers_on_a_bound": fit.verdict.at_limit,
+            "innovation_std": { "value": fit.noise_variance.sqrt(), "unit": series.unit },
+            "prediction_fit_percent": fit_percent(&measured, &simulated).ok(),
+            "simulation_fit_percent": simulated_percent(identified, &late(fit, series), &series.output, nuisances),
+            "offset_v": identified.offsets.first(),
+            "drift_v_per_s": identified.slopes.first(),
+            "whiteness": test.map(|t| json!({ "statistic": t.statistic, "freedom": t.freedom, "p_value": t.p_value })),
+        }))
+    }
+}
+
+/// The inputs, later by the whole samples that the discrete model leaves out.
+fn late(fit: &Grey, series: &PairSeries) -> Vec<f64> {
+    let (samples, dead) = (series.output.len().max(1), fit.discrete.dead_samples);
+    let moved = |u: &[f64]| (0..u.len()).map(|k| u[k.saturating_sub(dead)]).collect::<Vec<f64>>();
+    series.input.chunks(samples).flat_map(moved).collect()
+}
+
+/// The fit in the terms of `model.pem`; its initial state is the one from which the discrete model simulates the same.
+fn identified(fit: &Grey, series: &PairSeries) -> Result<Identified, StageError> {
+    let none = || StageError::new("the fit has no experiment");
+    let own = fit.experiments.first().ok_or_else(none)?;
+    let samples = series.output.len();
+    let centre = 0.5 * (samples.max(2) - 1) as f64;
+    let level = |k: usize| own.offset.value + own.slope.value * (k as f64 - centre) / centre;
+    let clean: Vec<f64> = (0..samples).map(|k| series.output[k] - own.residual[k] - level(k)).collect();
+    let nuisances = Nuisances { offset: false, slope: false };
+    let discrete = &fit.discrete;
+    let simulated = simulate_held_out(&discrete.model, &discrete.further, &late(fit, series), &clean, nuisances);
+    Ok(Identified {
+        model: discrete.model.clone(),
+        further_inputs: discrete.further.clone(),
+        initial_states: vec![simulated.map_err(StageError::from_error)?.initial_state],
+        offsets: vec![own.offset.value],
+        slopes: vec![own.slope.value * series.rate / centre],
+        residuals: vec![own.residual.clone()],
+        innovation_variance: fit.noise_variance,
+        covariance: discrete.covariance.clone(),
+        predictor_poles: Vec::new(),
+        singular_values: Vec::new(),
+        verdict: fit.verdict,
+    })
+}

@@ -1,0 +1,453 @@
+//! The stage `model.modes`.
+
+use afmid_kernels::spectra::Intersample;
+use afmid_pipeline::{
+    Array, Attribute, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace,
+    Table,
+};
+use faer::Mat;
+use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::pem::{DataSet, MODEL};
+use super::series::PairSeries;
+use afmid_kernels::model::{InnovationsModel, InputGains};
+use afmid_kernels::modes::{
+    Interval, LEVEL, ModeCriteria, Pole, PoleKind, ResponsePoint, Root, at_rest, poles, response,
+    share_error_from_onset, zeros,
+};
+use afmid_kernels::validation::{Nuisances, noise_ceiling_percent, simulate_held_out};
+
+/// Extracts modes, poles and zeros from a model, each with its standard error, and judges the model on held-out events.
+///
+/// Model: s = ln(z) / Ts, f = |s| / 2 pi, Q = |s| / (-2 Re s), pole by pole; a mode is an established, weakly damped pair; the rest are detector
+/// poles, doubtful pairs, and real negative ones, which have no continuous counterpart.
+/// Method: zeros are the invariant zeros of (A, B, C, D). Standard errors by the delta method from the model's covariance. Held-out fit: the model of
+/// the identification half simulated on the verification half's force, initial state, offset and drift fitted again. The error of a static share counts the ambiguity of t0: an event
+/// that was d earlier turns and raises the mode's amplitude by exp(-s d); the root mean square over the pair's `t0_ambiguity_s`, at least one
+/// sample, is added in squares. Intervals are those of 95 %: normal for frequencies, quality factors, gain and delay, log-normal for the response's magnitude; the phase's is 1.96 `phase_std` on
+/// either side.
+/// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency. Of a model with several inputs zeros,
+/// shares and response are those of the first. `at_rest` in the summary: static gain, and the group delay at zero frequency, without the hold's half sample if `intersample` is held.
+/// Units: Hz; static shares are parts of the static gain.
+/// Accuracy: first order in the errors; over 300 seeds of a second-order system the intervals of zeros, gain, delay and response cover 90 to 99 % each (test). A static share is the mode's own partial fraction: within the detector's roll-off it is turned and damped by it.
+/// Zeros map as poles do; the hold makes them differ from the continuous system's by 2e-3 in frequency (closed-form test).
+/// Errors: a model that is not one of `model.pem`, or without covariance; a pair of another sample rate.
+/// Source: Stark et al. 2005, Table I and Fig. 5; L. Ljung, System Identification, 1999, section 9.4.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Modes {
+    /// Least quality factor of a mode, above 0.5. Default: 5; detector poles are real or strongly damped.
+    pub min_quality_factor: f64,
+    /// Highest frequency of a mode in Hz, above 0. Default: none.
+    pub max_frequency_hz: Option<f64>,
+    /// Least amplitude of a mode's ringing over its standard error, 0 or more. Default: 6; the best of thousands of noise frequencies reaches 5.
+    pub min_significance: f64,
+    /// Largest relative standard error of a mode's quality factor, above 0. Default: 0.5; a line that does not decay is no mode.
+    pub max_quality_factor_error: f64,
+    /// Points of the frequency response, 2 to 100000, logarithmic from `response_from_hz` to half the sample rate. Default: 2000.
+    pub response_points: usize,
+    /// Lowest frequency of the response in Hz, above 0. Default: 1000.
+    pub response_from_hz: f64,
+    /// What the force does between samples, for `response`: `held` (half a sample's lag and droop are taken out, as in `spectrum.etfe`) or
+    /// `sampled`. Default: held, which is exact for a step at a sample.
+    pub intersample: Intersample,
+    /// Reference frequencies in Hz (a sweep), to compare with. Default: none.
+    pub reference_frequency_hz: Vec<f64>,
+    /// Reference quality factors, as many as frequencies, or none. Default: none.
+    pub reference_quality_factor: Vec<f64>,
+}
+
+impl Default for Modes {
+    fn default() -> Self {
+        let criteria = ModeCriteria::default();
+        Self {
+            min_quality_factor: criteria.min_quality_factor,
+            max_frequency_hz: None,
+            min_significance: criteria.min_significance,
+            max_quality_factor_error: criteria.max_quality_factor_error,
+            response_points: 2000,
+            response_from_hz: 1000.0,
+            intersample: Intersample::Held,
+            reference_frequency_hz: Vec::new(),
+            reference_quality_factor: Vec::new(),
+        }
+    }
+}
+
+const HALF: Port<StateSpace> =
+    Port::optional("half", "model", "the model of the identification half, for the held-out fit");
+const PAIR: Port<Array> = Port::optional("pair", "pair", "force and response with both halves, for the held-out fit");
+pub(super) const MODES: Port<Table> = Port::new("modes", "modes", "mechanical modes, ascending");
+pub(super) const ROOTS: Port<Table> =
+    Port::new("roots", "roots", "all poles and zeros, with classes and standard errors");
+const RESPONSE: Port<Array> = Port::new("response", "model-response", "frequency response with its standard errors");
+pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "modes and fits");
+
+impl Stage for Modes {
+    const SPEC: Spec = Spec {
+        name: "model.modes",
+        version: 5,
+        summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
+        inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
+        outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "Stark et al., Rev. Sci. Instrum. 2005, Table I and Fig. 5",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        let above = |name: &str, value: f64, least: f64| {
+            if value > least && value.is_finite() {
+                Ok(())
+            } else {
+                Err(wanted(name, value, &format!("above {least}")))
+            }
+        };
+        above("min_quality_factor", self.min_quality_factor, 0.5)?;
+        above("max_frequency_hz", self.max_frequency_hz.unwrap_or(1.0), 0.0)?;
+        above("min_significance", self.min_significance, -f64::MIN_POSITIVE)?;
+        above("max_quality_factor_error", self.max_quality_factor_error, 0.0)?;
+        above("response_from_hz", self.response_from_hz, 0.0)?;
+        if !(2..=100_000).contains(&self.response_points) {
+            return Err(wanted("response_points", self.response_points as f64, "2 to 100000"));
+        }
+        let (f, q) = (self.reference_frequency_hz.len(), self.reference_quality_factor.len());
+        if q > 0 && q != f {
+            let wanted = match f {
+                0 => "none, since `reference_frequency_hz` has none".to_owned(),
+                _ => format!("{f}, one for each of `reference_frequency_hz`, or none"),
+            };
+            let values = if q == 1 { "1 value".to_owned() } else { format!("{q} values") };
+            return Err(StageError::new(format!("`reference_quality_factor` has {values}, wanted {wanted}")));
+        }
+        if let Some(value) =
+            self.reference_frequency_hz.iter().chain(&self.reference_quality_factor).find(|v| v.is_nan() || **v <= 0.0)
+        {
+            return Err(wanted("a reference value", *value, "above 0"));
+        }
+        Ok(())
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let artifact = inputs.get(&MODEL)?;
+        let (model, covariance) = innovations(artifact)?;
+        let mut found = poles(&model, &covariance, &self.criteria()).map_err(StageError::from_error)?;
+        let ambiguity_s = onset_ambiguity(artifact);
+        for pole in found.iter_mut().filter(|pole| pole.root.is_complex()) {
+            let from_onset = share_error_from_onset(pole.amplitude, pole.root.s, ambiguity_s.unwrap_or(0.0));
+            pole.static_share_std = pole.static_share_std.hypot(from_onset);
+        }
+        let zeros = zeros(&model, &covariance).map_err(StageError::from_error)?;
+        let modes: Vec<&Pole> = found.iter().filter(|pole| pole.kind == PoleKind::Mechanical).collect();
+        if modes.is_empty() {
+            cx.warn("no pole passes as a mode: lower min_significance or min_quality_factor, or raise the order");
+        }
+        let half = inputs.find(&HALF)?;
+        let fits = match (half, inputs.find(&PAIR)?) {
+            (Some(half), Some(pair)) => held_out(half, pair)?,
+            _ => Fits::default(),
+        };
+        let points = response(&model, &covariance, &self.frequencies(1.0 / model.sample_time_s))
+            .map_err(StageError::from_error)?;
+        let summary = Document::new(&json!({
+            "modes": modes.iter().map(|mode| mode_document(mode)).collect::<Vec<Value>>(),
+            "fit_percent": {
+                "identification": fits.identification,
+                "held_out": fits.held_out,
+                "noise_ceiling": fits.noise_ceiling,
+            },
+            "t0_ambiguity_s": ambiguity_s,
+            "at_rest": self.at_rest(&model, &covariance)?,
+            "reference": self.compared(&modes),
+        }))?;
+        Ok(Ports::new()
+            .with(&MODES, mode_table(&modes))
+            .with(&ROOTS, root_table(&found, &zeros))
+            .with(&RESPONSE, response_array(&points, artifact, self.intersample))
+            .with(&SUMMARY, summary))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::example::modes()
+    }
+}
+
+impl Modes {
+    fn criteria(&self) -> ModeCriteria {
+        ModeCriteria {
+            min_quality_factor: self.min_quality_factor,
+            max_frequency_hz: self.max_frequency_hz.unwrap_or(f64::INFINITY),
+            min_significance: self.min_significance,
+            max_quality_factor_error: self.max_quality_factor_error,
+        }
+    }
+
+    /// Gain and delay with their intervals.
+    fn at_rest(&self, model: &InnovationsModel, covariance: &Mat<f64>) -> Result<Value, StageError> {
+        let rest = at_rest(model, covariance).map_err(StageError::from_error)?;
+        let hold_s = if self.intersample == Intersample::Held { 0.5 * model.sample_time_s } else { 0.0 };
+        let with_interval = |value: f64, std: f64| {
+            let Interval { low, high } = Interval::normal(value, std);
+            json!({ "value": value, "std": std, "low": low, "high": high })
+        };
+        Ok(json!({
+            "gain": with_interval(rest.gain, rest.gain_std),
+            "delay_s": with_interval(rest.delay_s - hold_s, rest.delay_std_s),
+            "level": LEVEL,
+        }))
+    }
+
+    fn frequencies(&self, rate: f64) -> Vec<f64> {
+        let (low, high) = (self.response_from_hz.min(0.25 * rate).ln(), (0.5 * rate).ln());
+        let last = (self.response_points - 1) as f64;
+        (0..self.response_points).map(|i| (low + (high - low) * i as f64 / last).exp()).collect()
+    }
+
+    /// Each reference value beside the nearest mode.
+    fn compared(&self, modes: &[&Pole]) -> Vec<Value> {
+        let row = |(i, &reference): (usize, &f64)| {
+            let distance = |mode: &Pole| (mode.root.frequency_hz / reference).ln().abs();
+            let numbered = modes.iter().enumerate().min_by(|(_, x), (_, y)| distance(x).total_cmp(&distance(y)));
+            let nearest = numbered.map(|(_, mode)| mode.root);
+            let q = self.reference_quality_factor.get(i);
+            json!({
+                "mode": numbered.map(|(index, _)| index + 1),
+                "reference_frequency_hz": reference,
+                "reference_quality_factor": q,
+                "frequency_hz": nearest.map(|root| root.frequency_hz),
+                "frequency_std_hz": nearest.map(|root| root.frequency_std_hz),
+                "frequency_difference": nearest.map(|root| root.frequency_hz / reference - 1.0),
+                "frequency_difference_in_errors":
+                    nearest.and_then(|root| in_errors(root.frequency_hz - reference, root.frequency_std_hz)),
+                "quality_factor": nearest.map(|root| root.quality_factor),
+                "quality_factor_std": nearest.map(|root| root.quality_factor_std),
+                "quality_factor_difference": nearest.zip(q).map(|(root, q)| root.quality_factor / q - 1.0),
+                "quality_factor_difference_in_errors":
+                    nearest.zip(q).and_then(|(root, q)| in_errors(root.quality_factor - q, root.quality_factor_std)),
+            })
+        };
+        self.reference_frequency_hz.iter().enumerate().map(row).collect()
+    }
+}
+
+/// Width of the interval in which t0 may lie, as `force.extrapolation` states it; at least a sample, since t0 lies on the grid and the event
+/// does not. None for a pair that says nothing of it.
+fn onset_ambiguity(model: &StateSpace) -> Option<f64> {
+    let stated = model.attributes.get("t0_ambiguity_s").and_then(Attribute::as_f64)?;
+    Some(stated.max(model.sample_time_s))
+}
+
+/// A difference in standard errors; unknown where there is no error.
+fn in_errors(difference: f64, std: f64) -> Option<f64> {
+    Some(difference / std).filter(|ratio| ratio.is_finite())
+}
+
+fn wanted(name: &str, value: f64, range: &str) -> StageError {
+    StageError::new(format!("`{name}` is {value}, wanted {range}"))
+}
+
+/// Column `input` of B.
+fn input_column(artifact: &StateSpace, input: usize) -> Vec<f64> {
+    artifact.b.values.iter().skip(input).step_by(artifact.b.columns.max(1)).copied().collect()
+}
+
+/// Gains of the inputs beyond the first.
+pub(super) fn further_inputs(artifact: &StateSpace) -> Vec<InputGains> {
+    let gains = |input: usize| {
+        let b = input_column(artifact, input);
+        let pairs = b.chunks(2).map(|b| [b[0], b.get(1).copied().unwrap_or(0.0)]).collect();
+        InputGains { b: pairs, feedthrough: artifact.d.values.get(input).copied().unwrap_or(0.0) }
+    };
+    (1..artifact.b.columns).map(gains).collect()
+}
+
+/// Model, from the first input, and covariance of an artifact that a stage of this domain made.
+pub(super) fn innovations(artifact: &StateSpace) -> Result<(InnovationsModel, Mat<f64>), StageError> {
+    let n = artifact.order();
+    let a = Mat::from_fn(n, n, |i, j| artifact.a.at(i, j));
+    let feedthrough = artifact.d.values.first().copied().unwrap_or(0.0);
+    let model = InnovationsModel::from_matrices(
+        &a,
+        &input_column(artifact, 0),
+        &artifact.k.values,
+        feedthrough,
+        artifact.sample_time_s,
+    )
+    .map_err(StageError::from_error)?;
+    let count = n + artifact.b.columns * (n + 1);
+    if (artifact.covariance.rows, artifact.covariance.columns) != (count, count) {
+        return Err(StageError::new(format!(
+            "the model's covariance is {} x {}, wanted {count} x {count}: all a, then all b and d of each input",
+            artifact.covariance.rows, artifact.covariance.columns
+        )));
+    }
+    let count = 2 * n + 1;
+    Ok((model, Mat::from_fn(count, count, |i, j| artifact.covariance.at(i, j))))
+}
+
+/// FIT % of the half-split model; unknown where a part is missing.
+#[derive(Default)]
+struct Fits {
+    identification: Option<f64>,
+    held_out: Option<f64>,
+    noise_ceiling: Option<f64>,
+}
+
+fn held_out(half: &StateSpace, pair: &Array) -> Result<Fits, StageError> {
+    let (model, _) = innovations(half)?;
+    let rate = pair.number("sample_rate_hz")?;
+    if (rate * model.sample_time_s - 1.0).abs() > 1e-9 {
+        return Err(StageError::new(format!(
+            "the pair's sample rate is {rate} Hz, the model's {} Hz",
+            1.0 / model.sample_time_s
+        )));
+    }
+    let first = half.attributes.get("first_sample").and_then(Attribute::as_f64).unwrap_or(0.0) as usize;
+    let further = further_inputs(half);
+    // what the model was fitted with is fitted again; models of before this was stored had both
+    let fitted = |name: &str| half.attributes.get(name) != Some(&Attribute::Flag(false));
+    let nuisances = Nuisances { offset: fitted("offset_fitted"), slope: fitted("drift_fitted") };
+    let simulated = |set: DataSet| -> Result<f64, StageError> {
+        let series = PairSeries::new(pair, set, first)?;
+        let simulation = simulate_held_out(&model, &further, &series.input, &series.output, nuisances);
+        Ok(simulation.map_err(StageError::from_error)?.fit_percent)
+    };
+    let held_out = DataSet::Verification;
+    let ceiling = match pair.real(&format!("standard_error{}", held_out.suffix())) {
+        Ok(error) => {
+            let series = PairSeries::new(pair, held_out, first)?;
+            let error = error.get(first..).unwrap_or(&[]);
+            Some(noise_ceiling_percent(&series.output, error).map_err(StageError::from_error)?)
+        }
+        // a measured record without repetition does not say how noisy it is
+        Err(_) => None,
+    };
+    Ok(Fits {
+        identification: Some(simulated(DataSet::Identification)?),
+        held_out: Some(simulated(held_out)?),
+        noise_ceiling: ceiling,
+    })
+}
+
+fn mode_document(mode: &Pole) -> Value {
+    json!({
+        "frequency_hz": mode.root.frequency_hz,
+        "frequency_std_hz": mode.root.frequency_std_hz,
+        "quality_factor": mode.root.quality_factor,
+        "quality_factor_std": mode.root.quality_factor_std,
+        "static_share": mode.static_share,
+        "static_share_std": mode.static_share_std,
+    })
+}
+
+fn mode_table(modes: &[&Pole]) -> Table {
+    let column = |value: fn(&Pole) -> f64| modes.iter().map(|mode| value(mode)).collect::<Vec<f64>>();
+    Table::new()
+        .with("frequency_hz", "Hz", "resonance frequency", column(|m| m.root.frequency_hz))
+        .with("frequency_std_hz", "Hz", "its standard error", column(|m| m.root.frequency_std_hz))
+        .with("quality_factor", "1", "quality factor", column(|m| m.root.quality_factor))
+        .with("quality_factor_std", "1", "its standard error", column(|m| m.root.quality_factor_std))
+        .with("static_share", "1", "part of the static gain", column(|m| m.static_share))
+        .with("static_share_std", "1", "its standard error", column(|m| m.static_share_std))
+        .with("significance", "1", "ringing amplitude over its standard error", column(|m| m.significance))
+}
+
+fn root_table(poles: &[Pole], zeros: &[Root]) -> Table {
+    let roots: Vec<Root> = poles.iter().map(|pole| pole.root).chain(zeros.iter().copied()).collect();
+    let column = |value: &dyn Fn(&Root) -> f64| roots.iter().map(value).collect::<Vec<f64>>();
+    let frequency = |r: &Root| Interval::normal(r.frequency_hz, r.frequency_std_hz);
+    let quality = |r: &Root| Interval::normal(r.quality_factor, r.quality_factor_std);
+    let zero_kind = |root: &Root| if root.is_complex() { "pair" } else { "real" };
+    let kinds = poles.iter().map(|_| "pole").chain(zeros.iter().map(|_| "zero"));
+    let classes = poles.iter().map(|pole| pole.kind.name()).chain(zeros.iter().map(zero_kind));
+    Table::new()
+        .with("kind", "", "pole or zero", kinds.map(str::to_owned).collect::<Vec<String>>())
+        .with(
+            "class",
+            "",
+            "what a pole belongs to; whether a zero is one of a pair",
+            classes.map(str::to_owned).collect::<Vec<String>>(),
+        )
+        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", column(&|r| r.frequency_hz))
+        .with("frequency_std_hz", "Hz", "its standard error", column(&|r| r.frequency_std_hz))
+        .with("quality_factor", "1", "magnitude of s over minus twice its real part", column(&|r| r.quality_factor))
+        .with("quality_factor_std", "1", "its standard error", column(&|r| r.quality_factor_std))
+        .with("frequency_low_hz", "Hz", "lower end of its 95 % interval", column(&|r| frequency(r).low))
+        .with("frequency_high_hz", "Hz", "upper end", column(&|r| frequency(r).high))
+        .with("quality_factor_low", "1", "lower end of its 95 % interval", column(&|r| quality(r).low))
+        .with("quality_factor_high", "1", "upper end", column(&|r| quality(r).high))
+        .with("z_re", "1", "real part in the z plane", column(&|r| r.z.re))
+        .with("z_im", "1", "imaginary part in the z plane, upper one of a pair", column(&|r| r.z.im))
+        .with("s_re", "rad/s", "real part in the s plane", column(&|r| r.s.re))
+        .with("s_im", "rad/s", "imaginary part in the s plane", column(&|r| r.s.im))
+}
+
+/// From the response to a held input to that of the continuous system: `i w T / (1 - exp(-i w T))`.
+fn hold_correction(frequency_hz: f64, sample_time_s: f64, intersample: Intersample) -> Complex64 {
+    let angle = std::f64::consts::TAU * frequency_hz * sample_time_s;
+    match intersample {
+        Intersample::Held if angle > 0.0 => {
+            Complex64::new(0.0, angle) / (Complex64::new(1.0, 0.0) - Complex64::cis(-angle))
+        }
+        _ => Complex64::new(1.0, 0.0),
+    }
+}
+
+fn response_array(points: &[ResponsePoint], model: &StateSpace, intersample: Intersample) -> Array {
+    let over = &["frequency_hz"];
+    let factor = |point: &ResponsePoint| hold_correction(point.frequency_hz, model.sample_time_s, intersample);
+    let interval = |p: &ResponsePoint| {
+        let scale = factor(p).norm();
+        Interval::positive(p.value.norm() * scale, p.magnitude_std() * scale)
+    };
+    let axis = Axis::new("frequency_hz", "Hz", "frequency", points.iter().map(|p| p.frequency_hz).collect());
+    Array::over(vec![axis])
+        .with(
+            "transfer",
+            "1",
+            "transfer function of the model",
+            over,
+            points.iter().map(|p| Complex64::new(p.value.re, p.value.im) * factor(p)).collect::<Vec<_>>(),
+        )
+        .with(
+            "magnitude_std",
+            "1",
+            "standard error of its magnitude",
+            over,
+            points.iter().map(|p| p.magnitude_std() * factor(p).norm()).collect::<Vec<_>>(),
+        )
+        .with(
+            "magnitude_low",
+            "1",
+            "lower end of the magnitude's 95 % interval",
+            over,
+            points.iter().map(|p| interval(p).low).collect::<Vec<_>>(),
+        )
+        .with("magnitude_high", "1", "upper end", over, points.iter().map(|p| interval(p).high).collect::<Vec<_>>())
+        .with(
+            "phase_std",
+            "rad",
+            "standard error of its phase",
+            over,
+            points.iter().map(ResponsePoint::phase_std_rad).collect::<Vec<_>>(),
+        )
+        .attribute("sample_rate_hz", 1.0 / model.sample_time_s)
+        .attribute("order", model.order())
+}
+
+#[cfg(test)]
+#[test]
+fn the_hold_correction_advances_by_half_a_sample_and_undoes_the_droop() {
+    let (rate, f) = (5e6, 1.05e6);
+    let found = hold_correction(f, 1.0 / rate, Intersample::Held);
+    let x = std::f64::consts::PI * f / rate;
+    // exact: exp(i x) x / sin(x); rounding of a few operations
+    assert!((found - Complex64::from_polar(x / x.sin(), x)).norm() < 1e-14);
+    assert_eq!(hold_correction(f, 1.0 / rate, Intersample::Sampled), Complex64::new(1.0, 0.0));
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,358 @@
+//! The stage `model.pem`.
+
+use afmid_pipeline::{
+    Array, Attribute, Axis, Caching, Context, Document, Example, Matrix, Port, Ports, Spec, Stage, StageError,
+    StateSpace,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::ensemble::LEAST_EVENTS;
+
+use super::order::{Order, OrderChoice, choose_order, simulated_percent};
+use super::series::PairSeries;
+use afmid_kernels::pem::{Ending, Experiment, Focus, Identified, NoiseModel, PemOptions, identify};
+use afmid_kernels::validation::{Nuisances, TestResult, fit_percent, input_dependence, whiteness};
+
+/// Identifies a state-space model in innovations form from force and response.
+///
+/// Model: Eq. 8, x(t+Ts) = A x + B u + K e, y = C x + D u + e + offset + drift; the initial state is estimated along.
+/// Method: minimum of the squared one-step prediction errors by Levenberg-Marquardt with analytic sensitivities; all that enters linearly is
+/// eliminated exactly. Poles and predictor are stable by construction: sections of second order in reflection coefficients. Starts from a
+/// subspace estimate at every order up to the wanted one.
+/// Shapes: `residual`, `prediction` over time; A order x order; covariance of the 2 order + 1 parameters of A, B and D. Several inputs (`force` over
+/// `input` and time) give B and D as many columns.
+/// Units: volts to volts where the force is given as static deflection.
+/// Accuracy: the Cramer-Rao bound within some per cent where the noise is white plus thermal. The covariance follows the residual's own
+/// spectrum, so wander that the model leaves is counted.
+/// Errors: too few samples for the order, values that are not finite, a response that is constant; missing outputs, unless the errors that are made small
+/// are those of the simulation without noise filter (`noise = "white"`), which leaves them out. No convergence is a warning.
+/// Source: Stark et al. 2005, Eq. 8; L. Ljung, System Identification, 1999, chapters 7 and 10.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Pem {
+    /// Number of states, 1 to 40, or `auto`: the smallest up to `max_order` whose simulation of the last third of the data, fitted on the rest, is within a
+    /// standard error of the best; after a release the least BIC. Default: 11, as in the paper: four modes and three detector poles.
+    pub order: Order,
+    /// Largest order that `auto` tries, 1 to 40. Default: 16; each takes a fit.
+    pub max_order: usize,
+    /// Which events: `all`, or one half (`identification`, `verification`). Default: all.
+    pub set: DataSet,
+    /// Rows of the Hankel matrix that the start comes from, more than `order` and at most 1000. Default: 60; half as many blur close poles.
+    pub block_rows: usize,
+    /// Most iterations in each stretch of the search, 1 to 10000. Default: 60; ten to thirty are usual.
+    pub max_iterations: usize,
+    /// Parametrisation of the Kalman gain: `thermal` (white output noise and a white force on every section, one intensity each), `free` (all its
+    /// elements), `white` (none: output error) or `coloured` (none; the errors are whitened by an autoregressive filter of their own, for noise that does not
+    /// pass through the model's poles). Default: thermal; a free gain also fits the dips that the fit itself leaves at resonances.
+    pub noise: NoiseModel,
+    /// Which errors are made small: `prediction` (one sample ahead) or `simulation` (output error, started from the best of the subspace estimates and the
+    /// prediction model; K is zero). Default: prediction, the most efficient where the noise model holds.
+    pub focus: Focus,
+    /// Starts that are refined, 1 to 100. Default: 3; more than three also take subspace estimates with instruments, which records of rich input need (8).
+    pub starts: usize,
+    /// Prior against responses that the data do not ask for, 0 to 1: as if white noise of this share of each input's energy had been put in and nothing had come
+    /// out. Default: 0, none. Records that excite a narrow band need one to say anything beyond it: the share of noise in the output, over the samples.
+    pub prior: f64,
+    /// Estimate a constant offset of the response. Default: true.
+    pub offset: bool,
+    /// Estimate a linear drift of the response. Default: true; averaged records wander.
+    pub drift: bool,
+    /// Seconds before t0 that are used, above 0. Default: none, all of them. After a snap-in a few periods suffice: before it the lever is another system.
+    pub before_s: Option<f64>,
+    /// Lags of the residual tests, 1 to 1000, beyond the order. Default: 25.
+    pub test_lags: usize,
+}
+
+/// Which events a model is fitted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DataSet {
+    /// All events.
+    All,
+    /// The identification half.
+    Identification,
+    /// The verification half.
+    Verification,
+}
+
+impl DataSet {
+    /// What its variables' names end in.
+    pub const fn suffix(self) -> &'static str {
+        match self {
+            Self::All => "",
+            Self::Identification => "_identification",
+            Self::Verification => "_verification",
+        }
+    }
+}
+
+impl Default for Pem {
+    fn default() -> Self {
+        Self {
+            order: Order::Fixed(11),
+            max_order: 16,
+            set: DataSet::All,
+            block_rows: 60,
+            max_iterations: 60,
+            noise: NoiseModel::Thermal,
+            focus: Focus::Prediction,
+            starts: 3,
+            prior: 0.0,
+            offset: true,
+            drift: true,
+            before_s: None,
+            test_lags: 25,
+        }
+    }
+}
+
+pub(super) const PAIR: Port<Array> = Port::new("pair", "pair", "force and response over time since t0");
+pub(super) const MODEL: Port<StateSpace> =
+    Port::new("model", "model", "the model, with the covariance of its parameters");
+pub(super) const RESIDUALS: Port<Array> =
+    Port::new("residuals", "residuals", "prediction errors and predictions over time");
+pub(super) const SUMMARY: Port<Document> =
+    Port::new("summary", "summary", "convergence, fits of the data that it was fitted to, residual tests");
+
+impl Stage for Pem {
+    const SPEC: Spec = Spec {
+        name: "model.pem",
+        version: 7,
+        summary: "identifies a state-space model in innovations form by the prediction error method",
+        inputs: &[PAIR.spec()],
+        outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "Stark et al., Rev. Sci. Instrum. 2005, Eq. 8; L. Ljung, System Identification, 1999",
+    };
+
+    fn check(&self) -> Result<(), StageError> {
+        self.order.check(self.max_order)?;
+        within("block_rows", self.block_rows, self.order.largest(self.max_order) + 1, 1000)?;
+        within("starts", self.starts, 1, 100)?;
+        within("max_iterations", self.max_iterations, 1, 10_000)?;
+        within("test_lags", self.test_lags, 1, 1000)?;
+        if !(0.0..=1.0).contains(&self.prior) {
+            return Err(StageError::new(format!("`prior` is {}, wanted 0 to 1", self.prior)));
+        }
+        match self.before_s {
+            Some(before) if !(before > 0.0 && before.is_finite()) => {
+                Err(StageError::new(format!("`before_s` is {before}, wanted above 0")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let pair = inputs.get(&PAIR)?;
+        self.require_set(pair)?;
+        let rate = pair.number("sample_rate_hz")?;
+        let first = self.first_sample(pair, rate)?;
+        let PairSeries { input, output, time, unit, .. } = PairSeries::new(pair, self.set, first)?;
+        let experiment = Experiment { input: &input, output: &output };
+        let choice = match self.order {
+            Order::Fixed(_) => None,
+            Order::Auto => Some(choose_order(experiment, 1.0 / rate, self.max_order, &self.options(self.max_order))),
+        };
+        let choice = choice.transpose().map_err(StageError::from_error)?;
+        let order = choice.as_ref().map_or(self.order.largest(0), |choice| choice.order);
+        let fit = identify(&[experiment], 1.0 / rate, &self.options(order)).map_err(StageError::from_error)?;
+        if !fit.verdict.converged {
+            cx.warn(format!(
+                "no minimum after {} iterations: the gradient is {:.1e} of the residual, {:.2} standard errors; try another order",
+                fit.verdict.iterations,
+                fit.verdict.gradient,
+                fit.verdict.gradient * (output.len() as f64).sqrt(),
+            ));
+        }
+        if fit.verdict.at_limit > 0 {
+            cx.warn(format!(
+                "{} coordinates at their limit: a pole that does not decay; a lower order may do",
+                fit.verdict.at_limit
+            ));
+        }
+        let summary = self.summary(&fit, choice.as_ref(), &input, &output, first)?;
+        let mut model = state_space(&fit, self.set, first)?;
+        model.attributes.insert("offset_fitted".to_owned(), self.offset.into());
+        model.attributes.insert("drift_fitted".to_owned(), self.drift.into());
+        // what the model cannot know: `model.modes` counts it in the shares
+        if let Some(ambiguity) = pair.attributes.get("t0_ambiguity_s") {
+            model.attributes.insert("t0_ambiguity_s".to_owned(), ambiguity.clone());
+        }
+        let residual = fit.residuals.into_iter().next().unwrap_or_default();
+        let prediction = output.iter().zip(&residual).map(|(y, e)| y - e).collect::<Vec<f64>>();
+        let residuals = Array::over(vec![Axis::new("time", "s", "time since t0", time)])
+            .with("residual", &unit, "one-step prediction error", &["time"], residual)
+            .with("prediction", &unit, "response predicted one sample ahead", &["time"], prediction)
+            .attribute("sample_rate_hz", rate);
+        Ok(Ports::new().with(&MODEL, model).with(&RESIDUALS, residuals).with(&SUMMARY, summary))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::example::pem()
+    }
+}
+
+impl Pem {
+    fn options(&self, order: usize) -> PemOptions {
+        PemOptions {
+            order,
+            block_rows: self.block_rows,
+            max_iterations: self.max_iterations,
+            offset: self.offset,
+            slope: self.drift,
+            noise: self.noise,
+            focus: self.focus,
+            starts: self.starts,
+            prior: self.prior,
+            ..PemOptions::default()
+        }
+    }
+
+    /// Errors: a half is asked for, and the pair has none.
+    fn require_set(&self, pair: &Array) -> Result<(), StageError> {
+        let suffix = self.set.suffix();
+        if suffix.is_empty() || pair.variable(&format!("force{suffix}")).is_ok() {
+            return Ok(());
+        }
+        let half = suffix.trim_start_matches('_');
+        let events = match pair.attributes.get("count").and_then(Attribute::as_f64) {
+            Some(count) => format!(", made from {count} events"),
+            None => String::new(),
+        };
+        Err(StageError::new(format!("`set` is \"{half}\", but the pair has no halves{events}")).help(format!(
+            "set `split = true` in the stage `ensemble.average`; it splits {LEAST_EVENTS} events or more. With fewer, fit all of them: `set = \"all\"`"
+        )))
+    }
+
+    fn first_sample(&self, pair: &Array, rate: f64) -> Result<usize, StageError> {
+        let Some(before) = self.before_s else { return Ok(0) };
+        let first = pair.number("t0_sample")? - (before * rate).ceil();
+        Ok(first.clamp(0.0, pair.axis("time")?.values.len() as f64) as usize)
+    }
+
+    fn summary(
+        &self,
+        fit: &Identified,
+        choice: Option<&OrderChoice>,
+        input: &[f64],
+        output: &[f64],
+        first: usize,
+    ) -> Result<Document, StageError> {
+        let residual = fit.residuals.first().map_or(&[][..], Vec::as_slice);
+        let predicted: Vec<f64> = output.iter().zip(residual).map(|(y, e)| y - e).collect();
+        let order = fit.model.order();
+        let lags = self.test_lags + order;
+        let (all_inputs, input) = (input, input.get(..output.len()).unwrap_or(input));
+        let nuisances = Nuisances { offset: self.offset, slope: self.drift };
+        let test = |result: Result<TestResult, afmid_kernels::model::ModelError>| {
+            result.map_or(
+                json!(null),
+                |t| json!({ "statistic": t.statistic, "freedom": t.freedom, "p_value": t.p_value }),
+            )
+        };
+        let verdict = &fit.verdict;
+        let samples = output.len() as f64;
+        Document::new(&json!({
+            "order": order,
+            "order_choice": choice.map(OrderChoice::document),
+            "set": self.set,
+            "samples": output.len(),
+            "first_sample": first,
+            "converged": verdict.converged,
+            "ending": ending(verdict.ending),
+            "iterations": verdict.iterations,
+            "gradient_standard_errors": verdict.gradient * samples.sqrt(),
+            "coordinates_at_limit": verdict.at_limit,
+            "innovation_std": { "value": fit.innovation_variance.sqrt(), "unit": "V" },
+            "prediction_fit_percent": fit_percent(output, &predicted).ok(),
+            "simulation_fit_percent": simulated_percent(fit, all_inputs, output, nuisances),
+            "offset_v": fit.offsets.first(),
+            "drift_v_per_s": fit.slopes.first(),
+            "whiteness": test(whiteness(residual, lags, order)),
+            "input_dependence": test(input_dependence(input, residual, lags)),
+            "singular_values": fit.singular_values,
+        }))
+    }
+}
+
+pub(super) fn ending(ending: Ending) -> &'static str {
+    match ending {
+        Ending::Minimum => "minimum",
+        Ending::Exact => "exact",
+        Ending::Stalled => "stalled",
+        Ending::IterationLimit => "iteration-limit",
+    }
+}
+
+fn within(name: &str, value: usize, least: usize, most: usize) -> Result<(), StageError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")))
+}
+
+/// The artifact: matrices in the sections' observer form, parameters a, then b and d of each input, with their covariance.
+pub(super) fn state_space(fit: &Identified, set: DataSet, first: usize) -> Result<StateSpace, StageError> {
+    let model = &fit.model;
+    let n = model.order();
+    let (a, b, c, k) = model.matrices();
+    let mut columns = vec![(b, model.feedthrough)];
+    for gains in &fit.further_inputs {
+        let (_, b, ..) = model.from_input(gains).map_err(StageError::from_error)?.matrices();
+        columns.push((b, gains.feedthrough));
+    }
+    let inputs = columns.len();
+    let mut names: Vec<String> = (1..=n).map(|i| format!("a{i}")).collect();
+    let mut parameters = model.parameters();
+    parameters.truncate(n);
+    for (input, (b, d)) in columns.iter().enumerate() {
+        let mark = if input == 0 { String::new() } else { format!("_{}", input + 1) };
+        names.extend((1..=n).map(|i| format!("b{i}{mark}")).chain([format!("d{mark}")]));
+        parameters.extend(b.iter().copied().chain([*d]));
+    }
+    let count = parameters.len();
+    let square = |matrix: &faer::Mat<f64>, n: usize| {
+        Matrix::new(n, n, (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).map(|(i, j)| matrix[(i, j)]).collect())
+    };
+    let mut artifact = StateSpace {
+        a: square(&a, n)?,
+        b: Matrix::new(n, inputs, (0..n).flat_map(|i| columns.iter().map(move |(b, _)| b[i])).collect())?,
+        c: Matrix::row(c),
+        d: Matrix::row(columns.iter().map(|(_, d)| *d).collect()),
+        k: Matrix::column(k),
+        x0: fit.initial_states.first().cloned().unwrap_or_default(),
+        sample_time_s: model.sample_time_s,
+        innovation_variance: fit.innovation_variance,
+        parameter_names: names,
+        parameters,
+        covariance: square(&fit.covariance, count)?,
+        ..StateSpace::default()
+    };
+    let set = set.suffix().trim_start_matches('_');
+    let mut tell = |name: &str, value: afmid_pipeline::Attribute| artifact.attributes.insert(name.to_owned(), value);
+    tell("set", if set.is_empty() { "all" } else { set }.into());
+    tell("first_sample", first.into());
+    tell("converged", fit.verdict.converged.into());
+    tell("offset_v", fit.offsets.first().copied().unwrap_or(0.0).into());
+    tell("drift_v_per_s", fit.slopes.first().copied().unwrap_or(0.0).into());
+    Ok(artifact)
+}
+
+#[cfg(test)]
+#[test]
+fn a_half_that_the_pair_does_not_have_is_refused_with_what_to_do() {
+    let pair = Array::over(vec![Axis::new("time", "s", "time", vec![0.0; 64])])
+        .with("response", "V", "response", &["time"], vec![0.0; 64])
+        .with("force", "V", "force", &["time"], vec![0.0; 64])
+        .attribute("sample_rate_hz", 5e6)
+        .attribute("count", 3.0);
+    let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
+    let stage = Pem { set: DataSet::Identification, ..Pem::default() };
+    let error = stage.run(&Ports::new().with(&PAIR, pair), &cx).unwrap_err();
+    assert_eq!(error.problem, "`set` is \"identification\", but the pair has no halves, made from 3 events");
+    let help = error.help.unwrap_or_default();
+    assert!(help.contains("split = true") && help.contains("ensemble.average") && help.contains("4 events"), "{help}");
+}

@@ -1,0 +1,97 @@
+//! What the stage hands on.
+
+use afmid_pipeline::{Array, Axis, Table};
+use faer::c64;
+
+use super::ErrorSource;
+use afmid_kernels::contact::Ringing;
+use afmid_kernels::ringdown::{EventParameters, ModeEstimate, Ringdown};
+
+pub(super) fn mode_table(fit: &Ringdown, modes: &[ModeEstimate]) -> Table {
+    let column = |value: fn(&ModeEstimate) -> f64| modes.iter().map(value).collect::<Vec<f64>>();
+    let scatter = fit.sandwich.as_ref().map(|covariance| fit.modes_with(covariance));
+    let other = |value: fn(&ModeEstimate) -> f64| match &scatter {
+        Some(scatter) => scatter.iter().map(value).collect::<Vec<f64>>(),
+        None => vec![f64::NAN; modes.len()],
+    };
+    let oscillating = || fit.exponentials.iter().filter(|e| e.oscillates());
+    let thermal = (0..modes.len())
+        .map(|i| fit.noise.thermal.get(i).map_or(f64::NAN, |mode| mode.variance.max(0.0).sqrt()))
+        .collect::<Vec<f64>>();
+    let table = Table::new()
+        .with("frequency_hz", "Hz", "resonance frequency", column(|m| m.frequency_hz.value))
+        .with("frequency_std_hz", "Hz", "its standard error", column(|m| m.frequency_hz.std))
+        .with("quality_factor", "1", "quality factor", column(|m| m.quality_factor.value))
+        .with("quality_factor_std", "1", "its standard error", column(|m| m.quality_factor.std))
+        .with("frequency_scatter_hz", "Hz", "standard error from the events' scatter", other(|m| m.frequency_hz.std))
+        .with("quality_factor_scatter", "1", "standard error from the events' scatter", other(|m| m.quality_factor.std))
+        .with(
+            "amplitude",
+            "V",
+            "ringing of an event of amplitude 1 at its onset",
+            oscillating().map(|e| e.residue.norm()).collect::<Vec<f64>>(),
+        )
+        .with("thermal_std", "V", "rms of the mode's thermal motion", thermal);
+    let Some(intervals) = fit.bootstrap_intervals(0.95) else { return table };
+    let end = |value: fn(&[(f64, f64); 2]) -> f64| intervals.iter().map(value).collect::<Vec<f64>>();
+    table
+        .with("frequency_low_hz", "Hz", "lower end of the bootstrap's 95 % interval", end(|i| i[0].0))
+        .with("frequency_high_hz", "Hz", "upper end of it", end(|i| i[0].1))
+        .with("quality_factor_low", "1", "lower end of the bootstrap's 95 % interval", end(|i| i[1].0))
+        .with("quality_factor_high", "1", "upper end of it", end(|i| i[1].1))
+}
+
+pub(super) fn poles(fit: &Ringdown, source: ErrorSource) -> Array {
+    let covariance = match (source, &fit.sandwich) {
+        (ErrorSource::Events, Some(sandwich)) => sandwich,
+        _ => &fit.covariance,
+    };
+    let ringing = Ringing::of(fit, covariance);
+    let residues = ringing.residues.clone().unwrap_or_default();
+    let count = 2 * ringing.poles.len();
+    let axis = |name: &str| {
+        Axis::new(name, "1", "real and imaginary part of each pole in turn", (0..count).map(|i| i as f64).collect())
+    };
+    // four numbers a mode: a pole's two parts at 0, a residue's at 2
+    let place = |i: usize, what: usize| 4 * (i / 2) + what + i % 2;
+    let block = |row: usize, column: usize| -> Vec<f64> {
+        (0..count * count).map(|i| ringing.covariance[(place(i / count, row), place(i % count, column))]).collect()
+    };
+    let parts = |values: &[c64]| values.iter().flat_map(|v| [v.re, v.im]).collect::<Vec<f64>>();
+    let both = &["parameter", "other"];
+    Array::over(vec![axis("parameter"), axis("other")])
+        .with("pole", "rad/s", "poles of the modes, the upper ones of pairs", &["parameter"], parts(&ringing.poles))
+        .with("covariance", "rad^2/s^2", "their covariance", both, block(0, 0))
+        .with(
+            "residue",
+            "V",
+            "their residues in an event of amplitude 1 at its onset",
+            &["parameter"],
+            parts(&residues),
+        )
+        .with("residue_covariance", "V^2", "covariance of the residues; 0 for the reference's", both, block(2, 2))
+        .with("cross_covariance", "V rad/s", "covariance of poles (first axis) and residues", both, block(0, 2))
+        .attribute("real_poles", ringing.real_poles)
+}
+
+pub(super) fn event_table(fit: &Ringdown) -> Table {
+    let column = |value: fn(&EventParameters) -> f64| fit.events.iter().map(value).collect::<Vec<f64>>();
+    let error = |value: fn(&EventParameters) -> f64| fit.event_std.iter().map(value).collect::<Vec<f64>>();
+    Table::new()
+        .with("amplitude", "1", "factor of the shared shape", column(|e| e.amplitude))
+        .with("amplitude_std", "1", "its standard error", error(|e| e.amplitude))
+        .with("onset_s", "s", "onset after the first sample used", column(|e| e.onset_s))
+        .with("onset_std_s", "s", "its standard error", error(|e| e.onset_s))
+        .with("offset", "V", "level that it decays to", column(|e| e.offset))
+        .with("offset_std", "V", "its standard error", error(|e| e.offset))
+        .with("slope", "V", "change of that level over half the window", column(|e| e.slope))
+        .with("slope_std", "V", "its standard error", error(|e| e.slope))
+}
+
+pub(super) fn spectrum(fit: &Ringdown) -> Array {
+    let over = &["frequency_hz"];
+    Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", fit.frequency_hz.clone())])
+        .with("residual", "V^2/Hz", "mean Hann periodogram of the residuals", over, fit.residual_periodogram.clone())
+        .with("expected", "V^2/Hz", "what the noise model expects of it", over, fit.expected_periodogram.clone())
+        .attribute("events", fit.events.len())
+}
