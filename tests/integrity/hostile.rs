@@ -121,7 +121,7 @@ pub fn unsealed(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// Bytes without a seal, with one: whoever changes a file can do so.
+/// Seals bytes that have no seal, as anybody who changes a file can.
 pub fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let hash = blake3::hash(&bytes);
     bytes.extend(format!("{SEAL}{hash}\n").into_bytes());

@@ -160,7 +160,7 @@ fn samples_in_other_files_are_refused() {
     }
 }
 
-/// Puts in the place of a dataset of a result one that leads elsewhere, as whoever seals it again can.
+/// Puts in the place of a dataset of a result one that leads elsewhere, as anybody who seals it again can.
 const LED_ELSEWHERE: &str = r#"
 import h5py, numpy as np, sys
 with h5py.File("source.h5", "w") as file:
@@ -200,12 +200,12 @@ fn sealed_results_lead_to_no_other_file() {
         every_command(here, &here.join("led.h5"));
         for arguments in [&["show", "led.h5", "welch", "--json"][..], &["diff", "led.h5", "whole.h5"]] {
             let output = command(here, arguments).output().expect("afmid starts");
-            let told = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
-            println!("{way} {arguments:?}: {told}");
-            assert!(!told.contains("4242"), "{way}, {arguments:?}: {told}");
+            let said = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+            println!("{way} {arguments:?}: {said}");
+            assert!(!said.contains("4242"), "{way}, {arguments:?}: {said}");
         }
         let diff = command(here, &["diff", "led.h5", "whole.h5"]).output().expect("afmid starts");
-        let told = String::from_utf8_lossy(&diff.stderr).into_owned();
-        assert!(diff.status.code() == Some(1) && told.contains("led.h5") && told.contains("density"), "{way}: {told}");
+        let said = String::from_utf8_lossy(&diff.stderr).into_owned();
+        assert!(diff.status.code() == Some(1) && said.contains("led.h5") && said.contains("density"), "{way}: {said}");
     }
 }

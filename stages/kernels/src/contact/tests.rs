@@ -157,9 +157,9 @@ fn simulated_snap_ins_give_the_contact_within_its_errors() {
     let seeds = 4;
     for seed in 0..seeds {
         let events: Vec<Vec<f64>> = (0..8).map(|event| snap_in(seed, event, 3000)).collect();
-        let lent: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
+        let borrowed: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
         let options = RingdownOptions { start_samples: Some(1024), ..RingdownOptions::default() };
-        let fit = fit_ringdowns(&lent, &[], 2e-7, &options).unwrap();
+        let fit = fit_ringdowns(&borrowed, &[], 2e-7, &options).unwrap();
         assert!(fit.verdict.converged);
         let measured = CoupledPoles::of(&fit, &fit.covariance);
         let found = contact_stiffness(&exact_lever(LOADED_BEAM_SHARES), &measured).unwrap();

@@ -327,9 +327,10 @@ fn missing_samples_several_experiments_and_inputs() {
             ([u, v].concat(), y)
         })
         .collect();
-    let lent: Vec<Experiment<'_>> = experiments.iter().map(|(input, output)| Experiment { input, output }).collect();
+    let borrowed: Vec<Experiment<'_>> =
+        experiments.iter().map(|(input, output)| Experiment { input, output }).collect();
     for before in [Before::Settled, Before::Anything] {
-        let fit = fit_grey(&lent, T, &GreyOptions { before, ..options() }).unwrap();
+        let fit = fit_grey(&borrowed, T, &GreyOptions { before, ..options() }).unwrap();
         assert!(fit.verdict.converged, "{:?}", fit.verdict);
         let mut truth: Vec<f64> = one.values();
         truth.extend([-0.4, 0.5, 0.3]);

@@ -26,9 +26,9 @@ fn counted(modes: usize, events: usize, seed: u64, noise: NoiseSource) -> Counte
             release[1..].iter().zip(noise).map(|(y, n)| y + 0.01 + n).collect()
         })
         .collect();
-    let lent: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
+    let borrowed: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
     let options = RingdownOptions { noise, ..RingdownOptions::default() };
-    fit_counted_ringdowns(&lent, &[], INTERVAL_S, 7, &options).unwrap()
+    fit_counted_ringdowns(&borrowed, &[], INTERVAL_S, 7, &options).unwrap()
 }
 
 /// How many of some seeds give the right number, and the mean square of the modes' errors over their standard errors.

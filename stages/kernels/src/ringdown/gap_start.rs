@@ -43,8 +43,8 @@ pub(super) fn gap_start(records: &Records<'_>, options: &RingdownOptions) -> Res
 fn refilled(records: &Records<'_>, options: &RingdownOptions) -> Result<Point, ModelError> {
     let mut filled: Vec<Cow<'_, [f64]>> = records.events.iter().map(|event| Cow::Borrowed(*event)).collect();
     let guess = |filled: &[Cow<'_, [f64]>]| {
-        let lent: Vec<&[f64]> = filled.iter().map(|event| &**event).collect();
-        first_guess(&lent, records.interval_s, options)
+        let borrowed: Vec<&[f64]> = filled.iter().map(|event| &**event).collect();
+        first_guess(&borrowed, records.interval_s, options)
     };
     let mut point = guess(&filled)?;
     for _ in 0..REFILLS {

@@ -47,9 +47,9 @@ fn clipped(samples: usize, noises: &[Vec<f64>], seed: u64) -> (Vec<Vec<f64>>, Ve
 }
 
 fn fitted(events: &[Vec<f64>], missing: &[Vec<Range<usize>>], noise: NoiseSource) -> Ringdown {
-    let lent: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
+    let borrowed: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
     let options = RingdownOptions { noise, missing: missing.to_vec(), ..RingdownOptions::default() };
-    fit_ringdowns(&lent, &[], INTERVAL_S, &options).unwrap()
+    fit_ringdowns(&borrowed, &[], INTERVAL_S, &options).unwrap()
 }
 
 /// Frequencies and quality factors in turn: values and standard errors.

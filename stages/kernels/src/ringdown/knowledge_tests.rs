@@ -20,9 +20,9 @@ fn fitted(seed: u64, known: Vec<Known>) -> Ringdown {
             lever.release(2049, 0.3 * e as f64, -0.8)[1..].iter().zip(noise).map(|(y, n)| y + n).collect()
         })
         .collect();
-    let lent: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
+    let borrowed: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
     let options = RingdownOptions { noise: NoiseSource::White, known, ..RingdownOptions::default() };
-    fit_ringdowns(&lent, &[], INTERVAL_S, &options).unwrap()
+    fit_ringdowns(&borrowed, &[], INTERVAL_S, &options).unwrap()
 }
 
 /// Frequencies and quality factors in turn: values and standard errors.

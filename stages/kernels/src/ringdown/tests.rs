@@ -141,11 +141,11 @@ fn many_events_give_the_modes_with_standard_errors_that_hold() {
                 lever.release(4097, onset, load)[1..].iter().zip(noise).map(|(y, n)| y + 0.01 + n).collect()
             })
             .collect();
-        let lent: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
+        let borrowed: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
         let draws = if seed == 0 { 400 } else { 0 };
         let options =
             RingdownOptions { noise: NoiseSource::White, bootstrap_draws: draws, ..RingdownOptions::default() };
-        let fit = fit_ringdowns(&lent, &[], INTERVAL_S, &options).unwrap();
+        let fit = fit_ringdowns(&borrowed, &[], INTERVAL_S, &options).unwrap();
         for (interval, mode) in fit.bootstrap_intervals(0.68).iter().flatten().zip(fit.modes()) {
             let half = 0.5 * (interval[0].1 - interval[0].0) / mode.frequency_hz.std;
             // ten events drawn again and again: their own scatter is known to 24 %, and draws of ten are narrower by 5 %
@@ -186,10 +186,10 @@ fn one_thread_and_many_give_the_same_bits() {
             lever.release(2049, 0.1 * e as f64, -0.8)[1..].iter().zip(noise).map(|(y, n)| y + n).collect()
         })
         .collect();
-    let lent: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
+    let borrowed: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let fit = pool.install(|| fit_ringdowns(&lent, &[], INTERVAL_S, &RingdownOptions::default()).unwrap());
+        let fit = pool.install(|| fit_ringdowns(&borrowed, &[], INTERVAL_S, &RingdownOptions::default()).unwrap());
         (fit.parameters(), fit.noise.variances())
     };
     assert_eq!(run(1), run(4));
