@@ -4,9 +4,10 @@
     benches/scaling.py [target/release/afmid] [MOST] [WORD...]
 
 Makes small raw records, stages and ledgers in a temporary folder with Python's standard library alone, for the commands whose line holds one of the
-words. Of each command the shortest of several runs counts: until they took 2 s together, three at least. The exponent is the slope of log(time) over
-log(items); the second one that of what the items add (log(time without that of a job of one item), from the second smallest size on). `find -size +1M`
-on the same folders tells what the system itself takes to look at each file: more files than the processor's caches hold cost more each.
+words. Of each command the shortest of several runs counts, once the files are 2.5 s old: until they took 2 s together, three at least. The exponent is
+the slope of log(time) over log(items); the second one that of what the items add (log(time without that of a job of one item), from the second
+smallest size on). `find -size +1M` on the same folders tells what the system itself takes to look at each file: more files than the processor's caches
+hold cost more each.
 """
 
 import json
@@ -115,6 +116,8 @@ def measured(make, commands, count):
     folder = tempfile.mkdtemp(prefix="afmid-scaling-")
     try:
         make(folder, count)
+        # hashes of files that were changed less than 2 s ago are not remembered
+        time.sleep(2.5)
         return [shortest(folder, arguments, runs) for _, arguments, runs in commands]
     finally:
         shutil.rmtree(folder)

@@ -7,7 +7,7 @@ use afmid_pipeline::cache::Cache;
 use afmid_pipeline::files::sweep_folders;
 use afmid_pipeline::graph::Stages;
 use afmid_pipeline::runner::{Failed, Options, RunError, run as run_plan, run_to_file};
-use afmid_pipeline::{Plan, RunResult};
+use afmid_pipeline::{InputFiles, Plan, RunResult};
 use serde_json::{Value, json};
 
 use super::load::load;
@@ -180,7 +180,7 @@ fn inputs(plan: &Plan, config: &Path) -> Vec<Input> {
     let mut inputs = vec![("the config", config.to_owned())];
     for node in &plan.nodes {
         // files that cannot be listed are for the run to complain about
-        let sources = node.stage.sources(plan.config.base()).unwrap_or_default();
+        let sources = node.stage.sources(plan.config.base(), &InputFiles::new()).unwrap_or_default();
         inputs.extend(sources.into_iter().map(|source| ("a record", source)));
     }
     inputs

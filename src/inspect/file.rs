@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use afmid_pipeline::StageError;
 use afmid_pipeline::recording::{InputFiles, Reading, open_contents};
-use afmid_pipeline::store::is_own;
 
 use super::channel::Channel;
 use super::config::stage;
@@ -53,7 +52,7 @@ pub enum Outcome {
 /// Looks at a file: what it holds, and every sample of it once.
 pub fn inspect(path: &Path) -> Inspected {
     let size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
-    let outcome = match is_own(path) {
+    let outcome = match InputFiles::new().is_result(path) {
         Ok(true) => Outcome::Own,
         _ => read(path).map_or_else(refused, |holdings| Outcome::Read(Box::new(holdings))),
     };

@@ -67,7 +67,7 @@ pub struct Writer {
 pub fn writers(plan: &Plan, base: &Path, scratch: &Path) -> Vec<Writer> {
     let writer = |node: &Node| {
         let (parameter, place) = location(node)?;
-        let reads = node.stage.sources(base).map_or(true, |sources| !sources.is_empty());
+        let reads = node.stage.sources(base, &InputFiles::new()).map_or(true, |sources| !sources.is_empty());
         let place = place.as_str().filter(|_| !reads)?.to_owned();
         let (folder, scratch) = (base.join(&place), scratch.join(&node.id));
         Some(Writer { id: node.id.clone(), parameter, place, folder, scratch })
@@ -130,7 +130,7 @@ impl Writer {
 }
 
 fn reads_the_same(node: &Node, record: &StageRecord, base: &Path) -> bool {
-    let Ok(now) = node.stage.sources(base) else { return false };
+    let Ok(now) = node.stage.sources(base, &InputFiles::new()) else { return false };
     let same = |(path, source): (&PathBuf, &SourceFile)| {
         file_name(&path.to_string_lossy()) == file_name(&source.path)
             && InputFiles::new().hash(path).is_ok_and(|hash| hash == source.blake3)

@@ -113,7 +113,7 @@ fn other_bytes_of_the_same_size_and_time_are_stated_as_they_are() {
     let here = scratch.path();
     std::thread::sleep(SETTLED);
     assert_eq!(run(here, "a.h5", "cache", &[]).code, Some(0));
-    assert_eq!(fs::read_dir(here.join("cache/stamps")).expect("stamps").count(), 2, "both hashes are remembered");
+    assert_eq!(fs::read_to_string(stamps(here)).expect("stamps").lines().count(), 2, "both hashes are remembered");
     let record = here.join("archive/r1.h5");
     let (before, bytes) = (hash(&record), fs::read(&record).expect("a record"));
     overwrite_unseen(&record, &altered(&bytes));
@@ -127,6 +127,11 @@ fn other_bytes_of_the_same_size_and_time_are_stated_as_they_are() {
     assert!(told.contains("r1.h5") && told.contains("other bytes"), "{told}");
 }
 
+/// What remembers the hashes of a folder's records, a line for each.
+fn stamps(here: &Path) -> PathBuf {
+    fs::read_dir(here.join("cache/stamps")).expect("stamps").next().expect("one").expect("one").path()
+}
+
 /// A folder after a run on one record: its hash, and the stamp that remembers it.
 fn remembered() -> (tempfile::TempDir, String, PathBuf) {
     let scratch = folder(1, 20_000);
@@ -134,13 +139,14 @@ fn remembered() -> (tempfile::TempDir, String, PathBuf) {
     std::thread::sleep(SETTLED);
     assert_eq!(run(here, "a.h5", "cache", &[]).code, Some(0));
     let right = hash(&here.join("archive/r0.h5"));
-    let stamp = fs::read_dir(here.join("cache/stamps")).expect("stamps").next().expect("one").expect("one").path();
+    let stamp = stamps(here);
     (scratch, right, stamp)
 }
 
-/// A stamp's lines but the last, which is the hash of these.
+/// A stamp with the hash of its own text before it.
 fn sealed(body: &str) -> String {
-    format!("{body}\n{}\n", blake3::hash(body.as_bytes()).to_hex())
+    let hash = blake3::hash(format!("afmid stamp 3{body}").as_bytes()).to_hex();
+    format!("{}\t{body}\n", &hash[..32])
 }
 
 #[test]
@@ -148,13 +154,17 @@ fn fresh_hashes_again_whatever_a_stamp_says() {
     let (scratch, right, stamp) = remembered();
     let here = scratch.path();
     let text = fs::read_to_string(&stamp).expect("text");
-    let body = text.trim_end().rsplit_once('\n').expect("a last line").0;
+    let body = text.trim_end().split_once('\t').expect("a hash first").1;
+    assert_eq!(sealed(body), text);
     // of the same state, with a hash that fits: only who can write the cache can make it
-    fs::write(&stamp, sealed(&body.replace(&right, &"0".repeat(64)))).expect("written");
+    let forged = sealed(&body.replace(&right, &"0".repeat(64)));
+    fs::write(&stamp, &forged).expect("written");
     assert_eq!(run(here, "b.h5", "cache", &["--fresh"]).code, Some(0));
     assert_eq!(stated(&here.join("b.h5"))[0].blake3, right);
     let again = fs::read_to_string(&stamp).expect("text");
-    assert_eq!(again, text, "the right hash is remembered again");
+    assert_eq!(again, forged + &text, "the right hash is remembered again, and counts");
+    assert_eq!(run(here, "c.h5", "cache", &[]).code, Some(0));
+    assert_eq!(stated(&here.join("c.h5"))[0].blake3, right);
 }
 
 #[test]

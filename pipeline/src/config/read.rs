@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use toml::de::DeTable;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use super::document;
 use super::overrides::{self, Override};
@@ -55,7 +56,7 @@ impl Config {
         if !document.usable {
             return (config, problems, false);
         }
-        config.fill(&document.root, &mut problems);
+        config.fill(document.root, &mut problems);
         name::check(&config.stages, &mut problems);
         for argument in arguments {
             match Override::parse(argument) {
@@ -89,7 +90,7 @@ impl Config {
         }
     }
 
-    fn fill(&mut self, root: &DeTable<'_>, problems: &mut Vec<Problem>) {
+    fn fill(&mut self, mut root: DeTable<'_>, problems: &mut Vec<Problem>) {
         let Pipeline { name, seed } = match root.get("pipeline") {
             Some(table) => pipeline::read(table, problems),
             None => {
@@ -99,10 +100,10 @@ impl Config {
             }
         };
         (self.name, self.seed) = (name, seed);
-        self.stages = stages(root, problems);
-        for (key, value) in root {
+        self.stages = stages(root.remove("stage"), problems);
+        for (key, value) in &root {
             match key.get_ref().as_ref() {
-                "pipeline" | "stage" => {}
+                "pipeline" => {}
                 "sweep" => self.sweep = sweep::read(value, problems),
                 "plugins" => self.plugins = plugins::read(value, problems),
                 other => {
@@ -115,17 +116,24 @@ impl Config {
     }
 }
 
-fn stages(root: &DeTable<'_>, problems: &mut Vec<Problem>) -> Vec<StageDecl> {
-    let Some(stages) = root.get("stage") else {
+/// Takes the document's tables: each is read and freed in one go, while it is at hand.
+fn stages(stages: Option<Spanned<DeValue<'_>>>, problems: &mut Vec<Problem>) -> Vec<StageDecl> {
+    let Some(stages) = stages else {
         let problem = Problem::new("the config has no [[stage]]", 0..0, "begins here");
         problems.push(problem.help("add a `[[stage]]` table with `id` and `uses`"));
         return Vec::new();
     };
-    let Some(tables) = stages.get_ref().as_array() else {
-        let message = format!("`stage`: found {}, wanted an array of tables", value::found(stages.get_ref()));
-        let help = "write [[stage]] with two brackets on each side";
-        problems.push(Problem::new(message, stages.span(), "one table").help(help));
-        return Vec::new();
-    };
-    tables.iter().enumerate().filter_map(|(index, table)| stage::read(index, table, problems)).collect()
+    let span = stages.span();
+    match stages.into_inner() {
+        DeValue::Array(tables) => {
+            let read = |(index, table)| stage::read(index, &table, problems);
+            tables.into_iter().enumerate().filter_map(read).collect()
+        }
+        other => {
+            let message = format!("`stage`: found {}, wanted an array of tables", value::found(&other));
+            let help = "write [[stage]] with two brackets on each side";
+            problems.push(Problem::new(message, span, "one table").help(help));
+            Vec::new()
+        }
+    }
 }

@@ -8,6 +8,7 @@ mod known_hashes;
 mod mark;
 mod own;
 mod replace;
+mod result_mark;
 mod temporary;
 
 pub use afmid_formats::{open_regular, read_regular};
@@ -18,6 +19,7 @@ pub use mark::{MARK, has_mark, marked, states_mark};
 pub use own::{sweep_folders, sweep_own, temporary_folder};
 pub(crate) use replace::{Replacement, replace_unsynced};
 pub use replace::{probe, replace_file, replace_with};
+pub(crate) use result_mark::{FORMAT_ATTRIBUTE, HDF5_SIGNATURE, SEAL, head, is_result, seal_line};
 #[cfg(test)]
 pub(crate) use temporary::host;
 pub(crate) use temporary::{TemporaryName, stale, temporary_path};

@@ -15,6 +15,7 @@ use crate::artifact::Shape;
 use crate::config::{Config, StageDecl};
 use crate::error::StageError;
 use crate::outcome::{PortSpec, Ports};
+use crate::recording::InputFiles;
 use crate::stage::{Caching, Context, DynStage, Entry, Example, Maker, ParamError, Spec};
 
 /// What to do about a plugin that nobody has agreed to.
@@ -151,7 +152,7 @@ impl DynStage for Unknown {
     }
 
     /// Which of its parameters name files is not known: no key can be made.
-    fn sources(&self, _base: &Path) -> Result<Vec<PathBuf>, StageError> {
+    fn sources(&self, _base: &Path, _files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
         Err(self.row.error())
     }
 

@@ -11,6 +11,7 @@ use super::row::{CONSENT, Row};
 use super::session::Session;
 use crate::error::StageError;
 use crate::outcome::Ports;
+use crate::recording::InputFiles;
 use crate::stage::{Context, DynStage, Spec};
 
 /// A plugin with its parameters.
@@ -35,7 +36,7 @@ impl DynStage for PluginStage {
     }
 
     /// Parameters of the format `path` name files, an empty one none: their bytes are part of the cache key.
-    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+    fn sources(&self, base: &Path, _files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
         let named = self.row.plugin.schema.paths(&self.params).into_iter().filter(|path| !path.is_empty());
         Ok(named.map(|path| base.join(path)).collect())
     }

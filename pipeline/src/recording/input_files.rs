@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::chunk_cache::ChunkCache;
 use super::opened_files::OpenedFiles;
 use crate::error::StageError;
-use crate::files::{FileState, KnownHashes, open_regular, read_regular};
+use crate::files::{FileState, KnownHashes, head, is_result, open_regular, read_regular};
 use crate::hdf5_files::{HeapGuard, Refusal, Vetted, finding_text, parse_finding};
 
 /// The files that a program reads. A value that is passed to whatever reads: cloning is cheap, and clones share what they know.
@@ -29,6 +29,7 @@ impl std::fmt::Debug for InputFiles {
 struct Inner {
     inspected: Mutex<HashMap<PathBuf, (FileState, Inspected)>>,
     earlier: Option<KnownHashes>,
+    here: OnceLock<PathBuf>,
     opened: OpenedFiles,
     chunks: ChunkCache,
 }
@@ -38,6 +39,8 @@ struct Inner {
 pub(super) struct Inspected {
     /// BLAKE3 hash of its bytes, in hexadecimal.
     pub(super) blake3: String,
+    /// Whether it is a stage or result file of this program's.
+    is_result: bool,
     /// See [`HeapGuard`].
     finding: Result<Vetted, Refusal>,
 }
@@ -87,6 +90,17 @@ impl InputFiles {
         Ok(HashedFile { path: path.to_owned(), settled: state.is_settled(), state, blake3: found.blake3 })
     }
 
+    /// Whether a file is a stage or result file of this program's, whole or damaged. Errors: it cannot be read.
+    pub fn is_result(&self, path: &Path) -> std::io::Result<bool> {
+        let known = self.known(&self.absolute(path)?, &FileState::at(path)?);
+        if let Some(found) = known {
+            return Ok(found.is_result);
+        }
+        let mut file = open_regular(path)?;
+        let head = head(&mut file)?;
+        is_result(&mut file, &head)
+    }
+
     /// A whole file, for what is small. The bytes are those that have the file's hash. Errors: as [`InputFiles::hash`].
     pub fn read(&self, path: &Path) -> Result<Vec<u8>, StageError> {
         let wanted = self.hash(path)?;
@@ -116,34 +130,51 @@ impl InputFiles {
     /// The state that the file had, and what one pass through it found. Errors: as [`InputFiles::hash`].
     pub(super) fn inspect(&self, path: &Path) -> Result<(FileState, Inspected), StageError> {
         let fail = |error: std::io::Error| unreadable(path, &error);
+        let key = self.absolute(path).map_err(fail)?;
+        // not opened while it is known; whoever opens it compares the states again
+        let state = FileState::at(path).map_err(fail)?;
+        if let Some(found) = self.known(&key, &state) {
+            return Ok((state, found));
+        }
         let mut file = open_regular(path).map_err(fail)?;
         let state = FileState::of(&file).map_err(fail)?;
-        let key = std::path::absolute(path).map_err(fail)?;
-        let known = |map: &HashMap<PathBuf, (FileState, Inspected)>| {
-            map.get(&key).filter(|(have, _)| *have == state).map(|(_, found)| found.clone())
-        };
-        let lock = || self.0.inspected.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = known(&lock()) {
-            return Ok((state, found));
-        }
-        let earlier = self.0.earlier.as_ref();
-        if let Some(found) = earlier.and_then(|known| known.find(&key, &state)).and_then(|line| Inspected::parse(&line))
-        {
-            lock().insert(key, (state, found.clone()));
-            return Ok((state, found));
-        }
         let found = pass(&mut file).map_err(fail)?;
         if FileState::of(&file).map_err(fail)? != state {
             return Err(changed(path));
         }
         // a state that may hide a change is not remembered
         if state.is_settled() {
-            if let Some(known) = earlier {
+            if let Some(known) = &self.0.earlier {
                 known.keep(&key, &state, &found.line());
             }
-            lock().insert(key, (state, found.clone()));
+            self.inspected().insert(key, (state, found.clone()));
         }
         Ok((state, found))
+    }
+
+    /// What is known of a file in this state, from this run or an earlier one.
+    fn known(&self, key: &Path, state: &FileState) -> Option<Inspected> {
+        if let Some((have, found)) = self.inspected().get(key)
+            && have == state
+        {
+            return Some(found.clone());
+        }
+        Inspected::parse(&self.0.earlier.as_ref()?.find(key, state)?)
+    }
+
+    fn inspected(&self) -> MutexGuard<'_, HashMap<PathBuf, (FileState, Inspected)>> {
+        self.0.inspected.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The folder where relative paths begin is asked for once.
+    fn absolute(&self, path: &Path) -> std::io::Result<PathBuf> {
+        if path.is_absolute() {
+            return Ok(path.to_owned());
+        }
+        if self.0.here.get().is_none() {
+            let _ = self.0.here.set(std::env::current_dir()?);
+        }
+        std::path::absolute(self.0.here.get().map_or_else(|| path.to_owned(), |here| here.join(path)))
     }
 }
 
@@ -201,25 +232,35 @@ fn changed(path: &Path) -> StageError {
 
 impl Inspected {
     fn line(&self) -> String {
-        format!("{} {}", self.blake3, finding_text(&self.finding))
+        let kind = if self.is_result { RESULT } else { OTHER };
+        format!("{} {kind} {}", self.blake3, finding_text(&self.finding))
     }
 
     fn parse(line: &str) -> Option<Self> {
-        let (blake3, finding) = line.split_once(' ')?;
+        let (blake3, rest) = line.split_once(' ')?;
+        let (kind, finding) = rest.split_once(' ')?;
         let is_hash = blake3.len() == 64 && blake3.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
-        let finding = parse_finding(finding)?;
-        is_hash.then(|| Self { blake3: blake3.to_owned(), finding })
+        let (is_result, finding) = (kind == RESULT, parse_finding(finding)?);
+        is_hash.then(|| Self { blake3: blake3.to_owned(), is_result, finding })
     }
 }
 
-/// Hashes a file and looks for damage that the HDF5 library does not survive.
+/// What stands for the kind of a file where it is kept.
+const RESULT: &str = "result";
+const OTHER: &str = "other";
+
+/// Hashes a file, sees whether it is a result, and looks for damage that the HDF5 library does not survive.
 fn pass(file: &mut File) -> std::io::Result<Inspected> {
+    let head = head(file)?;
+    let is_result = is_result(file, &head)?;
+    file.seek(SeekFrom::Start(0))?;
     let (mut hasher, mut guard) = (blake3::Hasher::new(), HeapGuard::new(file.metadata()?.len()));
     let mut buffer = vec![0; 1 << 16];
     loop {
         let count = file.read(&mut buffer)?;
         if count == 0 {
-            return Ok(Inspected { blake3: hasher.finalize().to_hex().to_string(), finding: guard.finish() });
+            let blake3 = hasher.finalize().to_hex().to_string();
+            return Ok(Inspected { blake3, is_result, finding: guard.finish() });
         }
         hasher.update(&buffer[..count]);
         guard.update(&buffer[..count]);

@@ -14,7 +14,7 @@ use crate::files::fixture::Folder;
 use crate::graph::load;
 use crate::outcome::{Port, Ports, RunResult};
 use crate::recording::{
-    Codes, NativeChannel, NativeRecord, RecordStorage, Recording, Wanted, open_native, write_native,
+    Codes, InputFiles, NativeChannel, NativeRecord, RecordStorage, Recording, Wanted, open_native, write_native,
 };
 use crate::stage::{Caching, Context, Entry, Example, Registry, Spec, Stage};
 
@@ -110,7 +110,7 @@ impl Stage for Read {
         source: "",
     };
 
-    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+    fn sources(&self, base: &Path, _files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
         Ok(vec![base.join(&self.file)])
     }
 
@@ -136,7 +136,7 @@ struct Open {
 impl Stage for Open {
     const SPEC: Spec = Spec { name: "test.open", outputs: &[RECORDS.spec()], caching: Caching::Stored, ..Read::SPEC };
 
-    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+    fn sources(&self, base: &Path, _files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
         Ok(vec![base.join(&self.file)])
     }
 

@@ -59,7 +59,7 @@ pub(super) fn plan_node<'a>(
     upstream: &dyn Fn(usize) -> Option<&'a Origin>,
 ) -> Result<StagePlan, StageError> {
     let spec = node.stage.spec();
-    let paths = node.stage.sources(around.base)?;
+    let paths = node.stage.sources(around.base, around.files)?;
     let hashed = paths.par_iter().map(|path| around.files.hashed(path)).collect::<Result<Vec<_>, _>>()?;
     let sources: Vec<SourceFile> = paths.iter().zip(&hashed).map(|(path, file)| source_file(path, file)).collect();
     let seed = spec.seeded.then(|| stage_seed(plan.seed(), &node.id));

@@ -9,6 +9,7 @@ use serde_json::Value;
 use super::{Context, Example, Spec, Stage};
 use crate::error::StageError;
 use crate::outcome::Ports;
+use crate::recording::InputFiles;
 
 /// A stage with its parameters, without its type.
 pub trait DynStage: Send + Sync {
@@ -19,7 +20,7 @@ pub trait DynStage: Send + Sync {
     /// See [`Stage::check`].
     fn check(&self) -> Result<(), StageError>;
     /// See [`Stage::sources`].
-    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError>;
+    fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError>;
     /// See [`Stage::depends_on`].
     fn depends_on(&self) -> Vec<String>;
     /// See [`Stage::location_params`].
@@ -42,8 +43,8 @@ impl<S: Stage> DynStage for S {
         Stage::check(self)
     }
 
-    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
-        Stage::sources(self, base)
+    fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
+        Stage::sources(self, base, files)
     }
 
     fn depends_on(&self) -> Vec<String> {

@@ -9,6 +9,7 @@ use serde::de::DeserializeOwned;
 use super::Context;
 use crate::error::StageError;
 use crate::outcome::{PortSpec, Ports};
+use crate::recording::InputFiles;
 
 /// What a stage is, apart from its parameters.
 #[derive(Debug, Clone, Copy)]
@@ -55,9 +56,10 @@ pub trait Stage: Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'stat
         Ok(())
     }
 
-    /// The files that the stage reads, in order; relative paths are taken from `base`. Their bytes go into the cache key.
-    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
-        let _ = base;
+    /// The files that the stage reads, in order; relative paths are taken from `base`; `files` knows what
+    /// was found in them before. Their bytes go into the cache key.
+    fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
+        let _ = (base, files);
         Ok(Vec::new())
     }
 

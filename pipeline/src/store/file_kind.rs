@@ -1,12 +1,9 @@
 //! What a file is, as far as its first bytes tell: for messages, and before a file is replaced.
 
 use std::fmt;
-use std::io::Read;
 use std::path::Path;
 
-use super::format::FORMAT;
-use super::seal::has_seal;
-use crate::files::open_regular;
+use crate::files::{HDF5_SIGNATURE, head, is_result, open_regular};
 use crate::recording::{InputFiles, is_native};
 
 /// What a file is.
@@ -45,41 +42,17 @@ impl fmt::Display for FileKind {
     }
 }
 
-/// How far into a file its kind is looked for. The store writes its format's name first, into the root group's header, some hundred bytes
-/// behind the signature.
-const HEAD: u64 = 1 << 13;
-
-const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
-
 /// What a file is. It need not be whole: a result that was cut short is still afmid's. Errors: it cannot be read.
 pub fn file_kind(path: &Path) -> std::io::Result<FileKind> {
-    let head = head(path)?;
-    if own(path, &head)? {
+    let mut file = open_regular(path)?;
+    let head = head(&mut file)?;
+    if is_result(&mut file, &head)? {
         return Ok(FileKind::Own);
     }
     if head.starts_with(HDF5_SIGNATURE) {
         return Ok(if is_native(&InputFiles::new(), path) { FileKind::Record } else { FileKind::Hdf5 });
     }
     Ok(text_kind(path, &head))
-}
-
-/// Whether a file is a stage or result file of afmid's. Errors: it cannot be read.
-pub fn is_own(path: &Path) -> std::io::Result<bool> {
-    own(path, &head(path)?)
-}
-
-fn own(path: &Path, head: &[u8]) -> std::io::Result<bool> {
-    if !head.starts_with(HDF5_SIGNATURE) {
-        return Ok(false);
-    }
-    Ok(memchr::memmem::find(head, FORMAT.as_bytes()).is_some() || has_seal(path)?)
-}
-
-fn head(path: &Path) -> std::io::Result<Vec<u8>> {
-    let file = open_regular(path)?;
-    let mut head = Vec::with_capacity(file.metadata()?.len().min(HEAD) as usize);
-    file.take(HEAD).read_to_end(&mut head)?;
-    Ok(head)
 }
 
 fn text_kind(path: &Path, head: &[u8]) -> FileKind {

@@ -42,7 +42,7 @@ pub(crate) mod fixture;
 mod tests;
 
 pub use compare::{Difference, Numbers, compare};
-pub use file_kind::{FileKind, file_kind, is_own};
+pub use file_kind::{FileKind, file_kind};
 pub use format::FORMAT_VERSION;
 pub use names::RESERVED_STAGE_IDS;
 pub(crate) use pending_result::PendingResult;

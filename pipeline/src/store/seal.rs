@@ -9,12 +9,8 @@ use std::path::Path;
 
 use super::file_kind::{FileKind, file_kind};
 use crate::error::{Result, StoreError};
-use crate::files::open_regular;
+use crate::files::{SEAL, open_regular, seal_line};
 use crate::hdf5_files::{HeapGuard, Vetted};
-
-pub(super) const MAGIC: &str = "\nafmid seal, BLAKE3 of all bytes before this line: ";
-const HASH_LENGTH: u64 = 64;
-const LENGTH: u64 = MAGIC.len() as u64 + HASH_LENGTH + 1;
 
 /// Bytes that threads hash together.
 const SHARED: u64 = 1 << 20;
@@ -25,7 +21,7 @@ pub(crate) fn seal(path: &Path) -> Result<()> {
         let mut file = OpenOptions::new().read(true).append(true).open(path)?;
         let size = file.metadata()?.len();
         let hash = hash_start(&mut file, size, |_| {})?;
-        file.write_all(format!("{MAGIC}{hash}\n").as_bytes())?;
+        file.write_all(format!("{SEAL}{hash}\n").as_bytes())?;
         file.sync_all()
     };
     seal().map_err(|error| StoreError::io("cannot be sealed", path, &error))
@@ -39,7 +35,7 @@ pub(super) fn check_seal(path: &Path) -> Result<Vetted> {
     let broken = |problem: &str| {
         Err(StoreError::new(problem).file(path).help("make it again: run the pipeline that it comes from"))
     };
-    let Some((body, last)) = last_line(&mut file, size).map_err(io)? else {
+    let Some((body, last)) = seal_line(&mut file).map_err(io)? else {
         return match file_kind(path).map_err(io)? {
             FileKind::Own => broken("cut short, or changed by another program: its last line is no seal"),
             other => Err(StoreError::new(format!("not a file of afmid's: it is {other}")).file(path)),
@@ -47,7 +43,7 @@ pub(super) fn check_seal(path: &Path) -> Result<Vetted> {
     };
     let mut guard = HeapGuard::new(size);
     let hash = hash_start(&mut file, body, |bytes| guard.update(bytes)).map_err(io)?;
-    if last != format!("{MAGIC}{hash}\n") {
+    if last != format!("{SEAL}{hash}\n") {
         return broken("damaged or altered: its bytes do not have the hash that its last line states");
     }
     guard.finish().or_else(|refusal| broken(refusal.text()))
@@ -66,26 +62,9 @@ pub(super) enum Seal {
 /// Errors: the file cannot be read.
 pub(super) fn look_at_seal(path: &Path) -> std::io::Result<Seal> {
     let mut file = File::open(path)?;
-    let size = file.metadata()?.len();
-    let Some((body, last)) = last_line(&mut file, size)? else { return Ok(Seal::None) };
+    let Some((body, last)) = seal_line(&mut file)? else { return Ok(Seal::None) };
     let hash = hash_start(&mut file, body, |_| {})?;
-    Ok(if last == format!("{MAGIC}{hash}\n") { Seal::Fits } else { Seal::DoesNotFit })
-}
-
-/// Whether a file ends in a seal, whether it fits or not. Errors: it cannot be read.
-pub(super) fn has_seal(path: &Path) -> std::io::Result<bool> {
-    let mut file = open_regular(path)?;
-    let size = file.metadata()?.len();
-    Ok(last_line(&mut file, size)?.is_some())
-}
-
-/// Where the seal begins, and the seal; none if the file ends in anything else.
-fn last_line(file: &mut File, size: u64) -> std::io::Result<Option<(u64, String)>> {
-    let Some(body) = size.checked_sub(LENGTH) else { return Ok(None) };
-    let mut last = Vec::new();
-    file.seek(SeekFrom::Start(body))?;
-    Read::by_ref(file).take(LENGTH).read_to_end(&mut last)?;
-    Ok(String::from_utf8(last).ok().filter(|last| last.starts_with(MAGIC)).map(|last| (body, last)))
+    Ok(if last == format!("{SEAL}{hash}\n") { Seal::Fits } else { Seal::DoesNotFit })
 }
 
 /// BLAKE3 of the first `size` bytes; `each` sees them as they pass.

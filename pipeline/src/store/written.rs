@@ -5,7 +5,8 @@ use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 use super::file_kind::{FileKind, file_kind};
-use super::seal::{MAGIC, Seal, look_at_seal};
+use super::seal::{Seal, look_at_seal};
+use crate::files::SEAL;
 
 /// What lies where a result is going to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,13 +54,13 @@ fn is_cut_short(path: &Path) -> std::io::Result<bool> {
     end.copy_from_slice(&head[at..at + 8]);
     let end = u64::from_le_bytes(end);
     let Some(behind) = length.checked_sub(end) else { return Ok(true) };
-    if behind == 0 || behind >= MAGIC.len() as u64 + 65 {
+    if behind == 0 || behind >= SEAL.len() as u64 + 65 {
         return Ok(false);
     }
     let mut rest = vec![0; behind as usize];
     file.read_exact_at(&mut rest, end)?;
-    let stated = rest.len().min(MAGIC.len());
-    Ok(rest[..stated] == MAGIC.as_bytes()[..stated])
+    let stated = rest.len().min(SEAL.len());
+    Ok(rest[..stated] == SEAL.as_bytes()[..stated])
 }
 
 #[cfg(test)]

@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::StageError;
 use afmid_pipeline::recording::recognised;
+use afmid_pipeline::{InputFiles, StageError};
 use glob::{MatchOptions, Pattern, glob_with};
+use rayon::prelude::*;
 
 use super::natural_order::natural_order;
 
@@ -17,27 +18,46 @@ use super::natural_order::natural_order;
 /// # Errors
 /// A pattern that is none, a folder that cannot be read, or one without a match: with the pattern, the folder that was looked
 /// at, and what is there.
-pub fn matching_files(patterns: &[String], base: &Path) -> Result<Vec<PathBuf>, StageError> {
-    let (mut files, mut seen): (Vec<PathBuf>, HashSet<PathBuf>) = Default::default();
+pub fn matching_files(patterns: &[String], base: &Path, files: &InputFiles) -> Result<Vec<Match>, StageError> {
+    let mut all = Vec::new();
     for pattern in patterns {
-        let mut matches = matches_of(pattern, base)?;
+        let matches = matches_of(pattern, base, files)?;
         if matches.is_empty() {
             return Err(no_match(pattern, base));
         }
-        matches.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
-        for file in matches {
-            if seen.insert(file.clone()) {
-                files.push(file);
-            }
-        }
+        all.extend(matches);
     }
-    Ok(files)
+    // one pattern matches no file twice
+    if patterns.len() > 1 {
+        let mut seen = HashSet::new();
+        all.retain(|file| seen.insert(file.path.clone()));
+    }
+    Ok(all)
 }
 
-fn matches_of(pattern: &str, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+/// A regular file that a pattern matches.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Match {
+    /// Its path.
+    pub path: PathBuf,
+    /// Whether it is a stage or result file of afmid's.
+    pub is_result: bool,
+}
+
+impl Match {
+    /// None: no regular file. One that cannot be read counts as no result: whoever opens it complains.
+    fn of(path: PathBuf, files: &InputFiles) -> Option<Self> {
+        match files.is_result(&path) {
+            Ok(is_result) => Some(Self { path, is_result }),
+            Err(_) => path.is_file().then_some(Self { path, is_result: false }),
+        }
+    }
+}
+
+fn matches_of(pattern: &str, base: &Path, files: &InputFiles) -> Result<Vec<Match>, StageError> {
     let whole = base.join(pattern);
     if whole.is_file() {
-        return Ok(vec![whole]);
+        return Ok(Match::of(whole, files).into_iter().collect());
     }
     // special characters in the folder of the config are no pattern; an absolute pattern replaces the folder
     let text = match Path::new(pattern).is_absolute() {
@@ -46,32 +66,33 @@ fn matches_of(pattern: &str, base: &Path) -> Result<Vec<PathBuf>, StageError> {
     };
     if whole.is_dir() {
         let folder = Pattern::escape(&whole.to_string_lossy());
-        let native = files_of(&format!("{folder}/*.h5"), pattern)?;
+        let native = files_of(&format!("{folder}/*.h5"), pattern, files)?;
         if !native.is_empty() {
             return Ok(native);
         }
-        return Ok(files_of(&format!("{folder}/*"), pattern)?.into_iter().filter(|file| recognised(file)).collect());
+        let all = files_of(&format!("{folder}/*"), pattern, files)?;
+        return Ok(all.into_iter().filter(|file| recognised(&file.path)).collect());
     }
-    files_of(&text, pattern)
+    files_of(&text, pattern, files)
 }
 
-/// The files that a whole pattern matches; `pattern` is what the user wrote.
-fn files_of(text: &str, pattern: &str) -> Result<Vec<PathBuf>, StageError> {
+/// The files that a whole pattern matches, in natural order; `pattern` is what the user wrote.
+fn files_of(text: &str, pattern: &str, files: &InputFiles) -> Result<Vec<Match>, StageError> {
     let options =
         MatchOptions { require_literal_leading_dot: true, require_literal_separator: true, ..MatchOptions::new() };
     let paths = glob_with(text, options)
         .map_err(|error| StageError::new(format!("`{pattern}` is no file pattern: {}", error.msg)).caused_by(error))?;
-    let mut files = Vec::new();
+    let mut found = Vec::new();
     for path in paths {
         let path = path.map_err(|error| {
             let place = error.path().to_owned();
             StageError::new(format!("a folder of the pattern `{pattern}` cannot be read: {}", error.error())).at(place)
         })?;
-        if path.is_file() {
-            files.push(path);
-        }
+        found.push((path.to_string_lossy().into_owned(), path));
     }
-    Ok(files)
+    // looked at afterwards: numbered files were mostly made in this order, and lie so in the file system
+    found.par_sort_by(|(a, _), (b, _)| natural_order(a, b));
+    Ok(found.into_par_iter().filter_map(|(_, path)| Match::of(path, files)).collect())
 }
 
 fn no_match(pattern: &str, base: &Path) -> StageError {
@@ -115,8 +136,8 @@ mod tests {
 
     fn names(patterns: &[&str], base: &Path) -> Vec<String> {
         let patterns: Vec<String> = patterns.iter().map(|&pattern| pattern.to_owned()).collect();
-        let files = matching_files(&patterns, base).unwrap();
-        files.iter().map(|file| file.file_name().unwrap().to_string_lossy().into_owned()).collect()
+        let files = matching_files(&patterns, base, &InputFiles::new()).unwrap();
+        files.iter().map(|file| file.path.file_name().unwrap().to_string_lossy().into_owned()).collect()
     }
 
     #[test]
@@ -144,7 +165,8 @@ mod tests {
     #[test]
     fn no_match_says_where_it_looked_and_what_is_there() {
         let base = folder("none", &["a.txt", "b.txt"]);
-        let said = |pattern: &str| matching_files(&[pattern.to_owned()], &base).unwrap_err().to_string();
+        let said =
+            |pattern: &str| matching_files(&[pattern.to_owned()], &base, &InputFiles::new()).unwrap_err().to_string();
         let text = said("*.h5");
         assert!(text.contains("`*.h5`") && text.contains(&base.display().to_string()), "{text}");
         assert!(text.contains("3 entries, from `a.txt` to `sub`"), "{text}");

@@ -21,7 +21,7 @@ pub use census::Census;
 pub use code_census::{CensusSettings, ChannelCensus, Found};
 pub use columns::Columns;
 pub use consistency::{Consistency, check_consistency};
-pub use file_patterns::matching_files;
+pub use file_patterns::{Match, matching_files};
 pub use memory::{MemorySource, memory_channel, memory_record};
 pub use natural_order::natural_order;
 pub use overview::Overview;

@@ -4,14 +4,15 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::{How, Opened, RawBinary, Reading, Wanted, open_records};
-use afmid_pipeline::store::is_own;
-use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
+use afmid_pipeline::{
+    Caching, Context, Document, Example, InputFiles, Port, Ports, Record, Recording, Spec, Stage, StageError,
+};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::consistency::{Consistency, check_consistency};
-use super::file_patterns::matching_files;
+use super::file_patterns::{Match, matching_files};
 use super::shared_data::moved;
 
 /// Opens records of any format by pattern.
@@ -115,8 +116,8 @@ impl Stage for Records {
         self.how().reading.check()
     }
 
-    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
-        self.matches(base).map(|(records, _)| records)
+    fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
+        self.matches(base, files).map(|(records, _)| records)
     }
 
     fn location_params() -> &'static [&'static str] {
@@ -124,7 +125,7 @@ impl Stage for Records {
     }
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let (paths, own) = self.matches(cx.base())?;
+        let (paths, own) = self.matches(cx.base(), cx.files())?;
         if let [first, ..] = &own[..] {
             let (count, are) = if own.len() == 1 {
                 ("1 file", "is a result")
@@ -163,14 +164,14 @@ impl Stage for Records {
 impl Records {
     /// The files that match: those to be opened, and afmid's own stage and result files, which lie beside the records where a run was told
     /// to write there. Errors: as [`matching_files`]; nothing but results.
-    fn matches(&self, base: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), StageError> {
+    fn matches(&self, base: &Path, input_files: &InputFiles) -> Result<(Vec<PathBuf>, Vec<PathBuf>), StageError> {
         let root = std::env::var_os("AFMID_DATA");
         let root = root.as_deref().map(Path::new);
         let files: Vec<String> = self.files.iter().map(|pattern| moved(pattern, root)).collect();
-        let files = matching_files(&files, base)?;
-        // a file that cannot be read is for `open` to complain about
-        let (own, records): (Vec<PathBuf>, Vec<PathBuf>) =
-            files.into_iter().partition(|file| is_own(file).unwrap_or(false));
+        let (mut records, mut own) = (Vec::new(), Vec::new());
+        for Match { path, is_result } in matching_files(&files, base, input_files)? {
+            if is_result { own.push(path) } else { records.push(path) }
+        }
         match (&records[..], own.first()) {
             ([], Some(first)) => Err(StageError::new(format!(
                 "all files that match `files` are results of afmid's ({} of them), wanted records",

@@ -1,8 +1,8 @@
 use std::fs;
 
-use afmid_pipeline::Artifact;
 use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
 use afmid_pipeline::stage::NoProgress;
+use afmid_pipeline::{Artifact, InputFiles};
 
 use super::*;
 
@@ -182,7 +182,7 @@ fn results_of_afmids_own_are_left_out_with_a_counted_warning() {
     assert_eq!((recording.records.len(), warnings.len()), (1, 1));
     assert!(warnings[0].starts_with("2 files of those that match are results of afmid's"), "{warnings:?}");
     // what is left out is no source either: the key does not depend on it
-    assert_eq!(all().sources(&folder.0).unwrap(), [folder.0.join("r1.h5")]);
+    assert_eq!(all().sources(&folder.0, &InputFiles::new()).unwrap(), [folder.0.join("r1.h5")]);
     let alone = Records { files: vec!["result.h5".to_owned()], ..all() };
     assert!(folder.run(&alone).unwrap_err().to_string().contains("all files that match"));
 }

@@ -104,9 +104,10 @@ impl Stage for Spectrum {
         Ok(())
     }
 
-    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+    fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
         let root = std::env::var_os("AFMID_DATA");
-        matching_files(&[moved(&self.file, root.as_deref().map(Path::new))], base)
+        let files = matching_files(&[moved(&self.file, root.as_deref().map(Path::new))], base, files)?;
+        Ok(files.into_iter().map(|file| file.path).collect())
     }
 
     fn location_params() -> &'static [&'static str] {
@@ -114,7 +115,7 @@ impl Stage for Spectrum {
     }
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let paths = self.sources(cx.base())?;
+        let paths = self.sources(cx.base(), cx.files())?;
         let [path] = &paths[..] else {
             return Err(StageError::new(format!("`file` matches {} files, wanted one", paths.len())));
         };

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Caching, Context, Document, Example, InputFiles, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -122,7 +122,7 @@ impl Stage for Columns {
         Ok(())
     }
 
-    fn sources(&self, base: &Path) -> Result<Vec<PathBuf>, StageError> {
+    fn sources(&self, base: &Path, _files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
         let path = self.path(base);
         if path.is_file() {
             return Ok(vec![path]);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::stage::NoProgress;
-use afmid_pipeline::{Context, Ports, Stage};
+use afmid_pipeline::{Context, InputFiles, Ports, Stage};
 
 use super::stage::{PAIR, SUMMARY};
 use super::*;
@@ -241,5 +241,5 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     ] {
         assert!(wrong.check().is_err());
     }
-    assert!(stage(|s| s.file = "b.csv".to_owned()).sources(folder.path()).is_err());
+    assert!(stage(|s| s.file = "b.csv".to_owned()).sources(folder.path(), &InputFiles::new()).is_err());
 }
