@@ -35,9 +35,11 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "the decay time"
 #[serde(deny_unknown_fields, default, crate = "afmid_pipeline::serde")]
 #[schemars(crate = "afmid_pipeline::schemars")]
 struct Envelope {
-    /// Samples per block, at least 2; default 256: a few periods of the paper's mode 1.
+    /// Samples per block. Default: 256, a few periods of the paper's mode 1.
+    #[schemars(range(min = 2))]
     block_samples: usize,
-    /// Seconds after the event at which the line begins, not negative; default 2e-4: higher modes are gone.
+    /// Seconds after the event at which the line begins. Default: 2e-4, higher modes are gone.
+    #[schemars(range(min = 0.0))]
     start_s: f64,
     /// Seconds after the event at which the line ends; default 6e-4: the ringing still stands above the noise.
     end_s: f64,
@@ -62,12 +64,9 @@ impl Stage for Envelope {
     };
 
     fn check(&self) -> Result<(), StageError> {
-        if self.block_samples < 2 {
-            return Err(StageError::new(format!("`block_samples` is {}, wanted at least 2", self.block_samples)));
-        }
-        if !(self.start_s >= 0.0 && self.end_s > self.start_s) {
+        if self.end_s <= self.start_s {
             return Err(StageError::new(format!(
-                "`end_s` is {}, wanted more than `start_s` ({}), which is not negative",
+                "`end_s` is {}, wanted more than `start_s` ({})",
                 self.end_s, self.start_s
             )));
         }

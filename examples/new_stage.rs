@@ -33,7 +33,8 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "root mean squar
 #[serde(deny_unknown_fields, default, crate = "afmid_pipeline::serde")]
 #[schemars(crate = "afmid_pipeline::schemars")]
 struct NewStage {
-    /// Samples at the end, at least 2; default 512.
+    /// Samples at the end. Default: 512.
+    #[schemars(range(min = 2))]
     samples: usize,
 }
 
@@ -54,13 +55,6 @@ impl Stage for NewStage {
         seeded: false,
         source: "definition",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        if self.samples < 2 {
-            return Err(StageError::new(format!("`samples` is {}, wanted at least 2", self.samples)));
-        }
-        Ok(())
-    }
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
         let average = inputs.get(&AVERAGE)?;

@@ -19,7 +19,7 @@ mod value;
 
 pub(crate) use name::RESERVED_ID;
 pub use overrides::Override;
-pub(crate) use parameters::instantiate;
+pub(crate) use parameters::{Ranges, instantiate};
 pub use place::Place;
 pub use plugins::{DEFAULT_TIMEOUT_S, PluginDecl};
 pub(crate) use plugins::{is_name as is_plugin_name, names as plugin_names};

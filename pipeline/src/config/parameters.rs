@@ -1,39 +1,65 @@
 //! The second step: from a `params` table to the stage itself.
 
+use std::collections::HashMap;
+
 use serde_json::Value;
 
 use super::problem::Problem;
 use super::stage::StageDecl;
 use super::suggest::did_you_mean;
-use crate::stage::{DynStage, Entry, ParamError};
+use crate::error::StageError;
+use crate::stage::{Bounds, DynStage, Entry, ParamError};
+
+/// The ranges that the schemas of stages state, each schema made once.
+#[derive(Debug, Default)]
+pub(crate) struct Ranges(HashMap<&'static str, Bounds>);
+
+impl Ranges {
+    fn of(&mut self, entry: &Entry) -> &Bounds {
+        self.0.entry(entry.spec.name).or_insert_with(|| Bounds::of(entry))
+    }
+}
 
 /// Makes the stage from its `params`. Errors: one problem per wrong parameter, each at its value or key.
-pub(crate) fn instantiate(decl: &StageDecl, entry: &Entry) -> Result<(Box<dyn DynStage>, Value), Vec<Problem>> {
+pub(crate) fn instantiate(
+    decl: &StageDecl,
+    entry: &Entry,
+    ranges: &mut Ranges,
+) -> Result<(Box<dyn DynStage>, Value), Vec<Problem>> {
     let mut problems = Vec::new();
     let mut params = decl.params.clone();
     // serde stops at the first error: take the wrong parameter out and go on, so that all are seen at once
     let stage = loop {
         match entry.parse(params.clone()) {
-            Ok(stage) => break stage,
+            Ok(stage) => break Some(stage),
             Err(error) => {
                 let kind = Kind::of(&error);
                 let path = steps(&error.path);
                 let at_root = matches!(&kind, Kind::Missing(_)) && path.is_empty();
                 if !at_root {
-                    problems.push(describe(decl, entry, &path, &kind, &error));
+                    problems.push(describe(decl, entry, ranges, &path, &kind, &error));
                 }
                 let Some(key) = path.first().filter(|key| params.contains_key(key.as_str())) else {
                     problems.extend(missing(decl, entry, &kind));
-                    return Err(problems);
+                    break None;
                 };
                 params.remove(key);
             }
         }
     };
+    let outside = if params.is_empty() { Vec::new() } else { ranges.of(entry).check(&params) };
+    for wrong in &outside {
+        let error = StageError::new(format!("`{}` {}", dotted(&wrong.path), wrong.message));
+        problems.push(unchecked(decl, &error.help(wrong.doc.clone())));
+    }
+    let Some(stage) = stage else { return Err(problems) };
+    // with a parameter left out or out of its range, what relates others to it says nothing
+    if problems.is_empty() {
+        problems.extend(stage.check().err().map(|error| unchecked(decl, &error)));
+    }
     if !problems.is_empty() {
         return Err(problems);
     }
-    stage.check().map_err(|error| vec![unchecked(decl, &error)])?;
     let resolved = stage.params().map_err(|error| vec![unchecked(decl, &error)])?;
     Ok((stage, resolved))
 }
@@ -61,7 +87,14 @@ impl Kind {
     }
 }
 
-fn describe(decl: &StageDecl, entry: &Entry, path: &[String], kind: &Kind, error: &ParamError) -> Problem {
+fn describe(
+    decl: &StageDecl,
+    entry: &Entry,
+    ranges: &mut Ranges,
+    path: &[String],
+    kind: &Kind,
+    error: &ParamError,
+) -> Problem {
     let (title, name) = (decl.title(), entry.spec.name);
     let known = || quoted(&error.message).skip(1);
     let dotted = dotted(path);
@@ -85,7 +118,7 @@ fn describe(decl: &StageDecl, entry: &Entry, path: &[String], kind: &Kind, error
         }
         Kind::Other => {
             let subject = if path.is_empty() { title } else { format!("parameter `{dotted}` of {title}") };
-            let message = ranged(decl, entry, path, &error.message).unwrap_or_else(|| plain(&error.message));
+            let message = ranged(entry, ranges, path, &error.message).unwrap_or_else(|| plain(&error.message));
             Problem::new(format!("{subject}: {message}"), 0..0, "wrong value")
                 .at(decl.locate(path, false))
                 .help(entry.manual())
@@ -93,28 +126,15 @@ fn describe(decl: &StageDecl, entry: &Entry, path: &[String], kind: &Kind, error
     }
 }
 
-/// The message about a negative number where a count is wanted, with the range that the stage's own check states: it is asked about 0, which
-/// the type allows and the range mostly does not.
-fn ranged(decl: &StageDecl, entry: &Entry, path: &[String], message: &str) -> Option<String> {
-    let [name] = path else { return None };
+/// The message about a negative number where a count is wanted, with the parameter's range.
+fn ranged(entry: &Entry, ranges: &mut Ranges, path: &[String], message: &str) -> Option<String> {
     let negative = message.strip_prefix("invalid value: integer `-").is_some();
     if !negative || !(message.ends_with(" usize") || message.ends_with(" u64")) {
         return None;
     }
-    let params = toml::Table::from_iter([(name.clone(), toml::Value::Integer(0))]);
-    let with_all = || {
-        let mut all = decl.params.clone();
-        all.extend(params.clone());
-        all
-    };
-    // other parameters may be wrong too: then their defaults
-    let stage = entry.parse(with_all()).or_else(|_| entry.parse(params.clone())).ok()?;
-    let said = stage.check().err()?.problem;
-    let range = [" is 0, wanted ", ": found 0, wanted "]
-        .into_iter()
-        .find_map(|verb| said.strip_prefix(&format!("`{name}`{verb}")))?;
+    let range = ranges.of(entry).range(path);
     let plain = plain(message);
-    let (found, _) = plain.split_once(", wanted ")?;
+    let (found, _) = plain.split_once(", wanted ").filter(|_| !range.is_empty())?;
     Some(format!("{found}, wanted {range}"))
 }
 
@@ -140,8 +160,8 @@ fn lacks(decl: &StageDecl, entry: &Entry, path: &[String], field: &str) -> Probl
         .help(format!("it has no default: add `{field} = ...`; {}", entry.manual()))
 }
 
-/// A problem of [`DynStage::check`]: at the parameter that its message begins with, or at the whole table.
-fn unchecked(decl: &StageDecl, error: &crate::StageError) -> Problem {
+/// A parameter out of its range, or the error of [`DynStage::check`]: at the parameter that its message begins with, or at the whole table.
+fn unchecked(decl: &StageDecl, error: &StageError) -> Problem {
     let message = error.to_string();
     let named = message.starts_with('`').then(|| quoted(&message).next().map(steps)).flatten().unwrap_or_default();
     let changes = decl.changes();

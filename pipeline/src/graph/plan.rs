@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::{Stages, order, sweep, wiring};
-use crate::config::{Config, Problem, StageDecl, instantiate, most_helped, nearest};
+use crate::config::{Config, Problem, Ranges, StageDecl, instantiate, most_helped, nearest};
 use crate::stage::{DynStage, Entry};
 
 /// A checked graph: what the runner runs. Cloning is cheap: stages are shared.
@@ -118,11 +118,12 @@ fn try_plan(config: Config, known: &dyn Stages, problems: &mut Vec<Problem>) -> 
     let mut unknown = 0;
     let entries: Vec<Option<Entry>> =
         config.stages.iter().map(|stage| find(stage, &config, known, &mut unknown, problems)).collect();
+    let mut ranges = Ranges::default();
     let stages: Vec<_> = config
         .stages
         .iter()
         .zip(&entries)
-        .map(|(decl, entry)| match instantiate(decl, entry.as_ref().filter(|_| decl.params_read)?) {
+        .map(|(decl, entry)| match instantiate(decl, entry.as_ref().filter(|_| decl.params_read)?, &mut ranges) {
             Ok(stage) => Some(stage),
             Err(wrong) => {
                 problems.extend(wrong);
@@ -130,7 +131,7 @@ fn try_plan(config: Config, known: &dyn Stages, problems: &mut Vec<Problem>) -> 
             }
         })
         .collect();
-    sweep::check(&config, &entries, problems);
+    sweep::check(&config, &entries, &mut ranges, problems);
     let wires = wiring::connect(&config.stages, &entries, problems);
     let order = order::topological(&config.stages, &wires, problems)?;
     let mut places = vec![None; order.len()];

@@ -6,11 +6,11 @@ use std::ops::Range;
 use serde_json::Value;
 
 use super::plan::Plan;
-use crate::config::{Config, Override, Problem, Swept, instantiate, point};
+use crate::config::{Config, Override, Problem, Ranges, Swept, instantiate, point};
 use crate::stage::Entry;
 
 /// Makes every swept stage with every combination of its own parameters. The first one is the config's and was checked with it.
-pub(super) fn check(config: &Config, entries: &[Option<Entry>], problems: &mut Vec<Problem>) {
+pub(super) fn check(config: &Config, entries: &[Option<Entry>], ranges: &mut Ranges, problems: &mut Vec<Problem>) {
     if config.sweep.is_empty() {
         return;
     }
@@ -26,7 +26,7 @@ pub(super) fn check(config: &Config, entries: &[Option<Entry>], problems: &mut V
             let applied =
                 values.filter_map(|(swept, value)| swept.values.get(value).cloned()).try_for_each(|set| alone.set(set));
             if let (Ok(()), Some(decl)) = (applied, alone.stages.first()) {
-                tell(instantiate(decl, entry).err().into_iter().flatten(), &mut told, problems);
+                tell(instantiate(decl, entry, ranges).err().into_iter().flatten(), &mut told, problems);
             }
         }
     }
@@ -73,7 +73,7 @@ impl Plan {
 
     /// The same plan with values set. Only the stages that they name are made anew.
     fn with(&self, sets: Vec<Override>) -> Result<Self, Vec<Problem>> {
-        let (mut plan, mut problems) = (self.clone(), Vec::new());
+        let (mut plan, mut problems, mut ranges) = (self.clone(), Vec::new(), Ranges::default());
         let changed: Vec<String> = sets.iter().filter_map(|set| set.stage().map(str::to_owned)).collect();
         for set in sets {
             let text = set.text().to_owned();
@@ -84,7 +84,7 @@ impl Plan {
         }
         for node in plan.nodes.iter_mut().filter(|node| changed.contains(&node.id)) {
             let Some(decl) = plan.config.stages.iter().find(|decl| decl.id == node.id) else { continue };
-            match instantiate(decl, &node.entry) {
+            match instantiate(decl, &node.entry, &mut ranges) {
                 Ok((stage, params)) => (node.stage, node.params) = (stage.into(), params),
                 Err(wrong) => problems.extend(wrong),
             }

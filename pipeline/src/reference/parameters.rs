@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 use super::params_schema;
-use crate::stage::Entry;
+use crate::stage::{Entry, range, resolve};
 
 /// A parameter, for people.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,7 +38,7 @@ impl<'a> Reader<'a> {
             schema["required"].as_array().is_some_and(|names| names.iter().any(|required| required == name))
         };
         for (name, property) in schema["properties"].as_object().into_iter().flatten() {
-            let (inner, optional) = self.resolve(property);
+            let (inner, optional) = resolve(property, self.definitions);
             let default = match &property["default"] {
                 _ if required(name) => None,
                 Value::Null => Some("none".to_owned()),
@@ -57,32 +57,14 @@ impl<'a> Reader<'a> {
             if prefix.matches('.').count() < 3 {
                 self.object(inner, &format!("{name}."), rows);
                 if inner["items"].is_object() {
-                    self.object(self.resolve(&inner["items"]).0, &format!("{name}[]."), rows);
+                    self.object(resolve(&inner["items"], self.definitions).0, &format!("{name}[]."), rows);
                 }
             }
         }
     }
 
-    /// The schema behind references and options, and whether it may be left out.
-    fn resolve(&self, schema: &'a Value) -> (&'a Value, bool) {
-        if let Some(reference) = schema["$ref"].as_str() {
-            let name = reference.rsplit('/').next().unwrap_or_default();
-            return self.definitions.get(name).map_or((schema, false), |inner| (inner, false));
-        }
-        if let Some([one]) = schema["allOf"].as_array().map(Vec::as_slice) {
-            return self.resolve(one);
-        }
-        if let Some([one, other]) = schema["anyOf"].as_array().map(Vec::as_slice)
-            && other["type"] == "null"
-        {
-            return (self.resolve(one).0, true);
-        }
-        let nullable = schema["type"].as_array().is_some_and(|kinds| kinds.iter().any(|kind| kind == "null"));
-        (schema, nullable)
-    }
-
     fn kind(&self, schema: &'a Value) -> String {
-        let (schema, _) = self.resolve(schema);
+        let (schema, _) = resolve(schema, self.definitions);
         let choices = choices(schema);
         if !choices.is_empty() {
             return choices.iter().map(|(value, _)| toml(value)).collect::<Vec<_>>().join(" or ");
@@ -135,23 +117,6 @@ fn plural(kind: &str) -> String {
         "number" | "whole number" | "table" | "value" => format!("{kind}s"),
         "text" => "texts".to_owned(),
         other => other.to_owned(),
-    }
-}
-
-/// The range that a schema states.
-fn range(schema: &Value) -> String {
-    // zero as the bound of an unsigned type says nothing of the parameter
-    let unsigned = schema["format"].as_str().is_some_and(|format| format.starts_with("uint"));
-    let told = |key: &str, bound: &f64| !(unsigned && key == "minimum" && *bound == 0.0);
-    let bound = |key: &str| schema[key].as_f64().filter(|bound| told(key, bound)).map(|bound| format!("{bound}"));
-    let low = bound("minimum").map(|low| (low, "at least")).or(bound("exclusiveMinimum").map(|low| (low, "above")));
-    let high = bound("maximum").map(|high| (high, "at most")).or(bound("exclusiveMaximum").map(|high| (high, "below")));
-    match (low, high) {
-        (Some((low, "at least")), Some((high, "at most"))) => format!("{low} to {high}"),
-        (Some((low, how)), Some((high, limit))) => format!("{how} {low}, {limit} {high}"),
-        (Some((low, how)), None) => format!("{how} {low}"),
-        (None, Some((high, limit))) => format!("{limit} {high}"),
-        (None, None) => String::new(),
     }
 }
 

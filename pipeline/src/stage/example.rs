@@ -2,7 +2,7 @@
 
 use tempfile::TempDir;
 
-use super::{Context, DynStage, Entry, Example, NoProgress};
+use super::{Bounds, Context, DynStage, Entry, Example, NoProgress};
 use crate::outcome::Ports;
 
 /// The seed of every example.
@@ -26,7 +26,10 @@ pub(crate) fn example_inputs(entry: &Entry, example: &Example) -> Result<Ports, 
 /// The stage with the example's parameters. Errors: what is wrong with them.
 pub(crate) fn instance(entry: &Entry, example: &Example) -> Result<Box<dyn DynStage>, String> {
     let params: toml::Table = example.params.parse().map_err(|error| format!("params are not TOML: {error}"))?;
-    let stage = entry.parse(params).map_err(|error| format!("params: at {}: {error}", error.path))?;
+    let stage = entry.parse(params.clone()).map_err(|error| format!("params: at {}: {error}", error.path))?;
+    if let Some(wrong) = Bounds::of(entry).check(&params).first() {
+        return Err(format!("params: `{}` {}", wrong.path.join("."), wrong.message));
+    }
     stage.check().map_err(|error| format!("params: {error}"))?;
     Ok(stage)
 }

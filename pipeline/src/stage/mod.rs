@@ -1,11 +1,14 @@
 //! The stage: what a component of a pipeline is.
 
+mod bounds;
 mod context;
 mod entry;
 mod example;
 mod registry;
 mod spec;
 
+pub use bounds::{Bounds, check};
+pub(crate) use bounds::{range, resolve};
 pub use context::{Context, NoProgress, Progress};
 pub use entry::{DynStage, Entry, Maker, ParamError};
 pub use example::run_example;

@@ -51,7 +51,9 @@ pub trait Stage: Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'stat
     /// Name, version, ports.
     const SPEC: Spec;
 
-    /// Checks the parameters alone, before any data is opened. Errors: what was found, what was wanted; the runner adds the place.
+    /// Checks what relates parameters to one another, before any data is opened. The range of a single parameter is stated on its field
+    /// (`#[schemars(range(min = 1, max = 40))]`) and checked before, of all parameters at once. Errors: what was found, what was wanted; the
+    /// runner adds the place.
     fn check(&self) -> Result<(), StageError> {
         Ok(())
     }

@@ -167,7 +167,7 @@ fn problems_of_all_kinds_come_at_once_in_the_order_of_the_text() {
         found,
         [
             "[pipeline] has no key `nam`",
-            "parameter `samples` of stage `a`: found the integer `-1`, wanted 1 or more",
+            "parameter `samples` of stage `a`: found the integer `-1`, wanted 1 to 1000000",
             "stage id `a` is used twice",
             "there is no stage named `test.peks`",
             "input `table` of stage `c` (`test.count`) is not wired",

@@ -30,7 +30,7 @@ const WEIGHTS: Port<Table> = Port::optional("weights", "marks", "weights, if the
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sine {
-    /// How many samples (1 to 1000000; default 16: two periods).
+    /// How many samples. Default: 16, two periods.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub samples: usize,
     /// Amplitude in V.
@@ -86,9 +86,6 @@ impl Stage for Sine {
     };
 
     fn check(&self) -> Result<(), StageError> {
-        if self.samples == 0 {
-            return Err(StageError::new("`samples`: found 0, wanted 1 or more").help("16 are two periods"));
-        }
         if self.amplitude_v == 0.0 && self.noise.std_v == 0.0 {
             return Err(StageError::new("a sine without amplitude or noise is no signal"));
         }

@@ -28,11 +28,14 @@ use afmid_kernels::calibration::{OnsetRule, onset_delay};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Delay {
-    /// Departure from the line before the event in standard errors, 2 to 1000. Default: 5.
+    /// Departure from the line before the event in standard errors. Default: 5.
+    #[schemars(range(min = 2.0, max = 1000.0))]
     pub threshold: f64,
-    /// Samples in a row that must depart, 1 to 1000. Default: 3.
+    /// Samples in a row that must depart. Default: 3.
+    #[schemars(range(min = 1, max = 1000))]
     pub sustained_samples: usize,
-    /// The ringing is fitted from this long after the departure, in s, 0 to 1. Default: 2e-5.
+    /// The ringing is fitted from this long after the departure, in s. Default: 2e-5.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub skip_s: f64,
     /// Real detector poles in Hz, above 0, as far as they are known. Default: none.
     pub detector_poles_hz: Vec<f64>,

@@ -11,12 +11,15 @@ use afmid_kernels::calibration::FreeRule;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FreeSettings {
-    /// Samples per block of the level and noise statistics, 16 to 65536. Default: 512 (0.1 ms at 5 MS/s: some periods of mode 1).
+    /// Samples per block of the level and noise statistics. Default: 512 (0.1 ms at 5 MS/s: some periods of mode 1).
+    #[schemars(range(min = 16, max = 65_536))]
     pub block_samples: usize,
-    /// Left out after a snap-off once the blocks' noise is back to normal, in s, 0 to 1. Default: 5e-3: eighteen decay times of the paper's
-    /// mode 1, the ringing is far below the thermal motion.
+    /// Left out after a snap-off once the blocks' noise is back to normal, in s. Default: 5e-3: eighteen decay times of
+    /// the paper's mode 1, the ringing is far below the thermal motion.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub settle_s: f64,
-    /// Left out before a snap-in, in s, 0 to 1. Default: 5e-4.
+    /// Left out before a snap-in, in s. Default: 5e-4.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub guard_s: f64,
 }
 

@@ -11,13 +11,17 @@ use afmid_kernels::calibration::PeakSearch;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PeakSettings {
-    /// Samples per segment of the spectra, even, 256 to 4194304. Default: 16384: bins of 305 Hz at 5 MS/s, a quarter of the paper's peak.
+    /// Samples per segment of the spectra, even. Default: 16384: bins of 305 Hz at 5 MS/s, a quarter of the paper's
+    /// peak.
+    #[schemars(range(min = 256, max = 4_194_304))]
     pub segment_samples: usize,
     /// The peak lies above this, in Hz. Default: 10e3.
     pub lowest_hz: f64,
     /// The peak lies below this, in Hz, above `lowest_hz`. Default: 150e3: below the paper's mode 2.
     pub highest_hz: f64,
-    /// The fit reaches from `f1 / band` to `f1 band`, 1.1 to 10. Default: 2.5: enough of both flanks for white and 1/f noise, mode 2 far off.
+    /// The fit reaches from `f1 / band` to `f1 band`. Default: 2.5: enough of both flanks for white and 1/f noise, mode
+    /// 2 far off.
+    #[schemars(range(min = 1.1, max = 10.0))]
     pub band: f64,
 }
 

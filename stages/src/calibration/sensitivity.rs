@@ -37,11 +37,13 @@ use afmid_kernels::calibration::{
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Sensitivity")]
 pub struct SlopeSensitivity {
-    /// Travel of the piezo per monitored volt in m/V, above 0. Default: 25e-9.
+    /// Travel of the piezo per monitored volt in m/V. Default: 25e-9.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub piezo_m_per_v: f64,
     /// Its standard uncertainty in m/V, not negative. Default: 0: unknown, left out.
     pub piezo_m_per_v_std: f64,
-    /// Stiffness of the contact in N/m, above 0; absent: rigid as far as is known. Default: absent.
+    /// Stiffness of the contact in N/m; absent: rigid as far as is known. Default: absent.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub contact_stiffness_n_per_m: Option<f64>,
     /// Stiffness of the lever in N/m, above 0, for the correction; absent: no correction here (`calibration.stiffness` corrects both
     /// together). Default: absent.

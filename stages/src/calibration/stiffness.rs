@@ -45,12 +45,14 @@ pub struct ThermalStiffness {
     /// Contact stiffness in N/m under the contact slope, above 0, where the sensitivity is not corrected yet; absent: as `sensitivity`
     /// says, or rigid. Default: absent.
     pub contact_stiffness_n_per_m: Option<f64>,
-    /// Temperature in K, above 0. Default: 295.
+    /// Temperature in K. Default: 295.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub temperature_k: f64,
     /// Its standard uncertainty in K, not negative. Default: 2.
     pub temperature_std_k: f64,
-    /// `c_slope_1^2 / c_tip_1`, above 0. Default: 0.8175, a uniform beam seen by its end slope. From an identified static share of mode
-    /// 1 of the detector signal: its square / 0.971.
+    /// `c_slope_1^2 / c_tip_1`. Default: 0.8175, a uniform beam seen by its end slope. From an identified static share
+    /// of mode 1 of the detector signal: its square / 0.971.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub mode_shape_factor: f64,
     /// Its standard uncertainty, not negative. Default: 0.01.
     pub mode_shape_factor_std: f64,

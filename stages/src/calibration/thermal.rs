@@ -34,7 +34,8 @@ use afmid_kernels::calibration::{AveragedPeriodogram, Stability, ThermalPeak, We
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Thermal {
-    /// p-value below which a change is reported, 1e-12 to 0.5. Default: 0.001: eight tests, one false alarm in 125 archives.
+    /// p-value below which a change is reported. Default: 0.001: eight tests, one false alarm in 125 archives.
+    #[schemars(range(min = 1e-12, max = 0.5))]
     pub significance: f64,
     /// Where the peak is sought.
     pub peak: PeakSettings,

@@ -22,11 +22,14 @@ use super::{DriftSettings, EnsembleError, ShapeDrift, SubEnsemble, shape_drift};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Drift {
-    /// Sub-ensembles of either kind, 2 to 1000. Default: 4; some twenty events each in an archive like the paper's.
+    /// Sub-ensembles of either kind. Default: 4; some twenty events each in an archive like the paper's.
+    #[schemars(range(min = 2, max = 1000))]
     pub groups: usize,
-    /// Random orders, 99 to 100000. Default: 999; a p-value of one per cent then has a standard error of a third of itself.
+    /// Random orders. Default: 999; a p-value of one per cent then has a standard error of a third of itself.
+    #[schemars(range(min = 99, max = 100_000))]
     pub permutations: usize,
-    /// A smaller p-value is a warning, 0 to 1. Default: 0.01.
+    /// A smaller p-value is a warning. Default: 0.01.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub alarm_p_value: f64,
 }
 
@@ -53,19 +56,6 @@ impl Stage for Drift {
         seeded: true,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        if !(2..=1000).contains(&self.groups) {
-            return Err(StageError::new(format!("`groups` is {}, wanted 2 to 1000", self.groups)));
-        }
-        if !(99..=100_000).contains(&self.permutations) {
-            return Err(StageError::new(format!("`permutations` is {}, wanted 99 to 100000", self.permutations)));
-        }
-        if !(0.0..=1.0).contains(&self.alarm_p_value) {
-            return Err(StageError::new(format!("`alarm_p_value` is {}, wanted 0 to 1", self.alarm_p_value)));
-        }
-        Ok(())
-    }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let ensemble = inputs.get(&ENSEMBLE)?;

@@ -39,32 +39,41 @@ use afmid_kernels::events::{Aligned, AveragingSettings, EventKind, Misfit, corre
 pub struct Correlation {
     /// `snap-off` (the contact ruptures) or `snap-in` (also `snap-to-contact`). Default: `snap-off`.
     pub kind: EventKind,
-    /// Length of the aligned windows, 256 to 4194304. Default: 8192, the paper's.
+    /// Length of the aligned windows. Default: 8192, the paper's.
+    #[schemars(range(min = 256, max = 4_194_304))]
     pub window_samples: usize,
-    /// Share of the window before the onset, 0.01 to 0.9. Default: 0.125, twice what a Tukey window of alpha 0.1 tapers and more.
+    /// Share of the window before the onset. Default: 0.125, twice what a Tukey window of alpha 0.1 tapers and more.
+    #[schemars(range(min = 0.01, max = 0.9))]
     pub pre_share: f64,
-    /// Samples in a block of the scan, 1 to 1024. Default: 16; shorter than half a period of the slowest mode.
+    /// Samples in a block of the scan. Default: 16; shorter than half a period of the slowest mode.
+    #[schemars(range(min = 1, max = 1024))]
     pub block_samples: usize,
     /// Samples on either side of a step that the level is taken from, at least 16 blocks. Default: 1024; some periods of the
     /// slowest mode.
     pub level_samples: usize,
-    /// How many robust standard deviations a step, and a jump of level, must exceed, 5 to 1000. Default: 8; at 5, noise alone
+    /// How many robust standard deviations a step, and a jump of level, must exceed. Default: 8; at 5, noise alone
     /// makes a step in thirty records of a million samples.
+    #[schemars(range(min = 5.0, max = 1000.0))]
     pub significance: f64,
-    /// Samples after the onset that are compared in the alignment (and a quarter of it before), 16 to 65536. Default: 256; the
+    /// Samples after the onset that are compared in the alignment (and a quarter of it before). Default: 256; the
     /// steepest slopes, and too short for resonances that differ between events to slip in phase.
+    #[schemars(range(min = 16, max = 65_536))]
     pub correlation_samples: usize,
     /// How far the alignment may move an event from its detected onset, 1 to 1024 samples. Default: 32; less than half a period
     /// of the slowest mode.
     pub max_shift_samples: usize,
-    /// Iterations of the averaging at most, 1 to 1000. Default: 20; four are usual.
+    /// Iterations of the averaging at most. Default: 20; four are usual.
+    #[schemars(range(min = 1, max = 1000))]
     pub max_iterations: usize,
-    /// The averaging ends when no event moves by more, in samples, 1e-9 to 1. Default: 0.001; below the noise of any shift.
+    /// The averaging ends when no event moves by more, in samples. Default: 0.001; below the noise of any shift.
+    #[schemars(range(min = 1e-9, max = 1.0))]
     pub tolerance_samples: f64,
-    /// Events that correlate less with the average of the others are rejected, 0 to 1. Default: 0.8; ordinary ones reach 0.99.
+    /// Events that correlate less with the average of the others are rejected. Default: 0.8; ordinary ones reach 0.99.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_correlation: f64,
-    /// Events are rejected whose residual against the others is this many times the median one (and 6 robust deviations above
-    /// it), 1 to 1e9. Default: 3.
+    /// Events are rejected whose residual against the others is this many times the median one (and 6 robust deviations
+    /// above it). Default: 3.
+    #[schemars(range(min = 1.0, max = 1e9))]
     pub max_residual_ratio: f64,
     /// Keep events with samples at the end of the converter's range instead of rejecting them. Default: false.
     pub keep_saturated: bool,

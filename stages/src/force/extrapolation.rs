@@ -29,10 +29,12 @@ pub struct Extrapolation {
     pub guard_s: f64,
     /// How far t0 may lie from the onset of the ensemble, above 0 to 1 s. Default: 10 us.
     pub reach_s: f64,
-    /// A departure counts above this many standard deviations of the mean about its line, 2 to 100. Default: 4; noise alone crosses it once in 16000
-    /// samples, and only a few are looked at.
+    /// A departure counts above this many standard deviations of the mean about its line. Default: 4; noise alone
+    /// crosses it once in 16000 samples, and only a few are looked at.
+    #[schemars(range(min = 2.0, max = 100.0))]
     pub departure_sigma: f64,
-    /// Share of the load by which the signal must leave the line to be the event, 0.001 to 0.9. Default: 0.1.
+    /// Share of the load by which the signal must leave the line to be the event. Default: 0.1.
+    #[schemars(range(min = 0.001, max = 0.9))]
     pub sure_share: f64,
     /// Line without force: `linear` (offset and slope) or `constant`. Default: linear, since crosstalk of the piezo makes a slope.
     pub zero_line: ZeroLine,
@@ -40,7 +42,8 @@ pub struct Extrapolation {
     pub t0_s: Option<f64>,
     /// Spring constant in N/m, above 0, for a force in newtons; it comes before the calibration's. Default: none.
     pub stiffness_n_per_m: Option<f64>,
-    /// Optical lever sensitivity in volts per metre of deflection, above 0; it comes before the calibration's. Default: none.
+    /// Optical lever sensitivity in volts per metre of deflection; it comes before the calibration's. Default: none.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: Option<f64>,
 }
 

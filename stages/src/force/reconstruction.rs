@@ -54,7 +54,8 @@ pub struct Reconstruction {
     pub noise: NoiseSource,
     /// Line without force: slope too? Default: false; a slope that is not there widens the band before a snap-off.
     pub sloped_line: bool,
-    /// Seconds left out between the event and the line without force, 0 to 1. Default: 10e-6, as in `force.extrapolation`.
+    /// Seconds left out between the event and the line without force. Default: 10e-6, as in `force.extrapolation`.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub guard_s: f64,
 }
 

@@ -32,7 +32,8 @@ use super::stretch_extremes::StretchExtremes;
 pub struct Overview {
     /// Number of the record, from 0. Default: 0, the first.
     pub record: usize,
-    /// Number of stretches, 2 to 100000. Default: 2000; twice what a page is wide in pixels.
+    /// Number of stretches. Default: 2000; twice what a page is wide in pixels.
+    #[schemars(range(min = 2, max = 100_000))]
     pub stretches: usize,
 }
 

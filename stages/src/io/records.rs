@@ -47,8 +47,9 @@ pub struct Records {
     pub channel: String,
     /// The piezo monitor, used where a file has it; empty: not looked for. Default: `/piezo`.
     pub piezo_channel: String,
-    /// Least sample rate, in Hz, 0 or more. Default: 200000: twenty samples in a period of a 10 kHz lever, the softest in use;
+    /// Least sample rate, in Hz. Default: 200000: twenty samples in a period of a 10 kHz lever, the softest in use;
     /// slower archives are force curves, low-pass filtered, without a ringdown.
+    #[schemars(range(min = 0.0))]
     pub min_sample_rate_hz: f64,
     /// Leave out files that cannot be opened, with a warning, instead of stopping. Default: false.
     pub skip_unreadable: bool,

@@ -38,11 +38,15 @@ pub struct Spectrum {
     pub density: String,
     /// Unit of the signal whose density it is. Default: V.
     pub unit: String,
-    /// Factor from the stored density to `unit`^2/Hz, above 0. Default: 1; 0.5 for a density that has been doubled once too often.
+    /// Factor from the stored density to `unit`^2/Hz. Default: 1; 0.5 for a density that has been doubled once too
+    /// often.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub scale: f64,
-    /// Independent spectra that were averaged, 1 to 1e9. Default: the attribute `n_avg` of the density's dataset or of the file.
+    /// Independent spectra that were averaged. Default: the attribute `n_avg` of the density's dataset or of the file.
+    #[schemars(range(min = 1.0, max = 1e9))]
     pub averages: Option<f64>,
-    /// Frequencies below are left out, in Hz, 0 or more. Default: 0.
+    /// Frequencies below are left out, in Hz. Default: 0.
+    #[schemars(range(min = 0.0))]
     pub lowest_hz: f64,
     /// Frequencies above are left out, in Hz. Default: none.
     pub highest_hz: Option<f64>,

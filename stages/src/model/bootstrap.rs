@@ -31,17 +31,21 @@ use afmid_kernels::validation::{BootstrapSettings, Bootstrapped, bootstrap};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BootstrapIntervals {
-    /// Replicates, 20 to 100000. Default: 200, a fit each: ends of the intervals to a tenth of their length.
+    /// Replicates. Default: 200, a fit each: ends of the intervals to a tenth of their length.
+    #[schemars(range(min = 20, max = 100_000))]
     pub replicates: usize,
     /// Consecutive events drawn together, 1 to half of the events. Default: 1; more where neighbours are alike, as when the lever drifts.
+    #[schemars(range(min = 1))]
     pub block_events: usize,
     /// Estimate a constant offset of the response. Default: true.
     pub offset: bool,
     /// Estimate a linear drift of the response. Default: true; averaged records wander.
     pub drift: bool,
-    /// Points of the frequency response, 2 to 10000, logarithmic from `response_from_hz` to half the sample rate. Default: 200.
+    /// Points of the frequency response, logarithmic from `response_from_hz` to half the sample rate. Default: 200.
+    #[schemars(range(min = 2, max = 10_000))]
     pub response_points: usize,
-    /// Lowest frequency of the response in Hz, above 0. Default: 1000.
+    /// Lowest frequency of the response in Hz. Default: 1000.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub response_from_hz: f64,
     /// What the force does between samples: of `held` the half sample's lag is taken out of the delay, lag and droop out of the response. Default: held, as in `model.modes`.
     pub intersample: Intersample,
@@ -80,19 +84,6 @@ impl Stage for BootstrapIntervals {
         seeded: true,
         source: "B. Efron and R. Tibshirani, An Introduction to the Bootstrap, 1993",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        let range = |name: &str, found: f64, ok: bool, wanted: &str| {
-            if ok { Ok(()) } else { Err(StageError::new(format!("`{name}` is {found}, wanted {wanted}"))) }
-        };
-        let count = self.replicates;
-        range("replicates", count as f64, (20..=100_000).contains(&count), "20 to 100000")?;
-        range("block_events", self.block_events as f64, self.block_events >= 1, "1 or more")?;
-        let points = self.response_points;
-        range("response_points", points as f64, (2..=10_000).contains(&points), "2 to 10000")?;
-        let from = self.response_from_hz;
-        range("response_from_hz", from, from > 0.0 && from.is_finite(), "above 0")
-    }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let (ensemble, pair, artifact) = (inputs.get(&ENSEMBLE)?, inputs.get(&PAIR)?, inputs.get(&MODEL)?);

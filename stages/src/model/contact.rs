@@ -40,13 +40,16 @@ use afmid_kernels::ringdown::{Estimate, ModeEstimate};
 pub struct ContactFit {
     /// Static stiffness of the lever at its tip in N/m, above 0, where `stiffness` is not wired. Default: absent.
     pub stiffness_n_per_m: Option<f64>,
-    /// Its relative standard error, 0 to 1, where `stiffness` is not wired. Default: 0, errors are then those of the ratio to k.
+    /// Its relative standard error, where `stiffness` is not wired. Default: 0, errors are then those of the ratio to
+    /// k.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub stiffness_error: f64,
     /// What each free mode has of the tip's static compliance, ascending, above 0, their sum at most 1; the rest counts as static. Their sum is kept, each
     /// is a start. Default: 0.9713, 0.0247, 0.0032, 0.0008, a beam loaded at its end.
     pub tip_shares: Vec<f64>,
-    /// Relative standard error of each share but the first, which makes up for the others, 0 to 10; 0 takes them as they are. Default: absent, the data
-    /// alone say them; wanted where there are fewer coupled poles than shares.
+    /// Relative standard error of each share but the first, which makes up for the others; 0 takes them as they are.
+    /// Default: absent, the data alone say them; wanted where there are fewer coupled poles than shares.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub tip_share_error: Option<f64>,
     /// The contact's law: `spring-damper`, `second-order`, or `auto`, which takes the second where it lowers chi square by more than 9. Default: auto.
     pub law: Law,
@@ -109,8 +112,6 @@ impl Stage for ContactFit {
 
     fn check(&self) -> Result<(), StageError> {
         within("stiffness_n_per_m", self.stiffness_n_per_m.unwrap_or(1.0), 1e-6, 1e6)?;
-        within("stiffness_error", self.stiffness_error, 0.0, 1.0)?;
-        within("tip_share_error", self.tip_share_error.unwrap_or(1.0), 0.0, 10.0)?;
         within("max_frequency_hz", self.max_frequency_hz.unwrap_or(1.0), 1e-6, 1e12)?;
         for &share in &self.tip_shares {
             within("tip_shares", share, 1e-12, 1.0)?;

@@ -28,9 +28,12 @@ pub struct EraEstimate {
     pub order: usize,
     /// Which data: `all`, `identification` or `verification`. Default: all.
     pub set: DataSet,
-    /// Rows of the Hankel matrix, more than the order, 2 to 1000. Default: 300; many average the noise, a third of the decay is best.
+    /// Rows of the Hankel matrix, more than the order. Default: 300; many average the noise, a third of the decay is
+    /// best.
+    #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
-    /// Seconds of the decay left out at its beginning, 0 or more. Default: 0.
+    /// Seconds of the decay left out at its beginning. Default: 0.
+    #[schemars(range(min = 0.0))]
     pub skip_s: f64,
     /// Estimate a constant offset of the response. Default: true.
     pub offset: bool,
@@ -61,11 +64,8 @@ impl Stage for EraEstimate {
             return Err(StageError::new(format!("`order` is {}, wanted 0 to 40", self.order)));
         }
         let least = (self.order + 1).max(2);
-        if !(least..=1000).contains(&self.block_rows) {
+        if self.block_rows < least {
             return Err(StageError::new(format!("`block_rows` is {}, wanted {least} to 1000", self.block_rows)));
-        }
-        if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
-            return Err(StageError::new(format!("`skip_s` is {}, wanted 0 or more", self.skip_s)));
         }
         Ok(())
     }

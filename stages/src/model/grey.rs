@@ -42,9 +42,11 @@ use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, white
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GreyEstimate {
-    /// Oscillating modes, 1 to 40. Default: 4, the paper's.
+    /// Oscillating modes. Default: 4, the paper's.
+    #[schemars(range(min = 1, max = 40))]
     pub modes: usize,
-    /// Real poles of detector and electronics, 0 to 8. Default: 1; further ones and the delay take each other's place.
+    /// Real poles of detector and electronics. Default: 1; further ones and the delay take each other's place.
+    #[schemars(range(min = 0, max = 8))]
     pub real_poles: usize,
     /// Estimate a delay, or take what is `known` of it. Default: true; without it is none.
     pub delay: bool,
@@ -61,18 +63,22 @@ pub struct GreyEstimate {
     pub offset: bool,
     /// Estimate a linear drift of the response. Default: true; averaged records wander.
     pub drift: bool,
-    /// Seconds before t0 that are used, above 0. Default: none, all of them.
+    /// Seconds before t0 that are used. Default: none, all of them.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub before_s: Option<f64>,
     /// What is known beforehand, such as `{ quantity = "delay_s", fixed = 1e-6 }`, `{ quantity = "gain", mode = 2, between = [0.0, 0.2] }` or
     /// `{ quantity = "corner_hz", real_pole = 1, about = [1.3e6, 1e5] }`. Default: nothing.
     pub known: Vec<GreyNumber>,
     /// Modes to start from, `[frequency in Hz, quality factor]` each, as many as `modes`. Default: none, from the port `start` or from subspace estimates.
     pub start_modes: Vec<[f64; 2]>,
-    /// Rows of the Hankel matrix of the start, six more than twice the modes and the real poles, at least, to 1000. Default: 60.
+    /// Rows of the Hankel matrix of the start, six more than twice the modes and the real poles, at least. Default: 60.
+    #[schemars(range(max = 1000))]
     pub block_rows: usize,
-    /// Starts that are refined, 1 to 100. Default: 3.
+    /// Starts that are refined. Default: 3.
+    #[schemars(range(min = 1, max = 100))]
     pub starts: usize,
-    /// Most steps of a search, 1 to 10000. Default: 60; ten are usual.
+    /// Most steps of a search. Default: 60; ten are usual.
+    #[schemars(range(min = 1, max = 10_000))]
     pub max_iterations: usize,
     /// Standard errors for `white` residuals or by the residual's own spectrum. Default: true, by the spectrum.
     pub coloured: bool,
@@ -119,19 +125,9 @@ impl Stage for GreyEstimate {
     };
 
     fn check(&self) -> Result<(), StageError> {
-        for (name, value, least, most) in [
-            ("modes", self.modes, 1, 40),
-            ("real_poles", self.real_poles, 0, 8),
-            ("block_rows", self.block_rows, 2 * self.modes + self.real_poles + 6, 1000),
-            ("starts", self.starts, 1, 100),
-            ("max_iterations", self.max_iterations, 1, 10_000),
-        ] {
-            if !(least..=most).contains(&value) {
-                return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
-            }
-        }
-        if let Some(before) = self.before_s.filter(|before| !(*before > 0.0 && before.is_finite())) {
-            return Err(StageError::new(format!("`before_s` is {before}, wanted above 0")));
+        let least = 2 * self.modes + self.real_poles + 6;
+        if self.block_rows < least {
+            return Err(StageError::new(format!("`block_rows` is {}, wanted {least} to 1000", self.block_rows)));
         }
         if !self.start_modes.is_empty() && self.start_modes.len() != self.modes {
             let found = self.start_modes.len();

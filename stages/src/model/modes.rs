@@ -39,17 +39,24 @@ use afmid_kernels::validation::{Nuisances, noise_ceiling_percent, simulate_held_
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Modes {
-    /// Least quality factor of a mode, above 0.5. Default: 5; detector poles are real or strongly damped.
+    /// Least quality factor of a mode. Default: 5; detector poles are real or strongly damped.
+    #[schemars(extend("exclusiveMinimum" = 0.5))]
     pub min_quality_factor: f64,
-    /// Highest frequency of a mode in Hz, above 0. Default: none.
+    /// Highest frequency of a mode in Hz. Default: none.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_frequency_hz: Option<f64>,
-    /// Least amplitude of a mode's ringing over its standard error, 0 or more. Default: 6; the best of thousands of noise frequencies reaches 5.
+    /// Least amplitude of a mode's ringing over its standard error. Default: 6; the best of thousands of noise
+    /// frequencies reaches 5.
+    #[schemars(range(min = 0.0))]
     pub min_significance: f64,
-    /// Largest relative standard error of a mode's quality factor, above 0. Default: 0.5; a line that does not decay is no mode.
+    /// Largest relative standard error of a mode's quality factor. Default: 0.5; a line that does not decay is no mode.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_quality_factor_error: f64,
-    /// Points of the frequency response, 2 to 100000, logarithmic from `response_from_hz` to half the sample rate. Default: 2000.
+    /// Points of the frequency response, logarithmic from `response_from_hz` to half the sample rate. Default: 2000.
+    #[schemars(range(min = 2, max = 100_000))]
     pub response_points: usize,
-    /// Lowest frequency of the response in Hz, above 0. Default: 1000.
+    /// Lowest frequency of the response in Hz. Default: 1000.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub response_from_hz: f64,
     /// What the force does between samples, for `response`: `held` (half a sample's lag and droop are taken out, as in `spectrum.etfe`) or
     /// `sampled`. Default: held, which is exact for a step at a sample.
@@ -99,21 +106,6 @@ impl Stage for Modes {
     };
 
     fn check(&self) -> Result<(), StageError> {
-        let above = |name: &str, value: f64, least: f64| {
-            if value > least && value.is_finite() {
-                Ok(())
-            } else {
-                Err(wanted(name, value, &format!("above {least}")))
-            }
-        };
-        above("min_quality_factor", self.min_quality_factor, 0.5)?;
-        above("max_frequency_hz", self.max_frequency_hz.unwrap_or(1.0), 0.0)?;
-        above("min_significance", self.min_significance, -f64::MIN_POSITIVE)?;
-        above("max_quality_factor_error", self.max_quality_factor_error, 0.0)?;
-        above("response_from_hz", self.response_from_hz, 0.0)?;
-        if !(2..=100_000).contains(&self.response_points) {
-            return Err(wanted("response_points", self.response_points as f64, "2 to 100000"));
-        }
         let (f, q) = (self.reference_frequency_hz.len(), self.reference_quality_factor.len());
         if q > 0 && q != f {
             let wanted = match f {

@@ -35,13 +35,16 @@ pub struct Pem {
     /// Number of states, 1 to 40, or `auto`: the smallest up to `max_order` whose simulation of the last third of the data, fitted on the rest, is within a
     /// standard error of the best; after a release the least BIC. Default: 11, as in the paper: four modes and three detector poles.
     pub order: Order,
-    /// Largest order that `auto` tries, 1 to 40. Default: 16; each takes a fit.
+    /// Largest order that `auto` tries. Default: 16; each takes a fit.
+    #[schemars(range(min = 1, max = 40))]
     pub max_order: usize,
     /// Which events: `all`, or one half (`identification`, `verification`). Default: all.
     pub set: DataSet,
-    /// Rows of the Hankel matrix that the start comes from, more than `order` and at most 1000. Default: 60; half as many blur close poles.
+    /// Rows of the Hankel matrix that the start comes from, more than `order`. Default: 60; half as many blur close poles.
+    #[schemars(range(max = 1000))]
     pub block_rows: usize,
-    /// Most iterations in each stretch of the search, 1 to 10000. Default: 60; ten to thirty are usual.
+    /// Most iterations in each stretch of the search. Default: 60; ten to thirty are usual.
+    #[schemars(range(min = 1, max = 10_000))]
     pub max_iterations: usize,
     /// Parametrisation of the Kalman gain: `thermal` (white output noise and a white force on every section, one intensity each), `free` (all its
     /// elements), `white` (none: output error) or `coloured` (none; the errors are whitened by an autoregressive filter of their own, for noise that does not
@@ -50,18 +53,24 @@ pub struct Pem {
     /// Which errors are made small: `prediction` (one sample ahead) or `simulation` (output error, started from the best of the subspace estimates and the
     /// prediction model; K is zero). Default: prediction, the most efficient where the noise model holds.
     pub focus: Focus,
-    /// Starts that are refined, 1 to 100. Default: 3; more than three also take subspace estimates with instruments, which records of rich input need (8).
+    /// Starts that are refined. Default: 3; more than three also take subspace estimates with instruments, which
+    /// records of rich input need (8).
+    #[schemars(range(min = 1, max = 100))]
     pub starts: usize,
-    /// Prior against responses that the data do not ask for, 0 to 1: as if white noise of this share of each input's energy had been put in and nothing had come
+    /// Prior variance of the response outside the excited band: as if white noise of this share of each input's energy had been put in and nothing had come
     /// out. Default: 0, none. Records that excite a narrow band need one to say anything beyond it: the share of noise in the output, over the samples.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub prior: f64,
     /// Estimate a constant offset of the response. Default: true.
     pub offset: bool,
     /// Estimate a linear drift of the response. Default: true; averaged records wander.
     pub drift: bool,
-    /// Seconds before t0 that are used, above 0. Default: none, all of them. After a snap-in a few periods suffice: before it the lever is another system.
+    /// Seconds before t0 that are used. Default: none, all of them. After a snap-in a few periods suffice: before it
+    /// the lever is another system.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub before_s: Option<f64>,
-    /// Lags of the residual tests, 1 to 1000, beyond the order. Default: 25.
+    /// Lags of the residual tests, beyond the order. Default: 25.
+    #[schemars(range(min = 1, max = 1000))]
     pub test_lags: usize,
 }
 
@@ -130,19 +139,11 @@ impl Stage for Pem {
 
     fn check(&self) -> Result<(), StageError> {
         self.order.check(self.max_order)?;
-        within("block_rows", self.block_rows, self.order.largest(self.max_order) + 1, 1000)?;
-        within("starts", self.starts, 1, 100)?;
-        within("max_iterations", self.max_iterations, 1, 10_000)?;
-        within("test_lags", self.test_lags, 1, 1000)?;
-        if !(0.0..=1.0).contains(&self.prior) {
-            return Err(StageError::new(format!("`prior` is {}, wanted 0 to 1", self.prior)));
+        let least = self.order.largest(self.max_order) + 1;
+        if self.block_rows < least {
+            return Err(StageError::new(format!("`block_rows` is {}, wanted {least} to 1000", self.block_rows)));
         }
-        match self.before_s {
-            Some(before) if !(before > 0.0 && before.is_finite()) => {
-                Err(StageError::new(format!("`before_s` is {before}, wanted above 0")))
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -285,13 +286,6 @@ pub(super) fn ending(ending: Ending) -> &'static str {
         Ending::Stalled => "stalled",
         Ending::IterationLimit => "iteration-limit",
     }
-}
-
-fn within(name: &str, value: usize, least: usize, most: usize) -> Result<(), StageError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")))
 }
 
 /// The artifact: matrices in the sections' observer form, parameters a, then b and d of each input, with their covariance.

@@ -49,11 +49,14 @@ pub struct RingdownFit {
     /// Oscillating modes, 1 to 20, or `auto`: as many up to `max_modes` as lower the chi square of held-out events by two standard errors each, below 4
     /// events as the least BIC wants. Default: 4, the paper's.
     pub modes: ModeNumber,
-    /// Largest number that `auto` tries, 1 to 20. Default: 8; each takes a fit, and three from 4 events on.
+    /// Largest number that `auto` tries. Default: 8; each takes a fit, and three from 4 events on.
+    #[schemars(range(min = 1, max = 20))]
     pub max_modes: usize,
-    /// Real poles of the detector, 0 to 8. Default: 3, the paper's; they matter in the first samples only.
+    /// Real poles of the detector. Default: 3, the paper's; they matter in the first samples only.
+    #[schemars(range(min = 0, max = 8))]
     pub real_poles: usize,
-    /// Samples after the onset that are left out, 0 to 100000. Default: 0; some where the onset is not sharp.
+    /// Samples after the onset that are left out. Default: 0; some where the onset is not sharp.
+    #[schemars(range(min = 0, max = 100_000))]
     pub skip_samples: usize,
     /// Noise beside the ringing: `estimated` (white, 1/f and thermal) or `white`. Default: estimated.
     pub noise: JointNoise,
@@ -61,9 +64,11 @@ pub struct RingdownFit {
     pub error_source: ErrorSource,
     /// Estimate a linear drift of each event beside its offset. Default: true.
     pub drift: bool,
-    /// Draws of a bootstrap over events for 95 % intervals, 0 (none) to 100000. Default: 0; 400 know an interval's ends to a tenth of its width.
+    /// Draws of a bootstrap over events for 95 % intervals. Default: 0, none; 400 know an interval's ends to a tenth of its width.
+    #[schemars(range(max = 100_000))]
     pub bootstrap_draws: usize,
-    /// Rows of the Hankel matrix of the start, more than its order and at most 400. Default: 100, a period of the slowest mode.
+    /// Rows of the Hankel matrix of the start, more than its order. Default: 100, a period of the slowest mode.
+    #[schemars(range(max = 400))]
     pub block_rows: usize,
     /// Samples after the onset that the start is made from, 0 (all) or 8 per mode, real pole and two more to 10 million. Default: 0; some decay times
     /// where the ringing fills a small part of the window, as on contact.
@@ -153,17 +158,12 @@ impl Stage for RingdownFit {
     fn check(&self) -> Result<(), StageError> {
         let modes = self.modes.largest(self.max_modes);
         let order = 2 * modes + self.real_poles.max(1);
-        for (name, value, least, most) in [
-            ("modes", self.modes.largest(1), 1, 20),
-            ("max_modes", self.max_modes, 1, 20),
-            ("real_poles", self.real_poles, 0, 8),
-            ("skip_samples", self.skip_samples, 0, 100_000),
-            ("bootstrap_draws", self.bootstrap_draws, 0, 100_000),
-            ("block_rows", self.block_rows, order + 2, 400),
-        ] {
-            if !(least..=most).contains(&value) {
-                return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
-            }
+        let (found, most) = (self.modes.largest(1), 20);
+        if !(1..=most).contains(&found) {
+            return Err(StageError::new(format!("`modes` is {found}, wanted 1 to {most}")));
+        }
+        if self.block_rows < order + 2 {
+            return Err(StageError::new(format!("`block_rows` is {}, wanted {} to 400", self.block_rows, order + 2)));
         }
         let least = 8 * (modes + self.real_poles + 2);
         if self.start_samples != 0 && !(least..=10_000_000).contains(&self.start_samples) {

@@ -33,27 +33,38 @@ pub struct StabilisationDiagram {
     /// Where the poles come from: `era` (the free decay), `release` (subspace without instruments), `n4sid`, `moesp` or `cva` (inputs that excite). Default: era, as the events here decay
     /// freely.
     pub method: PoleMethod,
-    /// Lowest order, 1 or more. Default: 2, one mode.
+    /// Lowest order. Default: 2, one mode.
+    #[schemars(range(min = 1))]
     pub from_order: usize,
-    /// Highest order, above the lowest, at most 100. Default: 40; noise needs room beyond the lever's 11.
+    /// Highest order, above the lowest. Default: 40; noise needs room beyond the lever's 11.
+    #[schemars(range(max = 100))]
     pub to_order: usize,
-    /// From one order to the next, 1 to 10. Default: 1.
+    /// From one order to the next. Default: 1.
+    #[schemars(range(min = 1, max = 10))]
     pub step: usize,
     /// Which data: `all`, `identification` or `verification`. Default: all.
     pub set: DataSet,
-    /// Rows of the Hankel matrix, more than the highest order and at most 1000. Default: 300, as in `model.era`.
+    /// Rows of the Hankel matrix, more than the highest order. Default: 300, as in `model.era`.
+    #[schemars(range(max = 1000))]
     pub block_rows: usize,
-    /// Largest relative change of a stable pole's frequency from one order to the next, above 0 and at most 0.5. Default: 0.01, as is usual.
+    /// Largest relative change of a stable pole's frequency from one order to the next. Default: 0.01, as is usual.
+    #[schemars(range(max = 0.5), extend("exclusiveMinimum" = 0.0))]
     pub frequency: f64,
-    /// Largest relative change of a stable pole's damping, above 0 and at most 1. Default: 0.05, as is usual; a mode's damping may spread twice as much.
+    /// Largest relative change of a stable pole's damping. Default: 0.05, as is usual; a mode's damping may spread
+    /// twice as much.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub damping: f64,
-    /// Least quality factor of a mode, above 0.5. Default: 5, as in `model.modes`.
+    /// Least quality factor of a mode. Default: 5, as in `model.modes`.
+    #[schemars(extend("exclusiveMinimum" = 0.5))]
     pub min_quality_factor: f64,
-    /// Least number of orders at which a mode is stable, 1 or more. Default: 4.
+    /// Least number of orders at which a mode is stable. Default: 4.
+    #[schemars(range(min = 1))]
     pub min_count: usize,
-    /// Least amplitude of a mode's ringing over its standard error, 0 or more. Default: 6, as in `model.modes`.
+    /// Least amplitude of a mode's ringing over its standard error. Default: 6, as in `model.modes`.
+    #[schemars(range(min = 0.0))]
     pub min_significance: f64,
-    /// Least share of the orders from a mode's first on at which it is stable, 0 to 1. Default: 0.5.
+    /// Least share of the orders from a mode's first on at which it is stable. Default: 0.5.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_share: f64,
 }
 
@@ -111,24 +122,17 @@ impl Stage for StabilisationDiagram {
     };
 
     fn check(&self) -> Result<(), StageError> {
-        let range = |name: &str, found: f64, ok: bool, wanted: &str| {
-            if ok { Ok(()) } else { Err(StageError::new(format!("`{name}` is {found}, wanted {wanted}"))) }
-        };
-        let (from, to) = (self.from_order, self.to_order);
-        range("from_order", from as f64, from >= 1, "1 or more")?;
-        range("step", self.step as f64, (1..=10).contains(&self.step), "1 to 10")?;
-        let wanted = format!("{} (the next after `from_order`) to 100", from.saturating_add(self.step));
-        range("to_order", to as f64, to <= 100 && to.saturating_sub(from) >= self.step, &wanted)?;
-        let rows = self.block_rows;
-        range("block_rows", rows as f64, (to + 1..=1000).contains(&rows), &format!("{} to 1000", to + 1))?;
-        range("frequency", self.frequency, self.frequency > 0.0 && self.frequency <= 0.5, "above 0, at most 0.5")?;
-        range("damping", self.damping, self.damping > 0.0 && self.damping <= 1.0, "above 0, at most 1")?;
-        let quality = self.min_quality_factor;
-        range("min_quality_factor", quality, quality > 0.5 && quality.is_finite(), "above 0.5")?;
-        range("min_count", self.min_count as f64, self.min_count >= 1, "1 or more")?;
-        let significance = self.min_significance;
-        range("min_significance", significance, significance >= 0.0 && significance.is_finite(), "0 or more")?;
-        range("min_share", self.min_share, (0.0..=1.0).contains(&self.min_share), "0 to 1")
+        let (from, to, rows) = (self.from_order, self.to_order, self.block_rows);
+        if to.saturating_sub(from) < self.step {
+            let next = from.saturating_add(self.step);
+            return Err(StageError::new(format!(
+                "`to_order` is {to}, wanted {next} (the next after `from_order`) or more"
+            )));
+        }
+        if rows <= to {
+            return Err(StageError::new(format!("`block_rows` is {rows}, wanted more than `to_order`, {to}")));
+        }
+        Ok(())
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

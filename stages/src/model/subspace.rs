@@ -28,7 +28,8 @@ use afmid_kernels::subspace::{InstrumentalSubspace, Subspace, Weight};
 pub struct SubspaceEstimate {
     /// Number of states, 1 to 40, or `auto`: as in `model.pem`, by output error. Default: 11, as in the paper.
     pub order: Order,
-    /// Largest order that `auto` tries, 1 to 40. Default: 16; each takes a fit.
+    /// Largest order that `auto` tries. Default: 16; each takes a fit.
+    #[schemars(range(min = 1, max = 40))]
     pub max_order: usize,
     /// Which data: `all`, `identification` or `verification`. Default: all.
     pub set: DataSet,

@@ -32,12 +32,14 @@ use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFit, VectorFitting, 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VectorFittingEstimate {
-    /// Number of poles, 1 to 40. Default: 11, as in the paper: four modes and three detector poles.
+    /// Number of poles. Default: 11, as in the paper: four modes and three detector poles.
+    #[schemars(range(min = 1, max = 40))]
     pub order: usize,
     /// Oscillating pairs among the starting poles, at most half the order; the rest starts real. Default: none, as many as fit. A fit that ends with another number warns: pairs and real poles
     /// may turn into each other.
     pub modes: Option<usize>,
-    /// Lowest frequency that is used, in Hz, 0 or more. Default: 0.
+    /// Lowest frequency that is used, in Hz. Default: 0.
+    #[schemars(range(min = 0.0))]
     pub min_frequency_hz: f64,
     /// Highest frequency that is used, in Hz, above the lowest. Default: none, all that is defined.
     pub max_frequency_hz: Option<f64>,
@@ -47,7 +49,8 @@ pub struct VectorFittingEstimate {
     pub intersample: Intersample,
     /// What the ends of the window add: `auto` (fitted for a response from differences that is not smoothed), `on` or `off`. Default: auto.
     pub transient: TransientChoice,
-    /// Relocations of the poles at most, 1 to 1000. Default: 30; ten are usual.
+    /// Relocations of the poles at most. Default: 30; ten are usual.
+    #[schemars(range(min = 1, max = 1000))]
     pub iterations: usize,
     /// End with Gauss-Newton on the weighted error. Default: true; without, errors are up to a seventh larger.
     pub refine: bool,
@@ -100,16 +103,16 @@ impl Stage for VectorFittingEstimate {
     };
 
     fn check(&self) -> Result<(), StageError> {
-        let range = |name: &str, found: f64, ok: bool, wanted: &str| {
-            if ok { Ok(()) } else { Err(StageError::new(format!("`{name}` is {found}, wanted {wanted}"))) }
-        };
-        range("order", self.order as f64, (1..=40).contains(&self.order), "1 to 40")?;
-        let modes = self.modes.unwrap_or(0);
-        range("modes", modes as f64, modes <= self.order / 2, "at most half the order")?;
+        let (modes, most) = (self.modes.unwrap_or(0), self.order / 2);
+        if modes > most {
+            return Err(StageError::new(format!("`modes` is {modes}, wanted at most half the order, {most}")));
+        }
         let (low, high) = (self.min_frequency_hz, self.max_frequency_hz.unwrap_or(f64::MAX));
-        range("min_frequency_hz", low, low >= 0.0 && low.is_finite(), "0 or more")?;
-        range("max_frequency_hz", high, high > low && high.is_finite(), "above `min_frequency_hz`")?;
-        range("iterations", self.iterations as f64, (1..=1000).contains(&self.iterations), "1 to 1000")
+        if !(high > low && high.is_finite()) {
+            let problem = format!("`max_frequency_hz` is {high}, wanted above `min_frequency_hz`, {low}");
+            return Err(StageError::new(problem));
+        }
+        Ok(())
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

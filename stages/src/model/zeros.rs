@@ -20,9 +20,12 @@ use afmid_kernels::validation::{Frequency, PoleShift, ZeroPair, compare_zeros, p
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Zeros {
-    /// Least magnitude of the quality factor of a zero that is compared, 0.5 or more. Default: 5; zeros of lever and tip are as sharp as its modes.
+    /// Least magnitude of the quality factor of a zero that is compared. Default: 5; zeros of lever and tip are as
+    /// sharp as its modes.
+    #[schemars(range(min = 0.5))]
     pub min_quality_factor: f64,
-    /// Largest relative standard error of a zero's frequency, above 0. Default: 0.05; a worse one is compared with nothing.
+    /// Largest relative standard error of a zero's frequency. Default: 0.05; a worse one is compared with nothing.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_frequency_error: f64,
 }
 
@@ -49,22 +52,6 @@ impl Stage for Zeros {
         seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Fig. 4",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        if !(self.min_quality_factor >= 0.5 && self.min_quality_factor.is_finite()) {
-            return Err(StageError::new(format!(
-                "`min_quality_factor` is {}, wanted 0.5 or more",
-                self.min_quality_factor
-            )));
-        }
-        if !(self.max_frequency_error > 0.0 && self.max_frequency_error.is_finite()) {
-            return Err(StageError::new(format!(
-                "`max_frequency_error` is {}, wanted above 0",
-                self.max_frequency_error
-            )));
-        }
-        Ok(())
-    }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let (free, coupled) = (inputs.get(&FREE)?, inputs.get(&COUPLED)?);

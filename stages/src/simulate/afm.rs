@@ -43,9 +43,11 @@ pub struct Afm {
     /// Folder for the records, relative to the config; created if missing. The truth is written beside it as `NAME.truth.json`.
     /// Default: `simulated`.
     pub out: PathBuf,
-    /// Number of records, at least 1. Default: 12.
+    /// Number of records. Default: 12.
+    #[schemars(range(min = 1))]
     pub records: usize,
-    /// Samples per record, at least 1. Default: 900000 (one cycle of the ramp at 5 MS/s).
+    /// Samples per record. Default: 900000 (one cycle of the ramp at 5 MS/s).
+    #[schemars(range(min = 1))]
     pub samples: usize,
     /// Sample rate in Hz, above twice the highest mode. Default: 5e6, the paper's.
     pub sample_rate_hz: f64,
@@ -59,7 +61,8 @@ pub struct Afm {
     /// An event counts if it lies at least this far from both ends of its record and from other events, samples; solved phases keep all
     /// events out of this margin. Default: 20000, more than two windows of the paper.
     pub margin_samples: usize,
-    /// Static stiffness of the lever at its tip in N/m, above 0. Default: 3.8, the paper's.
+    /// Static stiffness of the lever at its tip in N/m. Default: 3.8, the paper's.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: f64,
     /// Undamped natural frequencies of the modes in Hz, any number, above 0. Default: the paper's Table I.
     pub frequencies_hz: Vec<f64>,
@@ -69,32 +72,40 @@ pub struct Afm {
     pub tip_shares: Vec<f64>,
     /// Shares of the static detector signal, one per mode, sum 1. Default: the slope near the end of that beam.
     pub detector_shares: Vec<f64>,
-    /// Contact stiffness in N/m, above 0. Default: 60.
+    /// Contact stiffness in N/m. Default: 60.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub contact_stiffness_n_per_m: f64,
     /// Viscous damping of the contact in N s/m, not negative. Default: 8e-6 (the ringing against the sample dies in tens of microseconds).
     pub contact_damping_n_s_per_m: f64,
-    /// Gap at which the tip is caught in m, above 0. Default: 4e-9.
+    /// Gap at which the tip is caught in m. Default: 4e-9.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub snap_in_gap_m: f64,
     /// Mean pull-off force in N; less three standard deviations it must exceed the catch, `contact_stiffness_n_per_m * snap_in_gap_m`.
     /// Default: 330e-9, the paper's.
     pub adhesion_n: f64,
-    /// Relative standard deviation of the pull-off force from event to event, 0 to 0.3; normal, cut at three. Default: 0.06.
+    /// Relative standard deviation of the pull-off force from event to event; normal, cut at three. Default: 0.06.
+    #[schemars(range(min = 0.0, max = 0.3))]
     pub adhesion_scatter: f64,
     /// Mean height of the surface on the ramp's scale (0 in its middle) in m. Default: -22e-9: room for the pull-off above it.
     pub surface_m: f64,
     /// Standard deviation of the surface's height from record to record in m, not negative. Default: 3e-9.
     pub surface_std_m: f64,
-    /// Cycles of the ramp per second in Hz, above 0. Default: 5.58, the paper's.
+    /// Cycles of the ramp per second in Hz. Default: 5.58, the paper's.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub ramp_hz: f64,
-    /// Range of the ramp in m, above 0. Default: 200e-9, the paper's.
+    /// Range of the ramp in m. Default: 200e-9, the paper's.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub ramp_m: f64,
-    /// Travel per monitored volt in m/V, above 0. Default: 25e-9.
+    /// Travel per monitored volt in m/V. Default: 25e-9.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub piezo_m_per_v: f64,
-    /// Volts per code of the piezo monitor, above 0. Default: 4.88e-3 (20 V over 12 bit).
+    /// Volts per code of the piezo monitor. Default: 4.88e-3 (20 V over 12 bit).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub piezo_lsb_v: f64,
     /// White noise of the piezo monitor in V, not negative. Default: 5e-4.
     pub piezo_white_v: f64,
-    /// Optical lever sensitivity in V per m of static tip deflection, above 0. Default: 1e7 (0.87 V at 330 nN).
+    /// Optical lever sensitivity in V per m of static tip deflection. Default: 1e7 (0.87 V at 330 nN).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: f64,
     /// Real poles of the detector in Hz, any number, above 0. Default: 1.3, 1.9 and 2.4 MHz.
     pub detector_poles_hz: Vec<f64>,
@@ -108,9 +119,11 @@ pub struct Afm {
     pub pink_v: f64,
     /// Wander of the baseline over the archive in V, not negative. Default: 4e-3.
     pub drift_v: f64,
-    /// Bits of the converter, 2 to 16. Default: 12, the paper's.
+    /// Bits of the converter. Default: 12, the paper's.
+    #[schemars(range(min = 2, max = 16))]
     pub adc_bits: u32,
-    /// Volts per code, above 0. Default: 0.977e-3, the paper's.
+    /// Volts per code. Default: 0.977e-3, the paper's.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub lsb_v: f64,
     /// Deflate level of the files, 0 (raw) to 9. Default: 4.
     pub compression: u8,

@@ -31,29 +31,37 @@ use super::lever_model::{LeverModel, MODEL};
 pub struct AfmOfModel {
     /// Folder for the records, relative to the config; created if missing. The truth is written beside it as `NAME.truth.json`. Default: `resimulated`.
     pub out: PathBuf,
-    /// Number of records, at least 1; absent: as many as were diagnosed. Default: absent.
+    /// Number of records; absent: as many as were diagnosed. Default: absent.
+    #[schemars(range(min = 1))]
     pub records: Option<usize>,
-    /// Samples per record, at least 1. Default: 200000 (40 ms at 5 MS/s, a part of a cycle with one release).
+    /// Samples per record. Default: 200000 (40 ms at 5 MS/s, a part of a cycle with one release).
+    #[schemars(range(min = 1))]
     pub samples: usize,
     /// Total number of counted snap-offs; absent: one per record. Default: absent.
     pub snap_offs: Option<usize>,
     /// An event counts if it lies at least this far from both ends of its record and from other events, samples. Default: 20000, as in `simulate.afm`.
     pub margin_samples: usize,
-    /// Static stiffness of the lever at its tip in N/m, above 0. Default: 3.8, the paper's.
+    /// Static stiffness of the lever at its tip in N/m. Default: 3.8, the paper's.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: f64,
-    /// Optical lever sensitivity in V per m of static tip deflection, above 0. Default: 1e7.
+    /// Optical lever sensitivity in V per m of static tip deflection. Default: 1e7.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: f64,
     /// Mean height of the surface on the ramp's scale (0 in its middle) in m. Default: -100e-9: room for strong loads above it.
     pub surface_m: f64,
-    /// Cycles of the ramp per second in Hz, above 0. Default: 2.79, with the range the paper's speed.
+    /// Cycles of the ramp per second in Hz. Default: 2.79, with the range the paper's speed.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub ramp_hz: f64,
-    /// Range of the ramp in m, above 0. Default: 400e-9.
+    /// Range of the ramp in m. Default: 400e-9.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub ramp_m: f64,
     /// Wander of the baseline over the archive in V, not negative. Default: 4e-3, as in `simulate.afm`.
     pub drift_v: f64,
-    /// Bits of the converter, 2 to 16. Default: 12, the paper's.
+    /// Bits of the converter. Default: 12, the paper's.
+    #[schemars(range(min = 2, max = 16))]
     pub adc_bits: u32,
-    /// Volts per code, above 0. Default: 0.977e-3, the paper's.
+    /// Volts per code. Default: 0.977e-3, the paper's.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub lsb_v: f64,
     /// Deflate level of the files, 0 (raw) to 9. Default: 4.
     pub compression: u8,

@@ -27,7 +27,9 @@ use afmid_kernels::spectra::{EndTreatment, EtfeSettings, Intersample, etfe};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Etfe {
-    /// Bins above are undefined, in Hz, above 0. Default: 1.2 MHz; beyond the paper's fourth mode the response falls below the noise.
+    /// Bins above are undefined, in Hz. Default: 1.2 MHz; beyond the paper's fourth mode the response falls below the
+    /// noise.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub bandwidth_hz: f64,
     /// Bins are undefined where the force is smaller than this share of its median over 32 bins on either side, 0 to below 1.
     /// Default: 0.05; such a bin holds less than 1/400 of its neighbours' information.

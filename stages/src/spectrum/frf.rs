@@ -32,12 +32,15 @@ use afmid_kernels::spectra::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Frf {
-    /// Bins above are undefined, in Hz, above 0. Default: 1.2 MHz, as for `spectrum.etfe`.
+    /// Bins above are undefined, in Hz. Default: 1.2 MHz, as for `spectrum.etfe`.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub bandwidth_hz: f64,
-    /// Bins on either side over which levels and variance are averaged, 0 to 1000. Default: 2; with 24 events the variance is then good to a tenth, and a thermal
-    /// peak two bins wide is widened little.
+    /// Bins on either side over which levels and variance are averaged. Default: 2; with 24 events the variance is then
+    /// good to a tenth, and a thermal peak two bins wide is widened little.
+    #[schemars(range(min = 0, max = 1000))]
     pub half_width_bins: usize,
-    /// Chance per bin below which distortion counts in the summary, 1e-12 to 0.1. Default: 1e-4: 0.2 false bins among 2000.
+    /// Chance per bin below which distortion counts in the summary. Default: 1e-4: 0.2 false bins among 2000.
+    #[schemars(range(min = 1e-12, max = 0.1))]
     pub significance: f64,
 }
 

@@ -28,19 +28,26 @@ use afmid_kernels::spectra::{
 pub struct Smoothing {
     /// `local-rational` or `local-polynomial`. Default: local-rational.
     pub method: SmoothingMethod,
-    /// Bins on either side of each bin that are used (the most, for an adaptive polynomial), 1 to 1000. Default: 10, five widths of a resonance two bins wide.
+    /// Bins on either side of each bin that are used (the most, for an adaptive polynomial). Default: 10, five widths
+    /// of a resonance two bins wide.
+    #[schemars(range(min = 1, max = 1000))]
     pub half_width_bins: usize,
-    /// Order of the rational's numerator, 0 to 6. Default: 2.
+    /// Order of the rational's numerator. Default: 2.
+    #[schemars(range(min = 0, max = 6))]
     pub numerator_order: usize,
-    /// Order of the rational's denominator, 0 to 6. Default: 2, one resonance.
+    /// Order of the rational's denominator. Default: 2, one resonance.
+    #[schemars(range(min = 0, max = 6))]
     pub denominator_order: usize,
     /// Transient in the rational: `auto` (for differences), `on` or `off`. Default: auto; tapered series have their own errors, which it does not describe.
     pub transient: TransientChoice,
-    /// Order of the transient, 0 to 6. Default: 1.
+    /// Order of the transient. Default: 1.
+    #[schemars(range(min = 0, max = 6))]
     pub transient_order: usize,
-    /// Degree of the polynomial, 0 to 6. Default: 2.
+    /// Degree of the polynomial. Default: 2.
+    #[schemars(range(min = 0, max = 6))]
     pub degree: usize,
-    /// Standard errors by which neighbourhoods of the polynomial may disagree, 0 to 100; 0 for a fixed neighbourhood. Default: 2.
+    /// Standard errors by which neighbourhoods of the polynomial may disagree; 0 for a fixed neighbourhood. Default: 2.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub adapt_sigma: f64,
     /// Lines that do not belong to the transfer function. Default: none; the second harmonic of the first mode is the usual one.
     pub lines: Vec<LineParams>,
@@ -50,9 +57,11 @@ pub struct Smoothing {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineParams {
-    /// Centre in Hz, above 0.
+    /// Centre in Hz.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub frequency_hz: f64,
-    /// Half of the width that is left out, in Hz, above 0.
+    /// Half of the width that is left out, in Hz.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub half_width_hz: f64,
 }
 

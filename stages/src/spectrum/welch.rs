@@ -34,7 +34,8 @@ use afmid_kernels::spectra::{RecordSpectrum, average_spectra};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Welch {
-    /// Samples per segment, even, 16 to 4194304. Default: 16384: bins of 305 Hz at 5 MS/s, a quarter of the paper's first peak.
+    /// Samples per segment, even. Default: 16384: bins of 305 Hz at 5 MS/s, a quarter of the paper's first peak.
+    #[schemars(range(min = 16, max = 4_194_304))]
     pub segment_samples: usize,
     /// What counts as a free stretch.
     pub free: FreeSettings,

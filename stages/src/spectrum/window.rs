@@ -24,7 +24,8 @@ use afmid_kernels::spectra::{Taper, difference, taper, taper_gains};
 pub struct Window {
     /// `tukey`, `rectangular` or `hann`. Default: tukey, the paper's.
     pub kind: WindowKind,
-    /// Tapered share of a Tukey window, 0 to 1. Default: 0.1, the paper's.
+    /// Tapered share of a Tukey window. Default: 0.1, the paper's.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub alpha: f64,
     /// Take first differences before. Default: false, as in the paper; true with `kind = "rectangular"` is better.
     pub differenced: bool,

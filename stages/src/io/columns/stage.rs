@@ -42,7 +42,9 @@ pub struct Columns {
     pub inputs: Vec<Column>,
     /// Column of the output. Default: the second.
     pub output: Column,
-    /// Sample rate in Hz, above 0. Default: none: from `time`, or an LVM header. Where it is not known, 1 makes frequencies cycles per sample.
+    /// Sample rate in Hz. Default: none: from `time`, or an LVM header. Where it is not known, 1 makes frequencies
+    /// cycles per sample.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sample_rate_hz: Option<f64>,
     /// Column of the time in seconds, for the sample rate; equally spaced to 1 %. Default: none.
     pub time: Option<Column>,

@@ -81,7 +81,7 @@ fn what_is_missing_is_said() {
     assert!(few.run(&inputs, &context()).is_err());
     let given = ContactFit { tip_share_error: Some(0.01), ..few };
     assert!(given.run(&inputs, &context()).is_ok());
-    assert!(ContactFit { tip_share_error: Some(-0.1), ..stage.clone() }.check().is_err());
+    assert!(afmid_pipeline::stage::check(&ContactFit { tip_share_error: Some(-0.1), ..stage.clone() }).is_err());
     // the free lever's table has two modes, this fit one
     let other = inputs.with(&FREE_POLES, handed_on());
     assert!(stage.run(&other, &context()).unwrap_err().to_string().contains("free lever's poles"));

@@ -38,7 +38,7 @@ const TWO: &str = "modes = 2\nfeedthrough = false\nhistory = \"settled\"\n";
 
 fn run(params: &str, inputs: &Ports) -> Result<(Ports, Vec<String>), String> {
     let stage: GreyEstimate = afmid_pipeline::toml::from_str(params).map_err(|error| error.to_string())?;
-    stage.check().map_err(|error| error.to_string())?;
+    afmid_pipeline::stage::check(&stage).map_err(|error| error.to_string())?;
     let context = Context::new(std::path::Path::new("."), 1, &NoProgress);
     let outputs = stage.run(inputs, &context).map_err(|error| error.to_string())?;
     Ok((outputs, context.into_warnings()))

@@ -117,7 +117,7 @@ fn parameters_out_of_range_are_refused() {
         VectorFittingEstimate { max_frequency_hz: Some(0.0), ..usual() },
         VectorFittingEstimate { iterations: 0, ..usual() },
     ] {
-        assert!(wrong.check().is_err(), "{wrong:?}");
+        assert!(afmid_pipeline::stage::check(&wrong).is_err(), "{wrong:?}");
     }
     assert!(usual().check().is_ok());
 }
