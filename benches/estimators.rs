@@ -64,10 +64,10 @@ fn ringdowns(criterion: &mut Criterion) {
     group.sampling_mode(SamplingMode::Flat);
     for events in [1, 24, 84] {
         let data: Vec<Vec<f64>> = (0..events).map(|event| ringing(NOISE_V, event as u64)).collect();
-        let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
+        let borrowed: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
         let options = RingdownOptions::default();
         group.bench_function(BenchmarkId::new("events", events), |bench| {
-            bench.iter(|| fit_ringdowns(black_box(&lent), &[], INTERVAL_S, &options).expect("a fit"))
+            bench.iter(|| fit_ringdowns(black_box(&borrowed), &[], INTERVAL_S, &options).expect("a fit"))
         });
     }
     group.finish();
@@ -187,7 +187,7 @@ fn frequency_response(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// 200 means of 24 events drawn anew, with one `fit_decay` each.
+/// 200 means of 24 events drawn with replacement, with one `fit_decay` each.
 fn resampling(criterion: &mut Criterion) {
     let events: Vec<Vec<f64>> = (0..24).map(|event| ringing(NOISE_V, event)).collect();
     let statistic = |drawn: &[usize]| -> Result<Vec<f64>, ModelError> {

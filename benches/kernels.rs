@@ -94,7 +94,7 @@ fn averaging(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The ETFE of a mean response, from differences as in configs/free-lever.toml; its plan is made anew in each call.
+/// The ETFE of a mean response, from differences as in configs/free-lever.toml; its plan is made in each call.
 fn transfer_function(criterion: &mut Criterion) {
     let settings = EtfeSettings {
         sample_rate_hz: SAMPLE_RATE_HZ,

@@ -38,7 +38,7 @@ struct State {
     folders: Mutex<Vec<PathBuf>>,
 }
 
-/// Begins to listen. Signals that whoever started the command had ignored (`nohup`, a script's `&`) stay ignored. A file that grows beyond the limit
+/// Begins to listen. Signals that were ignored when the command started (`nohup`, a script's `&`) stay ignored. A file that grows beyond the limit
 /// of its size (`ulimit -f`) becomes an error of the write instead of a signal that ends the program.
 ///
 /// Errors: the system refuses.

@@ -26,7 +26,7 @@ pub fn print_styled(text: &str) -> Result<(), Failure> {
 
 /// How a command ends that does not succeed: said on stderr, with its exit code.
 pub fn report(failure: Failure) -> ExitCode {
-    let (text, code) = failure.told();
+    let (text, code) = failure.text_and_code();
     say_styled(&text);
     ExitCode::from(code)
 }

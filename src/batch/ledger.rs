@@ -94,8 +94,8 @@ impl Ledger {
 
     /// Keeps that a run went through, with the length of the result file as it lies there now. Errors: as [`Self::write`]; there is no result file.
     ///
-    /// The same data set may have been run twice at once, and results of one content differ in length by what `/entry/run` says of the run: whoever
-    /// writes last here looks at the file after that, and one that replaces the file still later writes after it.
+    /// The same data set may have been run twice at once, and results of one content differ in length by what `/entry/run` says of the run: the
+    /// last writer here looks at the file after that, and one that replaces the file still later writes after it.
     pub fn finish(&self, mut entry: Entry) -> Result<Entry, String> {
         let path = self.result(&entry.name);
         let length = || match std::fs::metadata(&path) {

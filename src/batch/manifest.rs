@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn every_wrong_line_is_told() {
+    fn every_wrong_line_is_reported() {
         let text = [
             "{\"name\": \"a\", \"file\": []}",
             "7",

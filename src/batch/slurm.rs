@@ -230,7 +230,7 @@ struct Log<'a> {
 }
 
 impl Log<'_> {
-    /// The folder, if Slurm can be told of it: a backslash stops all its patterns, a directive has one line.
+    /// The folder, if a directive for Slurm can name it: a backslash stops all its patterns, a directive has one line.
     fn folder(&self) -> Option<&str> {
         self.folder.to_str().filter(|folder| !folder.chars().any(|c| c.is_control() || c == '\\'))
     }

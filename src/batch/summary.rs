@@ -132,8 +132,8 @@ impl Tables {
         Ok(path)
     }
 
-    /// Writes `summary.csv`, `summary.parquet`, `trends.csv` and `summary.h5`, each whole or not at all: the same bytes from the same entries, whoever
-    /// computed them.
+    /// Writes `summary.csv`, `summary.parquet`, `trends.csv` and `summary.h5`, each whole or not at all: the same bytes from the same entries, wherever
+    /// they were computed.
     pub fn write_batch(&self, title: &Title<'_>, entries: &[Entry]) -> Result<PathBuf, Failure> {
         let (table, trends) = (table(entries), trends::table(entries));
         self.csv("summary.csv", &table)?;

@@ -54,7 +54,7 @@ impl Work<'_> {
         let RunKey { key, sources } = match self.key(plan) {
             Ok(known) if self.as_run => RunKey { key: stated(&known.key, plan), ..known },
             Ok(known) => known,
-            Err(error) => return self.kept(Entry::failed(name, None, told(&[error])), clock, (0, 0)),
+            Err(error) => return self.kept(Entry::failed(name, None, errors_text(&[error])), clock, (0, 0)),
         };
         let again = self.fresh || self.as_run && !writers(plan, base, Path::new("")).is_empty();
         if let Some(entry) = self.ledger.read(name).filter(|entry| entry.key.as_deref() == Some(&key) && !again)
@@ -85,7 +85,7 @@ impl Work<'_> {
         let failed = |why: &str| Entry::failed(name, None, why.to_owned());
         let entry = match (self.key(plan), self.ledger.read(name)) {
             (_, None) => failed("no run of it has ended"),
-            (Err(error), Some(_)) => Entry::failed(name, None, told(&[error])),
+            (Err(error), Some(_)) => Entry::failed(name, None, errors_text(&[error])),
             (Ok(known), Some(entry)) if entry.key.as_ref().is_some_and(|own| *own != known.key) => {
                 failed("its records, the config or the program have changed since its last run: run the batch again")
             }
@@ -125,7 +125,7 @@ impl Work<'_> {
             observer: &Silent,
         };
         let result = run_to_file(plan, &options, &path).map_err(|failed| match failed {
-            Failed::Stages(errors) => told(&errors),
+            Failed::Stages(errors) => errors_text(&errors),
             Failed::File(error) => error.to_string(),
         })?;
         // the key was made before the run: it is the run's only if both read the same files
@@ -152,7 +152,7 @@ impl Work<'_> {
     }
 }
 
-/// Does all of them, or those before an interruption, at most `threads` at once whatever their number, each on the present rayon pool; `watch` is told of every end.
+/// Does all of them, or those before an interruption, at most `threads` at once whatever their number, each on the present rayon pool; `watch` is called at every end.
 /// The order of what comes back is that of `sets`.
 pub fn all<T: Sync>(
     sets: &[T],
@@ -204,7 +204,7 @@ fn stated(key: &str, plan: &Plan) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-fn told(errors: &[RunError]) -> String {
+fn errors_text(errors: &[RunError]) -> String {
     let one = |error: &RunError| match &error.error.help {
         Some(help) => format!("{error} (help: {help})"),
         None => error.to_string(),

@@ -11,7 +11,7 @@ use super::{AllowArgs, threads};
 /// What to compare.
 #[derive(Debug, Args)]
 pub struct DiffArgs {
-    /// The first result file: differences are told in its standard errors.
+    /// The first result file: differences are given in its standard errors.
     #[arg(value_name = "A.h5")]
     pub a: PathBuf,
     /// The second.

@@ -125,9 +125,9 @@ pub fn listing(candidate: &Candidate) -> String {
 }
 
 fn question(candidate: &Candidate) -> bool {
-    let told = listing(candidate);
+    let listing = listing(candidate);
     say(&format!(
-        "{told}Start it, now and as long as nothing of this changes? What its files import is not seen. [y/N] "
+        "{listing}Start it, now and as long as nothing of this changes? What its files import is not seen. [y/N] "
     ));
     let mut answer = String::new();
     let read = std::io::stdin().read_line(&mut answer);

@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(fs::read_to_string(at("stages/a.md")).unwrap(), "page stages/a.md");
         fs::write(at("SUMMARY.md"), "mine").unwrap();
         fs::remove_file(at("causes/b.md")).unwrap();
-        let (text, _) = update(false).unwrap_err().told();
+        let (text, _) = update(false).unwrap_err().text_and_code();
         assert!(text.contains("SUMMARY.md") && text.contains("not replaced"), "{text}");
         assert_eq!(fs::read(at("SUMMARY.md")).unwrap(), b"mine");
         assert!(!at("causes/b.md").exists(), "nothing is written where one file is another's");

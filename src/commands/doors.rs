@@ -34,8 +34,8 @@ pub fn say_of_config(text: &str, set: &[String], registry: &Registry) -> String 
         }
         Err(problems) => problems,
     };
-    let told: Vec<Value> = problems.iter().map(|problem| check::problem(text, problem)).collect();
-    render(CONFIG, text, &problems) + &Value::Array(told).to_string()
+    let listed: Vec<Value> = problems.iter().map(|problem| check::problem(text, problem)).collect();
+    render(CONFIG, text, &problems) + &Value::Array(listed).to_string()
 }
 
 /// All that `inspect` says of a file, for people and for scripts.

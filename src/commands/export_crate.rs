@@ -60,10 +60,10 @@ pub fn run(args: &CrateArgs) -> Result<(), Failure> {
             &json!({ "folder": folder, "inputs": inputs.len(), "missing": gone.len(), "copied": args.with_data }),
         )?);
     }
-    print(&told(&folder, &inputs, gone.len()))
+    print(&summary(&folder, &inputs, gone.len()))
 }
 
-fn told(folder: &Path, inputs: &[CrateInput], gone: usize) -> String {
+fn summary(folder: &Path, inputs: &[CrateInput], gone: usize) -> String {
     let how = match inputs.first() {
         Some(CrateInput { copy: Some(_), .. }) => "copied",
         _ => "by their hashes",

@@ -52,7 +52,7 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     if args.json {
         return print(&pretty(&as_json(&output, &result))?);
     }
-    print(&format!("{}: {}\n", shown(&output), told(&result)))
+    print(&format!("{}: {}\n", shown(&output), summary(&result)))
 }
 
 /// The cache that was asked for, or the user's. What killed processes left in it and in the system's folder for temporary files is removed.
@@ -153,7 +153,7 @@ fn as_json(output: &Path, result: &RunResult) -> Value {
     })
 }
 
-fn told(result: &RunResult) -> String {
+fn summary(result: &RunResult) -> String {
     let (count, seconds) = (result.stages.len(), result.info.seconds);
     let (reused, warnings) = (reused(result), warnings(result));
     let mut text = format!("{count} stages in {seconds:.2} s");

@@ -84,7 +84,7 @@ fn slurm(args: &SlurmArgs, registry: &Registry) -> Result<(), Failure> {
     let here = folder.join(FOLDER);
     write(&here, &jobs, &sets, plan.config_text(), &agreed)?;
     let sent = if args.send { Some(send(&here)?) } else { None };
-    print(&told(args.json, &here, &jobs, sent.as_ref())?)
+    print(&summary(args.json, &here, &jobs, sent.as_ref())?)
 }
 
 /// Links stay: where they lead may be called otherwise on another machine.
@@ -177,7 +177,7 @@ fn script(here: &Path) -> String {
     crate::batch::shell::quoted(here.join(SUBMIT))
 }
 
-fn told(json: bool, here: &Path, jobs: &Jobs, sent: Option<&Sent>) -> Result<String, Failure> {
+fn summary(json: bool, here: &Path, jobs: &Jobs, sent: Option<&Sent>) -> Result<String, Failure> {
     if json {
         return pretty(&json!({
             "folder": here.display().to_string(),

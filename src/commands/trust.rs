@@ -92,7 +92,7 @@ fn agreed(plugins: &Plugins, candidate: &Candidate, json: bool) -> Result<Row, F
     }
     let outcome = match plugins.agree(candidate) {
         Ok(described) => Outcome::Trusted(described),
-        Err(error) => Outcome::Failed(error.told(candidate.name()), error.help),
+        Err(error) => Outcome::Failed(error.message_for(candidate.name()), error.help),
     };
     let row = Row { name: candidate.name().to_owned(), candidate: Some(candidate.clone()), outcome };
     if !json {

@@ -1,4 +1,4 @@
-//! What is told of a model.
+//! What an export states of a model.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

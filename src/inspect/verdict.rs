@@ -2,7 +2,7 @@
 
 use super::channel::{Channel, MOST_CODES, Values};
 
-/// What `io.records` demands unless told otherwise.
+/// Least sample rate that `io.records` accepts by default.
 pub const LEAST_RATE_HZ: f64 = 200e3;
 
 /// A ringdown of a few samples identifies nothing: the shipped configs take windows of 8192, the shortest useful ones have an eighth.
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn each_reason_is_told() {
+    fn each_reason_is_given() {
         let good = || channel("/a", Some(5e6), 90_000);
         let with = |values: Values| Channel { values: Some(values), ..good() };
         let values = |codes, missing, saturated| Values { least: 0.0, largest: 1.0, codes, missing, saturated };

@@ -28,7 +28,7 @@ pub fn config_path(run: &RunInfo) -> PathBuf {
 pub fn unfit(file: &ResultFile, finder: &Finder) -> Vec<(SourceFile, Now)> {
     let mut found: Vec<(SourceFile, Now)> = Vec::new();
     for source in file.stages().iter().flat_map(|stage| &stage.record.sources) {
-        if found.iter().any(|(told, _)| told == source) {
+        if found.iter().any(|(known, _)| known == source) {
             continue;
         }
         match finder.find(source) {

@@ -20,7 +20,7 @@ pub fn name(index: usize) -> String {
 
 impl Point {
     /// `model.order = 9, ...`
-    pub fn told(&self) -> String {
+    pub fn values_text(&self) -> String {
         self.values.iter().map(|(name, value)| format!("{name} = {value}")).collect::<Vec<_>>().join(", ")
     }
 }

@@ -34,8 +34,8 @@ fn files_that_changed_places_are_computed_again_with_a_warning() {
             let ran = run(here, "b.h5", "cache", &[]);
             assert_eq!(ran.code, Some(0), "{ran:?}");
             assert_eq!(differences(&truth, &here.join("b.h5")), [""; 0], "{one} and {other}: {ran:?}");
-            let told = ran.stderr.matches("holds another result").count();
-            assert!(told > 0 && ran.stderr.contains("its stage runs again"), "{one} and {other}: {ran:?}");
+            let warned = ran.stderr.matches("holds another result").count();
+            assert!(warned > 0 && ran.stderr.contains("its stage runs again"), "{one} and {other}: {ran:?}");
         }
     }
 }

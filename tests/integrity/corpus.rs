@@ -63,16 +63,16 @@ fn every_entrance_has_a_target_and_a_corpus_and_the_corpus_is_small() {
 
 #[test]
 fn no_file_of_the_corpus_breaks_a_promise() {
-    let (told, files) = mpsc::channel();
+    let (sender, files) = mpsc::channel();
     let worker = std::thread::spawn(move || {
         for entrance in ENTRANCES {
             for file in corpus(entrance.name) {
                 let bytes = fs::read(&file).expect("a file of the corpus");
-                if told.send((file, None)).is_err() {
+                if sender.send((file, None)).is_err() {
                     return;
                 }
                 let entered = catch_unwind(AssertUnwindSafe(|| enter(entrance.name, &bytes)));
-                let _ = told.send((PathBuf::from(entrance.name), Some(entered.is_ok())));
+                let _ = sender.send((PathBuf::from(entrance.name), Some(entered.is_ok())));
             }
         }
     });

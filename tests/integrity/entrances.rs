@@ -168,7 +168,7 @@ const fn port(name: &'static str, shape: Shape) -> PortSpec {
     PortSpec { name, shape, tag: "", optional: true, doc: "" }
 }
 
-/// A stage file that was changed and sealed again: the seal is no defence against whoever knows how it is made.
+/// A stage file that was changed and sealed again: the seal is no defence against a writer who knows how it is made.
 fn stage_file(bytes: &[u8]) {
     let path = file("stage.h5", &sealed(bytes));
     let _ = doors::say_of_stage(&path, &IDENTITY);

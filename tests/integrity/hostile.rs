@@ -22,8 +22,8 @@ fn bounded(folder: &Path, arguments: &[&str]) {
     let (clock, status) = (Instant::now(), format!("/proc/{}/status", child.id()));
     let mut most = 0;
     let ended = loop {
-        let told = fs::read_to_string(&status).unwrap_or_default();
-        let line = told.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
         let kib = line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<u64>().ok());
         most = most.max(kib.unwrap_or(0) << 10);
         if let Some(status) = child.try_wait().expect("the child is there") {
@@ -288,8 +288,8 @@ fn archives_that_inflate_to_much_are_bounded() {
     npz(&path("small.npz"), 1, 5000);
     mat(&path("small.mat"), 1, 5000);
     for small in ["small.npz", "small.mat"] {
-        let told = afmid(folder.path(), &["inspect", small]);
-        assert!(told.contains("/x") && told.contains("5000"), "{told}");
+        let output = afmid(folder.path(), &["inspect", small]);
+        assert!(output.contains("/x") && output.contains("5000"), "{output}");
     }
     // one large member; members that are each within the bounds
     let mib = 1 << 20;

@@ -58,12 +58,12 @@ fn what_is_no_regular_file_is_refused_before_it_is_opened() {
         ];
         for arguments in commands {
             let Output { status, stderr, .. } = ends(folder.path(), arguments);
-            let told = String::from_utf8_lossy(&stderr);
-            assert!(matches!(status.code(), Some(1 | 2)), "afmid {arguments:?}: {status}\n{told}");
+            let message = String::from_utf8_lossy(&stderr);
+            assert!(matches!(status.code(), Some(1 | 2)), "afmid {arguments:?}: {status}\n{message}");
         }
-        let told = ends(folder.path(), &["check", odd]);
-        let told = String::from_utf8_lossy(&told.stderr).into_owned();
-        assert!(told.contains("a regular file was wanted"), "{told}");
+        let output = ends(folder.path(), &["check", odd]);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(message.contains("a regular file was wanted"), "{message}");
     }
 }
 
@@ -90,8 +90,8 @@ fn a_config_has_at_most_8_mib() {
         (status.code(), String::from_utf8_lossy(&stderr).into_owned())
     };
     assert_eq!(with(8 << 20).0, Some(0));
-    let (code, told) = with((8 << 20) + 1);
-    assert!(code == Some(2) && told.contains("more than the 8388608 bytes"), "{told}");
+    let (code, message) = with((8 << 20) + 1);
+    assert!(code == Some(2) && message.contains("more than the 8388608 bytes"), "{message}");
 }
 
 #[test]
@@ -99,14 +99,14 @@ fn at_most_a_hundred_problems_are_printed() {
     let folder = tempfile::tempdir().expect("a folder");
     let stages: String = (0..1234).map(|n| format!("[[stage]]\nid = \"a{n}\"\nuses = \"io.nothing\"\n")).collect();
     fs::write(folder.path().join("a.toml"), format!("[pipeline]\nname = \"a\"\nseed = 1\n{stages}")).expect("a config");
-    let told = ends(folder.path(), &["check", "a.toml"]);
-    let text = String::from_utf8_lossy(&told.stderr).into_owned();
+    let output = ends(folder.path(), &["check", "a.toml"]);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(text.matches("there is no stage named").count(), 100);
     assert!(text.contains("and 1134 more") && text.contains("1234 problems"), "{}", &text[text.len() - 300..]);
-    // the last one is told at its line
+    // the last one is reported at its line
     assert!(text.contains("[a.toml:303:8]"), "{text}");
-    let told = ends(folder.path(), &["check", "--json", "a.toml"]);
-    let json: serde_json::Value = serde_json::from_slice(&told.stdout).expect("JSON");
+    let output = ends(folder.path(), &["check", "--json", "a.toml"]);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(json[0]["problems"].as_array().map(Vec::len), Some(100));
     assert_eq!(json[0]["more_problems"], 1134);
 }

@@ -112,7 +112,7 @@ pub struct Contents {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{problem}{}{}", at_byte.map(|byte| format!(", at byte {byte}")).unwrap_or_default(), file.as_ref().map(|file| format!(" ({})", file.display())).unwrap_or_default())]
 pub struct FormatError {
-    /// The file, as far as whoever failed knew it.
+    /// The file, where it is known.
     pub file: Option<PathBuf>,
     /// Byte in the file where it was seen, if that is known.
     pub at_byte: Option<u64>,

@@ -84,12 +84,12 @@ mod tests {
     #[test]
     fn the_same_process_states_the_same_arithmetic() {
         assert_eq!(arithmetic(), arithmetic());
-        let told = arithmetic();
+        let found = arithmetic();
         let checked = if cfg!(debug_assertions) { ", checked," } else { ", unchecked," };
         assert!(
-            told.starts_with(std::env::consts::ARCH) && told.contains("opt-level ") && told.contains(checked),
-            "{told}"
+            found.starts_with(std::env::consts::ARCH) && found.contains("opt-level ") && found.contains(checked),
+            "{found}"
         );
-        assert!(told.contains("rustc 1.") && !told.contains("unknown version"), "{told}");
+        assert!(found.contains("rustc 1.") && !found.contains("unknown version"), "{found}");
     }
 }

@@ -144,7 +144,7 @@ impl Cache {
     }
 
     /// A result that is not kept costs the next run its time, and this one nothing. What stops one stops the others as a rule (a full disk, a
-    /// folder that may only be read): the first is told, and no more.
+    /// folder that may only be read): only the first is reported.
     pub(crate) fn unkept(&self, error: &StoreError) {
         let mut notes = self.notes();
         if !std::mem::replace(&mut notes.unkept, true) {

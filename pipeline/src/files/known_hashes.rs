@@ -23,7 +23,7 @@ const MOST_BYTES: u64 = 1 << 28;
 /// Digits of a line's own hash.
 const DIGITS: usize = 32;
 
-/// Lines that no longer count before a file of them is written anew, beside as many as count.
+/// A file of lines is written again when its outdated lines exceed the valid ones by more than this.
 const SPARE: usize = 1000;
 
 /// A folder of stamps: for each folder of input files one, under the hash of its path.

@@ -1,5 +1,5 @@
-//! Marks: a page or a model that this program wrote states the hash of its other bytes, so that a file of others, or one that somebody edited since,
-//! is told from it.
+//! Marks: a page or a model that this program wrote states the hash of its other bytes, which distinguishes it from a file of others, and from one
+//! that somebody edited since.
 
 use std::path::Path;
 

@@ -168,7 +168,7 @@ fn find(
         Some(name) => known.process(decl, name, config),
         None => {
             *unknown += 1;
-            // the first ones, which are printed, are told better
+            // the first ones, which are printed, get better help
             let names = registry
                 .entries()
                 .iter()

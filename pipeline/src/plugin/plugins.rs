@@ -152,7 +152,7 @@ impl Plugins {
     fn problem(&self, decl: &StageDecl, name: &str, config: &Config, error: PluginError) -> Problem {
         let declared = config.plugins.iter().find(|plugin| plugin.name == name);
         let span = declared.map_or(decl.uses_span.clone(), |plugin| plugin.command_span.clone());
-        Problem::new(error.told(name), span, "this plugin").help(error.help)
+        Problem::new(error.message_for(name), span, "this plugin").help(error.help)
     }
 
     /// The row of a stage that uses a plugin. Errors: there is none of this name, nobody has agreed to start it, it does not start or describe itself.
@@ -160,7 +160,7 @@ impl Plugins {
         let candidate = self.candidate(decl, name, config)?;
         if !self.may_start(&candidate) && !matches!(self.rule, Rule::Never) {
             let error =
-                PluginError::new(format!("is not started before you agree to it: {}", candidate.told()), CONSENT);
+                PluginError::new(format!("is not started before you agree to it: {}", candidate.would_run()), CONSENT);
             return Err(self.problem(decl, name, config, error));
         }
         let row = self.row(&candidate).map_err(|error| self.problem(decl, name, config, error))?;

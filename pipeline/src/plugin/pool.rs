@@ -48,8 +48,8 @@ impl Pool {
     /// Returned is what is wrong with any: it wrote something that nobody had asked for.
     pub(super) fn shut_down(&self) -> Vec<String> {
         let mut idle = std::mem::take(&mut *self.lock());
-        let told = |session: &Session| Some(session.check_quiet().err()?.told(session.candidate.name()));
-        let wrong = idle.iter().filter_map(told).collect();
+        let not_quiet = |session: &Session| Some(session.check_quiet().err()?.message_for(session.candidate.name()));
+        let wrong = idle.iter().filter_map(not_quiet).collect();
         idle.iter_mut().for_each(Session::ask_to_end);
         for session in &mut idle {
             // one that does not end is killed there

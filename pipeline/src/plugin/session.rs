@@ -107,7 +107,7 @@ impl Session {
             let line = self.process.receive(deadline, &doing)?;
             let reply = reply(&line, id, &doing)?;
             match (reply.progress, reply.result, reply.error) {
-                (Some(told), None, None) => progress(told),
+                (Some(done), None, None) => progress(done),
                 (None, Some(result), None) => return Ok(result),
                 (None, None, Some(refusal)) => {
                     let help = refusal.help.unwrap_or_else(|| "this comes from the plugin itself".to_owned());
@@ -219,8 +219,8 @@ pub(super) fn reply(line: &str, id: u64, doing: &str) -> Result<Reply, PluginErr
     match reply.id {
         Some(found) if found == id => Ok(reply),
         found_id => {
-            let told = found_id.map_or("no id".to_owned(), |found| format!("the id {found}"));
-            let what = format!("answered with {told}, wanted the id {id} of the request: {}", found());
+            let answered = found_id.map_or("no id".to_owned(), |found| format!("the id {found}"));
+            let what = format!("answered with {answered}, wanted the id {id} of the request: {}", found());
             Err(PluginError::new(what, "an answer carries the id of its request"))
         }
     }

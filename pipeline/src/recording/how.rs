@@ -25,7 +25,7 @@ pub struct How {
     pub unit: Option<String>,
 }
 
-/// Which reader opens a file, and what it must be told: enough to open the file again.
+/// Which reader opens a file, and the parameters that it needs: enough to open the file again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reading {

@@ -131,7 +131,7 @@ impl InputFiles {
     pub(super) fn inspect(&self, path: &Path) -> Result<(FileState, Inspected), StageError> {
         let fail = |error: std::io::Error| unreadable(path, &error);
         let key = self.absolute(path).map_err(fail)?;
-        // not opened while it is known; whoever opens it compares the states again
+        // not opened while it is known; the code that opens it compares the states again
         let state = FileState::at(path).map_err(fail)?;
         if let Some(found) = self.known(&key, &state) {
             return Ok((state, found));

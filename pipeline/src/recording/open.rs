@@ -31,7 +31,7 @@ pub struct Opened {
     pub remarks: Vec<String>,
 }
 
-/// Whether a file is of a format that can be opened without being told which.
+/// Whether a file is of a format that can be opened without stating which.
 pub fn recognised(path: &Path) -> bool {
     is_recognised(path)
 }

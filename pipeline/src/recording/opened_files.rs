@@ -29,7 +29,7 @@ struct Key {
 #[derive(Debug, Default)]
 pub(super) struct OpenedFiles(Mutex<Vec<(Key, Slot)>>);
 
-/// What a file holds that is in this state, as it was opened last or anew. Errors: it is in another; as [`open_contents`].
+/// What a file holds that is in this state, as it was opened last or is opened now. Errors: it is in another; as [`open_contents`].
 pub(super) fn contents(
     files: &InputFiles,
     path: &Path,

@@ -142,8 +142,9 @@ fn plural(kind: &str) -> String {
 fn range(schema: &Value) -> String {
     // zero as the bound of an unsigned type says nothing of the parameter
     let unsigned = schema["format"].as_str().is_some_and(|format| format.starts_with("uint"));
-    let told = |key: &str, bound: &f64| !(unsigned && key == "minimum" && *bound == 0.0);
-    let bound = |key: &str| schema[key].as_f64().filter(|bound| told(key, bound)).map(|bound| format!("{bound}"));
+    let informative = |key: &str, bound: &f64| !(unsigned && key == "minimum" && *bound == 0.0);
+    let bound =
+        |key: &str| schema[key].as_f64().filter(|bound| informative(key, bound)).map(|bound| format!("{bound}"));
     let low = bound("minimum").map(|low| (low, "at least")).or(bound("exclusiveMinimum").map(|low| (low, "above")));
     let high = bound("maximum").map(|high| (high, "at most")).or(bound("exclusiveMaximum").map(|high| (high, "below")));
     match (low, high) {

@@ -10,7 +10,7 @@ use crate::error::StageError;
 pub const BLOCK_BYTES: usize = 4 << 20;
 
 /// Hands the `chosen` rows to `work` in their order, a block at a time, with the number of those handed before. Rows in memory are
-/// lent, others are read into one buffer: no more than [`BLOCK_BYTES`] of them are held (or one row).
+/// borrowed, others are read into one buffer: no more than [`BLOCK_BYTES`] of them are held (or one row).
 ///
 /// Whether rows lie in memory or in a file, the blocks are the same: so are all sums over them, bit for bit.
 /// Errors: those of `work`, and of the source.
@@ -23,8 +23,8 @@ pub fn in_blocks<E: From<StageError>>(
     let most = rows_per_block(length, BLOCK_BYTES);
     let mut buffer = Vec::new();
     for (number, part) in chosen.chunks(most).enumerate() {
-        let lent: Option<Vec<&[f64]>> = part.iter().map(|&row| source.lent(row)).collect();
-        match lent {
+        let borrowed: Option<Vec<&[f64]>> = part.iter().map(|&row| source.lent(row)).collect();
+        match borrowed {
             Some(rows) => work(number * most, &rows)?,
             None => {
                 buffer.resize(part.len() * length, 0.0);

@@ -248,9 +248,9 @@ fn a_stage_whose_recording_changes_meanwhile_fails_also_where_the_recording_come
             }
             let (result, kept) = ran(&folder, &stages(meanwhile));
             let errors = result.expect_err(meanwhile);
-            let told = errors[0].to_string();
-            assert!(errors.len() == 1 && told.contains("`s`") && told.contains("r.h5"), "{meanwhile}: {told}");
-            assert!(told.contains("changed"), "{meanwhile}, {stored}: {told}");
+            let message = errors[0].to_string();
+            assert!(errors.len() == 1 && message.contains("`s`") && message.contains("r.h5"), "{meanwhile}: {message}");
+            assert!(message.contains("changed"), "{meanwhile}, {stored}: {message}");
             assert_eq!(kept, 1, "only the list of records is kept");
             let (result, kept) = ran(&folder, &stages("nothing"));
             let result = result.expect("the file is as it was");

@@ -54,7 +54,7 @@ fn rows_come_back_bit_for_bit_from_memory_and_from_a_file() {
         assert_eq!(bits(&into), bits(&row(7, 50)));
         assert_eq!(view.lent(7).is_some(), !in_file);
         assert_eq!(bits(values.real().unwrap().unwrap()), bits(&whole));
-        // now that somebody has asked for all, rows are lent
+        // now that somebody has asked for all, rows are borrowed
         assert_eq!(bits(view.lent(8).unwrap()), bits(&row(8, 50)));
         assert!(view.lent(9).is_none());
         assert!(view.read(9, &mut into).is_err() && view.read(0, &mut into[..49]).is_err());
@@ -185,7 +185,7 @@ fn small_variables_are_read_into_memory() {
 }
 
 #[test]
-fn a_file_that_is_cut_short_while_it_is_in_use_is_told() {
+fn a_file_that_is_cut_short_while_it_is_in_use_is_reported() {
     let folder = folder();
     let path = folder.path().join("a.h5");
     let (rows, length) = (260, 4050);

@@ -71,7 +71,7 @@ mod tests {
     use crate::store::write_result;
 
     #[test]
-    fn a_result_is_known_by_its_seal_and_one_that_was_changed_is_told_from_one_that_was_cut() {
+    fn a_result_is_known_by_its_seal_and_a_changed_one_is_distinguished_from_a_cut_one() {
         let folder = Folder::new("written");
         let path = folder.file("r.h5");
         write_result(&path, &run_result()).unwrap();

@@ -62,7 +62,7 @@ impl Anchor {
         let later_s = match (self.start, before.start) {
             (Some(now), Some(then)) => now.seconds_since(then),
             (None, None) => 0.0,
-            // One of the two is not known: the axis begins anew.
+            // One of the two is not known: the axis begins again.
             _ => return true,
         } + (self.offset_s - before.offset_s);
         if later_s == 0.0 {

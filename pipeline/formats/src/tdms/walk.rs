@@ -34,7 +34,7 @@ struct Walk {
     plan: Plan,
     /// Whether the plan's chunks are interleaved.
     interleaved: bool,
-    /// Whether the plan has to be made anew.
+    /// Whether the plan has to be made again.
     changed: bool,
     extents_left: u64,
     /// Segments, apart from a cut off last one, whose data are no whole number of chunks.

@@ -99,7 +99,7 @@ impl Candidate {
     }
 
     /// Its command and folder in a line, for messages.
-    pub(in crate::plugin) fn told(&self) -> String {
+    pub(in crate::plugin) fn would_run(&self) -> String {
         let variables = self.environment().iter().map(|(name, value)| format!("{name}={value}"));
         let words = variables.chain([self.program().display().to_string()]).chain(self.arguments().iter().cloned());
         // a word with spaces or control characters must not look like others

@@ -12,7 +12,7 @@ pub enum Rule {
     Agreed {
         /// See [`Candidate::seal`].
         seals: BTreeSet<String>,
-        /// Asks whoever sits before the terminal.
+        /// Asks the user at the terminal.
         ask: Option<Ask>,
     },
     /// All.

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open, pidfd_send_signal};
 
-/// How often it is looked whether anything is left: whoever starts processes faster than they are killed ends here after a while.
+/// How often it is looked whether anything is left: bounds the search where processes start faster than they are killed.
 const ROUNDS: usize = 2_000;
 
 /// Kills all that a process has started, and all that these have, until nothing is left. It itself lives on.

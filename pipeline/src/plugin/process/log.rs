@@ -14,8 +14,8 @@ const MOST_BYTES: usize = 64 << 10;
 /// The most that is read at once: a plugin that never stops writing delays an answer by no more than this.
 const MOST_AT_ONCE: usize = 1 << 20;
 
-/// The end of a stream. Two read it, a thread that waits for it and whoever asks, each with the lock held: what was written
-/// before an answer is therefore never missed by the one who asks after it.
+/// The end of a stream. Two read it, a thread that waits for it and a caller, each with the lock held: what was written
+/// before an answer is therefore never missed by a caller that reads after it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Log(Arc<(Mutex<Tail>, Condvar)>);
 

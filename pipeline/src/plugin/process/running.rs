@@ -99,7 +99,6 @@ impl Process {
     /// The next line. Errors: it does not come in time, the process ends, it is no text or too long.
     pub(in crate::plugin) fn receive(&mut self, deadline: Instant, doing: &str) -> Result<String, PluginError> {
         let wait = deadline.saturating_duration_since(Instant::now());
-        let told = lines::shown;
         match self.lines.recv_timeout(wait) {
             Ok(Line::Text(text)) => Ok(text),
             Ok(Line::NotText(line)) => Err(PluginError::new(
@@ -112,7 +111,8 @@ impl Process {
             )),
             Ok(Line::CutShort(line)) => {
                 let status = self.status();
-                let what = format!("ended ({status}) in the middle of a line {doing}: {}", told(line.as_bytes()));
+                let what =
+                    format!("ended ({status}) in the middle of a line {doing}: {}", lines::shown(line.as_bytes()));
                 Err(PluginError::new(what, "end every message with a newline and flush stdout"))
             }
             Err(RecvTimeoutError::Timeout) => Err(PluginError::new(

@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_largest_difference_is_told_in_every_measure() {
+    fn the_largest_difference_is_given_in_every_measure() {
         let mut numbers = Numbers::new(2, 3);
         numbers.add(100.0, 101.0, Some(2.0), || "[0]".to_owned());
         numbers.add(1.0, 1.5, Some(0.1), || "[1]".to_owned());
