@@ -1,6 +1,7 @@
 //! The estimators beside the main job's: `cargo bench --bench estimators`.
 //!
-//! Inputs are noisy releases of the paper's lever in closed form, as in `kernels`; noise is white where nothing else is said. Results in docs/performance.md.
+//! Inputs are noisy releases of the paper's lever in closed form, as in `kernels`; noise is white where nothing else is
+//! said. Results in docs/performance.md.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -113,7 +114,8 @@ fn starts(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The grey modal form: four modes, one real pole, delay and feedthrough, from subspace estimates and from modes that are known nearly.
+/// The grey modal form: four modes, one real pole, delay and feedthrough, from subspace estimates and from modes that
+/// are known nearly.
 fn grey(criterion: &mut Criterion) {
     let (u, y) = (force(WINDOW, WINDOW / 8), release(WINDOW, WINDOW as f64 / 8.0 + 0.3, MEAN_NOISE_V, 7));
     let near = vec![[46.31e3, 41.0], [247.5e3, 190.0], [581.0e3, 350.0], [1051.0e3, 500.0]];

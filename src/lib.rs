@@ -61,7 +61,8 @@ pub fn fail(error: &DoubleName) -> ExitCode {
     output::report(Failure::failed(error, None))
 }
 
-/// Help and version go to stdout, mistakes to stderr, in colour if a person looks at them and nothing that they typed acts on the terminal.
+/// Help and version go to stdout, mistakes to stderr, in colour if a person looks at them and nothing that they typed
+/// acts on the terminal.
 fn help_or_mistake(error: &clap::Error) -> Result<(), Failure> {
     let plain = error.render().to_string();
     let styled = |terminal: bool| {

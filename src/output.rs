@@ -31,8 +31,8 @@ pub fn report(failure: Failure) -> ExitCode {
     ExitCode::from(code)
 }
 
-/// Says something on stderr, in one call, so that lines of several threads don't mix. If stderr takes nothing, there is nowhere left to say so:
-/// the exit code still tells.
+/// Says something on stderr, in one call, so that lines of several threads don't mix. If stderr takes nothing, there is
+/// nowhere left to say so: the exit code still tells.
 pub fn say(text: &str) {
     say_styled(&printable(text));
 }

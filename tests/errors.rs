@@ -1,4 +1,5 @@
-//! Every error as people see it: `tests/errors/NAME.toml` is a command with its files, `NAME.txt` what it says (`UPDATE_EXPECTED=1` writes these again: read them).
+//! Every error as people see it: `tests/errors/NAME.toml` is a command with its files, `NAME.txt` what it says
+//! (`UPDATE_EXPECTED=1` writes these again: read them).
 
 mod common;
 

@@ -158,8 +158,8 @@ fn an_archive_in_another_format_gives_the_same_events_and_modes() {
     }
 }
 
-/// Frequencies and quality factors agree far within their errors: codes and doubles round differently in the last bits alone, and the fit
-/// ends where its steps are below 1e-9 or so of a standard error.
+/// Frequencies and quality factors agree far within their errors: codes and doubles round differently in the last bits
+/// alone, and the fit ends where its steps are below 1e-9 or so of a standard error.
 fn same_modes(name: &str, native: &Value, other: &Value) {
     let modes = |value: &Value| value["modes"].as_array().unwrap().clone();
     let (native, other) = (modes(native), modes(other));

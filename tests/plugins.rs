@@ -1,4 +1,5 @@
-//! Plugins on the command line: the examples in Python, a new stage, the conformance test. Octave's and scikit-rf's are in `make test-interop`.
+//! Plugins on the command line: the examples in Python, a new stage, the conformance test. Octave's and scikit-rf's are
+//! in `make test-interop`.
 
 mod common;
 

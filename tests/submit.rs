@@ -1,4 +1,5 @@
-//! `afmid submit slurm`: what it writes is what bash and sbatch read, whatever the names; the jobs together give the table of one machine.
+//! `afmid submit slurm`: what it writes is what bash and sbatch read, whatever the names; the jobs together give the
+//! table of one machine.
 //!
 //! Here sbatch is a script that writes down what it was given; tests/cluster/slurm.sh does the same on a real Slurm.
 

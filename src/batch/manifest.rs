@@ -8,7 +8,8 @@ use super::dataset::{DataSet, absolute, check_name};
 
 const KEYS: [&str; 3] = ["name", "files", "set"];
 
-/// The data sets of a manifest, `{"name": "...", "files": ["..."], "set": {"stage.param": value}}` a line; empty lines are passed over.
+/// The data sets of a manifest, `{"name": "...", "files": ["..."], "set": {"stage.param": value}}` a line; empty lines
+/// are passed over.
 ///
 /// Errors: everything that is wrong with it, each with its line.
 pub fn read(file: &str, text: &str) -> Result<Vec<DataSet>, Vec<String>> {

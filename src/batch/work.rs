@@ -31,7 +31,8 @@ pub struct Work<'a> {
     pub fresh: bool,
     /// Run what failed once more.
     pub retry_failed: bool,
-    /// As `afmid run` would: a result states the config and the arguments as they are now, and stages that write files have written them.
+    /// As `afmid run` would: a result states the config and the arguments as they are now, and stages that write files
+    /// have written them.
     pub as_run: bool,
 }
 
@@ -80,7 +81,8 @@ impl Work<'_> {
         run_key(plan, &Surroundings { base, program, arithmetic: "", files })
     }
 
-    /// What the ledger has of a data set, without running anything: what is no longer what would be run counts as failed, as does what was never run.
+    /// What the ledger has of a data set, without running anything: what is no longer what would be run counts as
+    /// failed, as does what was never run.
     pub fn found(&self, name: &str, plan: &Plan) -> Done {
         let failed = |why: &str| Entry::failed(name, None, why.to_owned());
         let entry = match (self.key(plan), self.ledger.read(name)) {
@@ -97,7 +99,8 @@ impl Work<'_> {
         Done { entry, took: None, stages: (0, 0) }
     }
 
-    /// The same run, if it went through meanwhile in another process: one that failed here, for want of memory or disk, takes nothing back.
+    /// The same run, if it went through meanwhile in another process: one that failed here, for want of memory or disk,
+    /// takes nothing back.
     fn elsewhere(&self, name: &str, key: &str) -> Option<Entry> {
         self.ledger
             .read(name)
@@ -152,8 +155,8 @@ impl Work<'_> {
     }
 }
 
-/// Does all of them, or those before an interruption, at most `threads` at once whatever their number, each on the present rayon pool; `watch` is called at every end.
-/// The order of what comes back is that of `sets`.
+/// Does all of them, or those before an interruption, at most `threads` at once whatever their number, each on the
+/// present rayon pool; `watch` is called at every end. The order of what comes back is that of `sets`.
 pub fn all<T: Sync>(
     sets: &[T],
     threads: usize,
@@ -186,7 +189,8 @@ pub fn all<T: Sync>(
 
 /// What lies where a result is going to be written and must stay; none if nothing does.
 pub fn in_the_way(path: &Path) -> Option<String> {
-    // what is not there, or cannot be read, is for the writer to complain about; an empty file holds nothing that could be lost
+    // what is not there, or cannot be read, is for the writer to complain about; an empty file holds nothing that could
+    // be lost
     match written(path).ok()? {
         Written::AsWritten | Written::CutShort | Written::Other(FileKind::Empty) => None,
         Written::Changed => Some("was changed since afmid wrote it".to_owned()),

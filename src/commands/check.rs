@@ -29,7 +29,8 @@ pub fn run(configs: &[PathBuf], as_json: bool, stages: &dyn Stages) -> Result<()
                     plan.points().map(|count| format!(", every point of a sweep of {count}")).unwrap_or_default();
                 let right = format!("{}: right, {} stages{points}\n", shown(config), plan.nodes.len());
                 printed = print(&(right + &not_checked(&plan)));
-                // the process ends soon: of a hundred thousand stages, freeing each takes longer than giving all of it back
+                // the process ends soon: of a hundred thousand stages, freeing each takes longer than giving all of it
+                // back
                 std::mem::forget(plan);
             }
             Ok(_) => {}

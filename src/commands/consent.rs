@@ -29,8 +29,9 @@ fn starting(rule: Rule) -> Plugins {
     Plugins::new(rule, trust()).hosted(Host::this_program())
 }
 
-/// For commands that may start plugins: all of them with `--allow-plugins`, else those that are trusted, whose seals are in the file `agreed`, or that
-/// somebody who sits before a terminal says yes to. Errors, usage: the file cannot be read.
+/// For commands that may start plugins: all of them with `--allow-plugins`, else those that are trusted, whose seals
+/// are in the file `agreed`, or that somebody who sits before a terminal says yes to. Errors, usage: the file cannot be
+/// read.
 pub fn plugins(allow: &AllowArgs, agreed: Option<&Path>) -> Result<Plugins, Failure> {
     if allow.allow_plugins {
         return Ok(all());

@@ -63,8 +63,8 @@ const TUTORIALS: [(&str, &str); 4] = [
 const MOST_BYTES: u64 = 64 << 20;
 
 /// Writes `FOLDER/stages/*.md`, `FOLDER/causes/*.md`, `FOLDER/SUMMARY.md` and `FOLDER/pipeline.schema.json`, or says
-/// what would change. What was written is in the folder's list of files: nothing else is replaced. Pages of what is gone
-/// are removed if they are as they were written.
+/// what would change. What was written is in the folder's list of files: nothing else is replaced. Pages of what is
+/// gone are removed if they are as they were written.
 pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failure> {
     update(folder, check, &wanted(registry)?)
 }

@@ -81,7 +81,8 @@ fn text(metadata: &Value) -> Result<String, Failure> {
     serde_json::to_string_pretty(metadata).map(|text| text + "\n").map_err(|error| Failure::failed(error, None))
 }
 
-/// Sees to it that a folder may become a crate. Errors, usage: it is a file; the folder above it is not there; it holds something and is no crate.
+/// Sees to it that a folder may become a crate. Errors, usage: it is a file; the folder above it is not there; it holds
+/// something and is no crate.
 fn require_crate(folder: &Path) -> Result<(), Failure> {
     match fs::read_dir(folder).map(|mut entries| entries.next().is_some()) {
         Ok(true) if ![METADATA, LIST].iter().any(|name| folder.join(name).is_file()) => Err(Failure::usage(

@@ -69,7 +69,8 @@ fn require_inputs(file: &ResultFile, finder: &Finder) -> Result<(), Failure> {
     Err(Failure::Failed(Message::Listed(message, list, Some(help))))
 }
 
-/// The plan of the stored config, reading the files where they are now, and its stages that write. Errors, usage: this program cannot run it any more.
+/// The plan of the stored config, reading the files where they are now, and its stages that write. Errors, usage: this
+/// program cannot run it any more.
 fn plan(
     file: &ResultFile,
     base: &Path,

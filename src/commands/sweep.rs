@@ -21,7 +21,8 @@ use crate::show::{artifact_text, pretty};
 use crate::sweep::point::{self, Point};
 use crate::sweep::table::{shown, table};
 
-/// Runs all points, one after the other: each finds in the cache what those before it have computed. One that fails stops no other; then the exit code is 3.
+/// Runs all points, one after the other: each finds in the cache what those before it have computed. One that fails
+/// stops no other; then the exit code is 3.
 pub fn run(plan: &Plan, count: usize, args: &RunArgs) -> Result<(), Failure> {
     let clock = Instant::now();
     let folder = folder(plan, args)?;

@@ -101,8 +101,8 @@ fn agreed(plugins: &Plugins, candidate: &Candidate, json: bool) -> Result<Row, F
     Ok(row)
 }
 
-/// Takes back consent for the plugins of a config, as they are and as they were: what ran under these names in its folder, whether it is still there or
-/// not, and what is the same under another name.
+/// Takes back consent for the plugins of a config, as they are and as they were: what ran under these names in its
+/// folder, whether it is still there or not, and what is the same under another name.
 fn revoked(trust: &Trust, config: &Path, parsed: &Config, found: &[Candidate]) -> Result<Vec<Row>, Failure> {
     let folder = match config.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

@@ -5,7 +5,8 @@ use super::channel::{Channel, MOST_CODES, Values};
 /// Least sample rate that `io.records` accepts by default.
 pub const LEAST_RATE_HZ: f64 = 200e3;
 
-/// A ringdown of a few samples identifies nothing: the shipped configs take windows of 8192, the shortest useful ones have an eighth.
+/// A ringdown of a few samples identifies nothing: the shipped configs take windows of 8192, the shortest useful ones
+/// have an eighth.
 const LEAST_SAMPLES: usize = 1024;
 
 /// Samples in a period of a ring that is still well sampled.

@@ -39,8 +39,8 @@ pub fn unfit(file: &ResultFile, finder: &Finder) -> Vec<(SourceFile, Now)> {
     found
 }
 
-/// `--set` arguments that make a plan read the files that the run read, where they are now; none for a stage that finds them from `base`
-/// by itself.
+/// `--set` arguments that make a plan read the files that the run read, where they are now; none for a stage that finds
+/// them from `base` by itself.
 pub fn places(plan: &Plan, file: &ResultFile, base: &Path, finder: &Finder) -> Vec<String> {
     let set = |node: &Node| {
         let record = &file.stage(&node.id)?.record;

@@ -40,7 +40,8 @@ fn wired(source: &Option<String>) -> String {
     source.as_ref().map_or_else(|| "not wired".to_owned(), |source| format!("`{source}`"))
 }
 
-/// A change as JSON: `kind`, `name`, `was` and `is` are always there; `stage` names the stage that it happened in, null: the stage itself.
+/// A change as JSON: `kind`, `name`, `was` and `is` are always there; `stage` names the stage that it happened in,
+/// null: the stage itself.
 pub fn change_json(change: &Change) -> Value {
     let row = |kind: &str, name: Value, was: Value, is: Value| json!({ "kind": kind, "stage": null, "name": name, "was": was, "is": is });
     let file = |file: &Option<OriginFile>| match file {

@@ -13,7 +13,8 @@ pub struct Point {
     pub done: Done,
 }
 
-/// The name of its result file, counted from 0: five digits hold all that a config may have, so that names sort as points do.
+/// The name of its result file, counted from 0: five digits hold all that a config may have, so that names sort as
+/// points do.
 pub fn name(index: usize) -> String {
     format!("point_{:05}", index + 1)
 }

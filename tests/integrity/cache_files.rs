@@ -100,8 +100,8 @@ fn read_all(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     all
 }
 
-/// One mutation of a cache's files, in words. Nobody but who can write the cache seals what was mutated: then what names the result is altered, not its
-/// numbers, since the seal is no signature (SECURITY.md).
+/// One mutation of a cache's files, in words. Nobody but who can write the cache seals what was mutated: then what
+/// names the result is altered, not its numbers, since the seal is no signature (SECURITY.md).
 fn mutate(files: &mut [(PathBuf, Vec<u8>)], random: &mut ChaCha8Rng) -> String {
     let of = |ending: &str, files: &[(PathBuf, Vec<u8>)]| -> Vec<usize> {
         let has = |path: &Path| path.extension().is_some_and(|found| found == ending);

@@ -96,7 +96,8 @@ fn no_file_of_the_corpus_breaks_a_promise() {
     assert!(replayed > ENTRANCES.len());
 }
 
-/// `AFMID_WRITE_SEEDS=1` writes them; otherwise seeds of an old format, which are refused at their first line, would go unnoticed.
+/// `AFMID_WRITE_SEEDS=1` writes them; otherwise seeds of an old format, which are refused at their first line, would go
+/// unnoticed.
 #[test]
 fn seeds_of_own_formats_are_what_the_program_writes() {
     let scratch = tempfile::tempdir().expect("a temporary folder");

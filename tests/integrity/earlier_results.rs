@@ -1,7 +1,7 @@
 //! Results of earlier formats stay readable.
 //!
-//! `earlier/result-2.h5` was written by version 0.1.0 of commit 3e9ec2c from `earlier/simulate.toml` and `earlier/small.toml`: format 2, before stage files
-//! stated what they hold.
+//! `earlier/result-2.h5` was written by version 0.1.0 of commit 3e9ec2c from `earlier/simulate.toml` and
+//! `earlier/small.toml`: format 2, before stage files stated what they hold.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,6 @@
-//! The ways in which bytes of others enter, as functions of bytes: what the fuzz targets call and `corpus.rs` replays (`fuzz/Cargo.toml` has this file as
-//! its library). Each returns whatever the bytes are; it panics where a promise is broken.
+//! The ways in which bytes of others enter, as functions of bytes: what the fuzz targets call and `corpus.rs` replays
+//! (`fuzz/Cargo.toml` has this file as its library). Each returns whatever the bytes are; it panics where a promise is
+//! broken.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -15,7 +15,8 @@ use super::common::{ROOT, afmid, command};
 const MOST_TIME: Duration = Duration::from_secs(5);
 const MOST_BYTES: u64 = 512 << 20;
 
-/// Runs the program and looks at the most memory that it has had, again and again: it is stopped where it passes a limit.
+/// Runs the program and looks at the most memory that it has had, again and again: it is stopped where it passes a
+/// limit.
 fn bounded(folder: &Path, arguments: &[&str]) {
     let mut command = command(folder, arguments);
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("afmid starts");

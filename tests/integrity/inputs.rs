@@ -41,8 +41,8 @@ fn while_running(child: Child, mut meanwhile: impl FnMut()) -> (Option<i32>, Str
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// Runs with a file that `change` and `restore` alternate in until one run has failed, which most do. Whatever each of them kept, the next undisturbed
-/// run finds the truth.
+/// Runs with a file that `change` and `restore` alternate in until one run has failed, which most do. Whatever each of
+/// them kept, the next undisturbed run finds the truth.
 fn disturbed(prepare: impl Fn(&Path), change: impl Fn(&Path), restore: impl Fn(&Path)) {
     let scratch = folder(1, LONG);
     let here = scratch.path();

@@ -54,7 +54,8 @@ fn refused(here: &Path, arguments: &[&str]) -> String {
     message
 }
 
-/// Puts other bytes where something lies, has the command refuse it, and lets it go on when they are gone. Then edits what afmid wrote: it stays, too.
+/// Puts other bytes where something lies, has the command refuse it, and lets it go on when they are gone. Then edits
+/// what afmid wrote: it stays, too.
 fn kept(here: &Path, place: &str, arguments: &[&str]) {
     let path = here.join(place);
     fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");

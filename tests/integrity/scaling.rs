@@ -1,6 +1,7 @@
 //! Work grows in proportion to the number of items.
 //!
-//! Eight times as many items take less than 8^1.5 times as long: work in proportion takes 8 times, that of pairs 64 times. A busy machine gets three tries.
+//! Eight times as many items take less than 8^1.5 times as long: work in proportion takes 8 times, that of pairs 64
+//! times. A busy machine gets three tries.
 
 use std::fs;
 use std::path::Path;

@@ -2,11 +2,14 @@
 //!
 //! Sums and products are the same everywhere: the compiler contracts nothing. Four things are not:
 //!
-//! - which vector units the FFT, linear algebra and loops of this program choose at run time (other orders of summation, fused multiply-add): stated by
-//!   name;
-//! - the C library's functions (`exp`, `sin`, ...), which choose by processor and differ between releases: stated by what they return;
-//! - the build: compiler, target and its features, level of optimisation (what is computed when the program is built may be rounded otherwise), checks;
-//! - where there is no AVX2 with fused multiply-add, products of large matrices are summed in blocks that fit the processor's caches: stated by size.
+//! - which vector units the FFT, linear algebra and loops of this program choose at run time (other orders of
+//!   summation, fused multiply-add): stated by name;
+//! - the C library's functions (`exp`, `sin`, ...), which choose by processor and differ between releases: stated by
+//!   what they return;
+//! - the build: compiler, target and its features, level of optimisation (what is computed when the program is built
+//!   may be rounded otherwise), checks;
+//! - where there is no AVX2 with fused multiply-add, products of large matrices are summed in blocks that fit the
+//!   processor's caches: stated by size.
 //!
 //! Threads, memory and the order in which stages end change nothing (`tests/threads.rs`).
 

@@ -93,8 +93,8 @@ fn describe(decl: &StageDecl, entry: &Entry, path: &[String], kind: &Kind, error
     }
 }
 
-/// The message about a negative number where a count is wanted, with the range that the stage's own check states: it is asked about 0, which
-/// the type allows and the range mostly does not.
+/// The message about a negative number where a count is wanted, with the range that the stage's own check states: it is
+/// asked about 0, which the type allows and the range mostly does not.
 fn ranged(decl: &StageDecl, entry: &Entry, path: &[String], message: &str) -> Option<String> {
     let [name] = path else { return None };
     let negative = message.strip_prefix("invalid value: integer `-").is_some();
@@ -118,7 +118,8 @@ fn ranged(decl: &StageDecl, entry: &Entry, path: &[String], message: &str) -> Op
     Some(format!("{found}, wanted {range}"))
 }
 
-/// All parameters without default that are not given; at least the one that was found missing, if it is none that is wrong.
+/// All parameters without default that are not given; at least the one that was found missing, if it is none that is
+/// wrong.
 fn missing(decl: &StageDecl, entry: &Entry, found: &Kind) -> Vec<Problem> {
     let schema = entry.schema(&mut schemars::SchemaGenerator::default());
     let required = schema.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str);

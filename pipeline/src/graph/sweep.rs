@@ -9,7 +9,8 @@ use super::plan::Plan;
 use crate::config::{Config, Override, Problem, Swept, instantiate, point};
 use crate::stage::Entry;
 
-/// Makes every swept stage with every combination of its own parameters. The first one is the config's and was checked with it.
+/// Makes every swept stage with every combination of its own parameters. The first one is the config's and was checked
+/// with it.
 pub(super) fn check(config: &Config, entries: &[Option<Entry>], problems: &mut Vec<Problem>) {
     if config.sweep.is_empty() {
         return;

@@ -25,8 +25,8 @@ impl Wire {
     }
 }
 
-/// The wires of every stage, in the order of its input ports. What cannot be connected is a problem; nothing is said of stages
-/// that could not be looked up.
+/// The wires of every stage, in the order of its input ports. What cannot be connected is a problem; nothing is said of
+/// stages that could not be looked up.
 pub(super) fn connect(decls: &[StageDecl], entries: &[Option<Entry>], problems: &mut Vec<Problem>) -> Vec<Vec<Wire>> {
     // of two stages with one id, which is reported elsewhere, the first
     let mut places = HashMap::with_capacity(decls.len());

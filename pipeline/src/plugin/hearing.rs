@@ -1,5 +1,5 @@
-//! A conversation without a process: what would be believed of the lines that a plugin says. The door for the fuzz targets and the replay of their
-//! corpus; nothing else calls it.
+//! A conversation without a process: what would be believed of the lines that a plugin says. The door for the fuzz
+//! targets and the replay of their corpus; nothing else calls it.
 
 use std::path::Path;
 
@@ -15,8 +15,8 @@ use crate::outcome::Ports;
 /// The longest line here.
 const MOST_BYTES: usize = 1 << 20;
 
-/// Hears a stream as that of a plugin that was started, asked to describe itself and asked to run once with its defaults; `file` is its output
-/// file. What it made, and its warnings.
+/// Hears a stream as that of a plugin that was started, asked to describe itself and asked to run once with its
+/// defaults; `file` is its output file. What it made, and its warnings.
 ///
 /// Errors: whatever such a plugin would be refused for.
 pub fn hear(stream: &[u8], file: &Path) -> Result<(Ports, Vec<String>), String> {

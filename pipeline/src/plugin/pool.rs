@@ -28,7 +28,8 @@ impl Pool {
         Self { host, ..Self::default() }
     }
 
-    /// A process of this plugin: an idle one, or a new one. Errors: it does not start; its files are no longer the candidate's.
+    /// A process of this plugin: an idle one, or a new one. Errors: it does not start; its files are no longer the
+    /// candidate's.
     pub(super) fn take(&self, candidate: &Candidate) -> Result<Session, PluginError> {
         let mut idle = self.lock();
         if let Some(place) = idle.iter().position(|session| session.candidate == *candidate) {
@@ -43,7 +44,8 @@ impl Pool {
         self.lock().push(session);
     }
 
-    /// Ends all processes that wait. Where it is never called (the program was killed), the end of their input ends them.
+    /// Ends all processes that wait. Where it is never called (the program was killed), the end of their input ends
+    /// them.
     ///
     /// Returned is what is wrong with any: it wrote something that nobody had asked for.
     pub(super) fn shut_down(&self) -> Vec<String> {

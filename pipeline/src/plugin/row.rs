@@ -1,4 +1,5 @@
-//! Rows of the registry that plugins stand behind: those that have described themselves, and those that nobody may ask yet.
+//! Rows of the registry that plugins stand behind: those that have described themselves, and those that nobody may ask
+//! yet.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -132,7 +133,8 @@ impl Maker for NotDescribed {
     }
 }
 
-/// A stage of a plugin that has not described itself, with the parameters that the config gives: it can be shown, and nothing else.
+/// A stage of a plugin that has not described itself, with the parameters that the config gives: it can be shown, and
+/// nothing else.
 struct Unknown {
     row: NotDescribed,
     params: Value,

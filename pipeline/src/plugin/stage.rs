@@ -124,7 +124,8 @@ pub(super) fn run(
     Ok(outputs)
 }
 
-/// What an answer to `run` and the file that goes with it hold, and its warnings. Errors: it is not laid out so, or not as declared.
+/// What an answer to `run` and the file that goes with it hold, and its warnings. Errors: it is not laid out so, or not
+/// as declared.
 pub(super) fn outputs(
     declared: &[PortDescription],
     answer: Value,

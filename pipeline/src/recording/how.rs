@@ -55,7 +55,8 @@ impl Reading {
         [AUTO, NATIVE, HDF5].into_iter().chain(known).chain([RAW]).collect()
     }
 
-    /// Errors: no such format; a description of raw binary without that format, or the other way round; one that is out of its range.
+    /// Errors: no such format; a description of raw binary without that format, or the other way round; one that is out
+    /// of its range.
     pub fn check(&self) -> Result<(), StageError> {
         if !Self::names().contains(&self.format.as_str()) {
             let names = Self::names().join(", ");

@@ -8,9 +8,10 @@ use crate::stage::{Entry, Registry};
 
 /// JSON Schema (draft 7, which all editors know) of a config with these stages.
 ///
-/// Method: `uses` selects the stage by `if`/`then`, so that a wrong parameter is reported at its place and for its stage alone;
-/// the same definitions are listed once more under an `anyOf` that is always true, because editors complete from `anyOf` and don't
-/// look into `then`.
+/// Method: `uses` selects the stage by `if`/`then`, so that a wrong parameter is reported at its place and for its
+/// stage alone;
+/// the same definitions are listed once more under an `anyOf` that is always true, because editors complete from
+/// `anyOf` and don't look into `then`.
 pub fn config_schema(registry: &Registry) -> Value {
     let mut generator = schemars::generate::SchemaSettings::draft07().into_generator();
     let mut stages = Map::new();

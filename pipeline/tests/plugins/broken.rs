@@ -12,7 +12,8 @@ use super::support::{config, execute, plan, python, script};
 const BROKEN: [(&str, &str); 20] = [
     ("accepts_everything", "accepts the parameter `a_parameter_that_nobody_knows`"),
     ("banner", "does not begin with a handshake"),
-    // its line is seen after the answer or in place of the next one, as the machine happens to schedule it: both errors show it
+    // its line is seen after the answer or in place of the next one, as the machine happens to schedule it: both errors
+    // show it
     ("chatty", "done!"),
     ("crash", "ended (exit status: 3) during `run`"),
     ("deaf", "did not end"),

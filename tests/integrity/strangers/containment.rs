@@ -109,8 +109,8 @@ fn wait_until(what: &str, is_so: impl Fn() -> bool) {
     }
 }
 
-/// A plugin that starts a child and a daemon of its own session, writes down all their numbers, and hears neither the end of its input nor any
-/// signal that can be ignored.
+/// A plugin that starts a child and a daemon of its own session, writes down all their numbers, and hears neither the
+/// end of its input nor any signal that can be ignored.
 const DEAF: &str = r#"import signal
 def run(params):
     for name in ("SIGTERM", "SIGHUP", "SIGINT", "SIGPIPE"): signal.signal(getattr(signal, name), signal.SIG_IGN)

@@ -1,16 +1,17 @@
 //! Igor binary waves, `.ibw`: one numeric array with its scaling, units, labels and note.
 //!
 //! Source: WaveMetrics, *Technical Note #003: Igor Binary Format*, as the reader igor2 quotes it (`binarywave.py`,
-//! <https://github.com/AFM-analysis/igor2>); what the checksum covers up to version 3, and Asylum Research's note keys, were
-//! learnt from files. Type codes of 64-bit integers and of reference waves have not been checked against a file.
+//! <https://github.com/AFM-analysis/igor2>); what the checksum covers up to version 3, and Asylum Research's note keys,
+//! were learnt from files. Type codes of 64-bit integers and of reference waves have not been checked against a file.
 //!
-//! - Versions 1, 2, 3 and 5 in both byte orders, every real numeric type. Complex waves are refused; text, wave-reference
-//!   and folder waves are remarked, as is a wave whose samples were not saved because a formula gives them.
-//! - Arrays are stored column by column and rows are time: one channel per column. A column with a label is located by it
-//!   (`/Defl`), others by the wave's name (`/wave0`) and, if there are several columns, an index from 0 that counts columns, then
-//!   layers, then chunks (`/wave0[2]`).
-//! - The row scaling gives the sample rate if its unit is a time. Asylum Research's note gives it (`NumPtsPerSec`), and the
-//!   unit of columns of known names, where the header has none.
+//! - Versions 1, 2, 3 and 5 in both byte orders, every real numeric type. Complex waves are refused; text,
+//!   wave-reference and folder waves are remarked, as is a wave whose samples were not saved because a formula gives
+//!   them.
+//! - Arrays are stored column by column and rows are time: one channel per column. A column with a label is located by
+//!   it (`/Defl`), others by the wave's name (`/wave0`) and, if there are several columns, an index from 0 that counts
+//!   columns, then layers, then chunks (`/wave0[2]`).
+//! - The row scaling gives the sample rate if its unit is a time. Asylum Research's note gives it (`NumPtsPerSec`), and
+//!   the unit of columns of known names, where the header has none.
 //! - Packed experiments, `.pxp`, are refused: they hold many waves, histories and windows.
 
 mod channels;

@@ -1,6 +1,7 @@
 //! `NI_Scale` properties: from stored codes to values.
 //!
-//! Scales are numbered; the last one gives the value. Each names its input: another scale, a DAQmx scaler (a number without a scale type) or the stored value.
+//! Scales are numbered; the last one gives the value. Each names its input: another scale, a DAQmx scaler (a number
+//! without a scale type) or the stored value.
 
 use super::property::Properties;
 
@@ -37,7 +38,8 @@ impl Scaling {
     }
 }
 
-/// The scaling of a channel: its own properties', else its group's, else the file's. Errors: a reason, naming the scale type.
+/// The scaling of a channel: its own properties', else its group's, else the file's. Errors: a reason, naming the scale
+/// type.
 pub(super) fn scaling(owners: [Option<&Properties>; 3]) -> Result<Scaling, String> {
     let identity = Scaling { steps: Vec::new(), scaler: None };
     let scaled = owners.into_iter().flatten().find_map(|p| Some((p, count(p)?)));

@@ -23,7 +23,8 @@ struct Anchor {
 }
 
 impl Timing {
-    /// Takes in what the properties say before `sample` is added. True if the samples from there on do not continue those before.
+    /// Takes in what the properties say before `sample` is added. True if the samples from there on do not continue
+    /// those before.
     pub(super) fn breaks_at(&mut self, sample: usize, properties: &Properties) -> bool {
         let now = Anchor {
             sample,

@@ -1,4 +1,5 @@
-//! JPK force curves, built byte by byte; there are no free real ones. Values are compared with afmformats' reading of the same bytes.
+//! JPK force curves, built byte by byte; there are no free real ones. Values are compared with afmformats' reading of
+//! the same bytes.
 
 use std::io::Write;
 use std::path::Path;
@@ -329,7 +330,8 @@ fn damaged_archives_never_panic() {
     }
 }
 
-/// afmformats 0.18.7: `JPKReader(path).get_data("force", 0, segment)` and `"height (piezo)"`, the same for all three files.
+/// afmformats 0.18.7: `JPKReader(path).get_data("force", 0, segment)` and `"height (piezo)"`, the same for all three
+/// files.
 const AFMFORMATS: [(&str, [f64; 5]); 4] = [
     ("/segments/0/vDeflection/force", FORCE),
     ("/segments/1/vDeflection/force", FORCE),

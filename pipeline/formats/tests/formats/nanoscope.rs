@@ -162,8 +162,9 @@ fn a_header_without_data_is_refused() {
     );
 }
 
-/// Location, sum and samples 0, 1, 255, 511 of the codes. By `struct.unpack("<1024h", ...)` at the header's data offsets 40960 and
-/// 43008, the first 512 turned round; SciFiReaders 0.12.7 (`BrukerAFMReader(path).read()`) gives the same sums and, in stored order, samples.
+/// Location, sum and samples 0, 1, 255, 511 of the codes. By `struct.unpack("<1024h", ...)` at the header's data
+/// offsets 40960 and 43008, the first 512 turned round; SciFiReaders 0.12.7 (`BrukerAFMReader(path).read()`) gives the
+/// same sums and, in stored order, samples.
 const REAL: [(&str, f64, [f64; 4]); 4] = [
     ("/DeflectionError/extend", -10620.0, [-27.0, -26.0, -30.0, 537.0]),
     ("/DeflectionError/retract", -16897.0, [478.0, 423.0, -29.0, -26.0]),
@@ -183,7 +184,8 @@ fn a_real_force_curve_is_as_its_header_says() {
         assert_eq!(codes.iter().sum::<f64>(), sum, "{location}");
         assert_eq!([0, 1, 255, 511].map(|i| codes[i]), samples, "{location}");
         assert_eq!((c.samples, c.unit.as_str(), c.scale_factor, c.stored_as), (512, "V", 0.000375, "int16"));
-        // (512 + 512) samples * 1.02796 ramps per second; the header's `Effective BW: 1052.63` is the same rate to 6 digits
+        // (512 + 512) samples * 1.02796 ramps per second; the header's `Effective BW: 1052.63` is the same rate to 6
+        // digits
         near(c.sample_rate_hz.unwrap(), 1052.63104, 1e-12); // rounding
         near(c.sample_rate_hz.unwrap(), 1052.63, 5e-6);
     }

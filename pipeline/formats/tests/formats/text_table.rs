@@ -14,7 +14,9 @@ fn error(name: &str, bytes: &[u8]) -> FormatError {
 
 type Expected<'a> = (&'a str, &'a str, Option<f64>, usize, f64, f64);
 
-/// Location, unit, rate, samples, sum and first value. The reference: `lvm_read.read(path, read_from_pickle=False, dump_file=False)[0]`, of it `np.nansum(s['data'], axis=0)` and the header.
+/// Location, unit, rate, samples, sum and first value. The reference:
+/// `lvm_read.read(path, read_from_pickle=False, dump_file=False)[0]`, of it `np.nansum(s['data'], axis=0)` and the
+/// header.
 fn real_lvm(name: &str, started_at: &str, channels: &[Expected]) -> Option<Contents> {
     let found = TextTable::open(&real(&format!("lvm/{name}"))?).unwrap();
     assert_eq!(found.started_at, started_at);

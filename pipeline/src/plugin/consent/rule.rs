@@ -8,7 +8,8 @@ use super::Candidate;
 pub enum Rule {
     /// None, whatever was agreed to: what they are is known as far as it is remembered.
     Never,
-    /// Those that are trusted, those with one of these seals, and those that `ask` says yes to: it is asked once of each.
+    /// Those that are trusted, those with one of these seals, and those that `ask` says yes to: it is asked once of
+    /// each.
     Agreed {
         /// See [`Candidate::seal`].
         seals: BTreeSet<String>,

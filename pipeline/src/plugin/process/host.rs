@@ -1,11 +1,14 @@
 //! The process between this program and a plugin: it ends all that the plugin has started, whatever ends this program.
 //!
 //! ```text
-//! program -> PROGRAM __plugin-host PID FOLDER HOW COMMAND... -> PROGRAM __plugin-start PID FOLDER HOW COMMAND... = the plugin
+//! program
+//!     -> PROGRAM __plugin-host PID FOLDER HOW COMMAND...
+//!     -> PROGRAM __plugin-start PID FOLDER HOW COMMAND... = the plugin
 //! ```
 //!
-//! The host adopts what the plugin's processes leave behind, waits for the end of the plugin and for that of the program, kills what is left, and removes
-//! the folder of the exchange where the program no longer can. The last step lets the plugin die with its host, confines it, and becomes the plugin.
+//! The host adopts what the plugin's processes leave behind, waits for the end of the plugin and for that of the
+//! program, kills what is left, and removes the folder of the exchange where the program no longer can. The last step
+//! lets the plugin die with its host, confines it, and becomes the plugin.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -60,7 +63,8 @@ impl Host {
     }
 }
 
-/// What `main` of a program does first: if it was started to host a plugin it does that, and the exit code is returned. Otherwise nothing.
+/// What `main` of a program does first: if it was started to host a plugin it does that, and the exit code is returned.
+/// Otherwise nothing.
 pub fn host_main() -> Option<ExitCode> {
     let mut arguments = std::env::args_os().skip(1);
     let what = arguments.next()?;

@@ -92,7 +92,8 @@ impl Tail {
     }
 }
 
-/// Reading shall say that there is nothing instead of waiting; the writer's end is a file of its own and is not touched.
+/// Reading shall say that there is nothing instead of waiting; the writer's end is a file of its own and is not
+/// touched.
 fn never_wait(stream: &File) -> std::io::Result<()> {
     let flags = rustix::fs::fcntl_getfl(stream)?;
     Ok(rustix::fs::fcntl_setfl(stream, flags | rustix::fs::OFlags::NONBLOCK)?)

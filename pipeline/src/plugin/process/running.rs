@@ -16,7 +16,8 @@ use crate::plugin::launch::Launch;
 /// How long a process may take to end after it was asked to.
 const GRACE: Duration = Duration::from_secs(3);
 
-/// Lines that wait to be read, each of at most [`MOST_BYTES`]; beside them one that is being read. A plugin that says more waits until it is heard.
+/// Lines that wait to be read, each of at most [`MOST_BYTES`]; beside them one that is being read. A plugin that says
+/// more waits until it is heard.
 const MOST_LINES: usize = 1;
 
 /// A running plugin. Dropping it ends the process and everything that it started in its group.
@@ -31,7 +32,8 @@ pub(in crate::plugin) struct Process {
 }
 
 impl Process {
-    /// Starts it in a process group of its own, under a host if there is one; `folder` is that of the exchange. Errors: the system refuses.
+    /// Starts it in a process group of its own, under a host if there is one; `folder` is that of the exchange. Errors:
+    /// the system refuses.
     pub(in crate::plugin) fn start(
         launch: &Launch,
         host: Option<&Host>,
@@ -65,7 +67,8 @@ impl Process {
                 return Err(failed(error));
             }
         };
-        // one thread per pipe: a plugin that does not read, or that fills stderr, blocks a thread of its own and nothing else
+        // one thread per pipe: a plugin that does not read, or that fills stderr, blocks a thread of its own and
+        // nothing else
         let threads = [
             spawn("stdin", move || {
                 let Some(mut input) = input else { return };

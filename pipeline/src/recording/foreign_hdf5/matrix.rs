@@ -105,7 +105,8 @@ impl Lane {
         Self { matrix: Arc::clone(matrix), first, step, samples }
     }
 
-    /// Read straight from the file where the numbers lie in one stretch, else through the library. Errors: outside of the file.
+    /// Read straight from the file where the numbers lie in one stretch, else through the library. Errors: outside of
+    /// the file.
     pub(super) fn source(self) -> Result<Arc<dyn Source>, StageError> {
         let matrix = &self.matrix;
         let Some(offset) = matrix.offset else { return Ok(Arc::new(self)) };

@@ -46,8 +46,8 @@ impl Numbers {
         };
     }
 
-    /// Largest difference relative to the largest magnitude of all: what rounding leaves of numbers that are differences of large ones does
-    /// not count more than it does for those.
+    /// Largest difference relative to the largest magnitude of all: what rounding leaves of numbers that are
+    /// differences of large ones does not count more than it does for those.
     pub fn relative_to_scale(&self) -> f64 {
         match (self.largest, self.scale) {
             (0.0, _) => 0.0,
