@@ -17,7 +17,8 @@ struct UnequalSegments;
 
 const ABOUT: About = About {
     id: "unequal-segments",
-    physics: "the amplifiers of the photodiode's two segments differ in gain, so that the slope changes where the spot crosses their gap",
+    physics: "the amplifiers of the photodiode's two segments differ in gain, so that the slope changes where the spot \
+        crosses their gap",
     part: Part::Detector,
     domain: Domain::Release,
     parameters: &[Parameter {

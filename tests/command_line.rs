@@ -112,7 +112,8 @@ fn archive(folder: &Path) {
         write_native(&path, &record, RecordStorage::Raw).expect("a record");
     }
     let config = "[pipeline]\nname = \"count\"\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
-        params = { files = [\"record_*.h5\"] }\n[[stage]]\nid = \"census\"\nuses = \"io.census\"\ninputs = { records = \"records\" }\n";
+        params = { files = [\"record_*.h5\"] }\n[[stage]]\nid = \"census\"\nuses = \"io.census\"\n\
+        inputs = { records = \"records\" }\n";
     std::fs::write(folder.join("count.toml"), config).expect("a config");
 }
 

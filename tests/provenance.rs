@@ -47,7 +47,8 @@ fn record(path: &Path, number: i16) {
 }
 
 const COUNT: &str = "[pipeline]\nname = \"count\"\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
-    params = { files = [\"data/*.h5\"] }\n[[stage]]\nid = \"census\"\nuses = \"io.census\"\ninputs = { records = \"records\" }\n";
+    params = { files = [\"data/*.h5\"] }\n[[stage]]\nid = \"census\"\nuses = \"io.census\"\n\
+    inputs = { records = \"records\" }\n";
 
 /// Three records in `data`, a config that counts their samples, and its result `a.h5`.
 fn counted() -> tempfile::TempDir {

@@ -89,7 +89,8 @@ mod tests {
 
     #[test]
     fn a_line_is_a_data_set() {
-        let text = "{\"name\": \"a\", \"files\": [\"/x/*.h5\"]}\n\n{\"name\": \"b\", \"files\": [\"/y\"], \"set\": {\"fit.order\": 9, \"r.f\": \"x\"}}";
+        let text = "{\"name\": \"a\", \"files\": [\"/x/*.h5\"]}\n\n\
+            {\"name\": \"b\", \"files\": [\"/y\"], \"set\": {\"fit.order\": 9, \"r.f\": \"x\"}}";
         let sets = read("m.jsonl", text).unwrap();
         assert_eq!(sets[0], DataSet { name: "a".into(), files: vec!["/x/*.h5".into()], set: vec![] });
         assert_eq!(sets[1].set, ["fit.order=9", "r.f=\"x\""]);

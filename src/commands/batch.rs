@@ -45,7 +45,11 @@ pub fn run(args: &BatchArgs, stages: &dyn Stages) -> Result<(), Failure> {
         0 => Ok(()),
         failed => Err(Failure::Partly(Message::Line(
             format!("{failed} of {} data sets failed", entries.len()),
-            Some("what is wrong with each stands above and in `ledger`; those that changed are run by the next batch, the others with --retry-failed".to_owned()),
+            Some(
+                "what is wrong with each stands above and in `ledger`; those that changed are run by the next batch, \
+                the others with --retry-failed"
+                    .to_owned(),
+            ),
         ))),
     }
 }

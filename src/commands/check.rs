@@ -55,7 +55,13 @@ fn run_as_json(configs: &[PathBuf], stages: &dyn Stages) -> Result<(), Failure> 
             Err(problems) => {
                 let more = problems.len().saturating_sub(MOST_PROBLEMS);
                 let listed: Vec<Value> = problems.iter().take(MOST_PROBLEMS).map(|one| problem(&text, one)).collect();
-                json!({ "config": config.display().to_string(), "right": false, "ports_not_checked": [], "problems": listed, "more_problems": more })
+                json!({
+                    "config": config.display().to_string(),
+                    "right": false,
+                    "ports_not_checked": [],
+                    "problems": listed,
+                    "more_problems": more,
+                })
             }
         });
     }

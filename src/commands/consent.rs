@@ -49,7 +49,10 @@ pub fn end(plugins: &Plugins) -> Result<(), Failure> {
     if wrong.is_empty() {
         return Ok(());
     }
-    let help = "stdout of a plugin is for the protocol alone: mend it, what it made may be wrong; `afmid plugin check` tries it".to_owned();
+    let help =
+        "stdout of a plugin is for the protocol alone: mend it, what it made may be wrong; `afmid plugin check` \
+        tries it"
+            .to_owned();
     Err(Failure::failed(wrong.join("; "), Some(help)))
 }
 
@@ -65,7 +68,8 @@ pub fn agreed(allow: &AllowArgs, config: &Config) -> Result<Vec<Candidate>, Fail
             let message = format!("the plugin `{}` is not agreed to:", candidate.name());
             let list = listing(candidate).lines().map(str::to_owned).collect();
             let help = format!(
-                "`afmid trust {}` lists what its plugins would run, and remembers that you agree; `--allow-plugins` allows it for this submission",
+                "`afmid trust {}` lists what its plugins would run, and remembers that you agree; `--allow-plugins` \
+                 allows it for this submission",
                 quoted(&config.file)
             );
             Err(Failure::Usage(Message::Listed(message, list, Some(help))))

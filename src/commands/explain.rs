@@ -45,7 +45,8 @@ fn unseen(plan: &Plan) -> String {
 }
 
 /// What keys of plugins do not see.
-const UNSEEN: &str = "the key holds its program, all arguments, the variables of [plugins] and the files among them; what these import is not seen";
+const UNSEEN: &str = "the key holds its program, all arguments, the variables of [plugins] and the files among them; \
+    what these import is not seen";
 
 fn is_plugin(uses: &str) -> bool {
     uses.starts_with("exec:")

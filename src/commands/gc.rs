@@ -71,7 +71,8 @@ fn advice((count, bytes): (usize, u64)) -> String {
     match count {
         0 => format!("every result was used within {IDLE_DAYS} days; `--max-size 20G` bounds the whole\n"),
         _ => format!(
-            "{} not used for {IDLE_DAYS} days: `--older-than {IDLE_DAYS}d` frees them; `--max-size 20G` bounds the whole\n",
+            "{} not used for {IDLE_DAYS} days: `--older-than {IDLE_DAYS}d` frees them; `--max-size 20G` bounds the \
+             whole\n",
             counted(count, "result", bytes)
         ),
     }

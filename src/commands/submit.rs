@@ -134,7 +134,8 @@ fn send(here: &Path) -> Result<Sent, Failure> {
         Ok(collect) => Ok(Sent { array, collect }),
         Err(failure) => {
             say(&format!(
-                "the shards are sent, job {array}, the collecting job is not: `afmid batch ... --collect` when they have ended, or `scancel {array}`\n"
+                "the shards are sent, job {array}, the collecting job is not: `afmid batch ... --collect` when they \
+                 have ended, or `scancel {array}`\n"
             ));
             Err(failure)
         }

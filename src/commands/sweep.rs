@@ -127,7 +127,8 @@ impl Outcome<'_> {
         }
         let (count, ran, (stages, reused)) = (self.points.len(), self.ran(), self.stages());
         text.push_str(&format!(
-            "{}: {count} point{} in {:.2} s, {ran} run ({stages} stages, {reused} reused), {} as they were, {} failed\n",
+            "{}: {count} point{} in {:.2} s, {ran} run ({stages} stages, {reused} reused), {} as they were, {} \
+             failed\n",
             printable::shown(self.folder),
             if count == 1 { "" } else { "s" },
             clock.elapsed().as_secs_f64(),

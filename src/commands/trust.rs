@@ -141,7 +141,8 @@ impl Row {
                 };
                 let (name, version, summary) = (one_line(name), one_line(&version.to_string()), one_line(summary));
                 format!(
-                    "  is    {name} {version}: {summary}\n  takes {}\n  makes {}\ntrusted, as long as nothing of this changes; what its files import is not seen\n",
+                    "  is    {name} {version}: {summary}\n  takes {}\n  makes {}\n\
+                     trusted, as long as nothing of this changes; what its files import is not seen\n",
                     list(inputs),
                     list(outputs)
                 )

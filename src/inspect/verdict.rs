@@ -75,21 +75,23 @@ fn of_channel(channel: &Channel) -> (Answer, String) {
         Some(rate) if rate < LEAST_RATE_HZ => (
             Answer::No,
             format!(
-                "{rate} samples per second, wanted at least {LEAST_RATE_HZ}: a lever rings at 10 kHz and more. At this rate a ring of up to {} Hz \
-                 could be sampled: if the resonator is that slow, set `min_sample_rate_hz`",
+                "{rate} samples per second, wanted at least {LEAST_RATE_HZ}: a lever rings at 10 kHz and more. At this \
+                 rate a ring of up to {} Hz could be sampled: if the resonator is that slow, set `min_sample_rate_hz`",
                 rate / PERIOD_SAMPLES
             ),
         ),
         Some(rate) if channel.values.is_none() => (
             Answer::Unknown,
             format!(
-                "{rate} samples per second, {longest} samples without interruption; not read, the file has too many channels"
+                "{rate} samples per second, {longest} samples without interruption; not read, the file has too many \
+                 channels"
             ),
         ),
         Some(rate) => (
             Answer::Yes,
             format!(
-                "{rate} samples per second, {longest} samples without interruption: enough for a lever's first mode of up to {} Hz",
+                "{rate} samples per second, {longest} samples without interruption: enough for a lever's first mode of \
+                 up to {} Hz",
                 rate / PERIOD_SAMPLES
             ),
         ),

@@ -48,7 +48,8 @@ fn manifest(name: &str, sources: &Path) -> String {
         "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[workspace]\n\n[dependencies]\n\
          # the command line and the built-in stages\nafmid = {{ path = {} }}\n\
          # what a stage is\nafmid-pipeline = {{ path = {} }}\n\
-         # parameters and documents\nschemars = \"1.2\"\nserde = {{ version = \"1\", features = [\"derive\"] }}\nserde_json = \"1\"\n",
+         # parameters and documents\nschemars = \"1.2\"\nserde = {{ version = \"1\", features = [\"derive\"] }}\n\
+         serde_json = \"1\"\n",
         path(""),
         path("pipeline"),
     )

@@ -127,7 +127,8 @@ fn a_full_cache_warns_once_and_windows_go_elsewhere() {
     // ten windows of 1 MB: more than stay in memory
     let archive = simulated(place.folder(), "archive", 10, 3);
     let text = format!(
-        "[pipeline]\nname = \"windows\"\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\nparams = {{ files = [\"{}/*.h5\"] }}\n\
+        "[pipeline]\nname = \"windows\"\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
+         params = {{ files = [\"{}/*.h5\"] }}\n\
          [[stage]]\nid = \"events\"\nuses = \"events.correlation\"\ninputs = {{ records = \"records\" }}\n\
          params = {{ kind = \"snap-off\", window_samples = 131072 }}\n",
         archive.folder.display()

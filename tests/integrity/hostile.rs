@@ -103,7 +103,8 @@ fn result(folder: &Path) -> Vec<u8> {
     let long: String =
         (0..30_000).map(|line| format!("# a comment that is as long as thirty thousand lines: {line}\n")).collect();
     let config = format!(
-        "[pipeline]\nname = \"a\"\nseed = 1\n\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\nparams = {{ file = \"data.csv\", sample_rate_hz = 1.0 }}\n{long}"
+        "[pipeline]\nname = \"a\"\nseed = 1\n\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\n\
+         params = {{ file = \"data.csv\", sample_rate_hz = 1.0 }}\n{long}"
     );
     fs::write(folder.join("a.toml"), config).expect("a config is written");
     let mut arguments = vec!["run", "a.toml", "-o", "a.h5", "--cache", "cache"];

@@ -34,7 +34,8 @@ fn what_is_no_regular_file_is_refused_before_it_is_opened() {
     fs::write(folder.path().join("data.toml"), "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\nparams = { files = [\"x.h5\"] }\n").expect("a config");
     for odd in ["fifo", "socket", "link", "/dev/zero"] {
         let columns = format!(
-            "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\nparams = {{ file = {odd:?}, sample_rate_hz = 1.0 }}\n"
+            "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\n\
+             params = {{ file = {odd:?}, sample_rate_hz = 1.0 }}\n"
         );
         fs::write(folder.path().join("columns.toml"), columns).expect("a config");
         let commands: &[&[&str]] = &[
@@ -83,7 +84,8 @@ fn a_ledger_entry_that_is_a_fifo_is_no_entry() {
 #[test]
 fn a_config_has_at_most_8_mib() {
     let folder = tempfile::tempdir().expect("a folder");
-    let head = "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"a\"\nuses = \"io.columns\"\nparams = { file = \"x\" }\n# ";
+    let head = "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"a\"\nuses = \"io.columns\"\n\
+        params = { file = \"x\" }\n# ";
     let with = |bytes: usize| {
         fs::write(folder.path().join("a.toml"), head.to_owned() + &"x".repeat(bytes - head.len())).expect("a config");
         let Output { status, stderr, .. } = ends(folder.path(), &["check", "a.toml"]);

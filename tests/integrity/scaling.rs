@@ -73,7 +73,8 @@ fn stages_of_a_config_right_and_wrong() {
     in_proportion("right stages", &check, |folder, count| {
         let stage = |n| {
             format!(
-                "[[stage]]\nid = \"c{n}\"\nuses = \"io.census\"\ninputs = {{ records = \"r{n}.records\" }}\n[[stage]]\nid = \"r{n}\"\nuses = \"io.records\"\nparams = {{ files = [\"x\"] }}\n"
+                "[[stage]]\nid = \"c{n}\"\nuses = \"io.census\"\ninputs = {{ records = \"r{n}.records\" }}\n[[stage]]\n\
+                 id = \"r{n}\"\nuses = \"io.records\"\nparams = {{ files = [\"x\"] }}\n"
             )
         };
         write(folder, (0..count / 2).map(stage).collect());

@@ -65,13 +65,15 @@ impl Packed {
         }
         if inflated_bytes > packed_bytes.saturating_mul(MOST_FOR_ONE_BYTE) {
             let problem = format!(
-                "{inflated_bytes} bytes cannot come from {packed_bytes} compressed ones, {MOST_FOR_ONE_BYTE} from each are possible"
+                "{inflated_bytes} bytes cannot come from {packed_bytes} compressed ones, {MOST_FOR_ONE_BYTE} from each \
+                 are possible"
             );
             return Err(fail::at(at, problem, fail::COPY_AGAIN));
         }
         if !file.may_inflate(inflated_bytes) {
             let problem = format!(
-                "{inflated_bytes} bytes would come from {packed_bytes} compressed ones; all compressed data of a file of {} bytes may come to {}",
+                "{inflated_bytes} bytes would come from {packed_bytes} compressed ones; all compressed data of a file \
+                 of {} bytes may come to {}",
                 file.bytes(),
                 most_inflated(file.bytes())
             );

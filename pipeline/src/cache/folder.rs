@@ -157,8 +157,8 @@ impl Cache {
         if !std::mem::replace(&mut notes.unkept, true) {
             let folder = self.folder.display();
             notes.texts.push(format!(
-                "the cache {folder} cannot be written, the next run computes again what this one does not keep: {error}\n  \
-                 help: make room or choose another with --cache"
+                "the cache {folder} cannot be written, the next run computes again what this one does not keep: \
+                 {error}\n  help: make room or choose another with --cache"
             ));
         }
     }

@@ -355,7 +355,8 @@ pub(crate) fn check_samples(dataset: &Dataset, bytes_per_value: usize, allowance
             let shape = dataset.get_shape()?;
             let most = most_inflated(file_bytes);
             Err(StoreError::new(format!(
-                "claims the shape {shape:?} in a file of {file_bytes} bytes, wanted at most {most} bytes of samples: damaged"
+                "claims the shape {shape:?} in a file of {file_bytes} bytes, wanted at most {most} bytes of samples: \
+                 damaged"
             )))
         }
     }

@@ -20,7 +20,8 @@ use crate::recording::InputFiles;
 use crate::stage::{Caching, Context, DynStage, Entry, Example, Maker, ParamError, Spec};
 
 /// What to do about a plugin that nobody has agreed to.
-pub(super) const CONSENT: &str = "`afmid trust CONFIG` lists what it would run, and remembers that you agree; `--allow-plugins` allows it for one command";
+pub(super) const CONSENT: &str = "`afmid trust CONFIG` lists what it would run, and remembers that you agree; \
+    `--allow-plugins` allows it for one command";
 
 /// A plugin with its command: what makes its stages.
 #[derive(Debug)]

@@ -64,11 +64,13 @@ fn an_interrupted_recording_is_one_record_per_stretch() {
     let folder = Folder::new("gaps");
     let section = |time: &str, values: &str| {
         format!(
-            "Channels\t1\t\nSamples\t2\t\nDate\t2020/01/01\t\nTime\t{time}\t\nY_Unit_Label\tV\t\nDelta_X\t0.5\t\nX0\t0\t\n\
+            "Channels\t1\t\nSamples\t2\t\nDate\t2020/01/01\t\nTime\t{time}\t\nY_Unit_Label\tV\t\nDelta_X\t0.5\t\n\
+             X0\t0\t\n\
              ***End_of_Header***\t\t\nX_Value\tdeflection\tComment\n{values}\n"
         )
     };
-    let head = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\nMulti_Headings\tYes\nX_Columns\tNo\n\
+    let head = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\nMulti_Headings\tYes\n\
+        X_Columns\tNo\n\
                 ***End_of_Header***\t\n\n";
     let text = [
         head.to_owned(),

@@ -41,8 +41,8 @@ fn figure(run: &RunResult, kind: EventKind, id: &str, title: &str) -> Option<Fig
         all::<afmid_pipeline::StateSpace>(run).map(|found| found.value.sample_time_s).find(|t| *t > 0.0);
     let mut panels = vec![(1.0, whole(&poles, &zeros))];
     panels.extend(strip(&poles, &zeros, sample_time_s).map(|panel| (1.15, panel)));
-    let caption = "Weakly damped poles and zeros, close to the unit circle, belong to the lever; the others to detector and electronics. \
-                   The strip enlarges the distance from the circle, as far as the lever's poles \
+    let caption = "Weakly damped poles and zeros, close to the unit circle, belong to the lever; the others to \
+        detector and electronics. The strip enlarges the distance from the circle, as far as the lever's poles \
                    lie; bars: one standard error.";
     Some(Figure::new(id, title, caption).row(Row { height: 400.0, panels }))
 }

@@ -49,7 +49,8 @@ fn nothing_starts_before_consent_and_the_error_says_how_to_give_it() {
     fs::create_dir(project.folder().join("set")).expect("a folder");
     project.put("set/a.h5", "");
     let records = format!(
-        "{CONFIG}[[stage]]\nid = \"records\"\nuses = \"io.records\"\nparams = {{ files = [\"set/*.h5\"], channel = \"/d\" }}\n"
+        "{CONFIG}[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
+         params = {{ files = [\"set/*.h5\"], channel = \"/d\" }}\n"
     );
     project.put("b.toml", &records);
     project.stdout(&["run", "c.toml", "--allow-plugins", "-o", "r.h5"]);
@@ -125,7 +126,8 @@ fn on_a_terminal_a_question_lists_what_would_run_and_only_yes_is_yes() {
 fn ports_are_checked_after_consent_and_without_starting_anything() {
     let project = Project::new("");
     let wrong = CONFIG.to_owned()
-        + "params = { gian = 2 }\n[[stage]]\nid = \"two\"\nuses = \"exec:mine\"\ninputs = { table = \"one.nothing\" }\n";
+        + "params = { gian = 2 }\n[[stage]]\nid = \"two\"\nuses = \"exec:mine\"\n\
+            inputs = { table = \"one.nothing\" }\n";
     project.put("wrong.toml", &wrong);
     let before = project.stdout(&["check", "wrong.toml"]);
     assert!(before.contains("ports not checked") && before.contains("one") && before.contains("two"), "{before}");
@@ -256,7 +258,8 @@ fn jobs_of_a_submission_get_the_plugins_that_were_agreed_to_and_no_others() {
     fs::create_dir(project.folder().join("set")).expect("a folder");
     project.put("set/a.h5", "no record");
     let records = format!(
-        "{CONFIG}[[stage]]\nid = \"records\"\nuses = \"io.records\"\nparams = {{ files = [\"set/*.h5\"], channel = \"/d\" }}\n"
+        "{CONFIG}[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
+         params = {{ files = [\"set/*.h5\"], channel = \"/d\" }}\n"
     );
     project.put("b.toml", &records);
     let submit = ["submit", "slurm", "b.toml", "set", "--shards", "1", "-o", "jobs"];

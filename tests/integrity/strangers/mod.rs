@@ -53,7 +53,8 @@ for line in sys.stdin:
 "#;
 
 /// A config that runs the plugin of a project.
-pub const CONFIG: &str = "[pipeline]\nname = \"strange\"\n[plugins]\nmine = \"python3 mine.py\"\n[[stage]]\nid = \"one\"\nuses = \"exec:mine\"\n";
+pub const CONFIG: &str = "[pipeline]\nname = \"strange\"\n[plugins]\nmine = \"python3 mine.py\"\n[[stage]]\n\
+    id = \"one\"\nuses = \"exec:mine\"\n";
 
 /// A project that somebody sent, and folders of the user's own.
 pub struct Project {

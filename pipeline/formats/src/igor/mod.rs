@@ -54,7 +54,8 @@ impl Format for IgorWave {
         let mut remarks = Vec::new();
         if header.checksum != 0 {
             remarks.push(format!(
-                "the header's checksum is {} instead of 0: it may be damaged, compare the channel's values with what you expect",
+                "the header's checksum is {} instead of 0: it may be damaged, compare the channel's values with what \
+                 you expect",
                 header.checksum
             ));
         }
@@ -92,6 +93,7 @@ fn packed_experiment() -> FormatError {
     fail::at(
         0,
         "found an Igor packed experiment, wanted a single binary wave",
-        "open it in Igor Pro and export each wave: Data > Save Waves > Save Igor Binary (or `Save/C wave0` on the command line), then name the .ibw file",
+        "open it in Igor Pro and export each wave: Data > Save Waves > Save Igor Binary (or `Save/C wave0` on the \
+         command line), then name the .ibw file",
     )
 }

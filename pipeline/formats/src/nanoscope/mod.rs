@@ -92,7 +92,8 @@ fn refuse_images(header: &Header) -> FormatError {
     fail::at(
         image.at,
         format!(
-            "found {} images of {} samples a line at {} lines per second, wanted force curves: pixels are averages along a scan, no transients",
+            "found {} images of {} samples a line at {} lines per second, wanted force curves: pixels are averages \
+             along a scan, no transients",
             images.len(),
             of("Samps/line"),
             of("Scan rate")

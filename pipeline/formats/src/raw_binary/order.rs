@@ -148,7 +148,8 @@ fn refusal(grid: &Grid, declared: Look, other: Look) -> FormatError {
         format!("roughness {roughness}{wild}")
     };
     let problem = format!(
-        "the samples make no sense in {said}-endian order ({}) and do in {right}-endian order ({}); white noise has roughness 6",
+        "the samples make no sense in {said}-endian order ({}) and do in {right}-endian order ({}); white noise has \
+         roughness 6",
         shown(declared),
         shown(other)
     );

@@ -77,7 +77,8 @@ fn step(properties: &Properties, scale: u32, kind: &str) -> Result<Vec<f64>, Str
             (0..size).map(|power| number(&format!("Coefficients[{power}]"))).collect()
         }
         other => Err(format!(
-            "its scale {scale} is of type {other}; Linear and Polynomial scales can be applied: export it scaled from LabVIEW"
+            "its scale {scale} is of type {other}; Linear and Polynomial scales can be applied: export it scaled from \
+             LabVIEW"
         )),
     }
 }

@@ -26,7 +26,9 @@ fn file(force: &str, list: &str, data: &[u8]) -> Vec<u8> {
 }
 
 const FORCE: &str = "\\Scan rate: 2\r\n\\Forward vel.: 30\r\n\\Reverse vel.: 10\r\n";
-const LIST: &str = "\\Bytes/pixel: 2\r\n\\Samps/line: 3 2\r\n\\Spring Constant: 0.5\r\n\\@4:Image Data: S [DeflectionError] \"Deflection Error\"\r\n\\@4:Z scale: V [Sens. DeflSens] (0.0003750000 V/LSB) 2.5 V\r\n";
+const LIST: &str = "\\Bytes/pixel: 2\r\n\\Samps/line: 3 2\r\n\\Spring Constant: 0.5\r\n\
+    \\@4:Image Data: S [DeflectionError] \"Deflection Error\"\r\n\
+    \\@4:Z scale: V [Sens. DeflSens] (0.0003750000 V/LSB) 2.5 V\r\n";
 
 fn words(values: &[i16]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
@@ -133,7 +135,8 @@ fn what_is_no_force_curve_is_refused_with_a_reason() {
     assert!(refusal(&sound[..400]).problem.contains("no `\\*File list end`"));
     assert!(refusal(b"?*File list").problem.contains("found `?*File list`"));
     assert!(refusal(b"").problem.contains("found ``"));
-    let image = "\\*File list\n\\*Ciao image list\n\\Data offset: 4\n\\Data length: 2\n\\Samps/line: 512\n\\Scan Rate: 0.98\n\\*File list end\n";
+    let image = "\\*File list\n\\*Ciao image list\n\\Data offset: 4\n\\Data length: 2\n\\Samps/line: 512\n\
+        \\Scan Rate: 0.98\n\\*File list end\n";
     let image = refusal(image.as_bytes());
     assert!(image.problem.contains("1 images of 512 samples a line at 0.98 lines per second") && image.help.is_some());
     assert!(

@@ -93,7 +93,8 @@ fn lvm_with_empty_fields() {
     }
 }
 
-const LVM_HEAD: &str = "LabVIEW Measurement\t\r\nWriter_Version\t2\r\nSeparator\tTab\r\nDecimal_Separator\t.\r\nMulti_Headings\tYes\r\nX_Columns\tNo\r\n***End_of_Header***\t\r\n\r\n";
+const LVM_HEAD: &str = "LabVIEW Measurement\t\r\nWriter_Version\t2\r\nSeparator\tTab\r\nDecimal_Separator\t.\r\n\
+    Multi_Headings\tYes\r\nX_Columns\tNo\r\n***End_of_Header***\t\r\n\r\n";
 
 fn section(time: &str, x0: &str, rows: &str) -> String {
     let head = format!("Channels\t2\t\t\nSamples\t2\t2\t\nDate\t2020/01/01\t2020/01/01\t\nTime\t{time}\t{time}\t\n");

@@ -56,7 +56,8 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
                 remarks.push(format!("{} is the single number {value}, no channel", found.location));
             }
             Ok(Variable::Series(series)) if bytes.saturating_add(series.bytes()) > most_bytes => remarks.push(format!(
-                "{} is left out: with it the samples come to more than {most_bytes} bytes, the most that is read of a file of {}",
+                "{} is left out: with it the samples come to more than {most_bytes} bytes, the most that is read of a \
+                 file of {}",
                 found.location,
                 hashed.state.size()
             )),
