@@ -26,3 +26,4 @@ mod seeds;
 mod small;
 mod strangers;
 mod terminal;
+mod words;
