@@ -1,6 +1,7 @@
 //! The estimators beside the main job's: `cargo bench --bench estimators`.
 //!
-//! Inputs are noisy releases of the paper's lever in closed form, as in `kernels`; noise is white where nothing else is said. Results in docs/performance.md.
+//! Inputs are noisy releases of the paper's lever in closed form, as in `kernels`; noise is white where nothing else is
+//! said. Results in docs/performance.md.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -64,10 +65,10 @@ fn ringdowns(criterion: &mut Criterion) {
     group.sampling_mode(SamplingMode::Flat);
     for events in [1, 24, 84] {
         let data: Vec<Vec<f64>> = (0..events).map(|event| ringing(NOISE_V, event as u64)).collect();
-        let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
+        let borrowed: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
         let options = RingdownOptions::default();
         group.bench_function(BenchmarkId::new("events", events), |bench| {
-            bench.iter(|| fit_ringdowns(black_box(&lent), &[], INTERVAL_S, &options).expect("a fit"))
+            bench.iter(|| fit_ringdowns(black_box(&borrowed), &[], INTERVAL_S, &options).expect("a fit"))
         });
     }
     group.finish();
@@ -113,7 +114,8 @@ fn starts(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The grey modal form: four modes, one real pole, delay and feedthrough, from subspace estimates and from modes that are known nearly.
+/// The grey modal form: four modes, one real pole, delay and feedthrough, from subspace estimates and from modes that
+/// are known nearly.
 fn grey(criterion: &mut Criterion) {
     let (u, y) = (force(WINDOW, WINDOW / 8), release(WINDOW, WINDOW as f64 / 8.0 + 0.3, MEAN_NOISE_V, 7));
     let near = vec![[46.31e3, 41.0], [247.5e3, 190.0], [581.0e3, 350.0], [1051.0e3, 500.0]];
@@ -187,7 +189,7 @@ fn frequency_response(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// 200 means of 24 events drawn anew, with one `fit_decay` each.
+/// 200 means of 24 events drawn with replacement, with one `fit_decay` each.
 fn resampling(criterion: &mut Criterion) {
     let events: Vec<Vec<f64>> = (0..24).map(|event| ringing(NOISE_V, event)).collect();
     let statistic = |drawn: &[usize]| -> Result<Vec<f64>, ModelError> {

@@ -1,7 +1,8 @@
 //! The whole lean main job, cold: `cargo bench --bench free_lever`.
 //!
-//! `configs/free-lever.toml` on the archive lever-a (24 records of 0.9 MS, gzip) with an empty cache each time, all intermediates stored and
-//! synced; where lever-a is not there, on 24 simulated records, and the name of the benchmark says so.
+//! `configs/free-lever.toml` on the archive lever-a (24 records of 0.9 MS, gzip) with an empty cache each time, all
+//! intermediates stored and synced; where lever-a is not there, on 24 simulated records, and the name of the benchmark
+//! says so.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -1,6 +1,7 @@
 //! The kernels that the main job spends its time in, each at three sizes: `cargo bench --bench kernels`.
 //!
-//! Inputs are noisy releases of the paper's lever in closed form. What a size means is said at each bench; results in docs/performance.md.
+//! Inputs are noisy releases of the paper's lever in closed form. What a size means is said at each bench; results in
+//! docs/performance.md.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -50,7 +51,8 @@ fn cross_correlation(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Iterative correlation averaging of an ensemble with the stage's settings; events lie up to five samples from their place.
+/// Iterative correlation averaging of an ensemble with the stage's settings; events lie up to five samples from their
+/// place.
 fn alignment(criterion: &mut Criterion) {
     let settings = AveragingSettings {
         correlation_samples: 256,
@@ -94,7 +96,7 @@ fn averaging(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The ETFE of a mean response, from differences as in configs/free-lever.toml; its plan is made anew in each call.
+/// The ETFE of a mean response, from differences as in configs/free-lever.toml; its plan is made in each call.
 fn transfer_function(criterion: &mut Criterion) {
     let settings = EtfeSettings {
         sample_rate_hz: SAMPLE_RATE_HZ,

@@ -1,4 +1,5 @@
-//! What a stage in another language costs beside its own work: an array there and back, in a process that is already running.
+//! What a stage in another language costs beside its own work: an array there and back, in a process that is already
+//! running.
 //! `with_echo` less `without` less `echo_alone`, which is the plugin's own reading, writing and answering.
 //!
 //! Wants the Python of `make test-deps`.

@@ -1,8 +1,10 @@
-//! A cause of one's own, added to the catalogue: `cargo run --example custom_cause -- run examples/custom_cause.toml -o c.h5`,
-//! then `cargo run --example custom_cause -- show c.h5 diagnosis`.
+//! A cause of one's own, added to the catalogue:
+//! `cargo run --example custom_cause -- run examples/custom_cause.toml -o c.h5`, then
+//! `cargo run --example custom_cause -- show c.h5 diagnosis`.
 //!
-//! The segments of a split photodiode are amplified unequally. The simulator hides it, the diagnosis looks for it and names it, and `causes`, `exam` and
-//! `simulate.model` know it like any built-in one: the program is afmid with one more cause.
+//! The segments of a split photodiode are amplified unequally. The simulator hides it, the diagnosis looks for it and
+//! names it, and `causes`, `exam` and `simulate.model` know it like any built-in one: the program is afmid with one
+//! more cause.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -15,7 +17,8 @@ struct UnequalSegments;
 
 const ABOUT: About = About {
     id: "unequal-segments",
-    physics: "the amplifiers of the photodiode's two segments differ in gain, so that the slope changes where the spot crosses their gap",
+    physics: "the amplifiers of the photodiode's two segments differ in gain, so that the slope changes where the spot \
+        crosses their gap",
     part: Part::Detector,
     domain: Domain::Release,
     parameters: &[Parameter {

@@ -1,7 +1,7 @@
 function afmid_stage(about, run)
 % AFMID_STAGE  Serves a stage of afmid written in Octave or MATLAB.
 %
-%   afmid_stage(about, @run) speaks afmid's plugin protocol (docs/plugins.md) on stdin and stdout until it is told to end.
+%   afmid_stage(about, @run) speaks afmid's plugin protocol (docs/plugins.md) on stdin and stdout until `shutdown`.
 %
 %   about: a struct with the fields
 %     name, version, summary    texts

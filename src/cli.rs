@@ -22,7 +22,8 @@ pub use plugins::{AllowArgs, PluginCommand, TrustArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
 pub use submit::{SlurmArgs, SubmitTo};
 
-/// Identifies dynamic systems from archived transients, such as snap-off events in force curves of an atomic force microscope.
+/// Identifies dynamic systems from archived transients, such as snap-off events in force curves of an atomic force
+/// microscope.
 #[derive(Debug, Parser)]
 #[command(name = "afmid", version, about, propagate_version = true)]
 pub struct Cli {
@@ -34,7 +35,8 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run a config, reusing what is still valid, and write a result file; with [sweep], one per point and one table of them all.
+    /// Run a config, reusing what is still valid, and write a result file; with [sweep], one per point and one table of
+    /// them all.
     Run(RunArgs),
     /// Run a config on many data sets, each with its own result file, and write one table of them all.
     Batch(BatchArgs),
@@ -134,7 +136,8 @@ pub enum Command {
     },
     /// Print the JSON Schema of a config.
     Schema,
-    /// Look at everything that a run needs of this machine: library, cache, disk, arithmetic; say what to do where something is missing.
+    /// Look at everything that a run needs of this machine: library, cache, disk, arithmetic; say what to do where
+    /// something is missing.
     Doctor(DoctorArgs),
     /// Print the completions of a shell.
     Completions {
@@ -214,7 +217,8 @@ pub struct RunArgs {
     /// The config and what changes it.
     #[command(flatten)]
     pub config: ConfigArgs,
-    /// The result file, in a folder that is there; of a config with [sweep], the folder of the results [default: the pipeline's name, in the working directory].
+    /// The result file, in a folder that is there; of a config with [sweep], the folder of the results [default: the
+    /// pipeline's name, in the working directory].
     #[arg(short, long, value_name = "OUT.h5")]
     pub output: Option<PathBuf>,
     /// Threads [default: one per processor]; results don't depend on it.

@@ -17,8 +17,8 @@ use crate::printable::{one_line, printable};
 /// More problems are counted: who mends a hundred checks again.
 pub const MOST_PROBLEMS: usize = 100;
 
-/// Renders the first hundred problems of a config for stderr, printable, in colour if a person looks at it and nothing in the config acts on the
-/// terminal.
+/// Renders the first hundred problems of a config for stderr, printable, in colour if a person looks at it and nothing
+/// in the config acts on the terminal.
 pub fn render(file: &str, text: &str, problems: &[Problem]) -> String {
     let file = &one_line(file);
     let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();

@@ -15,7 +15,7 @@ pub enum Failure {
     Partly(Message),
     /// A signal was caught: exit code 128 and its number.
     Interrupted(i32),
-    /// Whoever read stdout has seen enough (`afmid schema | head`): the quiet end, exit code 0.
+    /// The reader of stdout has closed it (`afmid schema | head`): the quiet end, exit code 0.
     Closed,
 }
 
@@ -44,7 +44,7 @@ impl Failure {
     }
 
     /// What goes to stderr, printable, and the exit code.
-    pub fn told(self) -> (String, u8) {
+    pub fn text_and_code(self) -> (String, u8) {
         let (what, code) = match self {
             Self::Usage(message) => (message, 2),
             Self::Failed(message) => (message, 1),

@@ -1,8 +1,9 @@
-//! SIGINT, SIGTERM, and SIGHUP and SIGQUIT of a terminal: a command tidies up and ends with 128 and the signal's number (130, 143, 129, 131); a second
-//! signal ends it at once.
+//! SIGINT, SIGTERM, and SIGHUP and SIGQUIT of a terminal: a command tidies up and ends with 128 and the signal's number
+//! (130, 143, 129, 131); a second signal ends it at once.
 //!
-//! A run looks at [`caught`] before each of its stages and ends by itself, what has succeeded kept in the cache. What takes longer than [`GRACE`], or
-//! does not look, is ended from here: processes are killed, what the command has under way in the folders that it named ([`writes_in`]) is removed.
+//! A run looks at [`caught`] before each of its stages and ends by itself, what has succeeded kept in the cache. What
+//! takes longer than [`GRACE`], or does not look, is ended from here: processes are killed, what the command has under
+//! way in the folders that it named ([`writes_in`]) is removed.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
@@ -38,8 +39,9 @@ struct State {
     folders: Mutex<Vec<PathBuf>>,
 }
 
-/// Begins to listen. Signals that whoever started the command had ignored (`nohup`, a script's `&`) stay ignored. A file that grows beyond the limit
-/// of its size (`ulimit -f`) becomes an error of the write instead of a signal that ends the program.
+/// Begins to listen. Signals that were ignored when the command started (`nohup`, a script's `&`) stay ignored. A file
+/// that grows beyond the limit of its size (`ulimit -f`) becomes an error of the write instead of a signal that ends
+/// the program.
 ///
 /// Errors: the system refuses.
 pub fn listen() -> std::io::Result<()> {

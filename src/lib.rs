@@ -51,7 +51,7 @@ pub fn main(registry: &Registry) -> ExitCode {
     let parsed = cli::command().try_get_matches().and_then(|matches| cli::Cli::from_arg_matches(&matches));
     let done = match parsed {
         Ok(cli) => commands::dispatch(cli.command, registry),
-        Err(error) => told(&error),
+        Err(error) => help_or_mistake(&error),
     };
     interrupt::check().and(done).map_or_else(output::report, |()| ExitCode::SUCCESS)
 }
@@ -61,8 +61,9 @@ pub fn fail(error: &DoubleName) -> ExitCode {
     output::report(Failure::failed(error, None))
 }
 
-/// Help and version go to stdout, mistakes to stderr, in colour if a person looks at them and nothing that they typed acts on the terminal.
-fn told(error: &clap::Error) -> Result<(), Failure> {
+/// Help and version go to stdout, mistakes to stderr, in colour if a person looks at them and nothing that they typed
+/// acts on the terminal.
+fn help_or_mistake(error: &clap::Error) -> Result<(), Failure> {
     let plain = error.render().to_string();
     let styled = |terminal: bool| {
         let colour = terminal && std::env::var_os("NO_COLOR").is_none() && printable(&plain) == plain;

@@ -26,13 +26,13 @@ pub fn print_styled(text: &str) -> Result<(), Failure> {
 
 /// How a command ends that does not succeed: said on stderr, with its exit code.
 pub fn report(failure: Failure) -> ExitCode {
-    let (text, code) = failure.told();
+    let (text, code) = failure.text_and_code();
     say_styled(&text);
     ExitCode::from(code)
 }
 
-/// Says something on stderr, in one call, so that lines of several threads don't mix. If stderr takes nothing, there is nowhere left to say so:
-/// the exit code still tells.
+/// Says something on stderr, in one call, so that lines of several threads don't mix. If stderr takes nothing, there is
+/// nowhere left to say so: the exit code still tells.
 pub fn say(text: &str) {
     say_styled(&printable(text));
 }

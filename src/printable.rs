@@ -1,14 +1,14 @@
 //! What a terminal or a page shows instead of obeying it.
 //!
-//! Names, units, warnings and messages come from files of anybody. Characters in them that act (escape sequences move the cursor and rename the window,
-//! bidirectional marks turn text round) are shown as escapes, `\x1b` or `\u{202e}`. Everything that is printed goes through [`printable`] in
-//! `output`, everything on a page through it in `report`.
+//! Names, units, warnings and messages come from files of anybody. Characters in them that act (escape sequences move
+//! the cursor and rename the window, bidirectional marks turn text round) are shown as escapes, `\x1b` or `\u{202e}`.
+//! Everything that is printed goes through [`printable`] in `output`, everything on a page through it in `report`.
 
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Whether a character acts instead of being seen: controls but for the line's end and the tabulator, marks and overrides of direction,
-/// separators of lines and paragraphs.
+/// Whether a character acts instead of being seen: controls but for the line's end and the tabulator, marks and
+/// overrides of direction, separators of lines and paragraphs.
 fn acts(c: char) -> bool {
     c.is_control() && !matches!(c, '\n' | '\t')
         || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -28,7 +28,8 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(shown).collect())
 }
 
-/// The same of what is one line, such as a name or a cell: ends of lines and tabulators are escapes, too. A name could otherwise add lines of its own.
+/// The same of what is one line, such as a name or a cell: ends of lines and tabulators are escapes, too. A name could
+/// otherwise add lines of its own.
 pub fn one_line(text: &str) -> String {
     printable(text).replace('\n', "\\n").replace('\t', "\\t")
 }
@@ -55,7 +56,8 @@ pub fn help_line(help: &str) -> String {
     format!("  help: {}\n", lines.join("\n        "))
 }
 
-/// JSON with the escapes of JSON for the same characters, which it may hold in its strings alone. (Below a blank it has escapes already.)
+/// JSON with the escapes of JSON for the same characters, which it may hold in its strings alone. (Below a blank it has
+/// escapes already.)
 pub fn printable_json(json: &str) -> Cow<'_, str> {
     if !json.contains(acts) {
         return Cow::Borrowed(json);

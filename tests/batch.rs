@@ -24,10 +24,10 @@ fn one_bad_set_stops_no_other_and_nothing_is_done_twice() {
     let whole = std::fs::read(&bad).expect("a record");
     std::fs::write(&bad, &whole[..whole.len() / 2]).expect("a record cut short");
     let sets = ["census.toml", "c", "a", "b", "-o", "out", "--cache", "cache"];
-    let (code, told) = here.told(&sets);
-    assert_eq!((code, &told["data_sets"], &told["ran"], &told["failed"]), (3, &3.into(), &3.into(), &1.into()));
-    assert_eq!(told["failures"][0]["name"], "c");
-    assert!(told["failures"][0]["error"].as_str().is_some_and(|error| error.contains("record_1.h5")), "{told}");
+    let (code, output) = here.batch_json(&sets);
+    assert_eq!((code, &output["data_sets"], &output["ran"], &output["failed"]), (3, &3.into(), &3.into(), &1.into()));
+    assert_eq!(output["failures"][0]["name"], "c");
+    assert!(output["failures"][0]["error"].as_str().is_some_and(|error| error.contains("record_1.h5")), "{output}");
     assert!(here.path("out/a.h5").exists() && here.path("out/b.h5").exists() && !here.path("out/c.h5").exists());
     let table = std::fs::read_to_string(here.path("out/summary.csv")).expect("a table");
     let rows: Vec<&str> = table.lines().skip(1).collect();
@@ -35,18 +35,22 @@ fn one_bad_set_stops_no_other_and_nothing_is_done_twice() {
     assert!(rows[2].starts_with("c,,failed,"), "{table}");
 
     let before = here.bytes("out");
-    let (code, told) = here.told(&sets);
-    assert_eq!((code, &told["ran"], &told["failed"]), (3, &0.into(), &1.into()), "what failed is told, not run again");
+    let (code, output) = here.batch_json(&sets);
+    assert_eq!(
+        (code, &output["ran"], &output["failed"]),
+        (3, &0.into(), &1.into()),
+        "what failed is reported, not run again"
+    );
     assert_eq!(here.bytes("out"), before, "the second batch changed a file");
-    let (code, told) = here.told(&[&sets[..], &["--retry-failed"]].concat());
-    assert_eq!((code, &told["ran"], &told["failed"]), (3, &1.into(), &1.into()));
+    let (code, output) = here.batch_json(&[&sets[..], &["--retry-failed"]].concat());
+    assert_eq!((code, &output["ran"], &output["failed"]), (3, &1.into(), &1.into()));
 
     std::fs::write(&bad, &whole).expect("a whole record");
-    let (code, told) = here.told(&sets);
-    assert_eq!((code, &told["ran"], &told["failed"]), (0, &1.into(), &0.into()), "it has changed: it is run again");
+    let (code, output) = here.batch_json(&sets);
+    assert_eq!((code, &output["ran"], &output["failed"]), (0, &1.into(), &0.into()), "it has changed: it is run again");
     std::fs::remove_file(here.path("out/a.h5")).expect("a result");
-    let (_, told) = here.told(&sets);
-    assert_eq!(told["ran"], 1, "a result that is gone is made again");
+    let (_, output) = here.batch_json(&sets);
+    assert_eq!(output["ran"], 1, "a result that is gone is made again");
 }
 
 #[test]
@@ -56,10 +60,10 @@ fn a_changed_parameter_of_the_last_stage_costs_that_stage_alone() {
         here.set(&format!("set{seed}"), seed, 3000);
     }
     let sets = ["census.toml", "set0", "set1", "set2", "set3", "-o", "out", "--cache", "cache"];
-    here.told(&sets);
+    here.batch_json(&sets);
     let one = results_in(&here.path("cache"));
-    let (code, told) = here.told(&[&sets[..], &["--set", "census.min_bandwidth_share=0.05"]].concat());
-    assert_eq!((code, &told["ran"]), (0, &4.into()));
+    let (code, output) = here.batch_json(&[&sets[..], &["--set", "census.min_bandwidth_share=0.05"]].concat());
+    assert_eq!((code, &output["ran"]), (0, &4.into()));
     // one stage per set is kept in the cache
     assert_eq!((one, results_in(&here.path("cache"))), (4, 8));
 }
@@ -72,19 +76,19 @@ fn shards_add_up_to_the_same_table_byte_for_byte() {
     let lines = names.iter().map(|name| format!("{{\"name\": \"{name}\", \"files\": [\"{name}/*.h5\"]}}\n"));
     std::fs::write(here.path("m.jsonl"), lines.collect::<String>()).expect("a manifest");
     let whole = ["census.toml", "--manifest", "m.jsonl", "-o", "whole", "--cache", "cache"];
-    assert_eq!(here.told(&whole).0, 0);
+    assert_eq!(here.batch_json(&whole).0, 0);
     let parts = ["census.toml", "--manifest", "m.jsonl", "-o", "parts", "--cache", "other", "-j", "1"];
-    let (code, told) = here.told(&[&parts[..], &["--collect"]].concat());
-    assert_eq!((code, &told["failed"]), (3, &9.into()), "nothing has been run yet");
+    let (code, output) = here.batch_json(&[&parts[..], &["--collect"]].concat());
+    assert_eq!((code, &output["failed"]), (3, &9.into()), "nothing has been run yet");
     let mut ran = 0;
     // a shard twice: two machines may do the same one
     for shard in ["3/3", "1/3", "2/3", "1/3"] {
-        let (code, told) = here.told(&[&parts[..], &["--shard", shard]].concat());
+        let (code, output) = here.batch_json(&[&parts[..], &["--shard", shard]].concat());
         assert_eq!(code, 0);
-        ran += told["ran"].as_u64().expect("a number");
+        ran += output["ran"].as_u64().expect("a number");
     }
     assert_eq!(ran, 9);
-    assert_eq!(here.told(&[&parts[..], &["--collect"]].concat()).0, 0);
+    assert_eq!(here.batch_json(&[&parts[..], &["--collect"]].concat()).0, 0);
     for file in ["summary.csv", "summary.parquet", "summary.h5", "trends.csv"] {
         let [one, other] = ["whole", "parts"].map(|folder| std::fs::read(here.path(folder).join(file)).expect(file));
         assert!(one == other, "{file} differs");
@@ -96,17 +100,17 @@ fn shards_add_up_to_the_same_table_byte_for_byte() {
     assert!(shown.status.success() && String::from_utf8_lossy(&shown.stdout).contains("set8"), "{shown:?}");
     // what has changed since its run is not passed off as its result
     here.set("set4", 77, 2000);
-    let (code, told) = here.told(&[&parts[..], &["--collect"]].concat());
-    assert_eq!((code, &told["failed"], &told["failures"][0]["name"]), (3, &1.into(), &"set4".into()));
-    assert!(told["failures"][0]["error"].as_str().expect("a reason").contains("have changed"), "{told}");
-    assert_eq!(here.told(&parts).0, 0);
+    let (code, output) = here.batch_json(&[&parts[..], &["--collect"]].concat());
+    assert_eq!((code, &output["failed"], &output["failures"][0]["name"]), (3, &1.into(), &"set4".into()));
+    assert!(output["failures"][0]["error"].as_str().expect("a reason").contains("have changed"), "{output}");
+    assert_eq!(here.batch_json(&parts).0, 0);
     std::fs::remove_file(here.path("parts/set2.h5")).expect("a result");
-    let (code, told) = here.told(&[&parts[..], &["--collect"]].concat());
-    assert_eq!((code, &told["failures"][0]["name"]), (3, &"set2".into()), "{told}");
+    let (code, output) = here.batch_json(&[&parts[..], &["--collect"]].concat());
+    assert_eq!((code, &output["failures"][0]["name"]), (3, &"set2".into()), "{output}");
 }
 
 #[test]
-fn what_is_wrong_is_told_before_anything_runs() {
+fn what_is_wrong_is_reported_before_anything_runs() {
     let here = Here::new();
     here.set("a", 0, 2000);
     std::fs::create_dir_all(here.path("deep")).expect("a folder");
@@ -122,11 +126,11 @@ fn what_is_wrong_is_told_before_anything_runs() {
         (&["missing.toml", "a"], &["missing.toml"]),
     ] {
         let output = here.batch(&[arguments, &["-o", "out", "--cache", "cache"]].concat());
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {errors}");
         assert!(output.stdout.is_empty(), "{arguments:?}");
         for word in words {
-            assert!(told.contains(word), "{word:?} in {told}");
+            assert!(errors.contains(word), "{word:?} in {errors}");
         }
         assert!(!here.path("out/a.h5").exists());
     }
@@ -142,7 +146,7 @@ fn the_same_shard_twice_at_once_leaves_whole_results_and_a_whole_ledger() {
         let sets = names.iter().map(String::as_str);
         ["census.toml"].into_iter().chain(sets).chain(["-o", out, "--cache", cache, "-j", "2"]).collect()
     };
-    assert_eq!(here.told(&arguments("whole", "whole-cache")).0, 3);
+    assert_eq!(here.batch_json(&arguments("whole", "whole-cache")).0, 3);
     // with one cache for both, and with one each, as on two nodes
     for caches in [["cache", "cache"], ["cache-1", "cache-2"]] {
         for folder in ["out", "cache"] {
@@ -157,9 +161,9 @@ fn the_same_shard_twice_at_once_leaves_whole_results_and_a_whole_ledger() {
         }
         let left = here.bytes("out").into_keys().filter(|path| path.extension().is_some_and(|end| end == "tmp"));
         assert_eq!(left.count(), 0, "temporary files are left");
-        let (code, told) = here.told(&arguments("out", caches[0]));
+        let (code, output) = here.batch_json(&arguments("out", caches[0]));
         assert_eq!(
-            (code, &told["ran"], &told["failed"]),
+            (code, &output["ran"], &output["failed"]),
             (3, &0.into(), &1.into()),
             "{caches:?}: the ledger does not fit"
         );
@@ -187,7 +191,7 @@ fn a_killed_batch_goes_on_where_it_stopped() {
         ["census.toml"].into_iter().chain(sets).chain(["-o", out, "--cache", cache, "-j", "2"]).collect()
     };
     let clock = Instant::now();
-    assert_eq!(here.told(&arguments("whole", "whole-cache")).0, 0);
+    assert_eq!(here.batch_json(&arguments("whole", "whole-cache")).0, 0);
     let whole = clock.elapsed();
     let (mut random, mut interrupted) = (0x2545_f491_4f6c_dd1d_u64, 0);
     for round in 0..kills {
@@ -206,8 +210,8 @@ fn a_killed_batch_goes_on_where_it_stopped() {
         let ended = |name: &String| here.path("out/ledger").join(format!("{name}.json")).exists();
         let finished = names.iter().filter(|name| ended(name)).count();
         interrupted += usize::from(finished < names.len());
-        let (code, told) = here.told(&arguments("out", "cache"));
-        assert_eq!((code, &told["ran"]), (0, &(names.len() - finished).into()), "round {round}");
+        let (code, output) = here.batch_json(&arguments("out", "cache"));
+        assert_eq!((code, &output["ran"]), (0, &(names.len() - finished).into()), "round {round}");
         for name in &names {
             let [one, other] = ["whole", "out"].map(|folder| here.path(folder).join(format!("{name}.h5")));
             assert_eq!(compare(&one, &other).expect("two results"), [], "round {round}, {name}");

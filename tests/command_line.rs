@@ -70,8 +70,8 @@ fn a_wrong_command_line_or_config_is_exit_code_2_with_nothing_on_stdout() {
         assert_eq!(stdout(&output), "", "{arguments:?}");
         assert!(!stderr(&output).is_empty(), "{arguments:?}");
     }
-    let told = stderr(&afmid(folder.path(), &["check", "wrong.toml"]));
-    assert!(told.contains("wrong.toml:5:8") && told.contains("did you mean `io.records`?"), "{told}");
+    let message = stderr(&afmid(folder.path(), &["check", "wrong.toml"]));
+    assert!(message.contains("wrong.toml:5:8") && message.contains("did you mean `io.records`?"), "{message}");
 }
 
 #[test]
@@ -81,8 +81,8 @@ fn check_goes_on_after_a_wrong_config() {
     std::fs::write(folder.path().join("b.toml"), "[[stage]]\n").expect("a config");
     let output = afmid(folder.path(), &["check", "a.toml", "b.toml"]);
     assert_eq!(code(&output), 2);
-    let told = stderr(&output);
-    assert!(told.contains("a.toml: 2 problems") && told.contains("b.toml: 3 problems"), "{told}");
+    let message = stderr(&output);
+    assert!(message.contains("a.toml: 2 problems") && message.contains("b.toml: 3 problems"), "{message}");
 }
 
 #[test]
@@ -112,7 +112,8 @@ fn archive(folder: &Path) {
         write_native(&path, &record, RecordStorage::Raw).expect("a record");
     }
     let config = "[pipeline]\nname = \"count\"\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
-        params = { files = [\"record_*.h5\"] }\n[[stage]]\nid = \"census\"\nuses = \"io.census\"\ninputs = { records = \"records\" }\n";
+        params = { files = [\"record_*.h5\"] }\n[[stage]]\nid = \"census\"\nuses = \"io.census\"\n\
+        inputs = { records = \"records\" }\n";
     std::fs::write(folder.join("count.toml"), config).expect("a config");
 }
 
@@ -127,11 +128,11 @@ fn a_run_leaves_a_result_that_can_be_shown_and_the_next_one_reuses_it() {
         (stdout(&output), stderr(&output))
     };
     std::fs::create_dir(folder.join("out")).expect("a folder");
-    let (told, progress) = run(&["-o", "out/a.h5", "-j", "1"]);
-    assert!(told.starts_with("out/a.h5: 2 stages in "), "{told}");
+    let (output, progress) = run(&["-o", "out/a.h5", "-j", "1"]);
+    assert!(output.starts_with("out/a.h5: 2 stages in "), "{output}");
     assert!(progress.contains("census: "), "{progress}");
-    let (told, progress) = run(&["-o", "out/b.h5", "-j", "3"]);
-    assert!(told.contains("1 reused") && progress.contains("census: reused"), "{told}{progress}");
+    let (output, progress) = run(&["-o", "out/b.h5", "-j", "3"]);
+    assert!(output.contains("1 reused") && progress.contains("census: reused"), "{output}{progress}");
     run(&["-o", "out/c.h5", "-j", "3", "--fresh"]);
     for other in ["out/b.h5", "out/c.h5"] {
         let differences =
@@ -211,8 +212,8 @@ fn a_failed_run_is_exit_code_1_names_the_stage_and_leaves_no_result() {
     std::fs::write(folder.join("record_2.h5"), b"not HDF5").expect("a broken record");
     let output = afmid(folder, &["run", "count.toml", "--cache", "cache", "-o", "a.h5"]);
     assert_eq!(code(&output), 1);
-    let told = stderr(&output);
-    assert!(told.contains("stage `records` (io.records)") && told.contains("record_2.h5"), "{told}");
+    let message = stderr(&output);
+    assert!(message.contains("stage `records` (io.records)") && message.contains("record_2.h5"), "{message}");
     assert_eq!(stdout(&output), "");
     assert!(!folder.join("a.h5").exists());
 }
@@ -275,11 +276,14 @@ fn an_output_never_replaces_an_input_or_anything_that_afmid_did_not_write() {
         (&format!("{}.h5", "x".repeat(250)), "its name is too long"),
     ] {
         let run = afmid(folder, &["run", "count.toml", "--cache", "cache", "-o", output]);
-        let told = stderr(&run);
-        assert_eq!(code(&run), 2, "{output}: {told}");
-        assert!(told.contains(said), "{output}: {told}");
-        assert!(!told.contains(".tmp") && !told.contains("HDF5:") && !told.contains("records: "), "{output}: {told}");
-        assert!(told.contains("help: "), "{output}: {told}");
+        let message = stderr(&run);
+        assert_eq!(code(&run), 2, "{output}: {message}");
+        assert!(message.contains(said), "{output}: {message}");
+        assert!(
+            !message.contains(".tmp") && !message.contains("HDF5:") && !message.contains("records: "),
+            "{output}: {message}"
+        );
+        assert!(message.contains("help: "), "{output}: {message}");
         assert_eq!(stdout(&run), "");
     }
     assert_eq!(contents(folder), before, "nothing was written, nothing replaced");
@@ -339,13 +343,13 @@ fn a_file_that_is_no_result_is_called_what_it_is() {
             (".", "is a folder", ""),
         ] {
             let output = afmid(folder, &[command, file]);
-            let told = stderr(&output);
-            assert_eq!(code(&output), 2, "{command} {file}: {told}");
+            let message = stderr(&output);
+            assert_eq!(code(&output), 2, "{command} {file}: {message}");
             assert!(
-                told.contains(said) && told.contains("wanted a result file") && told.contains(help),
-                "{file}: {told}"
+                message.contains(said) && message.contains("wanted a result file") && message.contains(help),
+                "{file}: {message}"
             );
-            assert!(!told.contains("seal"), "{told}");
+            assert!(!message.contains("seal"), "{message}");
         }
         let whole = std::fs::read(folder.join("a.h5")).expect("the result");
         std::fs::write(folder.join("b.h5"), &whole[..whole.len() - 1]).expect("a file");
@@ -407,30 +411,30 @@ fn a_closed_pipe_ends_quietly_and_a_full_device_with_an_error() {
 }
 
 #[test]
-fn mistakes_are_told_with_the_range_that_holds() {
+fn mistakes_are_reported_with_the_range_that_holds() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     archive(folder);
-    let told = |arguments: &[&str]| {
+    let refused = |arguments: &[&str]| {
         let output = afmid(folder, arguments);
         assert_eq!(code(&output), 2);
         stderr(&output)
     };
-    let jobs = told(&["run", "count.toml", "-j", "0"]);
+    let jobs = refused(&["run", "count.toml", "-j", "0"]);
     assert!(jobs.contains("wanted a whole number from 1 to 65535") && !jobs.contains("non-zero"), "{jobs}");
     let config = std::fs::read_to_string(folder.join("count.toml")).expect("the config");
     let events = "[[stage]]\nid = \"events\"\nuses = \"events.correlation\"\ninputs = { records = \"records\" }\n\
         params = { kind = \"snap-off\", window_samples = -3 }\n";
     std::fs::write(folder.join("range.toml"), format!("{config}{events}")).expect("a config");
-    let range = told(&["check", "range.toml"]);
+    let range = refused(&["check", "range.toml"]);
     assert!(range.contains("found the integer `-3`, wanted 256 to 4194304"), "{range}");
     let modes = "[pipeline]\nname = \"x\"\n[[stage]]\nid = \"m\"\nuses = \"model.modes\"\ninputs = { model = \"m\" }\n\
         params = { reference_quality_factor = [1.0] }\n";
     std::fs::write(folder.join("modes.toml"), modes).expect("a config");
-    let modes = told(&["check", "modes.toml"]).replace(['\n', '│'], " ");
+    let modes = refused(&["check", "modes.toml"]).replace(['\n', '│'], " ");
     assert!(modes.contains("has 1 value, wanted none"), "{modes}");
     std::fs::write(folder.join("open.toml"), config.replace("[pipeline]", "[pipeline")).expect("a config");
-    let open = told(&["check", "open.toml"]);
+    let open = refused(&["check", "open.toml"]);
     assert!(open.contains("unclosed table") && !open.contains("given twice"), "{open}");
 }
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use common::{afmid, config, number, shown};
 
-/// The folder with `daisy/NAME`, or a stand-in below `scratch` of as many columns: a resonance driven by noise, counted in the output.
+/// The folder with `daisy/NAME`, or a stand-in below `scratch` of as many columns: a resonance driven by noise, counted
+/// in the output.
 fn data(scratch: &Path, name: &str, inputs: usize, outputs: usize) -> (PathBuf, bool) {
     let root =
         std::env::var_os("AFMID_DATA").map_or_else(|| Path::new(common::ROOT).join("../shared/data"), PathBuf::from);

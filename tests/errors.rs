@@ -1,4 +1,5 @@
-//! Every error as people see it: `tests/errors/NAME.toml` is a command with its files, `NAME.txt` what it says (`UPDATE_EXPECTED=1` writes these anew: read them).
+//! Every error as people see it: `tests/errors/NAME.toml` is a command with its files, `NAME.txt` what it says
+//! (`UPDATE_EXPECTED=1` writes these again: read them).
 
 mod common;
 
@@ -53,7 +54,7 @@ impl Case {
     }
 
     /// Exit code and stderr, the folder's name left out.
-    fn told(&self) -> (String, Output) {
+    fn run(&self) -> (String, Output) {
         let scratch = tempfile::tempdir().expect("a folder");
         // the folder's name as the system gives it: links followed
         let here = scratch.path().canonicalize().expect("a folder");
@@ -99,16 +100,16 @@ fn every_error_reads_as_expected() {
         let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
         let text = std::fs::read_to_string(&path).expect("a case");
         let case: Case = afmid_pipeline::toml::from_str(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let (told, output) = case.told();
-        if output.status.success() || output.stderr.is_empty() || told.contains("panicked") {
-            wrong.push(format!("{name} is no error:\n{told}"));
+        let (report, output) = case.run();
+        if output.status.success() || output.stderr.is_empty() || report.contains("panicked") {
+            wrong.push(format!("{name} is no error:\n{report}"));
         }
         let expected = path.with_extension("txt");
         if std::env::var_os("UPDATE_EXPECTED").is_some() {
-            std::fs::write(&expected, &told).expect("the expected text");
+            std::fs::write(&expected, &report).expect("the expected text");
         }
-        if std::fs::read_to_string(&expected).unwrap_or_default() != told {
-            wrong.push(format!("{name} gives:\n{told}"));
+        if std::fs::read_to_string(&expected).unwrap_or_default() != report {
+            wrong.push(format!("{name} gives:\n{report}"));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

@@ -29,7 +29,8 @@ fn a_stage_of_another_crate_runs_in_a_config() {
     let run = |arguments: &[&str]| example("custom_stage", here, arguments);
     run(&["run", &config.display().to_string(), "--set", &archive, "-o", "x.h5", "--cache", "cache"]);
     let shown: serde_json::Value = serde_json::from_str(&run(&["show", "x.h5", "envelope", "--json"])).expect("JSON");
-    // the simulated lever's mode 1: tau = Q / (pi f) = 0.2805 ms; higher modes and blocks of 2.4 periods cost some per cent
+    // the simulated lever's mode 1: tau = Q / (pi f) = 0.2805 ms; higher modes and blocks of 2.4 periods cost some per
+    // cent
     let tau = common::number(&shown, "/decay_time_s");
     assert!((tau / 2.805e-4 - 1.0).abs() < 0.05, "{tau} s");
     assert!(run(&["stages", "example.envelope"]).contains("Decay time"));

@@ -13,26 +13,26 @@ use serde_json::Value;
 /// Files of the archive: enough for an average on each half.
 const RECORDS: u64 = 4;
 
-/// How a native record is written in another format, and what must be told to read it.
+/// How a native record is written in another format, and the parameters that reading it needs.
 struct Written {
     ending: &'static str,
     channel: &'static str,
     piezo: &'static str,
-    told: &'static [&'static str],
+    parameters: &'static [&'static str],
     bytes: fn(&Record) -> Vec<u8>,
 }
 
 const WRITERS: [Written; 4] = [
-    Written { ending: "tdms", channel: "/AFM/deflection", piezo: "/AFM/piezo", told: &[], bytes: tdms },
+    Written { ending: "tdms", channel: "/AFM/deflection", piezo: "/AFM/piezo", parameters: &[], bytes: tdms },
     Written {
         ending: "npy",
         channel: "/array[0]",
         piezo: "/array[1]",
-        told: &["sample_rate_hz=5e6", "unit='V'"],
+        parameters: &["sample_rate_hz=5e6", "unit='V'"],
         bytes: npy,
     },
-    Written { ending: "csv", channel: "deflection", piezo: "piezo", told: &[], bytes: csv },
-    Written { ending: "mat", channel: "/deflection", piezo: "/piezo", told: &["unit='V'"], bytes: mat },
+    Written { ending: "csv", channel: "deflection", piezo: "piezo", parameters: &[], bytes: csv },
+    Written { ending: "mat", channel: "/deflection", piezo: "/piezo", parameters: &["unit='V'"], bytes: mat },
 ];
 
 fn values(record: &Record) -> [Vec<f64>; 2] {
@@ -149,7 +149,7 @@ fn an_archive_in_another_format_gives_the_same_events_and_modes() {
             format!("records.channel='{}'", writer.channel),
             format!("records.piezo_channel='{}'", writer.piezo),
         ];
-        set.extend(writer.told.iter().map(|told| format!("records.{told}")));
+        set.extend(writer.parameters.iter().map(|parameter| format!("records.{parameter}")));
         let other = run(here, writer.ending, &set);
         assert_eq!(other.0["events"]["found"], native.0["events"]["found"], "{}", writer.ending);
         same_modes(writer.ending, &native.1, &other.1);
@@ -158,8 +158,8 @@ fn an_archive_in_another_format_gives_the_same_events_and_modes() {
     }
 }
 
-/// Frequencies and quality factors agree far within their errors: codes and doubles round differently in the last bits alone, and the fit
-/// ends where its steps are below 1e-9 or so of a standard error.
+/// Frequencies and quality factors agree far within their errors: codes and doubles round differently in the last bits
+/// alone, and the fit ends where its steps are below 1e-9 or so of a standard error.
 fn same_modes(name: &str, native: &Value, other: &Value) {
     let modes = |value: &Value| value["modes"].as_array().unwrap().clone();
     let (native, other) = (modes(native), modes(other));

@@ -54,7 +54,8 @@ fn the_grey_form_gives_modes_gains_and_delay_of_the_free_lever() {
         {
             let (found, std) =
                 (number(&grey, &format!("/modes/{n}/{name}")), number(&grey, &format!("/modes/{n}/{std}")));
-            // 4 of its own standard errors, which follow the residual's spectrum: one real pole and a delay stand for three poles
+            // 4 of its own standard errors, which follow the residual's spectrum: one real pole and a delay stand for
+            // three poles
             assert!((found - truth).abs() < 4.0 * std, "mode {}: {name} {found} +- {std}, truth {truth}", n + 1);
         }
     }

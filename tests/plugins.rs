@@ -1,4 +1,5 @@
-//! Plugins on the command line: the examples in Python, a new stage, the conformance test. Octave's and scikit-rf's are in `make test-interop`.
+//! Plugins on the command line: the examples in Python, a new stage, the conformance test. Octave's and scikit-rf's are
+//! in `make test-interop`.
 
 mod common;
 
@@ -21,7 +22,7 @@ fn afmid(here: &Path, arguments: &[&str]) -> Output {
     command.output().expect("afmid starts")
 }
 
-fn told(here: &Path, arguments: &[&str]) -> String {
+fn stdout(here: &Path, arguments: &[&str]) -> String {
     let output = afmid(here, arguments);
     let all = [output.stdout.as_slice(), &output.stderr].concat();
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&all));
@@ -37,12 +38,12 @@ fn a_smoother_of_scipys_runs_beside_the_built_in_one() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
     let script = plugins().join("savgol.py").display().to_string();
-    let tried = told(here, &["plugin", "check", "--", "python3", &script]);
+    let tried = stdout(here, &["plugin", "check", "--", "python3", &script]);
     assert!(tried.contains("passed") && !tried.contains("FAIL"), "{tried}");
     let config = plugins().join("savgol.toml").display().to_string();
     let archive = format!("archive.out='{}'", here.join("archive").display());
-    told(here, &["run", &config, "--allow-plugins", "--set", &archive, "-o", "s.h5", "--cache", "cache"]);
-    let shown: Value = serde_json::from_str(&told(here, &["show", "s.h5", "savgol", "--json"])).expect("JSON");
+    stdout(here, &["run", &config, "--allow-plugins", "--set", &archive, "-o", "s.h5", "--cache", "cache"]);
+    let shown: Value = serde_json::from_str(&stdout(here, &["show", "s.h5", "savgol", "--json"])).expect("JSON");
     let comparison = find(&shown, "largest_peak_over_reference").expect("the comparison");
     // mode 1 is two bins wide: a parabola over 21 bins flattens it to a few per cent, the local rational does not
     let peak = number(comparison, "/largest_peak_over_reference");
@@ -51,7 +52,7 @@ fn a_smoother_of_scipys_runs_beside_the_built_in_one() {
     assert!((frequency / 46.3e3 - 1.0).abs() < 0.02, "{frequency} Hz");
     // the second run takes all from the cache
     let again = ["run", &config, "--allow-plugins", "--set", &archive, "-o", "s.h5", "--cache", "cache", "--json"];
-    let again = told(here, &again);
+    let again = stdout(here, &again);
     let again: Value = serde_json::from_str(&again).expect("JSON");
     // `simulate.afm` writes files and runs every time
     assert_eq!(number(&again, "/stages") - number(&again, "/reused"), 1.0, "{again}");
@@ -71,12 +72,12 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 fn a_new_stage_in_python_passes_and_runs() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
-    told(here, &["new", "stage", "end_noise", "--python"]);
-    let tried = told(&here.join("end_noise"), &["plugin", "check", "--", "python3", "end_noise.py"]);
+    stdout(here, &["new", "stage", "end_noise", "--python"]);
+    let tried = stdout(&here.join("end_noise"), &["plugin", "check", "--", "python3", "end_noise.py"]);
     assert!(tried.contains("passed") && !tried.contains("FAIL"), "{tried}");
-    told(here, &["trust", "end_noise/end_noise.toml"]);
-    told(here, &["run", "end_noise/end_noise.toml", "-o", "n.h5", "--cache", "cache"]);
-    let shown: Value = serde_json::from_str(&told(here, &["show", "n.h5", "end_noise", "--json"])).expect("JSON");
+    stdout(here, &["trust", "end_noise/end_noise.toml"]);
+    stdout(here, &["run", "end_noise/end_noise.toml", "-o", "n.h5", "--cache", "cache"]);
+    let shown: Value = serde_json::from_str(&stdout(here, &["show", "n.h5", "end_noise", "--json"])).expect("JSON");
     // 0.7 V of mode 1, five decay times later: 4 mV, noise beside it
     let rms = number(find(&shown, "rms").expect("the summary"), "/rms");
     assert!(rms > 2e-3 && rms < 8e-3, "{rms} V");
@@ -90,7 +91,7 @@ fn a_new_stage_in_python_passes_and_runs() {
 fn a_new_stage_in_rust_is_a_crate_that_cargo_understands() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
-    told(here, &["new", "stage", "end_noise", "--rust", "--sources", ROOT]);
+    stdout(here, &["new", "stage", "end_noise", "--rust", "--sources", ROOT]);
     // the program itself is examples/new_stage.rs, which cargo has built and tests/example.rs runs
     let metadata = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
@@ -137,7 +138,7 @@ fn a_program_on_the_path_is_a_plugin_by_its_name() {
     let config =
         "[pipeline]\nname = \"echo\"\n[[stage]]\nid = \"echo\"\nuses = \"exec:echo\"\nparams = { steps = 2 }\n";
     std::fs::write(here.join("echo.toml"), config).expect("a config");
-    told(here, &["run", "echo.toml", "--allow-plugins", "-o", "e.h5", "--cache", "cache"]);
-    let shown: Value = serde_json::from_str(&told(here, &["show", "e.h5", "echo", "--json"])).expect("JSON");
+    stdout(here, &["run", "echo.toml", "--allow-plugins", "-o", "e.h5", "--cache", "cache"]);
+    let shown: Value = serde_json::from_str(&stdout(here, &["show", "e.h5", "echo", "--json"])).expect("JSON");
     assert_eq!(number(find(&shown, "steps").expect("its parameters"), "/steps"), 2.0);
 }

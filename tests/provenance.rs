@@ -47,7 +47,8 @@ fn record(path: &Path, number: i16) {
 }
 
 const COUNT: &str = "[pipeline]\nname = \"count\"\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
-    params = { files = [\"data/*.h5\"] }\n[[stage]]\nid = \"census\"\nuses = \"io.census\"\ninputs = { records = \"records\" }\n";
+    params = { files = [\"data/*.h5\"] }\n[[stage]]\nid = \"census\"\nuses = \"io.census\"\n\
+    inputs = { records = \"records\" }\n";
 
 /// Three records in `data`, a config that counts their samples, and its result `a.h5`.
 fn counted() -> tempfile::TempDir {
@@ -83,9 +84,9 @@ fn gc_frees_what_was_not_used_and_nothing_that_is_not_its_own() {
     // used again: the last to go
     afmid(here, &["run", "count.toml", "--cache", "cache", "-o", "a.h5"]);
 
-    let told = afmid(here, &["gc", "--cache", "cache"]);
-    assert!(told.contains("freed nothing") && told.contains("left   2 results, "), "{told}");
-    assert!(told.contains("1 result, ") && told.contains("`--older-than 30d` frees them"), "{told}");
+    let output = afmid(here, &["gc", "--cache", "cache"]);
+    assert!(output.contains("freed nothing") && output.contains("left   2 results, "), "{output}");
+    assert!(output.contains("1 result, ") && output.contains("`--older-than 30d` frees them"), "{output}");
     let dry = json(here, &["gc", "--cache", "cache", "--older-than", "30d", "--dry-run", "--json"]);
     assert_eq!((&dry["dry_run"], &dry["freed"]["files"]), (&Value::from(true), &Value::from(1)), "{dry}");
     assert_eq!(results(&cache).len(), 3);
@@ -145,8 +146,8 @@ fn explain_names_the_parameter_the_file_and_the_input_that_changed() {
     assert!(fewer.contains("`records`: file `record_3.h5` is no longer read"), "{fewer}");
 
     record(&here.join("data/record_2.h5"), 9);
-    let told = json(here, &["explain", "count.toml", "--cache", "cache", "--json"]);
-    let census = &told["stages"][1];
+    let explained = json(here, &["explain", "count.toml", "--cache", "cache", "--json"]);
+    let census = &explained["stages"][1];
     assert_eq!((&census["id"], &census["would"]), (&Value::from("census"), &Value::from("run")));
     assert_eq!(census["compared_with"]["pipeline"], "count");
     let change = &census["changes"][0];
@@ -269,8 +270,8 @@ fn rerun_repeats_a_run_bit_for_bit_wherever_its_files_are_now() {
     let scratch = counted();
     let here = scratch.path();
     let before = fs::read(here.join("a.h5")).expect("the result");
-    let told = afmid(here, &["rerun", "a.h5", "--cache", "again"]);
-    assert!(told.contains("a.h5: identical, all "), "{told}");
+    let output = afmid(here, &["rerun", "a.h5", "--cache", "again"]);
+    assert!(output.contains("a.h5: identical, all "), "{output}");
     let away = tempfile::tempdir().expect("a folder");
     let a = here.join("a.h5").display().to_string();
     let repeated = json(away.path(), &["rerun", &a, "--cache", "c", "-o", "b.h5", "--json"]);
@@ -310,8 +311,8 @@ fn rerun_of_a_simulation_leaves_the_archive_alone_and_a_changed_result_is_seen()
     let archive = simulated(here, "archive", 2, 5);
     let file = archive.folder.join("record_0000.h5");
     let kept = fs::metadata(&file).and_then(|metadata| metadata.modified()).expect("a record");
-    let told = afmid(here, &["rerun", "archive.h5", "--cache", "cache"]);
-    assert!(told.contains("identical"), "{told}");
+    let output = afmid(here, &["rerun", "archive.h5", "--cache", "cache"]);
+    assert!(output.contains("identical"), "{output}");
     assert_eq!(fs::metadata(&file).and_then(|metadata| metadata.modified()).expect("a record"), kept);
 
     // a result of another program: one number of the truth is another
@@ -412,8 +413,8 @@ fn a_crate_is_one_for_its_own_tools_and_the_same_each_time() {
     let scratch = counted();
     let here = scratch.path();
     let export = |arguments: &[&str]| afmid(here, &[&["export-crate", "a.h5"], arguments].concat());
-    let told = export(&[]);
-    assert!(told.starts_with("a-crate: result, config, 3 inputs by their hashes"), "{told}");
+    let output = export(&[]);
+    assert!(output.starts_with("a-crate: result, config, 3 inputs by their hashes"), "{output}");
     let text =
         |folder: &str| fs::read_to_string(here.join(folder).join("ro-crate-metadata.json")).expect("the metadata");
     let first = text("a-crate");

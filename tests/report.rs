@@ -88,9 +88,9 @@ fn what_cannot_be_reported_is_said_with_the_exit_code() {
         (&["cut.h5"], 1, "no seal"),
     ] {
         let output = report(folder, arguments);
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {told}");
-        assert!(told.contains(message), "{arguments:?}: {told}");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
+        assert!(stderr.contains(message), "{arguments:?}: {stderr}");
     }
     assert_eq!(std::fs::read(folder.join("waves.h5")).expect("the result"), bytes, "nothing was replaced");
     assert_eq!(std::fs::read(folder.join("text.h5")).expect("a file"), b"no HDF5");

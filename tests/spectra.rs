@@ -73,7 +73,8 @@ fn forces_spectra_and_responses_come_from_one_archive() {
     let force = shown(here, "r.h5", "reconstruction");
     let (load, rise) = (number(&force, "/load/mean"), number(&force, "/rise_time/mean"));
     println!("load {load:.4} V, rise time {rise:.2e} s, {}", force);
-    // 330 nN at 3.8 N/m and 1e7 V/m: -0.87 V with 6 % of scatter over four events; a sudden release through poles of 1.3 to 2.4 MHz
+    // 330 nN at 3.8 N/m and 1e7 V/m: -0.87 V with 6 % of scatter over four events; a sudden release through poles of
+    // 1.3 to 2.4 MHz
     assert!((load + 0.87).abs() < 0.15, "{load}");
     assert!(rise > 0.0 && rise < 4e-6, "{rise}");
     let thermal = shown(here, "r.h5", "thermal");

@@ -1,4 +1,5 @@
-//! `afmid submit slurm`: what it writes is what bash and sbatch read, whatever the names; the jobs together give the table of one machine.
+//! `afmid submit slurm`: what it writes is what bash and sbatch read, whatever the names; the jobs together give the
+//! table of one machine.
 //!
 //! Here sbatch is a script that writes down what it was given; tests/cluster/slurm.sh does the same on a real Slurm.
 
@@ -114,8 +115,11 @@ fn jobs_in_hostile_folders_give_the_table_of_one_machine() {
         arguments.extend([out.as_os_str(), OsStr::new("--cache"), cache.as_os_str()]);
         let output = submit(here.folder(), None, &arguments);
         assert!(output.status.success(), "{name:?}: {}", text(&output.stderr));
-        let told: Value = serde_json::from_slice(&output.stdout).expect("JSON alone");
-        assert_eq!((&told["data_sets"], &told["shards"], &told["array"]), (&9.into(), &4.into(), &Value::Null));
+        let printed: Value = serde_json::from_slice(&output.stdout).expect("JSON alone");
+        assert_eq!(
+            (&printed["data_sets"], &printed["shards"], &printed["array"]),
+            (&9.into(), &4.into(), &Value::Null)
+        );
 
         let scripts = out.join("slurm");
         for script in ["array.sbatch", "collect.sbatch", "submit.sh"] {
@@ -151,7 +155,7 @@ fn jobs_in_hostile_folders_give_the_table_of_one_machine() {
 }
 
 #[test]
-fn jobs_are_sent_and_their_numbers_told() {
+fn jobs_are_sent_and_their_numbers_printed() {
     let here = Here::new();
     nine(&here);
     let bin = here.path("bin");
@@ -183,8 +187,8 @@ fn jobs_are_sent_and_their_numbers_told() {
     let output = submit(here.folder(), Some(&bin), &words(&[&arguments[..], &["--json"]].concat()));
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("lua: welcome"), "what sbatch says is passed on");
-    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON alone");
-    assert_eq!((&told["array"], &told["collect"]), (&"41".into(), &"42".into()));
+    let printed: Value = serde_json::from_slice(&output.stdout).expect("JSON alone");
+    assert_eq!((&printed["array"], &printed["collect"]), (&"41".into(), &"42".into()));
     let calls = fs::read_to_string(bin.join("calls")).expect("calls");
     let folder = here.path("out/slurm").canonicalize().expect("a folder");
     let folder = folder.display();
@@ -216,14 +220,14 @@ fn jobs_are_sent_and_their_numbers_told() {
 }
 
 #[test]
-fn a_cluster_that_refuses_is_told_as_it_is() {
+fn the_refusal_of_a_cluster_is_reported_as_it_is() {
     let here = Here::new();
     here.set("a", 0, 2000);
     let arguments = words(&["census.toml", "a", "--shards", "2", "-o", "out", "--send", "--json"]);
     let output = submit(here.folder(), None, &arguments);
-    let told = text(&output.stderr);
-    assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{told}");
-    assert!(told.contains("sbatch is not on the PATH") && told.contains("out/slurm/submit.sh"), "{told}");
+    let message = text(&output.stderr);
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{message}");
+    assert!(message.contains("sbatch is not on the PATH") && message.contains("out/slurm/submit.sh"), "{message}");
     assert!(here.path("out/slurm/submit.sh").exists(), "the jobs are written all the same");
 
     let refusals = [
@@ -238,16 +242,16 @@ fn a_cluster_that_refuses_is_told_as_it_is() {
         let bin = here.path(&format!("bin{number}"));
         executable(&bin.join("sbatch"), &format!("#!/bin/bash\n{script}\n"));
         let output = submit(here.folder(), Some(&bin), &arguments);
-        let told = text(&output.stderr);
-        assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{told}");
+        let message = text(&output.stderr);
+        assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{message}");
         for word in words {
-            assert!(told.contains(word), "{word:?} in {told}");
+            assert!(message.contains(word), "{word:?} in {message}");
         }
     }
 }
 
 #[test]
-fn what_is_wrong_is_told_before_anything_is_written() {
+fn what_is_wrong_is_reported_before_anything_is_written() {
     let here = Here::new();
     here.set("a", 0, 2000);
     fs::write(here.path("file"), "x").expect("a file");
@@ -276,11 +280,11 @@ fn what_is_wrong_is_told_before_anything_is_written() {
         (&["census.toml", "a", "-o", "out", "--shards", "2", "--sbatch=--array=1"], &["--array", "set by afmid"]),
     ] {
         let output = submit(here.folder(), None, &self::words(arguments));
-        let told = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         assert!(output.stdout.is_empty() && !here.path("out").exists(), "{arguments:?}");
         for word in words {
-            assert!(told.contains(word), "{word:?} in {told}");
+            assert!(message.contains(word), "{word:?} in {message}");
         }
     }
 }

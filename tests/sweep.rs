@@ -10,7 +10,7 @@ use common::{afmid, command, config, files, number, simulated};
 use serde_json::Value;
 
 /// Exit code, what `--json` printed, and stderr.
-fn told(here: &Path, arguments: &[&str]) -> (i32, Value, String) {
+fn run_json(here: &Path, arguments: &[&str]) -> (i32, Value, String) {
     let output = command(here, &[arguments, &["--json"]].concat()).output().expect("afmid starts");
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     let value = serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{errors}"));
@@ -37,7 +37,7 @@ fn only_the_changed_branch_is_computed_and_points_are_runs_like_others() {
     let set = files(&simulated(here, "archive", 6, 5).folder);
     let sweep = config("sweep-order.toml");
     let run = ["run", &sweep, "--set", &set, "-o", "orders", "--cache", "cache"];
-    let (code, first, errors) = told(here, &run);
+    let (code, first, errors) = run_json(here, &run);
     assert_eq!(code, 0, "{errors}");
     let points = first["points"].as_array().expect("points");
     let counts: Vec<u64> = points.iter().map(computed).collect();
@@ -81,10 +81,10 @@ fn only_the_changed_branch_is_computed_and_points_are_runs_like_others() {
     // nothing is done twice; on one thread, with an empty cache, the same bits
     let bytes = |folder: &str, name: &str| std::fs::read(here.join(folder).join(name)).expect(name);
     let before = bytes("orders", "point_00002.h5");
-    let (_, second, _) = told(here, &run);
+    let (_, second, _) = run_json(here, &run);
     assert_eq!((&second["ran"], &second["failed"]), (&0.into(), &0.into()));
     assert!(before == bytes("orders", "point_00002.h5"), "it was written again");
-    told(here, &["run", &sweep, "--set", &set, "-o", "thread", "--cache", "third", "-j", "1"]);
+    run_json(here, &["run", &sweep, "--set", &set, "-o", "thread", "--cache", "third", "-j", "1"]);
     for name in ["summary.csv", "summary.parquet", "summary.h5"] {
         assert!(bytes("orders", name) == bytes("thread", name), "{name} differs");
     }
@@ -114,7 +114,7 @@ fn one_bad_point_stops_no_other() {
     census(here, "records.files = [[\"b/*.h5\"], [\"a/*.h5\"]]\n\"census.min_bandwidth_share\" = [0.02, 0.05]\n");
     std::fs::create_dir_all(here.join("out/point_00004.h5")).expect("a folder in the way");
     std::fs::write(here.join("out/point_00003.h5"), "notes of somebody").expect("a file in the way");
-    let (code, all, errors) = told(here, &RUN);
+    let (code, all, errors) = run_json(here, &RUN);
     assert_eq!((code, &all["failed"], all["points"].as_array().map(Vec::len)), (3, &4.into(), Some(4)), "{errors}");
     assert!(errors.contains("4 of 4 points failed"), "{errors}");
     let error = |point: usize| all["points"][point]["error"].as_str().unwrap_or_default().to_owned();
@@ -125,7 +125,7 @@ fn one_bad_point_stops_no_other() {
     assert_eq!(kept, "notes of somebody");
     std::fs::remove_file(here.join("out/point_00003.h5")).expect("the notes");
 
-    let (code, all, _) = told(here, &RUN);
+    let (code, all, _) = run_json(here, &RUN);
     assert_eq!((code, &all["failed"], &all["ran"]), (3, &3.into(), &4.into()), "what failed is tried again");
     assert_eq!(all["points"][2]["values"]["records.files"], serde_json::json!(["a/*.h5"]));
     assert_eq!(all["points"][2]["file"], "out/point_00003.h5");
@@ -157,7 +157,7 @@ fn commands_for_one_set_of_parameters_say_so_and_the_others_count_points() {
     assert_eq!(before.lines().filter(|line| line.starts_with("census ")).count(), 4, "{before}");
     assert!(before.lines().any(|line| line.starts_with("records  all ")), "{before}");
     // the second of the swept parameters as an argument: two points are left
-    let (code, all, _) = told(here, &[&RUN[..], &set[..2]].concat());
+    let (code, all, _) = run_json(here, &[&RUN[..], &set[..2]].concat());
     assert_eq!((code, all["points"].as_array().map(Vec::len)), (0, Some(2)));
     let after: Value = serde_json::from_str(&afmid(here, &[&explain[..], &["--json"]].concat())).expect("JSON");
     let would: Vec<(&str, &Value)> = after["stages"]
@@ -176,7 +176,7 @@ fn commands_for_one_set_of_parameters_say_so_and_the_others_count_points() {
 }
 
 #[test]
-fn what_is_wrong_with_a_value_is_told_at_its_place_before_anything_runs() {
+fn what_is_wrong_with_a_value_is_reported_at_its_place_before_anything_runs() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
     census(

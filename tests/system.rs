@@ -22,7 +22,8 @@ fn data(scratch: &Path, name: &str, write: fn(&Path)) -> (PathBuf, bool) {
     (path, true)
 }
 
-/// Samples of `q'' + 0.1 w q' + w^2 (q + k3 q^3) + w c q^2 q' = w^2 u(t)` by 40 semi-implicit Euler steps each, u continuous.
+/// Samples of `q'' + 0.1 w q' + w^2 (q + k3 q^3) + w c q^2 q' = w^2 u(t)` by 40 semi-implicit Euler steps each, u
+/// continuous.
 fn oscillator(path: &Path, samples: usize, interval_s: f64, start: f64, k3: f64, c: f64, input: impl Fn(f64) -> f64) {
     let omega = TAU * 0.1 / interval_s;
     let (mut q, mut v, mut text) = (start, 0.0, "V1,V2\n".to_owned());

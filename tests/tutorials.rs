@@ -59,7 +59,7 @@ fn every_command_of_the_tutorials_runs() {
             let output = shell.output().expect("sh starts");
             assert!(output.status.success(), "{}: {line}\n{}", page.display(), String::from_utf8_lossy(&output.stderr));
             let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
-            told(&line, &stdout);
+            assert_promised(&line, &stdout);
             count += 1;
         }
     }
@@ -67,7 +67,7 @@ fn every_command_of_the_tutorials_runs() {
 }
 
 /// What the text promises of a command's output.
-fn told(line: &str, stdout: &str) {
+fn assert_promised(line: &str, stdout: &str) {
     let promised = match line {
         "afmid show results/diagnosis.h5 diagnosis --json" => ["\"named\"", "quadratic-detector"],
         "afmid show results/without.h5 diagnosis" => ["unexplained", "nearest"],

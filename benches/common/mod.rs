@@ -1,7 +1,8 @@
 //! Inputs of the kernels' benches: the paper's lever, released, in closed form.
 //!
-//! `H(s) = sum_n g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) * prod_i w_i / (s + w_i)`. A load held before t0 and gone after it gives
-//! `y(t) = -load sum_p (R_p / p) exp(p (t - t0))` after t0, with `R_p` the residue of H at the pole p: a sum of damped oscillations.
+//! `H(s) = sum_n g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) * prod_i w_i / (s + w_i)`. A load held before t0 and gone after
+//! it gives `y(t) = -load sum_p (R_p / p) exp(p (t - t0))` after t0, with `R_p` the residue of H at the pole p: a sum
+//! of damped oscillations.
 
 use std::f64::consts::TAU;
 

@@ -45,10 +45,10 @@ def vector_fit(inputs, parameters, context):
     use = np.isfinite(g) & (f > 0)
     network = skrf.Network(f=f[use], f_unit="Hz", s=g[use].reshape(-1, 1, 1), z0=50.0)
     fit = skrf.vectorFitting.VectorFitting(network)
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         fit.vector_fit(n_poles_real=parameters["real_poles"], n_poles_cmplx=parameters["modes"], fit_constant=True)
-    for text in dict.fromkeys(str(one.message) for one in told):
+    for text in dict.fromkeys(str(one.message) for one in caught):
         context.warn(text)
     pairs = sorted((p for p in fit.poles if p.imag > 0), key=abs)
     if not pairs:

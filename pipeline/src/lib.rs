@@ -1,12 +1,12 @@
-//! The engine of afmid: stages with typed ports, TOML configs, a checked graph, a parallel runner, a content-addressed cache
-//! and an HDF5 store. It knows no physics.
+//! The engine of afmid: stages with typed ports, TOML configs, a checked graph, a parallel runner, a content-addressed
+//! cache and an HDF5 store. It knows no physics.
 //!
 //! ```text
 //! config (TOML) -> graph (checked) -> runner (rayon) -> cache (one artifact file per stage) -> result file (one HDF5)
 //! ```
 //!
-//! A stage is a parameter struct that implements [`Stage`]; [`Entry::of`] makes it a row of the [`Registry`]. What travels
-//! between stages is an [`Artifact`]: one of five shapes, whatever it means.
+//! A stage is a parameter struct that implements [`Stage`]; [`Entry::of`] makes it a row of the [`Registry`]. What
+//! travels between stages is an [`Artifact`]: one of five shapes, whatever it means.
 
 pub mod artifact;
 pub mod cache;

@@ -1,5 +1,5 @@
-//! Every file of the folder of real files loads with the values that its field's Python reader gives, or is refused with a reason. A new
-//! file without an expectation fails.
+//! Every file of the folder of real files loads with the values that its field's Python reader gives, or is refused
+//! with a reason. A new file without an expectation fails.
 
 use std::path::{Path, PathBuf};
 
@@ -16,8 +16,9 @@ enum Expected {
 }
 use Expected::{Channels, NoChannel, Refused};
 
-/// Sums: npTDMS 1.13.0 (`np.sum(channel[:], dtype=float)`), igor2 0.5.15, lvm_read, pyuff, SciFiReaders 0.12.7 (codes times the header's
-/// 0.000375 V), scipy 1.17.1 (`loadmat`), h5py (MATLAB 7.3): the tests of each format have more of each file.
+/// Sums: npTDMS 1.13.0 (`np.sum(channel[:], dtype=float)`), igor2 0.5.15, lvm_read, pyuff, SciFiReaders 0.12.7 (codes
+/// times the header's 0.000375 V), scipy 1.17.1 (`loadmat`), h5py (MATLAB 7.3): the tests of each format have more of
+/// each file.
 const FILES: &[(&str, Expected)] = &[
     (
         "ibw/IgorIBWReader_ForceCurve.ibw",
@@ -201,7 +202,8 @@ fn check(name: &str, path: &Path, expected: &Expected) {
                 let raw = channel.source.read(0, *samples).unwrap();
                 raw.scale_into(channel.scale_factor, channel.add_offset, &mut values);
                 let magnitudes: f64 = values.iter().map(|value| value.abs()).sum();
-                // another order of summation, and a scale applied before or after it: n eps of the sum of magnitudes, twice
+                // another order of summation, and a scale applied before or after it: n eps of the sum of magnitudes,
+                // twice
                 let tolerance = 2.0 * (*samples as f64) * f64::EPSILON * magnitudes;
                 let found: f64 = values.iter().sum();
                 assert!((found - sum).abs() <= tolerance, "{name} {location}: {found} instead of {sum}");

@@ -51,7 +51,8 @@ pub struct ModeFound {
     pub static_share_std: Option<f64>,
 }
 
-/// Collects from the summaries of all stages; of several that list modes the one called `modes` counts, or else the last.
+/// Collects from the summaries of all stages; of several that list modes the one called `modes` counts, or else the
+/// last.
 pub fn harvest(run: &RunResult) -> Harvest {
     let summaries: Vec<(&StageRecord, &Value)> =
         run.stages.iter().filter_map(|stage| Some((stage, summary(stage)?))).collect();

@@ -76,7 +76,8 @@ impl Ledger {
         self.folder.join("ledger").join(format!("{name}.json"))
     }
 
-    /// What became of a data set; none if nothing is known, or what is there is damaged or of another layout: then it is run again.
+    /// What became of a data set; none if nothing is known, or what is there is damaged or of another layout: then it
+    /// is run again.
     pub fn read(&self, name: &str) -> Option<Entry> {
         let entry: Entry = serde_json::from_slice(&read_regular(&self.place(name), MOST_BYTES).ok()?).ok()?;
         (entry.version == VERSION && entry.name == name).then_some(entry)
@@ -92,10 +93,12 @@ impl Ledger {
         replace_with(&place, |temporary| std::fs::write(temporary, &text)).map_err(|error| error.to_string())
     }
 
-    /// Keeps that a run went through, with the length of the result file as it lies there now. Errors: as [`Self::write`]; there is no result file.
+    /// Keeps that a run went through, with the length of the result file as it lies there now. Errors: as
+    /// [`Self::write`]; there is no result file.
     ///
-    /// The same data set may have been run twice at once, and results of one content differ in length by what `/entry/run` says of the run: whoever
-    /// writes last here looks at the file after that, and one that replaces the file still later writes after it.
+    /// The same data set may have been run twice at once, and results of one content differ in length by what
+    /// `/entry/run` says of the run: the last writer here looks at the file after that, and one that replaces the file
+    /// still later writes after it.
     pub fn finish(&self, mut entry: Entry) -> Result<Entry, String> {
         let path = self.result(&entry.name);
         let length = || match std::fs::metadata(&path) {

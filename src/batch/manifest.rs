@@ -8,7 +8,8 @@ use super::dataset::{DataSet, absolute, check_name};
 
 const KEYS: [&str; 3] = ["name", "files", "set"];
 
-/// The data sets of a manifest, `{"name": "...", "files": ["..."], "set": {"stage.param": value}}` a line; empty lines are passed over.
+/// The data sets of a manifest, `{"name": "...", "files": ["..."], "set": {"stage.param": value}}` a line; empty lines
+/// are passed over.
 ///
 /// Errors: everything that is wrong with it, each with its line.
 pub fn read(file: &str, text: &str) -> Result<Vec<DataSet>, Vec<String>> {
@@ -88,7 +89,8 @@ mod tests {
 
     #[test]
     fn a_line_is_a_data_set() {
-        let text = "{\"name\": \"a\", \"files\": [\"/x/*.h5\"]}\n\n{\"name\": \"b\", \"files\": [\"/y\"], \"set\": {\"fit.order\": 9, \"r.f\": \"x\"}}";
+        let text = "{\"name\": \"a\", \"files\": [\"/x/*.h5\"]}\n\n\
+            {\"name\": \"b\", \"files\": [\"/y\"], \"set\": {\"fit.order\": 9, \"r.f\": \"x\"}}";
         let sets = read("m.jsonl", text).unwrap();
         assert_eq!(sets[0], DataSet { name: "a".into(), files: vec!["/x/*.h5".into()], set: vec![] });
         assert_eq!(sets[1].set, ["fit.order=9", "r.f=\"x\""]);
@@ -105,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn every_wrong_line_is_told() {
+    fn every_wrong_line_is_reported() {
         let text = [
             "{\"name\": \"a\", \"file\": []}",
             "7",

@@ -122,8 +122,8 @@ pub struct Jobs<'a> {
 }
 
 impl Jobs<'_> {
-    /// The script of a shard. Exit code 3, some data sets failed, is none of a failed task: it has done all that it had to, and would do the same
-    /// again; what failed is in the ledger, and the collecting job ends with 3.
+    /// The script of a shard. Exit code 3, some data sets failed, is none of a failed task: it has done all that it had
+    /// to, and would do the same again; what failed is in the ledger, and the collecting job ends with 3.
     pub fn array(&self) -> String {
         let tasks = ranges(self.filled);
         let what = format!("one task per shard of {} data sets", self.data_sets);
@@ -230,7 +230,7 @@ struct Log<'a> {
 }
 
 impl Log<'_> {
-    /// The folder, if Slurm can be told of it: a backslash stops all its patterns, a directive has one line.
+    /// The folder, if a directive for Slurm can name it: a backslash stops all its patterns, a directive has one line.
     fn folder(&self) -> Option<&str> {
         self.folder.to_str().filter(|folder| !folder.chars().any(|c| c.is_control() || c == '\\'))
     }
@@ -282,7 +282,8 @@ fn plain_name(name: &str) -> String {
     name.chars().map(keep).take(60).collect()
 }
 
-/// The number of a job in what `sbatch --parsable` prints: `12` or `12;cluster` in the last line; some sites print words of their own above.
+/// The number of a job in what `sbatch --parsable` prints: `12` or `12;cluster` in the last line; some sites print
+/// words of their own above.
 pub fn job_id(printed: &str) -> Option<String> {
     let last = printed.lines().map(str::trim).rfind(|line| !line.is_empty())?;
     let id = last.split(';').next()?;

@@ -80,7 +80,8 @@ pub struct Title<'a> {
 #[derive(Debug)]
 pub struct Tables {
     folder: FilledFolder,
-    /// Whether `summary.h5` is the table of an earlier run of the same kind: then the tables beside it are known, though earlier versions kept no list.
+    /// Whether `summary.h5` is the table of an earlier run of the same kind: then the tables beside it are known,
+    /// though earlier versions kept no list.
     earlier: bool,
 }
 
@@ -132,8 +133,8 @@ impl Tables {
         Ok(path)
     }
 
-    /// Writes `summary.csv`, `summary.parquet`, `trends.csv` and `summary.h5`, each whole or not at all: the same bytes from the same entries, whoever
-    /// computed them.
+    /// Writes `summary.csv`, `summary.parquet`, `trends.csv` and `summary.h5`, each whole or not at all: the same bytes
+    /// from the same entries, wherever they were computed.
     pub fn write_batch(&self, title: &Title<'_>, entries: &[Entry]) -> Result<PathBuf, Failure> {
         let (table, trends) = (table(entries), trends::table(entries));
         self.csv("summary.csv", &table)?;
@@ -192,8 +193,8 @@ fn result(title: &Title<'_>, uses: &str, outputs: Ports) -> RunResult {
     }
 }
 
-/// Comma-separated, a header line, unknown numbers empty, numbers to the last bit. Text that a spreadsheet would take for a formula gets an
-/// apostrophe before it.
+/// Comma-separated, a header line, unknown numbers empty, numbers to the last bit. Text that a spreadsheet would take
+/// for a formula gets an apostrophe before it.
 fn csv(path: &Path, table: &Table) -> std::io::Result<()> {
     let mut writer = csv::Writer::from_path(path).map_err(std::io::Error::other)?;
     let line =

@@ -24,7 +24,8 @@ const SAME_MODE: f64 = 1.25;
 /// Seconds of a Julian year.
 const YEAR_S: f64 = 365.25 * 86400.0;
 
-/// Weighted regression; none with fewer than three points, or all at one time. Points are (years, value, standard error).
+/// Weighted regression; none with fewer than three points, or all at one time. Points are (years, value, standard
+/// error).
 ///
 /// Source: P. R. Bevington, D. K. Robinson, Data Reduction and Error Analysis, 3rd ed. 2003, section 6.3.
 pub fn trend(points: &[(f64, f64, f64)]) -> Option<Trend> {
@@ -52,10 +53,11 @@ pub fn trend(points: &[(f64, f64, f64)]) -> Option<Trend> {
     })
 }
 
-/// How far a value lies from the line through all others, in standard deviations of such a distance, which widen as the others scatter; NaN where they are too few for
-/// a line. An outlier does not widen its own.
+/// How far a value lies from the line through all others, in standard deviations of such a distance, which widen as the
+/// others scatter; NaN where they are too few for a line. An outlier does not widen its own.
 ///
-/// Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, 1982, section 2.2 (externally studentised residuals).
+/// Source: R. D. Cook, S. Weisberg, Residuals and Influence in Regression, 1982, section 2.2 (externally studentised
+/// residuals).
 fn off(points: &[(f64, f64, f64)], index: usize) -> f64 {
     let Some(&(years, value, std)) = points.get(index) else { return f64::NAN };
     let others = [&points[..index], &points[index + 1..]].concat();
@@ -87,8 +89,8 @@ struct Quantity<'a> {
 
 /// Frequencies, quality factors and spring constants of all data sets that say when they were recorded.
 ///
-/// Modes are matched by frequency: those of the set with most modes (the first of them by name) are the reference, and a mode of another set is the reference's nearest,
-/// if it is within a quarter of it and no nearer one is.
+/// Modes are matched by frequency: those of the set with most modes (the first of them by name) are the reference, and
+/// a mode of another set is the reference's nearest, if it is within a quarter of it and no nearer one is.
 fn quantities<'a>(entries: &'a [Entry]) -> Vec<Quantity<'a>> {
     let timed: Vec<(f64, &'a Entry)> = entries.iter().filter_map(|entry| Some((years(entry)?, entry))).collect();
     let quantity = |name: String, unit: &'static str, of: &dyn Fn(&Entry) -> Option<(f64, f64)>| {

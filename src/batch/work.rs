@@ -31,7 +31,8 @@ pub struct Work<'a> {
     pub fresh: bool,
     /// Run what failed once more.
     pub retry_failed: bool,
-    /// As `afmid run` would: a result states the config and the arguments as they are now, and stages that write files have written them.
+    /// As `afmid run` would: a result states the config and the arguments as they are now, and stages that write files
+    /// have written them.
     pub as_run: bool,
 }
 
@@ -54,7 +55,7 @@ impl Work<'_> {
         let RunKey { key, sources } = match self.key(plan) {
             Ok(known) if self.as_run => RunKey { key: stated(&known.key, plan), ..known },
             Ok(known) => known,
-            Err(error) => return self.kept(Entry::failed(name, None, told(&[error])), clock, (0, 0)),
+            Err(error) => return self.kept(Entry::failed(name, None, errors_text(&[error])), clock, (0, 0)),
         };
         let again = self.fresh || self.as_run && !writers(plan, base, Path::new("")).is_empty();
         if let Some(entry) = self.ledger.read(name).filter(|entry| entry.key.as_deref() == Some(&key) && !again)
@@ -80,12 +81,13 @@ impl Work<'_> {
         run_key(plan, &Surroundings { base, program, arithmetic: "", files })
     }
 
-    /// What the ledger has of a data set, without running anything: what is no longer what would be run counts as failed, as does what was never run.
+    /// What the ledger has of a data set, without running anything: what is no longer what would be run counts as
+    /// failed, as does what was never run.
     pub fn found(&self, name: &str, plan: &Plan) -> Done {
         let failed = |why: &str| Entry::failed(name, None, why.to_owned());
         let entry = match (self.key(plan), self.ledger.read(name)) {
             (_, None) => failed("no run of it has ended"),
-            (Err(error), Some(_)) => Entry::failed(name, None, told(&[error])),
+            (Err(error), Some(_)) => Entry::failed(name, None, errors_text(&[error])),
             (Ok(known), Some(entry)) if entry.key.as_ref().is_some_and(|own| *own != known.key) => {
                 failed("its records, the config or the program have changed since its last run: run the batch again")
             }
@@ -97,7 +99,8 @@ impl Work<'_> {
         Done { entry, took: None, stages: (0, 0) }
     }
 
-    /// The same run, if it went through meanwhile in another process: one that failed here, for want of memory or disk, takes nothing back.
+    /// The same run, if it went through meanwhile in another process: one that failed here, for want of memory or disk,
+    /// takes nothing back.
     fn elsewhere(&self, name: &str, key: &str) -> Option<Entry> {
         self.ledger
             .read(name)
@@ -125,7 +128,7 @@ impl Work<'_> {
             observer: &Silent,
         };
         let result = run_to_file(plan, &options, &path).map_err(|failed| match failed {
-            Failed::Stages(errors) => told(&errors),
+            Failed::Stages(errors) => errors_text(&errors),
             Failed::File(error) => error.to_string(),
         })?;
         // the key was made before the run: it is the run's only if both read the same files
@@ -152,8 +155,8 @@ impl Work<'_> {
     }
 }
 
-/// Does all of them, or those before an interruption, at most `threads` at once whatever their number, each on the present rayon pool; `watch` is told of every end.
-/// The order of what comes back is that of `sets`.
+/// Does all of them, or those before an interruption, at most `threads` at once whatever their number, each on the
+/// present rayon pool; `watch` is called at every end. The order of what comes back is that of `sets`.
 pub fn all<T: Sync>(
     sets: &[T],
     threads: usize,
@@ -186,7 +189,8 @@ pub fn all<T: Sync>(
 
 /// What lies where a result is going to be written and must stay; none if nothing does.
 pub fn in_the_way(path: &Path) -> Option<String> {
-    // what is not there, or cannot be read, is for the writer to complain about; an empty file holds nothing that could be lost
+    // what is not there, or cannot be read, is for the writer to complain about; an empty file holds nothing that could
+    // be lost
     match written(path).ok()? {
         Written::AsWritten | Written::CutShort | Written::Other(FileKind::Empty) => None,
         Written::Changed => Some("was changed since afmid wrote it".to_owned()),
@@ -204,7 +208,7 @@ fn stated(key: &str, plan: &Plan) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-fn told(errors: &[RunError]) -> String {
+fn errors_text(errors: &[RunError]) -> String {
     let one = |error: &RunError| match &error.error.help {
         Some(help) => format!("{error} (help: {help})"),
         None => error.to_string(),

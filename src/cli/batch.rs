@@ -46,7 +46,8 @@ pub struct BatchArgs {
     /// Run data sets again that failed, though nothing has changed.
     #[arg(long)]
     pub retry_failed: bool,
-    /// Run nothing: make the summary from what the ledger holds of these data sets; what has changed since its run counts as failed.
+    /// Run nothing: make the summary from what the ledger holds of these data sets; what has changed since its run
+    /// counts as failed.
     #[arg(long, conflicts_with_all = ["shard", "fresh", "retry_failed"])]
     pub collect: bool,
     /// Whether plugins may start.

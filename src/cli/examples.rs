@@ -46,7 +46,13 @@ faults, submit again: what is finished is not run again.",
     },
     help(&["submit"], &["afmid submit slurm ringdown.toml --manifest levers.jsonl --shards 8 -o results"]),
     help(&["new"], &["afmid new pipeline archive/2004", "afmid new stage end_noise --python"]),
-    help(&["new", "stage"], &["afmid new stage end_noise --python", "afmid new stage end_noise --rust --sources ../afmid -o end-noise"]),
+    help(
+        &["new", "stage"],
+        &[
+            "afmid new stage end_noise --python",
+            "afmid new stage end_noise --rust --sources ../afmid -o end-noise",
+        ],
+    ),
     help(
         &["new", "pipeline"],
         &[
@@ -54,7 +60,13 @@ faults, submit again: what is finished is not run again.",
             "afmid new pipeline recordings --goal ringdown --channel '/Group 1/deflection' --rate 5e6 --unit V",
         ],
     ),
-    help(&["check"], &["afmid check configs/paper.toml configs/ringdown.toml", "afmid check configs/paper.toml --json"]),
+    help(
+        &["check"],
+        &[
+            "afmid check configs/paper.toml configs/ringdown.toml",
+            "afmid check configs/paper.toml --json",
+        ],
+    ),
     help(&["graph"], &["afmid graph configs/paper.toml", "afmid graph configs/paper.toml --format mermaid"]),
     help(&["explain"], &["afmid explain configs/paper.toml --set model.order=9"]),
     help(&["inspect"], &["afmid inspect archive/record_0001.tdms", "afmid inspect archive --json"]),
@@ -62,8 +74,19 @@ faults, submit again: what is finished is not run again.",
     help(&["diff"], &["afmid diff monday.h5 tuesday.h5", "afmid diff monday.h5 tuesday.h5 --exit-code"]),
     help(&["trace"], &["afmid trace paper.h5 'modes.modes[0].frequency_hz'"]),
     help(&["rerun"], &["afmid rerun paper.h5", "afmid rerun paper.h5 --data /mnt/archive -o again.h5"]),
-    help(&["export"], &["afmid export paper.h5 --model mat", "afmid export paper.h5 --model json --stage model -o lever.json"]),
-    help(&["export-crate"], &["afmid export-crate paper.h5 -o paper-crate --with-data --license https://creativecommons.org/licenses/by/4.0/"]),
+    help(
+        &["export"],
+        &[
+            "afmid export paper.h5 --model mat",
+            "afmid export paper.h5 --model json --stage model -o lever.json",
+        ],
+    ),
+    help(
+        &["export-crate"],
+        &[
+            "afmid export-crate paper.h5 -o paper-crate --with-data --license https://creativecommons.org/licenses/by/4.0/",
+        ],
+    ),
     help(&["gc"], &["afmid gc --dry-run --older-than 30d", "afmid gc --max-size 20G"]),
     help(&["report"], &["afmid report paper.h5 -o paper.html", "afmid report paper.h5 --figures figures --png"]),
     Help {
@@ -75,10 +98,22 @@ its command with all arguments and variables, and the bytes of the program and o
 `afmid/trust` in $XDG_DATA_HOME or ~/.local/share, and ends when one of these changes. --allow-plugins starts them once without it.",
     },
     help(&["plugin"], &["afmid plugin check -- python3 savgol.py"]),
-    help(&["plugin", "check"], &["afmid plugin check -- python3 savgol.py", "afmid plugin check --timeout 300 --json -- octave-cli --quiet envelope.m"]),
+    help(
+        &["plugin", "check"],
+        &[
+            "afmid plugin check -- python3 savgol.py",
+            "afmid plugin check --timeout 300 --json -- octave-cli --quiet envelope.m",
+        ],
+    ),
     help(&["stages"], &["afmid stages", "afmid stages model.pem", "afmid stages model.pem --json"]),
     help(&["causes"], &["afmid causes", "afmid causes finite-rupture"]),
-    help(&["exam"], &["afmid exam configs/diagnose.toml --seeds 20", "afmid exam configs/diagnose.toml --only clean --seeds 100 --json"]),
+    help(
+        &["exam"],
+        &[
+            "afmid exam configs/diagnose.toml --seeds 20",
+            "afmid exam configs/diagnose.toml --only clean --seeds 100 --json",
+        ],
+    ),
     help(&["schema"], &["afmid schema"]),
     help(&["doctor"], &["afmid doctor", "afmid doctor --cache /scratch/afmid --json"]),
     help(&["completions"], &["afmid completions bash", "afmid completions zsh"]),

@@ -55,7 +55,8 @@ pub struct NewPipelineArgs {
     /// What to find.
     #[arg(long, value_enum, default_value = "modes")]
     pub goal: Goal,
-    /// The deflection signal, as `afmid inspect` names it [default: the channel that can carry a ringdown and is named most like a deflection].
+    /// The deflection signal, as `afmid inspect` names it [default: the channel that can carry a ringdown and is named
+    /// most like a deflection].
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
     /// Samples per second in Hz, of files that state none.
@@ -64,7 +65,8 @@ pub struct NewPipelineArgs {
     /// Unit of the signal, of files that state none.
     #[arg(long, value_name = "UNIT")]
     pub unit: Option<String>,
-    /// The config [default: the goal's name with `.toml`, in the working directory]; a file that is there is left alone.
+    /// The config [default: the goal's name with `.toml`, in the working directory]; a file that is there is left
+    /// alone.
     #[arg(short, long, value_name = "CONFIG.toml")]
     pub output: Option<PathBuf>,
     /// What was written, as JSON, alone on stdout.

@@ -7,7 +7,8 @@ use clap::{Args, Subcommand};
 /// What to do with a plugin.
 #[derive(Debug, Subcommand)]
 pub enum PluginCommand {
-    /// Try whether a command is a plugin as docs/plugins.md has it: exit code 0 if everything passed, 1 if not. The command is started.
+    /// Try whether a command is a plugin as docs/plugins.md has it: exit code 0 if everything passed, 1 if not. The
+    /// command is started.
     Check {
         /// How long one request may take, in seconds.
         #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds)]
@@ -30,7 +31,8 @@ fn seconds(text: &str) -> Result<f64, String> {
 /// Whether plugins may start.
 #[derive(Debug, Default, Args)]
 pub struct AllowArgs {
-    /// Start the plugins of the config, this once; without it only those that `afmid trust CONFIG` has listed and remembered.
+    /// Start the plugins of the config, this once; without it only those that `afmid trust CONFIG` has listed and
+    /// remembered.
     #[arg(long)]
     pub allow_plugins: bool,
 }

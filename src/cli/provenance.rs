@@ -11,7 +11,7 @@ use super::{AllowArgs, threads};
 /// What to compare.
 #[derive(Debug, Args)]
 pub struct DiffArgs {
-    /// The first result file: differences are told in its standard errors.
+    /// The first result file: differences are given in its standard errors.
     #[arg(value_name = "A.h5")]
     pub a: PathBuf,
     /// The second.
@@ -30,7 +30,8 @@ pub struct DiffArgs {
 pub struct TraceArgs {
     /// The result file.
     pub result: PathBuf,
-    /// The number: the stage's id, then its place in what `afmid show RESULT ID --json` prints, such as `modes[0].frequency_hz`.
+    /// The number: the stage's id, then its place in what `afmid show RESULT ID --json` prints, such as
+    /// `modes[0].frequency_hz`.
     #[arg(value_name = "ID.PATH")]
     pub path: String,
     /// As JSON, alone on stdout.
@@ -103,7 +104,8 @@ pub struct GcArgs {
     /// Remove what has not been used for longer, such as `30d` (s, m, h, d or w).
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub older_than: Option<Duration>,
-    /// Remove the least recently used results until the rest is at most this large, such as `20G` (k, M, G, T, or Ki, Mi, Gi, Ti).
+    /// Remove the least recently used results until the rest is at most this large, such as `20G` (k, M, G, T, or Ki,
+    /// Mi, Gi, Ti).
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub max_size: Option<u64>,
     /// Remove nothing, say what would go.

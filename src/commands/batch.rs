@@ -33,19 +33,23 @@ pub fn run(args: &BatchArgs, stages: &dyn Stages) -> Result<(), Failure> {
     let whole = whole(&args.config, stages)?;
     let folder = args.output.clone().unwrap_or_else(|| default_output(whole.name()).with_extension(""));
     let ledger = ledger(&folder)?;
-    // a shard writes none: whoever collects does
+    // a shard writes none: the run with `--collect` does
     let tables = args.shard.is_none().then(|| Tables::open(&folder, BATCH)).transpose()?;
     let own = |set: &&DataSet| args.shard.is_none_or(|shard| shard.holds(&set.name));
     let done = computed(args, &planned(&args.config, sets.iter().filter(own), stages)?, &ledger)?;
     let entries: Vec<Entry> = done.iter().map(|done| done.entry.clone()).collect();
     let title = Title { name: whole.name(), seed: whole.seed(), config: whole.config_text(), program: PROGRAM };
     let table = tables.map(|tables| tables.write_batch(&title, &entries)).transpose()?;
-    print(&told(args.json, &folder, &done, table.as_deref(), clock)?)?;
+    print(&summary(args.json, &folder, &done, table.as_deref(), clock)?)?;
     match entries.iter().filter(|entry| !entry.is_done()).count() {
         0 => Ok(()),
         failed => Err(Failure::Partly(Message::Line(
             format!("{failed} of {} data sets failed", entries.len()),
-            Some("what is wrong with each stands above and in `ledger`; those that changed are run by the next batch, the others with --retry-failed".to_owned()),
+            Some(
+                "what is wrong with each stands above and in `ledger`; those that changed are run by the next batch, \
+                the others with --retry-failed"
+                    .to_owned(),
+            ),
         ))),
     }
 }
@@ -146,7 +150,7 @@ fn computed(args: &BatchArgs, sets: &[(&DataSet, Plan)], ledger: &Ledger) -> Res
     Ok(done)
 }
 
-fn told(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock: Instant) -> Result<String, Failure> {
+fn summary(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock: Instant) -> Result<String, Failure> {
     let failed: Vec<&Entry> = done.iter().map(|done| &done.entry).filter(|entry| !entry.is_done()).collect();
     let ran = done.iter().filter(|done| done.took.is_some()).count();
     if json {

@@ -18,7 +18,7 @@ use crate::show::pretty;
 /// Checks every config before it gives up.
 pub fn run(configs: &[PathBuf], as_json: bool, stages: &dyn Stages) -> Result<(), Failure> {
     if as_json {
-        return told(configs, stages);
+        return run_as_json(configs, stages);
     }
     let (mut wrong, mut printed) = (0, Ok(()));
     for config in configs {
@@ -29,7 +29,8 @@ pub fn run(configs: &[PathBuf], as_json: bool, stages: &dyn Stages) -> Result<()
                     plan.points().map(|count| format!(", every point of a sweep of {count}")).unwrap_or_default();
                 let right = format!("{}: right, {} stages{points}\n", shown(config), plan.nodes.len());
                 printed = print(&(right + &not_checked(&plan)));
-                // the process ends soon: of a hundred thousand stages, freeing each takes longer than giving all of it back
+                // the process ends soon: of a hundred thousand stages, freeing each takes longer than giving all of it
+                // back
                 std::mem::forget(plan);
             }
             Ok(_) => {}
@@ -43,7 +44,7 @@ pub fn run(configs: &[PathBuf], as_json: bool, stages: &dyn Stages) -> Result<()
 }
 
 /// The verdict on all configs as JSON. Errors: a config is wrong, which is said on stdout; one cannot be read.
-fn told(configs: &[PathBuf], stages: &dyn Stages) -> Result<(), Failure> {
+fn run_as_json(configs: &[PathBuf], stages: &dyn Stages) -> Result<(), Failure> {
     let (mut all, mut wrong) = (Vec::new(), false);
     for config in configs {
         let text = read(config)?;
@@ -53,8 +54,14 @@ fn told(configs: &[PathBuf], stages: &dyn Stages) -> Result<(), Failure> {
             Ok(plan) => right(config, &plan),
             Err(problems) => {
                 let more = problems.len().saturating_sub(MOST_PROBLEMS);
-                let told: Vec<Value> = problems.iter().take(MOST_PROBLEMS).map(|one| problem(&text, one)).collect();
-                json!({ "config": config.display().to_string(), "right": false, "ports_not_checked": [], "problems": told, "more_problems": more })
+                let listed: Vec<Value> = problems.iter().take(MOST_PROBLEMS).map(|one| problem(&text, one)).collect();
+                json!({
+                    "config": config.display().to_string(),
+                    "right": false,
+                    "ports_not_checked": [],
+                    "problems": listed,
+                    "more_problems": more,
+                })
             }
         });
     }

@@ -29,8 +29,9 @@ fn starting(rule: Rule) -> Plugins {
     Plugins::new(rule, trust()).hosted(Host::this_program())
 }
 
-/// For commands that may start plugins: all of them with `--allow-plugins`, else those that are trusted, whose seals are in the file `agreed`, or that
-/// somebody who sits before a terminal says yes to. Errors, usage: the file cannot be read.
+/// For commands that may start plugins: all of them with `--allow-plugins`, else those that are trusted, whose seals
+/// are in the file `agreed`, or that somebody who sits before a terminal says yes to. Errors, usage: the file cannot be
+/// read.
 pub fn plugins(allow: &AllowArgs, agreed: Option<&Path>) -> Result<Plugins, Failure> {
     if allow.allow_plugins {
         return Ok(all());
@@ -48,7 +49,10 @@ pub fn end(plugins: &Plugins) -> Result<(), Failure> {
     if wrong.is_empty() {
         return Ok(());
     }
-    let help = "stdout of a plugin is for the protocol alone: mend it, what it made may be wrong; `afmid plugin check` tries it".to_owned();
+    let help =
+        "stdout of a plugin is for the protocol alone: mend it, what it made may be wrong; `afmid plugin check` \
+        tries it"
+            .to_owned();
     Err(Failure::failed(wrong.join("; "), Some(help)))
 }
 
@@ -64,7 +68,8 @@ pub fn agreed(allow: &AllowArgs, config: &Config) -> Result<Vec<Candidate>, Fail
             let message = format!("the plugin `{}` is not agreed to:", candidate.name());
             let list = listing(candidate).lines().map(str::to_owned).collect();
             let help = format!(
-                "`afmid trust {}` lists what its plugins would run, and remembers that you agree; `--allow-plugins` allows it for this submission",
+                "`afmid trust {}` lists what its plugins would run, and remembers that you agree; `--allow-plugins` \
+                 allows it for this submission",
                 quoted(&config.file)
             );
             Err(Failure::Usage(Message::Listed(message, list, Some(help))))
@@ -125,9 +130,9 @@ pub fn listing(candidate: &Candidate) -> String {
 }
 
 fn question(candidate: &Candidate) -> bool {
-    let told = listing(candidate);
+    let listing = listing(candidate);
     say(&format!(
-        "{told}Start it, now and as long as nothing of this changes? What its files import is not seen. [y/N] "
+        "{listing}Start it, now and as long as nothing of this changes? What its files import is not seen. [y/N] "
     ));
     let mut answer = String::new();
     let read = std::io::stdin().read_line(&mut answer);

@@ -63,8 +63,8 @@ const TUTORIALS: [(&str, &str); 4] = [
 const MOST_BYTES: u64 = 64 << 20;
 
 /// Writes `FOLDER/stages/*.md`, `FOLDER/causes/*.md`, `FOLDER/SUMMARY.md` and `FOLDER/pipeline.schema.json`, or says
-/// what would change. What was written is in the folder's list of files: nothing else is replaced. Pages of what is gone
-/// are removed if they are as they were written.
+/// what would change. What was written is in the folder's list of files: nothing else is replaced. Pages of what is
+/// gone are removed if they are as they were written.
 pub fn run(folder: &Path, check: bool, registry: &Registry) -> Result<(), Failure> {
     update(folder, check, &wanted(registry)?)
 }
@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(fs::read_to_string(at("stages/a.md")).unwrap(), "page stages/a.md");
         fs::write(at("SUMMARY.md"), "mine").unwrap();
         fs::remove_file(at("causes/b.md")).unwrap();
-        let (text, _) = update(false).unwrap_err().told();
+        let (text, _) = update(false).unwrap_err().text_and_code();
         assert!(text.contains("SUMMARY.md") && text.contains("not replaced"), "{text}");
         assert_eq!(fs::read(at("SUMMARY.md")).unwrap(), b"mine");
         assert!(!at("causes/b.md").exists(), "nothing is written where one file is another's");

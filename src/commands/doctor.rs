@@ -42,6 +42,13 @@ fn as_text(findings: &[Finding]) -> String {
 }
 
 fn as_json(findings: &[Finding]) -> Value {
-    let one = |finding: &Finding| json!({ "what": finding.what, "state": finding.state.name(), "found": finding.found, "help": finding.help });
+    let one = |finding: &Finding| {
+        json!({
+            "what": finding.what,
+            "state": finding.state.name(),
+            "found": finding.found,
+            "help": finding.help,
+        })
+    };
     json!({ "findings": findings.iter().map(one).collect::<Vec<_>>() })
 }

@@ -1,5 +1,5 @@
-//! What commands say of files and texts of others, as functions without arguments, processes or a terminal: the doors of the fuzz targets and of the
-//! replay of their corpus. Nothing else calls them.
+//! What commands say of files and texts of others, as functions without arguments, processes or a terminal: the doors
+//! of the fuzz targets and of the replay of their corpus. Nothing else calls them.
 
 use std::path::Path;
 
@@ -23,7 +23,8 @@ use crate::show::{overview_json, overview_text, pretty, stage_json};
 
 const CONFIG: &str = "config.toml";
 
-/// All that `check` and `graph` say of a config with `--set` arguments, for people and for scripts. A registry starts no process.
+/// All that `check` and `graph` say of a config with `--set` arguments, for people and for scripts. A registry starts
+/// no process.
 pub fn say_of_config(text: &str, set: &[String], registry: &Registry) -> String {
     let problems = match graph::load(CONFIG, text, set, registry) {
         Ok(plan) => {
@@ -34,8 +35,8 @@ pub fn say_of_config(text: &str, set: &[String], registry: &Registry) -> String 
         }
         Err(problems) => problems,
     };
-    let told: Vec<Value> = problems.iter().map(|problem| check::problem(text, problem)).collect();
-    render(CONFIG, text, &problems) + &Value::Array(told).to_string()
+    let listed: Vec<Value> = problems.iter().map(|problem| check::problem(text, problem)).collect();
+    render(CONFIG, text, &problems) + &Value::Array(listed).to_string()
 }
 
 /// All that `inspect` says of a file, for people and for scripts.

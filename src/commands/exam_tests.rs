@@ -84,7 +84,7 @@ fn who_always_says_clean_passes_with_clean_archives_alone() {
     let hidden = exam(CONFIG, 1, Some(ExamKind::One)).unwrap();
     assert_eq!((hidden.archives, hidden.failed), (1, 0));
     assert!(!hidden.judged[0].right && hidden.judged[0].said.verdict == "clean");
-    // left out: the stage has been told
+    // left out: the stage's parameters say so
     let left_out = exam(CONFIG, 1, Some(ExamKind::LeftOut)).unwrap();
     assert_eq!((left_out.left_out.hits, left_out.left_out.of), (1, 1));
 }

@@ -17,7 +17,7 @@ use crate::printable::one_line;
 use crate::show::{change_json, change_text, grid, pretty};
 use crate::sweep::point;
 
-/// Changes that are told of one stage; `--json` has all.
+/// Changes that are listed for one stage; `--json` has all.
 const MOST: usize = 8;
 
 /// Says on stdout what a run would do with each stage.
@@ -45,7 +45,8 @@ fn unseen(plan: &Plan) -> String {
 }
 
 /// What keys of plugins do not see.
-const UNSEEN: &str = "the key holds its program, all arguments, the variables of [plugins] and the files among them; what these import is not seen";
+const UNSEEN: &str = "the key holds its program, all arguments, the variables of [plugins] and the files among them; \
+    what these import is not seen";
 
 fn is_plugin(uses: &str) -> bool {
     uses.starts_with("exec:")
@@ -126,11 +127,11 @@ fn ranges(points: &[usize], count: usize) -> String {
             None => runs.push((point, point)),
         }
     }
-    let told = |(first, last): &(usize, usize)| match first == last {
+    let range = |(first, last): &(usize, usize)| match first == last {
         true => format!("{}", first + 1),
         false => format!("{}-{}", first + 1, last + 1),
     };
-    runs.iter().map(told).collect::<Vec<_>>().join(", ")
+    runs.iter().map(range).collect::<Vec<_>>().join(", ")
 }
 
 /// A row per reason.
@@ -155,13 +156,13 @@ fn reasons(row: &Explanation) -> Vec<String> {
         (Decision::Run, None) => return vec!["no earlier result of this stage is in the cache".to_owned()],
         (Decision::Run, Some(nearest)) => nearest,
     };
-    let mut told: Vec<String> = nearest.changes.iter().take(MOST).map(change_text).collect();
+    let mut reasons: Vec<String> = nearest.changes.iter().take(MOST).map(change_text).collect();
     match nearest.changes.len() {
-        0 => told.push("its result is gone from the cache".to_owned()),
-        all if all > MOST => told.push(format!("and {} more: see --json", all - MOST)),
+        0 => reasons.push("its result is gone from the cache".to_owned()),
+        all if all > MOST => reasons.push(format!("and {} more: see --json", all - MOST)),
         _ => {}
     }
-    told
+    reasons
 }
 
 fn as_json(row: &Explanation) -> Value {
@@ -192,7 +193,7 @@ mod tests {
     use super::ranges;
 
     #[test]
-    fn points_are_told_as_ranges_from_one() {
+    fn points_are_given_as_ranges_from_one() {
         assert_eq!(ranges(&[0, 1, 2], 3), "all");
         assert_eq!(ranges(&[0, 1, 4, 6, 7], 9), "1-2, 5, 7-8");
     }

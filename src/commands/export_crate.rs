@@ -60,10 +60,10 @@ pub fn run(args: &CrateArgs) -> Result<(), Failure> {
             &json!({ "folder": folder, "inputs": inputs.len(), "missing": gone.len(), "copied": args.with_data }),
         )?);
     }
-    print(&told(&folder, &inputs, gone.len()))
+    print(&summary(&folder, &inputs, gone.len()))
 }
 
-fn told(folder: &Path, inputs: &[CrateInput], gone: usize) -> String {
+fn summary(folder: &Path, inputs: &[CrateInput], gone: usize) -> String {
     let how = match inputs.first() {
         Some(CrateInput { copy: Some(_), .. }) => "copied",
         _ => "by their hashes",
@@ -81,7 +81,8 @@ fn text(metadata: &Value) -> Result<String, Failure> {
     serde_json::to_string_pretty(metadata).map(|text| text + "\n").map_err(|error| Failure::failed(error, None))
 }
 
-/// Sees to it that a folder may become a crate. Errors, usage: it is a file; the folder above it is not there; it holds something and is no crate.
+/// Sees to it that a folder may become a crate. Errors, usage: it is a file; the folder above it is not there; it holds
+/// something and is no crate.
 fn require_crate(folder: &Path) -> Result<(), Failure> {
     match fs::read_dir(folder).map(|mut entries| entries.next().is_some()) {
         Ok(true) if ![METADATA, LIST].iter().any(|name| folder.join(name).is_file()) => Err(Failure::usage(

@@ -15,7 +15,7 @@ use crate::output::print;
 use crate::printable::shown;
 use crate::show::{pretty, size};
 
-/// How long results lie idle that are told about where no limit is given.
+/// Results idle for so many days are reported where no limit is given.
 const IDLE_DAYS: u64 = 30;
 
 /// Frees the cache and says what went and what is left.
@@ -25,8 +25,8 @@ pub fn run(args: &GcArgs) -> Result<(), Failure> {
     interrupt::writes_in(&folder);
     sweep_folders();
     let freed = free(&folder, &limits, args.dry_run).map_err(|error| Failure::failed(&error, error.help.clone()))?;
-    let told = if args.json { pretty(&as_json(args, &folder, &freed))? } else { as_text(args, &folder, &freed) };
-    print(&told)?;
+    let text = if args.json { pretty(&as_json(args, &folder, &freed))? } else { as_text(args, &folder, &freed) };
+    print(&text)?;
     match freed.failed.first() {
         None => Ok(()),
         Some((gone, why)) => Err(Failure::failed(
@@ -71,7 +71,8 @@ fn advice((count, bytes): (usize, u64)) -> String {
     match count {
         0 => format!("every result was used within {IDLE_DAYS} days; `--max-size 20G` bounds the whole\n"),
         _ => format!(
-            "{} not used for {IDLE_DAYS} days: `--older-than {IDLE_DAYS}d` frees them; `--max-size 20G` bounds the whole\n",
+            "{} not used for {IDLE_DAYS} days: `--older-than {IDLE_DAYS}d` frees them; `--max-size 20G` bounds the \
+             whole\n",
             counted(count, "result", bytes)
         ),
     }

@@ -11,12 +11,12 @@ use crate::inspect::{Inspected, Outcome, file_text, folder_text, inspect, inspec
 use crate::output::print;
 use crate::show::pretty;
 
-/// Looks at files, and at the files of folders. Errors: some could not be read; all are told before.
+/// Looks at files, and at the files of folders. Errors: some could not be read; all are reported before.
 pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
     let mut looked = Vec::new();
     for path in paths {
         let files = if path.is_dir() { files_of(path)? } else { vec![path.clone()] };
-        // in parallel, told in their order
+        // in parallel, printed in their order
         let inspected: Vec<Inspected> = files.par_iter().map(|file| inspect(file)).collect();
         if !as_json {
             print(&text(path, &inspected))?;

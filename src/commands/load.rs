@@ -9,7 +9,8 @@ use afmid_pipeline::graph::{self, Stages};
 use crate::diagnostic::render;
 use crate::failure::{Failure, Message};
 
-/// Reads a config, applies `--set` arguments and plans it. Errors: the file cannot be read; everything that is wrong with it.
+/// Reads a config, applies `--set` arguments and plans it. Errors: the file cannot be read; everything that is wrong
+/// with it.
 pub fn load(path: &Path, set: &[String], stages: &dyn Stages) -> Result<Plan, Failure> {
     let file = path.display().to_string();
     let text = read(path)?;

@@ -9,7 +9,8 @@ use afmid_pipeline::store::{FileKind, file_kind};
 
 use crate::failure::Failure;
 
-/// Sees to it that a path names a file of afmid's, whole or not. Errors, all usage: there is none; what it is instead, and what to do.
+/// Sees to it that a path names a file of afmid's, whole or not. Errors, all usage: there is none; what it is instead,
+/// and what to do.
 pub fn require_result(path: &Path) -> Result<(), Failure> {
     let shown = path.display();
     if path.is_dir() {

@@ -24,7 +24,7 @@ use crate::provenance::repeat::{Writer, base, config_path, places, unfit, writer
 use crate::provenance::same::{TOLERANCE, Verdict, distance, judge, results};
 use crate::show::{number, pretty};
 
-/// Files that are told of where some are missing.
+/// The most missing files that are listed.
 const MOST: usize = 20;
 
 /// Repeats a run and compares.
@@ -48,13 +48,13 @@ pub fn run(args: &RerunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     write_result(&output, &repeated?).map_err(|error| failed(&error))?;
     let diff = Diff::of(&file, &open(&output)?).map_err(|error| failed(&error))?;
     let verdict = judge(&diff);
-    let told = Told { args, file: &file, plan: &plan, diff: &diff, verdict };
-    print(&if args.json { pretty(&told.json()?)? } else { told.text() })?;
+    let comparison = Comparison { args, file: &file, plan: &plan, diff: &diff, verdict };
+    print(&if args.json { pretty(&comparison.json()?)? } else { comparison.text() })?;
     // what was printed says all
     if verdict == Verdict::Differs { Err(Failure::Failed(Message::Rendered(String::new()))) } else { Ok(()) }
 }
 
-/// Errors: files are missing or have other bytes, all of them told.
+/// Errors: files are missing or have other bytes; the first [`MOST`] are listed.
 fn require_inputs(file: &ResultFile, finder: &Finder) -> Result<(), Failure> {
     let unfit = unfit(file, finder);
     let Some(total) = Some(unfit.len()).filter(|&total| total > 0) else { return Ok(()) };
@@ -69,7 +69,8 @@ fn require_inputs(file: &ResultFile, finder: &Finder) -> Result<(), Failure> {
     Err(Failure::Failed(Message::Listed(message, list, Some(help))))
 }
 
-/// The plan of the stored config, reading the files where they are now, and its stages that write. Errors, usage: this program cannot run it any more.
+/// The plan of the stored config, reading the files where they are now, and its stages that write. Errors, usage: this
+/// program cannot run it any more.
 fn plan(
     file: &ResultFile,
     base: &Path,
@@ -102,7 +103,7 @@ fn inputs(args: &RerunArgs, file: &ResultFile, finder: &Finder) -> Vec<Input> {
     inputs
 }
 
-struct Told<'a> {
+struct Comparison<'a> {
     args: &'a RerunArgs,
     file: &'a ResultFile,
     plan: &'a Plan,
@@ -110,7 +111,7 @@ struct Told<'a> {
     verdict: Verdict,
 }
 
-impl Told<'_> {
+impl Comparison<'_> {
     fn outputs(&self) -> usize {
         self.file.stages().iter().map(|stage| stage.ports.len()).sum()
     }

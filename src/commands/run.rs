@@ -52,10 +52,11 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     if args.json {
         return print(&pretty(&as_json(&output, &result))?);
     }
-    print(&format!("{}: {}\n", shown(&output), told(&result)))
+    print(&format!("{}: {}\n", shown(&output), summary(&result)))
 }
 
-/// The cache that was asked for, or the user's. What killed processes left in it and in the system's folder for temporary files is removed.
+/// The cache that was asked for, or the user's. What killed processes left in it and in the system's folder for
+/// temporary files is removed.
 pub fn open_cache(folder: Option<&Path>) -> Cache {
     let folder = cache_folder(folder);
     interrupt::writes_in(&folder);
@@ -64,7 +65,8 @@ pub fn open_cache(folder: Option<&Path>) -> Cache {
     Cache::open(&folder)
 }
 
-/// The stages that write files (`simulate.afm`) do it in the folder that a parameter names, or beside the file that it names.
+/// The stages that write files (`simulate.afm`) do it in the folder that a parameter names, or beside the file that it
+/// names.
 pub fn written_folders(plan: &Plan) {
     for node in &plan.nodes {
         for place in node.stage.location_params().iter().filter_map(|name| node.params.get(name)?.as_str()) {
@@ -153,7 +155,7 @@ fn as_json(output: &Path, result: &RunResult) -> Value {
     })
 }
 
-fn told(result: &RunResult) -> String {
+fn summary(result: &RunResult) -> String {
     let (count, seconds) = (result.stages.len(), result.info.seconds);
     let (reused, warnings) = (reused(result), warnings(result));
     let mut text = format!("{count} stages in {seconds:.2} s");

@@ -36,7 +36,15 @@ pub fn run(name: Option<&str>, as_json: bool, registry: &Registry) -> Result<(),
 
 fn described(entry: &Entry) -> Value {
     let spec = entry.spec;
-    let port = |port: &PortSpec| json!({ "name": port.name, "shape": port.shape.name(), "tag": port.tag, "optional": port.optional, "meaning": port.doc });
+    let port = |port: &PortSpec| {
+        json!({
+            "name": port.name,
+            "shape": port.shape.name(),
+            "tag": port.tag,
+            "optional": port.optional,
+            "meaning": port.doc,
+        })
+    };
     let ports = |ports: &[PortSpec]| ports.iter().map(port).collect::<Vec<Value>>();
     json!({
         "name": spec.name,

@@ -84,7 +84,7 @@ fn slurm(args: &SlurmArgs, registry: &Registry) -> Result<(), Failure> {
     let here = folder.join(FOLDER);
     write(&here, &jobs, &sets, plan.config_text(), &agreed)?;
     let sent = if args.send { Some(send(&here)?) } else { None };
-    print(&told(args.json, &here, &jobs, sent.as_ref())?)
+    print(&summary(args.json, &here, &jobs, sent.as_ref())?)
 }
 
 /// Links stay: where they lead may be called otherwise on another machine.
@@ -134,7 +134,8 @@ fn send(here: &Path) -> Result<Sent, Failure> {
         Ok(collect) => Ok(Sent { array, collect }),
         Err(failure) => {
             say(&format!(
-                "the shards are sent, job {array}, the collecting job is not: `afmid batch ... --collect` when they have ended, or `scancel {array}`\n"
+                "the shards are sent, job {array}, the collecting job is not: `afmid batch ... --collect` when they \
+                 have ended, or `scancel {array}`\n"
             ));
             Err(failure)
         }
@@ -177,7 +178,7 @@ fn script(here: &Path) -> String {
     crate::batch::shell::quoted(here.join(SUBMIT))
 }
 
-fn told(json: bool, here: &Path, jobs: &Jobs, sent: Option<&Sent>) -> Result<String, Failure> {
+fn summary(json: bool, here: &Path, jobs: &Jobs, sent: Option<&Sent>) -> Result<String, Failure> {
     if json {
         return pretty(&json!({
             "folder": here.display().to_string(),

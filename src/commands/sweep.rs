@@ -21,7 +21,8 @@ use crate::show::{artifact_text, pretty};
 use crate::sweep::point::{self, Point};
 use crate::sweep::table::{shown, table};
 
-/// Runs all points, one after the other: each finds in the cache what those before it have computed. One that fails stops no other; then the exit code is 3.
+/// Runs all points, one after the other: each finds in the cache what those before it have computed. One that fails
+/// stops no other; then the exit code is 3.
 pub fn run(plan: &Plan, count: usize, args: &RunArgs) -> Result<(), Failure> {
     let clock = Instant::now();
     let folder = folder(plan, args)?;
@@ -30,8 +31,8 @@ pub fn run(plan: &Plan, count: usize, args: &RunArgs) -> Result<(), Failure> {
     let points = computed(plan, count, args, &ledger)?;
     let title = Title { name: plan.name(), seed: plan.seed(), config: plan.config_text(), program: PROGRAM };
     let summary = tables.write_sweep(&title, table(&points))?;
-    let told = Told { folder: &folder, points: &points, summary: &summary, ledger: &ledger };
-    print(&if args.json { pretty(&told.json())? } else { told.text(clock) })?;
+    let outcome = Outcome { folder: &folder, points: &points, summary: &summary, ledger: &ledger };
+    print(&if args.json { pretty(&outcome.json())? } else { outcome.text(clock) })?;
     match points.iter().filter(|point| !point.done.entry.is_done()).count() {
         0 => Ok(()),
         failed => Err(Failure::Partly(Message::Line(
@@ -95,14 +96,14 @@ fn computed(plan: &Plan, count: usize, args: &RunArgs, ledger: &Ledger) -> Resul
     Ok((0..).zip(done).map(|(index, done)| Point { values: plan.values(index), done }).collect())
 }
 
-struct Told<'a> {
+struct Outcome<'a> {
     folder: &'a Path,
     points: &'a [Point],
     summary: &'a Path,
     ledger: &'a Ledger,
 }
 
-impl Told<'_> {
+impl Outcome<'_> {
     fn failed(&self) -> impl Iterator<Item = &Point> {
         self.points.iter().filter(|point| !point.done.entry.is_done())
     }
@@ -120,13 +121,14 @@ impl Told<'_> {
     fn text(&self, clock: Instant) -> String {
         let mut text = artifact_text(&Artifact::Table(shown(self.points).into()));
         for point in self.failed() {
-            let (entry, values) = (&point.done.entry, point.told());
+            let (entry, values) = (&point.done.entry, point.values_text());
             let error = message(entry.error.as_deref().unwrap_or_default());
             text.push_str(&format!("{} ({}) failed: {error}\n", entry.name, one_line(&values)));
         }
         let (count, ran, (stages, reused)) = (self.points.len(), self.ran(), self.stages());
         text.push_str(&format!(
-            "{}: {count} point{} in {:.2} s, {ran} run ({stages} stages, {reused} reused), {} as they were, {} failed\n",
+            "{}: {count} point{} in {:.2} s, {ran} run ({stages} stages, {reused} reused), {} as they were, {} \
+             failed\n",
             printable::shown(self.folder),
             if count == 1 { "" } else { "s" },
             clock.elapsed().as_secs_f64(),
@@ -153,7 +155,7 @@ impl Told<'_> {
     fn point(&self, point: &Point) -> Value {
         let entry = &point.done.entry;
         let values: serde_json::Map<String, Value> = point.values.iter().cloned().collect();
-        let mut told = json!({
+        let mut value = json!({
             "point": entry.name,
             "values": values,
             "file": entry.is_done().then(|| self.ledger.result(&entry.name).display().to_string()),
@@ -164,7 +166,7 @@ impl Told<'_> {
             "found": entry.found,
         });
         // the ledger leaves it out where there are none
-        told["found"]["numbers"] = json!(entry.found.numbers);
-        told
+        value["found"]["numbers"] = json!(entry.found.numbers);
+        value
     }
 }

@@ -1,4 +1,5 @@
-//! Where a command may write: never over its own inputs, and over nothing that afmid did not write, or that was changed since.
+//! Where a command may write: never over its own inputs, and over nothing that afmid did not write, or that was changed
+//! since.
 
 use std::fs::{self, Metadata};
 use std::io::{ErrorKind, Read};
@@ -27,8 +28,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// Why what lies at the path must stay, in words that follow its name; none: it may be replaced. An empty file holds nothing that could be lost: a
-    /// script may have made it to reserve the name.
+    /// Why what lies at the path must stay, in words that follow its name; none: it may be replaced. An empty file
+    /// holds nothing that could be lost: a script may have made it to reserve the name.
     ///
     /// Results, pages and models state the hash of what was written. Errors: it cannot be read.
     fn in_the_way(self, path: &Path) -> std::io::Result<Option<String>> {
@@ -73,9 +74,11 @@ impl Target {
 /// An input of the command, and what it is to it.
 pub type Input = (&'static str, PathBuf);
 
-/// Sees to it, before anything runs, that `path` can be written and that nothing is lost by it. Removes what killed commands left beside it.
+/// Sees to it, before anything runs, that `path` can be written and that nothing is lost by it. Removes what killed
+/// commands left beside it.
 ///
-/// Errors, all usage: it is an input; it exists and is no regular file, or a file of another kind; its folder is not there or cannot be written.
+/// Errors, all usage: it is an input; it exists and is no regular file, or a file of another kind; its folder is not
+/// there or cannot be written.
 pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Failure> {
     let shown = path.display();
     match fs::metadata(path) {
@@ -170,7 +173,8 @@ fn odd(metadata: &Metadata) -> &'static str {
     }
 }
 
-/// Sees to it that a file can be made in a folder as far as the folder goes: one that is missing is most likely a misspelt path.
+/// Sees to it that a file can be made in a folder as far as the folder goes: one that is missing is most likely a
+/// misspelt path.
 ///
 /// Errors, usage: it is not there, or no folder.
 pub fn require_folder(folder: &Path) -> Result<(), Failure> {
@@ -193,8 +197,8 @@ pub fn require_folder(folder: &Path) -> Result<(), Failure> {
     })
 }
 
-/// A folder that a command fills (the results of a batch, figures), made if only that is missing. Errors, usage: the folder above it is not
-/// there; it cannot be made; it is a file.
+/// A folder that a command fills (the results of a batch, figures), made if only that is missing. Errors, usage: the
+/// folder above it is not there; it cannot be made; it is a file.
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     interrupt::writes_in(folder);
     if folder.is_dir() {

@@ -92,7 +92,7 @@ fn agreed(plugins: &Plugins, candidate: &Candidate, json: bool) -> Result<Row, F
     }
     let outcome = match plugins.agree(candidate) {
         Ok(described) => Outcome::Trusted(described),
-        Err(error) => Outcome::Failed(error.told(candidate.name()), error.help),
+        Err(error) => Outcome::Failed(error.message_for(candidate.name()), error.help),
     };
     let row = Row { name: candidate.name().to_owned(), candidate: Some(candidate.clone()), outcome };
     if !json {
@@ -101,8 +101,8 @@ fn agreed(plugins: &Plugins, candidate: &Candidate, json: bool) -> Result<Row, F
     Ok(row)
 }
 
-/// Takes back consent for the plugins of a config, as they are and as they were: what ran under these names in its folder, whether it is still there or
-/// not, and what is the same under another name.
+/// Takes back consent for the plugins of a config, as they are and as they were: what ran under these names in its
+/// folder, whether it is still there or not, and what is the same under another name.
 fn revoked(trust: &Trust, config: &Path, parsed: &Config, found: &[Candidate]) -> Result<Vec<Row>, Failure> {
     let folder = match config.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -141,7 +141,8 @@ impl Row {
                 };
                 let (name, version, summary) = (one_line(name), one_line(&version.to_string()), one_line(summary));
                 format!(
-                    "  is    {name} {version}: {summary}\n  takes {}\n  makes {}\ntrusted, as long as nothing of this changes; what its files import is not seen\n",
+                    "  is    {name} {version}: {summary}\n  takes {}\n  makes {}\n\
+                     trusted, as long as nothing of this changes; what its files import is not seen\n",
                     list(inputs),
                     list(outputs)
                 )

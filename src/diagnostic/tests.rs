@@ -1,4 +1,5 @@
-//! Diagnostics as people see them: `tests/diagnostics/NAME.toml` gives `NAME.txt` (`UPDATE_EXPECTED=1` writes them anew).
+//! Diagnostics as people see them: `tests/diagnostics/NAME.toml` gives `NAME.txt` (`UPDATE_EXPECTED=1` writes them
+//! again).
 
 use std::fs;
 use std::path::Path;

@@ -18,9 +18,13 @@ pub fn examples(registry: &Registry) -> Vec<Finding> {
             let clock = Instant::now();
             let wrong = examples_hold(entry);
             if wrong.is_empty() {
-                return Finding::good(name, format!("finds its examples' truth, {:.2} s", clock.elapsed().as_secs_f64()));
+                return Finding::good(
+                    name,
+                    format!("finds its examples' truth, {:.2} s", clock.elapsed().as_secs_f64()),
+                );
             }
-            let help = "this build computes wrong numbers here: build anew with `cargo build --release --locked`, and report it";
+            let help = "this build computes wrong numbers here: build again with `cargo build --release --locked`, and \
+                report it";
             Finding::bad(name, wrong.join("; "), help)
         })
         .collect()

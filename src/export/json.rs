@@ -5,7 +5,8 @@ use serde::ser::Error;
 
 use super::model::ExportedModel;
 
-/// The model as indented JSON, rows of matrices as lists; what is unknown is null. The last member, `mark`, states the hash of the file's other bytes.
+/// The model as indented JSON, rows of matrices as lists; what is unknown is null. The last member, `mark`, states the
+/// hash of the file's other bytes.
 /// Errors: none that happen.
 pub fn model_json(model: &ExportedModel) -> serde_json::Result<Vec<u8>> {
     // serde_json writes null for what is not finite

@@ -1,4 +1,4 @@
-//! What is told of a model.
+//! What an export states of a model.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -64,7 +64,8 @@ pub struct ExportedModel {
     pub attributes: BTreeMap<String, Attribute>,
 }
 
-/// A pole; a real negative one and one at zero have no continuous counterpart that is real: theirs are of the principal logarithm, or NaN (null).
+/// A pole; a real negative one and one at zero have no continuous counterpart that is real: theirs are of the principal
+/// logarithm, or NaN (null).
 #[derive(Debug, Serialize)]
 pub struct ExportedPole {
     /// Real part in the z plane.
@@ -91,7 +92,8 @@ pub struct Origin<'a> {
 }
 
 impl ExportedModel {
-    /// Describes a model. Errors: matrices that do not fit together or are not finite, eigenvalues that do not converge.
+    /// Describes a model. Errors: matrices that do not fit together or are not finite, eigenvalues that do not
+    /// converge.
     pub fn new(model: &StateSpace, origin: Origin, units: Units) -> Result<Self, ModelError> {
         Ok(Self {
             afmid_model: VERSION,

@@ -22,7 +22,7 @@ pub fn units(file: &ResultFile, stage: &StageSummary) -> Units {
         if have.shape != Shape::Array {
             return None;
         }
-        // an artifact that cannot be read has no units to give: whoever wants it is told why
+        // an artifact that cannot be read has no units to give: the export of the artifact itself reports why
         match file.artifact(from, port).ok()? {
             Artifact::Array(array) => Some(array),
             _ => None,

@@ -5,7 +5,8 @@ use std::path::Path;
 use super::channel::Channel;
 use super::verdict::LEAST_RATE_HZ;
 
-/// The `io.records` stage that reads a channel of a file, with what it must be told; what only the user knows is left to fill in.
+/// The `io.records` stage that reads a channel of a file, with the parameters that it needs; what only the user knows
+/// is left to fill in.
 pub fn stage(path: &Path, channel: &Channel) -> String {
     // a config's paths begin at its folder, which is not known here
     let file = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());

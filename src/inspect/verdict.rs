@@ -2,10 +2,11 @@
 
 use super::channel::{Channel, MOST_CODES, Values};
 
-/// What `io.records` demands unless told otherwise.
+/// Least sample rate that `io.records` accepts by default.
 pub const LEAST_RATE_HZ: f64 = 200e3;
 
-/// A ringdown of a few samples identifies nothing: the shipped configs take windows of 8192, the shortest useful ones have an eighth.
+/// A ringdown of a few samples identifies nothing: the shipped configs take windows of 8192, the shortest useful ones
+/// have an eighth.
 const LEAST_SAMPLES: usize = 1024;
 
 /// Samples in a period of a ring that is still well sampled.
@@ -74,21 +75,23 @@ fn of_channel(channel: &Channel) -> (Answer, String) {
         Some(rate) if rate < LEAST_RATE_HZ => (
             Answer::No,
             format!(
-                "{rate} samples per second, wanted at least {LEAST_RATE_HZ}: a lever rings at 10 kHz and more. At this rate a ring of up to {} Hz \
-                 could be sampled: if the resonator is that slow, set `min_sample_rate_hz`",
+                "{rate} samples per second, wanted at least {LEAST_RATE_HZ}: a lever rings at 10 kHz and more. At this \
+                 rate a ring of up to {} Hz could be sampled: if the resonator is that slow, set `min_sample_rate_hz`",
                 rate / PERIOD_SAMPLES
             ),
         ),
         Some(rate) if channel.values.is_none() => (
             Answer::Unknown,
             format!(
-                "{rate} samples per second, {longest} samples without interruption; not read, the file has too many channels"
+                "{rate} samples per second, {longest} samples without interruption; not read, the file has too many \
+                 channels"
             ),
         ),
         Some(rate) => (
             Answer::Yes,
             format!(
-                "{rate} samples per second, {longest} samples without interruption: enough for a lever's first mode of up to {} Hz",
+                "{rate} samples per second, {longest} samples without interruption: enough for a lever's first mode of \
+                 up to {} Hz",
                 rate / PERIOD_SAMPLES
             ),
         ),
@@ -120,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn each_reason_is_told() {
+    fn each_reason_is_given() {
         let good = || channel("/a", Some(5e6), 90_000);
         let with = |values: Values| Channel { values: Some(values), ..good() };
         let values = |codes, missing, saturated| Values { least: 0.0, largest: 1.0, codes, missing, saturated };

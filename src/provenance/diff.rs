@@ -198,7 +198,7 @@ fn sorted(found: Vec<Difference>, a: &ResultFile, b: &ResultFile) -> (Vec<Vec<Re
         let stage = index.and_then(|index| a.stages().get(index));
         let twin = stage.and_then(|stage| b.stage(&stage.record.id)).filter(|twin| twin.group == group);
         match (index, stage, twin) {
-            // told by name, from what the file says of itself
+            // reported by name, from what the file says of itself
             _ if ["pipeline", "title"].contains(&group) || ["version", "sequence_index"].contains(&rest) => {}
             _ if rest.starts_with("provenance") => {}
             // a stage of one file only
@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn files_are_told_apart_by_name_and_bytes() {
+    fn files_are_distinguished_by_name_and_bytes() {
         let found = files(
             &[file("x/a", "0"), file("x/b", "1"), file("x/c", "2")],
             &[file("y/a", "0"), file("y/b", "9"), file("y/d", "2")],

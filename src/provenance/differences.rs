@@ -6,7 +6,7 @@ use super::diff::{Diff, Files, Lines, Pair, ResultDiff, StageDiff};
 use crate::printable::one_line;
 use crate::show::{grid, number};
 
-/// Datasets that are told of one stage; `--json` has all.
+/// Datasets that are listed for one stage; `--json` has all.
 const MOST: usize = 40;
 
 /// Differences as text, the first file on the left.

@@ -102,7 +102,8 @@ fn look(path: &Path, file: &SourceFile) -> Now {
     }
 }
 
-/// All files below a folder by name, in order of their paths; links to folders are not followed: they may lead in circles.
+/// All files below a folder by name, in order of their paths; links to folders are not followed: they may lead in
+/// circles.
 fn list(folder: &Path, found: &mut BTreeMap<String, Vec<PathBuf>>) {
     let mut paths: Vec<PathBuf> =
         fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();

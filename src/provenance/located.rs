@@ -60,8 +60,9 @@ impl From<(String, String)> for Lost {
     }
 }
 
-/// Finds a value by its steps in the JSON of a stage, as `afmid show RESULT ID --json` prints it; outputs beside the summary are found by their
-/// names. Where the JSON has a key of the stage's own name, the path may leave it out: `modes[0]` is `modes.modes[0]`.
+/// Finds a value by its steps in the JSON of a stage, as `afmid show RESULT ID --json` prints it; outputs beside the
+/// summary are found by their names. Where the JSON has a key of the stage's own name, the path may leave it out:
+/// `modes[0]` is `modes.modes[0]`.
 pub fn locate(file: &ResultFile, stage: &StageSummary, steps: &[Step]) -> Result<Located, Lost> {
     let id = &stage.record.id;
     let named = |name: &str| stage.ports.iter().find(|port| port.name == name);

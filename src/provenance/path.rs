@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_leads_nowhere_is_told_with_what_there_is() {
+    fn a_step_that_leads_nowhere_is_reported_with_what_there_is() {
         let root = json!({ "modes": [{ "frequency_hz": 1.5 }] });
         let go = |text: &str| parse(text).map(|(id, steps)| walk(&root, &id, &steps).cloned()).unwrap();
         assert_eq!(go("m.modes[0].frequency_hz"), Ok(json!(1.5)));

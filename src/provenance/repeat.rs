@@ -28,7 +28,7 @@ pub fn config_path(run: &RunInfo) -> PathBuf {
 pub fn unfit(file: &ResultFile, finder: &Finder) -> Vec<(SourceFile, Now)> {
     let mut found: Vec<(SourceFile, Now)> = Vec::new();
     for source in file.stages().iter().flat_map(|stage| &stage.record.sources) {
-        if found.iter().any(|(told, _)| told == source) {
+        if found.iter().any(|(known, _)| known == source) {
             continue;
         }
         match finder.find(source) {
@@ -39,8 +39,8 @@ pub fn unfit(file: &ResultFile, finder: &Finder) -> Vec<(SourceFile, Now)> {
     found
 }
 
-/// `--set` arguments that make a plan read the files that the run read, where they are now; none for a stage that finds them from `base`
-/// by itself.
+/// `--set` arguments that make a plan read the files that the run read, where they are now; none for a stage that finds
+/// them from `base` by itself.
 pub fn places(plan: &Plan, file: &ResultFile, base: &Path, finder: &Finder) -> Vec<String> {
     let set = |node: &Node| {
         let record = &file.stage(&node.id)?.record;

@@ -169,7 +169,8 @@ fn agent(stated: &Stated) -> Option<Value> {
     Some(json!({ "@id": id, "@type": "Person", "name": name }))
 }
 
-/// A file by its place in the crate, or by the hash of its bytes, or, if it is gone, by its BLAKE3 hash as a thing that the crate does not hold.
+/// A file by its place in the crate, or by the hash of its bytes, or, if it is gone, by its BLAKE3 hash as a thing that
+/// the crate does not hold.
 fn input_entity(input: &CrateInput) -> std::io::Result<Value> {
     let source = &input.source;
     let sha = input.found.as_deref().map(Sha::of_file).transpose()?;

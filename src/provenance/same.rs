@@ -4,8 +4,8 @@ use afmid_pipeline::store::Numbers;
 
 use super::diff::{Diff, ResultDiff};
 
-/// The largest difference that still counts as the same, for one number of a document relative to itself, for a dataset relative to its
-/// largest magnitude. docs/conventions.md says why.
+/// The largest difference that still counts as the same, for one number of a document relative to itself, for a dataset
+/// relative to its largest magnitude. docs/conventions.md says why.
 pub const TOLERANCE: f64 = 1e-9;
 
 /// What a repetition showed.

@@ -13,7 +13,7 @@ const WIDEST: usize = 110;
 
 /// A stage and what it took, as text: each stage once, in full where it comes first.
 pub fn tree_text(file: &ResultFile, stage: &StageSummary, finder: &Finder) -> String {
-    let mut tree = Tree { file, finder, told: Vec::new(), text: String::new() };
+    let mut tree = Tree { file, finder, printed: Vec::new(), text: String::new() };
     tree.stage(&stage.record, "", "");
     tree.text
 }
@@ -21,7 +21,7 @@ pub fn tree_text(file: &ResultFile, stage: &StageSummary, finder: &Finder) -> St
 struct Tree<'a> {
     file: &'a ResultFile,
     finder: &'a Finder,
-    told: Vec<&'a str>,
+    printed: Vec<&'a str>,
     text: String,
 }
 
@@ -30,11 +30,11 @@ impl<'a> Tree<'a> {
     fn stage(&mut self, record: &'a StageRecord, lead: &str, indent: &str) {
         let key: String = record.key.chars().take(16).collect();
         let head = one_line(&format!("{} ({} version {}, key {key})", record.id, record.uses, record.version));
-        if self.told.contains(&record.id.as_str()) {
+        if self.printed.contains(&record.id.as_str()) {
             self.text.push_str(&format!("{lead}{head}: see above\n"));
             return;
         }
-        self.told.push(&record.id);
+        self.printed.push(&record.id);
         self.text.push_str(&format!("{lead}{head}\n"));
         let last = record.wires.is_empty() && record.sources.is_empty();
         let bar = if last { "   " } else { "│  " };

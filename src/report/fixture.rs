@@ -378,7 +378,9 @@ pub(crate) fn paper() -> RunResult {
     RunResult {
         name: "paper".to_owned(),
         seed: 1,
-        config: "[pipeline]\nname = \"paper\" # <config> & more\nseed = 1\n\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\n".to_owned(),
+        config: "[pipeline]\nname = \"paper\" # <config> & more\nseed = 1\n\n[[stage]]\nid = \"records\"\n\
+            uses = \"io.records\"\n"
+            .to_owned(),
         overrides: vec!["records.files=[\"a.h5\"]".to_owned()],
         program: "afmid 0.1.0".to_owned(),
         stages,

@@ -1,7 +1,10 @@
 //! The report: one self-contained HTML page about a run, with the paper's figures where the run has what they show.
 //!
 //! ```text
-//! RunResult -> batch/ (of many data sets) + diagnosis/ (its story) + paper/ (figures found by what artifacts mean) + generic/ (every stage) -> page -> template.html
+//! RunResult
+//!     -> batch/ (of many data sets) + diagnosis/ (its story) + paper/ (figures found by what artifacts mean)
+//!        + generic/ (every stage)
+//!     -> page -> template.html
 //! ```
 //!
 //! The page loads nothing, follows the reader's colour scheme and prints. The same run gives the same bytes.

@@ -40,8 +40,8 @@ pub(crate) fn integer(value: i64) -> String {
 
 /// A value with its standard error in units of its last digits: `46.30012(4)`.
 ///
-/// Method: the error keeps two digits if they are below 36, otherwise one (the Particle Data Group's rule, simplified). Without a
-/// finite, positive error the value stands alone.
+/// Method: the error keeps two digits if they are below 36, otherwise one (the Particle Data Group's rule, simplified).
+/// Without a finite, positive error the value stands alone.
 pub(crate) fn with_error(value: f64, error: f64) -> String {
     if !(value.is_finite() && error.is_finite() && error > 0.0) {
         return number(value);

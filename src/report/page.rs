@@ -98,7 +98,8 @@ pub(crate) fn is_page(head: &[u8]) -> bool {
     String::from_utf8_lossy(head).contains("<meta name=\"generator\" content=\"afmid")
 }
 
-/// As text of the page, escaped; what acts on a page instead of being seen (controls, marks of direction) as printable escapes.
+/// As text of the page, escaped; what acts on a page instead of being seen (controls, marks of direction) as printable
+/// escapes.
 fn shown_text(out: &mut Output, state: &mut State, value: &Text) -> Result<(), minijinja::Error> {
     match value.as_str().filter(|_| !value.is_safe()).map(printable) {
         Some(Cow::Owned(text)) => escape_formatter(out, state, &Text::from(text)),

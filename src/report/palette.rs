@@ -1,5 +1,5 @@
-//! Colours by name, in light and in dark. Data colours after Okabe and Ito (distinguishable with colour-blind eyes), darkened or
-//! lightened until they stand out from their ground by at least 3 to 1 (WCAG 2.2, 1.4.11).
+//! Colours by name, in light and in dark. Data colours after Okabe and Ito (distinguishable with colour-blind eyes),
+//! darkened or lightened until they stand out from their ground by at least 3 to 1 (WCAG 2.2, 1.4.11).
 
 /// Name, light, dark.
 const COLOURS: [(&str, &str, &str); 18] = [
@@ -35,7 +35,8 @@ pub(super) fn variables() -> String {
     )
 }
 
-/// A style sheet with every variable replaced by its light value, for files that are read by programs without CSS variables.
+/// A style sheet with every variable replaced by its light value, for files that are read by programs without CSS
+/// variables.
 pub(super) fn in_light(style: &str) -> String {
     COLOURS.iter().fold(style.to_owned(), |style, (name, light, _)| style.replace(&format!("var(--{name})"), light))
 }

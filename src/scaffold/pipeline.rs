@@ -182,8 +182,8 @@ mod tests {
         assert!(
             ask(source(Some(5e6), "V"), Wanted { channel: Some("ch"), ..goal }).1.expect("help").contains("/g/ch 0")
         );
-        let told = Wanted { rate_hz: Some(5e4), unit: Some("nm"), ..goal };
-        let text = pipeline(&source(None, ""), told, here).expect("a config");
+        let given = Wanted { rate_hz: Some(5e4), unit: Some("nm"), ..goal };
+        let text = pipeline(&source(None, ""), given, here).expect("a config");
         assert!(text.contains("sample_rate_hz = 50000.0") && text.contains("min_sample_rate_hz = 50000.0"), "{text}");
     }
 }

@@ -1,4 +1,4 @@
-//! What a new config must be told of recordings.
+//! What a new config must state of recordings.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! A folder with a stage of one's own: the examples of this repository under another name, so that what it begins with is compiled and run by the tests.
+//! A folder with a stage of one's own: the examples of this repository under another name, so that what it begins with
+//! is compiled and run by the tests.
 
 use std::path::Path;
 
@@ -29,7 +30,8 @@ pub fn python(name: &str) -> Vec<File> {
     ]
 }
 
-/// A crate: its manifest, the stage with its test and a main of ten lines, a config. `sources`: the clone that it depends on, as the manifest says it.
+/// A crate: its manifest, the stage with its test and a main of ten lines, a config. `sources`: the clone that it
+/// depends on, as the manifest says it.
 pub fn rust(name: &str, sources: &Path) -> Vec<File> {
     let program = renamed(include_str!("../../examples/new_stage.rs"), name);
     let config = renamed(include_str!("../../examples/new_stage.toml"), name);
@@ -46,7 +48,8 @@ fn manifest(name: &str, sources: &Path) -> String {
         "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[workspace]\n\n[dependencies]\n\
          # the command line and the built-in stages\nafmid = {{ path = {} }}\n\
          # what a stage is\nafmid-pipeline = {{ path = {} }}\n\
-         # parameters and documents\nschemars = \"1.2\"\nserde = {{ version = \"1\", features = [\"derive\"] }}\nserde_json = \"1\"\n",
+         # parameters and documents\nschemars = \"1.2\"\nserde = {{ version = \"1\", features = [\"derive\"] }}\n\
+         serde_json = \"1\"\n",
         path(""),
         path("pipeline"),
     )

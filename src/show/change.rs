@@ -40,9 +40,18 @@ fn wired(source: &Option<String>) -> String {
     source.as_ref().map_or_else(|| "not wired".to_owned(), |source| format!("`{source}`"))
 }
 
-/// A change as JSON: `kind`, `name`, `was` and `is` are always there; `stage` names the stage that it happened in, null: the stage itself.
+/// A change as JSON: `kind`, `name`, `was` and `is` are always there; `stage` names the stage that it happened in,
+/// null: the stage itself.
 pub fn change_json(change: &Change) -> Value {
-    let row = |kind: &str, name: Value, was: Value, is: Value| json!({ "kind": kind, "stage": null, "name": name, "was": was, "is": is });
+    let row = |kind: &str, name: Value, was: Value, is: Value| {
+        json!({
+            "kind": kind,
+            "stage": null,
+            "name": name,
+            "was": was,
+            "is": is,
+        })
+    };
     let file = |file: &Option<OriginFile>| match file {
         Some(file) => json!({ "size_bytes": file.size, "blake3": file.blake3 }),
         None => Value::Null,

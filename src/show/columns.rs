@@ -10,8 +10,8 @@ const MOST_COLUMNS: usize = 64;
 /// Cells that a table of more columns may have.
 const MOST_CELLS: usize = 100_000;
 
-/// The keys of objects in the order in which they first appear: the columns of their table. None where few objects share
-/// a key: the table would be as large as their number times that of all keys, and nearly empty.
+/// The keys of objects in the order in which they first appear: the columns of their table. None where few objects
+/// share a key: the table would be as large as their number times that of all keys, and nearly empty.
 pub fn columns<'a>(rows: &[&'a Map<String, Value>]) -> Option<Vec<&'a str>> {
     let (mut names, mut seen) = (Vec::new(), HashSet::new());
     for name in rows.iter().flat_map(|row| row.keys()) {

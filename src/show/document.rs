@@ -69,8 +69,8 @@ fn flat(value: &Value) -> bool {
     value.as_object().is_some_and(|entries| !entries.is_empty() && entries.values().all(simple))
 }
 
-/// The rows of a list of flat objects, names first. None of another list, and of one that would make far more cells than
-/// it has values.
+/// The rows of a list of flat objects, names first. None of another list, and of one that would make far more cells
+/// than it has values.
 fn table(values: &[Value]) -> Option<Vec<Vec<String>>> {
     if !values.iter().all(flat) {
         return None;

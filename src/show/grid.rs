@@ -2,7 +2,8 @@
 
 use crate::printable::one_line;
 
-/// Rows of cells as aligned columns, two blanks apart; columns of numbers are aligned to the right. The first row is the header.
+/// Rows of cells as aligned columns, two blanks apart; columns of numbers are aligned to the right. The first row is
+/// the header.
 pub fn grid(rows: &[Vec<String>]) -> String {
     aligned(rows, 1)
 }

@@ -2,8 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-/// Which of the names are standard errors of which others, as [`afmid_pipeline::artifact::std_name`] finds them, for all
-/// names at once.
+/// Which of the names are standard errors of which others, as [`afmid_pipeline::artifact::std_name`] finds them, for
+/// all names at once.
 pub struct Partners<'a> {
     /// Names of standard errors by the names of their values.
     std: HashMap<&'a str, &'a str>,

@@ -13,14 +13,15 @@ pub struct Point {
     pub done: Done,
 }
 
-/// The name of its result file, counted from 0: five digits hold all that a config may have, so that names sort as points do.
+/// The name of its result file, counted from 0: five digits hold all that a config may have, so that names sort as
+/// points do.
 pub fn name(index: usize) -> String {
     format!("point_{:05}", index + 1)
 }
 
 impl Point {
     /// `model.order = 9, ...`
-    pub fn told(&self) -> String {
+    pub fn values_text(&self) -> String {
         self.values.iter().map(|(name, value)| format!("{name} = {value}")).collect::<Vec<_>>().join(", ")
     }
 }

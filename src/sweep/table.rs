@@ -10,7 +10,8 @@ use super::point::Point;
 use crate::batch::ledger::Entry;
 use crate::batch::summary;
 
-/// A row per point and mode; a point without modes has one row. First the swept parameters, then what a batch's table has, then every number of the stages' summaries.
+/// A row per point and mode; a point without modes has one row. First the swept parameters, then what a batch's table
+/// has, then every number of the stages' summaries.
 pub fn table(points: &[Point]) -> Table {
     let entries: Vec<Entry> = points.iter().map(|point| point.done.entry.clone()).collect();
     let rows: Vec<&Point> = points.iter().flat_map(|point| vec![point; rows_of(point)]).collect();
@@ -43,7 +44,8 @@ const OF_MODES: [&str; 10] = [
 /// Numbers that are shown where no point has modes: the files have all.
 const MOST: usize = 6;
 
-/// What a person compares at the terminal: points, swept parameters, and what was found of the modes, or else the first numbers that differ between points.
+/// What a person compares at the terminal: points, swept parameters, and what was found of the modes, or else the first
+/// numbers that differ between points.
 pub fn shown(points: &[Point]) -> Table {
     let table = table(points);
     let swept = points.first().map_or(0, |point| point.values.len());

@@ -3,7 +3,7 @@
 #
 #   tests/cluster/slurm.sh [AFMID] [SNAKEMAKE]     (target/debug/afmid; SNAKEMAKE: also workflow/Snakefile on the same Slurm)
 #
-# Shown, else it fails: shards on both nodes; one bad data set, told with its reason; the lost node's shard finished by the other, both when the node is gone and
+# Shown, else it fails: shards on both nodes; one bad data set, reported with its reason; the lost node's shard finished by the other, both when the node is gone and
 # when it was only out of reach and works on at the same time; the table, and every number of every result, those of one machine.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
@@ -101,11 +101,11 @@ midway() {
 
 # One submission to folder $1, in the course of which n2 is lost: `gone`, or `frozen`, out of reach until its shard runs elsewhere.
 submitted() {
-    local folder=$1 how=$2 told clock=$SECONDS lost frozen on_n2 count log collect
+    local folder=$1 how=$2 sent clock=$SECONDS lost frozen on_n2 count log collect
     sinfo -h -n n2 -o %t | grep -q idle || { slurmd -N n2; until sinfo -h -n n2 -o %t | grep -q idle; do sleep 0.5; done; }
-    told=$("$afmid" submit slurm "$config" --manifest levers.jsonl --shards "$shards" -o "$folder" --cache "$scratch/cache-$how" --time 20 --partition main \
+    sent=$("$afmid" submit slurm "$config" --manifest levers.jsonl --shards "$shards" -o "$folder" --cache "$scratch/cache-$how" --time 20 --partition main \
         --sbatch "--comment=it's a \ # 'comment'" --send --json "${changes[@]}")
-    array=$(sed -n 's/.*"array": "\(.*\)".*/\1/p' <<<"$told") collect=$(sed -n 's/.*"collect": "\(.*\)".*/\1/p' <<<"$told")
+    array=$(sed -n 's/.*"array": "\(.*\)".*/\1/p' <<<"$sent") collect=$(sed -n 's/.*"collect": "\(.*\)".*/\1/p' <<<"$sent")
     scontrol show job "$collect" | grep -qF "Comment=it's a \\ # 'comment'" || fail "an option did not arrive as it was"
     lost=$(midway "$folder") || fail "n2 never was in the middle of a second shard"
     on_n2=$(finished "$folder" n2)
@@ -136,7 +136,7 @@ submitted() {
     log=$(scontrol show job "$array")
     grep -q "JobState=" <<<"$log" && ! grep "JobState=" <<<"$log" | grep -qv "JobState=COMPLETED" || fail "not all tasks are completed"
     scontrol show job "$collect" | grep -q "ExitCode=3:0" || fail "the collecting job did not end with 3"
-    grep -q "$bad failed:" "$folder/slurm/log/${collect}_collect.log" || fail "the bad data set is not told"
+    grep -q "$bad failed:" "$folder/slurm/log/${collect}_collect.log" || fail "the bad data set is not reported"
     if [ "$how" = frozen ]; then
         # the first attempt ends by itself; what it still writes changes nothing
         while [ -n "$(node_tasks n2)" ]; do sleep 0.2; done

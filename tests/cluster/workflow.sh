@@ -30,11 +30,11 @@ workflow() {
 }
 values=("config=$config" manifest=levers.jsonl "out=out of it" shards=3 "afmid=$afmid" "cache=$scratch/other" "set=[\"$set\"]")
 workflow "${values[@]}" || { tail -30 "$scratch/log" >&2; fail "Snakemake"; }
-grep -q "5 data sets, 1 failed" "$scratch/log" && grep -q "missing failed: " "$scratch/log" || fail "the missing data set is not told"
+grep -q "5 data sets, 1 failed" "$scratch/log" && grep -q "missing failed: " "$scratch/log" || fail "the missing data set is not reported"
 for table in summary.csv summary.parquet summary.h5 trends.csv; do
     cmp "whole/$table" "out of it/$table" || fail "$table is not that of one machine"
 done
 workflow "${values[@]}" && grep -q "Nothing to be done" "$scratch/log" || fail "a second run does something"
 workflow "${values[@]}" shard=4 && fail "a misspelt value is taken"
-grep -q '`shard` is not known' "$scratch/log" || fail "a misspelt value is not told"
+grep -q '`shard` is not known' "$scratch/log" || fail "a misspelt value is not reported"
 echo "workflow/Snakefile: 5 data sets in 3 shards, 1 failed; tables are those of one machine"

@@ -61,7 +61,8 @@ pub fn files(folder: &Path) -> String {
     format!("records.files=['{}/*.h5']", folder.display())
 }
 
-/// The recorded archive `lever-a`, or a stand-in that afmid's own simulator makes below `scratch`, counted in the output.
+/// The recorded archive `lever-a`, or a stand-in that afmid's own simulator makes below `scratch`, counted in the
+/// output.
 pub fn lever_a(scratch: &Path) -> Archive {
     let data = std::env::var_os("AFMID_DATA").map_or_else(|| Path::new(ROOT).join("../shared/data"), PathBuf::from);
     let folder = data.join("afm/lever-a");

@@ -85,8 +85,8 @@ impl Here {
         self.command(arguments).output().expect("afmid starts")
     }
 
-    /// Exit code and what `--json` says.
-    pub fn told(&self, arguments: &[&str]) -> (i32, Value) {
+    /// Exit code and JSON of `afmid batch --json`.
+    pub fn batch_json(&self, arguments: &[&str]) -> (i32, Value) {
         let output = self.batch(&[arguments, &["--json"]].concat());
         let value = serde_json::from_slice(&output.stdout);
         let value = value.unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)));

@@ -34,8 +34,8 @@ fn files_that_changed_places_are_computed_again_with_a_warning() {
             let ran = run(here, "b.h5", "cache", &[]);
             assert_eq!(ran.code, Some(0), "{ran:?}");
             assert_eq!(differences(&truth, &here.join("b.h5")), [""; 0], "{one} and {other}: {ran:?}");
-            let told = ran.stderr.matches("holds another result").count();
-            assert!(told > 0 && ran.stderr.contains("its stage runs again"), "{one} and {other}: {ran:?}");
+            let warned = ran.stderr.matches("holds another result").count();
+            assert!(warned > 0 && ran.stderr.contains("its stage runs again"), "{one} and {other}: {ran:?}");
         }
     }
 }
@@ -100,8 +100,8 @@ fn read_all(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     all
 }
 
-/// One mutation of a cache's files, in words. Nobody but who can write the cache seals what was mutated: then what names the result is altered, not its
-/// numbers, since the seal is no signature (SECURITY.md).
+/// One mutation of a cache's files, in words. Nobody but who can write the cache seals what was mutated: then what
+/// names the result is altered, not its numbers, since the seal is no signature (SECURITY.md).
 fn mutate(files: &mut [(PathBuf, Vec<u8>)], random: &mut ChaCha8Rng) -> String {
     let of = |ending: &str, files: &[(PathBuf, Vec<u8>)]| -> Vec<usize> {
         let has = |path: &Path| path.extension().is_some_and(|found| found == ending);

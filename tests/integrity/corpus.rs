@@ -63,16 +63,16 @@ fn every_entrance_has_a_target_and_a_corpus_and_the_corpus_is_small() {
 
 #[test]
 fn no_file_of_the_corpus_breaks_a_promise() {
-    let (told, files) = mpsc::channel();
+    let (sender, files) = mpsc::channel();
     let worker = std::thread::spawn(move || {
         for entrance in ENTRANCES {
             for file in corpus(entrance.name) {
                 let bytes = fs::read(&file).expect("a file of the corpus");
-                if told.send((file, None)).is_err() {
+                if sender.send((file, None)).is_err() {
                     return;
                 }
                 let entered = catch_unwind(AssertUnwindSafe(|| enter(entrance.name, &bytes)));
-                let _ = told.send((PathBuf::from(entrance.name), Some(entered.is_ok())));
+                let _ = sender.send((PathBuf::from(entrance.name), Some(entered.is_ok())));
             }
         }
     });
@@ -96,7 +96,8 @@ fn no_file_of_the_corpus_breaks_a_promise() {
     assert!(replayed > ENTRANCES.len());
 }
 
-/// `AFMID_WRITE_SEEDS=1` writes them; otherwise seeds of an old format, which are refused at their first line, would go unnoticed.
+/// `AFMID_WRITE_SEEDS=1` writes them; otherwise seeds of an old format, which are refused at their first line, would go
+/// unnoticed.
 #[test]
 fn seeds_of_own_formats_are_what_the_program_writes() {
     let scratch = tempfile::tempdir().expect("a temporary folder");

@@ -1,7 +1,7 @@
 //! Results of earlier formats stay readable.
 //!
-//! `earlier/result-2.h5` was written by version 0.1.0 of commit 3e9ec2c from `earlier/simulate.toml` and `earlier/small.toml`: format 2, before stage files
-//! stated what they hold.
+//! `earlier/result-2.h5` was written by version 0.1.0 of commit 3e9ec2c from `earlier/simulate.toml` and
+//! `earlier/small.toml`: format 2, before stage files stated what they hold.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -25,9 +25,9 @@ fn folder() -> tempfile::TempDir {
 fn an_earlier_result_is_shown_reported_and_traced() {
     let scratch = folder();
     let here = scratch.path();
-    let told = afmid(here, &["show", "result-2.h5"]);
+    let stdout = afmid(here, &["show", "result-2.h5"]);
     for stage in ["records", "census", "events", "ringdown"] {
-        assert!(told.contains(stage), "{told}");
+        assert!(stdout.contains(stage), "{stdout}");
     }
     let modes = shown(here, "result-2.h5", "ringdown");
     // what `afmid show` of that version printed
@@ -35,8 +35,8 @@ fn an_earlier_result_is_shown_reported_and_traced() {
     afmid(here, &["report", "result-2.h5", "-o", "page.html"]);
     let page = fs::read_to_string(here.join("page.html")).expect("a page");
     assert!(page.contains("model.ringdown") && page.contains("46299"), "the page shows the modes");
-    let told = afmid(here, &["trace", "result-2.h5", "ringdown.modes[0].frequency_hz"]);
-    assert!(told.contains("record_0001.h5") && told.contains("BLAKE3 0e3cce4a08e8c2fc"), "{told}");
+    let stdout = afmid(here, &["trace", "result-2.h5", "ringdown.modes[0].frequency_hz"]);
+    assert!(stdout.contains("record_0001.h5") && stdout.contains("BLAKE3 0e3cce4a08e8c2fc"), "{stdout}");
 }
 
 #[test]
@@ -48,8 +48,8 @@ fn an_earlier_result_is_compared_with_itself_and_with_one_of_today() {
     afmid(here, &["run", "simulate.toml", "-o", "simulate.h5", "--cache", "cache"]);
     afmid(here, &["run", "small.toml", "-o", "now.h5", "--cache", "cache", "--set", "ringdown.modes=1"]);
     let output = command(here, &["diff", "result-2.h5", "now.h5"]).output().expect("afmid starts");
-    let told = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success() && told.contains("modes") && told.contains("ringdown"), "{output:?}");
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success() && stdout.contains("modes") && stdout.contains("ringdown"), "{output:?}");
     // it may be replaced, as any result of afmid's
     afmid(here, &["run", "small.toml", "-o", "result-2.h5", "--cache", "cache"]);
 }

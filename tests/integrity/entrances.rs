@@ -1,5 +1,6 @@
-//! The ways in which bytes of others enter, as functions of bytes: what the fuzz targets call and `corpus.rs` replays (`fuzz/Cargo.toml` has this file as
-//! its library). Each returns whatever the bytes are; it panics where a promise is broken.
+//! The ways in which bytes of others enter, as functions of bytes: what the fuzz targets call and `corpus.rs` replays
+//! (`fuzz/Cargo.toml` has this file as its library). Each returns whatever the bytes are; it panics where a promise is
+//! broken.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -168,7 +169,7 @@ const fn port(name: &'static str, shape: Shape) -> PortSpec {
     PortSpec { name, shape, tag: "", optional: true, doc: "" }
 }
 
-/// A stage file that was changed and sealed again: the seal is no defence against whoever knows how it is made.
+/// A stage file that was changed and sealed again: the seal is no defence against a writer who knows how it is made.
 fn stage_file(bytes: &[u8]) {
     let path = file("stage.h5", &sealed(bytes));
     let _ = doors::say_of_stage(&path, &IDENTITY);

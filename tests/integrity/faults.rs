@@ -57,10 +57,10 @@ const RUN: [&str; 6] = ["run", "census.toml", "--set", "records.files=['set']", 
 
 #[track_caller]
 fn assert_warned_once(output: &Output, said: &str) {
-    let told = stderr(output);
-    assert_eq!(output.status.code(), Some(0), "{told}");
-    assert_eq!(told.matches("warning: ").count(), 1, "{told}");
-    assert!(told.contains("cannot be written") && told.contains(said) && told.contains("help: "), "{told}");
+    let message = stderr(output);
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    assert_eq!(message.matches("warning: ").count(), 1, "{message}");
+    assert!(message.contains("cannot be written") && message.contains(said) && message.contains("help: "), "{message}");
 }
 
 #[test]
@@ -104,9 +104,12 @@ fn no_command_makes_the_folder_of_its_output() {
         &["exam", &config("diagnose.toml"), "--keep", "no/exam"],
     ] {
         let output = place.command(arguments).output().expect("afmid starts");
-        let told = stderr(&output);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
-        assert!(told.contains("the folder no does not exist") && told.contains("mkdir -p no"), "{arguments:?}: {told}");
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(
+            message.contains("the folder no does not exist") && message.contains("mkdir -p no"),
+            "{arguments:?}: {message}"
+        );
         assert!(output.stdout.is_empty(), "{arguments:?} did something");
     }
     assert_eq!(below(place.folder()), before, "something ran");
@@ -124,7 +127,8 @@ fn a_full_cache_warns_once_and_windows_go_elsewhere() {
     // ten windows of 1 MB: more than stay in memory
     let archive = simulated(place.folder(), "archive", 10, 3);
     let text = format!(
-        "[pipeline]\nname = \"windows\"\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\nparams = {{ files = [\"{}/*.h5\"] }}\n\
+        "[pipeline]\nname = \"windows\"\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
+         params = {{ files = [\"{}/*.h5\"] }}\n\
          [[stage]]\nid = \"events\"\nuses = \"events.correlation\"\ninputs = {{ records = \"records\" }}\n\
          params = {{ kind = \"snap-off\", window_samples = 131072 }}\n",
         archive.folder.display()
@@ -155,9 +159,12 @@ fn a_result_on_a_full_disk_is_an_error_and_leaves_nothing() {
     match Mounts::new().run(&place, "mount -t tmpfs -o size=8k none disk", &run) {
         Some(output) => {
             println!("done: a result on a full disk (tmpfs of 8 kB)");
-            let told = stderr(&output);
-            assert_eq!(output.status.code(), Some(1), "{told}");
-            assert!(told.contains("error: ") && told.contains("disk/out.h5") && !names_a_temporary(&told), "{told}");
+            let message = stderr(&output);
+            assert_eq!(output.status.code(), Some(1), "{message}");
+            assert!(
+                message.contains("error: ") && message.contains("disk/out.h5") && !names_a_temporary(&message),
+                "{message}"
+            );
         }
         None => println!("NOT DONE: a result on a full disk, nothing can be mounted here"),
     }
@@ -174,8 +181,8 @@ fn a_cache_that_may_only_be_read_warns_once_and_serves() {
         return println!("NOT DONE: a cache that may only be read, nothing can be mounted here");
     };
     println!("done: a cache that may only be read (bind mount)");
-    let told = stderr(&reused);
-    assert!(reused.status.success() && told.contains("census: reused") && !told.contains("warning"), "{told}");
+    let message = stderr(&reused);
+    assert!(reused.status.success() && message.contains("census: reused") && !message.contains("warning"), "{message}");
     let other = [&RUN[..], &["--set", "census.min_bandwidth_share=0.03"]].concat();
     assert_warned_once(&mounts.run(&place, read_only, &other).expect("as before"), "cache");
     // and a folder of results that may only be read: nothing runs
@@ -200,9 +207,9 @@ fn a_limit_of_file_sizes_is_an_error_like_a_full_disk() {
     };
     // blocks of 512 bytes: nothing that a run writes is as small
     let output = limited("8", &RUN);
-    let told = stderr(&output);
-    assert_eq!(output.status.code(), Some(1), "{:?} {told}", output.status);
-    assert!(told.contains("error: ") && told.contains("out.h5"), "{told}");
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{:?} {message}", output.status);
+    assert!(message.contains("error: ") && message.contains("out.h5"), "{message}");
     assert!(!place.path("out.h5").exists());
     assert_eq!(place.leftovers(), Vec::<PathBuf>::new());
     // what goes to stdout, too
@@ -225,8 +232,8 @@ fn files_of_the_future_are_files_like_others() {
     for path in below(&place.path("cache")).iter().chain(&below(&place.path("set"))).filter(|path| path.is_file()) {
         later(path).expect("another time");
     }
-    let told = stderr(&place.command(&RUN).output().expect("afmid starts"));
-    assert!(told.contains("census: reused") && !told.contains("warning"), "{told}");
+    let message = stderr(&place.command(&RUN).output().expect("afmid starts"));
+    assert!(message.contains("census: reused") && !message.contains("warning"), "{message}");
     let gc = |arguments: &[&str]| {
         let output = place.command(&[&["gc", "--json"], arguments].concat()).output().expect("afmid starts");
         assert!(output.status.success(), "{}", stderr(&output));
@@ -241,8 +248,8 @@ fn files_of_the_future_are_files_like_others() {
     // a record that is changed and keeps a time to come
     sets::write_set(&place.path("set"), 4, 3000);
     below(&place.path("set")).iter().for_each(|path| later(path).expect("another time"));
-    let told = stderr(&place.command(&RUN).output().expect("afmid starts"));
-    assert!(!told.contains("reused"), "{told}");
+    let message = stderr(&place.command(&RUN).output().expect("afmid starts"));
+    assert!(!message.contains("reused"), "{message}");
     assert_eq!(count(&place.path("cache"), ".h5"), 1);
 }
 
@@ -269,8 +276,8 @@ fn two_runs_and_gc_share_a_cache() {
         assert!(freed > 0, "gc had no time");
         for (child, name) in runs.into_iter().zip(names) {
             let output = child.wait_with_output().expect("it ends");
-            let told = stderr(&output);
-            assert!(output.status.success() && !told.contains("warning: the cache"), "{told}");
+            let message = stderr(&output);
+            assert!(output.status.success() && !message.contains("warning: the cache"), "{message}");
             let differences = afmid_pipeline::store::compare(&place.path("whole.h5"), &place.path(&name));
             assert_eq!(differences.expect("two results"), []);
         }

@@ -15,15 +15,16 @@ use super::common::{ROOT, afmid, command};
 const MOST_TIME: Duration = Duration::from_secs(5);
 const MOST_BYTES: u64 = 512 << 20;
 
-/// Runs the program and looks at the most memory that it has had, again and again: it is stopped where it passes a limit.
+/// Runs the program and looks at the most memory that it has had, again and again: it is stopped where it passes a
+/// limit.
 fn bounded(folder: &Path, arguments: &[&str]) {
     let mut command = command(folder, arguments);
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("afmid starts");
     let (clock, status) = (Instant::now(), format!("/proc/{}/status", child.id()));
     let mut most = 0;
     let ended = loop {
-        let told = fs::read_to_string(&status).unwrap_or_default();
-        let line = told.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
         let kib = line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<u64>().ok());
         most = most.max(kib.unwrap_or(0) << 10);
         if let Some(status) = child.try_wait().expect("the child is there") {
@@ -102,7 +103,8 @@ fn result(folder: &Path) -> Vec<u8> {
     let long: String =
         (0..30_000).map(|line| format!("# a comment that is as long as thirty thousand lines: {line}\n")).collect();
     let config = format!(
-        "[pipeline]\nname = \"a\"\nseed = 1\n\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\nparams = {{ file = \"data.csv\", sample_rate_hz = 1.0 }}\n{long}"
+        "[pipeline]\nname = \"a\"\nseed = 1\n\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\n\
+         params = {{ file = \"data.csv\", sample_rate_hz = 1.0 }}\n{long}"
     );
     fs::write(folder.join("a.toml"), config).expect("a config is written");
     let mut arguments = vec!["run", "a.toml", "-o", "a.h5", "--cache", "cache"];
@@ -288,8 +290,8 @@ fn archives_that_inflate_to_much_are_bounded() {
     npz(&path("small.npz"), 1, 5000);
     mat(&path("small.mat"), 1, 5000);
     for small in ["small.npz", "small.mat"] {
-        let told = afmid(folder.path(), &["inspect", small]);
-        assert!(told.contains("/x") && told.contains("5000"), "{told}");
+        let output = afmid(folder.path(), &["inspect", small]);
+        assert!(output.contains("/x") && output.contains("5000"), "{output}");
     }
     // one large member; members that are each within the bounds
     let mib = 1 << 20;

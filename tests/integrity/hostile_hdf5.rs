@@ -1,4 +1,5 @@
-//! HDF5 files of strangers whose structure does harm: what inflates to much, circles, depth, one object under many names, very many attributes.
+//! HDF5 files of strangers whose structure does harm: what inflates to much, circles, depth, one object under many
+//! names, very many attributes.
 
 use std::fs;
 use std::path::Path;

@@ -41,8 +41,8 @@ fn while_running(child: Child, mut meanwhile: impl FnMut()) -> (Option<i32>, Str
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// Runs with a file that `change` and `restore` alternate in until one run has failed, which most do. Whatever each of them kept, the next undisturbed
-/// run finds the truth.
+/// Runs with a file that `change` and `restore` alternate in until one run has failed, which most do. Whatever each of
+/// them kept, the next undisturbed run finds the truth.
 fn disturbed(prepare: impl Fn(&Path), change: impl Fn(&Path), restore: impl Fn(&Path)) {
     let scratch = folder(1, LONG);
     let here = scratch.path();
@@ -54,24 +54,24 @@ fn disturbed(prepare: impl Fn(&Path), change: impl Fn(&Path), restore: impl Fn(&
         std::thread::sleep(SETTLED);
         let (result, cache) = (format!("r{round}.h5"), format!("cache-{round}"));
         let child = begun(here, &result, &cache);
-        let (code, told) = while_running(child, || {
+        let (code, stderr) = while_running(child, || {
             change(here);
             std::thread::sleep(Duration::from_millis(3));
             restore(here);
             std::thread::sleep(Duration::from_millis(3));
         });
         match code {
-            Some(0) => assert_eq!(differences(&truth, &here.join(&result)), [""; 0], "round {round}: {told}"),
+            Some(0) => assert_eq!(differences(&truth, &here.join(&result)), [""; 0], "round {round}: {stderr}"),
             Some(1) => {
                 failed += 1;
-                assert!(told.contains("r0.h5"), "it says which file: {told}");
-                assert!(!here.join(&result).exists(), "no result is left: {told}");
+                assert!(stderr.contains("r0.h5"), "it says which file: {stderr}");
+                assert!(!here.join(&result).exists(), "no result is left: {stderr}");
             }
-            other => panic!("{other:?}: {told}"),
+            other => panic!("{other:?}: {stderr}"),
         }
         let after = run(here, "after.h5", &cache, &[]);
         assert_eq!(after.code, Some(0), "{after:?}");
-        assert_eq!(differences(&truth, &here.join("after.h5")), [""; 0], "what round {round} kept: {told}");
+        assert_eq!(differences(&truth, &here.join("after.h5")), [""; 0], "what round {round} kept: {stderr}");
         if failed > 1 {
             return;
         }
@@ -92,7 +92,7 @@ fn a_file_that_changes_while_it_is_read_fails_the_run_though_it_is_restored() {
 }
 
 #[test]
-fn a_folder_that_takes_anothers_place_for_a_moment_is_noticed_by_whoever_opens_its_files() {
+fn a_folder_that_takes_anothers_place_for_a_moment_is_noticed_when_its_files_are_opened() {
     let lead = |here: &Path, to: &str| {
         std::os::unix::fs::symlink(to, here.join("link")).expect("a link");
         fs::rename(here.join("link"), here.join("archive")).expect("renamed");
@@ -123,8 +123,8 @@ fn other_bytes_of_the_same_size_and_time_are_stated_as_they_are() {
         assert_eq!(stated(&here.join("b.h5"))[1].blake3, hash(&record), "{more:?}");
         assert_eq!(differences(&truth(here), &here.join("b.h5")), [""; 0], "{more:?}");
     }
-    let told = afmid(here, &["trace", "a.h5", "census"]);
-    assert!(told.contains("r1.h5") && told.contains("other bytes"), "{told}");
+    let trace = afmid(here, &["trace", "a.h5", "census"]);
+    assert!(trace.contains("r1.h5") && trace.contains("other bytes"), "{trace}");
 }
 
 /// What remembers the hashes of a folder's records, a line for each.

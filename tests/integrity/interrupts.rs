@@ -78,9 +78,9 @@ fn a_run_keeps_what_has_succeeded_and_the_next_completes() {
             continue;
         }
         signal(&child, "INT");
-        let (code, told) = end(child);
-        assert_eq!(code, Some(130), "{told}");
-        assert!(told.contains("interrupted by SIGINT") && !told.contains("error:"), "{told}");
+        let (code, stderr) = end(child);
+        assert_eq!(code, Some(130), "{stderr}");
+        assert!(stderr.contains("interrupted by SIGINT") && !stderr.contains("error:"), "{stderr}");
         assert_tidy(&place);
         interrupted = !place.path("out.h5").exists();
         if interrupted {
@@ -114,8 +114,8 @@ fn the_ledger_of_a_batch_stays_consistent_and_the_next_one_goes_on() {
     let mut child = start(place.command(&arguments));
     assert!(wait_until(&mut child, || count(&place.path("out/ledger"), ".json") > 2), "it ended");
     signal(&child, "TERM");
-    let (code, told) = end(child);
-    assert_eq!(code, Some(143), "{told}");
+    let (code, stderr) = end(child);
+    assert_eq!(code, Some(143), "{stderr}");
     assert_tidy(&place);
     let done = count(&place.path("out/ledger"), ".json");
     assert!(done < 60 && !place.path("out/summary.h5").exists(), "{done} were done");
@@ -142,8 +142,8 @@ fn a_signal_that_was_ignored_stays_so() {
     let mut child = start(shell);
     assert!(wait_until(&mut child, || count(&place.path("out/ledger"), ".json") > 0), "it ended");
     signal(&child, "INT");
-    let (code, told) = end(child);
-    assert_eq!(code, Some(0), "{told}");
+    let (code, stderr) = end(child);
+    assert_eq!(code, Some(0), "{stderr}");
     assert_eq!(count(&place.path("out/ledger"), ".json"), 30);
 }
 
@@ -157,8 +157,8 @@ fn the_process_of_a_plugin_goes_with_it() {
     assert!(wait_until(&mut child, || said().is_some()), "it ended");
     let pid = std::fs::read_to_string(said().expect("it is there")).expect("its number");
     signal(&child, "INT");
-    let (code, told) = end(child);
-    assert_eq!(code, Some(130), "{told}");
+    let (code, stderr) = end(child);
+    assert_eq!(code, Some(130), "{stderr}");
     let state = std::fs::read_to_string(format!("/proc/{}/stat", pid.trim())).unwrap_or_default();
     // a zombie waits for the system to take it
     assert!(state.is_empty() || state.contains(") Z "), "the plugin goes on: {state}");
@@ -172,7 +172,7 @@ fn the_archives_of_an_exam_are_removed() {
     let drawn = |tmp: &Path| super::leftovers::below(tmp).iter().any(|path| path.ends_with("archive"));
     assert!(wait_until(&mut child, || drawn(&place.path("tmp"))), "it ended");
     signal(&child, "TERM");
-    let (code, told) = end(child);
-    assert_eq!(code, Some(143), "{told}");
+    let (code, stderr) = end(child);
+    assert_eq!(code, Some(143), "{stderr}");
     assert_tidy(&place);
 }

@@ -44,9 +44,9 @@ fn what_another_processor_or_build_computed_is_not_reused() {
         let rows = explained(here, other);
         assert_eq!(kept(&rows), 0, "{other}");
         let changes = rows.iter().filter_map(|row| row.nearest.as_ref()).flat_map(|nearest| &nearest.changes);
-        let told =
+        let changed =
             changes.filter(|change| matches!(change, Change::Arithmetic { was, is } if *was == own && is == other));
-        assert_eq!(told.count(), 3, "each stage says so: {rows:?}");
+        assert_eq!(changed.count(), 3, "each stage says so: {rows:?}");
     }
 }
 
@@ -66,8 +66,8 @@ fn explain_says_which_processor_or_build_made_what_is_there() {
         fs::rename(path.with_extension("h5"), to.with_extension("h5")).expect("renamed");
         fs::remove_file(path).expect("removed");
     }
-    let told = afmid(here, &["explain", CONFIG, "--cache", "cache"]);
-    assert_eq!(told.matches("processor or build was x86_64 [sse4.1], is").count(), 3, "{told}");
+    let output = afmid(here, &["explain", CONFIG, "--cache", "cache"]);
+    assert_eq!(output.matches("processor or build was x86_64 [sse4.1], is").count(), 3, "{output}");
     let json: serde_json::Value =
         serde_json::from_str(&afmid(here, &["explain", CONFIG, "--cache", "cache", "--json"])).expect("JSON");
     assert!(json.to_string().contains("\"arithmetic\""), "{json}");
@@ -144,5 +144,5 @@ fn every_argument_and_variable_of_a_plugin_is_in_the_key_and_explain_says_what_i
     afmid(&["trust", "a.toml", "--json"]);
     let explained = afmid(&["explain", "a.toml", "--json"]);
     assert_eq!(explained["stages"][0]["would"], "reuse", "{explained}");
-    assert!(explained["stages"][0]["unseen"].as_str().is_some_and(|told| told.contains("import")), "{explained}");
+    assert!(explained["stages"][0]["unseen"].as_str().is_some_and(|text| text.contains("import")), "{explained}");
 }

@@ -38,7 +38,8 @@ fn kill(place: &Place, arguments: &[&str], usual: Duration, random: &mut Random)
     child.wait().expect("it is gone").code().is_none()
 }
 
-/// Tries with their numbers, from 0, until `wanted` kills have come before the end of what they were to end. Panics: that took three times as many.
+/// Tries with their numbers, from 0, until `wanted` kills have come before the end of what they were to end. Panics:
+/// that took three times as many.
 fn until_killed(wanted: usize, what: &str, mut each: impl FnMut(usize) -> bool) {
     let (mut hit, mut tries) = (0, 0);
     while hit < wanted {

@@ -34,7 +34,8 @@ fn what_is_no_regular_file_is_refused_before_it_is_opened() {
     fs::write(folder.path().join("data.toml"), "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"records\"\nuses = \"io.records\"\nparams = { files = [\"x.h5\"] }\n").expect("a config");
     for odd in ["fifo", "socket", "link", "/dev/zero"] {
         let columns = format!(
-            "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\nparams = {{ file = {odd:?}, sample_rate_hz = 1.0 }}\n"
+            "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\n\
+             params = {{ file = {odd:?}, sample_rate_hz = 1.0 }}\n"
         );
         fs::write(folder.path().join("columns.toml"), columns).expect("a config");
         let commands: &[&[&str]] = &[
@@ -58,12 +59,12 @@ fn what_is_no_regular_file_is_refused_before_it_is_opened() {
         ];
         for arguments in commands {
             let Output { status, stderr, .. } = ends(folder.path(), arguments);
-            let told = String::from_utf8_lossy(&stderr);
-            assert!(matches!(status.code(), Some(1 | 2)), "afmid {arguments:?}: {status}\n{told}");
+            let message = String::from_utf8_lossy(&stderr);
+            assert!(matches!(status.code(), Some(1 | 2)), "afmid {arguments:?}: {status}\n{message}");
         }
-        let told = ends(folder.path(), &["check", odd]);
-        let told = String::from_utf8_lossy(&told.stderr).into_owned();
-        assert!(told.contains("a regular file was wanted"), "{told}");
+        let output = ends(folder.path(), &["check", odd]);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(message.contains("a regular file was wanted"), "{message}");
     }
 }
 
@@ -83,15 +84,16 @@ fn a_ledger_entry_that_is_a_fifo_is_no_entry() {
 #[test]
 fn a_config_has_at_most_8_mib() {
     let folder = tempfile::tempdir().expect("a folder");
-    let head = "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"a\"\nuses = \"io.columns\"\nparams = { file = \"x\" }\n# ";
+    let head = "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"a\"\nuses = \"io.columns\"\n\
+        params = { file = \"x\" }\n# ";
     let with = |bytes: usize| {
         fs::write(folder.path().join("a.toml"), head.to_owned() + &"x".repeat(bytes - head.len())).expect("a config");
         let Output { status, stderr, .. } = ends(folder.path(), &["check", "a.toml"]);
         (status.code(), String::from_utf8_lossy(&stderr).into_owned())
     };
     assert_eq!(with(8 << 20).0, Some(0));
-    let (code, told) = with((8 << 20) + 1);
-    assert!(code == Some(2) && told.contains("more than the 8388608 bytes"), "{told}");
+    let (code, message) = with((8 << 20) + 1);
+    assert!(code == Some(2) && message.contains("more than the 8388608 bytes"), "{message}");
 }
 
 #[test]
@@ -99,14 +101,14 @@ fn at_most_a_hundred_problems_are_printed() {
     let folder = tempfile::tempdir().expect("a folder");
     let stages: String = (0..1234).map(|n| format!("[[stage]]\nid = \"a{n}\"\nuses = \"io.nothing\"\n")).collect();
     fs::write(folder.path().join("a.toml"), format!("[pipeline]\nname = \"a\"\nseed = 1\n{stages}")).expect("a config");
-    let told = ends(folder.path(), &["check", "a.toml"]);
-    let text = String::from_utf8_lossy(&told.stderr).into_owned();
+    let output = ends(folder.path(), &["check", "a.toml"]);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(text.matches("there is no stage named").count(), 100);
     assert!(text.contains("and 1134 more") && text.contains("1234 problems"), "{}", &text[text.len() - 300..]);
-    // the last one is told at its line
+    // the last one is reported at its line
     assert!(text.contains("[a.toml:303:8]"), "{text}");
-    let told = ends(folder.path(), &["check", "--json", "a.toml"]);
-    let json: serde_json::Value = serde_json::from_slice(&told.stdout).expect("JSON");
+    let output = ends(folder.path(), &["check", "--json", "a.toml"]);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(json[0]["problems"].as_array().map(Vec::len), Some(100));
     assert_eq!(json[0]["more_problems"], 1134);
 }

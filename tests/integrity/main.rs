@@ -1,5 +1,5 @@
-//! What the engine promises whatever happens: what is stored was computed from the bytes that are stated, nothing of others is lost, strangers' files
-//! neither run commands nor take all time and memory.
+//! What the engine promises whatever happens: what is stored was computed from the bytes that are stated, nothing of
+//! others is lost, strangers' files neither run commands nor take all time and memory.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -26,3 +26,4 @@ mod seeds;
 mod small;
 mod strangers;
 mod terminal;
+mod words;

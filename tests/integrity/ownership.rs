@@ -37,33 +37,34 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 /// Runs a command that must refuse; what it says.
 fn fails(here: &Path, arguments: &[&str]) -> String {
     let output = command(here, arguments).output().expect("afmid starts");
-    let told = [output.stdout, output.stderr].concat();
-    let told = String::from_utf8_lossy(&told).into_owned();
-    assert!(matches!(output.status.code(), Some(1..=3)), "afmid {arguments:?}: {}\n{told}", output.status);
-    told
+    let message = [output.stdout, output.stderr].concat();
+    let message = String::from_utf8_lossy(&message).into_owned();
+    assert!(matches!(output.status.code(), Some(1..=3)), "afmid {arguments:?}: {}\n{message}", output.status);
+    message
 }
 
 /// Runs a command that must refuse, and changes no file of those that are there.
 fn refused(here: &Path, arguments: &[&str]) -> String {
     let before = files(here);
-    let told = fails(here, arguments);
+    let message = fails(here, arguments);
     let after = files(here);
     for (path, bytes) in &before {
-        assert!(after.get(path) == Some(bytes), "afmid {arguments:?} changed {}: {told}", path.display());
+        assert!(after.get(path) == Some(bytes), "afmid {arguments:?} changed {}: {message}", path.display());
     }
-    told
+    message
 }
 
-/// Puts other bytes where something lies, has the command refuse it, and lets it go on when they are gone. Then edits what afmid wrote: it stays, too.
+/// Puts other bytes where something lies, has the command refuse it, and lets it go on when they are gone. Then edits
+/// what afmid wrote: it stays, too.
 fn kept(here: &Path, place: &str, arguments: &[&str]) {
     let path = here.join(place);
     fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
     for others in [&b"<!DOCTYPE html>\n<html>mine</html>\n"[..], b"1,2,3\n", b"{\"mine\": 1}\n", b"\x89PNG\r\n\x1a\n"] {
         fs::write(&path, others).expect("written");
-        let told = fails(here, arguments);
-        assert!(fs::read(&path).expect("bytes") == others, "afmid {arguments:?} replaced {place}: {told}");
+        let message = fails(here, arguments);
+        assert!(fs::read(&path).expect("bytes") == others, "afmid {arguments:?} replaced {place}: {message}");
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
-        assert!(told.contains(&name), "it says which: {told}");
+        assert!(message.contains(&name), "it says which: {message}");
     }
     fs::remove_file(&path).expect("removed");
     afmid(here, arguments);
@@ -74,8 +75,8 @@ fn kept(here: &Path, place: &str, arguments: &[&str]) {
     let middle = whole.len() / 2;
     edited[middle] ^= 1;
     fs::write(&path, &edited).expect("written");
-    let told = fails(here, arguments);
-    assert!(fs::read(&path).expect("bytes") == edited && told.contains("changed since"), "{place}: {told}");
+    let message = fails(here, arguments);
+    assert!(fs::read(&path).expect("bytes") == edited && message.contains("changed since"), "{place}: {message}");
     fs::write(&path, &whole).expect("written");
     afmid(here, arguments);
     fs::write(&path, "").expect("written");
@@ -91,8 +92,11 @@ fn a_simulation_keeps_the_measurements_of_its_folder() {
     // a measurement that happens to have the name
     record(&here.join("simulated/record_0000.h5"), 5000, 1);
     let arguments = ["run", "sim.toml", "-o", "s.h5", "--cache", "cache"];
-    let told = refused(here, &arguments);
-    assert!(told.contains("record_0000.h5") && told.contains("did not write it") && told.contains("help"), "{told}");
+    let message = refused(here, &arguments);
+    assert!(
+        message.contains("record_0000.h5") && message.contains("did not write it") && message.contains("help"),
+        "{message}"
+    );
     fs::remove_file(here.join("simulated/record_0000.h5")).expect("removed");
     afmid(here, &arguments);
     afmid(here, &arguments);
@@ -102,8 +106,8 @@ fn a_simulation_keeps_the_measurements_of_its_folder() {
     let mut edited = whole.clone();
     edited[whole.len() / 2] ^= 1;
     fs::write(&path, &edited).expect("written");
-    let told = refused(here, &arguments);
-    assert!(told.contains("record_0001.h5") && told.contains("changed since"), "{told}");
+    let message = refused(here, &arguments);
+    assert!(message.contains("record_0001.h5") && message.contains("changed since"), "{message}");
     fs::write(&path, &whole).expect("written");
     let truth = here.join("simulated.truth.json");
     let text = fs::read_to_string(&truth).expect("the truth");

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 /// Per pair of folders (or files) directly below `src`: the places where the first names the second, as `file: path`.
 pub type Arrows = BTreeMap<(String, String), BTreeSet<String>>;
 
-/// Arrows between the folders of a crate, read from every `use`, inline `crate::` and `super::` of its code. Tests are left out: a test may use
-/// whatever lies above what it tests.
+/// Arrows between the folders of a crate, read from every `use`, inline `crate::` and `super::` of its code. Tests are
+/// left out: a test may use whatever lies above what it tests.
 pub fn arrows(src: &Path) -> Arrows {
     let mut found = Arrows::new();
     for file in sources(src) {
@@ -58,7 +58,8 @@ fn absolute(path: &[String], module: &[String]) -> Option<String> {
     }
 }
 
-/// All paths of a code without comments and texts: those of `use` with their braces undone, and those that stand anywhere else.
+/// All paths of a code without comments and texts: those of `use` with their braces undone, and those that stand
+/// anywhere else.
 fn paths(code: &str) -> Vec<Vec<String>> {
     let mut found = Vec::new();
     let mut rest = code;

@@ -1,6 +1,7 @@
 //! Work grows in proportion to the number of items.
 //!
-//! Eight times as many items take less than 8^1.5 times as long: work in proportion takes 8 times, that of pairs 64 times. A busy machine gets three tries.
+//! Eight times as many items take less than 8^1.5 times as long: work in proportion takes 8 times, that of pairs 64
+//! times. A busy machine gets three tries.
 
 use std::fs;
 use std::path::Path;
@@ -72,7 +73,8 @@ fn stages_of_a_config_right_and_wrong() {
     in_proportion("right stages", &check, |folder, count| {
         let stage = |n| {
             format!(
-                "[[stage]]\nid = \"c{n}\"\nuses = \"io.census\"\ninputs = {{ records = \"r{n}.records\" }}\n[[stage]]\nid = \"r{n}\"\nuses = \"io.records\"\nparams = {{ files = [\"x\"] }}\n"
+                "[[stage]]\nid = \"c{n}\"\nuses = \"io.census\"\ninputs = {{ records = \"r{n}.records\" }}\n[[stage]]\n\
+                 id = \"r{n}\"\nuses = \"io.records\"\nparams = {{ files = [\"x\"] }}\n"
             )
         };
         write(folder, (0..count / 2).map(stage).collect());

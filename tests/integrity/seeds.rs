@@ -169,13 +169,13 @@ fn runs(scratch: &Path) -> [(&'static str, RunResult); 4] {
     let events = || stage("events", "events.correlation", None, json!({"kind": "snap-off"}), found.clone());
     let force = stage("force", "force.extrapolation", Some("events"), json!({}), vec![("pair", pair().wrap())]);
     let etfe = stage("etfe", "spectrum.etfe", None, json!({}), vec![("estimate", estimate().wrap())]);
-    let told = vec![("summary", Document(diagnosis()).wrap())];
-    let told = stage("diagnosis", "diagnosis.release", Some("etfe"), json!({}), told);
+    let diagnosed = vec![("summary", Document(diagnosis()).wrap())];
+    let diagnosed = stage("diagnosis", "diagnosis.release", Some("etfe"), json!({}), diagnosed);
     [
         ("whole.h5", run("fitted", vec![records, fitted])),
         ("modes.h5", run("modes", vec![modes()])),
         ("events.h5", run("events", vec![events(), force])),
-        ("diagnosis.h5", run("diagnosis", vec![etfe, told])),
+        ("diagnosis.h5", run("diagnosis", vec![etfe, diagnosed])),
     ]
 }
 

@@ -13,7 +13,7 @@ use super::leftovers::Place;
 /// Renames the window, erases the screen, turns text round, ends the paragraph.
 const EVIL: &str = "\u{1b}]0;x\u{7}\u{9b}2J\u{202e}\u{2066}\u{61c}\u{200f}\u{2028}\u{7f}\u{8}";
 
-/// Whether text holds something that acts on a terminal; written anew here, byte by byte.
+/// Whether text holds something that acts on a terminal; written a second time here, byte by byte.
 fn acting(bytes: &[u8]) -> Option<usize> {
     let at = |k: usize| bytes.get(k).copied().unwrap_or(0);
     (0..bytes.len()).find(|&k| match at(k) {
@@ -45,7 +45,7 @@ fn assert_harmless(what: &str, bytes: &[u8]) {
 
 /// Runs the program; what it prints is harmless and shows `wanted` as an escape, if anything is wanted.
 #[track_caller]
-fn told(place: &Place, arguments: &[&str], wanted: &str) -> Output {
+fn harmless(place: &Place, arguments: &[&str], wanted: &str) -> Output {
     let output = place.command(arguments).output().expect("afmid starts");
     for (name, bytes) in [("stdout", &output.stdout), ("stderr", &output.stderr)] {
         assert_harmless(&format!("{name} of {arguments:?}"), bytes);
@@ -147,53 +147,53 @@ fn names_units_and_paths_of_recordings_are_shown_and_not_obeyed() {
     std::fs::write(place.path(&folder).join(format!("odd{EVIL}.bin")), [7; 100]).expect("a file");
     let file = format!("{folder}/{name}");
     let shown = "\\x1b]0;x\\x07\\u{9b}2J\\u{202e}\\u{2066}\\u{61c}\\u{200f}\\u{2028}\\x7f\\x08";
-    told(&place, &["inspect", &file], shown);
-    told(&place, &["inspect", &folder], shown);
-    let json = told(&place, &["inspect", &folder, "--json"], "\\u202e");
+    harmless(&place, &["inspect", &file], shown);
+    harmless(&place, &["inspect", &folder], shown);
+    let json = harmless(&place, &["inspect", &folder, "--json"], "\\u202e");
     assert!(String::from_utf8_lossy(&json.stdout).contains("\\u009b"));
     let value: serde_json::Value = serde_json::from_slice(&json.stdout).expect("JSON");
     assert!(value.to_string().contains('\u{202e}'), "JSON says what the file says");
-    told(&place, &["new", "pipeline", &folder, "-o", &format!("new{EVIL}.toml")], "");
+    harmless(&place, &["new", "pipeline", &folder, "-o", &format!("new{EVIL}.toml")], "");
 
     let config = format!("census{EVIL}.toml");
     std::fs::write(place.path(&config), census(&escaped(&format!("{folder}/rec*.h5")))).expect("a config");
-    told(&place, &["check", &config], shown);
-    told(&place, &["check", &config, "--json"], "\\u202e");
+    harmless(&place, &["check", &config], shown);
+    harmless(&place, &["check", &config, "--json"], "\\u202e");
     for format in ["text", "mermaid", "dot", "json"] {
-        told(&place, &["graph", &config, "--format", format], "");
+        harmless(&place, &["graph", &config, "--format", format], "");
     }
-    told(&place, &["explain", &config], "");
+    harmless(&place, &["explain", &config], "");
     let output = format!("out{EVIL}.h5");
-    let run = told(&place, &["run", &config, "-o", &output], shown);
+    let run = harmless(&place, &["run", &config, "-o", &output], shown);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    told(&place, &["run", &config, "-o", &output, "--json"], "\\u202e");
+    harmless(&place, &["run", &config, "-o", &output, "--json"], "\\u202e");
     for arguments in [&["show", &output][..], &["show", &output, "records"], &["show", &output, "census"]] {
-        told(&place, arguments, shown);
+        harmless(&place, arguments, shown);
         // numbers alone are in the census's
         let named = if arguments.contains(&"census") { "" } else { "\\u202e" };
-        told(&place, &[arguments, &["--json"]].concat(), named);
+        harmless(&place, &[arguments, &["--json"]].concat(), named);
     }
-    told(&place, &["trace", &output, "census.records"], "");
-    told(&place, &["diff", &output, &output], "");
-    told(&place, &["rerun", &output], shown);
-    told(&place, &["export", &output, "--model", "json"], shown);
-    told(&place, &["export-crate", &output], "");
-    told(&place, &["report", &output, "-o", "page.html", "--figures", "figures"], "");
+    harmless(&place, &["trace", &output, "census.records"], "");
+    harmless(&place, &["diff", &output, &output], "");
+    harmless(&place, &["rerun", &output], shown);
+    harmless(&place, &["export", &output, "--model", "json"], shown);
+    harmless(&place, &["export-crate", &output], "");
+    harmless(&place, &["report", &output, "-o", "page.html", "--figures", "figures"], "");
     assert_page(&place);
-    told(&place, &["gc", "--cache", &format!("ca{EVIL}")], shown);
-    told(&place, &["doctor", "--cache", &format!("ca{EVIL}")], shown);
+    harmless(&place, &["gc", "--cache", &format!("ca{EVIL}")], shown);
+    harmless(&place, &["doctor", "--cache", &format!("ca{EVIL}")], shown);
 
     // what goes wrong
     let other = format!("{}\n[[stage]]\nid = \"x\"\nuses = \"no{}\"\n", census("none"), escaped(EVIL));
     std::fs::write(place.path(&config), other).expect("a config");
-    told(&place, &["check", &config], shown);
+    harmless(&place, &["check", &config], shown);
     std::fs::write(place.path(&config), format!("[pipeline]\nname = \"a\"\n# {EVIL}\nx = 1\r\ny = '{EVIL}\n"))
         .expect("a config");
-    told(&place, &["check", &config], "");
-    told(&place, &["check", &config, "--json"], "");
+    harmless(&place, &["check", &config], "");
+    harmless(&place, &["check", &config, "--json"], "");
     std::fs::write(place.path(&config), census(&escaped(&format!("nowhere{EVIL}/*.h5")))).expect("a config");
-    told(&place, &["run", &config, "-o", &output], shown);
-    told(&place, &["run", &config, "-o", &output, "--set", &format!("census.{EVIL}=1")], shown);
+    harmless(&place, &["run", &config, "-o", &output], shown);
+    harmless(&place, &["run", &config, "-o", &output, "--set", &format!("census.{EVIL}=1")], shown);
     for arguments in [
         &["show", EVIL][..],
         &["show", &output, EVIL],
@@ -206,18 +206,18 @@ fn names_units_and_paths_of_recordings_are_shown_and_not_obeyed() {
         &["batch", &config, EVIL],
         &["run", &config, "-o", &format!("no{EVIL}/x.h5")],
     ] {
-        told(&place, arguments, "\\x1b]0;x\\x07");
+        harmless(&place, arguments, "\\x1b]0;x\\x07");
     }
     // what the command line's own parser leaves of it
-    told(&place, &[EVIL], "\\u{202e}");
-    told(&place, &["run", EVIL, "--no", EVIL], "");
+    harmless(&place, &[EVIL], "\\u{202e}");
+    harmless(&place, &["run", EVIL, "--no", EVIL], "");
 }
 
 #[test]
 fn a_plugin_cannot_speak_to_the_terminal() {
     let place = Place::new();
     let script = format!("printf '%s' '{EVIL}' >&2; printf '%s\\n' '{EVIL}'; sleep 0.2");
-    let output = told(&place, &["plugin", "check", "--", "sh", "-c", &script], "\\x1b]0;x\\x07");
+    let output = harmless(&place, &["plugin", "check", "--", "sh", "-c", &script], "\\x1b]0;x\\x07");
     assert_eq!(output.status.code(), Some(1));
 }
 
@@ -261,15 +261,15 @@ fn pages_and_figures_show_what_a_stranger_s_result_says() {
         info: RunInfo { host: evil("host"), started_at: evil("now"), ..RunInfo::default() },
     };
     write_result(&place.path("strange.h5"), &run).expect("a result");
-    told(&place, &["report", "strange.h5", "-o", "page.html", "--figures", "figures"], "");
+    harmless(&place, &["report", "strange.h5", "-o", "page.html", "--figures", "figures"], "");
     assert_page(&place);
     let page = std::fs::read_to_string(place.path("page.html")).expect("a page");
     for shown in ["careful\\x1b", "strange\\x1b", "V\\x1b", "x\\x1b"] {
         assert!(page.contains(shown), "the page does not show {shown}");
     }
-    told(&place, &["show", "strange.h5"], "\\x1b]0;x");
-    told(&place, &["show", "strange.h5", "strange"], "\\x1b]0;x");
-    told(&place, &["show", "strange.h5", "strange", "--json"], "\\u001b]0;x");
+    harmless(&place, &["show", "strange.h5"], "\\x1b]0;x");
+    harmless(&place, &["show", "strange.h5", "strange"], "\\x1b]0;x");
+    harmless(&place, &["show", "strange.h5", "strange", "--json"], "\\u001b]0;x");
 }
 
 #[test]

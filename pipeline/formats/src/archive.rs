@@ -74,7 +74,8 @@ impl Archive {
         self.directory.index_for_name(name).map(|number| self.member(number))
     }
 
-    /// Where a member lies. Errors: outside the file, encrypted, packed otherwise than by deflate, another size than it can have.
+    /// Where a member lies. Errors: outside the file, encrypted, packed otherwise than by deflate, another size than it
+    /// can have.
     pub(crate) fn member(&mut self, number: usize) -> Result<Member, Refused> {
         let found = self.directory.by_index_raw(number).map_err(|e| Refused::Damaged(damaged(&e)))?;
         let name = found.name().map_err(|e| Refused::Damaged(damaged(&e)))?.to_string();
@@ -112,7 +113,8 @@ impl Archive {
         Ok(bytes)
     }
 
-    /// The member as a compressed stretch of the file; none if it is stored as it is. Errors: it cannot hold what it announces.
+    /// The member as a compressed stretch of the file; none if it is stored as it is. Errors: it cannot hold what it
+    /// announces.
     pub(crate) fn packed(&self, member: &Member) -> Result<Option<Packed>, FormatError> {
         let wrapper = Wrapper::Bare { crc32: member.crc32 };
         let packed = || Packed::new(&self.pinned, member.at, member.packed_bytes, member.bytes, wrapper);

@@ -9,10 +9,12 @@ use std::fs::File;
 /// Packed bytes read at once.
 const PIECE_BYTES: u64 = 1 << 16;
 
-/// No deflate stream gives more than 1032 bytes for one: 258 bytes for a length code of 1 bit and a distance code of 1 bit.
+/// No deflate stream gives more than 1032 bytes for one: 258 bytes for a length code of 1 bit and a distance code of 1
+/// bit.
 pub(crate) const MOST_FOR_ONE_BYTE: u64 = 1032;
 
-/// A decoder of the bytes `at..end` of a file. Unlike `flate2`'s readers it knows a stream that stops early from one that ends.
+/// A decoder of the bytes `at..end` of a file. Unlike `flate2`'s readers it knows a stream that stops early from one
+/// that ends.
 #[derive(Debug)]
 pub(crate) struct Inflating {
     file: File,

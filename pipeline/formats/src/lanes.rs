@@ -1,6 +1,7 @@
 //! Which samples of an array make a channel.
 
-/// A channel of fewer samples identifies nothing: an array of at most this many rows and as many times more columns is wide.
+/// A channel of fewer samples identifies nothing: an array of at most this many rows and as many times more columns is
+/// wide.
 const FEW: usize = 16;
 
 /// How an array falls into channels. All distances count elements.
@@ -16,9 +17,9 @@ pub struct Lanes {
 }
 
 impl Lanes {
-    /// Finds the axis of time: axes of length 1 do not count; of one axis left it is that one; of more it is the first, as in
-    /// `plot`, `filter`, `fft` of MATLAB and the columns of `numpy.loadtxt`; but of two it is the second if the array has at
-    /// most 16 rows and at least 16 times as many columns, because 16 samples are no recording.
+    /// Finds the axis of time: axes of length 1 do not count; of one axis left it is that one; of more it is the first,
+    /// as in `plot`, `filter`, `fft` of MATLAB and the columns of `numpy.loadtxt`; but of two it is the second if the
+    /// array has at most 16 rows and at least 16 times as many columns, because 16 samples are no recording.
     ///
     /// None if a size is 0 or the number of elements overflows.
     pub fn of(shape: &[usize], first_axis_fastest: bool) -> Option<Self> {
@@ -37,8 +38,8 @@ impl Lanes {
         self.others.iter().map(|&(size, _)| size).product()
     }
 
-    /// Index (`[2]`, `[2,3]`, empty for the only one), counted from `base`, and first element of each channel; the first index
-    /// changes fastest.
+    /// Index (`[2]`, `[2,3]`, empty for the only one), counted from `base`, and first element of each channel; the
+    /// first index changes fastest.
     pub fn each(&self, base: usize) -> impl Iterator<Item = (String, u64)> {
         (0..self.count()).map(move |number| {
             let (mut left, mut first, mut index) = (number, 0, Vec::new());

@@ -1,7 +1,8 @@
-//! Readers of recorded files that are not afmid's own: what data acquisition programs, microscopes and numerical programs write.
+//! Readers of recorded files that are not afmid's own: what data acquisition programs, microscopes and numerical
+//! programs write.
 //!
-//! [`recognise`] finds the format of a file, [`Known::open`] reads everything of it but the samples, and each channel's [`Source`] reads
-//! any stretch of these. Nothing here knows physics, HDF5 or the rest of afmid.
+//! [`recognise`] finds the format of a file, [`Known::open`] reads everything of it but the samples, and each channel's
+//! [`Source`] reads any stretch of these. Nothing here knows physics, HDF5 or the rest of afmid.
 
 mod archive;
 mod budget;
@@ -47,8 +48,8 @@ pub use regular::{open_regular, read_regular};
 ///
 /// Holds no open file between reads; reads no more than it is asked for (plus, for compressed data, what that takes).
 pub trait Source: std::fmt::Debug + Send + Sync {
-    /// Reads `count` raw samples from sample `start`. Errors: beyond the end; the file cannot be read, is damaged, or has changed its
-    /// size since it was opened.
+    /// Reads `count` raw samples from sample `start`. Errors: beyond the end; the file cannot be read, is damaged, or
+    /// has changed its size since it was opened.
     fn read(&self, start: usize, count: usize) -> Result<Raw, FormatError>;
 
     /// The stretch that is cheapest to read at once (a storage chunk).
@@ -61,7 +62,8 @@ pub trait Source: std::fmt::Debug + Send + Sync {
         0
     }
 
-    /// Whether a stretch costs what its bytes cost, however often it is asked for: nothing to inflate, to parse or to search.
+    /// Whether a stretch costs what its bytes cost, however often it is asked for: nothing to inflate, to parse or to
+    /// search.
     fn is_direct(&self) -> bool {
         false
     }
@@ -80,8 +82,8 @@ pub struct FoundChannel {
     pub long_name: String,
     /// Samples per second; none if the file does not say.
     pub sample_rate_hz: Option<f64>,
-    /// value = stored * scale_factor + add_offset. Scalings that are no straight line are applied by the source, which then gives
-    /// `Float64`, and these are 1 and 0.
+    /// value = stored * scale_factor + add_offset. Scalings that are no straight line are applied by the source, which
+    /// then gives `Float64`, and these are 1 and 0.
     pub scale_factor: f64,
     /// See `scale_factor`.
     pub add_offset: f64,
@@ -112,7 +114,7 @@ pub struct Contents {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{problem}{}{}", at_byte.map(|byte| format!(", at byte {byte}")).unwrap_or_default(), file.as_ref().map(|file| format!(" ({})", file.display())).unwrap_or_default())]
 pub struct FormatError {
-    /// The file, as far as whoever failed knew it.
+    /// The file, where it is known.
     pub file: Option<PathBuf>,
     /// Byte in the file where it was seen, if that is known.
     pub at_byte: Option<u64>,

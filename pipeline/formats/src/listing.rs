@@ -8,8 +8,8 @@ use crate::{Contents, FoundChannel};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
-/// Memory for the descriptions of channels: enough for a force volume of 256 by 256 curves, where a small damaged file could
-/// declare millions.
+/// Memory for the descriptions of channels: enough for a force volume of 256 by 256 curves, where a small damaged file
+/// could declare millions.
 const MOST_BYTES: usize = 32 << 20;
 
 /// About what one description takes, besides its location that is kept about four times.

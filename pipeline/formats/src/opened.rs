@@ -29,7 +29,8 @@ impl Opened {
         &self.pinned
     }
 
-    /// Reads exactly `count` bytes from byte `from`; allocates only what the file can hold. Errors: beyond the end; unreadable.
+    /// Reads exactly `count` bytes from byte `from`; allocates only what the file can hold. Errors: beyond the end;
+    /// unreadable.
     pub(crate) fn read(&self, what: &str, from: u64, count: u64) -> Result<Vec<u8>, FormatError> {
         let inside = from.checked_add(count).is_some_and(|end| end <= self.bytes());
         let (true, Ok(length)) = (inside, usize::try_from(count)) else {

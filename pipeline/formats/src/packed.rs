@@ -50,8 +50,8 @@ struct Streaming {
 }
 
 impl Packed {
-    /// Errors: the stretch cannot hold as many inflated bytes as it says, or ends behind the file's end; all of the file's come to more than
-    /// [`most_inflated`].
+    /// Errors: the stretch cannot hold as many inflated bytes as it says, or ends behind the file's end; all of the
+    /// file's come to more than [`most_inflated`].
     pub(crate) fn new(
         file: &Pinned,
         at: u64,
@@ -65,13 +65,15 @@ impl Packed {
         }
         if inflated_bytes > packed_bytes.saturating_mul(MOST_FOR_ONE_BYTE) {
             let problem = format!(
-                "{inflated_bytes} bytes cannot come from {packed_bytes} compressed ones, {MOST_FOR_ONE_BYTE} from each are possible"
+                "{inflated_bytes} bytes cannot come from {packed_bytes} compressed ones, {MOST_FOR_ONE_BYTE} from each \
+                 are possible"
             );
             return Err(fail::at(at, problem, fail::COPY_AGAIN));
         }
         if !file.may_inflate(inflated_bytes) {
             let problem = format!(
-                "{inflated_bytes} bytes would come from {packed_bytes} compressed ones; all compressed data of a file of {} bytes may come to {}",
+                "{inflated_bytes} bytes would come from {packed_bytes} compressed ones; all compressed data of a file \
+                 of {} bytes may come to {}",
                 file.bytes(),
                 most_inflated(file.bytes())
             );
@@ -85,8 +87,8 @@ impl Packed {
         if self.is_short() { self.inflated_bytes } else { 0 }
     }
 
-    /// Whether it is kept once it was read, and inflated to its end while the file is opened, so that damage shows at once. What is longer is verified
-    /// where a stream reaches its end.
+    /// Whether it is kept once it was read, and inflated to its end while the file is opened, so that damage shows at
+    /// once. What is longer is verified where a stream reaches its end.
     fn is_short(&self) -> bool {
         self.inflated_bytes <= SHORT_BYTES
     }

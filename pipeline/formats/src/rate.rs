@@ -64,7 +64,8 @@ impl Clue {
     }
 }
 
-/// What the clues of each scope (a struct, or the file: empty) say about the arrays of one. The nearest scope with a clue decides.
+/// What the clues of each scope (a struct, or the file: empty) say about the arrays of one. The nearest scope with a
+/// clue decides.
 pub fn rate_in(scope: &str, clues: &HashMap<String, Vec<Clue>>) -> (Option<f64>, Option<String>) {
     let mut scope = scope;
     loop {

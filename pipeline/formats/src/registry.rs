@@ -44,7 +44,8 @@ impl Known {
     }
 }
 
-/// Marks at a file's beginning come first, in any order; MATLAB 4 has no mark but a plausible header; tables of text are what is left.
+/// Marks at a file's beginning come first, in any order; MATLAB 4 has no mark but a plausible header; tables of text
+/// are what is left.
 const FORMATS: &[Known] = &[
     Known::of::<Tdms>("tdms", "NI TDMS"),
     Known::of::<Npy>("npy", "NumPy array"),
@@ -57,7 +58,8 @@ const FORMATS: &[Known] = &[
     Known::of::<TextTable>("text", "LabVIEW LVM or a table of text"),
 ];
 
-/// All formats, in the order in which they are asked. Files without a header ([`crate::RawBinary`]) are recognised by nobody.
+/// All formats, in the order in which they are asked. Files without a header ([`crate::RawBinary`]) are recognised by
+/// nobody.
 pub fn formats() -> &'static [Known] {
     FORMATS
 }

@@ -9,8 +9,8 @@ use rustix::fs::OFlags;
 
 /// Opens a file for reading. Errors: the system's; it is no regular file.
 ///
-/// A FIFO, socket or device is refused before it is opened: opening alone may wait for ever or have an effect. Should the path become one in
-/// between, opening does not wait, and what was opened is looked at again.
+/// A FIFO, socket or device is refused before it is opened: opening alone may wait for ever or have an effect. Should
+/// the path become one in between, opening does not wait, and what was opened is looked at again.
 pub fn open_regular(path: &Path) -> Result<File> {
     check(std::fs::metadata(path)?.file_type())?;
     let file = OpenOptions::new().read(true).custom_flags(OFlags::NONBLOCK.bits().cast_signed()).open(path)?;

@@ -74,7 +74,8 @@ impl Values {
         }
     }
 
-    /// The real numbers, all of them in memory; none if they are of another kind. Errors: they lie in a file and cannot be read.
+    /// The real numbers, all of them in memory; none if they are of another kind. Errors: they lie in a file and cannot
+    /// be read.
     pub fn real(&self) -> Option<Result<&[f64], StageError>> {
         match self {
             Self::Real(values) => Some(Ok(values)),
@@ -83,7 +84,8 @@ impl Values {
         }
     }
 
-    /// The real numbers as rows of this length, wherever they lie; none if they are of another kind or no whole number of such rows.
+    /// The real numbers as rows of this length, wherever they lie; none if they are of another kind or no whole number
+    /// of such rows.
     pub fn rows(&self, row_length: usize) -> Option<RowView<'_>> {
         match self {
             Self::Real(values) if row_length > 0 && values.len().is_multiple_of(row_length) => {
@@ -160,14 +162,14 @@ impl Array {
             .ok_or_else(|| missing("variable", name, self.variables.iter().map(|variable| variable.name.as_str())))
     }
 
-    /// The values of the real variable `name`, all of them: from a file they are read once, and stay in memory. Errors: there is none, it is
-    /// not real, or it cannot be read.
+    /// The values of the real variable `name`, all of them: from a file they are read once, and stay in memory. Errors:
+    /// there is none, it is not real, or it cannot be read.
     pub fn real(&self, name: &str) -> Result<&[f64], StageError> {
         self.variable(name)?.values.real().unwrap_or_else(|| Err(not_real(name)))
     }
 
-    /// The rows of the real variable `name` over two axes, for [`in_blocks`](crate::rows::in_blocks): nothing is read yet. Errors: there is none,
-    /// it is not real, or not over two axes.
+    /// The rows of the real variable `name` over two axes, for [`in_blocks`](crate::rows::in_blocks): nothing is read
+    /// yet. Errors: there is none, it is not real, or not over two axes.
     pub fn rows(&self, name: &str) -> Result<RowView<'_>, StageError> {
         let variable = self.variable(name)?;
         let [_, last] = &variable.dims[..] else {

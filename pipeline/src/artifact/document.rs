@@ -7,7 +7,8 @@ use crate::error::StageError;
 
 /// A JSON document. The port named `summary` of a stage is what `afmid show OUT ID --json` prints.
 ///
-/// Unknown numbers are `null`, keys are never missing: [`Document::new`] turns NaN and infinities into null, as JSON has none.
+/// Unknown numbers are `null`, keys are never missing: [`Document::new`] turns NaN and infinities into null, as JSON
+/// has none.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Document(pub Value);

@@ -26,7 +26,8 @@ impl RowWriter {
         Self { scratch, row_length, rows: 0, memory: Vec::new(), file: None, moved: false }
     }
 
-    /// Adds a row and tells its number. Where the cache's disk is full, all rows go to the system's folder for temporary files.
+    /// Adds a row and tells its number. Where the cache's disk is full, all rows go to the system's folder for
+    /// temporary files.
     ///
     /// Errors: it has another length; no file can be made or written.
     pub fn push(&mut self, row: &[f64]) -> Result<usize, StageError> {

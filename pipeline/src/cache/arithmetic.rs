@@ -2,11 +2,14 @@
 //!
 //! Sums and products are the same everywhere: the compiler contracts nothing. Four things are not:
 //!
-//! - which vector units the FFT, linear algebra and loops of this program choose at run time (other orders of summation, fused multiply-add): stated by
-//!   name;
-//! - the C library's functions (`exp`, `sin`, ...), which choose by processor and differ between releases: stated by what they return;
-//! - the build: compiler, target and its features, level of optimisation (what is computed when the program is built may be rounded otherwise), checks;
-//! - where there is no AVX2 with fused multiply-add, products of large matrices are summed in blocks that fit the processor's caches: stated by size.
+//! - which vector units the FFT, linear algebra and loops of this program choose at run time (other orders of
+//!   summation, fused multiply-add): stated by name;
+//! - the C library's functions (`exp`, `sin`, ...), which choose by processor and differ between releases: stated by
+//!   what they return;
+//! - the build: compiler, target and its features, level of optimisation (what is computed when the program is built
+//!   may be rounded otherwise), checks;
+//! - where there is no AVX2 with fused multiply-add, products of large matrices are summed in blocks that fit the
+//!   processor's caches: stated by size.
 //!
 //! Threads, memory and the order in which stages end change nothing (`tests/threads.rs`).
 
@@ -84,12 +87,12 @@ mod tests {
     #[test]
     fn the_same_process_states_the_same_arithmetic() {
         assert_eq!(arithmetic(), arithmetic());
-        let told = arithmetic();
+        let found = arithmetic();
         let checked = if cfg!(debug_assertions) { ", checked," } else { ", unchecked," };
         assert!(
-            told.starts_with(std::env::consts::ARCH) && told.contains("opt-level ") && told.contains(checked),
-            "{told}"
+            found.starts_with(std::env::consts::ARCH) && found.contains("opt-level ") && found.contains(checked),
+            "{found}"
         );
-        assert!(told.contains("rustc 1.") && !told.contains("unknown version"), "{told}");
+        assert!(found.contains("rustc 1.") && !found.contains("unknown version"), "{found}");
     }
 }

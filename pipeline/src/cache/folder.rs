@@ -31,7 +31,8 @@ struct Notes {
 impl Cache {
     /// Opens the cache in `folder`, makes the folder if it is missing, and removes what killed runs left.
     ///
-    /// Where the folder cannot be made, nothing is found and nothing kept, and [`Cache::take_notes`] says so, once: a run goes on to its result.
+    /// Where the folder cannot be made, nothing is found and nothing kept, and [`Cache::take_notes`] says so, once: a
+    /// run goes on to its result.
     pub fn open(folder: &Path) -> Self {
         let cache = Self { folder: folder.to_owned(), notes: Mutex::default() };
         match cache.make_folder() {
@@ -41,7 +42,8 @@ impl Cache {
         cache
     }
 
-    /// The input files of a run, with what earlier runs hashed: kept beside the results. `fresh` hashes every file again.
+    /// The input files of a run, with what earlier runs hashed: kept beside the results. `fresh` hashes every file
+    /// again.
     pub fn input_files(&self, fresh: bool) -> InputFiles {
         InputFiles::keeping_hashes(&self.folder.join(STAMPS), fresh)
     }
@@ -66,15 +68,17 @@ impl Cache {
         self.folder.join(format!("{key}.json"))
     }
 
-    /// Whether there is a result with this key, without reading it. It may be gone a moment later: another process may free the cache.
+    /// Whether there is a result with this key, without reading it. It may be gone a moment later: another process may
+    /// free the cache.
     pub fn contains(&self, key: &str) -> bool {
         self.path(key).is_file()
     }
 
-    /// The result of this stage with this key, marked as used. A file that is damaged, or the result of something else, counts as absent: it is
-    /// removed, and [`Cache::take_notes`] says so.
+    /// The result of this stage with this key, marked as used. A file that is damaged, or the result of something else,
+    /// counts as absent: it is removed, and [`Cache::take_notes`] says so.
     ///
-    /// What comes back is in memory, or in the file, held open: removing it afterwards takes nothing from a run. Recordings in it are read through `files`.
+    /// What comes back is in memory, or in the file, held open: removing it afterwards takes nothing from a run.
+    /// Recordings in it are read through `files`.
     pub fn get(&self, identity: &StageIdentity, files: &InputFiles) -> Option<StageResult> {
         let path = self.path(identity.key);
         if !path.is_file() {
@@ -97,13 +101,15 @@ impl Cache {
         }
     }
 
-    /// Keeps a result; makes the folder again if somebody removed it. Errors: the folder cannot be written; an artifact is not valid.
+    /// Keeps a result; makes the folder again if somebody removed it. Errors: the folder cannot be written; an artifact
+    /// is not valid.
     pub fn put(&self, identity: &StageIdentity, result: &StageResult) -> Result<(), StoreError> {
         self.make_folder()?;
         PendingStage::write(&self.path(identity.key), identity, result)?.finish()
     }
 
-    /// Keeps a result with its origin, which is written first: the file is written, and not yet what the cache has under its key. Errors: as [`Cache::put`].
+    /// Keeps a result with its origin, which is written first: the file is written, and not yet what the cache has
+    /// under its key. Errors: as [`Cache::put`].
     pub(crate) fn write_with_origin(
         &self,
         origin: &Origin,
@@ -123,7 +129,8 @@ impl Cache {
         Origin::read(&self.origin_path(key)).filter(|origin| origin.key == key)
     }
 
-    /// The origins of all results that are there, with the times of their last use; by key. Unreadable ones are left out.
+    /// The origins of all results that are there, with the times of their last use; by key. Unreadable ones are left
+    /// out.
     pub fn origins(&self) -> Vec<(Origin, SystemTime)> {
         let Ok(entries) = fs::read_dir(&self.folder) else { return Vec::new() };
         let mut names: Vec<String> =
@@ -143,15 +150,15 @@ impl Cache {
         self.notes().texts.push(note);
     }
 
-    /// A result that is not kept costs the next run its time, and this one nothing. What stops one stops the others as a rule (a full disk, a
-    /// folder that may only be read): the first is told, and no more.
+    /// A result that is not kept costs the next run its time, and this one nothing. What stops one stops the others as
+    /// a rule (a full disk, a folder that may only be read): only the first is reported.
     pub(crate) fn unkept(&self, error: &StoreError) {
         let mut notes = self.notes();
         if !std::mem::replace(&mut notes.unkept, true) {
             let folder = self.folder.display();
             notes.texts.push(format!(
-                "the cache {folder} cannot be written, the next run computes again what this one does not keep: {error}\n  \
-                 help: make room or choose another with --cache"
+                "the cache {folder} cannot be written, the next run computes again what this one does not keep: \
+                 {error}\n  help: make room or choose another with --cache"
             ));
         }
     }
@@ -166,8 +173,8 @@ impl Cache {
     }
 }
 
-/// A result's time of modification is that of its last use: times of access are switched off on many machines. Where a file may only be
-/// read the time stays: the cache works all the same, it only forgets in another order.
+/// A result's time of modification is that of its last use: times of access are switched off on many machines. Where a
+/// file may only be read the time stays: the cache works all the same, it only forgets in another order.
 fn mark_used(path: &Path) {
     let _ = open_regular(path).and_then(|file| file.set_modified(SystemTime::now()));
 }

@@ -1,7 +1,7 @@
 //! Freeing the cache: what has not been used for longest goes first.
 //!
-//! Nothing here can break a run: results are read whole into memory, files under way have names of their own, and what is missing is computed
-//! again.
+//! Nothing here can break a run: results are read whole into memory, files under way have names of their own, and what
+//! is missing is computed again.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -62,7 +62,8 @@ pub struct Freed {
     pub failed: Vec<(Gone, String)>,
 }
 
-/// Frees a cache's folder: leftovers always, results and stamps as the limits say. `dry` removes nothing and says what would go.
+/// Frees a cache's folder: leftovers always, results and stamps as the limits say. `dry` removes nothing and says what
+/// would go.
 ///
 /// A result that a run uses in the meantime stays. Errors: the folder cannot be listed.
 pub fn free(folder: &Path, limits: &Limits, dry: bool) -> Result<Freed, StoreError> {
@@ -112,7 +113,8 @@ fn choose(stock: Stock, limits: &Limits, now: SystemTime) -> Vec<(Stored, Option
     chosen
 }
 
-/// Removes a file, a result with its origin; `false` if it was used since it was listed. A file that is gone already is removed.
+/// Removes a file, a result with its origin; `false` if it was used since it was listed. A file that is gone already is
+/// removed.
 fn remove(file: &Stored) -> std::io::Result<bool> {
     let modified = fs::metadata(&file.path).and_then(|metadata| metadata.modified());
     if modified.is_ok_and(|modified| modified != file.used) {

@@ -22,7 +22,8 @@ fn write(path: &Path, bytes: usize, days: u32) {
     File::options().write(true).open(path).unwrap().set_modified(SystemTime::now() - DAY * days).unwrap();
 }
 
-/// Three results of 100 bytes used 1, 10 and 40 days ago, the last with its origin; a leftover of each kind; files of others.
+/// Three results of 100 bytes used 1, 10 and 40 days ago, the last with its origin; a leftover of each kind; files of
+/// others.
 fn folder() -> Folder {
     let folder = Folder::new("free");
     for (digit, days) in [('a', 1), ('b', 10), ('c', 40)] {

@@ -1,8 +1,9 @@
 //! The content-addressed cache of stage results, and files that are either whole or not there.
 //!
-//! A stage's result lies in `DIR/KEY.h5`; the key is a hash of everything that the result depends on. Several processes may use one
-//! folder at once: every file is written under a name of its own, synced and renamed. Beside it lies `DIR/KEY.json`: what the key was made
-//! of, in words ([`Origin`]). Any file may go at any moment ([`free`]): a run has what it needs in memory or open, the next one computes it again.
+//! A stage's result lies in `DIR/KEY.h5`; the key is a hash of everything that the result depends on. Several processes
+//! may use one folder at once: every file is written under a name of its own, synced and renamed. Beside it lies
+//! `DIR/KEY.json`: what the key was made of, in words ([`Origin`]). Any file may go at any moment ([`free`]): a run has
+//! what it needs in memory or open, the next one computes it again.
 
 mod arithmetic;
 mod folder;

@@ -1,8 +1,8 @@
 //! Where a result comes from: the parts of its key in words, in a small file beside it.
 //!
-//! A key says that something changed, never what. The origin of each result lies in `DIR/KEY.json`, so that `afmid explain` can say it
-//! without opening results. It is written before the result and not synced: whoever finds it missing or cut short knows less, nothing
-//! else.
+//! A key says that something changed, never what. The origin of each result lies in `DIR/KEY.json`, so that
+//! `afmid explain` can say it without opening results. It is written before the result and not synced: where it is
+//! missing or cut short, less is known, and nothing else is lost.
 
 use std::path::Path;
 

@@ -20,7 +20,8 @@ impl PendingStage {
         }
     }
 
-    /// Seals and syncs the file and puts it in its place: nothing here waits for the HDF5 library. Errors: the file cannot be written.
+    /// Seals and syncs the file and puts it in its place: nothing here waits for the HDF5 library. Errors: the file
+    /// cannot be written.
     pub(crate) fn finish(self) -> Result<(), StoreError> {
         let sealed = store::seal(self.0.temporary());
         self.0.take(sealed)

@@ -56,7 +56,8 @@ pub struct Stock {
 }
 
 impl Stock {
-    /// Looks through a cache's folder; a folder that does not exist is empty. Files with other names than the cache gives are not seen.
+    /// Looks through a cache's folder; a folder that does not exist is empty. Files with other names than the cache
+    /// gives are not seen.
     ///
     /// Errors: the folder cannot be listed.
     pub fn list(folder: &Path) -> Result<Self, StoreError> {
@@ -100,7 +101,8 @@ struct Seen {
     used: SystemTime,
 }
 
-/// The order in which a file system keeps what it knows of its files: that of a folder's names costs a walk through all of it for each.
+/// The order in which a file system keeps what it knows of its files: that of a folder's names costs a walk through all
+/// of it for each.
 fn in_order_of_inodes(entries: fs::ReadDir) -> Vec<DirEntry> {
     let mut entries: Vec<DirEntry> = entries.flatten().collect();
     entries.sort_unstable_by_key(DirEntry::ino);

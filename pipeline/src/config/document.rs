@@ -33,7 +33,7 @@ pub(super) fn parse<'a>(text: &'a str, problems: &mut Vec<Problem>) -> Document<
             if span.start > broken {
                 continue;
             }
-            // every stage is looked at for each: the first ones, which are printed, are told better
+            // every stage is looked at for each: the first ones, which are printed, get better help
             looked_up += 1;
             problems.push(duplicate(text, &root, span, looked_up <= helped));
         } else {

@@ -1,7 +1,8 @@
 //! The config: TOML, parsed in two steps so that every error keeps its place.
 //!
-//! First the document becomes a [`Config`] (tables, ids, wires, raw `params` with their places in the text); then, with a
-//! registry, [`crate::graph::plan`] turns each `params` table into its stage. Both report all their [`Problem`]s at once.
+//! First the document becomes a [`Config`] (tables, ids, wires, raw `params` with their places in the text); then, with
+//! a registry, [`crate::graph::plan`] turns each `params` table into its stage. Both report all their [`Problem`]s at
+//! once.
 
 mod document;
 mod name;

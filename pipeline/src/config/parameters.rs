@@ -138,7 +138,8 @@ fn ranged(entry: &Entry, ranges: &mut Ranges, path: &[String], message: &str) ->
     Some(format!("{found}, wanted {range}"))
 }
 
-/// All parameters without default that are not given; at least the one that was found missing, if it is none that is wrong.
+/// All parameters without default that are not given; at least the one that was found missing, if it is none that is
+/// wrong.
 fn missing(decl: &StageDecl, entry: &Entry, found: &Kind) -> Vec<Problem> {
     let schema = entry.schema(&mut schemars::SchemaGenerator::default());
     let required = schema.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str);

@@ -39,8 +39,8 @@ pub struct Config {
 const TABLES: [&str; 4] = ["pipeline", "stage", "sweep", "plugins"];
 
 impl Config {
-    /// Parses a config and applies `--set` arguments (`ID.PARAM=VALUE`, VALUE in TOML). Errors: all problems that can be seen
-    /// without a registry; [`crate::graph::load`] reports them together with those of the graph.
+    /// Parses a config and applies `--set` arguments (`ID.PARAM=VALUE`, VALUE in TOML). Errors: all problems that can
+    /// be seen without a registry; [`crate::graph::load`] reports them together with those of the graph.
     pub fn parse(file: &str, text: &str, arguments: &[String]) -> Result<Self, Vec<Problem>> {
         let (config, mut problems, _) = Self::read(file, text, arguments);
         Problem::sort(&mut problems, arguments);
@@ -71,7 +71,8 @@ impl Config {
         (config, problems, true)
     }
 
-    /// Applies an argument or a value of a sweep. Errors: an unknown stage; a path through something that is not a table.
+    /// Applies an argument or a value of a sweep. Errors: an unknown stage; a path through something that is not a
+    /// table.
     pub(crate) fn set(&mut self, set: Override) -> Result<(), Problem> {
         overrides::apply(set, self)
     }

@@ -70,11 +70,11 @@ impl StageDecl {
 
     /// What changed it, for messages: `--set` arguments, values of a sweep.
     pub(crate) fn changes(&self) -> Vec<String> {
-        let told = |set: &Override| match set.is_argument() {
+        let named = |set: &Override| match set.is_argument() {
             true => format!("--set {}", set.text),
             false => format!("{} of [sweep]", set.text),
         };
-        self.overrides.iter().map(told).collect()
+        self.overrides.iter().map(named).collect()
     }
 }
 

@@ -1,7 +1,7 @@
 //! "Did you mean": the nearest of the names that exist.
 
-/// Problems of one kind that come with a look at all `items` that there are: each looks at all of them, a million in sum, and more than a hundred problems
-/// are not printed.
+/// Problems of one kind that come with a look at all `items` that there are: each looks at all of them, a million in
+/// sum, and more than a hundred problems are not printed.
 pub(crate) fn most_helped(items: usize) -> usize {
     (1_000_000 / items.max(1)).clamp(10, 200)
 }
@@ -9,8 +9,8 @@ pub(crate) fn most_helped(items: usize) -> usize {
 /// Names that are listed; more are counted.
 const MOST_LISTED: usize = 40;
 
-/// The candidate nearest to a word, if one is near: a misspelling of up to a third of its letters, another case, `-` for `_`, or
-/// the last part of a dotted name.
+/// The candidate nearest to a word, if one is near: a misspelling of up to a third of its letters, another case, `-`
+/// for `_`, or the last part of a dotted name.
 ///
 /// ```
 /// use afmid_pipeline::config::nearest;

@@ -4,7 +4,8 @@ use crate::error::StageError;
 use crate::outcome::{PortSpec, Ports, difference};
 use crate::stage::{DynStage, Entry, Example, example_inputs, instance, run_example, run_in_folder};
 
-/// Checks that there is an example, that each runs with the declared ports and makes the declared ports, and that the truth comes out.
+/// Checks that there is an example, that each runs with the declared ports and makes the declared ports, and that the
+/// truth comes out.
 pub fn examples_hold(entry: &Entry) -> Vec<String> {
     let examples = entry.examples();
     if examples.is_empty() {

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 /// Why a stage failed. A stage never names itself: the runner adds the config's place, the stage's id and the port.
 ///
-/// Write a lowercase fragment that reads after "failed to run stage `x`:" and states what was found and what was wanted;
+/// Write a lowercase fragment that reads after "failed to run stage `x`:" and states what was found and what was
+/// wanted;
 /// put what to do into [`StageError::help`].
 #[derive(Debug, thiserror::Error)]
 #[error("{problem}{}", place.as_ref().map(|place| format!(" ({})", place.display())).unwrap_or_default())]

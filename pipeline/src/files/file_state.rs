@@ -5,12 +5,12 @@ use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// A file changed this recently may change again within one tick of its time stamps, which some file systems count in seconds: its state
-/// alone does not show that.
+/// A file changed this recently may change again within one tick of its time stamps, which some file systems count in
+/// seconds: its state alone does not show that.
 const SETTLED: Duration = Duration::from_secs(2);
 
-/// Device, inode, size and both time stamps of a file. The time of the last change of state (`ctime`) is the system's own: programs can set the
-/// time of modification back, not this one.
+/// Device, inode, size and both time stamps of a file. The time of the last change of state (`ctime`) is the system's
+/// own: programs can set the time of modification back, not this one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FileState {
     size: u64,
@@ -56,7 +56,8 @@ impl FileState {
         self.size
     }
 
-    /// Whether every later change must show in the state: the last one lies some time back. A clock that was set back counts as no.
+    /// Whether every later change must show in the state: the last one lies some time back. A clock that was set back
+    /// counts as no.
     pub(crate) fn is_settled(&self) -> bool {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |now| now.as_nanos());
         let last = self.changed_ns.max(self.modified_ns);

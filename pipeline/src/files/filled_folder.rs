@@ -1,4 +1,5 @@
-//! Folders that this program fills with files: what it wrote there is listed with its hash, so that nothing else is ever replaced.
+//! Folders that this program fills with files: what it wrote there is listed with its hash, so that nothing else is
+//! ever replaced.
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
@@ -11,14 +12,14 @@ use super::replace::Replacement;
 use super::temporary::sweep;
 use crate::error::StoreError;
 
-/// The list in such a folder: a line per file, BLAKE3 hash and name, as `b3sum --check` takes them. A name may have several lines: what was written
-/// there before.
+/// The list in such a folder: a line per file, BLAKE3 hash and name, as `b3sum --check` takes them. A name may have
+/// several lines: what was written there before.
 pub const LIST: &str = ".afmid-files";
 
 /// A folder that this program fills with files.
 ///
-/// A file that it wrote is replaced as long as it is as it was written; a file of others, or one that somebody edited since, never. Several threads and
-/// processes may fill one folder at once.
+/// A file that it wrote is replaced as long as it is as it was written; a file of others, or one that somebody edited
+/// since, never. Several threads and processes may fill one folder at once.
 #[derive(Debug)]
 pub struct FilledFolder {
     folder: PathBuf,
@@ -48,8 +49,9 @@ impl FilledFolder {
         self.listed.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Sees that nothing of others lies at a name in the folder (with `/` in levels below it). `earlier` knows files of earlier versions, which kept no
-    /// list: it is asked where the list does not have the name. An empty file holds nothing that could be lost.
+    /// Sees that nothing of others lies at a name in the folder (with `/` in levels below it). `earlier` knows files of
+    /// earlier versions, which kept no list: it is asked where the list does not have the name. An empty file holds
+    /// nothing that could be lost.
     ///
     /// Errors: the file is not one that was written here, or it was changed since; it cannot be read.
     pub fn require_own(&self, name: &str, earlier: impl FnOnce(&Path) -> bool) -> Result<(), StoreError> {
@@ -77,7 +79,8 @@ impl FilledFolder {
         if hashes.contains(&now) { Ok(()) } else { Err(refused("was changed since afmid wrote it")) }
     }
 
-    /// Writes a file, whole or not at all, synced, and lists it. `fill` gets a name of its own in the same folder and leaves a closed file there.
+    /// Writes a file, whole or not at all, synced, and lists it. `fill` gets a name of its own in the same folder and
+    /// leaves a closed file there.
     ///
     /// Errors: as [`FilledFolder::require_own`]; those of `fill`; the folder cannot be written.
     pub fn replace(
@@ -94,7 +97,8 @@ impl FilledFolder {
         let listed = || {
             let hash = hash(temporary).map_err(io)?;
             File::open(temporary).and_then(|file| file.sync_all()).map_err(io)?;
-            // before the file is there: a kill in between leaves a line about what lies nowhere, not a file that nobody knows
+            // before the file is there: a kill in between leaves a line about what lies nowhere, not a file that nobody
+            // knows
             self.list(name, hash)
         };
         let written = fill(temporary).and_then(|()| listed());
@@ -143,7 +147,8 @@ impl FilledFolder {
     }
 }
 
-/// As `b3sum` has it: a name with a backslash or the end of a line in it is escaped, and its line begins with a backslash.
+/// As `b3sum` has it: a name with a backslash or the end of a line in it is escaped, and its line begins with a
+/// backslash.
 fn line(name: &str, hash: &str) -> String {
     let escaped = name.replace('\\', "\\\\").replace('\n', "\\n");
     let mark = if escaped == name { "" } else { "\\" };

@@ -1,7 +1,8 @@
 //! What was found in files, kept between runs: bulk data is read once.
 //!
-//! What is known serves only to skip reading: no key and no result contains it. Each line ends in the hash of its own text: whatever is wrong with one,
-//! that file is read again. One small file for all files of a folder: looking at a hundred thousand of them opens one.
+//! What is known serves only to skip reading: no key and no result contains it. Each line ends in the hash of its own
+//! text: whatever is wrong with one, that file is read again. One small file for all files of a folder: looking at a
+//! hundred thousand of them opens one.
 
 use std::collections::HashMap;
 use std::fs::{self, OpenOptions};
@@ -14,7 +15,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{FileState, read_regular, replace_unsynced};
 
-/// Begins the text of every line, though it is not written: another layout gets another number, and with it other hashes.
+/// Begins the text of every line, though it is not written: another layout gets another number, and with it other
+/// hashes.
 const TITLE: &str = "afmid stamp 3";
 
 /// The largest file of lines that is read: a million of them.
@@ -23,7 +25,7 @@ const MOST_BYTES: u64 = 1 << 28;
 /// Digits of a line's own hash.
 const DIGITS: usize = 32;
 
-/// Lines that no longer count before a file of them is written anew, beside as many as count.
+/// A file of lines is written again when its outdated lines exceed the valid ones by more than this.
 const SPARE: usize = 1000;
 
 /// A folder of stamps: for each folder of input files one, under the hash of its path.

@@ -1,5 +1,5 @@
-//! Marks: a page or a model that this program wrote states the hash of its other bytes, so that a file of others, or one that somebody edited since,
-//! is told from it.
+//! Marks: a page or a model that this program wrote states the hash of its other bytes, which distinguishes it from a
+//! file of others, and from one that somebody edited since.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ pub const MARK: &str = "afmid BLAKE3 ";
 /// Hexadecimal digits of a hash.
 const DIGITS: usize = 64;
 
-/// The bytes with their mark: [`MARK`] and 64 zeros stand somewhere in what `with` makes of these; the zeros become the hash of all bytes as they are with
-/// the zeros. None: they do not stand there.
+/// The bytes with their mark: [`MARK`] and 64 zeros stand somewhere in what `with` makes of these; the zeros become the
+/// hash of all bytes as they are with the zeros. None: they do not stand there.
 pub fn marked(with: impl FnOnce(&str) -> Vec<u8>) -> Option<Vec<u8>> {
     let blank = format!("{MARK}{}", "0".repeat(DIGITS));
     let mut bytes = with(&blank);

@@ -1,4 +1,5 @@
-//! Files that are either whole or not there, temporary names, what tells two states of a file apart, and which files this program wrote.
+//! Files that are either whole or not there, temporary names, what tells two states of a file apart, and which files
+//! this program wrote.
 
 mod file_state;
 mod filled_folder;

@@ -12,15 +12,17 @@ use super::temporary::{TemporaryName, host};
 /// Begins the names of folders in the system's one for temporary files.
 const TITLE: &str = "afmid-";
 
-/// A folder in the system's one for temporary files, removed when it is dropped. Its name says whose it is: what a kill leaves is found.
+/// A folder in the system's one for temporary files, removed when it is dropped. Its name says whose it is: what a kill
+/// leaves is found.
 ///
 /// Errors: the system refuses.
 pub fn temporary_folder(what: &str) -> std::io::Result<TempDir> {
     tempfile::Builder::new().prefix(&format!("{TITLE}{what}.{}.{}.", host(), std::process::id())).tempdir()
 }
 
-/// Removes what this process has under way in a folder: files under temporary names, folders of [`temporary_folder`]. For a process that ends
-/// without its own tidying up; what cannot be removed is left to the next one. Whether there was something.
+/// Removes what this process has under way in a folder: files under temporary names, folders of [`temporary_folder`].
+/// For a process that ends without its own tidying up; what cannot be removed is left to the next one. Whether there
+/// was something.
 pub fn sweep_own(folder: &Path) -> bool {
     let own = std::process::id();
     each(

@@ -33,7 +33,8 @@ impl Replacement {
         Ok(Self { path: path.to_owned(), temporary: temporary_path(path) })
     }
 
-    /// Takes the place, once it is `written` and synced. Errors: those of writing it; it cannot be renamed, or the folder not be synced.
+    /// Takes the place, once it is `written` and synced. Errors: those of writing it; it cannot be renamed, or the
+    /// folder not be synced.
     pub(crate) fn take(self, written: Result<(), StoreError>) -> Result<(), StoreError> {
         let Self { path, temporary } = &self;
         let io = |doing: &str, error: &std::io::Error| StoreError::io(doing, path, error);
@@ -70,7 +71,8 @@ pub fn replace_with(path: &Path, fill: impl FnOnce(&Path) -> std::io::Result<()>
     replace_file(path, |temporary| fill(temporary).map_err(|error| StoreError::io("cannot be written", path, &error)))
 }
 
-/// As [`replace_file`] with these bytes, without waiting for the disk: after a power cut the file may be empty. For what is only convenient.
+/// As [`replace_file`] with these bytes, without waiting for the disk: after a power cut the file may be empty. For
+/// what is only convenient.
 pub(crate) fn replace_unsynced(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let temporary = temporary_path(path);
     fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path)).map_err(|error| {
@@ -80,8 +82,8 @@ pub(crate) fn replace_unsynced(path: &Path, bytes: &[u8]) -> Result<(), StoreErr
     })
 }
 
-/// Finds out whether [`replace_file`] could write `path`, by making a temporary file beside it and removing it. Errors: why not, in the
-/// system's words.
+/// Finds out whether [`replace_file`] could write `path`, by making a temporary file beside it and removing it. Errors:
+/// why not, in the system's words.
 pub fn probe(path: &Path) -> std::io::Result<()> {
     let temporary = temporary_path(path);
     File::create_new(&temporary)?;

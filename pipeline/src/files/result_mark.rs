@@ -15,11 +15,12 @@ const SEAL_BYTES: u64 = SEAL.len() as u64 + 64 + 1;
 /// What an HDF5 file begins with.
 pub(crate) const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// How far into a file the name of its format is looked for. The store writes it first, into the root group's header, some hundred bytes behind the
-/// signature.
+/// How far into a file the name of its format is looked for. The store writes it first, into the root group's header,
+/// some hundred bytes behind the signature.
 pub(crate) const HEAD_BYTES: u64 = 1 << 13;
 
-/// Whether an open file, `head` of whose bytes are known, is a stage or result file of this program's. Errors: it cannot be read.
+/// Whether an open file, `head` of whose bytes are known, is a stage or result file of this program's. Errors: it
+/// cannot be read.
 pub(crate) fn is_result(file: &mut File, head: &[u8]) -> std::io::Result<bool> {
     if !head.starts_with(HDF5_SIGNATURE) {
         return Ok(false);

@@ -8,7 +8,8 @@ use std::time::{Duration, SystemTime};
 
 use rustix::process::{Pid, test_kill_process};
 
-/// On another machine nothing tells whether a process lives: its temporary file counts as left behind once nobody has touched it for a day.
+/// On another machine nothing tells whether a process lives: its temporary file counts as left behind once nobody has
+/// touched it for a day.
 const STALE: Duration = Duration::from_secs(24 * 3600);
 
 /// Digits that name a machine.
@@ -27,8 +28,9 @@ pub(crate) fn temporary_path(path: &Path) -> PathBuf {
     folder_of(path).join(temporary_name(path))
 }
 
-/// `.NAME.HOST.PID-STARTED.COUNT.tmp`: no other attempt has it, on this machine, in another container on it, or on another machine that shares the
-/// folder. A process is known by its number and the moment of its start: numbers are given again.
+/// `.NAME.HOST.PID-STARTED.COUNT.tmp`: no other attempt has it, on this machine, in another container on it, or on
+/// another machine that shares the folder. A process is known by its number and the moment of its start: numbers are
+/// given again.
 fn temporary_name(path: &Path) -> String {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     static OWNER: LazyLock<String> = LazyLock::new(|| {
@@ -39,8 +41,9 @@ fn temporary_name(path: &Path) -> String {
     format!(".{}.{}.{}.{count}.tmp", file_name(path), host(), *OWNER)
 }
 
-/// Where this process's number means this process: twelve digits for the machine since its start, its name and the namespace of process numbers.
-/// Names alone are not enough: cloned machines share them, and containers of one machine share the name but not the numbers.
+/// Where this process's number means this process: twelve digits for the machine since its start, its name and the
+/// namespace of process numbers. Names alone are not enough: cloned machines share them, and containers of one machine
+/// share the name but not the numbers.
 pub(crate) fn host() -> &'static str {
     static HOST: LazyLock<String> = LazyLock::new(|| {
         let mut hasher = blake3::Hasher::new();
@@ -115,8 +118,8 @@ fn started(pid: u32) -> Option<u64> {
     stat.rsplit_once(')')?.1.split_ascii_whitespace().nth(19)?.parse().ok()
 }
 
-/// Removes the temporary files of a folder that nobody will finish: those with exactly this program's names whose owner is dead, or which another
-/// machine left a day ago.
+/// Removes the temporary files of a folder that nobody will finish: those with exactly this program's names whose owner
+/// is dead, or which another machine left a day ago.
 ///
 /// Files that cannot be removed stay: another process may have been faster.
 pub fn sweep(folder: &Path) {

@@ -8,7 +8,8 @@ pub trait Stages: Sync {
     /// The stages that are part of the program.
     fn registry(&self) -> &Registry;
 
-    /// The row of a stage that uses `exec:NAME`. Where nobody knows its ports the row is one that is not described: see [`Entry::is_described`].
+    /// The row of a stage that uses `exec:NAME`. Where nobody knows its ports the row is one that is not described: see
+    /// [`Entry::is_described`].
     ///
     /// Errors: there is none of this name, or it may not be used.
     fn process(&self, decl: &StageDecl, name: &str, config: &Config) -> Result<Entry, Problem>;

@@ -6,8 +6,8 @@ use std::collections::BinaryHeap;
 use super::wiring::Wire;
 use crate::config::{Problem, StageDecl};
 
-/// Kahn's algorithm, stable: among the stages that are ready, the first in the text comes first. Nothing, and a problem for each
-/// cycle, if there is one.
+/// Kahn's algorithm, stable: among the stages that are ready, the first in the text comes first. Nothing, and a problem
+/// for each cycle, if there is one.
 pub(super) fn topological(decls: &[StageDecl], wires: &[Vec<Wire>], problems: &mut Vec<Problem>) -> Option<Vec<usize>> {
     let mut kahn = Kahn::new(wires);
     let mut cyclic = false;

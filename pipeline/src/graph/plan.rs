@@ -66,7 +66,8 @@ impl Plan {
         self.nodes.iter().find(|node| node.id == id)
     }
 
-    /// The nodes whose ports nobody knows yet: plugins that were never asked to describe themselves. Their wires are not checked, and they do not run.
+    /// The nodes whose ports nobody knows yet: plugins that were never asked to describe themselves. Their wires are
+    /// not checked, and they do not run.
     pub fn not_described(&self) -> impl Iterator<Item = &Node> {
         self.nodes.iter().filter(|node| !node.entry.is_described())
     }
@@ -90,8 +91,8 @@ impl std::fmt::Debug for Node {
     }
 }
 
-/// Reads a config, applies `--set` arguments and plans it with the stages that `stages` knows, such as a registry. Errors: everything that can be wrong without opening data, at once,
-/// in the order of the text.
+/// Reads a config, applies `--set` arguments and plans it with the stages that `stages` knows, such as a registry.
+/// Errors: everything that can be wrong without opening data, at once, in the order of the text.
 pub fn load(file: &str, text: &str, arguments: &[String], stages: &dyn Stages) -> Result<Plan, Vec<Problem>> {
     let (config, mut problems, usable) = Config::read(file, text, arguments);
     let plan = if usable { try_plan(config, stages, &mut problems) } else { None };
@@ -169,7 +170,7 @@ fn find(
         Some(name) => known.process(decl, name, config),
         None => {
             *unknown += 1;
-            // the first ones, which are printed, are told better
+            // the first ones, which are printed, get better help
             let names = registry
                 .entries()
                 .iter()

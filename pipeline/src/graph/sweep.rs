@@ -9,12 +9,14 @@ use super::plan::Plan;
 use crate::config::{Config, Override, Problem, Ranges, Swept, instantiate, point};
 use crate::stage::Entry;
 
-/// Makes every swept stage with every combination of its own parameters. The first one is the config's and was checked with it.
+/// Makes every swept stage with every combination of its own parameters. The first one is the config's and was checked
+/// with it.
 pub(super) fn check(config: &Config, entries: &[Option<Entry>], ranges: &mut Ranges, problems: &mut Vec<Problem>) {
     if config.sweep.is_empty() {
         return;
     }
-    let mut told: Told = problems.iter().map(|problem| (problem.message.clone(), problem.span.clone())).collect();
+    let mut reported: Reported =
+        problems.iter().map(|problem| (problem.message.clone(), problem.span.clone())).collect();
     for (decl, entry) in config.stages.iter().zip(entries) {
         let own: Vec<&Swept> = config.sweep.iter().filter(|swept| swept.stage() == decl.id).collect();
         let Some(entry) = entry.as_ref().filter(|_| decl.params_read && !own.is_empty()) else { continue };
@@ -26,19 +28,19 @@ pub(super) fn check(config: &Config, entries: &[Option<Entry>], ranges: &mut Ran
             let applied =
                 values.filter_map(|(swept, value)| swept.values.get(value).cloned()).try_for_each(|set| alone.set(set));
             if let (Ok(()), Some(decl)) = (applied, alone.stages.first()) {
-                tell(instantiate(decl, entry, ranges).err().into_iter().flatten(), &mut told, problems);
+                report(instantiate(decl, entry, ranges).err().into_iter().flatten(), &mut reported, problems);
             }
         }
     }
 }
 
 /// Messages with their places.
-type Told = HashSet<(String, Range<usize>)>;
+type Reported = HashSet<(String, Range<usize>)>;
 
-/// What is wrong with one value is wrong in all its combinations with others: it is told once.
-fn tell(wrong: impl Iterator<Item = Problem>, told: &mut Told, problems: &mut Vec<Problem>) {
+/// What is wrong with one value is wrong in all its combinations with others: it is reported once.
+fn report(wrong: impl Iterator<Item = Problem>, reported: &mut Reported, problems: &mut Vec<Problem>) {
     for problem in wrong {
-        if told.insert((problem.message.clone(), problem.span.clone())) {
+        if reported.insert((problem.message.clone(), problem.span.clone())) {
             problems.push(problem);
         }
     }
@@ -71,7 +73,7 @@ impl Plan {
         sweep.iter().zip(place).filter_map(|(swept, value)| Some((swept, swept.values.get(value)?)))
     }
 
-    /// The same plan with values set. Only the stages that they name are made anew.
+    /// The same plan with values set. Only the stages that they name are made again.
     fn with(&self, sets: Vec<Override>) -> Result<Self, Vec<Problem>> {
         let (mut plan, mut problems, mut ranges) = (self.clone(), Vec::new(), Ranges::default());
         let changed: Vec<String> = sets.iter().filter_map(|set| set.stage().map(str::to_owned)).collect();

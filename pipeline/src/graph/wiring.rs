@@ -25,10 +25,10 @@ impl Wire {
     }
 }
 
-/// The wires of every stage, in the order of its input ports. What cannot be connected is a problem; nothing is said of stages
-/// that could not be looked up.
+/// The wires of every stage, in the order of its input ports. What cannot be connected is a problem; nothing is said of
+/// stages that could not be looked up.
 pub(super) fn connect(decls: &[StageDecl], entries: &[Option<Entry>], problems: &mut Vec<Problem>) -> Vec<Vec<Wire>> {
-    // of two stages with one id, which was told, the first
+    // of two stages with one id, which is reported elsewhere, the first
     let mut places = HashMap::with_capacity(decls.len());
     decls.iter().enumerate().for_each(|(place, decl)| {
         places.entry(decl.id.as_str()).or_insert(place);
@@ -44,7 +44,7 @@ pub(super) fn connect(decls: &[StageDecl], entries: &[Option<Entry>], problems: 
         .collect()
 }
 
-/// Stands for an output that cannot be told before a plugin has described itself.
+/// Stands for an output that is not known before a plugin has described itself.
 const NOT_KNOWN: &str = "?";
 
 struct Board<'a> {

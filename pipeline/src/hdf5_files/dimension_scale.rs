@@ -1,7 +1,8 @@
 //! Dimension scales: what ties a variable's axes to their coordinates for netCDF readers such as xarray.
 //!
-//! Both ends know of each other, as HDF5's dimension scale specification wants: a variable lists its scales (`DIMENSION_LIST`), a scale the
-//! variables that it belongs to (`REFERENCE_LIST`). H5DSattach_scale rewrites the second list with every variable; here it is written once.
+//! Both ends know of each other, as HDF5's dimension scale specification wants: a variable lists its scales
+//! (`DIMENSION_LIST`), a scale the variables that it belongs to (`REFERENCE_LIST`). H5DSattach_scale rewrites the
+//! second list with every variable; here it is written once.
 
 use hdf5::types::VarLenArray;
 use hdf5::{Dataset, ObjectReference1};
@@ -34,7 +35,8 @@ impl Scales {
         Ok(())
     }
 
-    /// Attaches scales by name, one for every dimension of a dataset that has one. Errors: one is not there; the library refuses.
+    /// Attaches scales by name, one for every dimension of a dataset that has one. Errors: one is not there; the
+    /// library refuses.
     pub(crate) fn attach(&mut self, dataset: &Dataset, names: &[Option<&str>]) -> Result<()> {
         if names.iter().all(Option::is_none) {
             return Ok(());

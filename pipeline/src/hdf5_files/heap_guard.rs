@@ -1,8 +1,10 @@
-//! A guard against damage that keeps the HDF5 library busy for ever, or makes it read a stretch of a file many times over.
+//! A guard against damage that keeps the HDF5 library busy for ever, or makes it read a stretch of a file many times
+//! over.
 //!
-//! Texts of variable length lie in global heap collections. The library walks a collection object by object, and object 0 (the free
-//! space) takes as many bytes as it states: with 0 bytes stated the walk never ends (HDF5 2.0, H5HGcache.c). Collections have no
-//! checksum and may overlap, so that a small file can hold thousands of large ones. Files of others are looked through before they are opened.
+//! Texts of variable length lie in global heap collections. The library walks a collection object by object, and object
+//! 0 (the free space) takes as many bytes as it states: with 0 bytes stated the walk never ends (HDF5 2.0,
+//! H5HGcache.c). Collections have no checksum and may overlap, so that a small file can hold thousands of large ones.
+//! Files of others are looked through before they are opened.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -24,12 +26,14 @@ const SMALLEST: u64 = 4096;
 const FILE_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// The first place behind the beginning where a file's signature may lie.
 const USER_BLOCK: u64 = 512;
-/// Collections lie side by side: together they cannot take more than the file, and a little for bytes that only look like one.
+/// Collections lie side by side: together they cannot take more than the file, and a little for bytes that only look
+/// like one.
 const MOST_OVERLAP: u64 = 2;
 const SPARE: u64 = 1 << 20;
 
-/// Finds the signature. It is looked for by its first two bytes: of two neighbours one is the high byte of a sample of two bytes, and most converters
-/// never make it. The general guess, by how frequent bytes are in texts and programs, takes two low bytes and stops all the time.
+/// Finds the signature. It is looked for by its first two bytes: of two neighbours one is the high byte of a sample of
+/// two bytes, and most converters never make it. The general guess, by how frequent bytes are in texts and programs,
+/// takes two low bytes and stops all the time.
 static FINDER: LazyLock<Finder> =
     LazyLock::new(|| FinderBuilder::new().build_forward_with_ranker(Neighbours, &SIGNATURE));
 

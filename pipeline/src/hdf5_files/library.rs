@@ -1,7 +1,7 @@
 //! The HDF5 library itself, for the small objects of which a result has hundreds.
 //!
-//! Its safe wrapper makes property lists and spaces anew for every object and asks back about each: half of the time that files
-//! took (docs/performance.md). Here they are made once. All unsafe code of this package is in this file.
+//! Its safe wrapper makes new property lists and spaces for every object and asks back about each: half of the time
+//! that files took (docs/performance.md). Here they are made once. All unsafe code of this package is in this file.
 #![allow(unsafe_code)]
 
 use std::ffi::{CString, c_char, c_int, c_void};
@@ -40,7 +40,8 @@ fn kit() -> hdf5::Result<&'static Kit> {
     if let Some(kit) = KIT.get() {
         return Ok(kit);
     }
-    // SAFETY: a class of lists that the library has from its beginning, with the global lock held; the list was just made.
+    // SAFETY: a class of lists that the library has from its beginning, with the global lock held; the list was just
+    // made.
     let group = hdf5::sync::sync(|| unsafe {
         let list = checked(H5Pcreate(*H5P_CLS_GROUP_CREATE))?;
         checked(H5Pset_obj_track_times(list, 0).into()).map(|_| list)
@@ -50,11 +51,13 @@ fn kit() -> hdf5::Result<&'static Kit> {
     Ok(KIT.get_or_init(|| Kit { link, dataset, group }))
 }
 
-/// From now on the library follows no external link, in no file: they would lead to any file that this process may read. Errors: it refuses.
+/// From now on the library follows no external link, in no file: they would lead to any file that this process may
+/// read. Errors: it refuses.
 pub(crate) fn follow_no_external_links() -> hdf5::Result<()> {
     static DONE: OnceLock<()> = OnceLock::new();
     if DONE.get().is_none() {
-        // SAFETY: no handle is passed; the class of links is the library's own; the lock is held, and who comes second finds it done.
+        // SAFETY: no handle is passed; the class of links is the library's own; the lock is held, and who comes second
+        // finds it done.
         hdf5::sync::sync(|| match DONE.get() {
             Some(()) => Ok(0),
             None => unsafe { checked(H5Lunregister(H5L_type_t::H5L_TYPE_EXTERNAL).into()) }.inspect(|_| {
@@ -74,16 +77,17 @@ pub(crate) fn is_attribute(container: &Container) -> bool {
 /// A reference to a text in a heap: the text's length, the heap's place (8 bytes), its number there.
 pub(crate) const REFERENCE_BYTES: usize = 16;
 
-/// The lengths of `count` texts of variable length, as their references state them. Reading the texts would ask for as much memory before the
-/// library looks whether there are any. Errors: the library refuses; references of another size than of files with addresses of 8 bytes.
+/// The lengths of `count` texts of variable length, as their references state them. Reading the texts would ask for as
+/// much memory before the library looks whether there are any. Errors: the library refuses; references of another size
+/// than of files with addresses of 8 bytes.
 pub(crate) fn text_lengths(container: &Container, count: usize) -> hdf5::Result<Vec<u32>> {
     let raw = raw_reference()?;
     let size = count.checked_mul(REFERENCE_BYTES).ok_or("too many texts")?;
     let mut bytes = vec![0_u8; size];
     let into = bytes.as_mut_ptr().cast();
     let attribute = is_attribute(container);
-    // SAFETY: the handles are live; `count` is the number of elements in the container, each of which becomes one of `raw`'s 16 bytes, for which there is
-    // room; the lock is held.
+    // SAFETY: the handles are live; `count` is the number of elements in the container, each of which becomes one of
+    // `raw`'s 16 bytes, for which there is room; the lock is held.
     hdf5::sync::sync(|| unsafe {
         if attribute {
             checked(H5Aread(container.id(), raw, into).into())
@@ -102,7 +106,8 @@ fn raw_reference() -> hdf5::Result<hid_t> {
         return Ok(raw);
     }
     let text = Datatype::from_type::<VarLenUnicode>()?;
-    // SAFETY: the types are live and the name ends with a NUL; the function lives as long as the program; the lock is held.
+    // SAFETY: the types are live and the name ends with a NUL; the function lives as long as the program; the lock is
+    // held.
     let raw = hdf5::sync::sync(|| unsafe {
         let raw = checked(H5Tcreate(H5T_class_t::H5T_OPAQUE, REFERENCE_BYTES))?;
         checked(
@@ -125,7 +130,8 @@ extern "C" fn as_it_is(
     _background: *mut c_void,
     _transfer: hid_t,
 ) -> c_int {
-    // SAFETY: the library gives live types and a pointer to its own description of the conversion, or none; it holds its lock.
+    // SAFETY: the library gives live types and a pointer to its own description of the conversion, or none; it holds
+    // its lock.
     unsafe {
         let Some(about) = about.as_mut() else { return -1 };
         if about.command == H5T_cmd_t::H5T_CONV_INIT {
@@ -141,7 +147,8 @@ extern "C" fn as_it_is(
 /// A new group. Errors: the library refuses.
 pub(crate) fn group(parent: &Group, name: &str) -> hdf5::Result<Group> {
     let (kit, text) = (kit()?, c_text(name)?);
-    // SAFETY: every handle is live for the length of the call, since its owner is borrowed; the name ends with a NUL; the lock is held.
+    // SAFETY: every handle is live for the length of the call, since its owner is borrowed; the name ends with a NUL;
+    // the lock is held.
     let id = hdf5::sync::sync(|| unsafe {
         checked(H5Gcreate2(parent.id(), text.as_ptr(), kit.link.id(), kit.group, H5P_DEFAULT))
     })?;
@@ -167,8 +174,8 @@ pub(crate) fn filled_dataset<T: H5Type>(
     let kind = Datatype::from_type::<T>()?;
     let dataset = create(parent, name, shape, &kind)?;
     if !values.is_empty() {
-        // SAFETY: both handles are live; the dataset was made with this shape and type, and `values` are as many of it, laid out as the type says
-        // (`H5Type`); the lock is held.
+        // SAFETY: both handles are live; the dataset was made with this shape and type, and `values` are as many of it,
+        // laid out as the type says (`H5Type`); the lock is held.
         hdf5::sync::sync(|| unsafe {
             let from = values.as_ptr().cast();
             checked(H5Dwrite(dataset.id(), kind.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, from).into())
@@ -194,8 +201,9 @@ fn create(parent: &Group, name: &str, shape: &[usize], kind: &Datatype) -> hdf5:
 pub(crate) fn attribute<T: H5Type>(owner: &Location, name: &str, shape: &[usize], values: &[T]) -> hdf5::Result<()> {
     check_count(shape, values)?;
     let (text, kind, space) = (c_text(name)?, Datatype::from_type::<T>()?, Dataspace::try_new(shape)?);
-    // SAFETY: every handle is live; the attribute is made with this shape and type, and `values` are as many of it, laid out as the type says
-    // (`H5Type`); the name ends with a NUL; the lock is held. The new handle is closed and nobody else has it.
+    // SAFETY: every handle is live; the attribute is made with this shape and type, and `values` are as many of it,
+    // laid out as the type says (`H5Type`); the name ends with a NUL; the lock is held. The new handle is closed and
+    // nobody else has it.
     hdf5::sync::sync(|| unsafe {
         let id = checked(H5Acreate2(owner.id(), text.as_ptr(), kind.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT))?;
         let written = checked(H5Awrite(id, kind.id(), values.as_ptr().cast()).into());
@@ -227,7 +235,8 @@ impl ScaledDimension {
     }
 }
 
-// SAFETY: the fields lie where the descriptor says, the size is that of the structure, and none of its bytes is uninitialised.
+// SAFETY: the fields lie where the descriptor says, the size is that of the structure, and none of its bytes is
+// uninitialised.
 unsafe impl H5Type for ScaledDimension {
     fn type_descriptor() -> TypeDescriptor {
         let field = |name: &str, kind, offset, index| CompoundField::new(name, kind, offset, index);

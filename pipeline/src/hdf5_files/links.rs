@@ -1,5 +1,6 @@
-//! What leads out of a file is refused: a link, or a dataset whose values lie elsewhere, may name any file that this program can read; its bytes would be
-//! no part of a hash, and one that never ends would be read for ever. External links are followed nowhere (see `library`).
+//! What leads out of a file is refused: a link, or a dataset whose values lie elsewhere, may name any file that this
+//! program can read; its bytes would be no part of a hash, and one that never ends would be read for ever. External
+//! links are followed nowhere (see `library`).
 
 use hdf5::plist::dataset_create::Layout;
 use hdf5::{Dataset, File, Group, IndexType, IterationOrder, LinkType, LocationType};
@@ -10,7 +11,8 @@ use crate::error::StoreError;
 const MOST_OBJECTS: usize = 100_000;
 const MOST_DEPTH: usize = 32;
 
-/// Sees that a file holds nothing but groups and datasets of its own. Errors: a soft or external link, data in other files, too many objects.
+/// Sees that a file holds nothing but groups and datasets of its own. Errors: a soft or external link, data in other
+/// files, too many objects.
 pub(crate) fn refuse_links(file: &File) -> Result<(), StoreError> {
     let mut left = MOST_OBJECTS;
     group(file, 0, &mut left)
@@ -37,7 +39,8 @@ fn group(own: &Group, depth: usize, left: &mut usize) -> Result<(), StoreError> 
     Ok(())
 }
 
-/// Sees that a dataset has its values in the file itself; nothing else may be asked of it before. Errors: it is virtual, or has external files.
+/// Sees that a dataset has its values in the file itself; nothing else may be asked of it before. Errors: it is
+/// virtual, or has external files.
 pub(crate) fn require_own_values(dataset: &Dataset) -> Result<(), StoreError> {
     let how = dataset.dcpl()?;
     if how.layout() == Layout::Virtual || !how.get_external()?.is_empty() {

@@ -1,4 +1,5 @@
-//! HDF5 files: the library's small objects, checked reading, deterministic writing, and a guard against files that do harm.
+//! HDF5 files: the library's small objects, checked reading, deterministic writing, and a guard against files that do
+//! harm.
 
 mod dimension_scale;
 mod heap_guard;

@@ -1,7 +1,8 @@
 //! Checked HDF5 reading: whatever the bytes, an error instead of a panic, a huge allocation or an endless walk.
 //!
-//! [`open_file`] is the one door: it wants the finding of a pass through the file. What it gives carries an allowance, the bytes that may still be read
-//! out of the file: it is a few times the file's own, since every number and every text lies in it once, compressed samples aside, which are streamed.
+//! [`open_file`] is the one door: it wants the finding of a pass through the file. What it gives carries an allowance,
+//! the bytes that may still be read out of the file: it is a few times the file's own, since every number and every
+//! text lies in it once, compressed samples aside, which are streamed.
 
 use std::collections::HashSet;
 use std::ops::Deref;
@@ -21,8 +22,8 @@ use super::write::path_of;
 use crate::error::{Result, StoreError};
 use crate::files::open_regular;
 
-/// An allowance is this many times the file, and a little for small ones: a text is read for a list and again for what is listed, and a
-/// comparison reads standard errors once more.
+/// An allowance is this many times the file, and a little for small ones: a text is read for a list and again for what
+/// is listed, and a comparison reads standard errors once more.
 const MOST_READS: u64 = 4;
 const SPARE_BYTES: u64 = 1 << 20;
 
@@ -101,7 +102,8 @@ impl Opened<File> {
     }
 }
 
-/// Opens an HDF5 file for reading. Errors: there is none, it is not HDF5, it is cut short, it is not the one that was looked through.
+/// Opens an HDF5 file for reading. Errors: there is none, it is not HDF5, it is cut short, it is not the one that was
+/// looked through.
 pub(crate) fn open_file(path: &Path, vetted: &Vetted) -> Result<Opened<File>> {
     let io = |error: std::io::Error| StoreError::io("cannot be opened", path, &error);
     let size = open_regular(path).and_then(|file| file.metadata()).map_err(io)?.len();
@@ -114,7 +116,8 @@ pub(crate) fn open_file(path: &Path, vetted: &Vetted) -> Result<Opened<File>> {
     }
     follow_no_external_links()?;
     let file = File::with_options()
-        // closed with the last of its objects (`Semi` would leave it open for ever where the file goes out of scope before a dataset)
+        // closed with the last of its objects (`Semi` would leave it open for ever where the file goes out of scope
+        // before a dataset)
         .with_fapl(|access| access.fclose_degree(FileCloseDegree::Weak).file_locking(false))
         .open(path)
         .map_err(|error| {
@@ -264,7 +267,8 @@ pub(crate) fn descriptor(container: &Container) -> Result<TypeDescriptor> {
     Ok(container.dtype()?.to_descriptor()?)
 }
 
-/// Texts of a dataset or attribute, whatever the kind of HDF5 text. Errors: other types; more than the file can hold, or is left of the allowance.
+/// Texts of a dataset or attribute, whatever the kind of HDF5 text. Errors: other types; more than the file can hold,
+/// or is left of the allowance.
 pub(crate) fn read_texts(container: &Container, allowance: &Allowance) -> Result<Vec<String>> {
     let descriptor = descriptor(container)?;
     let count = count_of(container)?;
@@ -301,8 +305,8 @@ fn read_fixed<T: H5Type>(container: &Container, count: u64, bytes: fn(&T) -> &[u
     }
 }
 
-/// Sees that texts of variable length do not take more than the file allows, before any is read: references may all lead to one large text, and state
-/// any length.
+/// Sees that texts of variable length do not take more than the file allows, before any is read: references may all
+/// lead to one large text, and state any length.
 fn check_references(container: &Container, count: u64, allowance: &Allowance) -> Result<()> {
     allowance.take(count.checked_mul(library::REFERENCE_BYTES as u64))?;
     let lengths = library::text_lengths(container, count as usize)?;
@@ -335,12 +339,14 @@ fn count_of(container: &Container) -> Result<u64> {
     count.ok_or_else(|| StoreError::new(format!("claims the shape {shape:?}: damaged")))
 }
 
-/// Takes the bytes of a container from the allowance. Errors: it claims more values than its file can hold, or than is left.
+/// Takes the bytes of a container from the allowance. Errors: it claims more values than its file can hold, or than is
+/// left.
 pub(crate) fn check_size(container: &Container, bytes_per_value: usize, allowance: &Allowance) -> Result<()> {
     allowance.take(count_of(container)?.checked_mul(bytes_per_value as u64))
 }
 
-/// Refuses samples, perhaps compressed, that no file of this size can hold. They are streamed, so that nothing is taken from the allowance.
+/// Refuses samples, perhaps compressed, that no file of this size can hold. They are streamed, so that nothing is taken
+/// from the allowance.
 pub(crate) fn check_samples(dataset: &Dataset, bytes_per_value: usize, allowance: &Allowance) -> Result<()> {
     let file_bytes = allowance.vetted.file_bytes;
     match count_of(dataset)?.checked_mul(bytes_per_value as u64) {
@@ -349,7 +355,8 @@ pub(crate) fn check_samples(dataset: &Dataset, bytes_per_value: usize, allowance
             let shape = dataset.get_shape()?;
             let most = most_inflated(file_bytes);
             Err(StoreError::new(format!(
-                "claims the shape {shape:?} in a file of {file_bytes} bytes, wanted at most {most} bytes of samples: damaged"
+                "claims the shape {shape:?} in a file of {file_bytes} bytes, wanted at most {most} bytes of samples: \
+                 damaged"
             )))
         }
     }

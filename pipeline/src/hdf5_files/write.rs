@@ -12,7 +12,8 @@ use crate::error::{Result, StoreError};
 
 /// Creates an HDF5 file whose bytes depend on its contents alone. Errors: it exists, or the folder cannot be written.
 ///
-/// The format is HDF5 1.8's (checksummed object headers, attributes of any size): every reader of the last fifteen years.
+/// The format is HDF5 1.8's (checksummed object headers, attributes of any size): every reader of the last fifteen
+/// years.
 pub(crate) fn create_file(path: &Path) -> Result<File> {
     File::with_options()
         .with_fapl(|access| {
@@ -38,7 +39,8 @@ pub(crate) fn nexus_group(parent: &Group, name: &str, class: &str) -> Result<Gro
 
 /// A contiguous dataset of numbers, row-major.
 ///
-/// Contiguous and raw: gzip takes a tenth off aligned ensembles and means (noise does not compress) at a tenth of the speed.
+/// Contiguous and raw: gzip takes a tenth off aligned ensembles and means (noise does not compress) at a tenth of the
+/// speed.
 pub(crate) fn dataset<T: H5Type>(parent: &Group, name: &str, shape: &[usize], values: &[T]) -> Result<Dataset> {
     check_name(name).map_err(|error| error.at(parent.name()))?;
     let dataset = library::filled_dataset(parent, name, shape, values);

@@ -4,8 +4,8 @@ use std::fs;
 
 use super::process::kill_descendants;
 
-/// Kills every process that this one has started in a group of its own, with the group: plugins, whoever holds them. For a program that ends at
-/// once.
+/// Kills every process that this one has started in a group of its own, with the group: plugins, wherever they are
+/// held. For a program that ends at once.
 pub fn kill_children() {
     let own = std::process::id();
     for entry in fs::read_dir("/proc").into_iter().flatten().flatten() {

@@ -91,8 +91,9 @@ fn specs(ports: &[PortDescription]) -> &'static [PortSpec] {
     Vec::leak(ports.iter().map(spec).collect())
 }
 
-/// Text that lives as long as the program, as the texts of built-in stages do: the registry, plans, wires and errors refer to it without
-/// owning it. It is made once per plugin and process (descriptions are kept, see [`super::row`]), some hundred bytes each.
+/// Text that lives as long as the program, as the texts of built-in stages do: the registry, plans, wires and errors
+/// refer to it without owning it. It is made once per plugin and process (descriptions are kept, see [`super::row`]),
+/// some hundred bytes each.
 pub(super) fn leak(text: &str) -> &'static str {
     String::leak(text.to_owned())
 }

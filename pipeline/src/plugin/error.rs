@@ -32,11 +32,11 @@ impl PluginError {
 
     /// The error of a stage that runs the plugin `name`.
     pub(super) fn of(self, name: &str) -> StageError {
-        StageError::new(self.told(name)).help(self.help)
+        StageError::new(self.message_for(name)).help(self.help)
     }
 
     /// In one text, the end of stderr included.
-    pub fn told(&self, name: &str) -> String {
+    pub fn message_for(&self, name: &str) -> String {
         let lines: Vec<&str> = self.log.lines().collect();
         let first = lines.len().saturating_sub(SHOWN_LINES);
         let mut text = format!("the plugin `{name}` {}", self.what);

@@ -30,7 +30,8 @@ pub struct Launch {
 const MOST_START: Duration = Duration::from_secs(120);
 
 impl Launch {
-    /// From a command: a program with a `/` in its name is looked for from `folder` on, another one on the PATH. Errors: there is none.
+    /// From a command: a program with a `/` in its name is looked for from `folder` on, another one on the PATH.
+    /// Errors: there is none.
     pub fn command(name: &str, command: &[String], folder: &Path, timeout_s: f64) -> Result<Self, PluginError> {
         let no_folder = |error: std::io::Error| {
             PluginError::new(format!("cannot run in {}: {error}", folder.display()), "check the config's folder")

@@ -7,8 +7,8 @@ use serde_json::Value;
 
 use crate::artifact::Attribute;
 
-/// The first line of a plugin. Frozen: whatever becomes of the protocol, this line stays, so that two versions can tell each other who
-/// they are. Keys that are not known are ignored here, and here alone.
+/// The first line of a plugin. Frozen: whatever becomes of the protocol, this line stays, so that two versions can tell
+/// each other who they are. Keys that are not known are ignored here, and here alone.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Handshake {
     /// Always 1.

@@ -1,12 +1,14 @@
-//! Stages in any language: processes that speak newline-delimited JSON on stdio. `docs/plugins.md` is their specification.
+//! Stages in any language: processes that speak newline-delimited JSON on stdio. `docs/plugins.md` is their
+//! specification.
 //!
 //! ```text
-//! [plugins] or PATH -> Candidate (consent?) -> Process (handshake, describe) -> Plugin (a row without a type) -> run, run, run ...
+//! [plugins] or PATH -> Candidate (consent?) -> Process (handshake, describe)
+//!     -> Plugin (a row without a type) -> run, run, run ...
 //! ```
 //!
-//! Nothing starts without consent for command, folder and the bytes of its files. A process is started once per worker and reused over items. Nothing
-//! that it does is trusted: lines are bounded, times are limited, what it made is checked before it is stored, and whatever goes wrong is an error that
-//! names the plugin.
+//! Nothing starts without consent for command, folder and the bytes of its files. A process is started once per worker
+//! and reused over items. Nothing that it does is trusted: lines are bounded, times are limited, what it made is
+//! checked before it is stored, and whatever goes wrong is an error that names the plugin.
 
 mod children;
 mod conformance;

@@ -15,7 +15,8 @@ use crate::config::{Config, Problem, StageDecl, did_you_mean, is_plugin_name, pl
 use crate::graph::Stages;
 use crate::stage::{Entry, Registry};
 
-/// The plugins of a program: a value that is passed to whatever plans configs. Dropping it ends the processes that wait.
+/// The plugins of a program: a value that is passed to whatever plans configs. Dropping it ends the processes that
+/// wait.
 #[derive(Debug)]
 pub struct Plugins {
     rule: Rule,
@@ -52,8 +53,8 @@ impl Plugins {
         Self { rule, trust, pool, rows, answers: Mutex::default(), notes: Mutex::default() }
     }
 
-    /// The same with a process between this program and each plugin, which ends all that the plugin has started, whatever ends this program. Without
-    /// one a plugin that ignores the end of its input outlives a killed program.
+    /// The same with a process between this program and each plugin, which ends all that the plugin has started,
+    /// whatever ends this program. Without one a plugin that ignores the end of its input outlives a killed program.
     #[must_use]
     pub fn hosted(mut self, host: Option<Host>) -> Self {
         self.pool = Arc::new(Pool::hosted(host));
@@ -85,7 +86,8 @@ impl Plugins {
         if problems.is_empty() { Ok(found) } else { Err(problems) }
     }
 
-    /// Whether a plugin may be started: by the rule, by what was agreed to earlier, or because somebody who is asked says yes. Each is asked for once.
+    /// Whether a plugin may be started: by the rule, by what was agreed to earlier, or because somebody who is asked
+    /// says yes. Each is asked for once.
     pub fn may_start(&self, candidate: &Candidate) -> bool {
         let Rule::Agreed { seals, ask } = &self.rule else { return matches!(self.rule, Rule::All) };
         let seal = candidate.seal();
@@ -97,7 +99,8 @@ impl Plugins {
         *answers.entry(seal).or_insert_with(|| ask(candidate))
     }
 
-    /// Starts a plugin, asks it what it is, and remembers that together with consent to start it. The rule is not asked: this is how consent is given.
+    /// Starts a plugin, asks it what it is, and remembers that together with consent to start it. The rule is not
+    /// asked: this is how consent is given.
     ///
     /// Errors: there is no place to remember it; it does not start, or does not describe itself as it should.
     pub fn agree(&self, candidate: &Candidate) -> Result<Described, PluginError> {
@@ -152,15 +155,16 @@ impl Plugins {
     fn problem(&self, decl: &StageDecl, name: &str, config: &Config, error: PluginError) -> Problem {
         let declared = config.plugins.iter().find(|plugin| plugin.name == name);
         let span = declared.map_or(decl.uses_span.clone(), |plugin| plugin.command_span.clone());
-        Problem::new(error.told(name), span, "this plugin").help(error.help)
+        Problem::new(error.message_for(name), span, "this plugin").help(error.help)
     }
 
-    /// The row of a stage that uses a plugin. Errors: there is none of this name, nobody has agreed to start it, it does not start or describe itself.
+    /// The row of a stage that uses a plugin. Errors: there is none of this name, nobody has agreed to start it, it
+    /// does not start or describe itself.
     fn entry(&self, decl: &StageDecl, name: &str, config: &Config) -> Result<Entry, Problem> {
         let candidate = self.candidate(decl, name, config)?;
         if !self.may_start(&candidate) && !matches!(self.rule, Rule::Never) {
             let error =
-                PluginError::new(format!("is not started before you agree to it: {}", candidate.told()), CONSENT);
+                PluginError::new(format!("is not started before you agree to it: {}", candidate.would_run()), CONSENT);
             return Err(self.problem(decl, name, config, error));
         }
         let row = self.row(&candidate).map_err(|error| self.problem(decl, name, config, error))?;
@@ -210,8 +214,8 @@ impl Plugins {
         Ok((introduction, plugin))
     }
 
-    /// Remembers what a plugin says of itself: where somebody has just agreed, and where it says something else than it did then, since what a script
-    /// imports may have changed.
+    /// Remembers what a plugin says of itself: where somebody has just agreed, and where it says something else than it
+    /// did then, since what a script imports may have changed.
     fn keep(&self, candidate: &Candidate, introduction: &Introduction) {
         let Some(trust) = &self.trust else { return };
         let seal = candidate.seal();

@@ -28,7 +28,8 @@ impl Pool {
         Self { host, ..Self::default() }
     }
 
-    /// A process of this plugin: an idle one, or a new one. Errors: it does not start; its files are no longer the candidate's.
+    /// A process of this plugin: an idle one, or a new one. Errors: it does not start; its files are no longer the
+    /// candidate's.
     pub(super) fn take(&self, candidate: &Candidate) -> Result<Session, PluginError> {
         let mut idle = self.lock();
         if let Some(place) = idle.iter().position(|session| session.candidate == *candidate) {
@@ -43,13 +44,14 @@ impl Pool {
         self.lock().push(session);
     }
 
-    /// Ends all processes that wait. Where it is never called (the program was killed), the end of their input ends them.
+    /// Ends all processes that wait. Where it is never called (the program was killed), the end of their input ends
+    /// them.
     ///
     /// Returned is what is wrong with any: it wrote something that nobody had asked for.
     pub(super) fn shut_down(&self) -> Vec<String> {
         let mut idle = std::mem::take(&mut *self.lock());
-        let told = |session: &Session| Some(session.check_quiet().err()?.told(session.candidate.name()));
-        let wrong = idle.iter().filter_map(told).collect();
+        let not_quiet = |session: &Session| Some(session.check_quiet().err()?.message_for(session.candidate.name()));
+        let wrong = idle.iter().filter_map(not_quiet).collect();
         idle.iter_mut().for_each(Session::ask_to_end);
         for session in &mut idle {
             // one that does not end is killed there

@@ -1,4 +1,5 @@
-//! Rows of the registry that plugins stand behind: those that have described themselves, and those that nobody may ask yet.
+//! Rows of the registry that plugins stand behind: those that have described themselves, and those that nobody may ask
+//! yet.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,7 +20,8 @@ use crate::recording::InputFiles;
 use crate::stage::{Caching, Context, DynStage, Entry, Example, Maker, ParamError, Spec};
 
 /// What to do about a plugin that nobody has agreed to.
-pub(super) const CONSENT: &str = "`afmid trust CONFIG` lists what it would run, and remembers that you agree; `--allow-plugins` allows it for one command";
+pub(super) const CONSENT: &str = "`afmid trust CONFIG` lists what it would run, and remembers that you agree; \
+    `--allow-plugins` allows it for one command";
 
 /// A plugin with its command: what makes its stages.
 #[derive(Debug)]
@@ -132,7 +134,8 @@ impl Maker for NotDescribed {
     }
 }
 
-/// A stage of a plugin that has not described itself, with the parameters that the config gives: it can be shown, and nothing else.
+/// A stage of a plugin that has not described itself, with the parameters that the config gives: it can be shown, and
+/// nothing else.
 struct Unknown {
     row: NotDescribed,
     params: Value,

@@ -33,8 +33,8 @@ const FORM: &str =
     r#"the first line is {"afmid_stage": 1, "protocol": {"min": 1, "max": 1}, "name": "...", "version": "..."}"#;
 
 impl Session {
-    /// Starts a plugin and reads its handshake. Errors: it is not what the candidate says; it does not start, says something else, or speaks another
-    /// protocol.
+    /// Starts a plugin and reads its handshake. Errors: it is not what the candidate says; it does not start, says
+    /// something else, or speaks another protocol.
     pub(super) fn start(candidate: &Candidate, pool: &Pool) -> Result<Self, PluginError> {
         candidate.check_unchanged(&pool.hashes)?;
         let launch = &candidate.launch;
@@ -74,8 +74,8 @@ impl Session {
         Ok(Introduction { handshake: self.handshake.clone(), description })
     }
 
-    /// Sends a request and waits for its answer. Errors: the plugin says that it cannot (then it can be asked again), or anything else than the
-    /// protocol happens (then it was killed).
+    /// Sends a request and waits for its answer. Errors: the plugin says that it cannot (then it can be asked again),
+    /// or anything else than the protocol happens (then it was killed).
     pub(super) fn request(
         &mut self,
         method: &str,
@@ -107,7 +107,7 @@ impl Session {
             let line = self.process.receive(deadline, &doing)?;
             let reply = reply(&line, id, &doing)?;
             match (reply.progress, reply.result, reply.error) {
-                (Some(told), None, None) => progress(told),
+                (Some(done), None, None) => progress(done),
                 (None, Some(result), None) => return Ok(result),
                 (None, None, Some(refusal)) => {
                     let help = refusal.help.unwrap_or_else(|| "this comes from the plugin itself".to_owned());
@@ -182,7 +182,8 @@ impl Drop for Exchange {
     }
 }
 
-/// The first line. Errors: it is something else, or of a plugin that speaks no version of the protocol that is known here.
+/// The first line. Errors: it is something else, or of a plugin that speaks no version of the protocol that is known
+/// here.
 pub(super) fn handshake(line: &str) -> Result<(Handshake, u64), PluginError> {
     let found = || shown(line.as_bytes());
     let handshake: Handshake = serde_json::from_str(line)
@@ -219,8 +220,8 @@ pub(super) fn reply(line: &str, id: u64, doing: &str) -> Result<Reply, PluginErr
     match reply.id {
         Some(found) if found == id => Ok(reply),
         found_id => {
-            let told = found_id.map_or("no id".to_owned(), |found| format!("the id {found}"));
-            let what = format!("answered with {told}, wanted the id {id} of the request: {}", found());
+            let answered = found_id.map_or("no id".to_owned(), |found| format!("the id {found}"));
+            let what = format!("answered with {answered}, wanted the id {id} of the request: {}", found());
             Err(PluginError::new(what, "an answer carries the id of its request"))
         }
     }

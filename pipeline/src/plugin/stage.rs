@@ -105,14 +105,14 @@ pub(super) fn run(
         "output": made.path(),
     });
     let mut seen: Option<Progress> = None;
-    let mut progress = |told: Progress| {
+    let mut progress = |reported: Progress| {
         let before = seen.map_or(0, |seen| seen.done);
         if seen.is_none() {
-            cx.expect(usize::try_from(told.total).unwrap_or(usize::MAX));
+            cx.expect(usize::try_from(reported.total).unwrap_or(usize::MAX));
         }
         // no more ticks than were announced, whatever it says
-        let total = seen.map_or(told.total, |seen| seen.total);
-        let done = told.done.clamp(before, total.max(before));
+        let total = seen.map_or(reported.total, |seen| seen.total);
+        let done = reported.done.clamp(before, total.max(before));
         (before..done).take(1 << 20).for_each(|_| cx.tick());
         seen = Some(Progress { done, total });
     };
@@ -124,7 +124,8 @@ pub(super) fn run(
     Ok(outputs)
 }
 
-/// What an answer to `run` and the file that goes with it hold, and its warnings. Errors: it is not laid out so, or not as declared.
+/// What an answer to `run` and the file that goes with it hold, and its warnings. Errors: it is not laid out so, or not
+/// as declared.
 pub(super) fn outputs(
     declared: &[PortDescription],
     answer: Value,

@@ -12,7 +12,8 @@ use crate::error::StageError;
 
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// Opens a file: everything but the samples, and the name of the format that opened it. Native records are listed like any HDF5 file.
+/// Opens a file: everything but the samples, and the name of the format that opened it. Native records are listed like
+/// any HDF5 file.
 ///
 /// Errors: it cannot be read; nobody recognises it; it is damaged.
 pub fn open_contents(

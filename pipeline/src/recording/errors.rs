@@ -1,4 +1,5 @@
-//! Errors of readers of files are errors of the stage that reads, and the other way round for sources that the store opens.
+//! Errors of readers of files are errors of the stage that reads, and the other way round for sources that the store
+//! opens.
 
 use super::FormatError;
 use crate::error::StageError;

@@ -25,7 +25,7 @@ pub struct How {
     pub unit: Option<String>,
 }
 
-/// Which reader opens a file, and what it must be told: enough to open the file again.
+/// Which reader opens a file, and the parameters that it needs: enough to open the file again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reading {
@@ -55,7 +55,8 @@ impl Reading {
         [AUTO, NATIVE, HDF5].into_iter().chain(known).chain([RAW]).collect()
     }
 
-    /// Errors: no such format; a description of raw binary without that format, or the other way round; one that is out of its range.
+    /// Errors: no such format; a description of raw binary without that format, or the other way round; one that is out
+    /// of its range.
     pub fn check(&self) -> Result<(), StageError> {
         if !Self::names().contains(&self.format.as_str()) {
             let names = Self::names().join(", ");

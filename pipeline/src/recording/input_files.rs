@@ -12,10 +12,11 @@ use crate::error::StageError;
 use crate::files::{FileState, KnownHashes, head, is_result, open_regular, read_regular};
 use crate::hdf5_files::{HeapGuard, Refusal, Vetted, finding_text, parse_finding};
 
-/// The files that a program reads. A value that is passed to whatever reads: cloning is cheap, and clones share what they know.
+/// The files that a program reads. A value that is passed to whatever reads: cloning is cheap, and clones share what
+/// they know.
 ///
-/// A file is hashed once per state (device, inode, size, times of modification and change); with a folder also once over several runs. What foreign
-/// files were parsed or inflated to is kept up to a bound.
+/// A file is hashed once per state (device, inode, size, times of modification and change); with a folder also once
+/// over several runs. What foreign files were parsed or inflated to is kept up to a bound.
 #[derive(Clone, Default)]
 pub struct InputFiles(Arc<Inner>);
 
@@ -131,7 +132,7 @@ impl InputFiles {
     pub(super) fn inspect(&self, path: &Path) -> Result<(FileState, Inspected), StageError> {
         let fail = |error: std::io::Error| unreadable(path, &error);
         let key = self.absolute(path).map_err(fail)?;
-        // not opened while it is known; whoever opens it compares the states again
+        // not opened while it is known; the code that opens it compares the states again
         let state = FileState::at(path).map_err(fail)?;
         if let Some(found) = self.known(&key, &state) {
             return Ok((state, found));
@@ -184,10 +185,11 @@ impl HashedFile {
         self.state.size()
     }
 
-    /// Sees whether the file is still the one that was hashed, so that what was read since has this hash. Errors: it has changed, or is gone.
+    /// Sees whether the file is still the one that was hashed, so that what was read since has this hash. Errors: it
+    /// has changed, or is gone.
     ///
-    /// The state tells, since programs cannot set back the time of a file's last change; a file that was written shortly before it was hashed is
-    /// hashed again.
+    /// The state tells, since programs cannot set back the time of a file's last change; a file that was written
+    /// shortly before it was hashed is hashed again.
     pub(crate) fn check_unchanged(&self) -> Result<(), StageError> {
         let now = FileState::at(&self.path)
             .map_err(|error| StageError::new(format!("the file was there, and now: {error}")).at(&self.path))?;
@@ -202,7 +204,8 @@ impl HashedFile {
     }
 }
 
-/// Errors: the file that lies at a path now is not in the state in which it was opened. Whatever was read by name since was read from the same file.
+/// Errors: the file that lies at a path now is not in the state in which it was opened. Whatever was read by name since
+/// was read from the same file.
 pub(super) fn require_state(path: &Path, then: &FileState) -> Result<(), StageError> {
     let now = FileState::at(path).map_err(|error| unreadable(path, &error))?;
     require_same(path, &now, then)

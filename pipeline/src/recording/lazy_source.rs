@@ -66,7 +66,7 @@ impl LazySource {
         Ok(self.native.get_or_init(|| source))
     }
 
-    /// The file's state, in which it has the hash that was recorded: whoever opens it next sees that it is still in it.
+    /// The file's state, in which it has the recorded hash. Each later opening compares with it.
     fn state(&self) -> Result<FileState, FormatError> {
         if let Some(state) = self.state.get() {
             return Ok(*state);

@@ -51,7 +51,8 @@ pub struct Recording {
 /// One uninterrupted acquisition with all its channels: a file, or a stretch of one.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// The file's name without its folder, and the number of the stretch if there are several (`file.tdms[2]`): what tables and messages show.
+    /// The file's name without its folder, and the number of the stretch if there are several (`file.tdms[2]`): what
+    /// tables and messages show.
     pub name: String,
     /// Where it lies.
     pub path: PathBuf,
@@ -63,7 +64,8 @@ pub struct Record {
     pub sample_rate_hz: f64,
     /// When the acquisition began, ISO 8601; empty if unknown.
     pub started_at: String,
-    /// Sample of the file's channels that is the record's first: a file whose recording was interrupted is one record per uninterrupted stretch.
+    /// Sample of the file's channels that is the record's first: a file whose recording was interrupted is one record
+    /// per uninterrupted stretch.
     pub first_sample: usize,
     /// Which reader opens the file.
     pub reading: Reading,

@@ -33,9 +33,9 @@ pub struct Wanted<'a> {
 
 /// Opens a native record.
 ///
-/// Model: file attributes `sample_rate_hz` and, if known, `started_at`; one one-dimensional dataset per channel (integers or
-/// floats, contiguous or chunked) with attributes `units`, and, if not 1, 0, empty and none, `scale_factor`, `add_offset`,
-/// `long_name`, `_FillValue`. value = stored * scale_factor + add_offset.
+/// Model: file attributes `sample_rate_hz` and, if known, `started_at`; one one-dimensional dataset per channel
+/// (integers or floats, contiguous or chunked) with attributes `units`, and, if not 1, 0, empty and none,
+/// `scale_factor`, `add_offset`, `long_name`, `_FillValue`. value = stored * scale_factor + add_offset.
 ///
 /// Errors: no file, not HDF5, cut short, damaged; an attribute or a required channel is missing or of another type.
 pub fn open_native(files: &InputFiles, path: &Path, wanted: &[Wanted]) -> Result<Record, StageError> {
@@ -43,10 +43,12 @@ pub fn open_native(files: &InputFiles, path: &Path, wanted: &[Wanted]) -> Result
     hdf5::sync::sync(|| read_record(files, &open_file(path, &inspected.vetted)?, path, wanted, &inspected))
 }
 
-/// As [`open_native`] if the file is a native record: HDF5 that states a sample rate, whatever its channels. None: it is another file, or damaged.
+/// As [`open_native`] if the file is a native record: HDF5 that states a sample rate, whatever its channels. None: it
+/// is another file, or damaged.
 pub(super) fn open_if_native(files: &InputFiles, path: &Path, wanted: &[Wanted]) -> Result<Option<Record>, StageError> {
     let Ok(inspected) = files.inspect_hdf5(path) else { return Ok(None) };
-    // one turn for all calls of the library: threads that open a file each would otherwise wait for one another some fifty times
+    // one turn for all calls of the library: threads that open a file each would otherwise wait for one another some
+    // fifty times
     hdf5::sync::sync(|| match open_file(path, &inspected.vetted) {
         Ok(file) if states_rate(&file) => read_record(files, &file, path, wanted, &inspected).map(Some),
         _ => Ok(None),
@@ -181,7 +183,8 @@ fn open_channel(
     })
 }
 
-/// Opens one dataset of a file in this state as a source of samples. Errors: as [`open_native`]; the file is in another state.
+/// Opens one dataset of a file in this state as a source of samples. Errors: as [`open_native`]; the file is in another
+/// state.
 pub(super) fn open_source(
     files: &InputFiles,
     path: &Path,

@@ -31,15 +31,15 @@ pub struct Opened {
     pub remarks: Vec<String>,
 }
 
-/// Whether a file is of a format that can be opened without being told which.
+/// Whether a file is of a format that can be opened without stating which.
 pub fn recognised(path: &Path) -> bool {
     is_recognised(path)
 }
 
 /// Opens a file's channels as records.
 ///
-/// Errors: as [`super::open_contents`]; a required channel is missing; no sample rate or unit, neither in the file nor in `how`, or two
-/// that differ.
+/// Errors: as [`super::open_contents`]; a required channel is missing; no sample rate or unit, neither in the file nor
+/// in `how`, or two that differ.
 pub fn open_records(files: &InputFiles, path: &Path, wanted: &[Wanted], how: &How) -> Result<Opened, StageError> {
     how.reading.check()?;
     let (native, format) = match how.reading.format.as_str() {
@@ -188,7 +188,8 @@ fn agreed_rate(stated: Option<f64>, how: &How, what: &str) -> Result<f64, StageE
     }
 }
 
-/// The unit that is stated or given; `unit` is that of the required channels, others may go without. Errors: neither, or both and they differ.
+/// The unit that is stated or given; `unit` is that of the required channels, others may go without. Errors: neither,
+/// or both and they differ.
 fn agreed_unit(stated: &str, how: &How, wanted: &Wanted) -> Result<String, StageError> {
     let given = how.unit.as_deref().filter(|_| wanted.required);
     match (stated, given) {

@@ -64,11 +64,13 @@ fn an_interrupted_recording_is_one_record_per_stretch() {
     let folder = Folder::new("gaps");
     let section = |time: &str, values: &str| {
         format!(
-            "Channels\t1\t\nSamples\t2\t\nDate\t2020/01/01\t\nTime\t{time}\t\nY_Unit_Label\tV\t\nDelta_X\t0.5\t\nX0\t0\t\n\
+            "Channels\t1\t\nSamples\t2\t\nDate\t2020/01/01\t\nTime\t{time}\t\nY_Unit_Label\tV\t\nDelta_X\t0.5\t\n\
+             X0\t0\t\n\
              ***End_of_Header***\t\t\nX_Value\tdeflection\tComment\n{values}\n"
         )
     };
-    let head = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\nMulti_Headings\tYes\nX_Columns\tNo\n\
+    let head = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\nMulti_Headings\tYes\n\
+        X_Columns\tNo\n\
                 ***End_of_Header***\t\n\n";
     let text = [
         head.to_owned(),
@@ -79,12 +81,12 @@ fn an_interrupted_recording_is_one_record_per_stretch() {
     .concat();
     let path = written(&folder, "r.lvm", text.as_bytes());
     let opened = open_records(&InputFiles::new(), &path, &wanted("deflection"), &auto()).unwrap();
-    let told: Vec<(&str, usize, usize)> = opened
+    let found: Vec<(&str, usize, usize)> = opened
         .records
         .iter()
         .map(|record| (record.name.as_str(), record.first_sample, record.channels[0].samples))
         .collect();
-    assert_eq!(told, [("r.lvm[1]", 0, 4), ("r.lvm[2]", 4, 3)], "{:?}", opened.remarks);
+    assert_eq!(found, [("r.lvm[1]", 0, 4), ("r.lvm[2]", 4, 3)], "{:?}", opened.remarks);
     let [first, second] = &opened.records[..] else { panic!("two records") };
     assert_eq!(first.channels[0].read(0, 4).unwrap(), [1.0, 2.0, 3.0, 4.0]);
     assert_eq!(second.channels[0].read(1, 2).unwrap(), [6.0, 7.0]);

@@ -1,5 +1,5 @@
-//! Files of foreign formats that were opened last. Text is parsed and compressed data are inflated once; what that keeps in memory is
-//! bounded here, whatever the number of records.
+//! Files of foreign formats that were opened last. Text is parsed and compressed data are inflated once; what that
+//! keeps in memory is bounded here, whatever the number of records.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -29,7 +29,8 @@ struct Key {
 #[derive(Debug, Default)]
 pub(super) struct OpenedFiles(Mutex<Vec<(Key, Slot)>>);
 
-/// What a file holds that is in this state, as it was opened last or anew. Errors: it is in another; as [`open_contents`].
+/// What a file holds that is in this state, as it was opened last or is opened now. Errors: it is in another; as
+/// [`open_contents`].
 pub(super) fn contents(
     files: &InputFiles,
     path: &Path,
@@ -65,8 +66,8 @@ impl OpenedFiles {
         slot
     }
 
-    /// Forgets a file that could not be opened, and the oldest ones beyond the bound. Every thread's newest file stays: reading stretches of
-    /// records in turn must not parse them again and again.
+    /// Forgets a file that could not be opened, and the oldest ones beyond the bound. Every thread's newest file stays:
+    /// reading stretches of records in turn must not parse them again and again.
     fn trim(&self, key: &Key, failed: bool) {
         let mut opened = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         opened.retain(|(have, _)| !(failed && have == key));

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-/// The stretches between the gaps of any of the channels, of which the longest has `samples`. A gap before the first or behind the last
-/// sample interrupts nothing.
+/// The stretches between the gaps of any of the channels, of which the longest has `samples`. A gap before the first or
+/// behind the last sample interrupts nothing.
 pub(super) fn uninterrupted<'a>(samples: usize, gaps: impl Iterator<Item = &'a [usize]>) -> Vec<Range<usize>> {
     let mut cuts: Vec<usize> = gaps.flatten().copied().filter(|&gap| gap > 0 && gap < samples).collect();
     cuts.sort_unstable();

@@ -59,16 +59,16 @@ pub enum RecordStorage {
     Deflate(u8),
 }
 
-/// Writes a native record: to a temporary file in the same folder, synced, then renamed, so that a kill leaves the old file, the
-/// new one or none, never half of one. Same record, same bytes.
+/// Writes a native record: to a temporary file in the same folder, synced, then renamed, so that a kill leaves the old
+/// file, the new one or none, never half of one. Same record, same bytes.
 ///
 /// Errors: the folder cannot be written; a channel's name is empty, used twice or holds a slash.
 pub fn write_native(path: &Path, record: &NativeRecord, storage: RecordStorage) -> Result<(), StoreError> {
     replace_file(path, |temporary| write_file(temporary, record, storage).map_err(|error| error.file(path)))
 }
 
-/// The same into a folder that this program fills: the file is listed there, and one that this program did not write, or that was changed since, is not
-/// replaced. `earlier` knows files of versions that kept no list.
+/// The same into a folder that this program fills: the file is listed there, and one that this program did not write,
+/// or that was changed since, is not replaced. `earlier` knows files of versions that kept no list.
 ///
 /// Errors: as [`write_native`]; the file is another's.
 pub fn write_native_in(

@@ -13,7 +13,8 @@ pub struct Sections {
 }
 
 impl Sections {
-    /// Takes a doc comment apart. A heading is one of [`HEADINGS`] as `# Method` or, at the start of a line, as `Method:`.
+    /// Takes a doc comment apart. A heading is one of [`HEADINGS`] as `# Method` or, at the start of a line, as
+    /// `Method:`.
     ///
     /// ```
     /// use afmid_pipeline::reference::Sections;

@@ -1,4 +1,5 @@
-//! Documentation from the registry: JSON Schema of a config, a page per stage, their index. Nothing in it is written by hand.
+//! Documentation from the registry: JSON Schema of a config, a page per stage, their index. Nothing in it is written by
+//! hand.
 
 mod headings;
 mod index;

@@ -74,7 +74,7 @@ fn parameter_table(text: &mut String, entry: &Entry) {
         text.push_str("None.\n");
         return;
     }
-    // most ranges are told in words: a column of its own only where the schema states one
+    // most ranges are stated in words: a column of its own only where the schema states one
     let ranges = rows.iter().any(|row| !row.range.is_empty());
     let (title, rule) = if ranges { ("range | ", "---|") } else { ("", "") };
     let _ = writeln!(text, "| parameter | type | default | {title}meaning |\n|---|---|---|{rule}---|");

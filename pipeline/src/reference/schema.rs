@@ -8,9 +8,10 @@ use crate::stage::{Entry, Registry};
 
 /// JSON Schema (draft 7, which all editors know) of a config with these stages.
 ///
-/// Method: `uses` selects the stage by `if`/`then`, so that a wrong parameter is reported at its place and for its stage alone;
-/// the same definitions are listed once more under an `anyOf` that is always true, because editors complete from `anyOf` and don't
-/// look into `then`.
+/// Method: `uses` selects the stage by `if`/`then`, so that a wrong parameter is reported at its place and for its
+/// stage alone;
+/// the same definitions are listed once more under an `anyOf` that is always true, because editors complete from
+/// `anyOf` and don't look into `then`.
 pub fn config_schema(registry: &Registry) -> Value {
     let mut generator = schemars::generate::SchemaSettings::draft07().into_generator();
     let mut stages = Map::new();
@@ -36,7 +37,8 @@ pub fn config_schema(registry: &Registry) -> Value {
                 "properties": {
                     "name": { "description": "Its name, shown with the results.", "type": "string", "minLength": 1 },
                     "seed": {
-                        "description": "The seed of everything random (0 by default).", "type": "integer", "minimum": 0, "default": 0
+                        "description": "The seed of everything random (0 by default).",
+                        "type": "integer", "minimum": 0, "default": 0
                     }
                 }
             },
@@ -139,14 +141,16 @@ fn plugins() -> Value {
         "properties": {
             "command": command,
             "confined": {
-                "description": "Whether it may write to its own temporary folder alone, and use no TCP (Linux).", "type": "boolean", "default": true
+                "description": "Whether it may write to its own temporary folder alone, and use no TCP (Linux).",
+                "type": "boolean", "default": true
             },
             "environment": {
                 "description": "Variables of its environment; they are part of the cache key.", "type": "object",
                 "propertyNames": { "pattern": "^[^=]+$" }, "additionalProperties": { "type": "string" }
             },
             "timeout_s": {
-                "description": "How long one request may take.", "type": "number", "exclusiveMinimum": 0, "maximum": 604_800,
+                "description": "How long one request may take.",
+                "type": "number", "exclusiveMinimum": 0, "maximum": 604_800,
                 "default": DEFAULT_TIMEOUT_S
             }
         }

@@ -5,12 +5,12 @@ use rayon::prelude::*;
 use super::RowSource;
 use crate::error::StageError;
 
-/// Most bytes of rows in a block (one row at least). Small beside what a program needs anyway; large enough that reading it costs no
-/// more than copying it.
+/// Most bytes of rows in a block (one row at least). Small beside what a program needs anyway; large enough that
+/// reading it costs no more than copying it.
 pub const BLOCK_BYTES: usize = 4 << 20;
 
-/// Hands the `chosen` rows to `work` in their order, a block at a time, with the number of those handed before. Rows in memory are
-/// lent, others are read into one buffer: no more than [`BLOCK_BYTES`] of them are held (or one row).
+/// Hands the `chosen` rows to `work` in their order, a block at a time, with the number of those handed before. Rows in
+/// memory are borrowed, others are read into one buffer: no more than [`BLOCK_BYTES`] of them are held (or one row).
 ///
 /// Whether rows lie in memory or in a file, the blocks are the same: so are all sums over them, bit for bit.
 /// Errors: those of `work`, and of the source.
@@ -23,8 +23,8 @@ pub fn in_blocks<E: From<StageError>>(
     let most = rows_per_block(length, BLOCK_BYTES);
     let mut buffer = Vec::new();
     for (number, part) in chosen.chunks(most).enumerate() {
-        let lent: Option<Vec<&[f64]>> = part.iter().map(|&row| source.lent(row)).collect();
-        match lent {
+        let borrowed: Option<Vec<&[f64]>> = part.iter().map(|&row| source.borrowed(row)).collect();
+        match borrowed {
             Some(rows) => work(number * most, &rows)?,
             None => {
                 buffer.resize(part.len() * length, 0.0);
@@ -36,7 +36,8 @@ pub fn in_blocks<E: From<StageError>>(
     Ok(())
 }
 
-/// Reads rows, in parallel on a pool's own threads: others, such as the one that keeps results, would wait for one to be free.
+/// Reads rows, in parallel on a pool's own threads: others, such as the one that keeps results, would wait for one to
+/// be free.
 fn read(source: &dyn RowSource, rows: &[usize], buffer: &mut [f64]) -> Result<(), StageError> {
     // a row of no values has nothing to read
     let length = source.row_length().max(1);

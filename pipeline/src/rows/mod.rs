@@ -1,7 +1,9 @@
-//! Rows of equal length that need not all be in memory: windows of events, of which an archive may hold more than a machine has room for.
+//! Rows of equal length that need not all be in memory: windows of events, of which an archive may hold more than a
+//! machine has room for.
 //!
-//! A `RowWriter` of the floor above takes rows one at a time and keeps them in memory up to a limit, in an unlinked file ([`Scratch`]) beyond it. Whoever goes through it block by block ([`in_blocks`]) never holds more than
-//! [`BLOCK_BYTES`] of rows that lie in a file; whoever wants a slice (`Array::real`) gets all of it, and pays for that.
+//! A `RowWriter` of the floor above takes rows one at a time and keeps them in memory up to a limit, in an unlinked
+//! file ([`Scratch`]) beyond it. Block by block ([`in_blocks`]), no more than [`BLOCK_BYTES`] of rows from a file are
+//! in memory at once; a slice (`Array::real`) reads all of them.
 
 mod blocks;
 mod scratch;

@@ -41,7 +41,8 @@ impl Scratch {
         &self.beside
     }
 
-    /// A new file without a name: it goes with its last handle, also in a kill. Errors: no folder can be made or written.
+    /// A new file without a name: it goes with its last handle, also in a kill. Errors: no folder can be made or
+    /// written.
     pub(crate) fn file(&self) -> Result<File, StageError> {
         // a cache that cannot be written stops no run
         let made = unnamed(&self.beside).or_else(|error| self.elsewhere().map_err(|_| error));

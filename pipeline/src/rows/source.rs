@@ -10,7 +10,7 @@ pub trait RowSource: Sync {
     /// Values in a row.
     fn row_length(&self) -> usize;
     /// The row, where it lies in memory anyway.
-    fn lent(&self, row: usize) -> Option<&[f64]>;
+    fn borrowed(&self, row: usize) -> Option<&[f64]>;
     /// Copies a row into `into`, which has its length. Errors: there is no such row; it cannot be read.
     fn read(&self, row: usize, into: &mut [f64]) -> Result<(), StageError>;
 }
@@ -22,8 +22,8 @@ impl<S: RowSource + ?Sized> RowSource for &S {
     fn row_length(&self) -> usize {
         (**self).row_length()
     }
-    fn lent(&self, row: usize) -> Option<&[f64]> {
-        (**self).lent(row)
+    fn borrowed(&self, row: usize) -> Option<&[f64]> {
+        (**self).borrowed(row)
     }
     fn read(&self, row: usize, into: &mut [f64]) -> Result<(), StageError> {
         (**self).read(row, into)
@@ -54,17 +54,17 @@ impl RowSource for RowView<'_> {
         }
     }
 
-    fn lent(&self, row: usize) -> Option<&[f64]> {
+    fn borrowed(&self, row: usize) -> Option<&[f64]> {
         match self {
             Self::Memory(values, length) => values.get(row.checked_mul(*length)?..)?.get(..*length),
-            Self::Stored(rows) => rows.lent(row),
+            Self::Stored(rows) => rows.borrowed(row),
         }
     }
 
     fn read(&self, row: usize, into: &mut [f64]) -> Result<(), StageError> {
         match self {
             Self::Memory(_, length) => {
-                let found = self.lent(row).filter(|found| found.len() == into.len());
+                let found = self.borrowed(row).filter(|found| found.len() == into.len());
                 into.copy_from_slice(found.ok_or_else(|| no_such_row(row, self.rows(), *length, into.len()))?);
                 Ok(())
             }

@@ -9,9 +9,11 @@ use super::RowSource;
 use super::source::no_such_row;
 use crate::error::StageError;
 
-/// Real numbers in rows of equal length, in a file: little-endian doubles, row after row from some byte on. Cloning is cheap.
+/// Real numbers in rows of equal length, in a file: little-endian doubles, row after row from some byte on. Cloning is
+/// cheap.
 ///
-/// The file is held open: removing or replacing it takes nothing away. If it is cut short all the same, reading says so.
+/// The file is held open: removing or replacing it takes nothing away. If it is cut short all the same, reading says
+/// so.
 #[derive(Debug, Clone)]
 pub struct StoredRows(Arc<Inner>);
 
@@ -33,7 +35,8 @@ impl StoredRows {
         Self(Arc::new(Inner { file, path: path.to_owned(), offset, rows, row_length, whole: OnceLock::new() }))
     }
 
-    /// All values, row-major. The first call reads them, and they stay in memory: what goes by rows uses [`in_blocks`](super::in_blocks).
+    /// All values, row-major. The first call reads them, and they stay in memory: what goes by rows uses
+    /// [`in_blocks`](super::in_blocks).
     ///
     /// Errors: the file cannot be read, or was cut short.
     pub fn whole(&self) -> Result<&[f64], StageError> {
@@ -67,7 +70,7 @@ impl RowSource for StoredRows {
         self.0.row_length
     }
 
-    fn lent(&self, row: usize) -> Option<&[f64]> {
+    fn borrowed(&self, row: usize) -> Option<&[f64]> {
         self.0.whole.get()?.chunks_exact(self.0.row_length.max(1)).nth(row)
     }
 

@@ -128,14 +128,14 @@ fn files(was: &[OriginFile], is: &[OriginFile], found: &mut Vec<Change>) {
     is.iter().rev().for_each(|file| {
         named.insert(&file.name, file);
     });
-    let mut told: HashSet<&OriginFile> = HashSet::new();
+    let mut reported: HashSet<&OriginFile> = HashSet::new();
     for file in was.iter().filter(|file| !new.contains(file)) {
         let now = named.get(file.name.as_str()).copied().filter(|other| !old.contains(other));
-        told.extend(now);
+        reported.extend(now);
         found.push(Change::File { name: file.name.clone(), was: Some(file.clone()), is: now.cloned() });
     }
     for file in is.iter().filter(|file| !old.contains(file)) {
-        if told.insert(file) {
+        if reported.insert(file) {
             found.push(Change::File { name: file.name.clone(), was: None, is: Some(file.clone()) });
         }
     }
@@ -167,10 +167,10 @@ fn input(was: &OriginInput, is: &OriginInput, found: &mut Vec<Change>) {
     let upstream = |change| Change::Upstream { stage: is.stage.clone(), change: Box::new(change) };
     // two ports may take one stage: said once
     let new: Vec<Change> = inner.into_iter().map(upstream).filter(|change| !found.contains(change)).collect();
-    let told = !new.is_empty()
+    let reported = !new.is_empty()
         || found.iter().any(|change| matches!(change, Change::Upstream { stage, .. } if *stage == is.stage));
     found.extend(new);
-    if !told {
+    if !reported {
         found.push(Change::Input { port: is.port.clone(), was: Some(name(was)), is: Some(name(is)) });
     }
 }
@@ -254,12 +254,12 @@ mod tests {
     #[test]
     fn a_changed_stage_whose_results_are_not_kept_is_looked_into() {
         let with = |input| Origin { inputs: vec![input], ..origin() };
-        let told = changes(&with(input("k", None)), &with(input("l", None)));
+        let found = changes(&with(input("k", None)), &with(input("l", None)));
         let port = Change::Input { port: "in".to_owned(), was: Some("s.o".to_owned()), is: Some("s.o".to_owned()) };
-        assert_eq!(told, [port]);
+        assert_eq!(found, [port]);
         let (before, now) = (origin(), Origin { version: 2, ..origin() });
-        let told = changes(&with(input("k", Some(before))), &with(input("l", Some(now))));
+        let found = changes(&with(input("k", Some(before))), &with(input("l", Some(now))));
         let change = Box::new(Change::Version { was: 1, is: 2 });
-        assert_eq!(told, [Change::Upstream { stage: "s".to_owned(), change }]);
+        assert_eq!(found, [Change::Upstream { stage: "s".to_owned(), change }]);
     }
 }

@@ -72,15 +72,16 @@ struct Finished {
 
 /// Runs a plan: each stage as soon as its inputs are there, in parallel on the current rayon pool.
 ///
-/// A stage that needs a result begins at once, while a thread of its own puts the result into the cache, one after the other: a kill loses what
-/// was computed in the last moments, and the run ends when all is kept and synced.
-/// A result that cannot be kept is a note of the cache's ([`Cache::take_notes`]). Errors: all stages that failed, in the plan's order; independent
-/// stages are finished first.
+/// A stage that needs a result begins at once, while a thread of its own puts the result into the cache, one after the
+/// other: a kill loses what was computed in the last moments, and the run ends when all is kept and synced.
+/// A result that cannot be kept is a note of the cache's ([`Cache::take_notes`]). Errors: all stages that failed, in
+/// the plan's order; independent stages are finished first.
 pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError>> {
     perform(plan, options, None::<fn() -> _>).map(|(result, _)| result)
 }
 
-/// As [`run`], and writes the result file, each stage as soon as those before it are written: whole or not at all, as [`crate::store::write_result`].
+/// As [`run`], and writes the result file, each stage as soon as those before it are written: whole or not at all, as
+/// [`crate::store::write_result`].
 ///
 /// Errors: those of [`run`]; the file cannot be written.
 pub fn run_to_file(plan: &Plan, options: &Options<'_>, path: &Path) -> Result<RunResult, Failed> {
@@ -229,8 +230,8 @@ fn step(
     Ok(Finished { record, origin: planned.origin, seconds: took.as_secs_f64(), cached, log })
 }
 
-/// Runs the stage itself and checks what it made: the ports it declares, with the shapes that it declares, from files that are still those that were
-/// hashed. Beside it: what its process wrote to stderr.
+/// Runs the stage itself and checks what it made: the ports it declares, with the shapes that it declares, from files
+/// that are still those that were hashed. Beside it: what its process wrote to stderr.
 fn execute(
     node: &Node,
     options: &Options<'_>,

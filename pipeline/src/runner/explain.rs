@@ -47,7 +47,8 @@ pub struct Nearest {
     pub changes: Vec<Change>,
 }
 
-/// Says for each stage of a plan whether it would run, and what has changed since its nearest earlier result, without running anything.
+/// Says for each stage of a plan whether it would run, and what has changed since its nearest earlier result, without
+/// running anything.
 pub fn explain(plan: &Plan, around: &Surroundings, cache: &Cache) -> Vec<Explanation> {
     let mut origins: Vec<Option<Origin>> = Vec::new();
     let mut rows = Vec::new();
@@ -91,7 +92,8 @@ struct Earlier {
     stage: HashMap<String, Vec<usize>>,
 }
 
-/// Earlier results that a stage is compared with, the last used ones: each comparison takes time in proportion to the files.
+/// Earlier results that a stage is compared with, the last used ones: each comparison takes time in proportion to the
+/// files.
 const MOST_COMPARED: usize = 32;
 
 impl Earlier {
@@ -114,8 +116,8 @@ impl Earlier {
     }
 }
 
-/// The earlier result of the same stage that is most like it: of the same id and pipeline if there is one, with the fewest changes, last used; of
-/// many the last used [`MOST_COMPARED`] are looked at.
+/// The earlier result of the same stage that is most like it: of the same id and pipeline if there is one, with the
+/// fewest changes, last used; of many the last used [`MOST_COMPARED`] are looked at.
 fn nearest(origin: &Origin, earlier: &Earlier, cache: &Cache) -> Option<Nearest> {
     if let Some(gone) = cache.origin(&origin.key) {
         return Some(Nearest { origin: gone, changes: Vec::new() });

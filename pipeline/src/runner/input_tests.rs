@@ -216,7 +216,8 @@ fn a_stage_whose_own_file_changes_meanwhile_fails_and_is_not_kept() {
         let folder = folder();
         let stage = |what: &str| {
             format!(
-                "[[stage]]\nid = \"a\"\nuses = \"test.read\"\nparams = {{ file = \"data/r.h5\", meanwhile = \"{what}\" }}\n"
+                "[[stage]]\nid = \"a\"\nuses = \"test.read\"\n\
+                 params = {{ file = \"data/r.h5\", meanwhile = \"{what}\" }}\n"
             )
         };
         let (result, kept) = ran(&folder, &stage(meanwhile));
@@ -234,7 +235,8 @@ fn a_stage_whose_recording_changes_meanwhile_fails_also_where_the_recording_come
     let stages = |what: &str| {
         format!(
             "[[stage]]\nid = \"r\"\nuses = \"test.open\"\nparams = {{ file = \"data/r.h5\" }}\n\
-             [[stage]]\nid = \"s\"\nuses = \"test.samples\"\ninputs = {{ records = \"r\" }}\nparams = {{ meanwhile = \"{what}\" }}\n"
+             [[stage]]\nid = \"s\"\nuses = \"test.samples\"\ninputs = {{ records = \"r\" }}\n\
+             params = {{ meanwhile = \"{what}\" }}\n"
         )
     };
     for stored in [false, true] {
@@ -248,9 +250,9 @@ fn a_stage_whose_recording_changes_meanwhile_fails_also_where_the_recording_come
             }
             let (result, kept) = ran(&folder, &stages(meanwhile));
             let errors = result.expect_err(meanwhile);
-            let told = errors[0].to_string();
-            assert!(errors.len() == 1 && told.contains("`s`") && told.contains("r.h5"), "{meanwhile}: {told}");
-            assert!(told.contains("changed"), "{meanwhile}, {stored}: {told}");
+            let message = errors[0].to_string();
+            assert!(errors.len() == 1 && message.contains("`s`") && message.contains("r.h5"), "{meanwhile}: {message}");
+            assert!(message.contains("changed"), "{meanwhile}, {stored}: {message}");
             assert_eq!(kept, 1, "only the list of records is kept");
             let (result, kept) = ran(&folder, &stages("nothing"));
             let result = result.expect("the file is as it was");

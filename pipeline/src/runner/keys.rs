@@ -13,8 +13,8 @@ use crate::recording::{HashedFile, InputFiles};
 use crate::stage::Caching;
 use crate::store::FORMAT_VERSION;
 
-/// The seed of a stage: the pipeline's seed and the stage's id, mixed by BLAKE3, so that stages draw independent numbers and
-/// adding a stage changes no other's.
+/// The seed of a stage: the pipeline's seed and the stage's id, mixed by BLAKE3, so that stages draw independent
+/// numbers and adding a stage changes no other's.
 pub fn stage_seed(pipeline_seed: u64, id: &str) -> u64 {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&pipeline_seed.to_le_bytes()).update(id.as_bytes());
@@ -51,7 +51,8 @@ pub(super) struct StagePlan {
     pub origin: Origin,
 }
 
-/// Works out a node's key from its parameters, its files and the keys of what it needs. `upstream` gives the origin of a node's result.
+/// Works out a node's key from its parameters, its files and the keys of what it needs. `upstream` gives the origin of
+/// a node's result.
 pub(super) fn plan_node<'a>(
     plan: &Plan,
     node: &Node,
@@ -106,8 +107,8 @@ pub struct RunKey {
     pub sources: Vec<SourceFile>,
 }
 
-/// Whether a run would give the same results again, without running anything. The last bits, which processors may change, do not count: nodes of a
-/// cluster agree.
+/// Whether a run would give the same results again, without running anything. The last bits, which processors may
+/// change, do not count: nodes of a cluster agree.
 ///
 /// Errors: a stage whose files cannot be listed or read.
 pub fn run_key(plan: &Plan, around: &Surroundings) -> Result<RunKey, RunError> {

@@ -30,10 +30,13 @@ impl<T, E> Board<T, E> {
     }
 }
 
-/// Runs `work(node, board)` for each node once all nodes in `needs[node]` are done; independent nodes run in parallel on rayon's pool.
+/// Runs `work(node, board)` for each node once all nodes in `needs[node]` are done; independent nodes run in parallel
+/// on rayon's pool.
 ///
-/// What is ready first runs first: a long node at the head of a short branch is not left to the end by the short nodes of a long one.
-/// Model: `needs` is acyclic and refers to smaller indices only (topological order). A node after a failed one is skipped.
+/// What is ready first runs first: a long node at the head of a short branch is not left to the end by the short nodes
+/// of a long one.
+/// Model: `needs` is acyclic and refers to smaller indices only (topological order). A node after a failed one is
+/// skipped.
 /// The results do not depend on the order in which nodes happen to run, as long as `work` does not.
 pub(super) fn run_graph<T, E, W>(needs: &[Vec<usize>], work: W) -> Vec<Outcome<T, E>>
 where

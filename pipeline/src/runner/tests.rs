@@ -90,7 +90,8 @@ fn plan(count: usize, limit: f64) -> Plan {
     let text = format!(
         "[pipeline]\nname = \"squares\"\nseed = 1\n\
          [[stage]]\nid = \"count\"\nuses = \"test.count\"\nparams = {{ to = {count} }}\n\
-         [[stage]]\nid = \"square\"\nuses = \"test.square\"\ninputs = {{ in = \"count\" }}\nparams = {{ limit = {limit:.1} }}\n"
+         [[stage]]\nid = \"square\"\nuses = \"test.square\"\ninputs = {{ in = \"count\" }}\n\
+         params = {{ limit = {limit:.1} }}\n"
     );
     let registry = Registry::new().with(&[Entry::of::<Count>(), Entry::of::<Square>()]).expect("two names");
     load("squares.toml", &text, &[], &registry).expect("a valid config")

@@ -32,8 +32,8 @@ enum Unsynced {
     Share(File),
 }
 
-/// Puts results into the cache as they come and into the result file in an order of its own, until the run has ended. What cannot be put into the
-/// cache is a note of the cache's: the next run computes it again.
+/// Puts results into the cache as they come and into the result file in an order of its own, until the run has ended.
+/// What cannot be put into the cache is a note of the cache's: the next run computes it again.
 ///
 /// A second thread waits for the disk: meanwhile the next file is written.
 pub(super) fn keep(

@@ -1,5 +1,5 @@
-//! The ranges of parameters, stated once, on their fields: by `#[schemars(range(min = ..., max = ...))]`, or `exclusiveMinimum` and `exclusiveMaximum`
-//! by `#[schemars(extend(...))]`.
+//! The ranges of parameters, stated once, on their fields: by `#[schemars(range(min = ..., max = ...))]`, or
+//! `exclusiveMinimum` and `exclusiveMaximum` by `#[schemars(extend(...))]`.
 
 use serde_json::{Map, Value};
 
@@ -32,7 +32,8 @@ impl Bounds {
         Self { schema, definitions: generator.take_definitions(true) }
     }
 
-    /// The parameters of a table that are out of their ranges; infinite and undefined numbers are, where a range is stated.
+    /// The parameters of a table that are out of their ranges; where a range is stated, so are infinite and undefined
+    /// numbers.
     pub fn check(&self, params: &toml::Table) -> Vec<OutOfRange> {
         let mut found = Vec::new();
         self.table(&self.schema, params, &mut Vec::new(), &mut found);
@@ -149,7 +150,8 @@ fn number(bound: f64) -> String {
     if bound != 0.0 && !(1e-4..1e9).contains(&size) { format!("{bound:e}") } else { format!("{bound}") }
 }
 
-/// Checks a stage that no config declares: the ranges of its parameters, then [`Stage::check`]. Errors: the first that is wrong.
+/// Checks a stage that no config declares: the ranges of its parameters, then [`Stage::check`]. Errors: the first that
+/// is wrong.
 pub fn check<S: Stage>(stage: &S) -> Result<(), StageError> {
     let params = toml::Table::try_from(stage)
         .map_err(|error| StageError::new(format!("parameters cannot be written as TOML: {error}")))?;

@@ -81,14 +81,16 @@ impl<'a> Context<'a> {
         self.seed
     }
 
-    /// Keeps a warning as data: it is stored with the result and shown. Say what was found, with numbers, and what to do.
+    /// Keeps a warning as data: it is stored with the result and shown. Say what was found, with numbers, and what to
+    /// do.
     ///
     /// Call it in a fixed order (not from parallel work): warnings are part of the result.
     pub fn warn(&self, text: impl Into<String>) {
         self.warnings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text.into());
     }
 
-    /// Keeps what a process of another program said, beside the times of the run: a record for people, no part of the result.
+    /// Keeps what a process of another program said, beside the times of the run: a record for people, no part of the
+    /// result.
     pub fn log(&self, text: &str) {
         self.log.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push_str(text);
     }

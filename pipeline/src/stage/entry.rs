@@ -70,7 +70,8 @@ pub struct ParamError {
     pub message: String,
 }
 
-/// What makes the stages of a row: the built-in ones from a type, those of a plugin from what its process says of itself.
+/// What makes the stages of a row: the built-in ones from a type, those of a plugin from what its process says of
+/// itself.
 pub trait Maker: Send + Sync {
     /// Makes the stage from its `params` table. Errors: the first wrong parameter, in serde's words.
     fn parse(&self, params: toml::Table) -> Result<Box<dyn DynStage>, ParamError>;

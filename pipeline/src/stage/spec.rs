@@ -43,17 +43,18 @@ pub enum Caching {
 
 /// A stage: its own parameter struct, with typed ports round one call of a pure kernel.
 ///
-/// Implement `Serialize`, `Deserialize` and `JsonSchema` by derive, with `#[serde(deny_unknown_fields, default)]`, so that the doc
-/// comments of the fields are the parameters' documentation and an unknown key is an error with a suggestion.
+/// Implement `Serialize`, `Deserialize` and `JsonSchema` by derive, with `#[serde(deny_unknown_fields, default)]`, so
+/// that the doc comments of the fields are the parameters' documentation and an unknown key is an error with a
+/// suggestion.
 ///
 /// A stage MUST be deterministic: same parameters, inputs and seed, same bits, on one thread or many.
 pub trait Stage: Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'static {
     /// Name, version, ports.
     const SPEC: Spec;
 
-    /// Checks what relates parameters to one another, before any data is opened. The range of a single parameter is stated on its field
-    /// (`#[schemars(range(min = 1, max = 40))]`) and checked before, of all parameters at once. Errors: what was found, what was wanted; the
-    /// runner adds the place.
+    /// Checks what relates parameters to one another, before any data is opened. The range of a single parameter is
+    /// stated on its field (`#[schemars(range(min = 1, max = 40))]`) and checked before, of all parameters at once.
+    /// Errors: what was found, what was wanted; the runner adds the place.
     fn check(&self) -> Result<(), StageError> {
         Ok(())
     }
@@ -65,7 +66,8 @@ pub trait Stage: Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'stat
         Ok(Vec::new())
     }
 
-    /// What the result depends on beside parameters, files and inputs, such as plugins of the stage's own with their versions: part of the cache key.
+    /// What the result depends on beside parameters, files and inputs, such as plugins of the stage's own with their
+    /// versions: part of the cache key.
     fn depends_on(&self) -> Vec<String> {
         Vec::new()
     }

@@ -1,7 +1,7 @@
 //! Arrays: NXdata groups with real dimension scales.
 //!
-//! A complex variable `x` is stored as `x_real` and `x_imag`, with `x_magnitude` for viewers: compound complex numbers break
-//! xarray's other engines and most viewers' plots. Each carries the attribute `complex_of = "x"`.
+//! A complex variable `x` is stored as `x_real` and `x_imag`, with `x_magnitude` for viewers: compound complex numbers
+//! break xarray's other engines and most viewers' plots. Each carries the attribute `complex_of = "x"`.
 
 use hdf5::{Dataset, Group};
 use num_complex::Complex64;
@@ -142,7 +142,8 @@ fn write_signal(group: &Group, array: &Array) -> Result<()> {
     Ok(())
 }
 
-/// Reads what [`write_array`] wrote; with a `backing`, large variables over two axes stay in the file. Errors: damaged, or of another layout.
+/// Reads what [`write_array`] wrote; with a `backing`, large variables over two axes stay in the file. Errors: damaged,
+/// or of another layout.
 pub(super) fn read_array(group: &Node, backing: Option<&Backing>) -> Result<Array> {
     let layout: Layout = read_layout(group)?;
     let mut array = Array { attributes: read_attributes(group, &layout.attributes)?, ..Array::default() };

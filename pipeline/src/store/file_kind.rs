@@ -1,4 +1,4 @@
-//! What a file is, as far as its first bytes tell: for messages, and before a file is replaced.
+//! What a file is, as far as its first bytes show: for messages, and before a file is replaced.
 
 use std::fmt;
 use std::path::Path;
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_are_told_apart_by_their_bytes() {
+    fn files_are_distinguished_by_their_bytes() {
         let folder = tempfile::tempdir().unwrap();
         let kind = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);

@@ -7,12 +7,14 @@
 //! /entry                 NXentry, default = the stage to plot
 //! /entry/pipeline        name, config verbatim, overrides, seed, program
 //! /entry/run             when and where: the only group that comparisons leave out
-//! /entry/ID              NXprocess, one per stage, in the order of sequence_index (what NeXus forbids in names becomes `_`)
+//! /entry/ID              NXprocess, one per stage, in the order of sequence_index
+//!                        (what NeXus forbids in names becomes `_`)
 //! /entry/ID/provenance   stage, version, parameters, wires, seed, key, sources, warnings
 //! /entry/ID/PORT         an artifact: NXdata (array, table), NXcollection (model, recording), NXnote (document)
 //! ```
 //!
-//! Behind the HDF5 part a last line seals the file with the hash of its bytes. Same result, same bytes: no times are kept outside `/entry/run`.
+//! Behind the HDF5 part a last line seals the file with the hash of its bytes. Same result, same bytes: no times are
+//! kept outside `/entry/run`.
 
 mod array;
 mod compare;

@@ -2,14 +2,15 @@
 
 use std::collections::HashSet;
 
-/// What a result file keeps under its entry beside the stages: configs refuse these ids, so that a stage's group has its name.
+/// What a result file keeps under its entry beside the stages: configs refuse these ids, so that a stage's group has
+/// its name.
 pub const RESERVED_STAGE_IDS: [&str; 4] = ["pipeline", "run", "title", "definition"];
 
 /// What a stage's group holds beside its ports.
 pub(super) const TAKEN_BY_STAGE: [&str; 5] = ["provenance", "program", "version", "sequence_index", "date"];
 
-/// A group name per id: `nxcheck` passes letters, digits and `_`; every other character becomes `_`, and `_` is added until no two
-/// names are equal and none is taken.
+/// A group name per id: `nxcheck` passes letters, digits and `_`; every other character becomes `_`, and `_` is added
+/// until no two names are equal and none is taken.
 pub(super) fn group_names<'a>(ids: impl Iterator<Item = &'a str>, taken: &[&str]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     let mut used: HashSet<String> = taken.iter().map(|&name| name.to_owned()).collect();

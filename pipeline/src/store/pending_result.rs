@@ -28,7 +28,8 @@ pub fn write_result(path: &Path, run: &RunResult) -> Result<(), StoreError> {
     pending.finish(&run.info)
 }
 
-/// A result file that grows while its stages run: what is at its path stays until it is whole. The same bytes as [`write_result`].
+/// A result file that grows while its stages run: what is at its path stays until it is whole. The same bytes as
+/// [`write_result`].
 /// It sweeps nothing: thousands of results may lie in one folder.
 pub(crate) struct PendingResult {
     // before the replacement, which removes the file
@@ -65,7 +66,8 @@ impl PendingResult {
         self.writer.stage(stage).map_err(|error| self.replacement.named(error))
     }
 
-    /// The file as it is, if it has grown so much that another thread should send it to the disk: little is left to wait for when it ends.
+    /// The file as it is, if it has grown so much that another thread should send it to the disk: little is left to
+    /// wait for when it ends.
     pub(crate) fn next_share(&mut self) -> Option<File> {
         // a file that cannot be opened is an error at its end
         let file = File::open(self.replacement.temporary()).ok()?;
@@ -76,7 +78,8 @@ impl PendingResult {
         })
     }
 
-    /// Seals and syncs the file and puts it in its place. Errors: a stage is missing; something else has come to lie there; as [`write_result`].
+    /// Seals and syncs the file and puts it in its place. Errors: a stage is missing; something else has come to lie
+    /// there; as [`write_result`].
     pub(crate) fn finish(self, info: &RunInfo) -> Result<(), StoreError> {
         let Self { writer, replacement, place, before, .. } = self;
         let written = writer.finish(info).and_then(|()| seal(replacement.temporary()));
@@ -85,7 +88,8 @@ impl PendingResult {
     }
 }
 
-/// Errors: something that is no result as this program writes it has come to lie there since. (Two workers may make the same result.)
+/// Errors: something that is no result as this program writes it has come to lie there since. (Two workers may make the
+/// same result.)
 fn check_place(place: &Path, before: Option<FileState>) -> Result<(), StoreError> {
     let now = FileState::at(place).ok();
     if now.is_none() || now == before || matches!(written(place), Ok(Written::AsWritten | Written::CutShort)) {

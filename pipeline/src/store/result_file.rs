@@ -23,8 +23,8 @@ pub(super) const STAGES: &str = "stages";
 /// The groups of the stages, under the entry.
 pub(super) const GROUPS: &str = "stage_groups";
 
-/// The order in which stages are written, whatever the order in which they end: those that need nothing, those that need these, and so on. So a run
-/// of several threads seldom waits for one that ends late.
+/// The order in which stages are written, whatever the order in which they end: those that need nothing, those that
+/// need these, and so on. So a run of several threads seldom waits for one that ends late.
 fn by_depth(needs: &[Vec<usize>]) -> Vec<usize> {
     let mut depths: Vec<usize> = Vec::new();
     for sources in needs {
@@ -37,8 +37,8 @@ fn by_depth(needs: &[Vec<usize>]) -> Vec<usize> {
     order
 }
 
-/// Before so many stages the library writes down what it has put off, the headers of hundreds of objects: most runs end with stages that others
-/// wait for, and at the very end somebody waits.
+/// Before so many stages the library writes down what it has put off, the headers of hundreds of objects: most runs end
+/// with stages that others wait for, and at the very end somebody waits.
 const LAST: usize = 2;
 
 /// What is known of a run before its stages.

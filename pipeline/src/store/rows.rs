@@ -17,7 +17,8 @@ use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 use crate::rows::{RowSource, Scratch, StoredRows, in_blocks};
 
-/// Writes rows as [`write::dataset`] would if all were in memory: the same bytes. Errors: those of the rows, and as there.
+/// Writes rows as [`write::dataset`] would if all were in memory: the same bytes. Errors: those of the rows, and as
+/// there.
 pub(crate) fn write_rows(parent: &Group, name: &str, shape: &[usize], rows: &StoredRows) -> Result<Dataset> {
     let wrap = |error: hdf5::Error| StoreError::from(error).at(write::path_of(parent, name));
     let (count, length) = (rows.rows(), rows.row_length());
@@ -54,7 +55,8 @@ impl Backing {
     }
 }
 
-/// A variable over two axes as rows in its file; none if it is small enough for memory, or cannot be read that way. Errors: damaged.
+/// A variable over two axes as rows in its file; none if it is small enough for memory, or cannot be read that way.
+/// Errors: damaged.
 pub(super) fn read_rows(parent: &Node, name: &str, backing: &Backing) -> Result<Option<StoredRows>> {
     let dataset = read::dataset(parent, name)?;
     let [rows, row_length] = dataset.shape()[..] else { return Ok(None) };

@@ -52,11 +52,11 @@ fn rows_come_back_bit_for_bit_from_memory_and_from_a_file() {
         let mut into = vec![0.0; 50];
         view.read(7, &mut into).unwrap();
         assert_eq!(bits(&into), bits(&row(7, 50)));
-        assert_eq!(view.lent(7).is_some(), !in_file);
+        assert_eq!(view.borrowed(7).is_some(), !in_file);
         assert_eq!(bits(values.real().unwrap().unwrap()), bits(&whole));
-        // now that somebody has asked for all, rows are lent
-        assert_eq!(bits(view.lent(8).unwrap()), bits(&row(8, 50)));
-        assert!(view.lent(9).is_none());
+        // now that somebody has asked for all, rows are borrowed
+        assert_eq!(bits(view.borrowed(8).unwrap()), bits(&row(8, 50)));
+        assert!(view.borrowed(9).is_none());
         assert!(view.read(9, &mut into).is_err() && view.read(0, &mut into[..49]).is_err());
         assert!(values.rows(49).is_none());
     }
@@ -102,7 +102,7 @@ impl RowSource for Counted {
     fn row_length(&self) -> usize {
         self.length
     }
-    fn lent(&self, _row: usize) -> Option<&[f64]> {
+    fn borrowed(&self, _row: usize) -> Option<&[f64]> {
         None
     }
     fn read(&self, row: usize, into: &mut [f64]) -> Result<(), StageError> {
@@ -185,7 +185,7 @@ fn small_variables_are_read_into_memory() {
 }
 
 #[test]
-fn a_file_that_is_cut_short_while_it_is_in_use_is_told() {
+fn a_file_that_is_cut_short_while_it_is_in_use_is_reported() {
     let folder = folder();
     let path = folder.path().join("a.h5");
     let (rows, length) = (260, 4050);

@@ -1,7 +1,8 @@
 //! Seals: the last line of a stage or result file states the BLAKE3 hash of everything before it.
 //!
-//! A damaged or altered file is found before any HDF5 code looks at it: the library checks its own structures only in part, and some
-//! damage keeps it busy for ever. HDF5 readers ignore what lies behind the end that the file's header states.
+//! A damaged or altered file is found before any HDF5 code looks at it: the library checks its own structures only in
+//! part, and some damage keeps it busy for ever. HDF5 readers ignore what lies behind the end that the file's header
+//! states.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -27,7 +28,8 @@ pub(crate) fn seal(path: &Path) -> Result<()> {
     seal().map_err(|error| StoreError::io("cannot be sealed", path, &error))
 }
 
-/// What was found on the way for the HDF5 library. Errors: no file, no seal, or one that does not fit; damage that the library does not survive.
+/// What was found on the way for the HDF5 library. Errors: no file, no seal, or one that does not fit; damage that the
+/// library does not survive.
 pub(super) fn check_seal(path: &Path) -> Result<Vetted> {
     let io = |error: std::io::Error| StoreError::io("cannot be read", path, &error);
     let mut file = open_regular(path).map_err(io)?;

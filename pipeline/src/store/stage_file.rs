@@ -34,7 +34,8 @@ pub struct StageIdentity<'a> {
     pub outputs: &'a [PortSpec],
 }
 
-/// Writes a stage's result to a new file, seals and syncs it. Errors: the file exists or cannot be written; an artifact is not valid.
+/// Writes a stage's result to a new file, seals and syncs it. Errors: the file exists or cannot be written; an artifact
+/// is not valid.
 pub fn write_stage(path: &Path, identity: &StageIdentity, result: &StageResult) -> std::result::Result<(), StoreError> {
     write_unsealed_stage(path, identity, result)?;
     seal(path)
@@ -84,7 +85,8 @@ fn read_hdf5(path: &Path, vetted: &Vetted, identity: &StageIdentity, files: &Inp
     Ok(StageResult { outputs: read_ports(&read::group(&root, GROUP)?, files, Some(&backing))?, warnings })
 }
 
-/// Errors: the file is the result of another stage, another version or other inputs; its ports are not the declared ones.
+/// Errors: the file is the result of another stage, another version or other inputs; its ports are not the declared
+/// ones.
 fn check_identity(file: &Node, identity: &StageIdentity) -> Result<()> {
     let differs = |what: &str, found: &dyn std::fmt::Display, wanted: &dyn std::fmt::Display| {
         StoreError::new(format!("holds another result: its {what} is {found}, wanted {wanted}"))

@@ -33,7 +33,8 @@ enum Kind {
     Text,
 }
 
-/// Writes a table as the group `name`: NXdata if it has a column to plot, NXcollection otherwise. Errors: it is not valid.
+/// Writes a table as the group `name`: NXdata if it has a column to plot, NXcollection otherwise. Errors: it is not
+/// valid.
 pub(super) fn write_table(parent: &Group, name: &str, table: &Table) -> Result<Group> {
     table.validate().map_err(|error| StoreError::new(error.to_string()).at(write::path_of(parent, name)))?;
     let signal = table.columns.iter().find(|column| matches!(column.values, ColumnValues::Real(_)));

@@ -35,7 +35,8 @@ pub fn written(path: &Path) -> std::io::Result<Written> {
     })
 }
 
-/// Whether an HDF5 file ends before the end that its superblock states, or within the seal behind that. Programs that change a file write a new end.
+/// Whether an HDF5 file ends before the end that its superblock states, or within the seal behind that. Programs that
+/// change a file write a new end.
 fn is_cut_short(path: &Path) -> std::io::Result<bool> {
     let file = File::open(path)?;
     let length = file.metadata()?.len();
@@ -44,7 +45,8 @@ fn is_cut_short(path: &Path) -> std::io::Result<bool> {
         return Ok(true);
     }
     file.read_exact_at(&mut head, 0)?;
-    // HDF5 File Format Specification, version 3, II.A: where each version of the superblock has its address of the end of the file
+    // HDF5 File Format Specification, version 3, II.A: where each version of the superblock has its address of the end
+    // of the file
     let at = match head[8] {
         0 => 40,
         2 | 3 => 28,
@@ -71,7 +73,7 @@ mod tests {
     use crate::store::write_result;
 
     #[test]
-    fn a_result_is_known_by_its_seal_and_one_that_was_changed_is_told_from_one_that_was_cut() {
+    fn a_result_is_known_by_its_seal_and_a_changed_one_is_distinguished_from_a_cut_one() {
         let folder = Folder::new("written");
         let path = folder.file("r.h5");
         write_result(&path, &run_result()).unwrap();

@@ -111,7 +111,7 @@ fn values_may_be_of_any_type_and_lie_within_tables() {
 }
 
 #[test]
-fn what_is_wrong_with_one_value_is_told_once() {
+fn what_is_wrong_with_one_value_is_reported_once() {
     let found = faults("\"a.samples\" = [2, 0]\n\"a.amplitude_v\" = [0.5, 1.5, 2.5]\n");
     assert_eq!(found.len(), 1, "{found:?}");
     assert!(faults("")[0].starts_with("[sweep] | [sweep] is empty, wanted parameters | "));

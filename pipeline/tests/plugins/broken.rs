@@ -1,4 +1,4 @@
-//! Plugins that break the protocol: each is told by name with what is wrong, and costs nothing else.
+//! Plugins that break the protocol: each is reported by name with what is wrong, and costs nothing else.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -12,7 +12,8 @@ use super::support::{config, execute, plan, python, script};
 const BROKEN: [(&str, &str); 20] = [
     ("accepts_everything", "accepts the parameter `a_parameter_that_nobody_knows`"),
     ("banner", "does not begin with a handshake"),
-    // its line is seen after the answer or in place of the next one, as the machine happens to schedule it: both errors show it
+    // its line is seen after the answer or in place of the next one, as the machine happens to schedule it: both errors
+    // show it
     ("chatty", "done!"),
     ("crash", "ended (exit status: 3) during `run`"),
     ("deaf", "did not end"),
@@ -45,9 +46,9 @@ fn the_conformance_test_names_what_is_wrong() {
         let file = format!("{name}.py");
         let checks = tried(&format!("broken/{file}"));
         let failed: Vec<&String> = checks.iter().filter_map(|(_, outcome)| outcome.as_ref().err()).collect();
-        let Some(told) = failed.first() else { return Some(format!("{name} passes")) };
-        let right = told.contains(wanted) && told.contains(&file) && told.contains("help: ");
-        (!right).then(|| format!("{name}: wanted `{wanted}`, found: {told}"))
+        let Some(message) = failed.first() else { return Some(format!("{name} passes")) };
+        let right = message.contains(wanted) && message.contains(&file) && message.contains("help: ");
+        (!right).then(|| format!("{name}: wanted `{wanted}`, found: {message}"))
     };
     let wrong: Vec<String> = std::thread::scope(|scope| {
         let tries: Vec<_> = BROKEN.iter().map(|broken| scope.spawn(|| one(broken))).collect();
@@ -71,7 +72,7 @@ fn a_run_with_a_broken_plugin_fails_alone() {
         let stages = "[[stage]]\nid = \"all\"\nuses = \"test.all\"\n[[stage]]\nid = \"bad\"\nuses = \"exec:mine\"\n";
         let plan = match plan(folder.path(), &config(&script, 3.0, stages)) {
             Ok(plan) => plan,
-            // told before anything runs
+            // reported before anything runs
             Err(problems) => {
                 assert!(problems.iter().any(|problem| problem.message.contains("`mine`")), "{name}: {problems:?}");
                 continue;
@@ -93,9 +94,9 @@ fn a_time_limit_ends_a_plugin_with_what_it_started() {
     let stages = "[[stage]]\nid = \"bad\"\nuses = \"exec:mine\"\n";
     let plan = plan(folder.path(), &config(&script("orphan.py"), 3.0, stages)).unwrap();
     let errors = execute(folder.path(), &plan).unwrap_err();
-    let told = errors[0].to_string();
+    let message = errors[0].to_string();
     let child =
-        told.split("child ").nth(1).and_then(|rest| rest.split_whitespace().next()).expect("its stderr is shown");
+        message.split("child ").nth(1).and_then(|rest| rest.split_whitespace().next()).expect("its stderr is shown");
     let state = Path::new("/proc").join(child).join("stat");
     let gone = || std::fs::read_to_string(&state).map_or(true, |stat| stat.contains(") Z "));
     let clock = Instant::now();

@@ -68,7 +68,7 @@ fn a_process_is_reused_and_what_it_says_is_kept() {
     let said: Vec<(&str, &str)> = run.info.logs.iter().map(|(id, text)| (id.as_str(), text.trim())).collect();
     assert_eq!(said.iter().map(|(id, _)| *id).collect::<Vec<_>>(), ["one", "two"]);
     // this test has no host that would confine it
-    let told = |text: &str| text.starts_with("[afmid] not enforced") && text.ends_with("\nthis goes to stderr");
-    assert!(said.iter().all(|(_, text)| told(text)), "{said:?}");
+    let expected = |text: &str| text.starts_with("[afmid] not enforced") && text.ends_with("\nthis goes to stderr");
+    assert!(said.iter().all(|(_, text)| expected(text)), "{said:?}");
     assert!(run.stages.iter().all(|stage| stage.result.warnings == ["it was loud"]));
 }

@@ -67,21 +67,21 @@ fn parameters_are_checked_with_their_place_before_anything_runs() {
         let (text, problems) = problems(params);
         let [problem] = &problems[..] else { panic!("{params}: {problems:?}") };
         assert_eq!(&text[problem.span.clone()], marked, "{params}: {}", problem.message);
-        let told = format!("{} {}", problem.message, problem.help.clone().unwrap_or_default());
-        assert!(problem.message.contains(message) && told.contains(help), "{params}: {told}");
+        let all = format!("{} {}", problem.message, problem.help.clone().unwrap_or_default());
+        assert!(problem.message.contains(message) && all.contains(help), "{params}: {all}");
     }
     let (_, none) = problems("scale = 2, mode = \"loud\", steps = 3");
     assert!(none.is_empty(), "{none:?}");
 }
 
 #[test]
-fn a_plugin_that_is_not_there_is_told_with_its_place() {
+fn a_plugin_that_is_not_there_is_reported_with_its_place() {
     let folder = tempdir().unwrap();
     let text =
         "[pipeline]\nname = \"x\"\n[plugins]\nmine = \"python3 a.py\"\n[[stage]]\nid = \"a\"\nuses = \"exec:mien\"\n";
     let problems = plan(folder.path(), text).unwrap_err();
     let [problem] = &problems[..] else { panic!("{problems:?}") };
     assert_eq!(&text[problem.span.clone()], "\"exec:mien\"");
-    let told = format!("{} {}", problem.message, problem.help.clone().unwrap_or_default());
-    assert!(["mien", "`mine`", "PATH"].iter().all(|word| told.contains(word)), "{told}");
+    let all = format!("{} {}", problem.message, problem.help.clone().unwrap_or_default());
+    assert!(["mien", "`mine`", "PATH"].iter().all(|word| all.contains(word)), "{all}");
 }

@@ -34,7 +34,8 @@ pub fn script(name: &str) -> String {
 pub fn config(script: &str, timeout_s: f64, stages: &str) -> String {
     let python = python();
     format!(
-        "[pipeline]\nname = \"plugins\"\nseed = 7\n[plugins]\nmine = {{ command = [{python:?}, {script:?}], timeout_s = {timeout_s:?} }}\n{stages}"
+        "[pipeline]\nname = \"plugins\"\nseed = 7\n[plugins]\n\
+         mine = {{ command = [{python:?}, {script:?}], timeout_s = {timeout_s:?} }}\n{stages}"
     )
 }
 

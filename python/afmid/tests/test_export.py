@@ -96,8 +96,8 @@ def refused(program, tmp_path):
 
 
 def test_what_cannot_be_exported_is_refused_with_what_to_do(refused, result, tmp_path):
-    assert "no state-space model `modle`" in (told := refused(result, "--model", "mat", "--stage", "modle"))
-    assert "did you mean `model`?" in told
+    assert "no state-space model `modle`" in (errors := refused(result, "--model", "mat", "--stage", "modle"))
+    assert "did you mean `model`?" in errors
     assert "possible values: mat, json" in refused(result, "--model", "xml")
     assert "--model" in refused(result)
     assert "there is no file" in refused("nowhere.h5", "--model", "mat")

@@ -1,4 +1,4 @@
-"""Models: the response and the prediction are afmid's own, whoever computes them."""
+"""Models: the response and the prediction are afmid's own, in Python as in Rust."""
 
 import numpy as np
 import pytest

@@ -38,7 +38,8 @@ pub fn size(what: &'static str, found: usize) -> Result<u32, MatError> {
     u32::try_from(found).ok().filter(|size| *size <= most).ok_or(MatError { what, found, most })
 }
 
-/// Appends an element; one to four bytes go into the tag itself (the small format, which MATLAB wants for names of fields).
+/// Appends an element; one to four bytes go into the tag itself (the small format, which MATLAB wants for names of
+/// fields).
 pub fn element(out: &mut Vec<u8>, kind: Kind, data: &[u8]) -> Result<(), MatError> {
     let length = size("an element", data.len())?;
     let kind = kind as u32;

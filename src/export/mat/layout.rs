@@ -12,8 +12,8 @@ pub const TITLE: &str = "MATLAB 5.0 MAT-file, a model of afmid";
 /// Bytes of the header's text.
 const TEXT: usize = 116;
 
-/// The model as a MATLAB file: variables named as the keys of the JSON, and `Ts` beside `sample_time_s`; `poles` is a complex column. What is
-/// unknown is NaN, or an empty matrix. Errors: something is too large for the format.
+/// The model as a MATLAB file: variables named as the keys of the JSON, and `Ts` beside `sample_time_s`; `poles` is a
+/// complex column. What is unknown is NaN, or an empty matrix. Errors: something is too large for the format.
 pub fn model_mat(model: &ExportedModel) -> Result<Vec<u8>, MatError> {
     let mut body = Vec::new();
     for (name, value) in variables(model) {

@@ -101,7 +101,8 @@ fn write_fields(out: &mut Vec<u8>, fields: &[(String, Value)]) -> Result<(), Mat
     fields.iter().try_for_each(|(_, value)| value.write(out, ""))
 }
 
-/// Names that MATLAB takes: letters, digits and `_`, a letter first, at most 63; a number behind it where two are equal.
+/// Names that MATLAB takes: letters, digits and `_`, a letter first, at most 63; a number behind it where two are
+/// equal.
 fn field_names(fields: &[(String, Value)]) -> Vec<String> {
     let mut names: Vec<String> = Vec::with_capacity(fields.len());
     for (name, _) in fields {

@@ -54,10 +54,10 @@ pub(crate) fn all(stage: &StageRecord, link: &Link<'_>) -> Option<TableView> {
             started[row].get(..10).unwrap_or_default().to_owned(),
             states[row].clone(),
             if modes[row] > 0 { modes[row].to_string() } else { String::new() },
-            told(f, row, |value, std| quantity(value, std, "Hz")),
-            told(q, row, with_error),
-            told(k, row, |value, std| quantity(value, std, "N/m")),
-            told((held_out, held_out), row, |value, _| format!("{value:.3}")),
+            where_known(f, row, |value, std| quantity(value, std, "Hz")),
+            where_known(q, row, with_error),
+            where_known(k, row, |value, std| quantity(value, std, "N/m")),
+            where_known((held_out, held_out), row, |value, _| format!("{value:.3}")),
         ];
         if diagnosed {
             cells.extend([verdicts[row].clone(), causes[row].clone()]);
@@ -70,7 +70,7 @@ pub(crate) fn all(stage: &StageRecord, link: &Link<'_>) -> Option<TableView> {
 }
 
 /// A value with its error; nothing where it is not known.
-fn told((values, stds): (&[f64], &[f64]), row: usize, write: impl Fn(f64, f64) -> String) -> String {
+fn where_known((values, stds): (&[f64], &[f64]), row: usize, write: impl Fn(f64, f64) -> String) -> String {
     if values[row].is_finite() { write(values[row], stds[row]) } else { String::new() }
 }
 

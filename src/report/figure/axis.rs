@@ -150,8 +150,8 @@ pub(crate) struct Resolved {
 }
 
 impl Resolved {
-    /// Where a value lies, 0 at the low end and 1 at the high end; none if it has no place (not finite, not positive on a
-    /// logarithmic axis).
+    /// Where a value lies, 0 at the low end and 1 at the high end; none if it has no place (not finite, not positive on
+    /// a logarithmic axis).
     pub fn place(&self, value: f64) -> Option<f64> {
         let place = if self.log {
             if value <= 0.0 {

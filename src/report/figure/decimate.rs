@@ -8,8 +8,9 @@ const MOST_POINTS: usize = 20_000;
 
 /// Keeps of each column of pixels the first, the lowest, the highest and the last point; `None` breaks the curve.
 ///
-/// Model: points in drawing order; where x runs to and fro, consecutive points within one column are taken together. A curve that
-/// still has more points than a picture can show (x jumps at random) is thinned by keeping the extremes of equal stretches.
+/// Model: points in drawing order; where x runs to and fro, consecutive points within one column are taken together. A
+/// curve that still has more points than a picture can show (x jumps at random) is thinned by keeping the extremes of
+/// equal stretches.
 pub(super) fn decimate(points: impl Iterator<Item = Option<(f64, f64)>>, column_px: f64) -> Vec<Run> {
     let mut runs = Vec::new();
     let mut run = Run::new();
@@ -38,13 +39,14 @@ pub(super) fn decimate(points: impl Iterator<Item = Option<(f64, f64)>>, column_
     thin(runs.iter().map(straighten).collect())
 }
 
-/// How far a curve may lie from what is drawn, in pixels: half of the last decimal of a coordinate would be invisible, too.
+/// How far a curve may lie from what is drawn, in pixels: half of the last decimal of a coordinate would be invisible,
+/// too.
 const STRAIGHT_PX: f64 = 0.06;
 
 /// Leaves out points that lie on the straight line between their neighbours.
 ///
-/// Method: from each kept point a cone is narrowed by the points that follow; the last one inside it is kept next (Williams 1978). Steps
-/// back along x end a line, so that curves running to and fro stay whole.
+/// Method: from each kept point a cone is narrowed by the points that follow; the last one inside it is kept next
+/// (Williams 1978). Steps back along x end a line, so that curves running to and fro stay whole.
 fn straighten(run: &Run) -> Run {
     let mut out = Run::with_capacity(run.len());
     let mut cone = (f64::NEG_INFINITY, f64::INFINITY);

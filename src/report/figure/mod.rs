@@ -1,8 +1,8 @@
 //! Figures as SVG text: panels with linear and logarithmic axes, lines, bands, markers and a legend.
 //!
-//! Colours are CSS classes, so that one picture follows the page into dark mode and onto paper; every panel carries its axes as
-//! `data-` attributes and every mark its series, which is what the page's script needs for readouts and toggled curves. Lines are
-//! decimated to what a screen can show, peaks kept.
+//! Colours are CSS classes, so that one picture follows the page into dark mode and onto paper; every panel carries its
+//! axes as `data-` attributes and every mark its series, which is what the page's script needs for readouts and toggled
+//! curves. Lines are decimated to what a screen can show, peaks kept.
 
 mod axis;
 mod decimate;

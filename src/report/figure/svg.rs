@@ -19,7 +19,8 @@ pub(crate) fn escape(text: &str) -> String {
     out
 }
 
-/// A coordinate with at most two decimals. Pictures never ask for more than ±10⁵ or for what is not finite: both are clamped.
+/// A coordinate with at most two decimals. Pictures never ask for more than ±10⁵ or for what is not finite: both are
+/// clamped.
 pub(crate) fn px(value: f64) -> String {
     let value = if value.is_finite() { value.clamp(-1e5, 1e5) } else { 0.0 };
     let text = format!("{value:.2}");

@@ -66,8 +66,8 @@ impl BodeCurve {
         self
     }
 
-    /// With a variance of the complex value, E|h - mean|^2, at each of the frequencies that [`BodeCurve::new`] was given: half of it lies
-    /// along h, half across.
+    /// With a variance of the complex value, E|h - mean|^2, at each of the frequencies that [`BodeCurve::new`] was
+    /// given: half of it lies along h, half across.
     pub fn with_variance(self, frequency_hz: &[f64], transfer: &[Complex64], variance: &[f64]) -> Self {
         let error: Vec<f64> = variance.iter().map(|v| (0.5 * v).sqrt()).collect();
         let turn: Vec<f64> = error.iter().zip(transfer).map(|(e, h)| e / h.norm()).collect();

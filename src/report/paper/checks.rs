@@ -80,7 +80,8 @@ fn envelope(rows: &[&[f64]], count: usize) -> (Vec<f64>, Vec<f64>) {
 
 /// Correlations of ordered and random sub-ensembles.
 pub(crate) fn drift(run: &RunResult) -> Drawn {
-    let caption = "Each sub-ensemble's mean against the mean of all other events. Drift pulls the ordered ones away from the random ones.";
+    let caption = "Each sub-ensemble's mean against the mean of all other events. Drift pulls the ordered ones away \
+        from the random ones.";
     let panels: Vec<(f64, Panel)> =
         all::<Table>(run).filter_map(|found| Some((1.0, sub_ensembles(run, &found)?))).take(6).collect();
     let rows = panels.chunks(2).map(|pair| Row { height: 170.0, panels: pair.to_vec() }).collect();
@@ -205,7 +206,8 @@ fn several_spectra(found: &Found<'_, Array>, axis: &Coordinates) -> Option<Figur
 pub(crate) fn residuals(run: &RunResult) -> Drawn {
     let rows: Vec<Row> =
         all::<Array>(run).filter_map(|found| Some(Row::one(130.0, residual(&found)?))).take(8).collect();
-    let caption = "One-step prediction errors over the window of the fit. What is white was noise; what is left of a shape is not in the model.";
+    let caption = "One-step prediction errors over the window of the fit. What is white was noise; what is left of a \
+        shape is not in the model.";
     let figure = Figure { rows, ..Figure::new("residuals", "Residuals", caption) };
     let figures = if figure.rows.is_empty() { Vec::new() } else { vec![figure] };
     Drawn { id: "what-is-left", title: "Residuals", figures, missing: "no stage gives residuals", ..Drawn::default() }

@@ -7,8 +7,8 @@ use crate::report::find::{EventKind, Found, all, real_over, time_axis, unit_of};
 
 /// Fig. 2 with the panels that the run has data for.
 pub(crate) fn figure(run: &RunResult) -> Option<Figure> {
-    let caption = "Deflection away from the sample is positive. The thick line is the estimate of the force that acted, as the static \
-                   deflection that it causes.";
+    let caption = "Deflection away from the sample is positive. The thick line is the estimate of the force that \
+        acted, as the static deflection that it causes.";
     let mut figure = Figure::new("figure-2", "Force curve and events", caption);
     let mut letters = 'a'..='z';
     let mut letter = || letters.next().unwrap_or('z');

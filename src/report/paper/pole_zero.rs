@@ -41,13 +41,14 @@ fn figure(run: &RunResult, kind: EventKind, id: &str, title: &str) -> Option<Fig
         all::<afmid_pipeline::StateSpace>(run).map(|found| found.value.sample_time_s).find(|t| *t > 0.0);
     let mut panels = vec![(1.0, whole(&poles, &zeros))];
     panels.extend(strip(&poles, &zeros, sample_time_s).map(|panel| (1.15, panel)));
-    let caption = "Weakly damped poles and zeros, close to the unit circle, belong to the lever; the others to detector and electronics. \
-                   The strip enlarges the distance from the circle, as far as the lever's poles \
+    let caption = "Weakly damped poles and zeros, close to the unit circle, belong to the lever; the others to \
+        detector and electronics. The strip enlarges the distance from the circle, as far as the lever's poles \
                    lie; bars: one standard error.";
     Some(Figure::new(id, title, caption).row(Row { height: 400.0, panels }))
 }
 
-/// Reads the rows of one kind from a table of roots: `kind`, `z_re`, `z_im`, frequencies and quality factors with their errors.
+/// Reads the rows of one kind from a table of roots: `kind`, `z_re`, `z_im`, frequencies and quality factors with their
+/// errors.
 fn roots(table: &Table, kind: &str) -> Option<Roots> {
     let rows: Vec<usize> =
         table.text("kind").ok()?.iter().enumerate().filter(|(_, have)| *have == kind).map(|(row, _)| row).collect();
@@ -66,7 +67,8 @@ fn roots(table: &Table, kind: &str) -> Option<Roots> {
     {
         let class = class.and_then(|class| class.get(*row)).map_or("", String::as_str);
         titles.push(format!("{class} {kind}: f = {}, Q = {}", quantity(*f, *f_std, "Hz"), with_error(*q, *q_std)));
-        // |z| = exp(Re s Ts), and Re s = -|s| / 2Q: the logarithm of |z| has the relative error of Q (that of f is small beside it)
+        // |z| = exp(Re s Ts), and Re s = -|s| / 2Q: the logarithm of |z| has the relative error of Q (that of f is
+        // small beside it)
         let radius = re.hypot(*im);
         radius_std.push((radius * radius.ln() * q_std / q).abs());
     }
@@ -153,7 +155,8 @@ fn strip(poles: &Roots, zeros: &Roots, sample_time_s: Option<f64>) -> Option<Pan
         Some(t) => (Axis::new("arg z, as a frequency", "Hz"), 1.0 / (std::f64::consts::TAU * t)),
         None => (Axis::new("arg z", "rad"), 1.0),
     };
-    // what lies as close to the circle as the poles do; a zero that is hardly known may lie far off, and would hide the rest
+    // what lies as close to the circle as the poles do; a zero that is hardly known may lie far off, and would hide the
+    // rest
     let farthest = poles.iter().map(|root| (1.0 - root.0).abs()).fold(0.0, f64::max);
     let farthest = if farthest > 0.0 { farthest } else { 0.02 };
     let right = poles.iter().chain(&zeros).map(|(_, angle, _, _)| angle * scale).fold(0.0, f64::max) * 1.08;

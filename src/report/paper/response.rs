@@ -6,11 +6,13 @@ use num_complex::Complex64;
 /// Most points of a curve; models of high order get fewer, so that a page never takes more than a second or two.
 const MOST_POINTS: usize = 6_000;
 
-/// Response of the first output to the first input, from `lowest_hz` (default: a ten-thousandth of the Nyquist frequency) up to it.
+/// Response of the first output to the first input, from `lowest_hz` (default: a ten-thousandth of the Nyquist
+/// frequency) up to it.
 ///
 /// Model: `H(z) = C (zI - A)^-1 B + D`, `z = exp(i 2 pi f Ts)`.
-/// Method: points equally spaced in log f, then every interval halved whose middle lies off the chord by more than 1 % in
-/// magnitude or phase, up to ten times: peaks narrower than the first grid are found as long as their flanks are seen.
+/// Method: points equally spaced in log f, then every interval halved whose middle lies off the chord by more than 1 %
+/// in magnitude or phase, up to ten times: peaks narrower than the first grid are found as long as their flanks are
+/// seen.
 /// None: no input or output, no sample time, or A has a pole on every point of the grid.
 pub(crate) fn model_curve(model: &StateSpace, lowest_hz: Option<f64>) -> Option<(Vec<f64>, Vec<Complex64>)> {
     let (n, nyquist) = (model.order(), 0.5 / model.sample_time_s);
@@ -63,7 +65,8 @@ fn refine(
     out
 }
 
-/// `C (zI - A)^-1 B + D` of the first input and output by Gaussian elimination with partial pivoting; none where zI - A is singular.
+/// `C (zI - A)^-1 B + D` of the first input and output by Gaussian elimination with partial pivoting; none where zI - A
+/// is singular.
 fn transfer(model: &StateSpace, z: Complex64) -> Option<Complex64> {
     let n = model.order();
     let row = |matrix: &Matrix, row: usize| -> Vec<Complex64> {
@@ -104,13 +107,15 @@ fn transfer(model: &StateSpace, z: Complex64) -> Option<Complex64> {
     h.is_finite().then_some(h)
 }
 
-/// Standard error in radians above which a phase says nothing about its turn: a third of the half turn that unwrapping must tell apart.
+/// Standard error in radians above which a phase says nothing about its turn: a third of the half turn that unwrapping
+/// must tell apart.
 const VAGUE_RAD: f64 = 1.0;
 
 /// Phase in degrees without jumps, starting within half a turn of zero; NaN where the response is unknown or zero.
 ///
-/// Method: each value is put on the turn nearest to the last one that is well known. `std_rad` are the phases' standard errors (empty: all
-/// are well known): noise, as in the depth of an antiresonance, is put on a turn and never decides on one.
+/// Method: each value is put on the turn nearest to the last one that is well known. `std_rad` are the phases' standard
+/// errors (empty: all are well known): noise, as in the depth of an antiresonance, is put on a turn and never decides
+/// on one.
 pub(super) fn unwrapped_degrees(transfer: &[Complex64], std_rad: &[f64]) -> Vec<f64> {
     let mut last: Option<f64> = None;
     transfer

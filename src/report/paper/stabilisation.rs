@@ -41,6 +41,7 @@ fn figure(stage: &str, table: &Table) -> Option<Figure> {
         panel = panel.with(Mark::at_y(order, "proposed order"));
     }
     let id: String = stage.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-    let caption = "A mode stands in a column from the order on that can hold it; a pole that noise needs wanders. Stable: frequency and damping as at the next lower order.";
+    let caption = "A mode stands in a column from the order on that can hold it; a pole that noise needs wanders. \
+        Stable: frequency and damping as at the next lower order.";
     Some(Figure::new(&format!("stabilisation-{id}"), "Stabilisation diagram", caption).row(Row::one(380.0, panel)))
 }

@@ -57,7 +57,7 @@ impl RowSource for Rows<'_> {
         self.samples
     }
 
-    fn lent(&self, row: usize) -> Option<&[f64]> {
+    fn borrowed(&self, row: usize) -> Option<&[f64]> {
         (row < self.count()).then(|| self.row(row))
     }
 

@@ -40,7 +40,7 @@ fn averages_and_drift_have_the_same_bits_from_memory_and_from_a_file() {
         assert_eq!(difference(&outputs(&drift, memory.clone(), 1), &outputs(&drift, file.clone(), threads)), None);
     }
     let rows = file.rows("signal").unwrap();
-    assert!(rows.lent(0).is_none(), "a stage asked for all rows at once");
+    assert!(rows.borrowed(0).is_none(), "a stage asked for all rows at once");
 }
 
 #[test]
@@ -76,7 +76,7 @@ impl RowSource for Counted {
     fn row_length(&self) -> usize {
         self.samples
     }
-    fn lent(&self, _row: usize) -> Option<&[f64]> {
+    fn borrowed(&self, _row: usize) -> Option<&[f64]> {
         None
     }
     fn read(&self, row: usize, into: &mut [f64]) -> Result<(), StageError> {

@@ -13,7 +13,7 @@ use super::{CONFIG, Project, all};
 #[test]
 fn what_only_looks_starts_nothing() {
     let project = Project::new("");
-    project.told(&["run", "c.toml", "--allow-plugins", "-o", "r.h5"]);
+    project.stdout(&["run", "c.toml", "--allow-plugins", "-o", "r.h5"]);
     let before = project.starts();
     assert!(before > 0, "it was started");
     for arguments in [
@@ -49,10 +49,11 @@ fn nothing_starts_before_consent_and_the_error_says_how_to_give_it() {
     fs::create_dir(project.folder().join("set")).expect("a folder");
     project.put("set/a.h5", "");
     let records = format!(
-        "{CONFIG}[[stage]]\nid = \"records\"\nuses = \"io.records\"\nparams = {{ files = [\"set/*.h5\"], channel = \"/d\" }}\n"
+        "{CONFIG}[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
+         params = {{ files = [\"set/*.h5\"], channel = \"/d\" }}\n"
     );
     project.put("b.toml", &records);
-    project.told(&["run", "c.toml", "--allow-plugins", "-o", "r.h5"]);
+    project.stdout(&["run", "c.toml", "--allow-plugins", "-o", "r.h5"]);
     let before = project.starts();
     assert!(before > 0, "it was started");
     for arguments in [
@@ -63,10 +64,10 @@ fn nothing_starts_before_consent_and_the_error_says_how_to_give_it() {
         &["submit", "slurm", "b.toml", "set", "--shards", "1", "-o", "jobs"],
     ] {
         let output = project.run(arguments);
-        let told = all(&output);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
+        let message = all(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         for word in ["afmid trust", "--allow-plugins", "python3 mine.py", "`mine`"] {
-            assert!(told.contains(word), "{arguments:?} lacks {word}: {told}");
+            assert!(message.contains(word), "{arguments:?} lacks {word}: {message}");
         }
         assert_eq!(project.starts(), before, "{arguments:?} started a plugin");
     }
@@ -125,39 +126,40 @@ fn on_a_terminal_a_question_lists_what_would_run_and_only_yes_is_yes() {
 fn ports_are_checked_after_consent_and_without_starting_anything() {
     let project = Project::new("");
     let wrong = CONFIG.to_owned()
-        + "params = { gian = 2 }\n[[stage]]\nid = \"two\"\nuses = \"exec:mine\"\ninputs = { table = \"one.nothing\" }\n";
+        + "params = { gian = 2 }\n[[stage]]\nid = \"two\"\nuses = \"exec:mine\"\n\
+            inputs = { table = \"one.nothing\" }\n";
     project.put("wrong.toml", &wrong);
-    let before = project.told(&["check", "wrong.toml"]);
+    let before = project.stdout(&["check", "wrong.toml"]);
     assert!(before.contains("ports not checked") && before.contains("one") && before.contains("two"), "{before}");
     let before = project.json(&["check", "wrong.toml", "--json"]);
     assert_eq!((&before[0]["right"], &before[0]["ports_not_checked"]), (&json!(true), &json!(["one", "two"])));
-    assert!(project.told(&["graph", "wrong.toml"]).contains("table <- one.nothing"));
+    assert!(project.stdout(&["graph", "wrong.toml"]).contains("table <- one.nothing"));
     let explained = project.json(&["explain", "c.toml", "--json"]);
     assert_eq!(explained["stages"][0]["would"], "unknown", "{explained}");
 
-    let listed = project.told(&["trust", "wrong.toml"]);
+    let listed = project.stdout(&["trust", "wrong.toml"]);
     let folder = project.folder().canonicalize().expect("a folder");
     for word in ["python3", "mine.py", &folder.display().to_string(), "blake3:", "stranger 1", "table", "out"] {
         assert!(listed.contains(word), "no {word} in {listed}");
     }
     assert_eq!(project.starts(), 1);
     let after = project.run(&["check", "wrong.toml"]);
-    let told = all(&after);
-    assert_eq!(after.status.code(), Some(2), "{told}");
-    assert!(told.contains("no parameter `gian`") && told.contains("no output `nothing`"), "{told}");
+    let message = all(&after);
+    assert_eq!(after.status.code(), Some(2), "{message}");
+    assert!(message.contains("no parameter `gian`") && message.contains("no output `nothing`"), "{message}");
     assert_eq!(project.json(&["check", "c.toml", "--json"])[0]["ports_not_checked"], json!([]));
     assert_eq!(project.json(&["explain", "c.toml", "--json"])["stages"][0]["would"], "run");
     assert_eq!(project.starts(), 1, "it was asked once");
 
-    project.told(&["run", "c.toml", "-o", "a.h5"]);
+    project.stdout(&["run", "c.toml", "-o", "a.h5"]);
     assert_eq!(project.json(&["explain", "c.toml", "--json"])["stages"][0]["would"], "reuse");
     let list = project.json(&["trust", "--list", "--json"]);
     assert_eq!(list["plugins"][0]["identity"], "stranger 1", "{list}");
-    project.told(&["trust", "--revoke", "c.toml"]);
+    project.stdout(&["trust", "--revoke", "c.toml"]);
     assert_eq!(project.run(&["run", "c.toml", "-o", "a.h5"]).status.code(), Some(2));
 
     // what is there no more can be revoked, too
-    project.told(&["trust", "c.toml"]);
+    project.stdout(&["trust", "c.toml"]);
     project.put("c.toml", &CONFIG.replace("python3 mine.py", "./gone mine.py"));
     let revoked = project.json(&["trust", "--revoke", "c.toml", "--json"]);
     assert_eq!(revoked["plugins"][0]["program"], serde_json::Value::Null, "{revoked}");
@@ -167,7 +169,7 @@ fn ports_are_checked_after_consent_and_without_starting_anything() {
 #[test]
 fn a_changed_file_command_folder_or_variable_asks_again() {
     let project = Project::new("");
-    project.told(&["trust", "c.toml"]);
+    project.stdout(&["trust", "c.toml"]);
     let runs = |config: &str| project.run(&["run", config, "-o", "a.h5"]).status.code();
     assert_eq!(runs("c.toml"), Some(0));
     for (name, command) in [
@@ -205,7 +207,7 @@ fn a_folder_that_python_runs_belongs_to_consent_and_key() {
     project.put("package/__main__.py", &project.plugin(""));
     project.put("package/part.py", "x = 1\n");
     project.put("p.toml", &CONFIG.replace("mine.py", "package"));
-    let listed = project.told(&["trust", "p.toml"]);
+    let listed = project.stdout(&["trust", "p.toml"]);
     assert!(listed.contains("package/__main__.py blake3:") && listed.contains("package/part.py blake3:"), "{listed}");
     let runs = || project.run(&["run", "p.toml", "-o", "a.h5"]).status.code();
     assert_eq!((runs(), runs()), (Some(0), Some(0)));
@@ -217,7 +219,7 @@ fn a_folder_that_python_runs_belongs_to_consent_and_key() {
 #[test]
 fn damaged_consent_is_none_and_lies_with_the_user_alone() {
     let project = Project::new("");
-    project.told(&["trust", "c.toml"]);
+    project.stdout(&["trust", "c.toml"]);
     let entries: Vec<PathBuf> =
         fs::read_dir(project.trust()).expect("the folder").flatten().map(|entry| entry.path()).collect();
     let [entry] = &entries[..] else { panic!("{entries:?}") };
@@ -236,7 +238,7 @@ fn damaged_consent_is_none_and_lies_with_the_user_alone() {
     refused(&whole[..whole.len() / 2], "cut short");
     refused(b"", "empty");
     fs::write(entry, &whole).expect("written");
-    project.told(&["run", "c.toml", "-o", "a.h5"]);
+    project.stdout(&["run", "c.toml", "-o", "a.h5"]);
     // another plugin's consent under this one's name, and one that the project brings along
     project.put("c.toml", &CONFIG.replace("mine.py", "mine.py --more"));
     let other = project.json(&["trust", "c.toml", "--json"])["plugins"][0]["seal"].as_str().expect("a seal").to_owned();
@@ -256,13 +258,14 @@ fn jobs_of_a_submission_get_the_plugins_that_were_agreed_to_and_no_others() {
     fs::create_dir(project.folder().join("set")).expect("a folder");
     project.put("set/a.h5", "no record");
     let records = format!(
-        "{CONFIG}[[stage]]\nid = \"records\"\nuses = \"io.records\"\nparams = {{ files = [\"set/*.h5\"], channel = \"/d\" }}\n"
+        "{CONFIG}[[stage]]\nid = \"records\"\nuses = \"io.records\"\n\
+         params = {{ files = [\"set/*.h5\"], channel = \"/d\" }}\n"
     );
     project.put("b.toml", &records);
     let submit = ["submit", "slurm", "b.toml", "set", "--shards", "1", "-o", "jobs"];
-    project.told(&["trust", "b.toml"]);
+    project.stdout(&["trust", "b.toml"]);
     let before = project.starts();
-    project.told(&submit);
+    project.stdout(&submit);
     assert_eq!(project.starts(), before, "a submission starts nothing");
     // a node has no consent of its own
     fs::remove_dir_all(project.trust()).expect("removed");

@@ -48,12 +48,12 @@ fn links_in_and_to_an_output_file_are_refused() {
     ] {
         let project = Project::new(&answer(write));
         let output = project.run(&["run", "c.toml", "--allow-plugins", "-o", "a.h5"]);
-        let told = all(&output);
-        assert_eq!(output.status.code(), Some(1), "{name}: {told}");
-        assert!(told.contains(wanted) && told.contains("`out`"), "{name}: {told}");
+        let message = all(&output);
+        assert_eq!(output.status.code(), Some(1), "{name}: {message}");
+        assert!(message.contains(wanted) && message.contains("`out`"), "{name}: {message}");
     }
     let fine = Project::new(&answer("    with h5py.File(path, 'w') as f: f['v'] = [1.0, 2.0, 3.0]"));
-    fine.told(&["run", "c.toml", "--allow-plugins", "-o", "a.h5"]);
+    fine.stdout(&["run", "c.toml", "--allow-plugins", "-o", "a.h5"]);
 }
 
 /// The largest resident set of a process so far, in bytes.
@@ -109,8 +109,8 @@ fn wait_until(what: &str, is_so: impl Fn() -> bool) {
     }
 }
 
-/// A plugin that starts a child and a daemon of its own session, writes down all their numbers, and hears neither the end of its input nor any
-/// signal that can be ignored.
+/// A plugin that starts a child and a daemon of its own session, writes down all their numbers, and hears neither the
+/// end of its input nor any signal that can be ignored.
 const DEAF: &str = r#"import signal
 def run(params):
     for name in ("SIGTERM", "SIGHUP", "SIGINT", "SIGPIPE"): signal.signal(getattr(signal, name), signal.SIG_IGN)
@@ -211,11 +211,11 @@ fn a_plugin_writes_to_its_own_folder_alone_and_what_is_not_enforced_is_in_the_re
     }
     let free = CONFIG.replace("\"python3 mine.py\"", "{ command = \"python3 mine.py --free\", confined = false }");
     project.put("free.toml", &free);
-    let told = log("free.toml");
-    assert!(told.contains("[afmid] not enforced: where it writes, TCP"), "{told}");
-    assert_eq!((&possible(&told)["beside"], &possible(&told)["tcp"]), (&json!(true), &json!(true)));
+    let text = log("free.toml");
+    assert!(text.contains("[afmid] not enforced: where it writes, TCP"), "{text}");
+    assert_eq!((&possible(&text)["beside"], &possible(&text)["tcp"]), (&json!(true), &json!(true)));
     project.put("free.toml", &free.replace("--free", ""));
-    let listed = project.told(&["trust", "free.toml"]);
+    let listed = project.stdout(&["trust", "free.toml"]);
     assert!(listed.contains("it may write anywhere"), "{listed}");
     project.put("free.toml", &free.replace("--free", "").replace("confined = false", "confined = true"));
     assert_eq!(project.run(&["run", "free.toml", "-o", "b.h5"]).status.code(), Some(2), "that is another plugin");

@@ -53,7 +53,8 @@ for line in sys.stdin:
 "#;
 
 /// A config that runs the plugin of a project.
-pub const CONFIG: &str = "[pipeline]\nname = \"strange\"\n[plugins]\nmine = \"python3 mine.py\"\n[[stage]]\nid = \"one\"\nuses = \"exec:mine\"\n";
+pub const CONFIG: &str = "[pipeline]\nname = \"strange\"\n[plugins]\nmine = \"python3 mine.py\"\n[[stage]]\n\
+    id = \"one\"\nuses = \"exec:mine\"\n";
 
 /// A project that somebody sent, and folders of the user's own.
 pub struct Project {
@@ -122,15 +123,15 @@ impl Project {
         self.command(arguments).output().expect("afmid starts")
     }
 
-    /// What it prints, where it must go well.
-    pub fn told(&self, arguments: &[&str]) -> String {
+    /// Its stdout, where it must go well.
+    pub fn stdout(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
         assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", all(&output));
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
     pub fn json(&self, arguments: &[&str]) -> Value {
-        serde_json::from_str(&self.told(arguments)).expect("JSON")
+        serde_json::from_str(&self.stdout(arguments)).expect("JSON")
     }
 
     /// How often the plugin was started so far.

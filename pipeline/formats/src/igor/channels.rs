@@ -25,7 +25,8 @@ pub(super) fn of(
 ) -> Result<Vec<FoundChannel>, FormatError> {
     if header.unsaved() {
         remarks.push(format!(
-            "the {} samples of wave `{}` were not saved, for the formula gives them: no channel; in Igor, copy it to a free wave (`Duplicate`) and save that",
+            "the {} samples of wave `{}` were not saved, for the formula gives them: no channel; in Igor, copy it to a \
+             free wave (`Duplicate`) and save that",
             header.points, header.name
         ));
         return Ok(Vec::new());
@@ -40,7 +41,8 @@ pub(super) fn of(
         return Err(fail::at(
             132,
             format!(
-                "found {columns} columns of {rows} samples, wanted at most {MOST_COLUMNS}: this looks like an image or a map, not like recordings"
+                "found {columns} columns of {rows} samples, wanted at most {MOST_COLUMNS}: this looks like an image or \
+                 a map, not like recordings"
             ),
             "save the columns of interest as a wave of their own",
         ));

@@ -54,7 +54,8 @@ pub(super) fn version(head: &[u8]) -> Option<(u16, Order)> {
 
 /// Sum of the header's words, which the writer makes 0 (TN003); none if this is no header.
 ///
-/// Up to version 3 the header's structure ends in the first four samples or the padding, 16 bytes that are summed with it.
+/// Up to version 3 the header's structure ends in the first four samples or the padding, 16 bytes that are summed with
+/// it.
 pub(super) fn checksum(head: &[u8]) -> Option<u16> {
     let (version, order) = version(head)?;
     let summed = header_bytes(version)? + if version == 5 { 0 } else { 16 };
@@ -82,7 +83,8 @@ fn wave_header_bytes(version: u16) -> u64 {
 }
 
 impl Header {
-    /// Reads the header from the file's first bytes. Errors: no wave, cut off, complex, or its parts do not fit each other.
+    /// Reads the header from the file's first bytes. Errors: no wave, cut off, complex, or its parts do not fit each
+    /// other.
     pub(super) fn parse(head: &[u8], file_bytes: u64) -> Result<Self, FormatError> {
         let Some((version, order)) = version(head) else { return Err(no_wave(head)) };
         let start = file_header_bytes(version).unwrap_or_default();
@@ -130,7 +132,8 @@ impl Header {
 
     fn version_5(f: &Fields<'_>) -> Result<Self, FormatError> {
         let wave_bytes = f.size("a wave size", 4)?;
-        // the parts follow each other in this order: samples, formula, note, data unit, 4 dimension units, 4 sets of labels
+        // the parts follow each other in this order: samples, formula, note, data unit, 4 dimension units, 4 sets of
+        // labels
         let mut end = 64 + wave_bytes;
         let mut next = |what, at| {
             let part = Part { at: end, bytes: f.size(what, at)? };

@@ -18,7 +18,8 @@ pub(super) fn kind(code: u16, at: u64) -> Result<Kind, FormatError> {
         return Err(fail::at(
             at,
             format!("found complex samples (type {code:#x}), wanted real ones"),
-            "in Igor, save real parts and imaginary parts (or magnitudes) as waves of their own: `MatrixOp re = real(w)`",
+            "in Igor, save real parts and imaginary parts (or magnitudes) as waves of their own: \
+             `MatrixOp re = real(w)`",
         ));
     }
     Ok(Kind::Numbers(match code {
@@ -39,7 +40,8 @@ pub(super) fn kind(code: u16, at: u64) -> Result<Kind, FormatError> {
             return Err(fail::at(
                 at,
                 format!(
-                    "found type {code:#x}, wanted one of Igor's numeric types (2, 4, 8, 0x10, 0x20, 0x80, unsigned + 0x40) or text (0)"
+                    "found type {code:#x}, wanted one of Igor's numeric types (2, 4, 8, 0x10, 0x20, 0x80, unsigned + \
+                     0x40) or text (0)"
                 ),
                 "the header is damaged: copy or export the wave again",
             ));

@@ -1,16 +1,17 @@
 //! Igor binary waves, `.ibw`: one numeric array with its scaling, units, labels and note.
 //!
 //! Source: WaveMetrics, *Technical Note #003: Igor Binary Format*, as the reader igor2 quotes it (`binarywave.py`,
-//! <https://github.com/AFM-analysis/igor2>); what the checksum covers up to version 3, and Asylum Research's note keys, were
-//! learnt from files. Type codes of 64-bit integers and of reference waves have not been checked against a file.
+//! <https://github.com/AFM-analysis/igor2>); what the checksum covers up to version 3, and Asylum Research's note keys,
+//! were learnt from files. Type codes of 64-bit integers and of reference waves have not been checked against a file.
 //!
-//! - Versions 1, 2, 3 and 5 in both byte orders, every real numeric type. Complex waves are refused; text, wave-reference
-//!   and folder waves are remarked, as is a wave whose samples were not saved because a formula gives them.
-//! - Arrays are stored column by column and rows are time: one channel per column. A column with a label is located by it
-//!   (`/Defl`), others by the wave's name (`/wave0`) and, if there are several columns, an index from 0 that counts columns, then
-//!   layers, then chunks (`/wave0[2]`).
-//! - The row scaling gives the sample rate if its unit is a time. Asylum Research's note gives it (`NumPtsPerSec`), and the
-//!   unit of columns of known names, where the header has none.
+//! - Versions 1, 2, 3 and 5 in both byte orders, every real numeric type. Complex waves are refused; text,
+//!   wave-reference and folder waves are remarked, as is a wave whose samples were not saved because a formula gives
+//!   them.
+//! - Arrays are stored column by column and rows are time: one channel per column. A column with a label is located by
+//!   it (`/Defl`), others by the wave's name (`/wave0`) and, if there are several columns, an index from 0 that counts
+//!   columns, then layers, then chunks (`/wave0[2]`).
+//! - The row scaling gives the sample rate if its unit is a time. Asylum Research's note gives it (`NumPtsPerSec`), and
+//!   the unit of columns of known names, where the header has none.
 //! - Packed experiments, `.pxp`, are refused: they hold many waves, histories and windows.
 
 mod channels;
@@ -53,7 +54,8 @@ impl Format for IgorWave {
         let mut remarks = Vec::new();
         if header.checksum != 0 {
             remarks.push(format!(
-                "the header's checksum is {} instead of 0: it may be damaged, compare the channel's values with what you expect",
+                "the header's checksum is {} instead of 0: it may be damaged, compare the channel's values with what \
+                 you expect",
                 header.checksum
             ));
         }
@@ -91,6 +93,7 @@ fn packed_experiment() -> FormatError {
     fail::at(
         0,
         "found an Igor packed experiment, wanted a single binary wave",
-        "open it in Igor Pro and export each wave: Data > Save Waves > Save Igor Binary (or `Save/C wave0` on the command line), then name the .ibw file",
+        "open it in Igor Pro and export each wave: Data > Save Waves > Save Igor Binary (or `Save/C wave0` on the \
+         command line), then name the .ibw file",
     )
 }

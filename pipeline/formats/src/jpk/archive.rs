@@ -16,7 +16,8 @@ pub(super) fn names(archive: &Archive) -> Vec<String> {
     (0..archive.len()).map(|number| archive.name(number)).collect()
 }
 
-/// Where a member lies; none if there is no such member. Errors: outside the file, encrypted, packed otherwise than by deflate.
+/// Where a member lies; none if there is no such member. Errors: outside the file, encrypted, packed otherwise than by
+/// deflate.
 pub(super) fn locate(archive: &mut Archive, name: &str) -> Result<Option<Member>, FormatError> {
     let refused = |refused| match refused {
         Refused::Kind(what) => fail::plain(format!("{name}: the member of the archive is {what}"), fail::COPY_AGAIN),

@@ -1,13 +1,15 @@
 //! JPK (Bruker) NanoWizard force curves: `.jpk-force`.
 //!
 //! Source: the layout and the property names as the readers afmformats (`fmt_jpk`, with an example header,
-//! <https://github.com/AFM-analysis/afmformats>), Gwyddion (`jpkscan.c`) and Hooke use them; no public specification was found,
-//! and no real file was at hand.
+//! <https://github.com/AFM-analysis/afmformats>), Gwyddion (`jpkscan.c`) and Hooke use them; no public specification
+//! was found, and no real file was at hand.
 //!
-//! - A zip archive: `header.properties`; per segment (extend, pause, retract) `segments/N/segment-header.properties` and big-endian
-//!   samples in `segments/N/channels/*.dat`; in files of version 2 what segments share is in `shared-data/header.properties`.
-//! - One channel per segment and quantity: `/segments/0/vDeflection`, in the base unit (V), which the encoder's multiplier and
-//!   offset give. Each calibration that is defined is a channel as well, from the same samples: `/segments/0/vDeflection/force`.
+//! - A zip archive: `header.properties`; per segment (extend, pause, retract) `segments/N/segment-header.properties`
+//!   and big-endian samples in `segments/N/channels/*.dat`; in files of version 2 what segments share is in
+//!   `shared-data/header.properties`.
+//! - One channel per segment and quantity: `/segments/0/vDeflection`, in the base unit (V), which the encoder's
+//!   multiplier and offset give. Each calibration that is defined is a channel as well, from the same samples:
+//!   `/segments/0/vDeflection/force`.
 //!   The chain of conversions is put together into one straight line.
 //! - The sample rate is the segment's number of points by its duration.
 //! - Maps (`.jpk-force-map`, `.jpk-qi-data`) are refused: thousands of curves with an index of their own.

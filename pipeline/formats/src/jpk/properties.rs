@@ -65,7 +65,8 @@ fn unescape(text: &str) -> String {
     out
 }
 
-/// A segment's properties with those it refers to: `channel.x.lcd-info.*=3` stands for all of `lcd-info.3.` below `channel.x.`.
+/// A segment's properties with those it refers to: `channel.x.lcd-info.*=3` stands for all of `lcd-info.3.` below
+/// `channel.x.`.
 #[derive(Debug)]
 pub(super) struct Properties<'a> {
     own: Table,

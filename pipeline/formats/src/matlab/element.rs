@@ -94,5 +94,5 @@ impl Elements {
     }
 }
 
-const HELP: &str = "the file is damaged or cut off, perhaps by a transfer in text mode, which adds a byte 0d before each 0a: \
-     copy it again from where it was recorded";
+const HELP: &str = "the file is damaged or cut off, perhaps by a transfer in text mode, which adds a byte 0d before \
+    each 0a: copy it again from where it was recorded";

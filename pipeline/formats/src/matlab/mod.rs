@@ -1,17 +1,21 @@
 //! MATLAB's MAT-files of versions 4, 5, 6 and 7.
 //!
-//! Source: "MAT-File Format", The MathWorks (matfile_format.pdf, <https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf>):
-//! level 4 in its appendix, level 5 (that versions 6 and 7 extend by Unicode text and compressed variables) in its body. What it
-//! leaves out (functions, opaque objects, the unnamed workspace at the end) follows the notes in scipy's `scipy.io.matlab`.
+//! Source: "MAT-File Format", The MathWorks (matfile_format.pdf,
+//! <https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf>):
+//! level 4 in its appendix, level 5 (that versions 6 and 7 extend by Unicode text and compressed variables) in its
+//! body. What it leaves out (functions, opaque objects, the unnamed workspace at the end) follows the notes in scipy's
+//! `scipy.io.matlab`.
 //!
-//! A vector is one channel. Of a matrix every column is one (time runs downwards, as for `plot` and `filter`) except if it has at
-//! most 16 rows and at least 16 times as many columns: then every row. Of arrays of more dimensions the first axis that is longer
-//! than 1 is time. Locations are as MATLAB counts, from 1: `/x`, column 2 `/x[2]`, `/x[2,3]`, field `/s.f`, `/s(2).f` of an array of
-//! structs, `/c{2}` of a cell array. Single numbers are remarks, as are texts; the sampling rate comes from a single number with
-//! a usual name (`fs`, `dt`, `Tinterval`, ...) in the same struct or, failing that, around it.
+//! A vector is one channel. Of a matrix every column is one (time runs downwards, as for `plot` and `filter`) except if
+//! it has at most 16 rows and at least 16 times as many columns: then every row. Of arrays of more dimensions the first
+//! axis that is longer than 1 is time. Locations are as MATLAB counts, from 1: `/x`, column 2 `/x[2]`, `/x[2,3]`, field
+//! `/s.f`, `/s(2).f` of an array of structs, `/c{2}` of a cell array. Single numbers are remarks, as are texts; the
+//! sampling rate comes from a single number with a usual name (`fs`, `dt`, `Tinterval`, ...) in the same struct or,
+//! failing that, around it.
 //!
-//! A compressed variable of at most 64 MiB is inflated to its end when the file is opened, so that damage shows, and once more and kept when one of
-//! its channels is read; a longer one is inflated by stream. All of a file may come to 64 MiB, or to 32 times the file.
+//! A compressed variable of at most 64 MiB is inflated to its end when the file is opened, so that damage shows, and
+//! once more and kept when one of its channels is read; a longer one is inflated by stream. All of a file may come to
+//! 64 MiB, or to 32 times the file.
 //!
 //! Version 7.3 is HDF5: it is recognised here so that it can be said, so ask an HDF5 reader before this one.
 

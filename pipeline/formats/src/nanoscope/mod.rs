@@ -1,16 +1,20 @@
 //! Bruker (Veeco, Digital Instruments) Nanoscope force curves: `.000`, `.001`, `.spm`.
 //!
-//! Source: Bruker, *NanoScope Software 8.10 User Guide* (CIAO parameters: hard value, hard scale, soft scale), as excerpted in
-//! <https://github.com/kogens/spmpy>; order of the samples in a force curve from Gwyddion's reader (`nanoscope.c`), and the real
-//! curve's height sensor agrees. `Hold Time` and samples of 4 bytes have not been checked against a file.
+//! Source: Bruker, *NanoScope Software 8.10 User Guide* (CIAO parameters: hard value, hard scale, soft scale), as
+//! excerpted in <https://github.com/kogens/spmpy>; order of the samples in a force curve from Gwyddion's reader
+//! (`nanoscope.c`), and the real curve's height sensor agrees. `Hold Time` and samples of 4 bytes have not been checked
+//! against a file.
 //!
-//! - A text header of sections (`\*Ciao force image list`) with `\key: value` lines; samples after it, little-endian int16 or int32.
-//! - One channel per force image list and part of the ramp: `/DeflectionError/extend`, `/DeflectionError/retract` and, if the tip
-//!   was held, `/DeflectionError/hold`. The name is the header's internal one of the image data.
-//! - A curve is stored as extend, retract, hold, and extend begins at the turning point. All channels are given in the order in
-//!   which they were recorded, so extend is turned round.
-//! - Values are in the unit of the hard scale (V): code times V/LSB. The soft scale (`Sens. DeflSens`, nm/V) is remarked.
-//! - A ramp forth and back takes 1/`Scan rate`; it is shared out by the forward and reverse velocity, which gives each part's sample rate.
+//! - A text header of sections (`\*Ciao force image list`) with `\key: value` lines; samples after it, little-endian
+//!   int16 or int32.
+//! - One channel per force image list and part of the ramp: `/DeflectionError/extend`, `/DeflectionError/retract` and,
+//!   if the tip was held, `/DeflectionError/hold`. The name is the header's internal one of the image data.
+//! - A curve is stored as extend, retract, hold, and extend begins at the turning point. All channels are given in the
+//!   order in which they were recorded, so extend is turned round.
+//! - Values are in the unit of the hard scale (V): code times V/LSB. The soft scale (`Sens. DeflSens`, nm/V) is
+//!   remarked.
+//! - A ramp forth and back takes 1/`Scan rate`; it is shared out by the forward and reverse velocity, which gives each
+//!   part's sample rate.
 //! - Images and force volumes are refused, as are headers without data.
 
 mod curve;
@@ -88,7 +92,8 @@ fn refuse_images(header: &Header) -> FormatError {
     fail::at(
         image.at,
         format!(
-            "found {} images of {} samples a line at {} lines per second, wanted force curves: pixels are averages along a scan, no transients",
+            "found {} images of {} samples a line at {} lines per second, wanted force curves: pixels are averages \
+             along a scan, no transients",
             images.len(),
             of("Samps/line"),
             of("Scan rate")

@@ -27,8 +27,8 @@ impl Named<'_> {
         if several && header.fields.iter().any(|field| matches!(field.what, Part::Number(..))) {
             let axes = if header.fortran { "Fortran" } else { "C" };
             listing.remark(format!(
-                "{location} has the shape {:?} in {axes} order; NumPy does not say which axis is time: the channels are its \
-                 columns, or its rows if they are at most 16 and 16 times as long",
+                "{location} has the shape {:?} in {axes} order; NumPy does not say which axis is time: the channels \
+                 are its columns, or its rows if they are at most 16 and 16 times as long",
                 header.shape
             ));
         }

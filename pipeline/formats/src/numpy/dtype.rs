@@ -3,7 +3,8 @@
 use super::literal::Literal;
 use crate::number::Number;
 
-/// Structs in structs beyond this are refused, so that no file can exhaust the stack or, by arrays of arrays, the memory.
+/// Structs in structs beyond this are refused, so that no file can exhaust the stack or, by arrays of arrays, the
+/// memory.
 const DEEPEST: usize = 8;
 /// More fields than a recording has channels.
 const MOST_FIELDS: usize = 4096;

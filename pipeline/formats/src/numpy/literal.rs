@@ -1,6 +1,7 @@
 //! The few Python literals that headers are written in.
 
-/// Tuples in lists in tuples: the deepest real headers have 6, deeper ones are refused so that no file can exhaust the stack.
+/// Tuples in lists in tuples: the deepest real headers have 6, deeper ones are refused so that no file can exhaust the
+/// stack.
 const DEEPEST: usize = 32;
 
 /// A value.

@@ -2,12 +2,12 @@
 //!
 //! Source: none, there is no format: the user says what the file is. Nothing is recognised by looking.
 //!
-//! Interleaved channels lie as rows: one sample of each, then the next of each. Else the channels lie one behind the other,
-//! each as long as the others. Locations are `/channel[0]`, `/channel[1]`, ...
+//! Interleaved channels lie as rows: one sample of each, then the next of each. Else the channels lie one behind the
+//! other, each as long as the others. Locations are `/channel[0]`, `/channel[1]`, ...
 //!
-//! An incomplete last row of interleaved channels (or last sample of a single one) is left out with a remark, because a recording
-//! that was interrupted ends like this. For channels one behind the other it is an error: where each of them begins follows from
-//! the file's size, so nothing would be right.
+//! An incomplete last row of interleaved channels (or last sample of a single one) is left out with a remark, because a
+//! recording that was interrupted ends like this. For channels one behind the other it is an error: where each of them
+//! begins follows from the file's size, so nothing would be right.
 //!
 //! Nor do they state a rate or a unit: both are left open.
 //!
@@ -70,7 +70,8 @@ pub struct RawBinary {
     pub header_bytes: u64,
     /// Number of channels, 1 to 4096. Default: 1.
     pub channels: usize,
-    /// Whether the file holds a sample of each channel, then the next of each (else one channel behind the other). Default: true.
+    /// Whether the file holds a sample of each channel, then the next of each (else one channel behind the other).
+    /// Default: true.
     pub interleaved: bool,
     /// value = stored * scale_factor + add_offset; finite and not 0. Default: 1.
     pub scale_factor: f64,
@@ -93,9 +94,10 @@ impl Default for RawBinary {
 }
 
 impl RawBinary {
-    /// Opens a file and checks that it can be what was said: that it has samples, and that they are not much smoother in the
-    /// other byte order. White noise, which is equally rough in both, and channels of a constant are given the benefit of the
-    /// doubt. Errors: a value out of its range; no such file; no whole row of samples; the other byte order is the right one.
+    /// Opens a file and checks that it can be what was said: that it has samples, and that they are not much smoother
+    /// in the other byte order. White noise, which is equally rough in both, and channels of a constant are given the
+    /// benefit of the doubt. Errors: a value out of its range; no such file; no whole row of samples; the other byte
+    /// order is the right one.
     pub fn open(&self, path: &Path) -> Result<Contents, FormatError> {
         self.check()?;
         let (pinned, _) = Pinned::open(path)?;

@@ -18,24 +18,26 @@ const MOST_CHANNELS: usize = 8;
 /// Bytes read for one stretch of one channel, with the samples of other channels in between.
 const STRETCH_BYTES: u64 = 1 << 17;
 
-/// The other order must be smoother by this factor. The roughest samples possible (16) are 2.7 times as rough as the noise (6)
-/// that swapping their bytes makes of them, so a smaller factor than 3 would refuse good data; three times that for chance.
+/// The other order must be smoother by this factor. The roughest samples possible (16) are 2.7 times as rough as the
+/// noise (6) that swapping their bytes makes of them, so a smaller factor than 3 would refuse good data; three times
+/// that for chance.
 const MUCH_SMOOTHER: f64 = 8.0;
 
-/// And it must be smooth: an eighth of white noise, which is a tone with more than 6.5 samples to its period or a signal with 7
-/// times the power of its noise. White noise is six standard deviations away.
+/// And it must be smooth: an eighth of white noise, which is a tone with more than 6.5 samples to its period or a
+/// signal with 7 times the power of its noise. White noise is six standard deviations away.
 const SMOOTH: f64 = 0.75;
 
-/// Integers of fewer different codes in a window are not judged: a short pattern that repeats itself can become any other
-/// pattern when its bytes are swapped, also a slower one.
+/// Integers of fewer different codes in a window are not judged: a short pattern that repeats itself can become any
+/// other pattern when its bytes are swapped, also a slower one.
 const LEAST_CODES: usize = 32;
 
 /// Share of windows, in percent, that must speak for the other order, and more than speak for the declared one.
 const ENOUGH_PERCENT: usize = 1;
 
-/// Floating point data are in the wrong order if more than this share of them is wild (right ones have none) and a half of it or
-/// less in the other order. NaN for missing samples, whatever their share, become denormal when swapped: they count equally in
-/// both. Of full-precision numbers two thirds (single) or nearly all (double) are wild when swapped, so a half is no chance.
+/// Floating point data are in the wrong order if more than this share of them is wild (right ones have none) and a half
+/// of it or less in the other order. NaN for missing samples, whatever their share, become denormal when swapped: they
+/// count equally in both. Of full-precision numbers two thirds (single) or nearly all (double) are wild when swapped,
+/// so a half is no chance.
 const MANY_WILD: f64 = 0.01;
 const FEWER_WILD: f64 = 0.5;
 
@@ -127,8 +129,8 @@ fn wilder(one: Look, than: Look) -> bool {
     one.wild > MANY_WILD && than.wild <= one.wild * FEWER_WILD
 }
 
-/// Samples of which many are wild cannot be called smooth: most of their bends are unknown. Codes of one byte are right however
-/// rough (see `for_other`): between -1 and 0 the swapped ones have no step, which can hide their noise.
+/// Samples of which many are wild cannot be called smooth: most of their bends are unknown. Codes of one byte are right
+/// however rough (see `for_other`): between -1 and 0 the swapped ones have no step, which can hide their noise.
 fn smoother(one: Look, than: Look) -> bool {
     match (one.roughness, than.roughness) {
         (Some(smooth), Some(rough)) => {
@@ -146,7 +148,8 @@ fn refusal(grid: &Grid, declared: Look, other: Look) -> FormatError {
         format!("roughness {roughness}{wild}")
     };
     let problem = format!(
-        "the samples make no sense in {said}-endian order ({}) and do in {right}-endian order ({}); white noise has roughness 6",
+        "the samples make no sense in {said}-endian order ({}) and do in {right}-endian order ({}); white noise has \
+         roughness 6",
         shown(declared),
         shown(other)
     );

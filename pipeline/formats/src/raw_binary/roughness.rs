@@ -3,10 +3,11 @@
 /// Roughness and what else tells sense from nonsense, of the samples of one channel in one byte order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Look {
-    /// Mean square of the second differences over the variance: 6 for white noise, 16 sin^4(w/2) for a tone of w radians per
-    /// sample, so at most 16. None if all samples are the same.
+    /// Mean square of the second differences over the variance: 6 for white noise, 16 sin^4(w/2) for a tone of w
+    /// radians per sample, so at most 16. None if all samples are the same.
     pub(super) roughness: Option<f64>,
-    /// Share of floating point samples that no recorder gives: NaN, infinite, denormal, or off the median by a factor above 2^40.
+    /// Share of floating point samples that no recorder gives: NaN, infinite, denormal, or off the median by a factor
+    /// above 2^40.
     pub(super) wild: f64,
     /// Whether every sample is an integer that would fit into one byte.
     pub(super) fits_a_byte: bool,
@@ -14,11 +15,12 @@ pub(super) struct Look {
     pub(super) codes: usize,
 }
 
-/// Twelve decades each way: more than the dynamic range of any instrument, and nothing against the 77 and 600 decades over
-/// which the exponents of swapped numbers spread.
+/// Twelve decades each way: more than the dynamic range of any instrument, and nothing against the 77 and 600 decades
+/// over which the exponents of swapped numbers spread.
 const WILD_EXPONENT: f64 = 40.0;
 
-/// Looks at samples. `tiny` is the smallest magnitude that is no denormal number; 0 for integers, of which none is wild.
+/// Looks at samples. `tiny` is the smallest magnitude that is no denormal number; 0 for integers, of which none is
+/// wild.
 pub(super) fn look<'a>(samples: impl IntoIterator<Item = &'a f64>, tiny: f64) -> Look {
     let samples: Vec<f64> = samples.into_iter().copied().collect();
     let fits_a_byte = tiny == 0.0 && samples.iter().all(|value| (-128.0..=255.0).contains(value));
@@ -50,7 +52,8 @@ fn different(mut samples: Vec<f64>) -> usize {
     samples.len()
 }
 
-/// Magnitudes within `WILD_EXPONENT` of the median of those that are finite, not zero and not denormal; everything for integers.
+/// Magnitudes within `WILD_EXPONENT` of the median of those that are finite, not zero and not denormal; everything for
+/// integers.
 fn sane_range(samples: &[f64], tiny: f64) -> Option<(f64, f64)> {
     if tiny == 0.0 {
         return Some((0.0, f64::INFINITY));
@@ -89,7 +92,8 @@ mod tests {
             let tone: Vec<f64> = (0..20_000).map(|n| 1e3 + (step * n as f64).sin()).collect();
             let found = look(&tone, 0.0).roughness.unwrap();
             let wanted = 16.0 * (step / 2.0).sin().powi(4);
-            // The ends of a stretch that is no whole number of periods give about 1/(20000 step), 0.5 percent at the slowest.
+            // The ends of a stretch that is no whole number of periods give about 1/(20000 step), 0.5 percent at the
+            // slowest.
             assert!((found / wanted - 1.0).abs() < 0.02, "{step}: {found} {wanted}");
         }
     }

@@ -34,7 +34,8 @@ struct Extent {
     shape: u32,
 }
 
-/// All samples of a channel. Shapes are kept once as long as they don't change: a long recording has many segments of one shape.
+/// All samples of a channel. Shapes are kept once as long as they don't change: a long recording has many segments of
+/// one shape.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Extents {
     extents: Vec<Extent>,
@@ -66,7 +67,8 @@ impl Extents {
         self.shapes.iter().all(|s| of(s) == first).then_some(first)
     }
 
-    /// The segment's part that holds `sample`: its shape, the first sample's byte, the sample within it and how many follow in it, this one included.
+    /// The segment's part that holds `sample`: its shape, the first sample's byte, the sample within it and how many
+    /// follow in it, this one included.
     pub(super) fn find(&self, sample: usize) -> Option<(Shape, u64, u64, u64)> {
         let behind = self.extents.partition_point(|e| e.first <= sample);
         let extent = self.extents.get(behind.checked_sub(1)?)?;

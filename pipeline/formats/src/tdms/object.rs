@@ -1,4 +1,4 @@
-//! An object of the file: the root, a group or a channel, as far as the segments so far have told of it.
+//! An object of the file: the root, a group or a channel, as the segments read so far describe it.
 
 use super::extents::Extents;
 use super::index::Index;
@@ -20,7 +20,7 @@ pub(super) struct Object {
     pub(super) streams: Vec<Stream>,
     pub(super) gaps: Vec<usize>,
     pub(super) timing: Timing,
-    /// Whether the time axis may have been stated anew since the last samples.
+    /// Whether the time axis may have been stated again since the last samples.
     pub(super) retimed: bool,
 }
 

@@ -21,7 +21,8 @@ pub(super) struct Entry {
     pub(super) values: u64,
 }
 
-/// A part of a chunk: rows of equal width, one after the other. Contiguous data have a block per channel, interleaved data one, DAQmx data one per raw buffer.
+/// A part of a chunk: rows of equal width, one after the other. Contiguous data have a block per channel, interleaved
+/// data one, DAQmx data one per raw buffer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block {
     pub(super) row_width: u64,

@@ -1,6 +1,7 @@
 //! `NI_Scale` properties: from stored codes to values.
 //!
-//! Scales are numbered; the last one gives the value. Each names its input: another scale, a DAQmx scaler (a number without a scale type) or the stored value.
+//! Scales are numbered; the last one gives the value. Each names its input: another scale, a DAQmx scaler (a number
+//! without a scale type) or the stored value.
 
 use super::property::Properties;
 
@@ -37,7 +38,8 @@ impl Scaling {
     }
 }
 
-/// The scaling of a channel: its own properties', else its group's, else the file's. Errors: a reason, naming the scale type.
+/// The scaling of a channel: its own properties', else its group's, else the file's. Errors: a reason, naming the scale
+/// type.
 pub(super) fn scaling(owners: [Option<&Properties>; 3]) -> Result<Scaling, String> {
     let identity = Scaling { steps: Vec::new(), scaler: None };
     let scaled = owners.into_iter().flatten().find_map(|p| Some((p, count(p)?)));
@@ -75,7 +77,8 @@ fn step(properties: &Properties, scale: u32, kind: &str) -> Result<Vec<f64>, Str
             (0..size).map(|power| number(&format!("Coefficients[{power}]"))).collect()
         }
         other => Err(format!(
-            "its scale {scale} is of type {other}; Linear and Polynomial scales can be applied: export it scaled from LabVIEW"
+            "its scale {scale} is of type {other}; Linear and Polynomial scales can be applied: export it scaled from \
+             LabVIEW"
         )),
     }
 }

@@ -10,7 +10,8 @@ use crate::{FormatError, Raw, Source};
 
 /// Bytes read at once: large enough that the call does not count, small enough for a cache.
 const BLOCK: u64 = 1 << 20;
-/// Chunks in which a channel has fewer bytes in a row than this are read whole, neighbours included: a page of the disk is read anyhow.
+/// Chunks in which a channel has fewer bytes in a row than this are read whole, neighbours included: a page of the disk
+/// is read anyhow.
 const WORTH_A_READ: u64 = 4096;
 
 /// Where a channel's samples come from.

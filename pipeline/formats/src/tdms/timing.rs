@@ -23,7 +23,8 @@ struct Anchor {
 }
 
 impl Timing {
-    /// Takes in what the properties say before `sample` is added. True if the samples from there on do not continue those before.
+    /// Takes in what the properties say before `sample` is added. True if the samples from there on do not continue
+    /// those before.
     pub(super) fn breaks_at(&mut self, sample: usize, properties: &Properties) -> bool {
         let now = Anchor {
             sample,
@@ -62,7 +63,7 @@ impl Anchor {
         let later_s = match (self.start, before.start) {
             (Some(now), Some(then)) => now.seconds_since(then),
             (None, None) => 0.0,
-            // One of the two is not known: the axis begins anew.
+            // One of the two is not known: the axis begins again.
             _ => return true,
         } + (self.offset_s - before.offset_s);
         if later_s == 0.0 {

@@ -34,7 +34,7 @@ struct Walk {
     plan: Plan,
     /// Whether the plan's chunks are interleaved.
     interleaved: bool,
-    /// Whether the plan has to be made anew.
+    /// Whether the plan has to be made again.
     changed: bool,
     extents_left: u64,
     /// Segments, apart from a cut off last one, whose data are no whole number of chunks.
@@ -44,7 +44,8 @@ struct Walk {
 
 /// Reads all metadata.
 pub(super) fn walk(file: &File, file_bytes: u64) -> Result<Recorded, FormatError> {
-    // Each stretch of samples takes at least a byte of the file, so that a file that needs more of them is made to fill the memory.
+    // Each stretch of samples takes at least a byte of the file, so that a file that needs more of them is made to fill
+    // the memory.
     let mut walk = Walk { extents_left: file_bytes, ..Walk::default() };
     let mut first = None;
     let mut at = 0;
@@ -207,8 +208,8 @@ impl Walk {
     }
 }
 
-/// Bytes of each block in a last, smaller chunk of `rest` bytes: what there is, one block after the other, where the writer was interrupted;
-/// otherwise it wrote fewer values of every channel, in proportion.
+/// Bytes of each block in a last, smaller chunk of `rest` bytes: what there is, one block after the other, where the
+/// writer was interrupted; otherwise it wrote fewer values of every channel, in proportion.
 fn rest_sizes(plan: &Plan, rest: u64, in_turn: bool) -> Vec<u64> {
     let mut left = rest;
     let in_turn = in_turn || plan.entries.iter().any(|e| e.scaler.is_some());

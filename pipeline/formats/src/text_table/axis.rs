@@ -17,7 +17,8 @@ const TOLERANCE: f64 = 1e-6;
 /// Coarsest printing, in steps, that still shows a lost sample beyond doubt.
 const COARSEST: f64 = 0.25;
 
-/// Looks at the column against a straight line of the given step, or of the one its ends give. Errors: why it is not even.
+/// Looks at the column against a straight line of the given step, or of the one its ends give. Errors: why it is not
+/// even.
 pub(super) fn even(column: &Column, stated_step: Option<f64>) -> Result<Even, String> {
     let times = &column.values;
     let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return Err("it is empty".to_owned()) };

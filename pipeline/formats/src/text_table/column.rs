@@ -18,7 +18,8 @@ pub(super) struct Column {
     pub(super) missing: usize,
 }
 
-/// How many numbers, gaps included, may still be kept: as many as the file has bytes. Rows that lack most of their fields need more; those are no table.
+/// How many numbers, gaps included, may still be kept: as many as the file has bytes. Rows that lack most of their
+/// fields need more; those are no table.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Budget(pub(super) u64);
 

@@ -110,7 +110,8 @@ fn no_end(at: u64) -> FormatError {
     fail::at(at, format!("a header begins here that does not end, {END} was wanted"), fail::COPY_AGAIN)
 }
 
-/// A date `2016/08/23` and a time `10:45:47.035`: ISO 8601 (no zone: the file has none), whole seconds since 1970 and the rest.
+/// A date `2016/08/23` and a time `10:45:47.035`: ISO 8601 (no zone: the file has none), whole seconds since 1970 and
+/// the rest.
 pub(super) fn moment(date: &str, time: &str) -> Option<(String, i64, f64)> {
     let mut parts = date.split(['/', '-', '.']).map(|p| p.parse::<i64>().ok());
     let (year, month, day) = (parts.next()??, parts.next()??, parts.next()??);

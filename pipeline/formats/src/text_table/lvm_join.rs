@@ -12,7 +12,8 @@ use std::sync::Arc;
 /// Sections may be thousands; so many remarks of them are read.
 const REMARKS: usize = 40;
 
-/// What columns of several sections must share to be one channel: title, its number among those of that title in the section, unit and step.
+/// What columns of several sections must share to be one channel: title, its number among those of that title in the
+/// section, unit and step.
 ///
 /// The step is given to seven digits: one that is estimated from an X column differs a little from section to section.
 type Key = (String, usize, String, Option<String>);
@@ -152,7 +153,8 @@ fn is_time(section: &Section, at: usize) -> bool {
     section.tags.field("X_Dimension", at).is_none_or(|dimension| dimension == "Time")
 }
 
-/// Seconds between samples: `Delta_X` as far as the X column agrees, otherwise that of the X column; none if it is no time or not even.
+/// Seconds between samples: `Delta_X` as far as the X column agrees, otherwise that of the X column; none if it is no
+/// time or not even.
 fn step(
     section: &Section,
     at: usize,

@@ -1,17 +1,24 @@
 //! Tables of text: LabVIEW measurement files (LVM) and plain CSV, TSV, DAT, TXT.
 //!
-//! A channel per column; its location is the column's title (`column_3` without one, `Title[2]` for the second of that title).
+//! A channel per column; its location is the column's title (`column_3` without one, `Title[2]` for the second of that
+//! title).
 //! The text is parsed once, line by line, when the file is opened, and kept as float64.
-//! Empty fields and fields that are no number are NaN where a number follows in their column, with a remark that counts them; at a column's end they are no samples.
+//! Empty fields and fields that are no number are NaN where a number follows in their column, with a remark that counts
+//! them; at a column's end they are no samples.
 //!
-//! **LVM**: sections begin with a header that ends in `***End_of_Header***`. Columns of the same title, unit and `Delta_X` are joined over the sections;
-//! a section begins behind a gap unless its start (`Date`, `Time`, `X0`) follows from the one before. The rate is 1 / `Delta_X` as long as the X column, if there is one, agrees.
-//! An X column that does not run evenly is a channel of its own.
+//! **LVM**: sections begin with a header that ends in `***End_of_Header***`. Columns of the same title, unit and
+//! `Delta_X` are joined over the sections; a section begins behind a gap unless its start (`Date`, `Time`, `X0`)
+//! follows from the one before. The rate is 1 / `Delta_X` as long as the X column, if there is one, agrees. An X column
+//! that does not run evenly is a channel of its own.
 //!
-//! **Plain**: the delimiter (tab, semicolon, comma, blanks) and the decimal sign are those that make most fields numbers.
-//! Titles and units (`Deflection (V)`, `[V]`, or a row of units) come from the lines above the numbers, comments (`#`, `%`) included.
-//! A column titled as time that runs evenly gives the sample rate and is no channel; otherwise it is one and there is no rate.
-//! Evenly: each time deviates from the straight line by at most 1e-6 of a step plus one unit of the last place it is printed to.
+//! **Plain**: the delimiter (tab, semicolon, comma, blanks) and the decimal sign are those that make most fields
+//! numbers.
+//! Titles and units (`Deflection (V)`, `[V]`, or a row of units) come from the lines above the numbers, comments (`#`,
+//! `%`) included.
+//! A column titled as time that runs evenly gives the sample rate and is no channel; otherwise it is one and there is
+//! no rate.
+//! Evenly: each time deviates from the straight line by at most 1e-6 of a step plus one unit of the last place it is
+//! printed to.
 //!
 //! Source: National Instruments, "Specification for the LabVIEW Measurement File (.lvm)", ni.com/tutorial/4139/en.
 

@@ -74,7 +74,7 @@ pub(super) fn sniff(lines: &[&str]) -> Option<Sniffed> {
         return None;
     }
     let widths: Vec<Option<usize>> = lines.iter().map(|line| dialect.is_row(line)).collect();
-    // The last row looked at is far behind any header; a cut off one is left out by whoever asks.
+    // The last row looked at is far behind any header; a cut off one is left out by the caller.
     let columns = most_frequent(widths.iter().flatten().copied())?;
     let first_row = widths.iter().position(|w| *w == Some(columns))?;
     let comma_pairs = dialect == Dialect { delimiter: ',', decimal: '.' } && columns == 2;

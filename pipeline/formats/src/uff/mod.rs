@@ -1,13 +1,16 @@
-//! Universal File Format: dataset 58 (functions at nodal degrees of freedom) as text and 58b, the same with binary data.
+//! Universal File Format: dataset 58 (functions at nodal degrees of freedom) as text and 58b, the same with binary
+//! data.
 //!
-//! - Real functions, single or double precision, are channels: the location is the response's name (`Mic 01`) or node and direction (`12+X`), with `[2]` for the second of a name.
-//! - An even abscissa that is time gives the sample rate. Over another quantity (a spectrum over frequency) there is none: a remark states the abscissa.
+//! - Real functions, single or double precision, are channels: the location is the response's name (`Mic 01`) or node
+//!   and direction (`12+X`), with `[2]` for the second of a name.
+//! - An even abscissa that is time gives the sample rate. Over another quantity (a spectrum over frequency) there is
+//!   none: a remark states the abscissa.
 //! - An uneven abscissa is a channel of its own, `…/abscissa`; then there is no rate, and a remark.
 //! - Complex functions and other datasets are no channels: a remark says so.
 //! - The data of 58b are read as they are asked for; text is parsed on the first read and kept.
 //!
-//! Source: Structural Dynamics Research Corporation, "Universal Dataset Number 58" and University of Cincinnati SDRL, "The Binary 58 Universal File Format",
-//! www.sdrl.uc.edu/sdrl/referenceinfo/universalfileformats.
+//! Source: Structural Dynamics Research Corporation, "Universal Dataset Number 58" and University of Cincinnati SDRL,
+//! "The Binary 58 Universal File Format", www.sdrl.uc.edu/sdrl/referenceinfo/universalfileformats.
 
 mod fixed;
 mod function;

@@ -66,7 +66,8 @@ impl Text {
         Ok(numbers)
     }
 
-    /// The numbers of a line: at fixed columns (where they may touch), or else between blanks (as some programs write them).
+    /// The numbers of a line: at fixed columns (where they may touch), or else between blanks (as some programs write
+    /// them).
     fn line(&self, line: &[u8]) -> Option<Vec<f64>> {
         let line = line.trim_ascii_end();
         let mut rest = line;

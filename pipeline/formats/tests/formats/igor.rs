@@ -355,7 +355,8 @@ fn a_file_that_grows_after_opening_is_noticed() {
 
 #[test]
 fn small_real_waves_are_as_igor2_reads_them() {
-    // igor2 0.5.15: binarywave.load(f)["wave"]["wData"] is [5, 4, 3, 2, 1] in each; dates by datetime(1904, 1, 1) + creationDate
+    // igor2 0.5.15: binarywave.load(f)["wave"]["wData"] is [5, 4, 3, 2, 1] in each; dates by datetime(1904, 1, 1) +
+    // creationDate
     let cases = [
         ("mac-version5", "/version5", "float32", "Igor binary wave 5, big-endian", "1999-02-07T17:09:40"),
         ("win-version5", "/version5", "float32", "Igor binary wave 5, little-endian", "1999-02-07T17:09:40"),

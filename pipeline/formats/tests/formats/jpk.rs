@@ -1,4 +1,5 @@
-//! JPK force curves, built byte by byte; there are no free real ones. Values are compared with afmformats' reading of the same bytes.
+//! JPK force curves, built byte by byte; there are no free real ones. Values are compared with afmformats' reading of
+//! the same bytes.
 
 use std::io::Write;
 use std::path::Path;
@@ -58,20 +59,25 @@ fn deflection(prefix: &str, encoder: &str) -> String {
     let unit = |key: &str, unit: &str| format!("{prefix}{key}.unit.type=metric-unit\n{prefix}{key}.unit.unit={unit}\n");
     let scaling = |key: &str, multiplier: &str, offset: &str, u: &str| {
         format!(
-            "{prefix}{key}.type=linear\n{prefix}{key}.style=offsetmultiplier\n{prefix}{key}.offset={offset}\n{prefix}{key}.multiplier={multiplier}\n{}",
+            "{prefix}{key}.type=linear\n{prefix}{key}.style=offsetmultiplier\n{prefix}{key}.offset={offset}\n\
+             {prefix}{key}.multiplier={multiplier}\n{}",
             unit(key, u)
         )
     };
     let slot = |name: &str, base: &str| {
         let key = format!("{prefix}conversion-set.conversion.{name}");
         format!(
-            "{key}.name={name}\n{key}.defined=true\n{key}.type=simple\n{key}.base-calibration-slot={base}\n{key}.calibration-slot={name}\n"
+            "{key}.name={name}\n{key}.defined=true\n{key}.type=simple\n{key}.base-calibration-slot={base}\n\
+             {key}.calibration-slot={name}\n"
         )
     };
     let set = format!("{prefix}conversion-set.conversion");
     [
         scaling(&format!("{encoder}.scaling"), "3.0921021713588157E-4", "-0.00728873489143207", "V"),
-        format!("{set}s.list=distance force\n{set}s.default=force\n{set}s.base=volts\n{set}.volts.name=Volts\n{set}.volts.defined=false\n"),
+        format!(
+            "{set}s.list=distance force\n{set}s.default=force\n{set}s.base=volts\n{set}.volts.name=Volts\n\
+            {set}.volts.defined=false\n"
+        ),
         slot("distance", "volts"),
         scaling("conversion-set.conversion.distance.scaling", "7.000143623002982E-8", "1E-9", "m"),
         slot("force", "distance"),
@@ -90,9 +96,12 @@ fn height(prefix: &str, encoder: &str) -> String {
 
 fn segment(style: &str, points: usize, duration: &str) -> String {
     format!(
-        "#comment\nforce-segment-header.num-points={points}\nforce-segment-header.duration={duration}\nforce-segment-header.settings.style={style}\n\
-         force-segment-header.time-stamp=2016-02-05 13\\:27\\:32 +0100\nforce-segment-header.approach-id=a\nforce-segment-header.settings.segment-settings.duration={duration}\n\
-         force-segment-header.settings.segment-settings.z-start=1.0\nforce-segment-header.settings.segment-settings.z-end=2.0\nchannels.list=vDeflection height\n"
+        "#comment\nforce-segment-header.num-points={points}\nforce-segment-header.duration={duration}\n\
+         force-segment-header.settings.style={style}\n\
+         force-segment-header.time-stamp=2016-02-05 13\\:27\\:32 +0100\nforce-segment-header.approach-id=a\n\
+         force-segment-header.settings.segment-settings.duration={duration}\n\
+         force-segment-header.settings.segment-settings.z-start=1.0\n\
+         force-segment-header.settings.segment-settings.z-end=2.0\nchannels.list=vDeflection height\n"
     )
 }
 
@@ -107,7 +116,8 @@ fn integers() -> Vec<u8> {
     INTEGERS.iter().flat_map(|v| v.to_be_bytes()).collect()
 }
 
-const GENERAL: &str = "file-format-version=0.13\nforce-scan-series.header.position-index=0\nforce-scan-series.description.instrument=none\n";
+const GENERAL: &str = "file-format-version=0.13\nforce-scan-series.header.position-index=0\n\
+    force-scan-series.description.instrument=none\n";
 
 /// A file whose segments hold all their properties.
 fn version_1(deflate: bool) -> Vec<u8> {
@@ -115,7 +125,8 @@ fn version_1(deflate: bool) -> Vec<u8> {
     for (number, style) in [(0, "extend"), (1, "retract")] {
         let channel = |name: &str, kind: &str, encoder: &str| {
             format!(
-                "channel.{name}.data.file.name=channels/{name}.dat\nchannel.{name}.data.type={kind}\nchannel.{name}.data.encoder.type={encoder}\n"
+                "channel.{name}.data.file.name=channels/{name}.dat\nchannel.{name}.data.type={kind}\n\
+                 channel.{name}.data.encoder.type={encoder}\n"
             )
         };
         let header = segment(style, 5, "0.25")
@@ -244,7 +255,8 @@ fn every_encoder_is_read_big_endian() {
 
 #[test]
 fn what_is_no_channel_of_numbers_is_remarked() {
-    let scaling = "channel.x.data.encoder.type=signedshort\nchannel.x.data.encoder.scaling.multiplier=2\nchannel.x.data.encoder.scaling.offset=1\n";
+    let scaling = "channel.x.data.encoder.type=signedshort\nchannel.x.data.encoder.scaling.multiplier=2\n\
+        channel.x.data.encoder.scaling.offset=1\n";
     let remark =
         |properties: String, data: &[u8]| open_bytes::<JpkForce>("c.jpk-force", &one(&properties, data)).1.unwrap();
     let cases = [
@@ -271,7 +283,8 @@ fn what_is_no_channel_of_numbers_is_remarked() {
 
     let set = "channel.x.conversion-set.conversion";
     let circle = format!(
-        "{scaling}{set}s.base=volts\n{set}s.list=a b c\n{set}.b.defined=false\n{set}.c.scaling.type=cubic\n{set}.a.base-calibration-slot=a\n{set}.a.scaling.multiplier=2\n{set}.a.scaling.offset=0\n"
+        "{scaling}{set}s.base=volts\n{set}s.list=a b c\n{set}.b.defined=false\n{set}.c.scaling.type=cubic\n\
+         {set}.a.base-calibration-slot=a\n{set}.a.scaling.multiplier=2\n{set}.a.scaling.offset=0\n"
     );
     let contents = remark(circle, &[0, 1, 0, 2]);
     assert_eq!(contents.channels.len(), 1);
@@ -329,7 +342,8 @@ fn damaged_archives_never_panic() {
     }
 }
 
-/// afmformats 0.18.7: `JPKReader(path).get_data("force", 0, segment)` and `"height (piezo)"`, the same for all three files.
+/// afmformats 0.18.7: `JPKReader(path).get_data("force", 0, segment)` and `"height (piezo)"`, the same for all three
+/// files.
 const AFMFORMATS: [(&str, [f64; 5]); 4] = [
     ("/segments/0/vDeflection/force", FORCE),
     ("/segments/1/vDeflection/force", FORCE),

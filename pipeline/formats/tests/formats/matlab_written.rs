@@ -17,7 +17,8 @@ fn picoscope_exports_have_their_rate_from_tinterval() {
         assert!(remarked(&contents, "/Length is the single number 400"));
         assert_eq!(remarked(&contents, "/Version is the text \"2.3.1\""), name != "pico_v4.mat");
         let samples_a = samples(a);
-        // float(loadmat(f)['A'].astype('f8').sum()), [3, 0] and ['B'][399, 0]; the sum in another order: 400 roundings of 1e-16.
+        // float(loadmat(f)['A'].astype('f8').sum()), [3, 0] and ['B'][399, 0]; the sum in another order: 400 roundings
+        // of 1e-16.
         assert!((samples_a.iter().sum::<f64>() - 0.917822778574191).abs() < 1e-12);
         assert_eq!(samples_a[3], 0.4155718684196472);
         assert_eq!(samples(channel(&contents, "/B"))[399], 1.308494210243225);

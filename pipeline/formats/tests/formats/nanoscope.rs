@@ -26,7 +26,9 @@ fn file(force: &str, list: &str, data: &[u8]) -> Vec<u8> {
 }
 
 const FORCE: &str = "\\Scan rate: 2\r\n\\Forward vel.: 30\r\n\\Reverse vel.: 10\r\n";
-const LIST: &str = "\\Bytes/pixel: 2\r\n\\Samps/line: 3 2\r\n\\Spring Constant: 0.5\r\n\\@4:Image Data: S [DeflectionError] \"Deflection Error\"\r\n\\@4:Z scale: V [Sens. DeflSens] (0.0003750000 V/LSB) 2.5 V\r\n";
+const LIST: &str = "\\Bytes/pixel: 2\r\n\\Samps/line: 3 2\r\n\\Spring Constant: 0.5\r\n\
+    \\@4:Image Data: S [DeflectionError] \"Deflection Error\"\r\n\
+    \\@4:Z scale: V [Sens. DeflSens] (0.0003750000 V/LSB) 2.5 V\r\n";
 
 fn words(values: &[i16]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
@@ -133,7 +135,8 @@ fn what_is_no_force_curve_is_refused_with_a_reason() {
     assert!(refusal(&sound[..400]).problem.contains("no `\\*File list end`"));
     assert!(refusal(b"?*File list").problem.contains("found `?*File list`"));
     assert!(refusal(b"").problem.contains("found ``"));
-    let image = "\\*File list\n\\*Ciao image list\n\\Data offset: 4\n\\Data length: 2\n\\Samps/line: 512\n\\Scan Rate: 0.98\n\\*File list end\n";
+    let image = "\\*File list\n\\*Ciao image list\n\\Data offset: 4\n\\Data length: 2\n\\Samps/line: 512\n\
+        \\Scan Rate: 0.98\n\\*File list end\n";
     let image = refusal(image.as_bytes());
     assert!(image.problem.contains("1 images of 512 samples a line at 0.98 lines per second") && image.help.is_some());
     assert!(
@@ -162,8 +165,9 @@ fn a_header_without_data_is_refused() {
     );
 }
 
-/// Location, sum and samples 0, 1, 255, 511 of the codes. By `struct.unpack("<1024h", ...)` at the header's data offsets 40960 and
-/// 43008, the first 512 turned round; SciFiReaders 0.12.7 (`BrukerAFMReader(path).read()`) gives the same sums and, in stored order, samples.
+/// Location, sum and samples 0, 1, 255, 511 of the codes. By `struct.unpack("<1024h", ...)` at the header's data
+/// offsets 40960 and 43008, the first 512 turned round; SciFiReaders 0.12.7 (`BrukerAFMReader(path).read()`) gives the
+/// same sums and, in stored order, samples.
 const REAL: [(&str, f64, [f64; 4]); 4] = [
     ("/DeflectionError/extend", -10620.0, [-27.0, -26.0, -30.0, 537.0]),
     ("/DeflectionError/retract", -16897.0, [478.0, 423.0, -29.0, -26.0]),
@@ -183,7 +187,8 @@ fn a_real_force_curve_is_as_its_header_says() {
         assert_eq!(codes.iter().sum::<f64>(), sum, "{location}");
         assert_eq!([0, 1, 255, 511].map(|i| codes[i]), samples, "{location}");
         assert_eq!((c.samples, c.unit.as_str(), c.scale_factor, c.stored_as), (512, "V", 0.000375, "int16"));
-        // (512 + 512) samples * 1.02796 ramps per second; the header's `Effective BW: 1052.63` is the same rate to 6 digits
+        // (512 + 512) samples * 1.02796 ramps per second; the header's `Effective BW: 1052.63` is the same rate to 6
+        // digits
         near(c.sample_rate_hz.unwrap(), 1052.63104, 1e-12); // rounding
         near(c.sample_rate_hz.unwrap(), 1052.63, 5e-6);
     }

@@ -99,7 +99,8 @@ pub fn remarked(contents: &Contents, text: &str) -> bool {
     contents.remarks.iter().any(|remark| remark.contains(text))
 }
 
-/// The sum against the reference's. Summing in another order rounds otherwise: by at most n eps of the sum of magnitudes.
+/// The sum against the reference's. Summing in another order rounds otherwise: by at most n eps of the sum of
+/// magnitudes.
 pub fn assert_sum(values: &[f64], expected: f64) {
     let magnitudes: f64 = values.iter().map(|v| v.abs()).sum();
     let tolerance = values.len() as f64 * f64::EPSILON * magnitudes;
@@ -146,8 +147,8 @@ impl Random {
     }
 }
 
-/// Opens and reads cut and damaged copies of a file: whatever comes out, it must come without panic, soon, and be no longer than
-/// `most_samples` in all.
+/// Opens and reads cut and damaged copies of a file: whatever comes out, it must come without panic, soon, and be no
+/// longer than `most_samples` in all.
 pub fn survive<F: Format>(name: &str, sound: &[u8], cuts: usize, flips: usize, most_samples: usize) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);

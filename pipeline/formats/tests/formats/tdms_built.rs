@@ -217,7 +217,7 @@ fn timed(start: i64, fraction: u64) -> Vec<u8> {
 
 #[test]
 fn a_start_that_does_not_follow_is_a_gap() {
-    // Continues after 4 samples of 0.25 s; is then repeated; begins anew 10 s later.
+    // Continues after 4 samples of 0.25 s; is then repeated; begins again 10 s later.
     let bytes = [timed(1000, 0), timed(1001, 0), timed(1001, 0), timed(1013, 1 << 63)].concat();
     let found = contents("gaps", &bytes);
     let a = channel(&found, "/g/a");

@@ -1,4 +1,5 @@
-//! Real TDMS files against npTDMS 1.13.0: `TdmsFile.read(path)`, then per channel `len(c)`, `float(np.sum(c[:], dtype=float))`, `c[0]`, `c[1]`, `c[len // 2]`, `c[-1]` and `c.properties`.
+//! Real TDMS files against npTDMS 1.13.0: `TdmsFile.read(path)`, then per channel `len(c)`,
+//! `float(np.sum(c[:], dtype=float))`, `c[0]`, `c[1]`, `c[len // 2]`, `c[-1]` and `c.properties`.
 
 use crate::support::{assert_sum, channel, locations, real, values};
 use afmid_formats::tdms::Tdms;

@@ -14,7 +14,9 @@ fn error(name: &str, bytes: &[u8]) -> FormatError {
 
 type Expected<'a> = (&'a str, &'a str, Option<f64>, usize, f64, f64);
 
-/// Location, unit, rate, samples, sum and first value. The reference: `lvm_read.read(path, read_from_pickle=False, dump_file=False)[0]`, of it `np.nansum(s['data'], axis=0)` and the header.
+/// Location, unit, rate, samples, sum and first value. The reference:
+/// `lvm_read.read(path, read_from_pickle=False, dump_file=False)[0]`, of it `np.nansum(s['data'], axis=0)` and the
+/// header.
 fn real_lvm(name: &str, started_at: &str, channels: &[Expected]) -> Option<Contents> {
     let found = TextTable::open(&real(&format!("lvm/{name}"))?).unwrap();
     assert_eq!(found.started_at, started_at);
@@ -91,7 +93,8 @@ fn lvm_with_empty_fields() {
     }
 }
 
-const LVM_HEAD: &str = "LabVIEW Measurement\t\r\nWriter_Version\t2\r\nSeparator\tTab\r\nDecimal_Separator\t.\r\nMulti_Headings\tYes\r\nX_Columns\tNo\r\n***End_of_Header***\t\r\n\r\n";
+const LVM_HEAD: &str = "LabVIEW Measurement\t\r\nWriter_Version\t2\r\nSeparator\tTab\r\nDecimal_Separator\t.\r\n\
+    Multi_Headings\tYes\r\nX_Columns\tNo\r\n***End_of_Header***\t\r\n\r\n";
 
 fn section(time: &str, x0: &str, rows: &str) -> String {
     let head = format!("Channels\t2\t\t\nSamples\t2\t2\t\nDate\t2020/01/01\t2020/01/01\t\nTime\t{time}\t{time}\t\n");

@@ -80,7 +80,8 @@ fn binary_id(order: u8, bytes: usize) -> String {
 fn a_sound_recorded_as_58b() {
     let Some(path) = real("uff/Sample_UFF58b_bin.uff") else { return };
     let found = Uff::open(&path).unwrap();
-    // pyuff.UFF(path).read_sets(): id3, rsp_ent_name, abscissa_inc, ordinate_axis_units_lab; data.sum(), data[0], [1], [39646], [-1].
+    // pyuff.UFF(path).read_sets(): id3, rsp_ent_name, abscissa_inc, ordinate_axis_units_lab; data.sum(), data[0], [1],
+    // [39646], [-1].
     assert_eq!(
         (found.format.as_str(), found.started_at.as_str()),
         ("Universal File Format, dataset 58b", "2016-04-18T13:49:58")

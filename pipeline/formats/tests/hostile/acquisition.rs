@@ -1,4 +1,5 @@
-//! Damaged files: cut at some hundred places and with random bytes flipped. Never a panic, never much memory, always an end.
+//! Damaged files: cut at some hundred places and with random bytes flipped. Never a panic, never much memory, always an
+//! end.
 
 use crate::support::{self, Random, peak_bytes};
 use crate::tdms_file::*;
@@ -21,7 +22,8 @@ fn read_all<F: Format>(path: &Path, bytes: &[u8]) {
             let _ = channel.source.read(channel.samples / 2, 1);
         }
     }
-    // A file of this size takes milliseconds; a loop that does not end, or one that goes over all pairs of something, would show.
+    // A file of this size takes milliseconds; a loop that does not end, or one that goes over all pairs of something,
+    // would show.
     assert!(began.elapsed() < Duration::from_secs(5), "{} took {:?}", path.display(), began.elapsed());
 }
 
@@ -49,7 +51,8 @@ fn torment<F: Format>(name: &str, whole: &[u8], flips: usize) {
         read_all::<F>(&path, &copy);
     }
     let _ = std::fs::remove_file(path);
-    // This process's files have 3 MB at most, each with copies and a test's own buffers; one test makes 64 MiB of zeros.
+    // This process's files have 3 MB at most, each with copies and a test's own buffers; one test makes 64 MiB of
+    // zeros.
     assert!(peak_bytes() < 400 << 20, "{name}: {} MiB", peak_bytes() >> 20);
 }
 

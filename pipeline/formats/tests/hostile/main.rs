@@ -1,4 +1,5 @@
-//! Whatever the bytes: no panic, no endless loop, little memory. A process of its own, since it looks at its peak memory.
+//! Whatever the bytes: no panic, no endless loop, little memory. A process of its own, since it looks at its peak
+//! memory.
 
 mod acquisition;
 mod arrays;

@@ -18,7 +18,8 @@ pub struct Check {
     pub outcome: Result<String, String>,
 }
 
-/// Tries a plugin, from its start to its end: whoever types its command agrees to it. What cannot be tried because of an earlier failure is not listed.
+/// Tries a plugin, from its start to its end. To type its command is to agree to it. What cannot be tried because of an
+/// earlier failure is not listed.
 pub fn check(plugins: &Plugins, command: &[String], folder: &Path, timeout_s: f64) -> Vec<Check> {
     let name = command.last().map_or("plugin", |word| word.rsplit('/').next().unwrap_or(word));
     let mut steps = steps::Steps::default();

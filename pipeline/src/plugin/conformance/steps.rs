@@ -39,8 +39,8 @@ impl Steps {
     }
 
     pub(super) fn wrong(&mut self, name: &'static str, error: &PluginError) {
-        let (told, help) = (error.told(&self.name), &error.help);
-        self.checks.push(Check { name, outcome: Err(format!("{told}\n  help: {help}")) });
+        let (message, help) = (error.message_for(&self.name), &error.help);
+        self.checks.push(Check { name, outcome: Err(format!("{message}\n  help: {help}")) });
     }
 
     fn step<T>(&mut self, name: &'static str, done: Result<(T, String), PluginError>) -> Option<T> {
@@ -87,7 +87,7 @@ impl Steps {
         }
         if let Some(outputs) = made.first()
             && (self.step("it gives the same bits twice", repeated(&mut session, row, first, outputs)).is_none()
-                || self.step("a new process gives the same bits", anew(row, first, outputs)).is_none())
+                || self.step("a new process gives the same bits", in_a_new_process(row, first, outputs)).is_none())
         {
             return;
         }
@@ -193,7 +193,7 @@ fn repeated(session: &mut Session, row: &Row, trial: &Trial, before: &Ports) -> 
     same(row, before, &once(session, row, trial)?)
 }
 
-fn anew(row: &Row, trial: &Trial, before: &Ports) -> Seen<()> {
+fn in_a_new_process(row: &Row, trial: &Trial, before: &Ports) -> Seen<()> {
     let mut session = Session::start(&row.candidate, &row.pool)?;
     session.introduction()?;
     let outputs = once(&mut session, row, trial)?;

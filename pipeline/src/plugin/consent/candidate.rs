@@ -8,7 +8,8 @@ use crate::plugin::error::PluginError;
 use crate::plugin::launch::Launch;
 use crate::recording::InputFiles;
 
-/// What a plugin would run, with the hashes of the files that its command names: what consent is given for, and what belongs to a cache key.
+/// What a plugin would run, with the hashes of the files that its command names: what consent is given for, and what
+/// belongs to a cache key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Candidate {
     pub(in crate::plugin) launch: Launch,
@@ -74,7 +75,8 @@ impl Candidate {
         &self.files
     }
 
-    /// One hash of folder, command, environment and files: whatever of them changes, it is another one. Its name and its time limit are none of it.
+    /// One hash of folder, command, environment and files: whatever of them changes, it is another one. Its name and
+    /// its time limit are none of it.
     pub fn seal(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         let mut part = |bytes: &[u8]| {
@@ -99,7 +101,7 @@ impl Candidate {
     }
 
     /// Its command and folder in a line, for messages.
-    pub(in crate::plugin) fn told(&self) -> String {
+    pub(in crate::plugin) fn would_run(&self) -> String {
         let variables = self.environment().iter().map(|(name, value)| format!("{name}={value}"));
         let words = variables.chain([self.program().display().to_string()]).chain(self.arguments().iter().cloned());
         // a word with spaces or control characters must not look like others
@@ -107,8 +109,8 @@ impl Candidate {
         format!("it would run `{}` in {}", words.map(word).collect::<Vec<_>>().join(" "), self.folder().display())
     }
 
-    /// What of it belongs to a cache key: every argument, the variables, and the files by name and bytes. Folders do not: a plugin that was moved
-    /// with its config is the same.
+    /// What of it belongs to a cache key: every argument, the variables, and the files by name and bytes. Folders do
+    /// not: a plugin that was moved with its config is the same.
     pub(in crate::plugin) fn key_parts(&self) -> Vec<String> {
         let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let files = self.files.iter().map(|file| format!("{} blake3:{}", name(&file.path), file.blake3));
@@ -131,7 +133,8 @@ fn plain(c: char) -> bool {
     c.is_alphanumeric() || "/._-+,:@%=".contains(c)
 }
 
-/// The file that an argument names, as it is or after its `=`, or the folder that Python would run: one with a `__main__.py`.
+/// The file that an argument names, as it is or after its `=`, or the folder that Python would run: one with a
+/// `__main__.py`.
 fn named(folder: &Path, argument: &str) -> Option<PathBuf> {
     let value = argument.split_once('=').map(|(_, value)| value);
     let names = std::iter::once(argument).chain(value).filter(|name| !name.is_empty());
@@ -141,8 +144,8 @@ fn named(folder: &Path, argument: &str) -> Option<PathBuf> {
 /// Files of a plugin's folder: more is no program.
 const MOST_FILES: usize = 1000;
 
-/// The files of a folder that is run, by name, but for what the interpreter keeps there. Errors: too many; one cannot be
-/// listed.
+/// The files of a folder that is run, by name, but for what the interpreter keeps there. Errors: too many; one cannot
+/// be listed.
 fn files_below(folder: &Path, into: &mut Vec<PathBuf>) -> Result<(), PluginError> {
     let failed = |error: std::io::Error| {
         PluginError::new(

@@ -8,11 +8,12 @@ use super::Candidate;
 pub enum Rule {
     /// None, whatever was agreed to: what they are is known as far as it is remembered.
     Never,
-    /// Those that are trusted, those with one of these seals, and those that `ask` says yes to: it is asked once of each.
+    /// Those that are trusted, those with one of these seals, and those that `ask` says yes to: it is asked once of
+    /// each.
     Agreed {
         /// See [`Candidate::seal`].
         seals: BTreeSet<String>,
-        /// Asks whoever sits before the terminal.
+        /// Asks the user at the terminal.
         ask: Option<Ask>,
     },
     /// All.

@@ -19,9 +19,11 @@ const TITLE: &str = "afmid consent 1";
 /// The largest file that is read: a description has at most 16 MiB.
 const MOST_BYTES: u64 = 64 << 20;
 
-/// The folder of what a user agreed to. It must be none that comes with what others send: neither a project's nor the cache.
+/// The folder of what a user agreed to. It must be none that comes with what others send: neither a project's nor the
+/// cache.
 ///
-/// A file lies under its plugin's seal ([`Candidate::seal`]) and ends with the hash of its own text: one that is damaged, renamed or cut short is no consent.
+/// A file lies under its plugin's seal ([`Candidate::seal`]) and ends with the hash of its own text: one that is
+/// damaged, renamed or cut short is no consent.
 #[derive(Debug, Clone)]
 pub struct Trust {
     folder: PathBuf,

@@ -189,7 +189,7 @@ fn record(record: &Record) -> Result<SentRecord> {
         fill_code: channel.fill_code,
     };
     let file = std::path::absolute(&record.path).unwrap_or_else(|_| record.path.clone());
-    let told = |error: serde_json::Error| StoreError::new(format!("how a record is read: {error}"));
+    let fail = |error: serde_json::Error| StoreError::new(format!("how a record is read: {error}"));
     Ok(SentRecord {
         name: record.name.clone(),
         file: file.display().to_string(),
@@ -198,7 +198,7 @@ fn record(record: &Record) -> Result<SentRecord> {
         sample_rate_hz: record.sample_rate_hz,
         started_at: record.started_at.clone(),
         first_sample: record.first_sample,
-        reading: serde_json::to_value(&record.reading).map_err(told)?,
+        reading: serde_json::to_value(&record.reading).map_err(fail)?,
         channels: record.channels.iter().map(channel).collect(),
     })
 }

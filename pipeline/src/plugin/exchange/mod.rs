@@ -1,7 +1,7 @@
 //! The exchange layout: numbers in an HDF5 file, words in the line.
 //!
-//! Every HDF5 library writes plain datasets of numbers; few write attributes, texts and dimension scales alike (Octave writes no attributes at
-//! all). So a file holds nothing else, and the line says what each dataset is.
+//! Every HDF5 library writes plain datasets of numbers; few write attributes, texts and dimension scales alike (Octave
+//! writes no attributes at all). So a file holds nothing else, and the line says what each dataset is.
 
 mod give;
 mod numbers;

@@ -71,9 +71,10 @@ impl<'a> Numeric<'a> {
         };
         let dataset = read::dataset(file, path).map_err(|_| "is not in the output file".to_owned())?;
         let found = dataset.shape();
-        // axes of length 1 are not told apart: Octave has no arrays of one dimension
+        // axes of length 1 are not distinguished: Octave has no arrays of one dimension
         let long = |shape: &[usize]| shape.iter().copied().filter(|&length| length != 1).collect::<Vec<usize>>();
-        // all values in one row are taken too: reversing axes for each dataset is more than a small language should have to do
+        // all values in one row are taken too: reversing axes for each dataset is more than a small language should
+        // have to do
         let flat = long(&found) == long(&[shape.iter().product()]);
         if !flat && long(&found) != long(shape) {
             let transposed = long(&found).iter().rev().eq(long(shape).iter()) && found.len() > 1;

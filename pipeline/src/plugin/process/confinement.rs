@@ -1,7 +1,8 @@
-//! What a plugin may do to the rest of the machine: write to its own folder and /dev/null, no TCP, and signals to its own processes alone: it could
-//! otherwise end the host that ends it. Linux enforces it (Landlock), as far as it can.
+//! What a plugin may do to the rest of the machine: write to its own folder and /dev/null, no TCP, and signals to its
+//! own processes alone: it could otherwise end the host that ends it. Linux enforces it (Landlock), as far as it can.
 //!
-//! Reading, UDP, named sockets, and what is no byte of another file (its permissions, owner, times, extended attributes) are not confined.
+//! Reading, UDP, named sockets, and what is no byte of another file (its permissions, owner, times, extended
+//! attributes) are not confined.
 
 use std::path::Path;
 
@@ -13,7 +14,8 @@ use landlock::{
 /// What files and TCP need: Linux 6.7. Signals need 6.12 (V6).
 const WANTED: ABI = ABI::V4;
 
-/// Confines this process, and whatever it becomes and starts, as far as the kernel can. Errors: the kernel can, and refuses.
+/// Confines this process, and whatever it becomes and starts, as far as the kernel can. Errors: the kernel can, and
+/// refuses.
 pub(super) fn confine(folder: &Path) -> Result<(), RulesetError> {
     let mut rules: RulesetCreated = Ruleset::default()
         .handle_access(AccessFs::from_write(WANTED))?

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open, pidfd_send_signal};
 
-/// How often it is looked whether anything is left: whoever starts processes faster than they are killed ends here after a while.
+/// How often it is looked whether anything is left: bounds the search where processes start faster than they are
+/// killed.
 const ROUNDS: usize = 2_000;
 
 /// Kills all that a process has started, and all that these have, until nothing is left. It itself lives on.
@@ -76,7 +77,8 @@ mod tests {
     #[test]
     fn what_a_process_started_dies_and_it_itself_does_not() {
         let mut shell = Command::new("sh")
-            // the inner one may be left to the system when its shell goes first, since this one adopts nothing: it ends by itself
+            // the inner one may be left to the system when its shell goes first, since this one adopts nothing: it ends
+            // by itself
             .args(["-c", "sleep 60 & sh -c 'sleep 5; true' & read line"])
             .stdin(Stdio::piped())
             .stdout(Stdio::null())

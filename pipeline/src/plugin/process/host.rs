@@ -1,11 +1,14 @@
 //! The process between this program and a plugin: it ends all that the plugin has started, whatever ends this program.
 //!
 //! ```text
-//! program -> PROGRAM __plugin-host PID FOLDER HOW COMMAND... -> PROGRAM __plugin-start PID FOLDER HOW COMMAND... = the plugin
+//! program
+//!     -> PROGRAM __plugin-host PID FOLDER HOW COMMAND...
+//!     -> PROGRAM __plugin-start PID FOLDER HOW COMMAND... = the plugin
 //! ```
 //!
-//! The host adopts what the plugin's processes leave behind, waits for the end of the plugin and for that of the program, kills what is left, and removes
-//! the folder of the exchange where the program no longer can. The last step lets the plugin die with its host, confines it, and becomes the plugin.
+//! The host adopts what the plugin's processes leave behind, waits for the end of the plugin and for that of the
+//! program, kills what is left, and removes the folder of the exchange where the program no longer can. The last step
+//! lets the plugin die with its host, confines it, and becomes the plugin.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -60,7 +63,8 @@ impl Host {
     }
 }
 
-/// What `main` of a program does first: if it was started to host a plugin it does that, and the exit code is returned. Otherwise nothing.
+/// What `main` of a program does first: if it was started to host a plugin it does that, and the exit code is returned.
+/// Otherwise nothing.
 pub fn host_main() -> Option<ExitCode> {
     let mut arguments = std::env::args_os().skip(1);
     let what = arguments.next()?;
@@ -94,7 +98,7 @@ fn host(parent: Pid, folder: &Path, command: &[OsString]) -> ExitCode {
                 let plugin = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
                 return hosted(plugin, program, folder);
             }
-            Err(error) => told(command.get(1), &error),
+            Err(error) => report_not_started(command.get(1), &error),
         }
     }
     ExitCode::from(127)
@@ -139,7 +143,7 @@ fn reaped(plugin: Option<Pid>) -> Option<WaitStatus> {
     }
 }
 
-/// Ends as the plugin did, for whoever waits.
+/// Ends as the plugin did, for the process that waits.
 fn ended_as(status: Option<WaitStatus>) -> ExitCode {
     let Some(status) = status else { return ExitCode::FAILURE };
     if let Some(signal) = status.terminating_signal() {
@@ -192,20 +196,20 @@ fn start(host: Pid, confined: Option<&Path>, program: &OsStr, arguments: &[OsStr
     let _ = set_parent_process_death_signal(Some(Signal::KILL));
     if getppid() == Some(host) {
         if let Some(Err(error)) = confined.map(confine) {
-            told(
+            report_not_started(
                 Some(&program.to_owned()),
                 &format!("it cannot be confined ({error}): see `confined` in docs/plugins.md"),
             );
             return ExitCode::from(127);
         }
         let error = Command::new(program).args(arguments).exec();
-        told(Some(&program.to_owned()), &error);
+        report_not_started(Some(&program.to_owned()), &error);
     }
     ExitCode::from(127)
 }
 
 /// On stderr, which the program shows.
-fn told(program: Option<&OsString>, error: &dyn std::fmt::Display) {
+fn report_not_started(program: Option<&OsString>, error: &dyn std::fmt::Display) {
     use std::io::Write;
     let program = program.map(|program| program.to_string_lossy().into_owned()).unwrap_or_default();
     let _ = writeln!(std::io::stderr(), "{program} cannot be started: {error}");

@@ -14,8 +14,8 @@ const MOST_BYTES: usize = 64 << 10;
 /// The most that is read at once: a plugin that never stops writing delays an answer by no more than this.
 const MOST_AT_ONCE: usize = 1 << 20;
 
-/// The end of a stream. Two read it, a thread that waits for it and whoever asks, each with the lock held: what was written
-/// before an answer is therefore never missed by the one who asks after it.
+/// The end of a stream. Two read it, a thread that waits for it and a caller, each with the lock held: what was written
+/// before an answer is therefore never missed by a caller that reads after it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Log(Arc<(Mutex<Tail>, Condvar)>);
 
@@ -92,7 +92,8 @@ impl Tail {
     }
 }
 
-/// Reading shall say that there is nothing instead of waiting; the writer's end is a file of its own and is not touched.
+/// Reading shall say that there is nothing instead of waiting; the writer's end is a file of its own and is not
+/// touched.
 fn never_wait(stream: &File) -> std::io::Result<()> {
     let flags = rustix::fs::fcntl_getfl(stream)?;
     Ok(rustix::fs::fcntl_setfl(stream, flags | rustix::fs::OFlags::NONBLOCK)?)

@@ -16,7 +16,8 @@ use crate::plugin::launch::Launch;
 /// How long a process may take to end after it was asked to.
 const GRACE: Duration = Duration::from_secs(3);
 
-/// Lines that wait to be read, each of at most [`MOST_BYTES`]; beside them one that is being read. A plugin that says more waits until it is heard.
+/// Lines that wait to be read, each of at most [`MOST_BYTES`]; beside them one that is being read. A plugin that says
+/// more waits until it is heard.
 const MOST_LINES: usize = 1;
 
 /// A running plugin. Dropping it ends the process and everything that it started in its group.
@@ -31,7 +32,8 @@ pub(in crate::plugin) struct Process {
 }
 
 impl Process {
-    /// Starts it in a process group of its own, under a host if there is one; `folder` is that of the exchange. Errors: the system refuses.
+    /// Starts it in a process group of its own, under a host if there is one; `folder` is that of the exchange. Errors:
+    /// the system refuses.
     pub(in crate::plugin) fn start(
         launch: &Launch,
         host: Option<&Host>,
@@ -65,7 +67,8 @@ impl Process {
                 return Err(failed(error));
             }
         };
-        // one thread per pipe: a plugin that does not read, or that fills stderr, blocks a thread of its own and nothing else
+        // one thread per pipe: a plugin that does not read, or that fills stderr, blocks a thread of its own and
+        // nothing else
         let threads = [
             spawn("stdin", move || {
                 let Some(mut input) = input else { return };
@@ -99,7 +102,6 @@ impl Process {
     /// The next line. Errors: it does not come in time, the process ends, it is no text or too long.
     pub(in crate::plugin) fn receive(&mut self, deadline: Instant, doing: &str) -> Result<String, PluginError> {
         let wait = deadline.saturating_duration_since(Instant::now());
-        let told = lines::shown;
         match self.lines.recv_timeout(wait) {
             Ok(Line::Text(text)) => Ok(text),
             Ok(Line::NotText(line)) => Err(PluginError::new(
@@ -112,7 +114,8 @@ impl Process {
             )),
             Ok(Line::CutShort(line)) => {
                 let status = self.status();
-                let what = format!("ended ({status}) in the middle of a line {doing}: {}", told(line.as_bytes()));
+                let what =
+                    format!("ended ({status}) in the middle of a line {doing}: {}", lines::shown(line.as_bytes()));
                 Err(PluginError::new(what, "end every message with a newline and flush stdout"))
             }
             Err(RecvTimeoutError::Timeout) => Err(PluginError::new(

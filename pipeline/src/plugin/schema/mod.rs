@@ -1,6 +1,8 @@
-//! Parameters of a plugin: the part of JSON Schema (draft 2020-12) that configs need, checked with errors like a built-in stage's.
+//! Parameters of a plugin: the part of JSON Schema (draft 2020-12) that configs need, checked with errors like a
+//! built-in stage's.
 //!
-//! A keyword outside this part is refused when the plugin describes itself, so that nothing is believed to be checked and is not.
+//! A keyword outside this part is refused when the plugin describes itself, so that nothing is believed to be checked
+//! and is not.
 
 mod definition;
 mod number;
@@ -18,7 +20,8 @@ use crate::stage::ParamError;
 pub(super) struct Schema(Value);
 
 impl Schema {
-    /// Errors: it is no object that refuses unknown keys, uses a keyword that is not checked here, or has a wrong default.
+    /// Errors: it is no object that refuses unknown keys, uses a keyword that is not checked here, or has a wrong
+    /// default.
     pub(super) fn new(schema: &Value) -> Result<Self, String> {
         definition::check_root(schema)?;
         Ok(Self(schema.clone()))
@@ -29,7 +32,8 @@ impl Schema {
         &self.0
     }
 
-    /// Checks parameters and fills in the defaults. Errors: the first that is wrong, in serde's words, which configs translate.
+    /// Checks parameters and fills in the defaults. Errors: the first that is wrong, in serde's words, which configs
+    /// translate.
     pub(super) fn resolve(&self, params: Value) -> Result<Value, ParamError> {
         resolve::resolve(&self.0, params, "")
     }

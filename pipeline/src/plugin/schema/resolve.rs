@@ -5,7 +5,8 @@ use serde_json::{Map, Value};
 use super::{number, properties};
 use crate::stage::ParamError;
 
-/// The value with its defaults; numbers in the form that their type asks for, so that `1` and `1.0` are one parameter and one cache key.
+/// The value with its defaults; numbers in the form that their type asks for, so that `1` and `1.0` are one parameter
+/// and one cache key.
 pub(super) fn resolve(schema: &Value, value: Value, path: &str) -> Result<Value, ParamError> {
     let value = typed(schema, value, path)?;
     choices(schema, &value, path)?;

@@ -62,7 +62,8 @@ impl Matrix {
         let chunk_bytes = chunk.iter().fold(number.bytes(), |product, &size| product.saturating_mul(size as u64));
         if !chunk.is_empty() && chunk_bytes > MOST_CHUNK_BYTES.min(most_inflated(file_size)) {
             return Err(StageError::new(format!(
-                "stored in chunks of the shape {chunk:?}, wanted at most {MOST_CHUNK_BYTES} bytes each, and not more than the file can hold"
+                "stored in chunks of the shape {chunk:?}, wanted at most {MOST_CHUNK_BYTES} bytes each, and not more \
+                 than the file can hold"
             )));
         }
         let contiguous = matches!(creation.layout(), Layout::Contiguous);
@@ -105,7 +106,8 @@ impl Lane {
         Self { matrix: Arc::clone(matrix), first, step, samples }
     }
 
-    /// Read straight from the file where the numbers lie in one stretch, else through the library. Errors: outside of the file.
+    /// Read straight from the file where the numbers lie in one stretch, else through the library. Errors: outside of
+    /// the file.
     pub(super) fn source(self) -> Result<Arc<dyn Source>, StageError> {
         let matrix = &self.matrix;
         let Some(offset) = matrix.offset else { return Ok(Arc::new(self)) };

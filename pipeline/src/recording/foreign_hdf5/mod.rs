@@ -1,17 +1,19 @@
 //! HDF5 files of any layout: every dataset of numbers is a channel, or several.
 //!
 //! - Groups at any depth (to 32) and hard links only; datasets of one dimension, and the lanes of two-dimensional ones.
-//! - Of two dimensions the last is time, as in NSID and in the main datasets of USID and general-mode AFM (a row per position, flattened), unless it
-//!   has at most 16 samples and the other at least 16 times as many: then the columns are the channels. MATLAB 7.3 stores its arrays
-//!   transposed, so that there the columns of MATLAB are the channels. Channels are numbered from 0, in MATLAB's files from 1: `/x[2]`.
-//! - Unit from the attribute `units` or `unit`, name from `long_name` or `quantity`, scale from `scale_factor` and `add_offset`, missing
-//!   samples from `_FillValue` or `missing_value`.
-//! - Sample rate from a number that is named like one (`sample_rate_hz`, `sampling_rate`, `fs`, `dt`, ...): an attribute of the dataset,
-//!   else an attribute or a dataset of one number in its group, else in the groups around it.
+//! - Of two dimensions the last is time, as in NSID and in the main datasets of USID and general-mode AFM (a row per
+//!   position, flattened), unless it has at most 16 samples and the other at least 16 times as many: then the columns
+//!   are the channels. MATLAB 7.3 stores its arrays transposed, so that there the columns of MATLAB are the channels.
+//!   Channels are numbered from 0, in MATLAB's files from 1: `/x[2]`.
+//! - Unit from the attribute `units` or `unit`, name from `long_name` or `quantity`, scale from `scale_factor` and
+//!   `add_offset`, missing samples from `_FillValue` or `missing_value`.
+//! - Sample rate from a number that is named like one (`sample_rate_hz`, `sampling_rate`, `fs`, `dt`, ...): an
+//!   attribute of the dataset, else an attribute or a dataset of one number in its group, else in the groups around it.
 //! - Text, structs, references, complex and half-precision numbers are remarks.
 //!
 //! Source: The HDF Group, "HDF5 File Format Specification", version 3; pycroscopy, "USID" and "NSID" data models
-//! (<https://pycroscopy.github.io/USID>, <https://pycroscopy.github.io/pyNSID>); MathWorks, "MAT-File Versions" (7.3 is HDF5).
+//! (<https://pycroscopy.github.io/USID>, <https://pycroscopy.github.io/pyNSID>); MathWorks, "MAT-File Versions" (7.3 is
+//! HDF5).
 
 mod matrix;
 mod scope;
@@ -54,7 +56,8 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
                 remarks.push(format!("{} is the single number {value}, no channel", found.location));
             }
             Ok(Variable::Series(series)) if bytes.saturating_add(series.bytes()) > most_bytes => remarks.push(format!(
-                "{} is left out: with it the samples come to more than {most_bytes} bytes, the most that is read of a file of {}",
+                "{} is left out: with it the samples come to more than {most_bytes} bytes, the most that is read of a \
+                 file of {}",
                 found.location,
                 hashed.state.size()
             )),

@@ -43,7 +43,8 @@ struct Walk<'a> {
     scopes: &'a mut Scopes,
     remarks: &'a mut Vec<String>,
     found: Vec<Found>,
-    /// Groups that are listed, by what the library tells them apart with, and where: several hard links may lead to one, in circles too.
+    /// Groups that are listed, by what the library tells them apart with, and where: several hard links may lead to
+    /// one, in circles too.
     seen: HashMap<String, String>,
     objects: usize,
     links: usize,

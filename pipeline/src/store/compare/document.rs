@@ -63,16 +63,16 @@ impl Walk {
         self.numbers.add(left, right, error, || at.to_owned());
         if x != y {
             self.numbers.differing += 1;
-            self.tell(x, y, at);
+            self.keep_first(x, y, at);
         }
     }
 
     fn other(&mut self, x: &Value, y: &Value, at: &str) {
         self.others += 1;
-        self.tell(x, y, at);
+        self.keep_first(x, y, at);
     }
 
-    fn tell(&mut self, x: &Value, y: &Value, at: &str) {
+    fn keep_first(&mut self, x: &Value, y: &Value, at: &str) {
         let short = |value: &Value| value.to_string().chars().take(60).collect::<String>();
         self.first.get_or_insert_with(|| (at.to_owned(), short(x), short(y)));
     }

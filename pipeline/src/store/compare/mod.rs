@@ -36,7 +36,8 @@ pub struct Difference {
     pub numbers: Option<Numbers>,
 }
 
-/// All differences between two result files (or two stage files) except under `/entry/run`, by place. Numbers are compared bit by bit.
+/// All differences between two result files (or two stage files) except under `/entry/run`, by place. Numbers are
+/// compared bit by bit.
 ///
 /// Errors: a file cannot be read or is damaged.
 pub fn compare(a: &Path, b: &Path) -> std::result::Result<Vec<Difference>, StoreError> {

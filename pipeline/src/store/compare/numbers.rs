@@ -46,8 +46,8 @@ impl Numbers {
         };
     }
 
-    /// Largest difference relative to the largest magnitude of all: what rounding leaves of numbers that are differences of large ones does
-    /// not count more than it does for those.
+    /// Largest difference relative to the largest magnitude of all: what rounding leaves of numbers that are
+    /// differences of large ones does not count more than it does for those.
     pub fn relative_to_scale(&self) -> f64 {
         match (self.largest, self.scale) {
             (0.0, _) => 0.0,
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_largest_difference_is_told_in_every_measure() {
+    fn the_largest_difference_is_given_in_every_measure() {
         let mut numbers = Numbers::new(2, 3);
         numbers.add(100.0, 101.0, Some(2.0), || "[0]".to_owned());
         numbers.add(1.0, 1.5, Some(0.1), || "[1]".to_owned());

@@ -21,7 +21,8 @@ pub(super) struct Values {
     pub(super) numbers: Vec<f64>,
 }
 
-/// What differs between two containers of one type and shape. Errors: they cannot be read, or are of a type that this store never writes.
+/// What differs between two containers of one type and shape. Errors: they cannot be read, or are of a type that this
+/// store never writes.
 pub(super) fn differing(
     pair: &Pair,
     kind: &TypeDescriptor,

@@ -99,7 +99,7 @@ class Stage(Mapping[str, Any]):
     def __len__(self) -> int:
         return len(self._ports)
 
-    # artifacts are compared by whoever knows what they are; a stage is itself
+    # artifacts are compared by code that knows what they are; a stage is itself
     __hash__ = object.__hash__
 
     def __eq__(self, other: object) -> bool:
