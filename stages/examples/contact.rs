@@ -147,8 +147,8 @@ fn true_poles() -> Vec<c64> {
 }
 
 fn fit(events: &[Vec<f64>], start_samples: Option<usize>) -> Result<Ringdown, ModelError> {
-    let lent: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
-    fit_ringdowns(&lent, &[], 1.0 / RATE_HZ, &RingdownOptions { start_samples, ..RingdownOptions::default() })
+    let borrowed: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
+    fit_ringdowns(&borrowed, &[], 1.0 / RATE_HZ, &RingdownOptions { start_samples, ..RingdownOptions::default() })
 }
 
 /// One catch through the whole microscope, as [`real_event`] makes a release; the samples from the first one after it on.

@@ -3,11 +3,12 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
+use super::file_kind::FileKind;
 use super::result_file::{ResultWriter, RunHead};
 use super::seal::seal;
 use super::written::{Written, written};
 use crate::error::StoreError;
-use crate::files::{FileState, Replacement, sweep_beside};
+use crate::files::{Replacement, sweep_beside};
 use crate::outcome::{RunInfo, RunResult, StageRecord};
 
 /// Writes a run's result file, whole or not at all, and removes what killed runs left beside it.
@@ -35,9 +36,8 @@ pub(crate) struct PendingResult {
     // before the replacement, which removes the file
     writer: ResultWriter,
     replacement: Replacement,
-    /// Where it goes, and what lay there when it began.
+    /// Where it goes.
     place: PathBuf,
-    before: Option<FileState>,
     /// The file's length when it was last on its way to the disk.
     sent: u64,
 }
@@ -48,10 +48,9 @@ const SHARE: u64 = 1 << 20;
 impl PendingResult {
     /// Begins the file beside `path`. Errors: as [`write_result`].
     pub(crate) fn new(path: &Path, run: &RunHead) -> Result<Self, StoreError> {
-        let before = FileState::at(path).ok();
         let replacement = Replacement::new(path)?;
         match ResultWriter::new(replacement.temporary(), run) {
-            Ok(writer) => Ok(Self { writer, replacement, place: path.to_owned(), before, sent: 0 }),
+            Ok(writer) => Ok(Self { writer, replacement, place: path.to_owned(), sent: 0 }),
             Err(error) => Err(replacement.named(error)),
         }
     }
@@ -81,19 +80,20 @@ impl PendingResult {
     /// Seals and syncs the file and puts it in its place. Errors: a stage is missing; something else has come to lie
     /// there; as [`write_result`].
     pub(crate) fn finish(self, info: &RunInfo) -> Result<(), StoreError> {
-        let Self { writer, replacement, place, before, .. } = self;
+        let Self { writer, replacement, place, .. } = self;
         let written = writer.finish(info).and_then(|()| seal(replacement.temporary()));
-        let written = written.and_then(|()| check_place(&place, before));
+        let written = written.and_then(|()| check_place(&place));
         replacement.take(written)
     }
 }
 
-/// Errors: something that is no result as this program writes it has come to lie there since. (Two workers may make the
-/// same result.)
-fn check_place(place: &Path, before: Option<FileState>) -> Result<(), StoreError> {
-    let now = FileState::at(place).ok();
-    if now.is_none() || now == before || matches!(written(place), Ok(Written::AsWritten | Written::CutShort)) {
-        return Ok(());
+/// Errors: something lies there that is no result as this program writes it, whenever it came: a state taken when the
+/// writing began would miss what came between the look at the output and then. (Two workers may make the same result.)
+fn check_place(place: &Path) -> Result<(), StoreError> {
+    match written(place) {
+        Ok(Written::AsWritten | Written::CutShort | Written::Other(FileKind::Empty)) => return Ok(()),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Ok(_) | Err(_) => {}
     }
     let problem = "was made or changed by another program meanwhile: it is not replaced";
     let help = "run again with another output: what was computed is in the cache";

@@ -91,8 +91,8 @@ fn rms_factor(squares: impl ExactSizeIterator<Item = f64>) -> f64 {
 }
 
 fn estimate(data: &[Vec<f64>], free: &[&[f64]]) -> Vec<Outcome> {
-    let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
-    fit_ringdowns(&lent, free, 1.0 / RATE_HZ, &RingdownOptions::default())
+    let borrowed: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
+    fit_ringdowns(&borrowed, free, 1.0 / RATE_HZ, &RingdownOptions::default())
         .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit.modes()))
 }
 
@@ -124,8 +124,8 @@ fn variants(scatter: f64, seeds: u64) {
 }
 
 fn estimate_with(data: &[Vec<f64>], options: &RingdownOptions) -> Vec<Outcome> {
-    let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
-    fit_ringdowns(&lent, &[], 1.0 / RATE_HZ, options)
+    let borrowed: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
+    fit_ringdowns(&borrowed, &[], 1.0 / RATE_HZ, options)
         .map_or_else(|error| panic!("the fit failed: {error}"), |fit| outcomes(&fit.modes()))
 }
 
@@ -188,11 +188,15 @@ fn speed() {
         let _ = std::hint::black_box(fit_ringdowns(&[&y], &[], 1.0 / RATE_HZ, &white_options()));
     });
     let data: Vec<Vec<f64>> = (0..84).map(|e| real_event(1, e, 0.06, SAMPLES).0).collect();
-    let lent: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
+    let borrowed: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
     for count in EVENTS {
         time(&format!("{count} events jointly, noise estimated along"), 9, &|| {
-            let _ =
-                std::hint::black_box(fit_ringdowns(&lent[..count], &[], 1.0 / RATE_HZ, &RingdownOptions::default()));
+            let _ = std::hint::black_box(fit_ringdowns(
+                &borrowed[..count],
+                &[],
+                1.0 / RATE_HZ,
+                &RingdownOptions::default(),
+            ));
         });
     }
 }

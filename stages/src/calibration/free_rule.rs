@@ -1,4 +1,4 @@
-//! How stages are told what a free stretch is.
+//! Parameters that state what a free stretch is.
 
 use afmid_pipeline::StageError;
 use schemars::JsonSchema;

@@ -1,4 +1,4 @@
-//! How stages are told where the thermal peak of mode 1 lies.
+//! Parameters that state where the thermal peak of mode 1 lies.
 
 use afmid_pipeline::StageError;
 use schemars::JsonSchema;

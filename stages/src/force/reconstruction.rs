@@ -317,7 +317,7 @@ fn warn(found: &[Reconstructed], cx: &Context) {
     let limit: Vec<usize> = found.iter().filter(|r| r.found.walk_at_limit).map(|r| r.number).collect();
     if let Some(first) = limit.first() {
         cx.warn(format!(
-            "in {} events the force moves too little between jumps to be told from a constant (first: event {first}): the band there is that of a constant",
+            "in {} events the force moves too little between jumps to be distinguished from a constant (first: event {first}): the band there is that of a constant",
             limit.len()
         ));
     }

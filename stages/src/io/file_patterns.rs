@@ -45,7 +45,7 @@ pub struct Match {
 }
 
 impl Match {
-    /// None: no regular file. One that cannot be read counts as no result: whoever opens it complains.
+    /// None: no regular file. One that cannot be read counts as no result: opening it gives the error.
     fn of(path: PathBuf, files: &InputFiles) -> Option<Self> {
         match files.is_result(&path) {
             Ok(is_result) => Some(Self { path, is_result }),

@@ -163,8 +163,8 @@ impl Stage for Records {
 }
 
 impl Records {
-    /// The files that match: those to be opened, and afmid's own stage and result files, which lie beside the records where a run was told
-    /// to write there. Errors: as [`matching_files`]; nothing but results.
+    /// The files that match: those to be opened, and afmid's own stage and result files, which lie beside the records where a run was to
+    /// write there. Errors: as [`matching_files`]; nothing but results.
     fn matches(&self, base: &Path, input_files: &InputFiles) -> Result<(Vec<PathBuf>, Vec<PathBuf>), StageError> {
         let root = std::env::var_os("AFMID_DATA");
         let root = root.as_deref().map(Path::new);
@@ -248,11 +248,11 @@ fn said_once(opened: &[Opened]) -> Vec<String> {
         }
     }
     let unsaid = kinds.len().saturating_sub(MOST_REMARKS);
-    let told = |(first, files): (String, usize)| match files {
+    let line = |(first, files): (String, usize)| match files {
         1 => first,
         _ => format!("{first} (the like in {files} files)"),
     };
-    let mut said: Vec<String> = kinds.into_iter().take(MOST_REMARKS).map(told).collect();
+    let mut said: Vec<String> = kinds.into_iter().take(MOST_REMARKS).map(line).collect();
     said.extend((unsaid > 0).then(|| format!("{unsaid} more kinds of remarks: `afmid inspect` shows those of a file")));
     said
 }

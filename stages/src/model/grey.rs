@@ -34,8 +34,8 @@ use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, white
 /// the delay.
 /// Units: Hz, seconds; gains in volts per volt where the force is given as static deflection.
 /// Accuracy: the Cramer-Rao bound in white noise, unbiased, 95 % intervals that hold (docs/accuracy.md); the errors follow the residual's own spectrum, but under thermal noise
-/// `model.ringdown` is more precise. A delay is told from a real pole by the shape of the first samples alone: the errors say how well. `model` is exact up to two samples of delay, beyond
-/// which whole samples are told as `dead_samples` and warned of.
+/// `model.ringdown` is more precise. A delay is distinguished from a real pole by the shape of the first samples alone: the errors say how well. `model` is exact up to two samples of delay, beyond
+/// which whole samples are reported as `dead_samples` and warned of.
 /// Errors: too few samples, values that are not finite, a response that is constant, fewer oscillations than `modes`, knowledge of what is not fitted. No convergence is a warning, and
 /// so is a number on a bound, whose error is unknown.
 /// Source: L. Ljung, System Identification, 1999, chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1; E. I. Jury, Theory and Application of the z-Transform Method, 1964.
@@ -72,7 +72,7 @@ pub struct GreyEstimate {
     /// Modes to start from, `[frequency in Hz, quality factor]` each, as many as `modes`. Default: none, from the port `start` or from subspace estimates.
     pub start_modes: Vec<[f64; 2]>,
     /// Rows of the Hankel matrix of the start, six more than twice the modes and the real poles, at least. Default: 60.
-    #[schemars(range(max = 1000))]
+    #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
     /// Starts that are refined. Default: 3.
     #[schemars(range(min = 1, max = 100))]

@@ -41,7 +41,7 @@ pub struct Pem {
     /// Which events: `all`, or one half (`identification`, `verification`). Default: all.
     pub set: DataSet,
     /// Rows of the Hankel matrix that the start comes from, more than `order`. Default: 60; half as many blur close poles.
-    #[schemars(range(max = 1000))]
+    #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
     /// Most iterations in each stretch of the search. Default: 60; ten to thirty are usual.
     #[schemars(range(min = 1, max = 10_000))]

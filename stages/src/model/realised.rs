@@ -15,7 +15,7 @@ pub(super) const MODEL: Port<StateSpace> =
 pub(super) const SUMMARY: Port<Document> =
     Port::new("summary", "summary", "order, singular values, fit of the data that it is from");
 
-/// How the linear part is fitted, and what is told of the poles.
+/// How the linear part is fitted, and what is reported of the poles.
 pub(super) struct Realised<'a> {
     pub set: DataSet,
     pub first: usize,

@@ -68,7 +68,7 @@ pub struct RingdownFit {
     #[schemars(range(max = 100_000))]
     pub bootstrap_draws: usize,
     /// Rows of the Hankel matrix of the start, more than its order. Default: 100, a period of the slowest mode.
-    #[schemars(range(max = 400))]
+    #[schemars(range(min = 2, max = 400))]
     pub block_rows: usize,
     /// Samples after the onset that the start is made from, 0 (all) or 8 per mode, real pole and two more to 10 million. Default: 0; some decay times
     /// where the ringing fills a small part of the window, as on contact.
@@ -193,10 +193,10 @@ impl Stage for RingdownFit {
             Some(records) => free_windows(records, self.free, samples - first, rate)?,
             None => Vec::new(),
         };
-        let lent: Vec<&[f64]> = free.iter().map(Vec::as_slice).collect();
+        let borrowed: Vec<&[f64]> = free.iter().map(Vec::as_slice).collect();
         let missing = total(&gaps);
         let options = RingdownOptions { missing: gaps, ..self.options(cx.seed())? };
-        let (fit, seen) = self.fitted(&events, &lent, 1.0 / rate, &options)?;
+        let (fit, seen) = self.fitted(&events, &borrowed, 1.0 / rate, &options)?;
         self.warn(&fit, &seen, cx);
         let modes = self.estimates(&fit, cx)?;
         Ok(Ports::new()

@@ -18,7 +18,7 @@ use afmid_kernels::subspace::{Era, InstrumentalSubspace, Subspace, Weight};
 ///
 /// Model: a physical mode has one pole at every order that can hold it; a pole that noise needs moves as the order changes.
 /// Method: one Hankel matrix and one singular value decomposition; the poles of every order from it by shift invariance. A pole is stable if the next lower order has one within
-/// `frequency` and `damping`. Stable poles of at least `min_quality_factor` are gathered round the frequencies at which most orders agree; a gathering of enough orders, whose
+/// `frequency` and `damping`. Stable poles of at least `min_quality_factor` are grouped around the frequencies at which most orders agree; a group of enough orders, whose
 /// damping agrees, is a mode if it rings: all of them are fitted to the record together, and those with an amplitude below `min_significance` standard errors are dropped, since one
 /// record's noise is the same at every order and has poles that stay, too. The proposed order is the least at which all of them are there and stay.
 /// Shapes: `poles`: one row per order and pair; `modes`: one row per mode.
@@ -37,7 +37,7 @@ pub struct StabilisationDiagram {
     #[schemars(range(min = 1))]
     pub from_order: usize,
     /// Highest order, above the lowest. Default: 40; noise needs room beyond the lever's 11.
-    #[schemars(range(max = 100))]
+    #[schemars(range(min = 2, max = 100))]
     pub to_order: usize,
     /// From one order to the next. Default: 1.
     #[schemars(range(min = 1, max = 10))]
@@ -45,7 +45,7 @@ pub struct StabilisationDiagram {
     /// Which data: `all`, `identification` or `verification`. Default: all.
     pub set: DataSet,
     /// Rows of the Hankel matrix, more than the highest order. Default: 300, as in `model.era`.
-    #[schemars(range(max = 1000))]
+    #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
     /// Largest relative change of a stable pole's frequency from one order to the next. Default: 0.01, as is usual.
     #[schemars(range(max = 0.5), extend("exclusiveMinimum" = 0.0))]

@@ -133,7 +133,7 @@ impl ModelCause {
     pub fn hidden(&self) -> Result<Hidden, StageError> {
         let cause = find(&self.id).ok_or_else(|| {
             StageError::new(format!("the model names the cause `{}`, which is not in the catalogue", self.id))
-                .help("diagnose anew with this version, or check the spelling: `afmid causes` lists all")
+                .help("diagnose again with this version, or check the spelling: `afmid causes` lists all")
         })?;
         let about = cause.about();
         let values: Vec<f64> = about

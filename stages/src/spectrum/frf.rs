@@ -11,7 +11,7 @@ use afmid_kernels::spectra::{
     EnsembleResponse, EnsembleResponseSettings, bin_frequencies, difference, ensemble_response,
 };
 
-/// Frequency response of all events at once, with noise, timing and distortion told apart by their scatter.
+/// Frequency response of all events at once, with noise, timing and distortion distinguished by their scatter.
 ///
 /// # Model
 /// Each event is the linear response to a force of its own size, a lag, a distortion that goes with the size, and noise.

@@ -51,7 +51,7 @@ pub struct Thermal {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpectrumWindow {
-    /// As the input says, or told from the data.
+    /// As the input says, or found from the data.
     Auto,
     /// Raised cosine.
     Hann,

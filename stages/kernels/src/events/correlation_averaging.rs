@@ -76,7 +76,7 @@ pub struct Averaging {
 /// T is the average of the aligned events, each normalised to unit rms so that none dominates; every event is compared with the
 /// average of the *others* (its own noise would hold it in place): FFT cross-correlation finds the place, Gauss-Newton least
 /// squares the fraction of a sample; then average again, until no event moves by more than the tolerance. Events below
-/// `min_correlation` leave (at most half in a round) and the rest is aligned anew. Only the first samples after the onset
+/// `min_correlation` leave (at most half in a round) and the rest is aligned again. Only the first samples after the onset
 /// count: they hold the steepest slopes, and a resonance that differs from event to event has not yet slipped in phase.
 /// # Shapes
 /// Segments of one length, with [`AveragingSettings::margins`] round `onset`.

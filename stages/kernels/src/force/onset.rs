@@ -41,7 +41,7 @@ impl Onset {
 /// From the first sample that has left the line by `sure_share` of the load, back to the last one within
 /// `departure_sigma` standard errors: any later `t0` would have the response come first. An earlier one is compatible too,
 /// with a delay in the transfer function instead: lines through the 2nd to 4th root of the first departures give
-/// the earliest. A fraction of a sample cannot be told from that delay, so `t0` lies on the grid, where a held input
+/// the earliest. A fraction of a sample cannot be distinguished from that delay, so `t0` lies on the grid, where a held input
 /// represents it exactly.
 ///
 /// # Shapes

@@ -9,7 +9,7 @@ use super::hold::{Hold, InputBetween, parts};
 use super::point::Point;
 use crate::model::{InnovationsModel, InputGains, Section};
 
-/// Poles at zero that sections can hold: two; further whole samples of delay are told beside the model.
+/// Poles at zero that sections can hold: two; further whole samples of delay stand beside the model.
 const ZEROS: usize = 2;
 /// Step of the differences that carry the covariance over: the map is analytic, and its second differences are of this order squared.
 const STEP: f64 = 1e-5;

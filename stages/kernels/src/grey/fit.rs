@@ -19,7 +19,7 @@ use crate::ringdown::{Estimate, Knowledge};
 
 /// Samples that the start leaves out while it does not know the delay: its grid ends at 16, and a step may go one beyond.
 const START_MASK: usize = 18;
-/// Rounds in which the samples that hold earlier input are set anew, and with them the noise that expectations are weighed with.
+/// Rounds in which the samples that hold earlier input are set again, and with them the noise that expectations are weighed with.
 const ROUNDS: usize = 4;
 
 /// Fits modes, real poles, delay and feedthrough to inputs and output.
@@ -44,7 +44,7 @@ const ROUNDS: usize = 4;
 /// # Source
 /// L. Ljung, System Identification (1999), chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1; E. I. Jury (1964), chapter 1.
 pub fn fit_grey(experiments: &[Experiment<'_>], sample_time_s: f64, options: &GreyOptions) -> Result<Grey, ModelError> {
-    let options = &told(options);
+    let options = &settled(options);
     let mut problem = checked(experiments, sample_time_s, options)?;
     let longest = experiments.iter().max_by_key(|e| e.output.len()).ok_or(ModelError::NoExperiment)?;
     let rows = PemOptions { block_rows: options.block_rows, ..PemOptions::default() };
@@ -78,12 +78,12 @@ pub fn fit_grey(experiments: &[Experiment<'_>], sample_time_s: f64, options: &Gr
 }
 
 /// The options with what they leave unsaid: no delay is a delay of zero.
-fn told(options: &GreyOptions) -> GreyOptions {
-    let mut told = options.clone();
+fn settled(options: &GreyOptions) -> GreyOptions {
+    let mut settled = options.clone();
     if !options.delay && !options.known.iter().any(|k| k.quantity == GreyQuantity::Delay) {
-        told.known.push(GreyKnown { quantity: GreyQuantity::Delay, knowledge: Knowledge::Fixed(0.0) });
+        settled.known.push(GreyKnown { quantity: GreyQuantity::Delay, knowledge: Knowledge::Fixed(0.0) });
     }
-    told
+    settled
 }
 
 /// Leaves out the samples that hold what was put in before the record.

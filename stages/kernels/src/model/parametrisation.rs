@@ -7,7 +7,7 @@
 
 use faer::c64;
 
-/// Largest coordinate: `1 - tanh(9) = 3e-8`, a decay over some 10^8 samples. Slower ones cannot be told from undamped in any window.
+/// Largest coordinate: `1 - tanh(9) = 3e-8`, a decay over some 10^8 samples. Slower ones cannot be distinguished from undamped in any window.
 pub(crate) const LIMIT: f64 = 9.0;
 
 /// `[a1, a2]` of a section; `a2 = 0` in a section of first order.

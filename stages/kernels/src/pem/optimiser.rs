@@ -49,10 +49,10 @@ fn stalled(state: &State, output: f64) -> Ending {
     if state.projection.cost <= NEARLY_EXACT * output { Ending::Exact } else { Ending::Stalled }
 }
 
-/// Real poles of different sections that merge cannot become a complex pair: so often are they paired anew.
+/// Real poles of different sections that merge cannot become a complex pair: so often are they paired again.
 const PAIRINGS: usize = 3;
 
-/// Iterates to the minimum or to a limit; where it stalls, real poles are paired anew. Errors: the starting point cannot be evaluated.
+/// Iterates to the minimum or to a limit; where it stalls, real poles are paired again. Errors: the starting point cannot be evaluated.
 pub(crate) fn minimise(problem: &Problem, start: State, limits: Limits) -> Result<State, ModelError> {
     let mut state = descend(problem, start, limits)?;
     for _ in 0..PAIRINGS {

@@ -41,7 +41,7 @@ impl State {
     /// The point with other coordinates. Errors: no finite prediction errors there.
     pub fn moved(&self, problem: &Problem, coordinates: &[f64]) -> Result<Self, ModelError> {
         let point = self.point.at(coordinates);
-        // a whitening that stays is not computed anew
+        // a whitening that stays is not computed again
         if self.whitened.filter == point.whitening() {
             Self::through(problem, point, Arc::clone(&self.whitened))
         } else {

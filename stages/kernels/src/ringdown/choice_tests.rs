@@ -80,7 +80,7 @@ fn one_event_tells_the_number_of_modes() {
 }
 
 #[test]
-fn what_was_seen_is_told() {
+fn what_was_seen_is_reported() {
     let found = counted(3, 8, 1, NoiseSource::White);
     assert!(found.seen.iter().enumerate().all(|(i, count)| count.modes == i + 1) && found.seen.len() >= 3);
     assert!(found.seen[..3].iter().all(|count| count.held_out.is_finite() && count.bic > count.chi_square));

@@ -15,7 +15,7 @@ use super::search::Point;
 use super::start::start;
 use crate::model::ModelError;
 
-/// Times that gaps are filled by the first guess and it is made anew: each leaves of the bridges' error the share of what is missing.
+/// Times that gaps are filled by the first guess and it is made again: each leaves of the bridges' error the share of what is missing.
 const REFILLS: usize = 4;
 
 /// The better of two starts by the fit under white noise: from all samples, gaps filled by the guess itself in turns, and from the longest stretch

@@ -100,8 +100,8 @@ fn bounds_that_are_wide_change_nothing_and_tight_ones_hold() {
 fn a_prior_weighs_as_its_variance_says() {
     let plain = fitted(5, Vec::new());
     let (value, std) = numbers(&plain)[3];
-    let told = fitted(5, known(Q2, Knowledge::About(value + 2.0 * std, std)));
-    let (found, error) = numbers(&told)[3];
+    let with_prior = fitted(5, known(Q2, Knowledge::About(value + 2.0 * std, std)));
+    let (found, error) = numbers(&with_prior)[3];
     // equal weights: half way, and the error falls by the root of two; the likelihood's curvature changes by some per cent over two errors
     assert!(((found - value) / std - 1.0).abs() < 0.05, "{value} {std} {found}");
     assert!((error * 2f64.sqrt() / std - 1.0).abs() < 0.03, "{error} {std}");

@@ -51,7 +51,7 @@ pub(super) fn ladder(
         if bic < least {
             (ladder.best, least) = (ladder.steps.len(), bic);
         }
-        // the real poles begin anew: their priors are about their start, and would wander from fit to fit
+        // the real poles begin again: their priors are about their start, and would wander from fit to fit
         current = fit.exponentials.into_iter().filter(Exponential::oscillates).chain(real.iter().copied()).collect();
         ladder.steps.push(current.clone());
         if ladder.steps.len() > ladder.best + beyond {

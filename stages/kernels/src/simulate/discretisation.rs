@@ -99,7 +99,7 @@ impl LinearSystem {
     /// The stationary covariance of a stable system.
     ///
     /// # Method
-    /// Doubling: with `P_T` the covariance gathered over `T`, `P_2T = P_T + Phi_T P_T Phi_T^T` and `Phi_2T = Phi_T^2`,
+    /// Doubling: with `P_T` the covariance accumulated over `T`, `P_2T = P_T + Phi_T P_T Phi_T^T` and `Phi_2T = Phi_T^2`,
     /// until the slowest pole has decayed by `exp(-40)`.
     ///
     /// # Accuracy
@@ -159,13 +159,13 @@ mod tests {
         let (whole, half) = (system.step(2e-7), system.step(1e-7));
         let twice = half.transition.times(&half.transition);
         let covariance = |step: &Step| step.noise_factor.times(&step.noise_factor.transposed());
-        let gathered =
+        let accumulated =
             covariance(&half).plus(&half.transition.times(&covariance(&half)).times(&half.transition.transposed()));
         for i in 0..2 {
             for j in 0..2 {
                 // rounding of entries of order one
                 assert!((twice[(i, j)] - whole.transition[(i, j)]).abs() < 1e-13);
-                assert!((gathered[(i, j)] - covariance(&whole)[(i, j)]).abs() < 1e-13);
+                assert!((accumulated[(i, j)] - covariance(&whole)[(i, j)]).abs() < 1e-13);
             }
         }
         let (h, v) = (0.3, 1e5);

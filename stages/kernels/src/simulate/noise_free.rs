@@ -1,4 +1,4 @@
-//! A release without noise, cut as an event's window: what a hidden cause does to it can be told to a microvolt.
+//! A release without noise, cut as an event's window: what a hidden cause does to it is known to a microvolt.
 
 use super::afm_system::AfmSystem;
 use super::hidden_motion::simulate_hidden;

@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn both_errors_are_the_scatter_over_seeds() {
         let (seeds, stretches, samples) = (200, 6, 3 * 64);
-        let (mut sum, mut square, mut told, mut seen, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let (mut sum, mut square, mut stated, mut seen, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for seed in 0..seeds {
             let records: Vec<RecordSpectrum> = (0..stretches)
                 .map(|record| {
@@ -105,18 +105,18 @@ mod tests {
             for k in (4..30).step_by(3) {
                 sum += got.density[k];
                 square += (got.density[k] - 2.0).powi(2);
-                told += got.standard_error[k].powi(2);
+                stated += got.standard_error[k].powi(2);
                 seen += got.record_error[k].powi(2);
                 count += 1.0;
             }
         }
         // 1800 values, correlated by 1 % at three bins: mean 0.4 %, variances sqrt(2 / 1800) = 3.3 %; four of them
         assert!((sum / count / 2.0 - 1.0).abs() < 0.018, "{}", sum / count);
-        // told is of the estimate: E density^2 is 1 + 1 / averages above the square of the mean
+        // stated is of the estimate: E density^2 is 1 + 1 / averages above the square of the mean
         assert!(
-            (square / told - 1.0).abs() < 0.17 && (square / seen - 1.0).abs() < 0.17,
+            (square / stated - 1.0).abs() < 0.17 && (square / seen - 1.0).abs() < 0.17,
             "{} {}",
-            square / told,
+            square / stated,
             square / seen
         );
     }

@@ -1,4 +1,4 @@
-//! Stable poles of many orders, gathered into physical modes.
+//! Stable poles of many orders, grouped into physical modes.
 
 use crate::statistics::median;
 

@@ -1,4 +1,4 @@
-//! Which of the gathered modes ring in the record at all.
+//! Which of the grouped modes ring in the record at all.
 
 use faer::c64;
 

@@ -80,7 +80,7 @@ pub struct Stabilisation {
 /// # Model
 /// A physical mode has one pole at every order that can hold it; a pole that noise needs moves as the order changes.
 /// # Method
-/// Each pole is compared with the nearest in frequency at the next lower order that was tried. The stable ones with enough quality are gathered round the frequency at which
+/// Each pole is compared with the nearest in frequency at the next lower order that was tried. The stable ones with enough quality are grouped around the frequency at which
 /// most orders agree, one per order, and so on with the rest; a gathering is a mode if it has enough orders and its damping agrees. One record's noise is the same at every order, and has
 /// poles that stay, too: [`Stabilisation::established`] drops what does not ring.
 /// # Shapes

@@ -35,11 +35,11 @@ fn write_table() -> Result<Ports, StageError> {
 }
 
 fn expect(outputs: &Ports) -> Result<String, String> {
-    let told = |error: StageError| error.to_string();
-    let pair = outputs.get(&PAIR).map_err(told)?;
-    let rate = pair.number("sample_rate_hz").map_err(told)?;
-    let (y, u) = (pair.real("response_verification").map_err(told)?, pair.real("force_identification").map_err(told)?);
-    let removed = outputs.get(&SUMMARY).map_err(told)?.0["removed"]["output"]["level"].as_f64();
+    let text = |error: StageError| error.to_string();
+    let pair = outputs.get(&PAIR).map_err(text)?;
+    let rate = pair.number("sample_rate_hz").map_err(text)?;
+    let (y, u) = (pair.real("response_verification").map_err(text)?, pair.real("force_identification").map_err(text)?);
+    let removed = outputs.get(&SUMMARY).map_err(text)?.0["removed"]["output"]["level"].as_f64();
     // 4.5 is the first half's mean; the second half keeps its own level of 100 above it
     let right = (rate - 50.0).abs() < 1e-9 && removed == Some(4.5) && y[1] == 96.5 && y[20].is_nan() && u.len() == 50;
     match right {

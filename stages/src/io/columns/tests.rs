@@ -222,16 +222,16 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         change(&mut stage);
         stage
     };
-    let told = |stage: &Columns| run(stage, folder.path()).map(|_| ()).unwrap_err().to_string();
+    let error = |stage: &Columns| run(stage, folder.path()).map(|_| ()).unwrap_err().to_string();
     assert!(run(&stage(|_| {}), folder.path()).is_ok());
-    assert!(told(&stage(|s| s.inputs = vec![Column::Number(2)])).contains("misses sample 1"));
-    assert!(told(&stage(|s| s.sample_rate_hz = None)).contains("sample rate is not known"));
+    assert!(error(&stage(|s| s.inputs = vec![Column::Number(2)])).contains("misses sample 1"));
+    assert!(error(&stage(|s| s.sample_rate_hz = None)).contains("sample rate is not known"));
     let unequal = |s: &mut Columns| {
         s.sample_rate_hz = None;
         s.time = Some(Column::Number(1));
     };
-    assert!(told(&stage(unequal)).contains("not equally spaced"));
-    assert!(told(&stage(|s| s.verification = Some([2, 9]))).contains("the record has 4 samples"));
+    assert!(error(&stage(unequal)).contains("not equally spaced"));
+    assert!(error(&stage(|s| s.verification = Some([2, 9]))).contains("the record has 4 samples"));
     for wrong in [
         stage(|s| s.file.clear()),
         stage(|s| s.inputs.clear()),

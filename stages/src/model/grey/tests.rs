@@ -86,7 +86,7 @@ fn a_release_gives_its_modes_its_delay_and_a_model_that_others_read() {
 }
 
 #[test]
-fn gaps_bounds_and_late_events_are_told() {
+fn gaps_bounds_and_late_events_are_reported() {
     let mut holed = pair(2);
     for variable in &mut holed.variables {
         if let (true, afmid_pipeline::Values::Real(values)) = (variable.name == "response", &mut variable.values) {

@@ -134,7 +134,7 @@ fn knowledge_holds_and_what_sits_on_a_bound_has_no_error() {
 }
 
 #[test]
-fn the_number_of_modes_is_found_and_told() {
+fn the_number_of_modes_is_found_and_reported() {
     let events: Vec<Vec<f64>> = (0..6).map(event).collect();
     let (summary, _) =
         run("modes = \"auto\"\nmax_modes = 6", &Ports::new().with(&ENSEMBLE, ensemble(&events))).unwrap();

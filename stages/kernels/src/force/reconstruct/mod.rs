@@ -75,7 +75,7 @@ pub struct Reconstruction {
     pub log_likelihood: f64,
     /// Passes of the filter that the search took.
     pub evaluations: usize,
-    /// A walk is too weak to be told from none.
+    /// A walk is too weak to be distinguished from none.
     pub walk_at_limit: bool,
 }
 

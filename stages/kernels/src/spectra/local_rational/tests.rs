@@ -128,22 +128,22 @@ fn the_variance_is_that_of_repeated_measurements() {
     let trials = 40;
     for known in [true, false] {
         let v = vec![if known { variance } else { 0.0 }; g.len()];
-        let (mut seen, mut told, mut peaks, mut misfit) = (0.0, 0.0, 0.0, 0.0);
+        let (mut seen, mut stated, mut peaks, mut misfit) = (0.0, 0.0, 0.0, 0.0);
         for seed in 0..trials {
             let data = noisy(&g, variance, 50 + seed);
             let bins = Bins { frequency_hz: &f, transfer: &data, variance: &v };
             let got = local_rational(bins, settings(10), &[]).unwrap();
             seen += got.transfer.iter().zip(&g).map(|(s, g)| (s - g).norm_sqr()).sum::<f64>();
-            told += got.variance.iter().sum::<f64>();
+            stated += got.variance.iter().sum::<f64>();
             misfit += got.misfit.iter().sum::<f64>() / g.len() as f64 / trials as f64;
             for f in RESONANCES_HZ {
                 let k = nearest_bin(f);
                 peaks += (got.transfer[k] - g[k]).norm_sqr() / got.variance[k] / (4.0 * trials as f64);
             }
         }
-        println!("known {known}: seen / told {:.4}, at peaks {peaks:.3}, misfit {:.4e}", seen / told, misfit);
+        println!("known {known}: seen / stated {:.4}, at peaks {peaks:.3}, misfit {:.4e}", seen / stated, misfit);
         // 40 x 1967 bins, neighbours share their data over some 20: 4000 values, 1.6 %, three of them
-        assert!((0.95..1.05).contains(&(seen / told)), "{known} {}", seen / told);
+        assert!((0.95..1.05).contains(&(seen / stated)), "{known} {}", seen / stated);
         // 160 exponential values: 4 sigma = 0.32, and the residual's own scatter when the variance is unknown
         assert!((0.65..1.4).contains(&peaks), "{known} {peaks}");
         let expected = if known { 1.0 } else { variance };

@@ -47,7 +47,7 @@ pub(super) struct Likelihood<'a> {
     pub through: SeenThrough,
 }
 
-/// A noise term that nowhere makes more than this share of the density cannot be told from zero.
+/// A noise term that nowhere makes more than this share of the density cannot be distinguished from zero.
 const NEGLIGIBLE: f64 = 1e-4;
 const ITERATIONS: usize = 200;
 

@@ -25,7 +25,7 @@ pub struct AveragedDensity<'a> {
     pub density: &'a [f64],
     /// Independent spectra that were averaged: the shape of the gamma distribution; overlapping ones count less.
     pub averages: f64,
-    /// The window that the spectra were made with; `None`: told from the correlation of neighbouring bins.
+    /// The window that the spectra were made with; `None`: found from the correlation of neighbouring bins.
     pub through: Option<SeenThrough>,
 }
 
@@ -39,7 +39,7 @@ pub struct ThermalFitSettings {
     /// Probability that a spectrum without lines loses a bin to the search for lines; 0 for no search.
     pub line_false_alarm: f64,
     /// 1/f noise: `Some` with or without it, `None` where the likelihood gains more than chance does once in a hundred times (never over less than a tenth of
-    /// an octave, where it cannot be told from white noise).
+    /// an octave, where it cannot be distinguished from white noise).
     pub flicker: Option<bool>,
 }
 
@@ -74,9 +74,9 @@ pub struct ThermalFit {
     pub quality_factor: Fitted,
     /// Mean square of the signal in the resonance.
     pub variance: Fitted,
-    /// Density of the white noise; 0 where none can be told.
+    /// Density of the white noise; 0 where none is found.
     pub white: Fitted,
-    /// Density of the 1/f noise at 1 Hz; 0 where none can be told.
+    /// Density of the 1/f noise at 1 Hz; 0 where none is found.
     pub flicker: Fitted,
     /// Lines that were set aside, ascending.
     pub lines: Vec<FoundLine>,

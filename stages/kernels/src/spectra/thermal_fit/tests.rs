@@ -68,7 +68,7 @@ fn errors_are_true_for_resonances_of_two_bins_and_of_forty() {
 fn a_resonance_of_two_bins_seen_through_hann_segments_is_unbiased() {
     // time series of an oscillator driven by white noise, exact discretisation: Q 20, two bins wide
     let (rate, f0, quality, segment) = (4000.0, 120.0, 20.0, 1336);
-    let (mut sum, mut square, mut told, mut variance) = (0.0, 0.0, 0.0, 0.0);
+    let (mut sum, mut square, mut stated, mut variance) = (0.0, 0.0, 0.0, 0.0);
     let seeds = 60;
     for seed in 0..seeds {
         let x = oscillator(f0, quality, rate, 160_000, seed);
@@ -90,12 +90,12 @@ fn a_resonance_of_two_bins_seen_through_hann_segments_is_unbiased() {
         let off = fit.quality_factor.value - quality;
         sum += off;
         square += off * off;
-        told += fit.quality_factor.std.powi(2);
+        stated += fit.quality_factor.std.powi(2);
         variance += fit.variance.value / seeds as f64;
     }
     let n = seeds as f64;
-    let (bias, rms, std) = (sum / n, (square / n).sqrt(), (told / n).sqrt());
-    println!("Q: bias {bias:.3}, rms {rms:.3}, told {std:.3}");
+    let (bias, rms, std) = (sum / n, (square / n).sqrt(), (stated / n).sqrt());
+    println!("Q: bias {bias:.3}, rms {rms:.3}, stated {std:.3}");
     // without the window's width Q would come out near 13; rms over 60 seeds has 9 %, four of them and the segments' finite number
     assert!(bias.abs() < 4.0 * rms / n.sqrt() && (0.65..1.4).contains(&(rms / std)));
     // variance one: 160000 samples hold some 500 independent values, 60 seeds, 2.5 %
