@@ -35,6 +35,7 @@ pub mod grey;
 pub mod linear_algebra;
 pub mod model;
 pub mod modes;
+pub mod optimise;
 pub mod pem;
 pub mod ringdown;
 pub mod simulate;

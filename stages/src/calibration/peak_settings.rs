@@ -5,7 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::reading::within;
-use afmid_kernels::calibration::PeakSearch;
+use afmid_kernels::calibration::AveragedPeriodogram;
+use afmid_kernels::spectra::{AveragedDensity, PeakSearch, SeenThrough, SpectrumError, ThermalFit, thermal_peak};
 
 /// Where the thermal peak is sought and how it is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -45,7 +46,14 @@ impl PeakSettings {
         within("peak.band", self.band, 1.1, 10.0)
     }
 
-    pub(super) fn search(&self) -> PeakSearch {
-        PeakSearch { lowest_hz: self.lowest_hz, highest_hz: self.highest_hz, band: self.band }
+    /// The peak in an averaged spectrum. Errors: none, or no fit.
+    pub(super) fn fit(&self, spectrum: &AveragedPeriodogram) -> Result<ThermalFit, SpectrumError> {
+        let density = AveragedDensity {
+            frequency_hz: &spectrum.frequency_hz(),
+            density: &spectrum.density_v2_per_hz,
+            averages: spectrum.independent_segments(),
+            through: Some(SeenThrough::Hann),
+        };
+        thermal_peak(density, PeakSearch { lowest_hz: self.lowest_hz, highest_hz: self.highest_hz, band: self.band })
     }
 }

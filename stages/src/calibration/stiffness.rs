@@ -11,9 +11,8 @@ use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
 use super::reading::{common_rate, push_free, read_blocks, read_free, within};
 use super::sensitivity::SensitivitySummary;
-use afmid_kernels::calibration::{
-    Estimate, SpringConstant, ThermalGauge, ThermalPeak, UNIFORM_BEAM_FACTOR, Welch, spring_constant, thermal_peak,
-};
+use afmid_kernels::calibration::{Estimate, SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, Welch, spring_constant};
+use afmid_kernels::spectra::{Fitted, ThermalFit};
 
 /// Spring constant from the thermal motion of mode 1 in the free stretches.
 ///
@@ -138,7 +137,7 @@ pub struct RelativeErrors {
 impl Stage for ThermalStiffness {
     const SPEC: Spec = Spec {
         name: "calibration.stiffness",
-        version: 1,
+        version: 2,
         summary: "spring constant from the thermal peak of mode 1 in the free stretches",
         inputs: &[RECORDS.spec(), SENSITIVITY.spec()],
         outputs: &[SPECTRUM.spec(), SUMMARY.spec()],
@@ -183,13 +182,13 @@ impl Stage for ThermalStiffness {
         parts.iter().for_each(|(part, _)| welch.merge(part));
         let free_samples: usize = parts.iter().map(|(_, samples)| samples).sum();
         let average = welch.average().map_err(StageError::from_error)?;
-        let peak = thermal_peak(&average, self.peak.search()).map_err(StageError::from_error)?;
-        let variance = Estimate { value: peak.variance_v2, std: peak.variance_std_v2 };
-        let k = spring_constant(peak.frequency_hz, variance, &gauge).map_err(StageError::from_error)?;
+        let peak = self.peak.fit(&average).map_err(StageError::from_error)?;
+        let estimate = |fitted: Fitted| Estimate { value: fitted.value, std: fitted.std };
+        let variance = estimate(peak.variance);
+        let k = spring_constant(peak.frequency_hz.value, variance, &gauge).map_err(StageError::from_error)?;
         warn(&peak, &k, cx);
-        let frequencies: Vec<f64> = (0..average.density_v2_per_hz.len()).map(|i| i as f64 * average.bin_hz).collect();
-        let model: Vec<f64> =
-            frequencies.iter().map(|&f| if f > 0.0 { peak.density_v2_per_hz(f) } else { f64::NAN }).collect();
+        let frequencies = average.frequency_hz();
+        let model: Vec<f64> = frequencies.iter().map(|&f| if f > 0.0 { peak.density(f) } else { f64::NAN }).collect();
         let axis = Axis::new("frequency", "Hz", "frequency", frequencies);
         let spectrum = Array::over(vec![axis])
             .with("density", "V^2/Hz", "one-sided power spectral density", &["frequency"], average.density_v2_per_hz)
@@ -200,10 +199,10 @@ impl Stage for ThermalStiffness {
             apparent_n_per_m: k.apparent_n_per_m,
             sensitivity_v_per_m: k.sensitivity_v_per_m,
             contact_stiffness_n_per_m: gauge.contact_stiffness_n_per_m,
-            frequency_hz: Estimate { value: peak.frequency_hz, std: peak.frequency_std_hz },
-            quality_factor: Estimate { value: peak.quality_factor, std: peak.quality_factor_std },
+            frequency_hz: estimate(peak.frequency_hz),
+            quality_factor: estimate(peak.quality_factor),
             variance_v2: variance,
-            white_v2_per_hz: peak.white_v2_per_hz,
+            white_v2_per_hz: peak.white.value,
             attenuation: k.attenuation,
             relative_errors: RelativeErrors {
                 peak: k.relative_errors[0],
@@ -212,7 +211,7 @@ impl Stage for ThermalStiffness {
                 mode_shape: k.relative_errors[3],
             },
             dispersion: peak.dispersion,
-            lines_hz: peak.lines_hz,
+            lines_hz: peak.lines.iter().map(|line| line.frequency_hz).collect(),
             segments: average.segments,
             free_s: free_samples as f64 / rate,
         };
@@ -272,7 +271,7 @@ impl ThermalStiffness {
     }
 }
 
-fn warn(peak: &ThermalPeak, k: &SpringConstant, cx: &Context) {
+fn warn(peak: &ThermalFit, k: &SpringConstant, cx: &Context) {
     if peak.dispersion > 1.5 {
         cx.warn(format!(
             "the thermal peak scatters {:.2} times as much about its model as chance allows: lines, a second peak or ringing in the free stretches",

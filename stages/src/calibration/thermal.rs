@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
 use super::reading::{common_rate, push_free, read_blocks, read_free, within};
-use afmid_kernels::calibration::{AveragedPeriodogram, Stability, ThermalPeak, Welch, stability, thermal_peak};
+use afmid_kernels::calibration::{AveragedPeriodogram, Stability, Welch, stability};
+use afmid_kernels::spectra::ThermalFit;
 
 /// Noise control: thermal spectra of the free stretches record by record, to detect a change of the system.
 ///
@@ -19,7 +20,7 @@ use afmid_kernels::calibration::{AveragedPeriodogram, Stability, ThermalPeak, We
 /// A record's spectrum is a harmonic oscillator (mode 1), white and 1/f noise. If nothing changes, frequency, quality factor, thermal variance and
 /// white level of all records agree within their standard errors.
 /// # Method
-/// Averaged Hann periodograms, Whittle fit per record; two tests per quantity: chi-square of the scatter about the weighted mean, and a
+/// Averaged Hann periodograms, Whittle fit per record as in `spectrum.thermal`; two tests per quantity: chi-square of the scatter about the weighted mean, and a
 /// weighted line against the record's index.
 /// # Shapes
 /// `spectra`: density over record and frequency; `peaks`: one row per record.
@@ -58,7 +59,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "whether anythin
 impl Stage for Thermal {
     const SPEC: Spec = Spec {
         name: "calibration.thermal",
-        version: 1,
+        version: 2,
         summary: "thermal spectra per record, and tests for a change of the system over the archive",
         inputs: &[RECORDS.spec()],
         outputs: &[SPECTRA.spec(), PEAKS.spec(), SUMMARY.spec()],
@@ -86,10 +87,10 @@ impl Stage for Thermal {
                 spectrum
             })
             .collect::<Result<Vec<Option<AveragedPeriodogram>>, StageError>>()?;
-        let peaks: Vec<Result<ThermalPeak, String>> = spectra
+        let peaks: Vec<Result<ThermalFit, String>> = spectra
             .par_iter()
             .map(|spectrum| match spectrum {
-                Some(spectrum) => thermal_peak(spectrum, self.peak.search()).map_err(|error| error.to_string()),
+                Some(spectrum) => self.peak.fit(spectrum).map_err(|error| error.to_string()),
                 None => Err("no free stretch of a segment's length".to_owned()),
             })
             .collect();
@@ -132,11 +133,11 @@ impl Thermal {
         Ok(if welch.segments() == 0 { None } else { welch.average().ok() })
     }
 
-    fn summary(&self, records: &[Record], peaks: &[Result<ThermalPeak, String>], cx: &Context) -> Value {
+    fn summary(&self, records: &[Record], peaks: &[Result<ThermalFit, String>], cx: &Context) -> Value {
         let mut tests = Vec::new();
         let mut changed = Vec::new();
         for (quantity, unit, value, std) in QUANTITIES {
-            let of = |pick: fn(&ThermalPeak) -> f64| -> Vec<f64> {
+            let of = |pick: fn(&ThermalFit) -> f64| -> Vec<f64> {
                 peaks.iter().map(|peak| peak.as_ref().map_or(f64::NAN, pick)).collect()
             };
             let Some(test) = stability(&of(value), &of(std)) else { continue };
@@ -166,13 +167,13 @@ impl Thermal {
     }
 }
 
-type Pick = fn(&ThermalPeak) -> f64;
+type Pick = fn(&ThermalFit) -> f64;
 /// What is watched: name, unit, value, standard error.
 const QUANTITIES: [(&str, &str, Pick, Pick); 4] = [
-    ("frequency", "Hz", |p| p.frequency_hz, |p| p.frequency_std_hz),
-    ("quality_factor", "1", |p| p.quality_factor, |p| p.quality_factor_std),
-    ("variance", "V^2", |p| p.variance_v2, |p| p.variance_std_v2),
-    ("white", "V^2/Hz", |p| p.white_v2_per_hz, |p| p.white_std_v2_per_hz),
+    ("frequency", "Hz", |p| p.frequency_hz.value, |p| p.frequency_hz.std),
+    ("quality_factor", "1", |p| p.quality_factor.value, |p| p.quality_factor.std),
+    ("variance", "V^2", |p| p.variance.value, |p| p.variance.std),
+    ("white", "V^2/Hz", |p| p.white.value, |p| p.white.std),
 ];
 
 fn as_json(quantity: &str, unit: &str, test: &Stability) -> Value {
@@ -210,7 +211,7 @@ fn spectra_array(spectra: &[Option<AveragedPeriodogram>], rate: f64, segment: us
     )
 }
 
-fn table(records: &[Record], spectra: &[Option<AveragedPeriodogram>], peaks: &[Result<ThermalPeak, String>]) -> Table {
+fn table(records: &[Record], spectra: &[Option<AveragedPeriodogram>], peaks: &[Result<ThermalFit, String>]) -> Table {
     let mut table = Table::new()
         .with("record", "", "file name of the record", records.iter().map(|r| r.name.clone()).collect::<Vec<String>>())
         .with(

@@ -1,7 +1,8 @@
 //! Calibration and noise control: sensitivity, spring constant, delay, thermal spectra.
 //!
 //! [`Blocks`] reduce a record to levels and slopes; [`free_stretches`] finds where the lever is at rest; [`contact_slope`] and
-//! [`sensitivity`] give the optical lever sensitivity, [`Welch`], [`thermal_peak`] and [`spring_constant`] the stiffness,
+//! [`sensitivity`] give the optical lever sensitivity, [`Welch`] and [`spring_constant`] the stiffness
+//! (the peak between them is fitted by [`crate::spectra::thermal_peak`]),
 //! [`stability`] says whether either changed, [`onset_delay`] what is known of the delay.
 
 mod blocks;
@@ -14,7 +15,6 @@ mod spring_constant;
 mod stability;
 #[cfg(test)]
 mod tests;
-mod thermal_peak;
 mod welch;
 
 pub use blocks::Blocks;
@@ -25,6 +25,4 @@ pub use onset_delay::{OnsetDelay, OnsetRule, onset_delay};
 pub use sensitivity_model::{Estimate, Sensitivity, SlopeGauge, sensitivity};
 pub use spring_constant::{SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, ringdown_s, spring_constant};
 pub use stability::{Stability, stability};
-pub(crate) use thermal_peak::inverse;
-pub use thermal_peak::{PeakSearch, ThermalPeak, thermal_peak};
 pub use welch::{AveragedPeriodogram, Welch};

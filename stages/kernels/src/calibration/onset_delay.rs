@@ -3,7 +3,9 @@
 use super::error::CalibrationError;
 use super::sensitivity_model::Estimate;
 use super::welch::Welch;
-use faer::c64;
+use crate::linear_algebra::definite_inverse;
+use crate::optimise::{Damping, Ending, Limits, Objective, Taken, Trial, damped_step, descend};
+use faer::{Mat, c64};
 
 /// What is known of the onset and the delay. All times on the average's own axis, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -187,51 +189,113 @@ impl RingingMode {
     ) -> Result<(f64, Self), CalibrationError> {
         let failed = |reason| CalibrationError::Fit { near_hz: guess_hz, reason };
         let undamped = std::f64::consts::TAU * guess_hz;
-        let mut p = [0.0, 0.0, 0.0, undamped / (2.0 * quality), undamped];
-        for iteration in 0..50 {
-            let (mut normal, mut gradient, mut misfit) = ([[0.0; 5]; 5], [0.0; 5], 0.0);
-            for (t, y) in time.iter().zip(values) {
-                let decay = (-p[3] * t).exp();
-                let (sin, cos) = (p[4] * t).sin_cos();
-                let (c, s) = (decay * cos, decay * sin);
-                let model = p[2] + p[0] * c - p[1] * s;
-                let row = [c, -s, 1.0, -t * (p[0] * c - p[1] * s), -t * (p[0] * s + p[1] * c)];
-                misfit += (y - model).powi(2);
-                for i in 0..5 {
-                    gradient[i] += row[i] * (y - model);
-                    (0..5).for_each(|j| normal[i][j] += row[i] * row[j]);
-                }
-            }
-            // the first pass is linear: amplitude and offset at the guessed pole
-            if iteration == 0 {
-                for i in 3..5 {
-                    gradient[i] = 0.0;
-                    (0..5).for_each(|j| (normal[i][j], normal[j][i]) = (0.0, 0.0));
-                    normal[i][i] = 1.0;
-                }
-            }
-            let inverse =
-                super::thermal_peak::inverse(normal).ok_or_else(|| failed("the ringing's equations are singular"))?;
-            let step: [f64; 5] = std::array::from_fn(|i| inverse[i].iter().zip(&gradient).map(|(a, g)| a * g).sum());
-            (0..5).for_each(|i| p[i] += step[i]);
-            if !(p[3] > 0.0 && p[4] > 0.0 && p.iter().all(|v| v.is_finite())) {
-                return Err(failed("mode 1 left the range of decaying oscillations"));
-            }
-            if iteration > 1 && step[4].abs() < 1e-10 * p[4] && step[3].abs() < 1e-8 * p[3] {
-                let square = p[0].hypot(p[1]).powi(2);
-                // d arg C = (Re C dIm - Im C dRe) / |C|^2
-                let (a, b) = (-p[1] / square, p[0] / square);
-                let variance = a * a * inverse[0][0] + 2.0 * a * b * inverse[0][1] + b * b * inverse[1][1];
-                let mode = Self {
-                    decay_per_s: p[3],
-                    angular_per_s: p[4],
-                    amplitude: c64::new(p[0], p[1]),
-                    phase_std: noise * variance.sqrt(),
-                };
-                return Ok((misfit, mode));
+        let mut fit = Ringing { time, values };
+        let (start, limits) = (fit.start(undamped / (2.0 * quality), undamped), Limits { steps: 50, ..Limits::NONE });
+        let found = descend(&mut fit, start, &mut { FIRST_DAMPING }, Damping::STANDARD, limits).map_err(failed)?;
+        if found.ending == Ending::IterationLimit {
+            return Err(failed("50 iterations were not enough"));
+        }
+        let At { p, cost } = found.point;
+        let (information, _) = fit.normal(&p);
+        let inverse = definite_inverse(&information).ok_or_else(|| failed(SINGULAR))?;
+        let square = p[0].hypot(p[1]).powi(2);
+        // d arg C = (Re C dIm - Im C dRe) / |C|^2
+        let (a, b) = (-p[1] / square, p[0] / square);
+        let variance = a * a * inverse[(0, 0)] + 2.0 * a * b * inverse[(0, 1)] + b * b * inverse[(1, 1)];
+        let mode = Self {
+            decay_per_s: p[3],
+            angular_per_s: p[4],
+            amplitude: c64::new(p[0], p[1]),
+            phase_std: noise * variance.sqrt(),
+        };
+        Ok((cost, mode))
+    }
+}
+
+/// Damping of the first step.
+const FIRST_DAMPING: f64 = 1e-6;
+const SINGULAR: &str = "the ringing's equations are singular";
+
+/// `Re C exp(-d t) exp(i w t) + c` against the samples, as an objective.
+struct Ringing<'a> {
+    time: &'a [f64],
+    values: &'a [f64],
+}
+
+/// `Re C`, `Im C`, `c`, `d`, `w`, with the sum of squares.
+struct At {
+    p: [f64; 5],
+    cost: f64,
+}
+
+impl Ringing<'_> {
+    fn at(&self, p: [f64; 5]) -> At {
+        let cost = self.rows(&p).map(|(_, rest)| rest * rest).sum();
+        At { p, cost }
+    }
+
+    /// Amplitude and offset by linear least squares at a guessed pole.
+    fn start(&self, decay: f64, angular: f64) -> At {
+        let (information, gradient) = self.normal(&[0.0, 0.0, 0.0, decay, angular]);
+        let (linear, _) = damped_step(&information.as_ref().get(..3, ..3).to_owned(), &gradient[..3], 0.0);
+        self.at([linear[0], linear[1], linear[2], decay, angular])
+    }
+
+    /// Slopes and residual of each sample.
+    fn rows(&self, p: &[f64; 5]) -> impl Iterator<Item = ([f64; 5], f64)> {
+        let p = *p;
+        self.time.iter().zip(self.values).map(move |(t, y)| {
+            let decay = (-p[3] * t).exp();
+            let (sin, cos) = (p[4] * t).sin_cos();
+            let (c, s) = (decay * cos, decay * sin);
+            let row = [c, -s, 1.0, -t * (p[0] * c - p[1] * s), -t * (p[0] * s + p[1] * c)];
+            (row, y - (p[2] + p[0] * c - p[1] * s))
+        })
+    }
+
+    fn normal(&self, p: &[f64; 5]) -> (Mat<f64>, Vec<f64>) {
+        let (mut information, mut gradient) = (Mat::zeros(5, 5), vec![0.0; 5]);
+        for (row, rest) in self.rows(p) {
+            for i in 0..5 {
+                gradient[i] += row[i] * rest;
+                (0..5).for_each(|j| information[(i, j)] += row[i] * row[j]);
             }
         }
-        Err(failed("50 iterations were not enough"))
+        (information, gradient)
+    }
+}
+
+impl Objective for Ringing<'_> {
+    type Point = At;
+    type Local = (Mat<f64>, Vec<f64>);
+    type Step = ();
+    type Error = &'static str;
+
+    fn cost(&self, at: &At) -> f64 {
+        at.cost
+    }
+
+    fn local(&mut self, at: &mut At) -> Result<Option<Self::Local>, &'static str> {
+        let normal = self.normal(&at.p);
+        definite_inverse(&normal.0).map(|_| Some(normal)).ok_or(SINGULAR)
+    }
+
+    fn trial(&mut self, at: &At, local: &Self::Local, damping: f64) -> Result<Trial<At, ()>, &'static str> {
+        let (step, _) = damped_step(&local.0, &local.1, damping);
+        let p: [f64; 5] = std::array::from_fn(|i| at.p[i] + step[i]);
+        let possible = p[3] > 0.0 && p[4] > 0.0 && p.iter().all(|v| v.is_finite());
+        Ok(possible.then(|| (self.at(p), ())))
+    }
+
+    /// The last steps change the sum of squares by less than its rounding.
+    fn accepts(&self, cost: f64, next: f64) -> bool {
+        next <= cost * (1.0 + 1e-13)
+    }
+
+    fn taken(&mut self, from: &At, _: &Self::Local, (): (), to: &mut At) -> Taken {
+        let moved = |i: usize| (to.p[i] - from.p[i]).abs();
+        let arrived = moved(4) < 1e-10 * to.p[4] && moved(3) < 1e-8 * to.p[3];
+        Taken { kept: None, ending: arrived.then_some(Ending::Minimum) }
     }
 }
 

@@ -16,6 +16,19 @@ pub struct AveragedPeriodogram {
     pub segments: usize,
 }
 
+impl AveragedPeriodogram {
+    /// Frequencies of the bins, Hz.
+    pub fn frequency_hz(&self) -> Vec<f64> {
+        (0..self.density_v2_per_hz.len()).map(|k| k as f64 * self.bin_hz).collect()
+    }
+
+    /// How many independent segments the average is worth: neighbouring ones are correlated by 1/36.
+    pub fn independent_segments(&self) -> f64 {
+        let n = self.segments as f64;
+        n * n / (n + 2.0 * (n - 1.0) / 36.0)
+    }
+}
+
 /// Collects segments: Hann window, half overlap, each segment's mean removed.
 ///
 /// # Model

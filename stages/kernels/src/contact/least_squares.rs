@@ -4,6 +4,10 @@ use crate::linear_algebra::Svd;
 use faer::Mat;
 
 use crate::model::ModelError;
+use crate::optimise::{Damping, Ending, Limits, Objective, Taken, Trial, damped_svd_step, descend};
+
+/// Residuals in standard errors at these values; none where the model has no poles.
+type Residuals<'a> = &'a dyn Fn(&[f64]) -> Option<Vec<f64>>;
 
 /// Where a search ended.
 pub(super) struct Minimum {
@@ -18,59 +22,82 @@ pub(super) struct Minimum {
 const STEPS: usize = 200;
 /// A step that lowers the sum of squares by less has arrived: a thousandth of a standard error.
 const ARRIVED: f64 = 1e-6;
-/// Trials of a damping before the search ends where it is.
-const TRIALS: usize = 20;
+/// Damping of the first step.
+const FIRST: f64 = 1e-12;
 /// Directions with less of the largest singular value are not determined: differences are right to 1e-6.
 const RANK: f64 = 1e-7;
 
 /// Minimises the sum of squares of `residuals`, differences over `step` for derivatives.
 ///
 /// # Method
-/// Levenberg and Marquardt with columns of unit length, each step by singular values.
+/// [`descend`] with columns of unit length, each step by singular values.
 /// # Errors
 /// A start without residuals, a direction that they do not determine, no arrival.
-pub(super) fn minimise(
-    residuals: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
-    start: Vec<f64>,
-    step: &[f64],
-) -> Result<Minimum, ModelError> {
-    let mut values = start;
-    let mut present =
-        residuals(&values).ok_or(ModelError::Degenerate("the lever's contact has no poles at the start"))?;
-    let (mut cost, mut damping) = (square(&present), 0.0_f64);
-    for _ in 0..STEPS {
-        let slope = slope(residuals, &values, step)?;
-        let (svd, norm) = scaled(&slope)?;
-        let trial = (0..TRIALS).find_map(|_| {
-            let moved = moved(&svd, &norm, &present, &values, damping);
-            let found = residuals(&moved).map(|r| (square(&r), r)).filter(|(c, _)| *c <= cost);
-            if found.is_none() {
-                damping = (5.0 * damping).max(1e-6);
-            }
-            found.map(|(c, r)| (moved, c, r))
-        });
-        damping *= 0.1;
-        let gained = match trial {
-            Some((moved, lower, r)) => {
-                let gained = cost - lower;
-                (values, cost, present) = (moved, lower, r);
-                gained
-            }
-            None => 0.0,
-        };
-        if gained < ARRIVED {
-            return ended(residuals, values, cost, step);
-        }
+pub(super) fn minimise(residuals: Residuals<'_>, start: Vec<f64>, step: &[f64]) -> Result<Minimum, ModelError> {
+    let present = residuals(&start).ok_or(ModelError::Degenerate("the lever's contact has no poles at the start"))?;
+    let start = At { cost: square(&present), values: start, residuals: present };
+    let limits = Limits { steps: STEPS, ..Limits::NONE };
+    let found = descend(&mut Fit { residuals, step }, start, &mut { FIRST }, Damping::STANDARD, limits)?;
+    if found.ending == Ending::IterationLimit {
+        return Err(ModelError::Degenerate("the search for the contact did not arrive at a minimum"));
     }
-    Err(ModelError::Degenerate("the search for the contact did not arrive at a minimum"))
+    ended(residuals, found.point.values, found.point.cost, step)
 }
 
-fn ended(
-    residuals: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
+/// The residuals as an objective.
+struct Fit<'a> {
+    residuals: Residuals<'a>,
+    step: &'a [f64],
+}
+
+/// Values with their residuals.
+struct At {
     values: Vec<f64>,
+    residuals: Vec<f64>,
     cost: f64,
-    step: &[f64],
-) -> Result<Minimum, ModelError> {
+}
+
+/// Singular values of the slope, with columns of unit length, and the residuals along each.
+struct Local {
+    svd: Svd,
+    norm: Vec<f64>,
+    along: Vec<f64>,
+}
+
+impl Objective for Fit<'_> {
+    type Point = At;
+    type Local = Local;
+    type Step = ();
+    type Error = ModelError;
+
+    fn cost(&self, at: &At) -> f64 {
+        at.cost
+    }
+
+    fn local(&mut self, at: &mut At) -> Result<Option<Local>, ModelError> {
+        let (svd, norm) = scaled(&slope(self.residuals, &at.values, self.step)?)?;
+        let along = |k: usize| at.residuals.iter().enumerate().map(|(i, r)| svd.u[(i, k)] * r).sum();
+        let along = (0..svd.s.len()).map(along).collect();
+        Ok(Some(Local { svd, norm, along }))
+    }
+
+    fn trial(&mut self, at: &At, local: &Local, damping: f64) -> Result<Trial<At, ()>, ModelError> {
+        let step = damped_svd_step(&local.svd, &local.along, damping, RANK);
+        let moved = |((v, s), norm): ((&f64, &f64), &f64)| v + s / norm;
+        let values: Vec<f64> = at.values.iter().zip(&step).zip(&local.norm).map(moved).collect();
+        Ok((self.residuals)(&values).map(|residuals| (At { cost: square(&residuals), values, residuals }, ())))
+    }
+
+    fn accepts(&self, cost: f64, next: f64) -> bool {
+        next <= cost
+    }
+
+    fn taken(&mut self, from: &At, _: &Local, (): (), to: &mut At) -> Taken {
+        Taken { kept: None, ending: (from.cost - to.cost < ARRIVED).then_some(Ending::Minimum) }
+    }
+}
+
+fn ended(residuals: Residuals<'_>, values: Vec<f64>, cost: f64, step: &[f64]) -> Result<Minimum, ModelError> {
     let slope = slope(residuals, &values, step)?;
     let (svd, norm) = scaled(&slope)?;
     if slope.nrows() < norm.len() || svd.rank(RANK) < norm.len() {
@@ -79,14 +106,12 @@ fn ended(
         ));
     }
     let n = norm.len();
-    let covariance = Mat::from_fn(n, n, |i, j| {
-        let sum: f64 = (0..n).map(|k| svd.v[(i, k)] * svd.v[(j, k)] / (svd.s[k] * svd.s[k])).sum();
-        sum / (norm[i] * norm[j])
-    });
+    let inverse = svd.normal_inverse(n);
+    let covariance = Mat::from_fn(n, n, |i, j| inverse[(i, j)] / (norm[i] * norm[j]));
     Ok(Minimum { values, slope, covariance, cost })
 }
 
-fn slope(residuals: &dyn Fn(&[f64]) -> Option<Vec<f64>>, values: &[f64], step: &[f64]) -> Result<Mat<f64>, ModelError> {
+fn slope(residuals: Residuals<'_>, values: &[f64], step: &[f64]) -> Result<Mat<f64>, ModelError> {
     let column = |p: usize| {
         let at = |sign: f64| {
             let mut moved = values.to_vec();
@@ -106,18 +131,6 @@ fn scaled(slope: &Mat<f64>) -> Result<(Svd, Vec<f64>), ModelError> {
     let length = |j: usize| slope.col(j).iter().map(|v| v * v).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     let norm: Vec<f64> = (0..slope.ncols()).map(length).collect();
     Ok((Svd::new(&Mat::from_fn(slope.nrows(), slope.ncols(), |i, j| slope[(i, j)] / norm[j]))?, norm))
-}
-
-fn moved(svd: &Svd, norm: &[f64], residuals: &[f64], values: &[f64], damping: f64) -> Vec<f64> {
-    let limit = RANK * svd.s.first().copied().unwrap_or(0.0);
-    let part: Vec<f64> = (0..svd.s.len())
-        .map(|k| {
-            let along: f64 = residuals.iter().enumerate().map(|(i, r)| svd.u[(i, k)] * r).sum();
-            if svd.s[k] > limit { along * svd.s[k] / (svd.s[k] * svd.s[k] + damping * damping) } else { 0.0 }
-        })
-        .collect();
-    let step = |i: usize| part.iter().enumerate().map(|(k, p)| svd.v[(i, k)] * p).sum::<f64>() / norm[i];
-    values.iter().enumerate().map(|(i, v)| v + step(i)).collect()
 }
 
 fn square(values: &[f64]) -> f64 {

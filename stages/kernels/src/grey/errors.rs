@@ -6,9 +6,9 @@ use faer::Mat;
 use super::columns::visit;
 use super::evaluation::{Evaluation, Normal, Problem, solved};
 use super::fractions::Fractions;
+use crate::linear_algebra::symmetric_inverse;
 use crate::model::ModelError;
 use crate::pem::{ResidualColour, time_domain_covariance};
-use crate::ringdown::internals::symmetric_inverse;
 
 /// Covariances of `[estimated gains | estimated values of the point]` in the search's coordinates, and the residuals.
 pub(super) struct Errors {

@@ -1,17 +1,20 @@
-//! Levenberg-Marquardt on modes, real poles and delay.
+//! The search for modes, real poles and delay.
 
 use faer::Mat;
 
 use super::evaluation::{Evaluation, Normal, Problem};
 use super::point::Point;
+use crate::linear_algebra::symmetric_inverse;
 use crate::model::ModelError;
-use crate::pem::{Ending, Verdict};
-use crate::ringdown::internals::symmetric_inverse;
+use crate::optimise::{Damping, Descent, Ending, Limits, Objective, Trial, damped_step, descend, shortened};
+use crate::pem::Verdict;
 
 /// Promised fall of the cost, in variances of the noise, that ends the search: a thousandth of a standard error.
 const ARRIVED: f64 = 1e-6;
 /// Residual over the output below which what is left is rounding: single exponentials run for thousands of samples.
 const EXACT: f64 = 1e-10;
+/// Damping of the first step.
+const FIRST: f64 = 1e-6;
 /// Longest step of a logarithm or of the delay in samples: beyond it the linearisation means nothing.
 const LONGEST: f64 = 0.7;
 
@@ -21,7 +24,7 @@ pub(super) struct Found {
     pub verdict: Verdict,
 }
 
-/// Searches from `start`; `variance` weighs the expectations.
+/// Searches from `start`; `variance` weighs the expectations. Errors: no finite triangle.
 pub(super) fn search(
     problem: &Problem<'_>,
     start: Evaluation,
@@ -29,82 +32,75 @@ pub(super) fn search(
     iterations: usize,
 ) -> Result<Found, ModelError> {
     let energy: f64 = start.triangles.iter().map(|t| t.col(t.ncols() - 1).squared_norm_l2()).sum();
-    let mut best = start;
-    let mut damping = 1e-6;
-    let mut verdict =
-        Verdict { ending: Ending::IterationLimit, converged: false, iterations: 0, gradient: f64::NAN, at_limit: 0 };
-    while verdict.iterations < iterations {
-        if best.cost <= EXACT * EXACT * energy {
-            verdict.ending = Ending::Exact;
-            break;
-        }
-        let normal = problem.normal(&best, variance);
-        let noise = problem.variance(&best);
-        let values = best.point.values();
-        let (information, gradient) = reduced(problem, &normal, &values);
-        let promised = quadratic(&symmetric_inverse(&information), &gradient);
-        verdict.gradient = (promised / best.cost.max(f64::MIN_POSITIVE)).sqrt();
-        if promised < ARRIVED * noise {
-            verdict.ending = Ending::Minimum;
-            break;
-        }
-        match lower(problem, &best, &values, &information, &gradient, variance, &mut damping) {
-            Some(next) => best = next,
-            None => {
-                // nothing lower along any damped step: at a minimum to rounding, or stuck
-                let near = promised < 1e-2 * noise;
-                verdict.ending = if near { Ending::Minimum } else { Ending::Stalled };
-                break;
-            }
-        }
-        verdict.iterations += 1;
-    }
-    verdict.converged = matches!(verdict.ending, Ending::Minimum | Ending::Exact);
-    verdict.at_limit = problem.rules.edges(&best.point.values()).iter().filter(|&&e| e != 0).count()
+    let mut fit = Fit { problem, variance, energy, gradient: f64::NAN };
+    let limits = Limits { steps: iterations, ..Limits::NONE };
+    let Descent { point: best, ending, steps } = descend(&mut fit, start, &mut { FIRST }, Damping::STANDARD, limits)?;
+    let at_limit = problem.rules.edges(&best.point.values()).iter().filter(|&&e| e != 0).count()
         + best.held.iter().filter(|h| h.is_some_and(|side| side != 0)).count();
+    let converged = matches!(ending, Ending::Minimum | Ending::Exact);
+    let verdict = Verdict { ending, converged, iterations: steps, gradient: fit.gradient, at_limit };
     Ok(Found { best, verdict })
 }
 
-/// A lower trial, or none for any damping.
-fn lower(
-    problem: &Problem<'_>,
-    best: &Evaluation,
-    values: &[f64],
-    information: &Mat<f64>,
-    gradient: &[f64],
+/// The fit as an objective.
+struct Fit<'a, 'b> {
+    problem: &'a Problem<'b>,
     variance: f64,
-    damping: &mut f64,
-) -> Option<Evaluation> {
-    while *damping < 1e12 {
-        let trial = stepped(problem, values, information, gradient, *damping);
-        let point = best.point.with(&trial);
-        let next = point.possible().then(|| problem.evaluate(&point, variance).ok()).flatten();
-        match next.filter(|next| next.cost < best.cost) {
-            Some(next) => {
-                *damping = (0.1 * *damping).max(1e-12);
-                return Some(next);
-            }
-            None => *damping = (10.0 * *damping).max(1e-4),
-        }
-    }
-    *damping = 1e-6;
-    None
+    /// Sum of squares of the output.
+    energy: f64,
+    /// Share of the residual in the tangent space at the last local model.
+    gradient: f64,
 }
 
-fn stepped(problem: &Problem<'_>, values: &[f64], information: &Mat<f64>, gradient: &[f64], damping: f64) -> Vec<f64> {
-    let mut damped = information.clone();
-    (0..gradient.len()).for_each(|i| damped[(i, i)] *= 1.0 + damping);
-    let inverse = symmetric_inverse(&damped);
-    let step: Vec<f64> =
-        (0..gradient.len()).map(|i| (0..gradient.len()).map(|j| inverse[(i, j)] * gradient[j]).sum()).collect();
-    let longest = step.iter().fold(0.0_f64, |longest, s| longest.max(s.abs()));
-    let share = if longest > LONGEST { LONGEST / longest } else { 1.0 };
-    let mut trial = values.to_vec();
-    for (&i, step) in problem.rules.free.iter().zip(&step) {
-        let (least, most) = problem.rules.limits[i];
-        trial[i] = (trial[i] + share * step).clamp(least, most);
+/// Normal equations of the point's values.
+struct Local {
+    values: Vec<f64>,
+    information: Mat<f64>,
+    gradient: Vec<f64>,
+    /// Fall of the cost that the undamped step promises.
+    promised: f64,
+}
+
+impl Objective for Fit<'_, '_> {
+    type Point = Evaluation;
+    type Local = Local;
+    type Step = ();
+    type Error = ModelError;
+
+    fn cost(&self, at: &Evaluation) -> f64 {
+        at.cost
     }
-    trial
+
+    fn exact(&self, at: &Evaluation) -> bool {
+        at.cost <= EXACT * EXACT * self.energy
+    }
+
+    fn local(&mut self, at: &mut Evaluation) -> Result<Option<Local>, ModelError> {
+        let normal = self.problem.normal(at, self.variance);
+        let values = at.point.values();
+        let (information, gradient) = reduced(self.problem, &normal, &values);
+        let promised = quadratic(&symmetric_inverse(&information), &gradient);
+        self.gradient = (promised / at.cost.max(f64::MIN_POSITIVE)).sqrt();
+        let arrived = promised < ARRIVED * self.problem.variance(at);
+        Ok((!arrived).then_some(Local { values, information, gradient, promised }))
+    }
+
+    fn trial(&mut self, at: &Evaluation, local: &Local, damping: f64) -> Result<Trial<Evaluation, ()>, ModelError> {
+        let (step, _) = damped_step(&local.information, &local.gradient, damping);
+        let step = shortened(step, LONGEST);
+        let mut values = local.values.clone();
+        for (&i, step) in self.problem.rules.free.iter().zip(&step) {
+            let (least, most) = self.problem.rules.limits[i];
+            values[i] = (values[i] + step).clamp(least, most);
+        }
+        Ok(tried(self.problem, &at.point.with(&values), self.variance).map(|next| (next, ())))
+    }
+
+    /// At a minimum to rounding, or stuck.
+    fn stalled(&self, at: &Evaluation, local: &Local) -> Ending {
+        let near = local.promised < 1e-2 * self.problem.variance(at);
+        if near { Ending::Minimum } else { Ending::Stalled }
+    }
 }
 
 /// Information and gradient of the point's values, the linear ones eliminated; what is pushed against its limit is taken out.

@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 
 use super::{Before, Grey, GreyHold, GreyKnown, GreyOptions, GreyQuantity, GreyStart, InputBetween, fit_grey};
 use crate::fixture::white_noise;
+use crate::linear_algebra::symmetric_inverse;
 use crate::pem::{Experiment, ResidualColour};
 use crate::ringdown::Knowledge;
-use crate::ringdown::internals::symmetric_inverse;
 
 const T: f64 = 1e-6;
 

@@ -116,6 +116,15 @@ impl Svd {
         Ok(Self { u, s, v })
     }
 
+    /// `(M^T M)^+` of the decomposed matrix M, directions beyond the first `rank` left out.
+    pub fn normal_inverse(&self, rank: usize) -> Mat<f64> {
+        let n = self.v.nrows();
+        let entry = |i: usize, j: usize| {
+            (0..rank).map(|k| self.v[(i, k)] * self.v[(j, k)] / (self.s[k] * self.s[k])).sum::<f64>()
+        };
+        Mat::from_fn(n, n, entry)
+    }
+
     /// How many singular values exceed `tolerance` times the largest.
     pub fn rank(&self, tolerance: f64) -> usize {
         let limit = tolerance * self.s.first().copied().unwrap_or(0.0);
@@ -210,24 +219,4 @@ pub fn product(lhs: MatRef<'_, f64>, rhs: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = Mat::zeros(lhs.nrows(), rhs.ncols());
     matmul(out.as_mut(), Accum::Replace, lhs, rhs, 1.0, Par::Seq);
     out
-}
-
-/// Lower Cholesky factor of a symmetric positive semidefinite matrix: a direction with less than `1e-14` of its own variance left is rounding
-/// and gets `1e-7` of its scale.
-pub fn cholesky(matrix: &Mat<f64>) -> Mat<f64> {
-    let n = matrix.nrows();
-    let mut lower = Mat::<f64>::zeros(n, n);
-    for j in 0..n {
-        let left = matrix[(j, j)] - (0..j).map(|k| lower[(j, k)].powi(2)).sum::<f64>();
-        if left <= 1e-14 * matrix[(j, j)] {
-            lower[(j, j)] = 1e-7 * matrix[(j, j)].max(f64::MIN_POSITIVE).sqrt();
-            continue;
-        }
-        lower[(j, j)] = left.sqrt();
-        for i in j + 1..n {
-            let rest = matrix[(i, j)] - (0..j).map(|k| lower[(i, k)] * lower[(j, k)]).sum::<f64>();
-            lower[(i, j)] = rest / lower[(j, j)];
-        }
-    }
-    lower
 }

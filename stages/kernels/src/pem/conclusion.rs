@@ -5,7 +5,6 @@ use faer::Mat;
 use super::columns::Columns;
 use super::covariance::{ResidualColour, covariance};
 use super::gradient::Noise;
-use super::optimiser::Ending;
 use super::options::{Identified, NoiseModel, PemOptions, Verdict};
 use super::predictor::Problem;
 use super::projection::{Present, present};
@@ -13,6 +12,7 @@ use super::state::State;
 use crate::model::{
     InnovationsModel, InputGains, LIMIT, ModelError, Section, kalman_gains, roots, section_order, sections,
 };
+use crate::optimise::Ending;
 
 pub(super) fn conclude(
     problem: &Problem,

@@ -57,10 +57,10 @@ mod tests;
 mod turns;
 mod whitening;
 
+pub use crate::optimise::Ending;
 pub use covariance::ResidualColour;
 pub(crate) use covariance::covariance as time_domain_covariance;
 pub(crate) use data::complete as longest_complete;
 pub use identify::{identify, refit, with_poles};
-pub use optimiser::Ending;
 pub use options::{Experiment, Focus, Identified, NoiseModel, PemOptions, Verdict};
 pub(crate) use predictor::all_pole;

@@ -5,9 +5,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::covariance::ResidualColour;
-use super::optimiser::Ending;
 use crate::model::{InnovationsModel, InputGains, ModelError};
 use crate::modes::{ModeCriteria, Pole, PoleKind, poles};
+use crate::optimise::Ending;
 
 /// One record of input and output, equally sampled.
 #[derive(Debug, Clone, Copy)]

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use super::columns::Columns;
 use super::gradient::{Point, coefficient_jacobian, residual, to_coordinates};
-use super::optimiser::{DAMPING, Ending};
+use super::optimiser::DAMPING;
 use super::predictor::Problem;
 use super::projection::{Projection, Sensitivities};
 use super::secant::Secant;
 use super::whitening::Whitened;
 use crate::model::ModelError;
+use crate::optimise::Ending;
 
 /// A point with everything known of it.
 pub(crate) struct State {

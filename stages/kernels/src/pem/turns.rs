@@ -5,13 +5,14 @@ use faer::c64;
 use super::conclusion::Jacobian;
 use super::gradient::{Noise, Point};
 use super::noise::{Seen, gain, intensities};
-use super::optimiser::{Ending, Limits, minimise};
+use super::optimiser::{Limits, minimise};
 use super::options::NoiseModel;
 use super::predictor::Problem;
 use super::starts::{lowest, refined};
 use super::state::State;
 use super::tangent::{Tangent, Transform, periodogram, remaining};
 use crate::model::{ModelError, coordinates, roots, section_order, sections};
+use crate::optimise::Ending;
 
 /// Prediction errors with a noise filter, from the output error's starts, which compete on the shortened problem.
 pub(super) fn thermal_or_free(

@@ -36,14 +36,18 @@ impl Fitted {
             for (i, &parameter) in freedom.shared.iter().enumerate().skip(j) {
                 let factor = shared_root[(i, j)];
                 for (c, (direction, shared)) in direction.iter_mut().zip(&w.shared[parameter]).enumerate() {
-                    let own: f64 =
-                        freedom.own.iter().enumerate().map(|(k, &o)| w.own[o][c] * block.coupling[(k, i)]).sum();
+                    let own: f64 = freedom
+                        .own
+                        .iter()
+                        .enumerate()
+                        .map(|(k, &o)| w.own[o][c] * block.eliminated.coupling[(k, i)])
+                        .sum();
                     *direction += factor * (shared - own);
                 }
             }
             directions.push(direction);
         }
-        let own_root = cholesky(&block.own_inverse);
+        let own_root = cholesky(&block.eliminated.own_inverse);
         for j in 0..freedom.own.len() {
             let mut direction = vec![0.0; width];
             for (i, &o) in freedom.own.iter().enumerate().skip(j) {

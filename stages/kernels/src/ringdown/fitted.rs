@@ -6,10 +6,11 @@ use super::estimate::RingdownVerdict;
 use super::limits::hold;
 use super::modal_form::{EventParameters, Exponential};
 use super::noise::RingdownNoise;
-use super::normal::{EventBlock, Freedom, blocks, symmetric_inverse};
+use super::normal::{EventBlock, Freedom, blocks};
 use super::projected::{Projected, Whitened};
 use super::records::Records;
 use super::search::{Point, assembled, search};
+use crate::linear_algebra::symmetric_inverse;
 use crate::model::ModelError;
 
 /// Outer rounds: each takes the basis to the present poles.
@@ -85,9 +86,10 @@ impl Fitted {
         self.data.rest.iter_mut().for_each(|rest| *rest /= excess);
         for block in &mut self.blocks {
             block.cost /= excess;
-            block.own_inverse = grow(&block.own_inverse, excess);
-            block.information = grow(&block.information, 1.0 / excess);
-            block.score.iter_mut().for_each(|score| *score /= excess);
+            let part = &mut block.eliminated;
+            part.own_inverse = grow(&part.own_inverse, excess);
+            part.information = grow(&part.information, 1.0 / excess);
+            part.score.iter_mut().for_each(|score| *score /= excess);
         }
     }
 

@@ -60,7 +60,6 @@ pub mod internals {
     pub use super::estimate::mode;
     pub use super::modal_form::{columns, shared, signal, weights};
     pub use super::noise_estimate::noise_of_stretches;
-    pub use super::normal::symmetric_inverse;
     pub use super::whitener::{LANES, Whitener};
     pub use super::whittle::{hann, mean_periodogram};
 }

@@ -46,7 +46,7 @@ impl Fitted {
             for block in &self.blocks {
                 for i in 0..n {
                     for j in 0..n {
-                        scores[(i, j)] += block.score[i] * block.score[j] * count / (count - 1.0);
+                        scores[(i, j)] += block.eliminated.score[i] * block.eliminated.score[j] * count / (count - 1.0);
                     }
                 }
             }
@@ -95,9 +95,9 @@ impl Fitted {
             .iter()
             .map(|block| {
                 let mut std = [0.0; 4];
-                let shared = &block.coupling * &self.covariance * block.coupling.transpose();
+                let shared = &block.eliminated.coupling * &self.covariance * block.eliminated.coupling.transpose();
                 for (k, &parameter) in freedom.own.iter().enumerate() {
-                    std[parameter] = (block.own_inverse[(k, k)] + shared[(k, k)]).max(0.0).sqrt();
+                    std[parameter] = (block.eliminated.own_inverse[(k, k)] + shared[(k, k)]).max(0.0).sqrt();
                 }
                 EventParameters { amplitude: std[0], onset_s: std[1], offset: std[2], slope: std[3] }
             })

@@ -1,10 +1,13 @@
-//! Levenberg-Marquardt on compressed events.
+//! The search on compressed events.
+
+use std::convert::Infallible;
 
 use faer::Mat;
 
 use super::modal_form::{EventParameters, Exponential};
-use super::normal::{EventBlock, Freedom, blocks, cost, symmetric_inverse};
+use super::normal::{EventBlock, Freedom, blocks, cost};
 use super::projected::Projected;
+use crate::optimise::{Damping, Ending, Limits, Objective, Taken, Trial, damped_step, descend};
 
 /// Where the search stands.
 #[derive(Clone)]
@@ -27,8 +30,8 @@ pub(super) fn assembled(blocks: &[EventBlock], freedom: &Freedom, values: &[f64]
     let mut information = Mat::<f64>::zeros(n, n);
     let mut gradient = vec![0.0; n];
     for block in blocks {
-        information += &block.information;
-        gradient.iter_mut().zip(&block.score).for_each(|(g, s)| *g += s);
+        information += &block.eliminated.information;
+        gradient.iter_mut().zip(&block.eliminated.score).for_each(|(g, s)| *g += s);
     }
     for (k, &parameter) in freedom.shared.iter().enumerate() {
         if let Some(prior) = freedom.priors[parameter] {
@@ -42,15 +45,19 @@ pub(super) fn assembled(blocks: &[EventBlock], freedom: &Freedom, values: &[f64]
 /// Largest number of trial steps of one search.
 const TRIALS: usize = 40;
 
+/// Damping of the first step.
+const FIRST: f64 = 1e-6;
+
 /// Gain of the cost that is left lying: a quarter of a standard error, squared.
 const VALLEY: f64 = 0.06;
 
 /// Minimises the cost from `point`, while the basis round `reference` holds.
 ///
 /// # Method
-/// Levenberg-Marquardt, the events' own parameters eliminated by Schur complements; steps that leave the stable half plane, or make the fit
-/// worse, are repeated shorter; parameters on a bound are held while they want beyond it. Ends when no parameter of a mode moves by `tolerance` of its standard error and all of them together by less than
-/// a quarter of one: real poles that nearly coincide make a long flat valley, along which nothing else changes.
+/// [`descend`] with the events' own parameters eliminated by Schur complements. Steps that leave the stable half plane, or
+/// make the fit worse, are repeated shorter; parameters on a bound are held while they push beyond it. Ends when no
+/// parameter of a mode moves by `tolerance` of its standard error and all of them together by less than a quarter of one:
+/// real poles that nearly coincide make a long flat valley, along which nothing else changes.
 pub(super) fn search(
     data: &Projected,
     reference: &[Exponential],
@@ -58,57 +65,97 @@ pub(super) fn search(
     freedom: &Freedom,
     tolerance: f64,
 ) -> Search {
-    let mut damping = 1e-6;
-    let mut best = cost(
-        data,
-        reference,
-        &point.exponentials,
-        &point.events,
-        &freedom.values(&point.exponentials),
-        &freedom.priors,
-    );
-    let of_mode: Vec<bool> =
-        reference.iter().flat_map(|e| std::iter::repeat_n(e.oscillates(), e.parameters())).collect();
-    let mut out = Search { distance: f64::INFINITY, steps: 0 };
-    for _ in 0..TRIALS {
-        let parts = blocks(data, reference, &point.exponentials, &point.events, freedom, damping);
+    let of_mode = reference.iter().flat_map(|e| std::iter::repeat_n(e.oscillates(), e.parameters())).collect();
+    let mut fit = Fit { data, reference, freedom, of_mode, tolerance, distance: f64::INFINITY };
+    let start = fit.at(point.clone());
+    let limits = Limits { trials: TRIALS, ..Limits::NONE };
+    let found = match descend(&mut fit, start, &mut { FIRST }, Damping::STANDARD, limits) {
+        Ok(found) => found,
+        Err(never) => match never {},
+    };
+    *point = found.point.point;
+    Search { distance: fit.distance, steps: found.steps }
+}
+
+/// The joint fit as an objective.
+struct Fit<'a> {
+    data: &'a Projected,
+    reference: &'a [Exponential],
+    freedom: &'a Freedom,
+    /// Which parameters are those of modes.
+    of_mode: Vec<bool>,
+    tolerance: f64,
+    /// Length of the last step taken, in standard errors.
+    distance: f64,
+}
+
+/// A point with its cost.
+struct Costed {
+    point: Point,
+    cost: f64,
+}
+
+/// What arriving depends on.
+struct Reach {
+    distance: f64,
+    gain: f64,
+}
+
+impl Fit<'_> {
+    fn at(&self, point: Point) -> Costed {
+        let stable = point.exponentials.iter().all(|e| e.pole.re < 0.0 && e.pole.is_finite());
+        let values = self.freedom.values(&point.exponentials);
+        let Self { data, reference, freedom, .. } = self;
+        let cost = match stable {
+            true => cost(data, reference, &point.exponentials, &point.events, &values, &freedom.priors),
+            false => f64::INFINITY,
+        };
+        Costed { point, cost }
+    }
+}
+
+impl Objective for Fit<'_> {
+    type Point = Costed;
+    // damping enters the events' own blocks: the local model belongs to one trial
+    type Local = ();
+    type Step = Reach;
+    type Error = Infallible;
+
+    fn cost(&self, at: &Costed) -> f64 {
+        at.cost
+    }
+
+    fn local(&mut self, _at: &mut Costed) -> Result<Option<()>, Infallible> {
+        Ok(Some(()))
+    }
+
+    fn trial(&mut self, at: &Costed, (): &(), damping: f64) -> Result<Trial<Costed, Reach>, Infallible> {
+        let (point, freedom) = (&at.point, self.freedom);
+        let parts = blocks(self.data, self.reference, &point.exponentials, &point.events, freedom, damping);
         let values = freedom.values(&point.exponentials);
         let (mut information, mut gradient) = assembled(&parts, freedom, &values);
         freedom.hold_pushed(&values, &mut information, &mut gradient);
-        (0..gradient.len()).for_each(|i| information[(i, i)] *= 1.0 + damping);
-        let inverse = symmetric_inverse(&information);
-        let mut step: Vec<f64> =
-            (0..gradient.len()).map(|i| (0..gradient.len()).map(|j| inverse[(i, j)] * gradient[j]).sum()).collect();
+        let (mut step, inverse) = damped_step(&information, &gradient, damping);
         freedom.cut(&values, &mut step);
-        let trial = moved(point, &values, &step, &parts, freedom);
-        let stable = trial.exponentials.iter().all(|e| e.pole.re < 0.0 && e.pole.is_finite());
-        let next = if stable {
-            let values = freedom.values(&trial.exponentials);
-            cost(data, reference, &trial.exponentials, &trial.events, &values, &freedom.priors)
-        } else {
-            f64::INFINITY
-        };
         let gain: f64 = step.iter().zip(&gradient).map(|(s, g)| s * g).sum::<f64>()
-            + parts.iter().map(|block| block.own_gain).sum::<f64>();
-        if next <= best * (1.0 + 1e-13) {
-            (*point, best) = (trial, next);
-            out.steps += 1;
-            out.distance = (0..step.len())
-                .filter(|&k| of_mode[freedom.shared[k]])
-                .map(|k| step[k].abs() / inverse[(k, k)].sqrt().max(f64::MIN_POSITIVE))
-                .fold(0.0, f64::max);
-            damping = (damping * 0.1).max(1e-12);
-            if out.distance < tolerance && gain < VALLEY {
-                break;
-            }
-        } else {
-            damping = (damping * 10.0).max(1e-4);
-            if damping > 1e8 {
-                break;
-            }
-        }
+            + parts.iter().map(|part| part.eliminated.own_gain).sum::<f64>();
+        let distance = (0..step.len())
+            .filter(|&k| self.of_mode[freedom.shared[k]])
+            .map(|k| step[k].abs() / inverse[(k, k)].sqrt().max(f64::MIN_POSITIVE))
+            .fold(0.0, f64::max);
+        Ok(Some((self.at(moved(point, &values, &step, &parts, freedom)), Reach { distance, gain })))
     }
-    out
+
+    /// The last steps change the cost by less than its rounding.
+    fn accepts(&self, cost: f64, next: f64) -> bool {
+        next.is_finite() && next <= cost * (1.0 + 1e-13)
+    }
+
+    fn taken(&mut self, _from: &Costed, (): &(), Reach { distance, gain }: Reach, _to: &mut Costed) -> Taken {
+        self.distance = distance;
+        let arrived = distance < self.tolerance && gain < VALLEY;
+        Taken { kept: None, ending: arrived.then_some(Ending::Minimum) }
+    }
 }
 
 fn moved(point: &Point, values: &[f64], step: &[f64], parts: &[EventBlock], freedom: &Freedom) -> Point {
@@ -121,8 +168,8 @@ fn moved(point: &Point, values: &[f64], step: &[f64], parts: &[EventBlock], free
         .map(|(event, part)| {
             let mut own = [event.amplitude, event.onset_s, event.offset, event.slope];
             for (k, &parameter) in freedom.own.iter().enumerate() {
-                let turned: f64 = step.iter().enumerate().map(|(j, s)| part.coupling[(k, j)] * s).sum();
-                own[parameter] += part.own_step[k] - turned;
+                let turned: f64 = step.iter().enumerate().map(|(j, s)| part.eliminated.coupling[(k, j)] * s).sum();
+                own[parameter] += part.eliminated.own_step[k] - turned;
             }
             EventParameters { amplitude: own[0], onset_s: own[1], offset: own[2], slope: own[3] }
         })

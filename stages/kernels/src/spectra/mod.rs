@@ -4,7 +4,8 @@
 //! Undefined values are NaN.
 //!
 //! [`etfe`] divides transforms (Eqs. 5 to 7), [`local_rational`] and [`local_polynomial`] smooth it, [`power_spectrum`] and [`average_spectra`] are for noise,
-//! [`thermal_fit`] reads modes from it. A transform costs O(N log N), a local fit O(bins x neighbours).
+//! [`thermal_fit`] reads modes
+//! from it, [`thermal_peak`] one of several. A transform costs O(N log N), a local fit O(bins x neighbours).
 //!
 //! ```
 //! use afmid_kernels::spectra::{EndTreatment, EtfeSettings, Intersample, difference, etfe};
@@ -46,6 +47,7 @@ mod ratio;
 mod seen_oscillator;
 mod taper;
 mod thermal_fit;
+mod thermal_peak;
 
 pub use averaged::{AveragedSpectrum, RecordSpectrum, average_spectra};
 pub use ensemble_response::{EnsembleResponse, EnsembleResponseSettings, ensemble_response};
@@ -59,3 +61,4 @@ pub use ratio::{EndTreatment, EtfeSettings, Intersample, TransferEstimate, diffe
 pub use seen_oscillator::SeenThrough;
 pub use taper::{Taper, TaperGains, taper, taper_gains};
 pub use thermal_fit::{AveragedDensity, Fitted, FoundLine, ThermalFit, ThermalFitSettings, thermal_fit};
+pub use thermal_peak::{PeakSearch, thermal_peak};

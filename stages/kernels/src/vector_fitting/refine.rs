@@ -1,4 +1,4 @@
-//! Gauss-Newton on the weighted error itself, and what follows from its last linearisation.
+//! Damped least squares on the weighted error itself, and what follows from its last linearisation.
 
 use crate::linear_algebra::{Qr, Svd};
 use faer::{Mat, c64};
@@ -6,6 +6,7 @@ use faer::{Mat, c64};
 use super::linear::{Fitted, Points, with_sections};
 use super::{VectorFit, VectorFitting};
 use crate::model::ModelError;
+use crate::optimise::{Damping, Ending, Limits, Objective, Taken, Trial, damped_svd_step, descend};
 
 /// A fit with its weighted squared error.
 pub(super) struct Refined {
@@ -17,6 +18,8 @@ pub(super) struct Refined {
     pub settled: bool,
 }
 
+/// Damping of the first step.
+const FIRST: f64 = 1e-8;
 /// Steps at most: ten are usual; more where the data hardly know a pole.
 const STEPS: usize = 100;
 /// Gradient share that counts as none: a hundredth of a standard error at 8192 points, as in `model.pem`.
@@ -37,38 +40,54 @@ pub(super) fn refined(
     if !cost.is_finite() {
         return Err(ModelError::Degenerate("the response of a starting model is not finite"));
     }
-    let mut state = Refined { fitted, cost, steps, gradient: f64::NAN, settled: false };
-    let mut damping = 1e-4;
-    for _ in 0..if settings.refine { STEPS } else { 0 } {
-        let linear = Linearised::new(points, &state.fitted)?;
-        state.gradient = linear.gradient();
-        if state.gradient < GRADIENT {
-            break;
-        }
-        let accepted = (0..16).find_map(|_| {
-            let trial = trial(points, &state.fitted, &linear.step(damping), settings);
-            match trial {
-                Some((fitted, cost)) if cost < state.cost => Some((fitted, cost)),
-                _ => {
-                    damping *= 5.0;
-                    None
-                }
-            }
-        });
-        let Some((fitted, cost)) = accepted else {
-            // at the end of what damping can do: what gradient is left lies along poles that the data hardly know, and is less than one standard error in all
-            state.settled = state.gradient * (2.0 * points.len() as f64).sqrt() < 1.0;
-            break;
-        };
-        // twice the log-likelihood, the noise's level taken from the fit itself
-        let gain = 2.0 * points.len() as f64 * (state.cost / cost).ln();
-        state = Refined { fitted, cost, steps: state.steps + 1, gradient: state.gradient, settled: gain < SETTLED };
-        if state.settled {
-            break;
-        }
-        damping = (damping * 0.1).max(1e-12);
+    let state = Refined { fitted, cost, steps, gradient: f64::NAN, settled: false };
+    if !settings.refine {
+        return Ok(state);
     }
-    Ok(state)
+    let limits = Limits { steps: STEPS, ..Limits::NONE };
+    let found = descend(&mut Fit { points, settings }, state, &mut { FIRST }, Damping::STANDARD, limits)?;
+    let stalled = found.ending == Ending::Stalled;
+    let mut best = Refined { steps: steps + found.steps, ..found.point };
+    // no damping helps any more: what gradient is left lies along poles that the data hardly determine, and is less than
+    // one standard error in all
+    best.settled |= stalled && best.gradient * (2.0 * points.len() as f64).sqrt() < 1.0;
+    Ok(best)
+}
+
+/// The weighted error as an objective.
+struct Fit<'a> {
+    points: &'a Points,
+    settings: &'a VectorFitting,
+}
+
+impl Objective for Fit<'_> {
+    type Point = Refined;
+    type Local = Linearised;
+    type Step = ();
+    type Error = ModelError;
+
+    fn cost(&self, at: &Refined) -> f64 {
+        at.cost
+    }
+
+    fn local(&mut self, at: &mut Refined) -> Result<Option<Linearised>, ModelError> {
+        let linear = Linearised::new(self.points, &at.fitted)?;
+        at.gradient = linear.gradient();
+        Ok((at.gradient >= GRADIENT).then_some(linear))
+    }
+
+    fn trial(&mut self, at: &Refined, linear: &Linearised, damping: f64) -> Result<Trial<Refined, ()>, ModelError> {
+        let trial = trial(self.points, &at.fitted, &linear.step(damping), self.settings);
+        let refined = |(fitted, cost)| Refined { fitted, cost, steps: 0, gradient: at.gradient, settled: false };
+        Ok(trial.map(|found| (refined(found), ())))
+    }
+
+    fn taken(&mut self, from: &Refined, _: &Linearised, (): (), to: &mut Refined) -> Taken {
+        // twice the log-likelihood, the noise's level taken from the fit itself
+        let gain = 2.0 * self.points.len() as f64 * (from.cost / to.cost).ln();
+        to.settled = gain < SETTLED;
+        Taken { kept: None, ending: to.settled.then_some(Ending::Minimum) }
+    }
 }
 
 /// The model whose sections are a step further, and its squared error; none if a pole that must be stable is not.
@@ -155,15 +174,12 @@ impl Linearised {
         if self.norm > 0.0 { squared(known).sqrt() / self.norm } else { 0.0 }
     }
 
-    /// Levenberg-Marquardt step of the section coefficients.
+    /// Damped step of the section coefficients. The columns are scaled, and a cancelled pole's are still weak: damping
+    /// counts from the strongest direction on.
     fn step(&self, damping: f64) -> Vec<f64> {
-        let (s, v, n) = (&self.projected.s, &self.projected.v, self.along.len());
-        // relative to the strongest direction: the columns are scaled, and a cancelled pole's are still weak
-        let damping = damping * s.first().copied().unwrap_or(1.0);
-        let gain = |k: usize| s[k] / (s[k].powi(2) + damping * damping);
-        let own = |j: usize| (0..n).map(|k| v[(j, k)] * gain(k) * self.along[k]).sum::<f64>();
-        let first = self.scale.len() - n;
-        (0..n).map(|j| own(j) / self.scale[first + j]).collect()
+        let first = self.scale.len() - self.along.len();
+        let step = damped_svd_step(&self.projected, &self.along, damping, 0.0);
+        step.iter().zip(&self.scale[first..]).map(|(own, scale)| own / scale).collect()
     }
 
     /// `(J^T J)^+` of all a, all b and D. Errors: no convergence.
@@ -173,10 +189,8 @@ impl Linearised {
         let rank = svd.rank(RANK);
         // the a were rotated to the end
         let place = |i: usize| if i < order { columns - order + i } else { i - order };
-        let entry = |i: usize, j: usize| {
-            let sum = (0..rank).map(|k| svd.v[(i, k)] * svd.v[(j, k)] / (svd.s[k] * svd.s[k])).sum::<f64>();
-            sum / (self.scale[i] * self.scale[j])
-        };
+        let inverse = svd.normal_inverse(rank);
+        let entry = |i: usize, j: usize| inverse[(i, j)] / (self.scale[i] * self.scale[j]);
         Ok(Mat::from_fn(2 * order + 1, 2 * order + 1, |i, j| entry(place(i), place(j))))
     }
 }

@@ -8,7 +8,7 @@ use super::replicates::Weighted;
 use super::segments::SegmentKind;
 use super::slow_lines::SlowLine;
 use super::summary::RecordSummary;
-use afmid_kernels::ringdown::internals::symmetric_inverse;
+use afmid_kernels::linear_algebra::symmetric_inverse;
 
 /// Fewest records: replicates for a t test.
 pub(super) const FEWEST_RECORDS: usize = 4;

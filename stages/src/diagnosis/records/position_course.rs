@@ -5,7 +5,7 @@ use faer::Mat;
 
 use super::basis::span;
 use super::free_level::{FreeLevel, FreeRecord};
-use afmid_kernels::ringdown::internals::symmetric_inverse;
+use afmid_kernels::linear_algebra::symmetric_inverse;
 
 /// The free level where the piezo stood at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]

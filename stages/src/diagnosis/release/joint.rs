@@ -11,8 +11,9 @@ use super::normal::{Event, Normal};
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::{Hold, State};
+use afmid_kernels::linear_algebra::symmetric_inverse;
 use afmid_kernels::model::ModelError;
-use afmid_kernels::ringdown::internals::{Whitener, symmetric_inverse};
+use afmid_kernels::ringdown::internals::Whitener;
 
 /// A finished fit.
 pub struct JointFit {

@@ -1,6 +1,7 @@
 //! Normal equations of the joint fit, the events' own parameters eliminated.
 
-use afmid_kernels::linear_algebra::product;
+use afmid_kernels::linear_algebra::{Eliminated, product};
+use afmid_kernels::optimise::damped_step;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -9,7 +10,6 @@ use super::change::{CrossedSlopes, Slopes};
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::{Hold, State, Step};
-use afmid_kernels::ringdown::internals::symmetric_inverse;
 
 /// One event at one point.
 pub(super) struct Event<'a> {
@@ -162,28 +162,11 @@ pub(super) struct Normal {
     events: Vec<Eliminated>,
 }
 
-/// One event's share of them.
-pub(super) struct Eliminated {
-    inverse: Mat<f64>,
-    coupling: Mat<f64>,
-    own_gradient: Vec<f64>,
-    pub information: Mat<f64>,
-    pub gradient: Vec<f64>,
-}
-
-/// Takes the last columns, the event's own four, out.
-pub(super) fn eliminate(products: &Products) -> Eliminated {
-    let Products { gram, right } = products;
-    let shared = right.len() - 4;
-    let inverse = symmetric_inverse(&Mat::from_fn(4, 4, |i, j| gram[(shared + i, shared + j)]));
-    let cross = Mat::from_fn(4, shared, |i, j| gram[(shared + i, j)]);
-    let coupling = product(inverse.as_ref(), cross.as_ref());
-    let taken = product(cross.transpose(), coupling.as_ref());
-    let information = Mat::from_fn(shared, shared, |i, j| gram[(i, j)] - taken[(i, j)]);
-    let own_gradient: Vec<f64> = right[shared..].to_vec();
-    let gradient =
-        (0..shared).map(|j| right[j] - (0..4).map(|i| coupling[(i, j)] * own_gradient[i]).sum::<f64>()).collect();
-    Eliminated { inverse, coupling, own_gradient, information, gradient }
+impl Products {
+    /// Takes the last columns, the event's own four, out.
+    pub fn eliminated(&self) -> Eliminated {
+        Eliminated::of(&self.gram, &self.right, self.right.len() - 4, 0.0)
+    }
 }
 
 impl Normal {
@@ -197,13 +180,13 @@ impl Normal {
     ) -> Self {
         let count = if hold == Hold::Shared { 0 } else { state.lever.parameters().len() + state.causes() };
         let crossed = AllCrossed::of(basis, slopes);
-        let one = |(i, event): (usize, &Event<'_>)| eliminate(&event.products(basis, crossed.get(i), hold, None));
+        let one = |(i, event): (usize, &Event<'_>)| event.products(basis, crossed.get(i), hold, None).eliminated();
         let events: Vec<Eliminated> = events.par_iter().enumerate().map(one).collect();
         let mut information = Mat::zeros(count, count);
         let mut gradient = vec![0.0; count];
         for event in &events {
             information += &event.information;
-            gradient.iter_mut().zip(&event.gradient).for_each(|(g, e)| *g += e);
+            gradient.iter_mut().zip(&event.score).for_each(|(g, e)| *g += e);
         }
         if hold == Hold::Nothing {
             problem.add_prior(&state.lever, &mut information, &mut gradient);
@@ -213,23 +196,16 @@ impl Normal {
 
     /// The step of a search whose diagonal is enlarged by `damping`.
     pub fn solve(&self, damping: f64) -> Step {
-        let n = self.gradient.len();
-        let mut damped = self.information.clone();
-        (0..n).for_each(|i| damped[(i, i)] *= 1.0 + damping);
-        let covariance = symmetric_inverse(&damped);
-        let shared: Vec<f64> = (0..n).map(|i| (0..n).map(|j| covariance[(i, j)] * self.gradient[j]).sum()).collect();
-        let mut promised: f64 = shared.iter().zip(&self.gradient).map(|(s, g)| s * g).sum();
+        let (shared, _) = damped_step(&self.information, &self.gradient, damping);
+        let of_own: f64 = self.events.iter().map(|event| event.own_gain).sum();
+        let promised = shared.iter().zip(&self.gradient).map(|(s, g)| s * g).sum::<f64>() + of_own;
         let own = self
             .events
             .iter()
             .map(|event| {
-                let mut step = [0.0; 4];
-                for (i, value) in step.iter_mut().enumerate() {
-                    let alone: f64 = (0..4).map(|k| event.inverse[(i, k)] * event.own_gradient[k]).sum();
-                    promised += alone * event.own_gradient[i];
-                    *value = alone - (0..n).map(|j| event.coupling[(i, j)] * shared[j]).sum::<f64>();
-                }
-                step
+                let follows =
+                    |i: usize| shared.iter().enumerate().map(|(j, s)| event.coupling[(i, j)] * s).sum::<f64>();
+                std::array::from_fn(|i| event.own_step[i] - follows(i))
             })
             .collect();
         Step { shared, own, promised }

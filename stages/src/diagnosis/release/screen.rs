@@ -12,15 +12,15 @@ use super::change::changed;
 use super::detuning::Detuning;
 use super::exponent::Exponent;
 use super::joint::{JointFit, Linear};
-use super::normal::{AllCrossed, Crossed, Event, eliminate};
+use super::normal::{AllCrossed, Crossed, Event};
 use super::problem::Problem;
 use super::signals::Signals;
 use super::state::Hold;
 use super::stepper::Pace;
 use crate::causes::{Cause, Scene};
 use afmid_kernels::effects::Effects;
+use afmid_kernels::linear_algebra::symmetric_inverse;
 use afmid_kernels::model::ModelError;
-use afmid_kernels::ringdown::internals::symmetric_inverse;
 use afmid_kernels::statistics::normal_two_sided;
 
 /// A candidate at one of its trial values.
@@ -202,10 +202,10 @@ pub(super) struct Scores {
 
 impl Scores {
     fn of(event: &Event<'_>, basis: &Basis, crossed: Option<&Crossed<'_>>, trials: &Signals) -> Self {
-        let eliminated = eliminate(&event.products(basis, crossed, Hold::Nothing, Some(trials)));
+        let eliminated = event.products(basis, crossed, Hold::Nothing, Some(trials)).eliminated();
         let raw: Vec<f64> = (0..trials.count()).map(|i| trials.get(i).iter().map(|v| v * v).sum()).collect();
-        let known = eliminated.gradient.len() - raw.len();
-        Self { known, information: eliminated.information, gradient: eliminated.gradient, raw }
+        let known = eliminated.score.len() - raw.len();
+        Self { known, information: eliminated.information, gradient: eliminated.score, raw }
     }
 }
 

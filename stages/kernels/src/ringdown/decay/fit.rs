@@ -1,14 +1,16 @@
 //! The search, and what it yields.
 
+use std::convert::Infallible;
+
 use crate::linear_algebra::{Qr, product};
 use faer::{Mat, c64};
 
 use super::projection::{Projected, Record, back_substitute};
 use super::start::hankel_poles;
 use crate::model::{ModelError, finite};
+use crate::optimise::{Damping, Ending, Limits, Objective, Trial, damped_step, descend};
 use crate::ringdown::estimate::{ModeEstimate, RingdownVerdict, modes_of};
 use crate::ringdown::modal_form::Exponential;
-use crate::ringdown::normal::symmetric_inverse;
 
 /// What is fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +59,8 @@ const GONE: f64 = 28.0;
 const POLE_STD: f64 = 0.5;
 /// Most trial steps.
 const TRIALS: usize = 40;
+/// Damping of the first step: the start is near.
+const FIRST_DAMPING: f64 = 1e-9;
 /// Promised fall of the sum of squares, in noise variances, that ends the search: a step of a thirtieth of a standard error.
 const ARRIVED: f64 = 1e-3;
 
@@ -90,33 +94,75 @@ pub fn fit_decay(values: &[f64], interval_s: f64, options: &DecayOptions) -> Res
     let head = check(values, interval_s, options)?;
     let record = Record::new(values, head);
     let noise = white_variance(values);
-    let mut poles = first_poles(values, head, options, &record)?;
-    let mut state = record.project(&poles.modes, &poles.decays);
-    let prior = poles.clone();
-    let mut damping = 1e-9;
-    let mut verdict = RingdownVerdict { converged: false, distance: f64::INFINITY, steps: 0 };
-    for _ in 0..TRIALS {
-        let normal = Normal::of(&state, &poles, &prior, noise);
-        let Step { step, promised, of_modes } = normal.step(damping, poles.modes.len());
-        verdict.distance = of_modes;
-        if promised < ARRIVED || (of_modes < MODES_ARRIVED && promised < VALLEY) {
-            verdict.converged = true;
-            break;
-        }
-        let cost = state.rest() / noise + poles.distance(&prior);
-        let trial = poles.moved(&step);
-        let next = trial.stable().then(|| record.project(&trial.modes, &trial.decays));
-        match next.filter(|next| next.rest() / noise + trial.distance(&prior) <= cost) {
-            Some(next) => {
-                (poles, state) = (trial, next);
-                verdict.steps += 1;
-                damping = (0.1 * damping).max(1e-12);
-            }
-            None if damping > 1e6 => break,
-            None => damping = (10.0 * damping).max(1e-3),
-        }
+    let start = first_poles(values, head, options, &record)?;
+    let mut fit = Fit { record: &record, prior: start.clone(), noise, distance: f64::INFINITY };
+    let start = fit.at(start);
+    let limits = Limits { trials: TRIALS, ..Limits::NONE };
+    let found = match descend(&mut fit, start, &mut { FIRST_DAMPING }, Damping::STANDARD, limits) {
+        Ok(found) => found,
+        Err(never) => match never {},
+    };
+    let verdict =
+        RingdownVerdict { converged: found.ending == Ending::Minimum, distance: fit.distance, steps: found.steps };
+    let At { poles, state, .. } = found.point;
+    result(&state, &poles, &fit.prior, values.len(), interval_s, verdict)
+}
+
+/// The decay as an objective.
+struct Fit<'a> {
+    record: &'a Record<'a>,
+    /// What is expected of the real poles.
+    prior: Poles,
+    noise: f64,
+    /// Largest step of a mode's parameter that the local model wants, in its standard errors.
+    distance: f64,
+}
+
+/// Poles, with the amplitudes solved for.
+struct At {
+    poles: Poles,
+    state: Projected,
+    cost: f64,
+}
+
+impl Fit<'_> {
+    fn at(&self, poles: Poles) -> At {
+        let state = self.record.project(&poles.modes, &poles.decays);
+        let cost = state.rest() / self.noise + poles.distance(&self.prior);
+        At { poles, state, cost }
     }
-    result(&state, &poles, &prior, values.len(), interval_s, verdict)
+}
+
+impl Objective for Fit<'_> {
+    type Point = At;
+    type Local = Normal;
+    type Step = ();
+    type Error = Infallible;
+
+    fn cost(&self, at: &At) -> f64 {
+        at.cost
+    }
+
+    fn local(&mut self, at: &mut At) -> Result<Option<Normal>, Infallible> {
+        let normal = Normal::of(&at.state, &at.poles, &self.prior, self.noise);
+        let (step, inverse) = damped_step(&normal.information, &normal.gradient, 0.0);
+        let errors =
+            (0..2 * at.poles.modes.len()).map(|i| step[i].abs() / inverse[(i, i)].sqrt().max(f64::MIN_POSITIVE));
+        self.distance = errors.fold(0.0, f64::max);
+        let promised: f64 = step.iter().zip(&normal.gradient).map(|(s, g)| s * g).sum();
+        let arrived = promised < ARRIVED || (self.distance < MODES_ARRIVED && promised < VALLEY);
+        Ok((!arrived).then_some(normal))
+    }
+
+    fn trial(&mut self, at: &At, normal: &Normal, damping: f64) -> Result<Trial<At, ()>, Infallible> {
+        let (step, _) = damped_step(&normal.information, &normal.gradient, damping);
+        let poles = at.poles.moved(&step);
+        Ok(poles.stable().then(|| (self.at(poles), ())))
+    }
+
+    fn accepts(&self, cost: f64, next: f64) -> bool {
+        next <= cost
+    }
 }
 
 fn check(values: &[f64], interval_s: f64, options: &DecayOptions) -> Result<usize, ModelError> {
@@ -246,28 +292,6 @@ impl Normal {
         }
         Self { information, gradient }
     }
-
-    /// The damped step.
-    fn step(&self, damping: f64, modes: usize) -> Step {
-        let mut damped = self.information.clone();
-        (0..damped.nrows()).for_each(|i| damped[(i, i)] *= 1.0 + damping);
-        let inverse = symmetric_inverse(&damped);
-        let n = self.gradient.len();
-        let step: Vec<f64> = (0..n).map(|i| (0..n).map(|j| inverse[(i, j)] * self.gradient[j]).sum()).collect();
-        let promised = step.iter().zip(&self.gradient).map(|(s, g)| s * g).sum();
-        let errors = (0..2 * modes).map(|i| step[i].abs() / inverse[(i, i)].sqrt().max(f64::MIN_POSITIVE));
-        let of_modes = errors.fold(0.0, f64::max);
-        Step { step, promised, of_modes }
-    }
-}
-
-/// A step of the search.
-struct Step {
-    step: Vec<f64>,
-    /// Fall of the cost that it promises.
-    promised: f64,
-    /// Largest move of a mode's parameter, in its standard errors.
-    of_modes: f64,
 }
 
 /// Poles per second, residues, and the covariance of both under the residuals' variance.

@@ -1,7 +1,9 @@
 //! Standard errors: Fisher information with correlated bins, and the sandwich.
 
+use faer::Mat;
+
 use super::likelihood::{Likelihood, Parameters, Slopes, information};
-use crate::calibration::inverse;
+use crate::linear_algebra::definite_inverse;
 
 pub(super) struct Covariances {
     /// Relative standard errors if the model holds.
@@ -23,7 +25,7 @@ pub(super) fn covariances(likelihood: &Likelihood<'_>, parameters: &Parameters, 
     let count = slopes.misfit.len() as f64;
     let lagged = |lag: usize| pairs(&slopes, lag).map(|(k, l)| slopes.misfit[k] * slopes.misfit[l]).sum::<f64>();
     let power = lagged(0);
-    let (model, robust) = match inverse(square) {
+    let (model, robust) = match definite_inverse(&square) {
         None => (unknown, unknown),
         Some(inverse) => {
             let expected = scores(&slopes, 2, |_, _, lag| known[lag] / averages);
@@ -39,9 +41,9 @@ pub(super) fn covariances(likelihood: &Likelihood<'_>, parameters: &Parameters, 
 }
 
 /// Share of a bin in its own fitted value.
-fn leverage(inverse: &[[f64; 5]; 5], row: &[f64; 5], active: [bool; 5]) -> f64 {
+fn leverage(inverse: &Mat<f64>, row: &[f64; 5], active: [bool; 5]) -> f64 {
     let on = |i: usize| if active[i] { row[i] } else { 0.0 };
-    (0..5).map(|i| (0..5).map(|j| on(i) * inverse[i][j] * on(j)).sum::<f64>()).sum()
+    (0..5).map(|i| (0..5).map(|j| on(i) * inverse[(i, j)] * on(j)).sum::<f64>()).sum()
 }
 
 /// Used bins that lie `lag` apart.
@@ -68,12 +70,12 @@ fn scores(slopes: &Slopes, reach: usize, weight: impl Fn(usize, usize, usize) ->
     sum
 }
 
-fn spread(inverse: &[[f64; 5]; 5], middle: &[[f64; 5]; 5], active: [bool; 5]) -> [f64; 5] {
+fn spread(inverse: &Mat<f64>, middle: &[[f64; 5]; 5], active: [bool; 5]) -> [f64; 5] {
     std::array::from_fn(|i| {
         if !active[i] {
             return f64::NAN;
         }
-        let row: [f64; 5] = std::array::from_fn(|j| if active[j] { inverse[i][j] } else { 0.0 });
+        let row: [f64; 5] = std::array::from_fn(|j| if active[j] { inverse[(i, j)] } else { 0.0 });
         let variance: f64 = (0..5).map(|j| (0..5).map(|l| row[j] * middle[j][l] * row[l]).sum::<f64>()).sum();
         // a sum with correlated misfits can fall below zero by chance: nothing is known then
         if variance > 0.0 { variance.sqrt() } else { f64::NAN }

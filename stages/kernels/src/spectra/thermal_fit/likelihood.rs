@@ -1,7 +1,10 @@
 //! Whittle's likelihood and its maximum.
 
+use faer::Mat;
+
 use super::AveragedDensity;
-use crate::calibration::inverse;
+use crate::linear_algebra::definite_inverse;
+use crate::optimise::{Damping, Ending, Limits, Objective, Taken, Trial, damped_step, descend};
 use crate::spectra::error::SpectrumError;
 use crate::spectra::seen_oscillator::{SeenOscillator, SeenThrough};
 
@@ -49,7 +52,11 @@ pub(super) struct Likelihood<'a> {
 
 /// A noise term that nowhere makes more than this share of the density cannot be distinguished from zero.
 const NEGLIGIBLE: f64 = 1e-4;
-const ITERATIONS: usize = 200;
+const STEPS: usize = 200;
+/// Damping of the first step.
+const FIRST: f64 = 1e-3;
+/// Gain of log-likelihood that ends the search: a thousandth of a standard error.
+const ARRIVED: f64 = 1e-6;
 
 impl<'a> Likelihood<'a> {
     pub fn new(data: AveragedDensity<'a>, through: SeenThrough) -> Self {
@@ -98,44 +105,20 @@ impl<'a> Likelihood<'a> {
         slopes
     }
 
-    /// Fisher scoring with Levenberg's damping. Errors: no convergence.
+    /// Fisher scoring, damped. Errors: no convergence.
     pub fn maximise(&self, start: Parameters, used: &[bool]) -> Result<Parameters, SpectrumError> {
-        let mut at = start;
-        let (mut damping, mut value) = (1e-3, self.value(&at, used));
         let lost = |reason| SpectrumError::NoFit { near_hz: start.frequency_hz(), reason };
-        if !value.is_finite() {
+        let mut fit = Fit { likelihood: self, used };
+        let at = fit.at(start);
+        if !at.cost.is_finite() {
             return Err(lost("the start has no likelihood"));
         }
-        for _ in 0..ITERATIONS {
-            let slopes = self.slopes(&at, used);
-            self.leave_out(&mut at, &slopes);
-            let (information, gradient) = information(&slopes, at.active);
-            let mut damped = information;
-            (0..5).for_each(|i| damped[i][i] *= 1.0 + damping);
-            let inverse = inverse(damped).ok_or_else(|| lost("its information matrix is singular"))?;
-            let step: [f64; 5] = std::array::from_fn(|i| (0..5).map(|j| inverse[i][j] * gradient[j]).sum());
-            // logarithms move by one at a time, the frequency by its width
-            let width = 2.0 / at.value(2).max(0.5) + 4.0 * self.bin_hz / at.value(1);
-            let longest = (0..5).map(|i| step[i].abs() / if i == 1 { width } else { 1.0 }).fold(1.0, f64::max);
-            let mut moved = at;
-            (0..5).for_each(|i| moved.ln[i] += step[i] / longest);
-            moved.ln[2] = moved.ln[2].max(0.51_f64.ln());
-            let there = self.value(&moved, used);
-            if there >= value {
-                let gain = there - value;
-                (at, value, damping) = (moved, there, (0.2 * damping).max(1e-9));
-                // a thousandth of a standard error
-                if gain < 1e-6 && longest <= 1.0 {
-                    return Ok(at);
-                }
-            } else {
-                damping *= 8.0;
-                if damping > 1e9 {
-                    return Ok(at);
-                }
-            }
+        let limits = Limits { steps: STEPS, ..Limits::NONE };
+        let found = descend(&mut fit, at, &mut { FIRST }, Damping::STANDARD, limits).map_err(lost)?;
+        match found.ending {
+            Ending::IterationLimit => Err(lost("200 steps were not enough")),
+            _ => Ok(found.point.parameters),
         }
-        Err(lost("200 iterations were not enough"))
     }
 
     /// Drops white or 1/f noise that has become negligible: its logarithm would run away.
@@ -149,15 +132,79 @@ impl<'a> Likelihood<'a> {
     }
 }
 
+/// The negative log-likelihood as an objective.
+struct Fit<'a, 'b> {
+    likelihood: &'a Likelihood<'b>,
+    used: &'a [bool],
+}
+
+/// Parameters with their cost.
+struct At {
+    parameters: Parameters,
+    cost: f64,
+}
+
+impl Fit<'_, '_> {
+    fn at(&self, parameters: Parameters) -> At {
+        At { parameters, cost: -self.likelihood.value(&parameters, self.used) }
+    }
+}
+
+impl Objective for Fit<'_, '_> {
+    type Point = At;
+    type Local = (Mat<f64>, [f64; 5]);
+    /// Whether the step was as long as the local model has it.
+    type Step = bool;
+    type Error = &'static str;
+
+    fn cost(&self, at: &At) -> f64 {
+        at.cost
+    }
+
+    fn local(&mut self, at: &mut At) -> Result<Option<Self::Local>, &'static str> {
+        let slopes = self.likelihood.slopes(&at.parameters, self.used);
+        self.likelihood.leave_out(&mut at.parameters, &slopes);
+        let (information, gradient) = information(&slopes, at.parameters.active);
+        match definite_inverse(&information) {
+            Some(_) => Ok(Some((information, gradient))),
+            None => Err("its information matrix is singular"),
+        }
+    }
+
+    fn trial(
+        &mut self,
+        at: &At,
+        (information, gradient): &Self::Local,
+        damping: f64,
+    ) -> Result<Trial<At, bool>, &'static str> {
+        let (step, _) = damped_step(information, gradient, damping);
+        // logarithms move by one at a time, the frequency by its width
+        let mut moved = at.parameters;
+        let width = 2.0 / moved.value(2).max(0.5) + 4.0 * self.likelihood.bin_hz / moved.value(1);
+        let longest = (0..5).map(|i| step[i].abs() / if i == 1 { width } else { 1.0 }).fold(1.0, f64::max);
+        (0..5).for_each(|i| moved.ln[i] += step[i] / longest);
+        moved.ln[2] = moved.ln[2].max(0.51_f64.ln());
+        Ok(Some((self.at(moved), longest <= 1.0)))
+    }
+
+    fn accepts(&self, cost: f64, next: f64) -> bool {
+        next <= cost
+    }
+
+    fn taken(&mut self, from: &At, _: &Self::Local, whole: bool, to: &mut At) -> Taken {
+        Taken { kept: None, ending: (from.cost - to.cost < ARRIVED && whole).then_some(Ending::Minimum) }
+    }
+}
+
 /// Information per average, and gradient; the rows of what is not active are those of the unit matrix.
-pub(super) fn information(slopes: &Slopes, active: [bool; 5]) -> ([[f64; 5]; 5], [f64; 5]) {
-    let (mut square, mut gradient) = ([[0.0; 5]; 5], [0.0; 5]);
+pub(super) fn information(slopes: &Slopes, active: [bool; 5]) -> (Mat<f64>, [f64; 5]) {
+    let (mut square, mut gradient) = (Mat::zeros(5, 5), [0.0; 5]);
     for (row, misfit) in slopes.row.iter().zip(&slopes.misfit) {
         for i in (0..5).filter(|&i| active[i]) {
             gradient[i] += row[i] * misfit;
-            (0..5).filter(|&j| active[j]).for_each(|j| square[i][j] += row[i] * row[j]);
+            (0..5).filter(|&j| active[j]).for_each(|j| square[(i, j)] += row[i] * row[j]);
         }
     }
-    (0..5).filter(|&i| !active[i]).for_each(|i| square[i][i] = 1.0);
+    (0..5).filter(|&i| !active[i]).for_each(|i| square[(i, i)] = 1.0);
     (square, gradient)
 }

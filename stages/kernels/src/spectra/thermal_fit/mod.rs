@@ -7,6 +7,8 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+use std::f64::consts::PI;
+
 use super::error::{finite, positive};
 use super::seen_oscillator::SeenThrough;
 use crate::spectra::error::SpectrumError;
@@ -92,6 +94,16 @@ pub struct ThermalFit {
     pub bins: usize,
     /// The fitted density, the window's width included, at the frequencies given.
     pub fitted: Vec<f64>,
+}
+
+impl ThermalFit {
+    /// The fitted density itself, without the window's width.
+    pub fn density(&self, frequency_hz: f64) -> f64 {
+        let (f, f0) = (frequency_hz, self.frequency_hz.value);
+        let damping = f0 / self.quality_factor.value;
+        let peak = 2.0 / PI * f0 * f0 * damping / ((f0 * f0 - f * f).powi(2) + (f * damping).powi(2));
+        self.variance.value * peak + self.white.value + self.flicker.value / f.max(f64::MIN_POSITIVE)
+    }
 }
 
 /// Fits a thermal spectrum.
