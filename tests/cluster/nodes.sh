@@ -1,6 +1,6 @@
 # A Slurm of one machine with two emulated nodes, n1 and n2, each of one processor, without systemd: sourced by the
-# tests of clusters, as root. Everything, the key of munge included, lies in one folder; /etc and a Slurm that may run on
-# the machine are left alone.
+# tests of clusters, as root. Everything, the key of munge included, lies in one folder; /etc and a Slurm that may run
+# on the machine are left alone.
 
 # Installs what is missing with apt. Fails where that is not possible.
 cluster_install() {
