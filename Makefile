@@ -15,7 +15,8 @@ deps: .tools/bin/cmake
 # The readers that the tests open results with.
 test-deps: deps .tools/readers
 
-# Simulates an archive, runs the paper's pipeline on it, writes result and report, prints the modes; the last table has them beside the truth.
+# Simulates an archive, runs the paper's pipeline on it, writes result and report, prints the modes; the last table has
+# them beside the truth.
 demo: deps
 	cargo build --release --locked
 	mkdir -p results
@@ -27,9 +28,10 @@ demo: deps
 test: test-deps
 	cargo test --workspace --locked
 
-# afmid with other programs, which `make test` does without: a real Slurm of two emulated nodes (root; installs slurm-wlm and munge with apt where
-# they are missing), Snakemake, a model and a plugin under Octave, a plugin with scikit-rf, a result in H5Web (octave, chromium, nodejs and npm with apt where
-# they are missing; H5Web from registry.npmjs.org). The first line builds the program as `make test` does.
+# afmid with other programs, which `make test` does without: a real Slurm of two emulated nodes (root; installs
+# slurm-wlm and munge with apt where they are missing), Snakemake, a model and a plugin under Octave, a plugin with
+# scikit-rf, a result in H5Web (octave, chromium, nodejs and npm with apt where they are missing; H5Web from
+# registry.npmjs.org). The first line builds the program as `make test` does.
 test-interop: test-slurm test-deps
 	tests/interop/octave.sh target/debug/afmid .tools/bin/python
 	tests/interop/h5web.sh target/debug/afmid
@@ -55,14 +57,16 @@ book: .tools/mdbook/bin/mdbook
 .tools/mdbook/bin/mdbook:
 	cargo install --quiet --locked --root .tools/mdbook --no-default-features --features search --version $(MDBOOK_VERSION) mdbook
 
-# Every fuzz target for SECONDS s each, from the corpus in fuzz/corpus; prints a table, fails if something is found. Needs g++ (docs/reliability.md).
+# Every fuzz target for SECONDS s each, from the corpus in fuzz/corpus; prints a table, fails if something is found.
+# Needs g++ (docs/reliability.md).
 fuzz: deps .tools/cargo-fuzz/bin/cargo-fuzz
 	fuzz/run.sh $(SECONDS)
 
 .tools/cargo-fuzz/bin/cargo-fuzz:
 	cargo install --quiet --locked --root .tools/cargo-fuzz --version $(CARGO_FUZZ_VERSION) cargo-fuzz
 
-# Licences, duplicates and sources of all that is compiled (deny.toml), and known vulnerabilities where their database can be fetched.
+# Licences, duplicates and sources of all that is compiled (deny.toml), and known vulnerabilities where their database
+# can be fetched.
 deny: .tools/cargo-deny/bin/cargo-deny
 	.tools/cargo-deny/bin/cargo-deny --locked check --hide-inclusion-graph licenses bans sources
 	@if .tools/cargo-deny/bin/cargo-deny fetch db; then \

@@ -3,11 +3,12 @@
 
     benches/scaling.py [target/release/afmid] [MOST] [WORD...]
 
-Makes small raw records, stages and ledgers in a temporary folder with Python's standard library alone, for the commands whose line holds one of the
-words. Of each command the shortest of several runs counts, once the files are 2.5 s old: until they took 2 s together, three at least. The exponent is
-the slope of log(time) over log(items); the second one that of what the items add (log(time without that of a job of one item), from the second
-smallest size on). `find -size +1M` on the same folders tells what the system itself takes to look at each file: more files than the processor's caches
-hold cost more each.
+Makes small raw records, stages and ledgers in a temporary folder with Python's standard library alone, for the commands
+whose line holds one of the words. Of each command the shortest of several runs counts, once the files are 2.5 s old:
+until they took 2 s together, three at least. The exponent is the slope of log(time) over log(items); the second one
+that of what the items add (log(time without that of a job of one item), from the second smallest size on).
+`find -size +1M` on the same folders tells what the system itself takes to look at each file: more files than the
+processor's caches hold cost more each.
 """
 
 import json
@@ -72,7 +73,9 @@ def data_sets(folder, count):
     raw_records(folder, count)
     stage = f'[[stage]]\nid = "records"\nuses = "io.records"\nparams = {{ files = ["raw/r0.bin"], {RAW} }}\n'
     write(folder, "a.toml", HEAD + stage + CENSUS)
-    lines = (json.dumps({"name": f"s{n}", "files": [os.path.join(folder, f"raw/r{n}.bin")]}) + "\n" for n in range(count))
+    lines = (
+        json.dumps({"name": f"s{n}", "files": [os.path.join(folder, f"raw/r{n}.bin")]}) + "\n" for n in range(count)
+    )
     write(folder, "sets.jsonl", "".join(lines))
 
 

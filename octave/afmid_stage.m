@@ -16,14 +16,16 @@ function afmid_stage(about, run)
 %     axes        struct array: name, unit, long_name, values (column)
 %     variables   struct array: name, unit, long_name, dims (cell of axis names, slowest first), values (of that size)
 %     attributes  struct of scalars
-%   a table has columns (struct array: name, unit, long_name, values) and attributes; a state-space model A, B, C, D, K, x0,
-%   sample_time_s, innovation_variance; a document is a struct with the one field value; recordings are structs as in the protocol.
+%   a table has columns (struct array: name, unit, long_name, values) and attributes; a state-space model A, B, C, D, K,
+%   x0, sample_time_s, innovation_variance; a document is a struct with the one field value; recordings are structs as
+%   in the protocol.
 %   context: seed, base, warn(text) (a function).
 %
 %   An error() in run fails that item alone; its text is shown. Write nothing to stdout: use fprintf(stderr, ...).
 %
-%   Numbers go through HDF5: load reads the plain datasets that afmid writes, and save("-hdf5") writes PATH/value, which the answer names.
-%   Tested under Octave 7.3. In MATLAB, which has no such save, replace read_file and write_file by h5read, h5create and h5write.
+%   Numbers go through HDF5: load reads the plain datasets that afmid writes, and save("-hdf5") writes PATH/value, which
+%   the answer names. Tested under Octave 7.3. In MATLAB, which has no such save, replace read_file and write_file by
+%   h5read, h5create and h5write.
 
   schema = struct("type", "object", "additionalProperties", false, "properties", about.parameters);
   names = fieldnames(about.parameters);
@@ -132,7 +134,8 @@ function made = take(sent)
       axes = cells(sent.axes);
       for k = 1:numel(axes)
         values = numbers(axes{k}.values, data)(:);
-        made.axes(k) = struct("name", axes{k}.name, "unit", axes{k}.unit, "long_name", axes{k}.long_name, "values", values);
+        made.axes(k) = struct("name", axes{k}.name, "unit", axes{k}.unit, "long_name", axes{k}.long_name, ...
+                              "values", values);
         lengths.(axes{k}.name) = axes{k}.length;
       end
       variables = cells(sent.variables);
@@ -145,7 +148,8 @@ function made = take(sent)
         end
         dims = cells(one.dims);
         sizes = cellfun(@(d) lengths.(d), dims);
-        made.variables(k) = struct("name", one.name, "unit", one.unit, "long_name", one.long_name, "dims", {dims}, "values", rows_first(values, sizes));
+        made.variables(k) = struct("name", one.name, "unit", one.unit, "long_name", one.long_name, "dims", {dims}, ...
+                                   "values", rows_first(values, sizes));
       end
     case "table"
       made = struct("attributes", sent.attributes);
@@ -161,8 +165,9 @@ function made = take(sent)
       end
     case "state_space"
       made = sent;
-      sizes = struct("A", [sent.states sent.states], "B", [sent.states sent.inputs], "C", [sent.outputs sent.states], ...
-                     "D", [sent.outputs sent.inputs], "K", [sent.states sent.outputs], "x0", [sent.states 1]);
+      sizes = struct("A", [sent.states sent.states], "B", [sent.states sent.inputs], ...
+                     "C", [sent.outputs sent.states], "D", [sent.outputs sent.inputs], ...
+                     "K", [sent.states sent.outputs], "x0", [sent.states 1]);
       for name = fieldnames(sizes)'
         made.(name{1}) = rows_first(numbers(sent.matrices.(name{1}), data), sizes.(name{1}));
       end
@@ -320,7 +325,8 @@ function say(message)
   fflush(stdout);
 end
 
-% JSON to the last digit, which jsonencode rounds away; a cell is a list, a struct array too, a number that is not finite is null.
+% JSON to the last digit, which jsonencode rounds away; a cell is a list, a struct array too, a number that is not
+% finite is null.
 function text = json(value)
   if ischar(value)
     text = quoted(value);

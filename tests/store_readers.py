@@ -106,7 +106,10 @@ def check_silx(path):
         check(shown.signal_dataset_name == signal, f"silx: {shown.signal_dataset_name} is not {signal}")
         check(all(axis is not None for axis in shown.axes), f"silx: {shown.group.name}: an axis is missing")
         check(shown.is_curve or shown.is_image, f"silx: {shown.group.name} is neither a curve nor an image")
-        print(f"silx: default plot {shown.group.name}, {shown.signal_dataset_name} over {', '.join(shown.axes_dataset_names)}")
+        print(
+            f"silx: default plot {shown.group.name}, {shown.signal_dataset_name} "
+            f"over {', '.join(shown.axes_dataset_names)}"
+        )
         plots = 0
         for name, stage in file["entry"].items():
             if "default" in stage.attrs:
@@ -124,7 +127,9 @@ def check_xarray(path):
     count = {"variables": 0, "coordinates": 0, "complex": 0}
     for group in groups:
         with h5py.File(path) as file:
-            scales = {name: data[()] for name, data in file[group].items() if data.attrs.get("CLASS") == b"DIMENSION_SCALE"}
+            scales = {
+                name: data[()] for name, data in file[group].items() if data.attrs.get("CLASS") == b"DIMENSION_SCALE"
+            }
             kinds = {name: data.dtype.kind for name, data in file[group].items()}
         with xr.open_dataset(path, group=group, engine="h5netcdf") as data:
             data.load()

@@ -4,11 +4,13 @@
     apt-get install octave octave-control
     cargo build --release && /tmp/venv-daisy/bin/python benches/peers/daisy.py
 
-Everyone gets the same training half, less its mean, and the same order; everyone is judged alike: simulation of the test half (the
-training half's means taken off) from the inputs alone, the initial state fitted by least squares, FIT % = 100 (1 - |y - yhat| / |y - mean y|).
-Errors: moving-block bootstrap of the test half. Nothing of afmid's is selected on it; of the peers, which run with their own defaults and with 20 and
-40 block rows, the best is taken on it. `within`: behind the first by no more than the bootstrap error of the first. The last number but one is the
-difference with the error of the difference itself, from the same draws, which is smaller.
+Everyone gets the same training half, less its mean, and the same order; everyone is judged alike: simulation of the
+test half (the training half's means taken off) from the inputs alone, the initial state fitted by least squares,
+FIT % = 100 (1 - |y - yhat| / |y - mean y|).
+Errors: moving-block bootstrap of the test half. Nothing of afmid's is selected on it; of the peers, which run with
+their own defaults and with 20 and 40 block rows, the best is taken on it. `within`: behind the first by no more than
+the bootstrap error of the first. The last number but one is the difference with the error of the difference itself,
+from the same draws, which is smaller.
 """
 
 import argparse
@@ -118,7 +120,9 @@ def octave(work, jobs):
                     continue
                 option = "" if rows is None else f', "s", {rows}'
                 mark = f"{work}/{name}.{method}-{rows or 'default'}"
-                script.append(f'try, keep("{mark}", {method}(dat, {order}{option})); catch e, disp(["{mark}: " e.message]); end')
+                script.append(
+                    f'try, keep("{mark}", {method}(dat, {order}{option})); catch e, disp(["{mark}: " e.message]); end'
+                )
     subprocess.run(["octave", "-q", "--no-gui", "--eval", "\n".join(script)], check=True, stderr=subprocess.DEVNULL)
     models = {}
     for path in work.glob("*.a"):
@@ -153,7 +157,10 @@ def main():
     parser.add_argument("--program", default=ROOT / "target/release/afmid", type=Path)
     parser.add_argument("--all", action="store_true", help="every method of every row, not only the best peer")
     options = parser.parse_args()
-    print("| data | channels | order | afmid `model.pem` | afmid `model.subspace` | best peer | its fit | behind the best | |")
+    print(
+        "| data | channels | order | afmid `model.pem` | afmid `model.subspace` "
+        "| best peer | its fit | behind the best | |"
+    )
     print("|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)

@@ -1,13 +1,14 @@
 """The lean main job as a careful numpy/scipy script, timed beside afmid.
 
     python3 -m venv /tmp/venv-peers && /tmp/venv-peers/bin/pip install numpy scipy h5py
-    cargo build --release && /tmp/venv-peers/bin/python benches/peers/free_lever.py [--afmid target/release/afmid] [--runs 5]
+    cargo build --release
+    /tmp/venv-peers/bin/python benches/peers/free_lever.py [--afmid target/release/afmid] [--runs 5]
 
-Decompresses lever-a into a temporary folder, which warms the page cache; then both do the job in turn: whole processes, from start to synced result, afmid
-with an empty cache each time, the script on one thread.
-The script does what configs/free-lever.toml does, intermediates stored. It does less: no keys or hashes; a local parabola (seven bins) where afmid smooths
-by a local rational; output error (no noise model) from one start, with four modes and three real poles given; no zeros, no held-out fit. scipy.signal is left
-out: its import would nearly double the time.
+Decompresses lever-a into a temporary folder, which warms the page cache; then both do the job in turn: whole processes,
+from start to synced result, afmid with an empty cache each time, the script on one thread. The script does what
+configs/free-lever.toml does, intermediates stored. It does less: no keys or hashes; a local parabola (seven bins) where
+afmid smooths by a local rational; output error (no noise model) from one start, with four modes and three real poles
+given; no zeros, no held-out fit. scipy.signal is left out: its import would nearly double the time.
 """
 
 import argparse
@@ -77,7 +78,9 @@ def cut(folder):
 
 
 def shifted(windows, shift):
-    """Each window `shift` samples later in its record, by band-limited interpolation of what a line through its ends leaves."""
+    """Each window `shift` samples later in its record, by band-limited interpolation of what a line through its ends
+    leaves.
+    """
     n, slope = windows.shape[1], (windows[:, -1:] - windows[:, :1]) / (windows.shape[1] - 1)
     line = windows[:, :1] + slope * np.arange(n)
     turn = np.exp(2j * np.pi / n * np.arange(n // 2 + 1) * shift[:, None])
@@ -111,7 +114,8 @@ def drift(remainders, rng, permutations=999):
     n, gram = len(remainders), remainders @ remainders.T
     trends = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, n), 4, increasing=True))[0][:, 1:]
     power = lambda p: np.einsum("...ik,...ij,...jk->...", p, gram, p, optimize=True)
-    return (1 + np.sum(power(np.array([trends[rng.permutation(n)] for _ in range(permutations)])) >= power(trends))) / (1 + permutations)
+    permuted = np.array([trends[rng.permutation(n)] for _ in range(permutations)])
+    return (1 + np.sum(power(permuted) >= power(trends))) / (1 + permutations)
 
 
 def release(mean, error):
@@ -123,14 +127,18 @@ def release(mean, error):
 
 
 def force(y, t0):
-    """Line before t0 less the line without force, as (slope, value at t0), and the force: that difference before t0, zero from t0 on."""
+    """Line before t0 less the line without force, as (slope, value at t0), and the force: that difference before t0,
+    zero from t0 on.
+    """
     t, before = np.arange(LENGTH) - t0, slice(BEFORE - GUARD)
     line = np.polyfit(t[before], y[before], 1) - np.polyfit(t[t0:], y[t0:], 1, w=np.sqrt(np.hanning(LENGTH - t0)))
     return line, np.where(t < 0, np.polyval(line, t), 0.0)
 
 
 def transfer(windowed, rate, half_width=3):
-    """ETFE of first differences, half a sample's hold taken out, up to 1.2 MHz; smoothed by a parabola through seven bins."""
+    """ETFE of first differences, half a sample's hold taken out, up to 1.2 MHz; smoothed by a parabola through seven
+    bins.
+    """
     f, (u, y) = np.fft.rfftfreq(LENGTH, 1.0 / rate), np.fft.rfft(windowed, LENGTH)
     etfe = np.where(f > 1.2e6, np.nan, y / u * np.exp(1j * np.pi * f / rate) / np.sinc(f / rate))
     parabola = np.vander(np.arange(-half_width, half_width + 1), 3, increasing=True)
@@ -159,18 +167,22 @@ def start(y, rows=64):
 
 
 def fit(y, t0, line, u):
-    """Output error by variable projection: y = D u + sum of first-order sections, free initial state, offset and drift; all that is linear solved for.
+    """Output error by variable projection: y = D u + sum of first-order sections, free initial state, offset and drift;
+    all that is linear solved for.
 
-    The force is a line before t0 and zero after. A section with pole z then answers with c P(k) + x z^k before, P a line itself, and with g z^(k - t0) after,
-    g = c P(t0) + x z^t0: nothing is to be filtered. Linear parameters: g and x of every pole, D, offset, drift. Least squares gets the triangle of [J r]
-    (Kaufman's J): from a QR of the samples before t0 + `HEAD` on top of the Cholesky factor of the rest, where only modes are left.
+    The force is a line before t0 and zero after. A section with pole z then answers with c P(k) + x z^k before, P a
+    line itself, and with g z^(k - t0) after, g = c P(t0) + x z^t0: nothing is to be filtered. Linear parameters: g and
+    x of every pole, D, offset, drift. Least squares gets the triangle of [J r] (Kaufman's J): from a QR of the samples
+    before t0 + `HEAD` on top of the Cholesky factor of the rest, where only modes are left.
     """
     m, g, d, k = MODES, 2 * MODES + REAL, 2 * ORDER + 3, np.arange(LENGTH) - t0
     logarithms = lambda x: (-np.exp(x[:m]) + 1j * x[m : 2 * m], np.log(x[2 * m :]))  # ln z of modes and of real poles
     late = np.column_stack([np.ones(LENGTH), SCALE * k, y])[t0 + HEAD :]
 
     def basis(s, real_s, samples):
-        """Columns of all linear parameters, then derivatives by ln z of what rings after t0, then y, for the first `samples`."""
+        """Columns of all linear parameters, then derivatives by ln z of what rings after t0, then y, for the first
+        `samples`.
+        """
         a, z = np.zeros((samples, d + g + 1), order="F"), np.exp(s)
         # P(k) / P(t0); before t0 next to nothing depends on z
         ratio = 1.0 + k[:t0, None] * (line[0] / (line[1] - line[0] / (1.0 - np.exp(np.append(s, real_s)))))
@@ -194,26 +206,44 @@ def fit(y, t0, line, u):
         t = np.linalg.qr(np.vstack([near, rest]), mode="r")
         theta = np.linalg.lstsq(t[:d, :d], t[:d, -1], rcond=1e-12)[0]
         (re, im, real), (a, b, c) = np.split(t[d:, d:-1] / SCALE, [m, 2 * m], axis=1), np.split(theta[:g], [m, 2 * m])
-        j = -np.hstack([(re * a + im * b) * s.real, im * a - re * b, real * c / np.exp(real_s)])  # d Re(g e) = Re(g k e ds)
+        # d Re(g e) = Re(g k e ds)
+        j = -np.hstack([(re * a + im * b) * s.real, im * a - re * b, real * c / np.exp(real_s)])
         return t[d:, -1], j, theta
 
     bounds = [-np.inf] * 2 * m + [REAL_LEAST] * REAL, [np.inf] * 2 * m + [REAL_MOST] * REAL
     # ends when the sum of squares falls by less than 0.08 of the noise variance
-    found = least_squares(lambda x: evaluate(x.tobytes())[0], start(y[t0 + 16 :]), lambda x: evaluate(x.tobytes())[1], bounds, x_scale="jac", ftol=1e-5)
+    found = least_squares(
+        lambda x: evaluate(x.tobytes())[0],
+        start(y[t0 + 16 :]),
+        lambda x: evaluate(x.tobytes())[1],
+        bounds,
+        x_scale="jac",
+        ftol=1e-5,
+    )
     assert found.success, found.message
     (s, real_s), (_, j, theta) = logarithms(found.x), evaluate(found.x.tobytes())
     prediction = basis(s, real_s, LENGTH)[:, :d] @ theta
     covariance = np.linalg.pinv(j.T @ j) * np.sum((y - prediction) ** 2) / (LENGTH - d - g)
-    return dict(s=s, real_s=real_s, theta=theta, covariance=covariance, prediction=prediction, residual=y - prediction, evaluations=found.nfev)
+    return dict(
+        s=s,
+        real_s=real_s,
+        theta=theta,
+        covariance=covariance,
+        prediction=prediction,
+        residual=y - prediction,
+        evaluations=found.nfev,
+    )
 
 
 def modes(model, rate):
     """Rows of f, its standard error, Q, its standard error, ascending in frequency."""
     s, re, im = model["s"], model["s"].real, model["s"].imag
     size, own = np.abs(s), np.arange(MODES)[:, None] + [0, MODES]
-    slope = np.array([[re**2 / size, im / size], [0.5 * im**2 / (re * size), -0.5 * im / (re * size)]])  # of |s| and Q, by ln(-re) and im
+    # of |s| and Q, by ln(-re) and im
+    slope = np.array([[re**2 / size, im / size], [0.5 * im**2 / (re * size), -0.5 * im / (re * size)]])
     error = np.sqrt(np.einsum("aik,kij,ajk->ak", slope, model["covariance"][own[:, :, None], own[:, None, :]], slope))
-    return np.column_stack([size * rate / (2.0 * np.pi), error[0] * rate / (2.0 * np.pi), -0.5 * size / re, error[1]])[np.argsort(size)]
+    table = [size * rate / (2.0 * np.pi), error[0] * rate / (2.0 * np.pi), -0.5 * size / re, error[1]]
+    return np.column_stack(table)[np.argsort(size)]
 
 
 def job(folder, out):
@@ -227,7 +257,11 @@ def job(folder, out):
         mean = aligned[rows].mean(axis=0)
         coefficients, noise = regress(aligned[rows], mean)
         error = np.sqrt((noise**2).sum(axis=0) / (len(rows) - 1) / len(rows))
-        store |= {f"mean_{name}": mean, f"variance_{name}": aligned[rows].var(axis=0, ddof=1), f"standard_error_{name}": error}
+        store |= {
+            f"mean_{name}": mean,
+            f"variance_{name}": aligned[rows].var(axis=0, ddof=1),
+            f"standard_error_{name}": error,
+        }
         store |= {f"regression_{name}": coefficients, f"rows_{name}": rows}
     p = drift(noise, rng)
     lap("average, drift")
@@ -245,13 +279,22 @@ def job(folder, out):
     with h5py.File(out, "w") as file:
         for name, value in store.items():
             file[name] = value
-        file.attrs.update(sample_rate_hz=rate, t0_sample=t0, drift_p_value=p, mode_columns=["f_hz", "f_std_hz", "Q", "Q_std"])
+        file.attrs.update(
+            sample_rate_hz=rate, t0_sample=t0, drift_p_value=p, mode_columns=["f_hz", "f_std_hz", "Q", "Q_std"]
+        )
     with open(out, "rb") as file:
         os.fsync(file.fileno())
     lap("write, sync")
     print(*("{:12.2f} +- {:5.2f} Hz   Q {:7.3f} +- {:.3f}".format(*row) for row in table), sep="\n")
-    print(f"{len(aligned)} events, t0 at {t0}, drift p = {p:.2f}, evaluations {[m['evaluations'] for m in models.values()]}")
-    print("seconds:", ", ".join(f"{name} {seconds:.3f}" for name, seconds in CLOCK.items()), f"(CPU in all {time.process_time():.3f})")
+    print(
+        f"{len(aligned)} events, t0 at {t0}, drift p = {p:.2f}, "
+        f"evaluations {[m['evaluations'] for m in models.values()]}"
+    )
+    print(
+        "seconds:",
+        ", ".join(f"{name} {seconds:.3f}" for name, seconds in CLOCK.items()),
+        f"(CPU in all {time.process_time():.3f})",
+    )
 
 
 def timed(command, threads):
@@ -285,10 +328,15 @@ def main():
         times = {"script": [], "afmid": []}
         for i in range(options.runs):
             times["script"].append(timed(script, {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}))
-            times["afmid"].append(timed([*ours, "--cache", Path(folder, f"cache-{i}"), "-o", Path(folder, "afmid.h5")], {}))
+            times["afmid"].append(
+                timed([*ours, "--cache", Path(folder, f"cache-{i}"), "-o", Path(folder, "afmid.h5")], {})
+            )
     print(min(times["script"])[2])  # of the fastest run
     print("| seconds | least | median | CPU, least | CPU, median |\n|---|---|---|---|---|")
-    figures = {name: [pick([run[i] for run in runs]) for i in (0, 1) for pick in (min, np.median)] for name, runs in times.items()}
+    figures = {
+        name: [pick([run[i] for run in runs]) for i in (0, 1) for pick in (min, np.median)]
+        for name, runs in times.items()
+    }
     for name in figures:
         print(f"| {name} |", " | ".join(f"{seconds:.3f}" for seconds in figures[name]), "|")
     print("| ratio |", " | ".join(f"{a / b:.1f}" for a, b in zip(*figures.values())), "|")

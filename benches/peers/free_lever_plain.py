@@ -1,10 +1,12 @@
-"""The lean main job as one writes it with numpy and scipy in an afternoon, carefully: vectors throughout, an analytic Jacobian, one thread.
+"""The lean main job as one writes it with numpy and scipy in an afternoon, carefully: vectors throughout, an analytic
+Jacobian, one thread.
 
     /tmp/venv-peers/bin/python benches/peers/free_lever_plain.py [--afmid target/release/afmid] [--runs 5]
 
-Beside `free_lever.py`, which was made to be as fast as it could be: this one takes records as volts in double precision, looks for events at every sample, and
-fits by filters (`scipy.signal.lfilter`) and a QR of all samples at every step. The rest of the job is that script's. It does less than afmid as that one
-does: no keys or hashes, a local parabola, output error from one start with numbers of modes and real poles given, no zeros, no held-out fit.
+Beside `free_lever.py`, which was made to be as fast as it could be: this one takes records as volts in double
+precision, looks for events at every sample, and fits by filters (`scipy.signal.lfilter`) and a QR of all samples at
+every step. The rest of the job is that script's. It does less than afmid as that one does: no keys or hashes, a local
+parabola, output error from one start with numbers of modes and real poles given, no zeros, no held-out fit.
 """
 
 import sys
@@ -12,7 +14,8 @@ import sys
 import free_lever
 import h5py
 import numpy as np
-from free_lever import BEFORE, LENGTH, MARGIN, MODES, ORDER, REAL, REAL_LEAST, REAL_MOST, Path, lap, least_squares, start
+from free_lever import BEFORE, LENGTH, MARGIN, MODES, ORDER, REAL, REAL_LEAST, REAL_MOST
+from free_lever import Path, lap, least_squares, start
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import lfilter
 
@@ -22,7 +25,9 @@ SOME = 16  # every so manieth step tells their scatter to two percent: some 7,00
 
 
 def onsets(y):
-    """Samples where the level jumps up: running means, their differences against the scatter, then the first sample above half of the jump."""
+    """Samples where the level jumps up: running means, their differences against the scatter, then the first sample
+    above half of the jump.
+    """
     means = uniform_filter1d(y, BLOCK)
     step = means[2 * BLOCK :] - means[: -2 * BLOCK]
     some = step[::SOME]
@@ -53,7 +58,9 @@ def cut(folder):
 
 
 def fit(y, t0, line, u):
-    """Output error by variable projection: sections of second and first order, their initial states, D, offset and drift solved for at each step."""
+    """Output error by variable projection: sections of second and first order, their initial states, D, offset and
+    drift solved for at each step.
+    """
     m, d, k = MODES, 2 * ORDER + 3, np.arange(LENGTH)
     impulse = (k == 0).astype(float)
 
@@ -63,7 +70,8 @@ def fit(y, t0, line, u):
 
     def denominators(x):
         s, real = poles(x)
-        return [np.array([1.0, -2.0 * z.real, abs(z) ** 2]) for z in np.exp(s)] + [np.array([1.0, -np.exp(r)]) for r in real]
+        second = [np.array([1.0, -2.0 * z.real, abs(z) ** 2]) for z in np.exp(s)]
+        return second + [np.array([1.0, -np.exp(r)]) for r in real]
 
     def regressors(x):
         columns = []
@@ -87,7 +95,9 @@ def fit(y, t0, line, u):
         return memory["found"]
 
     def jacobian(x):
-        """Kaufman's: derivatives of the prediction to the denominators' coefficients, then to x, less what the linear parameters reach."""
+        """Kaufman's: derivatives of the prediction to the denominators' coefficients, then to x, less what the linear
+        parameters reach.
+        """
         q, phi, theta, _ = remembered(x)
         s, real = poles(x)
         j, at = np.zeros((LENGTH, len(x))), 0
@@ -109,7 +119,15 @@ def fit(y, t0, line, u):
     assert found.success, found.message
     (s, real_s), (_, phi, theta, residual), j = poles(found.x), remembered(found.x), jacobian(found.x)
     covariance = np.linalg.pinv(j.T @ j) * np.sum(residual**2) / (LENGTH - d - len(found.x))
-    return dict(s=s, real_s=real_s, theta=theta, covariance=covariance, prediction=y - residual, residual=residual, evaluations=found.nfev)
+    return dict(
+        s=s,
+        real_s=real_s,
+        theta=theta,
+        covariance=covariance,
+        prediction=y - residual,
+        residual=residual,
+        evaluations=found.nfev,
+    )
 
 
 free_lever.cut, free_lever.fit, free_lever.SCRIPT = cut, fit, __file__

@@ -4,12 +4,13 @@
     apt-get install octave octave-control
     cargo build --release -p afmid-stages --example accuracy && /tmp/venv-peers/bin/python benches/peers/ringdown.py
 
-Data: the mean of 84 releases of the paper's lever in white noise, 8192 samples at 5 MS/s, from the first sample after the release
-(`accuracy export SEED 84`); order 11: four modes and three real poles. Everyone gets the same samples, less the mean of their last quarter, and the
-order; nobody gets a start value from the truth. Every time is a fit alone, start values included: no interpreter start, no reading of files, one thread.
-Everyone is warm: one fit before the clock runs.
-Errors: rms over the seeds in units of the Cramer-Rao bound; the pole nearest in frequency counts, and a mode with no decaying pole within 1 % of its
-frequency or with a Q off by more than a factor of two is missing.
+Data: the mean of 84 releases of the paper's lever in white noise, 8192 samples at 5 MS/s, from the first sample after
+the release (`accuracy export SEED 84`); order 11: four modes and three real poles. Everyone gets the same samples, less
+the mean of their last quarter, and the order; nobody gets a start value from the truth. Every time is a fit alone,
+start values included: no interpreter start, no reading of files, one thread. Everyone is warm: one fit before the clock
+runs.
+Errors: rms over the seeds in units of the Cramer-Rao bound; the pole nearest in frequency counts, and a mode with no
+decaying pole within 1 % of its frequency or with a Q off by more than a factor of two is missing.
 """
 
 import argparse
@@ -39,11 +40,12 @@ ORDER = 2 * MODES + REAL
 LIMIT = 120.0  # seconds per fit
 
 
-# ---- scipy: variable projection in modal form ------------------------------------------------------------------------------------------
+# ---- scipy: variable projection in modal form ------------------------------------------------------------------------
 
 
 HEAD = 128  # samples in which real poles may show
-SLOWEST, FASTEST = 0.2, 8.0  # bounds of a real pole's decay per sample: nothing left of it after the head; gone within one sample
+# bounds of a real pole's decay per sample: nothing left of it after the head; gone within one sample
+SLOWEST, FASTEST = 0.2, 8.0
 REAL_START = np.array([-2.0, -1.0, 0.0])  # 1.1, 2.3 and 4.1 per sample: spread over what the bounds leave
 SCALE = 1e-3  # of the sample number, for columns of similar size
 ROWS = 64  # of the start's Hankel matrix
@@ -57,7 +59,9 @@ def powers(z, samples):
 
 
 def hankel_poles(y, order, rows):
-    """Poles by shift invariance of the dominant eigenvectors of the Hankel matrix's Gram matrix (ERA without its inputs)."""
+    """Poles by shift invariance of the dominant eigenvectors of the Hankel matrix's Gram matrix (ERA without its
+    inputs).
+    """
     from scipy.linalg import eigh
 
     columns = len(y) - rows + 1
@@ -87,9 +91,10 @@ MODAL = np.r_[: 2 * MODES, ORDER, ORDER + 1 : ORDER + 1 + 2 * MODES, 2 * ORDER +
 class Projection:
     """Residual and Kaufman's Jacobian of y = sum c_p z_p^k + offset with the linear part solved for.
 
-    Both are handed on as the triangle of [J r]: same norms and gradients, 12 rows instead of 8192, which is all that Levenberg-Marquardt looks at.
-    The triangle comes from a QR of the head's rows on top of the Cholesky factor of all later ones, where only modes are left; their Gram matrix is
-    sums of exponentials, taken over blocks: no pass over the samples but one product with y.
+    Both are handed on as the triangle of [J r]: same norms and gradients, 12 rows instead of 8192, which is all that
+    Levenberg-Marquardt looks at. The triangle comes from a QR of the head's rows on top of the Cholesky factor of all
+    later ones, where only modes are left; their Gram matrix is sums of exponentials, taken over blocks: no pass over
+    the samples but one product with y.
     """
 
     def __init__(self, y):
@@ -103,14 +108,20 @@ class Projection:
         self.total, self.square = y.sum(), y @ y
 
     def tail(self, a, b, head):
-        """Cholesky factor of [Re z^k, Im z^k, 1, k Re z^k, k Im z^k, y] after the head, from z^k inside blocks and from block to block."""
+        """Cholesky factor of [Re z^k, Im z^k, 1, k Re z^k, k Im z^k, y] after the head, from z^k inside blocks and from
+        block to block.
+        """
         m, n = MODES, 2 * MODES + 1
         gram = np.empty((2 * n, 2 * n))
         # sums of k^i p q, k = fine + coarse, for p of the modes and q of the modes and of their conjugates
         right, far = np.hstack([a, a.conj()]), np.hstack([b, b.conj()])
         f = [a.T @ (w * right) for w in (1.0, self.fine, self.fine**2)]
         c = [b.T @ (w * far) for w in (1.0, self.coarse, self.coarse**2)]
-        sums = f[0] * c[0], SCALE * (f[1] * c[0] + f[0] * c[1]), SCALE**2 * (f[2] * c[0] + 2.0 * f[1] * c[1] + f[0] * c[2])
+        sums = (
+            f[0] * c[0],
+            SCALE * (f[1] * c[0] + f[0] * c[1]),
+            SCALE**2 * (f[2] * c[0] + 2.0 * f[1] * c[1] + f[0] * c[2]),
+        )
         for total, (i, j) in zip(sums, ((0, 0), (0, n), (n, n))):
             plus, minus = 0.5 * (total[:, :m] + total[:, m:]), 0.5 * (total[:, m:] - total[:, :m])
             gram[i : i + m, j : j + m], gram[i + m : i + 2 * m, j + m : j + 2 * m] = plus.real, minus.real
@@ -153,7 +164,8 @@ class Projection:
         # columns: modes, real poles, offset, derivatives of both, y
         basis = np.hstack([e.real, e.imag, early])
         a = np.zeros((HEAD + 4 * m + 2, 2 * n + 2), order="F")
-        a[:HEAD, :n], a[:HEAD, n], a[:HEAD, n + 1 : -1], a[:HEAD, -1] = basis, 1.0, SCALE * self.fine * basis, self.y[:HEAD]
+        a[:HEAD, :n], a[:HEAD, n] = basis, 1.0
+        a[:HEAD, n + 1 : -1], a[:HEAD, -1] = SCALE * self.fine * basis, self.y[:HEAD]
         a[HEAD:, MODAL] = self.tail(e, np.exp(self.coarse * s), a[:HEAD, MODAL])
         t = triangle(a)
         c = np.linalg.solve(t[: n + 1, : n + 1], t[: n + 1, -1])
@@ -217,11 +229,13 @@ def with_scipy(y, kind):
     return np.exp(-np.exp(found.x[:MODES]) + 1j * found.x[MODES : 2 * MODES])
 
 
-# ---- vector fitting --------------------------------------------------------------------------------------------------------------------
+# ---- vector fitting --------------------------------------------------------------------------------------------------
 
 
 def vector_fit(y, spacing, bilinear):
-    """scikit-rf on the spectrum, up to the Nyquist frequency exclusively; `bilinear`: its axis bent so that sampled decays are exactly rational."""
+    """scikit-rf on the spectrum, up to the Nyquist frequency exclusively; `bilinear`: its axis bent so that sampled
+    decays are exactly rational.
+    """
     import skrf
 
     spectrum = np.fft.rfft(y)[:-1]
@@ -231,12 +245,14 @@ def vector_fit(y, spacing, bilinear):
     fit = skrf.vectorFitting.VectorFitting(network)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit.vector_fit(n_poles_real=REAL, n_poles_cmplx=MODES, init_pole_spacing=spacing, fit_constant=True, enforce_dc=False)
+        fit.vector_fit(
+            n_poles_real=REAL, n_poles_cmplx=MODES, init_pole_spacing=spacing, fit_constant=True, enforce_dc=False
+        )
     s = fit.poles / RATE
     return (1.0 + s / 2.0) / (1.0 - s / 2.0) if bilinear else np.exp(s)
 
 
-# ---- subspace methods ------------------------------------------------------------------------------------------------------------------
+# ---- subspace methods ------------------------------------------------------------------------------------------------
 
 
 def pulse(y, before):
@@ -289,7 +305,10 @@ def with_octave(data, rows, before, algorithm):
         script = OCTAVE % (", ".join(names), before + 1, ORDER, rows, algorithm)
         try:
             done = subprocess.run(
-                ["octave", "-q", "--no-gui", "--eval", script], capture_output=True, text=True, timeout=LIMIT * (len(data) + 1)
+                ["octave", "-q", "--no-gui", "--eval", script],
+                capture_output=True,
+                text=True,
+                timeout=LIMIT * (len(data) + 1),
             )
         except subprocess.TimeoutExpired:
             return "timeout"
@@ -300,10 +319,11 @@ def with_octave(data, rows, before, algorithm):
     return [(n[0], n[1::2] + 1j * n[2::2]) for n in numbers]
 
 
-# ---- the comparison --------------------------------------------------------------------------------------------------------------------
+# ---- the comparison --------------------------------------------------------------------------------------------------
 
 
-# name, fit, its arguments, most seeds. Subspace methods take s block rows; `rest`: twice as many zeros before the pulse that starts the decay
+# name, fit, its arguments, most seeds. Subspace methods take s block rows; `rest`: twice as many zeros before the pulse
+# that starts the decay
 PEERS = [
     ("scipy `least_squares`, variable projection, a residual per sample", with_scipy, (Samples,), 1000),
     ("scipy `least_squares`, variable projection, compressed", with_scipy, (Projection,), 1000),
@@ -337,7 +357,9 @@ def serve(pipe, fit, arguments):
 
 
 def in_process(data, fit, arguments):
-    """(seconds, poles) per seed, after one fit to import and warm up, from one process that ends with a fit that takes too long."""
+    """(seconds, poles) per seed, after one fit to import and warm up, from one process that ends with a fit that takes
+    too long.
+    """
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     child = context.Process(target=serve, args=(theirs, fit, arguments), daemon=True)
@@ -377,7 +399,8 @@ def row(name, times, relative, bound, ours):
         rms = np.sqrt(np.append(np.nanmean(squares, axis=0), np.nanmean(squares)))
     cells = " | ".join("-" if np.isnan(r) else f"{r:.2f}" if r < 99.995 else f"{r:.0f}" for r in rms)
     median = float(np.median(times))
-    span = f"{1e3 * median:.4g} | {1e3 * min(times):.4g} | {1e3 * ours:.4g} | {median / ours:.{1 if median < 10.0 * ours else 0}f}"
+    ratio = f"{median / ours:.{1 if median < 10.0 * ours else 0}f}"
+    span = f"{1e3 * median:.4g} | {1e3 * min(times):.4g} | {1e3 * ours:.4g} | {ratio}"
     return f"| {name} | {len(relative)} | {cells} | {missing} | {span} |"
 
 
@@ -415,16 +438,24 @@ def main():
             rows.append(row(name, [t for t, _ in done], relative, bound, float(np.median(beside))))
         else:
             rows.append(f"| {name} | 0 |" + " - |" * 10 + f" {results[0].split(':')[0]} | - | - | - |")
-    print("| fit | seeds | f1 | Q1 | f2 | Q2 | f3 | Q3 | f4 | Q4 | all | modes missing | median, ms | least, ms | ours beside it, ms | over ours |")
+    print(
+        "| fit | seeds | f1 | Q1 | f2 | Q2 | f3 | Q3 | f4 | Q4 | all | modes missing "
+        "| median, ms | least, ms | ours beside it, ms | over ours |"
+    )
     print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     median = float(np.median(times))
     own = [("fit_decay", "decay", times), ("fit_ringdowns", "joint", joint)]
-    own = [row(f"afmid `{name}`", t, np.array([f[key]["relative_error"] for f in fits]), bound, median) for name, key, t in own]
+    own = [
+        row(f"afmid `{name}`", t, np.array([f[key]["relative_error"] for f in fits]), bound, median)
+        for name, key, t in own
+    ]
     print(*own, *rows, "", *notes, sep="\n")
     packages = ("numpy", "scipy", "scikit-rf", "nfoursid", "sippy_unipi")
     print(f"Python {platform.python_version()}", *(f"{p} {version(p)}" for p in packages), sep=", ")
     control = 'p = pkg("list", "control"); disp(["Octave " version ", control " p{1}.version])'
-    print(subprocess.run(["octave", "-q", "--no-gui", "--eval", control], capture_output=True, text=True).stdout.strip())
+    print(
+        subprocess.run(["octave", "-q", "--no-gui", "--eval", control], capture_output=True, text=True).stdout.strip()
+    )
     print(f"load over a minute, at each peer's start: {min(loads):.1f} to {max(loads):.1f} on {os.cpu_count()} cores")
 
 

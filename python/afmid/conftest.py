@@ -1,4 +1,6 @@
-"""A result file for tests and examples: AFMID_RESULT, written by the program AFMID from a free-lever config (tests/python_reader.rs makes both)."""
+"""A result file for tests and examples: AFMID_RESULT, written by the program AFMID from a free-lever config
+(tests/python_reader.rs makes both).
+"""
 
 import json
 import os

@@ -15,8 +15,9 @@
 
     afmid.serve(halve)
 
-The protocol is docs/plugins.md of afmid; this file is all that it takes. It needs numpy and h5py (the latter is imported when the first
-file is read or written). stdout belongs to the protocol: `print` goes to stderr while a plugin is served.
+The protocol is docs/plugins.md of afmid; this file is all that it takes. It needs numpy and h5py (the latter is
+imported when the first file is read or written). stdout belongs to the protocol: `print` goes to stderr while a plugin
+is served.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Refused(Exception):
         self.help = help
 
 
-# ---- artifacts ----------------------------------------------------------------------------------------------------------------
+# ---- artifacts -------------------------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -181,7 +182,7 @@ def _named(items: list, name: str, what: str):
     raise Refused(f"there is no {what} `{name}`; there is: {have}", "check what is wired to the input")
 
 
-# ---- declarations -------------------------------------------------------------------------------------------------------------
+# ---- declarations ----------------------------------------------------------------------------------------------------
 
 
 def port(name: str, shape: str, tag: str = "", doc: str = "", optional: bool = False, finite: bool = True) -> dict:
@@ -194,7 +195,11 @@ _REQUIRED = object()
 
 
 def _parameter(kind: str, default: Any, doc: str, limits: dict[str, Any]) -> dict:
-    words = {"exclusive_minimum": "exclusiveMinimum", "exclusive_maximum": "exclusiveMaximum", "multiple_of": "multipleOf"}
+    words = {
+        "exclusive_minimum": "exclusiveMinimum",
+        "exclusive_maximum": "exclusiveMaximum",
+        "multiple_of": "multipleOf",
+    }
     schema = {"type": kind, "description": doc} if doc else {"type": kind}
     schema.update({words.get(name, name): value for name, value in limits.items()})
     return schema if default is _REQUIRED else {**schema, "default": default}
@@ -282,7 +287,8 @@ def stage(
 ) -> Callable[[Callable], Stage]:
     """Makes a stage of a function `(inputs, parameters, context) -> outputs`, both by port name.
 
-    `examples`: a function that returns a list of (title, parameters, inputs), small ones: `afmid plugin check` runs them.
+    `examples`: a function that returns a list of (title, parameters, inputs), small ones: `afmid plugin check` runs
+    them.
     """
     parameters = parameters or {}
     schema = {
@@ -299,7 +305,7 @@ def stage(
     return lambda run: Stage(description, run, examples)
 
 
-# ---- the exchange layout: numbers in an HDF5 file, words in the line ----------------------------------------------------------
+# ---- the exchange layout: numbers in an HDF5 file, words in the line -------------------------------------------------
 
 
 class _Inline:
@@ -310,7 +316,9 @@ class _Inline:
 
 
 class _Writer:
-    """Numbers that go into a file, made when the first ones come. h5py's low-level interface: half the time of the other."""
+    """Numbers that go into a file, made when the first ones come. h5py's low-level interface: half the time of the
+    other.
+    """
 
     def __init__(self, path: str):
         self.path, self.file, self.count = path, None, 0
@@ -432,10 +440,20 @@ def _give(made: Any, to: _Inline | _Writer) -> dict:
         parts = {"A": made.A, "B": made.B, "C": made.C, "D": made.D, "K": made.K, "x0": made.x0,
                  "parameters": made.parameters, "covariance": made.covariance}
         a, b, c = np.atleast_2d(made.A), np.atleast_2d(made.B), np.atleast_2d(made.C)
-        matrices = {name: to.put(name, np.asarray(value, dtype=float)) for name, value in parts.items() if value is not None}
-        return {"shape": "state_space", "states": a.shape[0], "inputs": b.shape[1], "outputs": c.shape[0],
-                "sample_time_s": float(made.sample_time_s), "innovation_variance": float(made.innovation_variance),
-                "parameter_names": list(made.parameter_names), "matrices": matrices, "attributes": _plain(made.attributes)}
+        matrices = {
+            name: to.put(name, np.asarray(value, dtype=float)) for name, value in parts.items() if value is not None
+        }
+        return {
+            "shape": "state_space",
+            "states": a.shape[0],
+            "inputs": b.shape[1],
+            "outputs": c.shape[0],
+            "sample_time_s": float(made.sample_time_s),
+            "innovation_variance": float(made.innovation_variance),
+            "parameter_names": list(made.parameter_names),
+            "matrices": matrices,
+            "attributes": _plain(made.attributes),
+        }
     if isinstance(made, (dict, list)):
         return {"shape": "document", "value": _plain(made)}
     raise TypeError(f"an output is a {type(made).__name__}, wanted an Array, a Table, a StateSpace or a dict")
@@ -456,7 +474,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
-# ---- the conversation ---------------------------------------------------------------------------------------------------------
+# ---- the conversation ------------------------------------------------------------------------------------------------
 
 
 def serve(served: Stage) -> None:
@@ -471,7 +489,14 @@ def serve(served: Stage) -> None:
         out.flush()
 
     about = served.description
-    say({"afmid_stage": 1, "protocol": {"min": PROTOCOL[0], "max": PROTOCOL[1]}, "name": about["name"], "version": about["version"]})
+    say(
+        {
+            "afmid_stage": 1,
+            "protocol": {"min": PROTOCOL[0], "max": PROTOCOL[1]},
+            "name": about["name"],
+            "version": about["version"],
+        }
+    )
     for line in sys.stdin:
         request = json.loads(line)
         if request["method"] == "shutdown":

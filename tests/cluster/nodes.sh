@@ -1,5 +1,6 @@
-# A Slurm of one machine with two emulated nodes, n1 and n2, each of one processor, without systemd: sourced by the tests of clusters, as root.
-# Everything, the key of munge included, lies in one folder; /etc and a Slurm that may run on the machine are left alone.
+# A Slurm of one machine with two emulated nodes, n1 and n2, each of one processor, without systemd: sourced by the
+# tests of clusters, as root. Everything, the key of munge included, lies in one folder; /etc and a Slurm that may run
+# on the machine are left alone.
 
 # Installs what is missing with apt. Fails where that is not possible.
 cluster_install() {
@@ -72,7 +73,8 @@ CONF
     return 1
 }
 
-# Process numbers of the tasks on node $1 and of the Slurm steps above them. Processes may end while one looks: what is gone is passed over.
+# Process numbers of the tasks on node $1 and of the Slurm steps above them. Processes may end while one looks: what is
+# gone is passed over.
 node_tasks() {
     local pid parent
     { grep -lzx "SLURMD_NODENAME=$1" /proc/[0-9]*/environ | xargs -r grep -lzxF "SLURM_CONF=$SLURM_CONF"; } 2>/dev/null |

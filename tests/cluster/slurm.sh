@@ -1,10 +1,14 @@
 #!/bin/bash
-# A batch on a real Slurm of two emulated nodes, one of which is lost on the way; needs root, and apt where Slurm and munge are missing.
+# A batch on a real Slurm of two emulated nodes, one of which is lost on the way; needs root, and apt where Slurm and
+# munge are missing.
 #
-#   tests/cluster/slurm.sh [AFMID] [SNAKEMAKE]     (target/debug/afmid; SNAKEMAKE: also workflow/Snakefile on the same Slurm)
+#   tests/cluster/slurm.sh [AFMID] [SNAKEMAKE]
 #
-# Shown, else it fails: shards on both nodes; one bad data set, reported with its reason; the lost node's shard finished by the other, both when the node is gone and
-# when it was only out of reach and works on at the same time; the table, and every number of every result, those of one machine.
+# (target/debug/afmid; SNAKEMAKE: also workflow/Snakefile on the same Slurm)
+#
+# Shown, else it fails: shards on both nodes; one bad data set, reported with its reason; the lost node's shard finished
+# by the other, both when the node is gone and when it was only out of reach and works on at the same time; the table,
+# and every number of every result, those of one machine.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 afmid=$(realpath "${1:-$root/target/debug/afmid}")
@@ -99,7 +103,8 @@ midway() {
     return 1
 }
 
-# One submission to folder $1, in the course of which n2 is lost: `gone`, or `frozen`, out of reach until its shard runs elsewhere.
+# One submission to folder $1, in the course of which n2 is lost: `gone`, or `frozen`, out of reach until its shard runs
+# elsewhere.
 submitted() {
     local folder=$1 how=$2 sent clock=$SECONDS lost frozen on_n2 count log collect
     sinfo -h -n n2 -o %t | grep -q idle || { slurmd -N n2; until sinfo -h -n n2 -o %t | grep -q idle; do sleep 0.5; done; }

@@ -1,5 +1,6 @@
 #!/bin/bash
-# workflow/Snakefile with Snakemake's local executor: the table of one machine, a second run that does nothing, errors in one line.
+# workflow/Snakefile with Snakemake's local executor: the table of one machine, a second run that does nothing, errors
+# in one line.
 #
 #   tests/cluster/workflow.sh AFMID SNAKEMAKE
 set -euo pipefail

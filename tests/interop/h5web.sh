@@ -1,7 +1,9 @@
 #!/bin/bash
 # H5Web in headless Chromium shows the default plot of a result file.
 #
-#   tests/interop/h5web.sh AFMID [RESULT.h5]     (installs chromium, nodejs and npm with apt where they are missing, H5Web from registry.npmjs.org)
+#   tests/interop/h5web.sh AFMID [RESULT.h5]
+#
+# (installs chromium, nodejs and npm with apt where they are missing, H5Web from registry.npmjs.org)
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 afmid=$(realpath "$1")

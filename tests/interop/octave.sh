@@ -1,7 +1,9 @@
 #!/bin/bash
 # A model that `afmid export` wrote, simulated under Octave: the prediction is the one that afmid itself stored.
 #
-#   tests/interop/octave.sh AFMID PYTHON [RESULT.h5]     (installs octave with apt where it is missing; RESULT.h5: instead of a simulated one)
+#   tests/interop/octave.sh AFMID PYTHON [RESULT.h5]
+#
+# (installs octave with apt where it is missing; RESULT.h5: instead of a simulated one)
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 afmid=$(realpath "$1")
@@ -18,7 +20,8 @@ PYTHONPATH=$root/python/afmid/src "$python" - <<'END'
 import afmid, scipy.io
 with afmid.open("a.h5") as r:
     pair = r.force
-    signals = {"force": pair.force.values, "response": pair.response.values, "prediction": r["model.residuals"].prediction.values}
+    prediction = r["model.residuals"].prediction.values
+    signals = {"force": pair.force.values, "response": pair.response.values, "prediction": prediction}
 scipy.io.savemat("signals.mat", signals, oned_as="column")
 END
 octave-cli --no-init-file --no-history --quiet "$root/tests/interop/octave_model.m"

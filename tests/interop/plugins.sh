@@ -1,7 +1,9 @@
 #!/bin/bash
 # The example plugins in Octave and with scikit-rf: each passes `afmid plugin check`, each runs in its config.
 #
-#   tests/interop/plugins.sh AFMID PYTHON      (installs octave with apt where it is missing; PYTHON has numpy, h5py, and here gets scikit-rf in a folder of its own)
+#   tests/interop/plugins.sh AFMID PYTHON
+#
+# (installs octave with apt where it is missing; PYTHON has numpy, h5py, and here gets scikit-rf in a folder of its own)
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 afmid=$(realpath "$1")

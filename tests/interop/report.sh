@@ -1,9 +1,12 @@
 #!/bin/bash
 # Reports in headless Chromium: the lean main job's, and a diagnosis's of each archive with something hidden.
 #
-#   tests/interop/report.sh AFMID [FOLDER]     (installs chromium, nodejs and npm with apt where they are missing; FOLDER: keeps pages and screenshots)
+#   tests/interop/report.sh AFMID [FOLDER]
 #
-# The archives are those of $AFMID_DATA or ../shared/data beside the clone; where they are missing simulated ones take their place, and the output says so.
+# (installs chromium, nodejs and npm with apt where they are missing; FOLDER: keeps pages and screenshots)
+#
+# The archives are those of $AFMID_DATA or ../shared/data beside the clone; where they are missing simulated ones take
+# their place, and the output says so.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 afmid=$(realpath "$1")

@@ -1,8 +1,8 @@
 """Compares the datasets of afmid result files bit for bit, whatever versions of afmid wrote them.
 
-Usage: same_datasets.py A.h5 B.h5 [A.h5 B.h5 ...], or same_datasets.py FOLDER FOLDER (files of the same name). Prints a line per pair and per
-difference; exits with 1 if any dataset differs. Left out: /entry/run (times and host), and what names versions, places and keys rather than
-results (program, key, path, arithmetic). Needs h5py.
+Usage: same_datasets.py A.h5 B.h5 [A.h5 B.h5 ...], or same_datasets.py FOLDER FOLDER (files of the same name). Prints a
+line per pair and per difference; exits with 1 if any dataset differs. Left out: /entry/run (times and host), and what
+names versions, places and keys rather than results (program, key, path, arithmetic). Needs h5py.
 """
 
 import sys
@@ -40,7 +40,9 @@ def compare(first, second):
         left, right = datasets(a), datasets(b)
         wrong = [f"only in {first}: {name}" for name in sorted(left.keys() - right.keys())]
         wrong += [f"only in {second}: {name}" for name in sorted(right.keys() - left.keys())]
-        wrong += [f"differs: {name}" for name in sorted(left.keys() & right.keys()) if not same(left[name], right[name])]
+        wrong += [
+            f"differs: {name}" for name in sorted(left.keys() & right.keys()) if not same(left[name], right[name])
+        ]
         print(f"{first} and {second}: {len(left.keys() & right.keys())} datasets, {len(wrong)} differences")
         for line in wrong:
             print(f"  {line}")

@@ -1,4 +1,5 @@
-# What the scripts beside it share: tools from Debian's packages, and a result file to try them on. Wants $root and $scratch.
+# What the scripts beside it share: tools from Debian's packages, and a result file to try them on. Wants $root and
+# $scratch.
 # shellcheck shell=bash
 
 fail() { echo "FAILED: $*" >&2; exit 1; }

@@ -73,7 +73,9 @@ def test_unknown_names_come_with_the_nearest(result):
 def test_nothing_is_read_before_it_is_asked_for_and_what_was_read_stays(result, monkeypatch):
     read = []
     plain = h5py.Dataset.__getitem__
-    monkeypatch.setattr(h5py.Dataset, "__getitem__", lambda self, *args: (read.append(self.name), plain(self, *args))[1])
+    monkeypatch.setattr(
+        h5py.Dataset, "__getitem__", lambda self, *args: (read.append(self.name), plain(self, *args))[1]
+    )
     with afmid.open(result) as r:
         stage = r["etfe"]
         assert stage.ports and repr(stage) and not any(name.endswith("transfer_real") for name in read)

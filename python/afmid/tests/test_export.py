@@ -57,7 +57,8 @@ def test_the_json_file_is_the_model_and_knows_no_nan(exported, model):
     for name in (*MATRICES, "covariance", "x0", "parameters"):
         assert np.array_equal(np.array(found[name]), getattr(model, name)), name
     assert found["parameter_names"] == list(model.parameter_names) and found["attributes"] == model.attributes
-    assert found["sample_time_s"] == model.sample_time_s and found["units"] == {"time": "s", "input": "V", "output": "V"}
+    assert found["sample_time_s"] == model.sample_time_s
+    assert found["units"] == {"time": "s", "input": "V", "output": "V"}
     assert next(iter(found)) == "afmid_model" and found["source"] == "model.model"
 
 
@@ -88,7 +89,9 @@ def refused(program, tmp_path):
     """Runs a command that ends with exit code 2 and nothing on stdout; gives what it says."""
 
     def run(*arguments):
-        done = subprocess.run([program, "export", *map(str, arguments)], capture_output=True, text=True, check=False, cwd=tmp_path)
+        done = subprocess.run(
+            [program, "export", *map(str, arguments)], capture_output=True, text=True, check=False, cwd=tmp_path
+        )
         assert (done.returncode, done.stdout) == (2, ""), done.stderr
         return done.stderr
 

@@ -34,7 +34,8 @@ def test_response_and_band_are_those_of_the_stage_modes(r, model):
     # the two are computed in another order: the resolvent's condition is below 1e6
     close = dict(rtol=1e-8, atol=1e-12)
     assert np.allclose(found.transfer, stored.transfer, **close)
-    below = stored.frequency_hz < 0.499 / model.sample_time_s   # at half the rate G is real: its phase's error vanishes by rounding
+    # at half the rate G is real: its phase's error vanishes by rounding
+    below = stored.frequency_hz < 0.499 / model.sample_time_s
     for name in ("magnitude_std", "magnitude_low", "magnitude_high", "phase_std"):
         # errors are roots of small differences: half the digits at least where they nearly cancel
         assert np.allclose(found[name][below], stored[name][below], rtol=1e-5, atol=1e-12), name

@@ -24,9 +24,13 @@ def test_it_runs_from_top_to_bottom(path, result, monkeypatch):
     book = nbformat.read(path, as_version=4)
     stored = [len(cell.outputs) for cell in book.cells if cell.cell_type == "code"]
     # a cell that hangs is an error: the slowest takes two seconds on an idle machine
-    NotebookClient(book, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(path.parent)}}).execute()
+    NotebookClient(
+        book, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(path.parent)}}
+    ).execute()
     assert [len(cell.outputs) for cell in book.cells if cell.cell_type == "code"] == stored
-    pictures = [output for cell in book.cells for output in cell.get("outputs", []) if "image/png" in output.get("data", {})]
+    pictures = [
+        output for cell in book.cells for output in cell.get("outputs", []) if "image/png" in output.get("data", {})
+    ]
     assert len(pictures) >= 2
 
 

@@ -20,7 +20,8 @@ def as_shown(value):
             for name, axis in value.coords.items()
         ]
         variables = [
-            {"name": name, "unit": v.units, "dims": list(v.dims), "shape": list(v.shape)} for name, v in value.data_vars.items()
+            {"name": name, "unit": v.units, "dims": list(v.dims), "shape": list(v.shape)}
+            for name, v in value.data_vars.items()
         ]
         return {"axes": axes, "variables": variables, "attributes": value.attrs}
     assert isinstance(value, (dict, list)), type(value)
@@ -37,7 +38,12 @@ def test_the_list_of_stages_is_the_programs(r, afmid_cli, result):
     shown = json.loads(afmid_cli("show", result, "--json"))
     assert (r.name, r.seed, r.program) == (shown["name"], shown["seed"], shown["program"])
     for stage, of in zip(r.stages.values(), shown["stages"], strict=True):
-        assert (stage.id, stage.uses, stage.version, stage.warnings) == (of["id"], of["uses"], of["version"], of["warnings"])
+        assert (stage.id, stage.uses, stage.version, stage.warnings) == (
+            of["id"],
+            of["uses"],
+            of["version"],
+            of["warnings"],
+        )
         assert stage.ports == {artifact["port"]: artifact["shape"] for artifact in of["artifacts"]}
 
 
@@ -61,7 +67,13 @@ def test_modes_are_the_numbers_of_show_to_the_last_bit(r, show):
 
 
 def test_every_artifact_opens(r):
-    kinds = {"array": xr.Dataset, "table": pd.DataFrame, "document": dict, "state-space model": afmid.Model, "recording": afmid.Recording}
+    kinds = {
+        "array": xr.Dataset,
+        "table": pd.DataFrame,
+        "document": dict,
+        "state-space model": afmid.Model,
+        "recording": afmid.Recording,
+    }
     seen = set()
     for stage in r.stages.values():
         for port, shape in stage.ports.items():

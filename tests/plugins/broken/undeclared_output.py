@@ -7,7 +7,10 @@ def say(message):
 DESCRIPTION = {
     "name": "broken", "version": "1", "summary": "a plugin that breaks the protocol",
     "inputs": [], "outputs": [{"name": "out", "shape": "array"}],
-    "parameters": {"type": "object", "additionalProperties": False, "properties": {"length": {"type": "integer", "default": 3}}},
+    "parameters": {
+        "type": "object", "additionalProperties": False,
+        "properties": {"length": {"type": "integer", "default": 3}},
+    },
     "deterministic": True, "seeded": False,
 }
 

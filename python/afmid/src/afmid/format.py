@@ -19,7 +19,8 @@ _SEAL_LENGTH = len(_SEAL) + 64 + 1
 def open_result(path: Path, require_seal: bool = True) -> h5py.File:
     """Opens the file for reading. Errors: `FileNotFoundError`; `NotAResult`, saying what it is; `OtherFormat`.
 
-    The last line of a result seals it; a program that opens it for writing, such as `nxcheck`, takes the seal off though it may change nothing.
+    The last line of a result seals it; a program that opens it for writing, such as `nxcheck`, takes the seal off
+    though it may change nothing.
 
     >>> open_result(Path("a.h5")).attrs["afmid_format"]
     'result'
@@ -88,7 +89,10 @@ class OpenFile:
 def _check(path: Path, file: h5py.File, require_seal: bool) -> None:
     kind = stored.plain(file.attrs.get("afmid_format"))
     if kind is None and "sample_rate_hz" in file.attrs:
-        raise NotAResult(f"{path} is a recording: name it in a config's stage `io.records`, `afmid run CONFIG -o OUT.h5` makes a result")
+        raise NotAResult(
+            f"{path} is a recording: name it in a config's stage `io.records`, "
+            "`afmid run CONFIG -o OUT.h5` makes a result"
+        )
     if kind is None:
         raise NotAResult(f"{path} is an HDF5 file of another program: it has no `afmid_format`")
     if kind != "result":
@@ -96,7 +100,11 @@ def _check(path: Path, file: h5py.File, require_seal: bool) -> None:
     version = stored.plain(file.attrs.get("afmid_format_version"))
     if version != FORMAT:
         newer = isinstance(version, int) and version > FORMAT
-        what = "install a newer `afmid` package" if newer else "run its config again, or read it with the package of that time"
+        what = (
+            "install a newer `afmid` package"
+            if newer
+            else "run its config again, or read it with the package of that time"
+        )
         raise OtherFormat(f"{path} has format {version}, this reader knows {FORMAT}: {what}")
     if require_seal and not _sealed(path):
         what = "its last line is no seal; with require_seal=False it is read as it is"

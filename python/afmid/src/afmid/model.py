@@ -47,7 +47,9 @@ class Model:
     innovation_variance: float
     """Variance of e, in squared units of the output."""
     parameter_names: tuple[str, ...]
-    """The free parameters, in the order of `covariance`: a1... (A's first columns of the sections, negative), b1... and d, of further inputs b1_2..."""
+    """The free parameters, in the order of `covariance`: a1... (A's first columns of the sections, negative), b1... and
+    d, of further inputs b1_2...
+    """
     parameters: Array
     """Their values."""
     covariance: Array
@@ -84,7 +86,9 @@ class Model:
         ['value', 'std']
         """
         std = np.sqrt(np.diag(self.covariance)) if self.covariance.size else np.full(len(self.parameters), np.nan)
-        return pd.DataFrame({"value": self.parameters, "std": std}, index=pd.Index(self.parameter_names, name="parameter"))
+        return pd.DataFrame(
+            {"value": self.parameters, "std": std}, index=pd.Index(self.parameter_names, name="parameter")
+        )
 
     def frequency_response(
         self,
@@ -107,7 +111,8 @@ class Model:
         )
 
     def simulate(self, u: Any, x0: Any = None) -> Array:
-        """The response to the inputs alone (e = 0), from state `x0` (its own by default). Shapes: u N or m x N; y p x N, or N for one output.
+        """The response to the inputs alone (e = 0), from state `x0` (its own by default). Shapes: u N or m x N;
+        y p x N, or N for one output.
 
         >>> import afmid
         >>> afmid.open("a.h5").model("model").simulate([0.0, 0.0], x0=[0.0] * 11)
@@ -116,8 +121,8 @@ class Model:
         return self._run(u, None, x0)
 
     def predict(self, u: Any, y: Any, x0: Any = None) -> Array:
-        """The response one sample ahead, from inputs and measured outputs up to the sample before. Offset and drift (`attributes`) are not the model's:
-        take them off first.
+        """The response one sample ahead, from inputs and measured outputs up to the sample before. Offset and drift
+        (`attributes`) are not the model's: take them off first.
 
         >>> import afmid
         >>> afmid.open("a.h5").model("model").predict([0.0, 0.0], [0.0, 0.0], x0=[0.0] * 11)

@@ -20,13 +20,20 @@ POINTS = 2000
 
 
 def frequency_response(
-    model: Model, frequency_hz: Any = None, *, input: int = 0, output: int = 0, level: float = 0.95, intersample: str = "held"
+    model: Model,
+    frequency_hz: Any = None,
+    *,
+    input: int = 0,
+    output: int = 0,
+    level: float = 0.95,
+    intersample: str = "held",
 ) -> xr.Dataset:
     """`G = C (z I - A)^-1 B + D` at `z = exp(i 2 pi f Ts)`, from one input to one output, with its band.
 
-    `frequency_hz`: where; 2000 points, logarithmic from 1/5000 of the sample rate to half of it, by default. `intersample`: what the input does between samples:
-    `held` takes the hold's half sample of lag and its droop out, as `model.modes` and `spectrum.etfe` do by default, `sampled` is G itself.
-    Standard errors are those of the delta method with the model's covariance; the magnitude's interval of probability `level` is log-normal, as in
+    `frequency_hz`: where; 2000 points, logarithmic from 1/5000 of the sample rate to half of it, by default.
+    `intersample`: what the input does between samples: `held` takes the hold's half sample of lag and its droop out, as
+    `model.modes` and `spectrum.etfe` do by default, `sampled` is G itself. Standard errors are those of the delta
+    method with the model's covariance; the magnitude's interval of probability `level` is log-normal, as in
     `model.modes`; the phase is unwrapped, in radians. Without a covariance, errors and intervals are NaN.
 
     >>> import afmid
@@ -57,7 +64,9 @@ def frequency_response(
 def _resolvents(model: Model, z: Array, input: int, output: int) -> tuple[Array, Array]:
     """`C (zI - A)^-1` and `(zI - A)^-1 B` at every z, frequencies x n."""
     matrix = z[:, None, None] * np.eye(model.order) - model.A
-    left = np.linalg.solve(matrix.swapaxes(1, 2), np.broadcast_to(model.C[output, :, None], (len(z), model.order, 1)).astype(complex))
+    left = np.linalg.solve(
+        matrix.swapaxes(1, 2), np.broadcast_to(model.C[output, :, None], (len(z), model.order, 1)).astype(complex)
+    )
     right = np.linalg.solve(matrix, np.broadcast_to(model.B[:, input, None], (len(z), model.order, 1)).astype(complex))
     return left[..., 0], right[..., 0]
 
@@ -128,7 +137,9 @@ def _hold(turns: Array) -> Array:
         return np.where(angle > 0, 1j * angle / (1 - np.exp(-1j * angle)), 1)
 
 
-def _dataset(frequency: Array, transfer: Array, std: Array, low: Array, high: Array, phase_std: Array, level: float) -> xr.Dataset:
+def _dataset(
+    frequency: Array, transfer: Array, std: Array, low: Array, high: Array, phase_std: Array, level: float
+) -> xr.Dataset:
     per_cent = f"{100 * level:g} %"
     variables = {
         "transfer": (transfer, "1", "transfer function of the model"),

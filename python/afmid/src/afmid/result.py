@@ -22,7 +22,8 @@ from .stage import Stage
 class Result:
     """What a run left behind. Opened by `afmid.open`; nothing but the list of stages is read until it is asked for.
 
-    `r["modes"]` is a stage, `r["modes.roots"]` an artifact, `r.etfe` what stage `etfe` found (`Stage.value`; for `-` in an id write `_`).
+    `r["modes"]` is a stage, `r["modes.roots"]` an artifact, `r.etfe` what stage `etfe` found (`Stage.value`; for `-` in
+    an id write `_`).
 
     >>> import afmid
     >>> with afmid.open("a.h5") as r:
@@ -57,7 +58,9 @@ class Result:
     def __enter__(self) -> Result:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
 
     @property
@@ -97,7 +100,8 @@ class Result:
 
     @cached_property
     def modes(self) -> pd.DataFrame:
-        """The modal table, of the stage `modes` or else of the last one that has one; standard errors are the columns with `std` in their names.
+        """The modal table, of the stage `modes` or else of the last one that has one; standard errors are the columns
+        with `std` in their names.
 
         >>> import afmid
         >>> afmid.open("a.h5").modes[["frequency_hz", "frequency_std_hz"]].shape[1]
@@ -111,7 +115,12 @@ class Result:
         return table
 
     def _tables(self) -> list[str]:
-        return [f"{stage.id}.{name}" for stage in self._stages.values() for name, shape in stage.ports.items() if shape == "table"]
+        return [
+            f"{stage.id}.{name}"
+            for stage in self._stages.values()
+            for name, shape in stage.ports.items()
+            if shape == "table"
+        ]
 
     def model(self, id: str | None = None) -> Model:
         """A state-space model: of stage `id` (or `id.port`); of the last stage that has one by default.
@@ -121,7 +130,12 @@ class Result:
         'identification'
         """
         shape = "state-space model"
-        have = {f"{stage.id}.{name}": stage for stage in self._stages.values() for name, found in stage.ports.items() if found == shape}
+        have = {
+            f"{stage.id}.{name}": stage
+            for stage in self._stages.values()
+            for name, found in stage.ports.items()
+            if found == shape
+        }
         if not have:
             raise AfmidError(f"{self.path} holds no state-space model")
         if id is None:
@@ -185,7 +199,8 @@ class Result:
 
     @cached_property
     def run(self) -> dict[str, Any]:
-        """When and where: started_at, seconds, host, threads, folder, config_file, and each stage's seconds and whether it came from the cache.
+        """When and where: started_at, seconds, host, threads, folder, config_file, and each stage's seconds and whether
+        it came from the cache.
 
         >>> import afmid
         >>> afmid.open("a.h5").run["threads"] > 0
@@ -219,7 +234,8 @@ class Result:
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
-        """Where everything comes from, ready for JSON: program, config, seed, and of each stage version, parameters, inputs, seed, key, files and warnings.
+        """Where everything comes from, ready for JSON: program, config, seed, and of each stage version, parameters,
+        inputs, seed, key, files and warnings.
 
         >>> import afmid
         >>> afmid.open("a.h5").provenance["stages"]["etfe"]["uses"]
@@ -241,7 +257,8 @@ class Result:
 def open(path: str | os.PathLike[str], *, require_seal: bool = True) -> Result:
     """Opens a result file of `afmid run`. Errors: `FileNotFoundError`; `NotAResult`; `OtherFormat`.
 
-    `require_seal`: whether to refuse a file without the line that seals it, as the program does; another program that had it open for writing has taken it off.
+    `require_seal`: whether to refuse a file without the line that seals it, as the program does; another program that
+    had it open for writing has taken it off.
 
     >>> import afmid
     >>> with afmid.open("a.h5") as r:

@@ -167,7 +167,9 @@ class Stage(Mapping[str, Any]):
         >>> afmid.open("a.h5")["modes"].inputs["half"]
         'half.model'
         """
-        ports, stages, outputs = (stored.value(self._provenance, f"input_{part}") for part in ("port", "stage", "output"))
+        ports, stages, outputs = (
+            stored.value(self._provenance, f"input_{part}") for part in ("port", "stage", "output")
+        )
         return {port: f"{stage}.{output}" for port, stage, output in zip(ports, stages, outputs)}
 
     @cached_property
@@ -199,7 +201,11 @@ class Stage(Mapping[str, Any]):
         64
         """
         group = self._provenance
-        columns = (stored.value(group, "source_path"), stored.numbers(group, "source_size"), stored.value(group, "source_blake3"))
+        columns = (
+            stored.value(group, "source_path"),
+            stored.numbers(group, "source_size"),
+            stored.value(group, "source_blake3"),
+        )
         return [Source(path, int(size), blake3) for path, size, blake3 in zip(*columns)]
 
     @cached_property

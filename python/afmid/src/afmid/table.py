@@ -13,7 +13,8 @@ from . import stored
 def read_table(group: h5py.Group) -> pd.DataFrame:
     """A table artifact, its columns in reading order; standard errors are the columns with `std` in their names.
 
-    `attrs["units"]` and `attrs["long_name"]` say what each column holds, `attrs["attributes"]` are the table's scalars. Unknown numbers are NaN.
+    `attrs["units"]` and `attrs["long_name"]` say what each column holds, `attrs["attributes"]` are the table's scalars.
+    Unknown numbers are NaN.
 
     >>> with h5py.File("a.h5") as file:
     ...     modes = read_table(file["entry/modes/modes"])
