@@ -6,7 +6,8 @@
 use std::process::ExitCode;
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Entry, Example, Port, Ports, Spec, Stage, StageError, schemars, serde,
+    Array, Axis, Caching, Context, Document, Entry, Example, Faults, Port, Ports, Spec, Stage, StageError, schemars,
+    serde,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -35,10 +36,10 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "the decay time"
 #[serde(deny_unknown_fields, default, crate = "afmid_pipeline::serde")]
 #[schemars(crate = "afmid_pipeline::schemars")]
 struct Envelope {
-    /// Samples per block. Default: 256, a few periods of the paper's mode 1.
+    /// Samples per block. Why: a few periods of the paper's mode 1.
     #[schemars(range(min = 2))]
     block_samples: usize,
-    /// Seconds after the event at which the line begins. Default: 2e-4, higher modes are gone.
+    /// Seconds after the event at which the line begins. Why: higher modes are gone.
     #[schemars(range(min = 0.0))]
     start_s: f64,
     /// Seconds after the event at which the line ends; default 6e-4: the ringing still stands above the noise.
@@ -63,14 +64,9 @@ impl Stage for Envelope {
         source: "logarithmic decrement",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        if self.end_s <= self.start_s {
-            return Err(StageError::new(format!(
-                "`end_s` is {}, wanted more than `start_s` ({})",
-                self.end_s, self.start_s
-            )));
-        }
-        Ok(())
+    fn check(&self, faults: &mut Faults) {
+        let (start, end) = (self.start_s, self.end_s);
+        faults.require(end > start, || format!("`end_s` is {end}, wanted more than `start_s` ({start})"));
     }
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {

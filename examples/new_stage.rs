@@ -33,7 +33,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "root mean squar
 #[serde(deny_unknown_fields, default, crate = "afmid_pipeline::serde")]
 #[schemars(crate = "afmid_pipeline::schemars")]
 struct NewStage {
-    /// Samples at the end. Default: 512.
+    /// Samples at the end.
     #[schemars(range(min = 2))]
     samples: usize,
 }

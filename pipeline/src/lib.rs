@@ -36,4 +36,4 @@ pub use error::StageError;
 pub use graph::{Node, Plan, Wire};
 pub use outcome::{Port, PortSpec, Ports, RunInfo, RunResult, SourceFile, StageRecord, StageResult};
 pub use recording::{Channel, InputFiles, Record, Recording, Source};
-pub use stage::{Caching, Context, DynStage, Entry, Example, Registry, Spec, Stage};
+pub use stage::{Caching, Context, DynStage, Entry, Example, Faults, Registry, Spec, Stage};

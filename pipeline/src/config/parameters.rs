@@ -55,7 +55,7 @@ pub(crate) fn instantiate(
     let Some(stage) = stage else { return Err(problems) };
     // with a parameter left out or out of its range, what relates others to it says nothing
     if problems.is_empty() {
-        problems.extend(stage.check().err().map(|error| unchecked(decl, &error)));
+        problems.extend(stage.faults().iter().map(|error| unchecked(decl, error)));
     }
     if !problems.is_empty() {
         return Err(problems);

@@ -150,8 +150,8 @@ impl DynStage for Unknown {
         Ok(self.params.clone())
     }
 
-    fn check(&self) -> Result<(), StageError> {
-        Ok(())
+    fn faults(&self) -> Vec<StageError> {
+        Vec::new()
     }
 
     /// Which of its parameters name files is not known: no key can be made.

@@ -31,8 +31,8 @@ impl DynStage for PluginStage {
     }
 
     /// The schema was checked when the parameters were read.
-    fn check(&self) -> Result<(), StageError> {
-        Ok(())
+    fn faults(&self) -> Vec<StageError> {
+        Vec::new()
     }
 
     /// Parameters of the format `path` name files, an empty one none: their bytes are part of the cache key.

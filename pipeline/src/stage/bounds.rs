@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value};
 
-use super::{Entry, Stage};
+use super::{DynStage, Entry, Stage};
 use crate::error::StageError;
 
 /// The JSON Schema of a stage's parameters, asked for the ranges that it states.
@@ -60,11 +60,8 @@ impl Bounds {
             let property = &schema["properties"][name.as_str()];
             let before = found.len();
             self.value(property, value, path, found);
-            let doc = property["description"].as_str().unwrap_or_default();
-            found[before..]
-                .iter_mut()
-                .filter(|wrong| wrong.doc.is_empty())
-                .for_each(|wrong| wrong.doc = doc.to_owned());
+            let fresh = found[before..].iter_mut().filter(|wrong| wrong.doc.is_empty());
+            fresh.for_each(|wrong| wrong.doc = help(property));
             path.pop();
         }
     }
@@ -87,7 +84,32 @@ impl Bounds {
     }
 }
 
+/// What a parameter is, in one line, with its default.
+fn help(property: &Value) -> String {
+    let doc = property["description"].as_str().unwrap_or_default().replace('\n', " ");
+    match &property["default"] {
+        Value::Null => doc,
+        default => format!("{doc} Default: {}.", shown(default)),
+    }
+}
+
+/// A default as it would be written.
+fn shown(default: &Value) -> String {
+    match default {
+        Value::Number(found) => found.as_f64().map_or_else(|| found.to_string(), number),
+        other => other.to_string(),
+    }
+}
+
+/// Of alternatives the one for numbers.
+fn of_numbers(schema: &Value) -> &Value {
+    let alternatives = schema["anyOf"].as_array().map(Vec::as_slice).unwrap_or_default();
+    let numeric = |one: &&Value| one["type"] == "integer" || one["type"] == "number";
+    alternatives.iter().find(numeric).unwrap_or(schema)
+}
+
 fn number_in(schema: &Value, number: f64, shown: String, path: &[String], found: &mut Vec<OutOfRange>) {
+    let schema = of_numbers(schema);
     let bound = |key: &str| schema[key].as_f64();
     let limits = [bound("minimum"), bound("exclusiveMinimum"), bound("maximum"), bound("exclusiveMaximum")];
     let [least, above, most, below] = limits;
@@ -126,6 +148,7 @@ pub(crate) fn resolve<'a>(schema: &'a Value, definitions: &'a Map<String, Value>
 
 /// The range that a schema states, in words: `1 to 40`, `above 0, at most 1`; empty if it states none.
 pub(crate) fn range(schema: &Value) -> String {
+    let schema = of_numbers(schema);
     // zero as the bound of an unsigned type says nothing of the parameter
     let unsigned = schema["format"].as_str().is_some_and(|format| format.starts_with("uint"));
     let stated = |key: &str, bound: &f64| !(unsigned && key == "minimum" && *bound == 0.0);
@@ -157,6 +180,6 @@ pub fn check<S: Stage>(stage: &S) -> Result<(), StageError> {
         .map_err(|error| StageError::new(format!("parameters cannot be written as TOML: {error}")))?;
     match Bounds::of(&Entry::of::<S>()).check(&params).into_iter().next() {
         Some(wrong) => Err(StageError::new(format!("`{}` {}", wrong.path.join("."), wrong.message)).help(wrong.doc)),
-        None => stage.check(),
+        None => DynStage::faults(stage).into_iter().next().map_or(Ok(()), Err),
     }
 }

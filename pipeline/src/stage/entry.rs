@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use schemars::{Schema, SchemaGenerator};
 use serde_json::Value;
 
-use super::{Context, Example, Spec, Stage};
+use super::{Context, Example, Faults, Spec, Stage};
 use crate::error::StageError;
 use crate::outcome::Ports;
 use crate::recording::InputFiles;
@@ -17,8 +17,8 @@ pub trait DynStage: Send + Sync {
     fn spec(&self) -> &'static Spec;
     /// All parameters, defaults filled in.
     fn params(&self) -> Result<Value, StageError>;
-    /// See [`Stage::check`].
-    fn check(&self) -> Result<(), StageError>;
+    /// What [`Stage::check`] finds.
+    fn faults(&self) -> Vec<StageError>;
     /// See [`Stage::sources`].
     fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError>;
     /// See [`Stage::depends_on`].
@@ -39,8 +39,10 @@ impl<S: Stage> DynStage for S {
             .map_err(|error| StageError::new(format!("parameters cannot be written as JSON: {error}")))
     }
 
-    fn check(&self) -> Result<(), StageError> {
-        Stage::check(self)
+    fn faults(&self) -> Vec<StageError> {
+        let mut faults = Faults::default();
+        Stage::check(self, &mut faults);
+        faults.into_errors()
     }
 
     fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {

@@ -30,8 +30,10 @@ pub(crate) fn instance(entry: &Entry, example: &Example) -> Result<Box<dyn DynSt
     if let Some(wrong) = Bounds::of(entry).check(&params).first() {
         return Err(format!("params: `{}` {}", wrong.path.join("."), wrong.message));
     }
-    stage.check().map_err(|error| format!("params: {error}"))?;
-    Ok(stage)
+    match stage.faults().first() {
+        Some(error) => Err(format!("params: {error}")),
+        None => Ok(stage),
+    }
 }
 
 /// Runs a stage in a folder that is removed again. Errors: those of the stage.

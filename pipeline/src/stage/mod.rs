@@ -4,6 +4,7 @@ mod bounds;
 mod context;
 mod entry;
 mod example;
+mod faults;
 mod registry;
 mod spec;
 
@@ -13,5 +14,6 @@ pub use context::{Context, NoProgress, Progress};
 pub use entry::{DynStage, Entry, Maker, ParamError};
 pub use example::run_example;
 pub(crate) use example::{example_inputs, instance, run_in_folder};
+pub use faults::Faults;
 pub use registry::{DoubleName, Registry};
 pub use spec::{Caching, Example, Spec, Stage};

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::Context;
+use super::{Context, Faults};
 use crate::error::StageError;
 use crate::outcome::{PortSpec, Ports};
 use crate::recording::InputFiles;
@@ -54,9 +54,9 @@ pub trait Stage: Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'stat
 
     /// Checks what relates parameters to one another, before any data is opened. The range of a single parameter is
     /// stated on its field (`#[schemars(range(min = 1, max = 40))]`) and checked before, of all parameters at once.
-    /// Errors: what was found, what was wanted; the runner adds the place.
-    fn check(&self) -> Result<(), StageError> {
-        Ok(())
+    /// Each fault says what was found and what was wanted; the runner adds the place.
+    fn check(&self, faults: &mut Faults) {
+        let _ = faults;
     }
 
     /// The files that the stage reads, in order; relative paths are taken from `base`; `files` knows what

@@ -150,7 +150,7 @@ fn a_parameter_without_default_is_asked_for() {
 fn a_check_that_names_a_parameter_points_at_it() {
     assert_eq!(
         wrong(&stage("params = { samples = 0 }"), &[]),
-        ["0 | stage `a`: `samples` is 0, wanted 1 to 1000000 | How many samples. Default: 16, two periods."]
+        ["0 | stage `a`: `samples` is 0, wanted 1 to 1000000 | How many samples. Why: two periods. Default: 16."]
     );
     assert_eq!(
         wrong(&stage("params = { amplitude_v = 0 }"), &[]),
@@ -237,7 +237,7 @@ fn wrong_arguments_are_marked_in_the_argument() {
 fn an_argument_that_fails_a_check_is_named() {
     assert_eq!(
         wrong(&stage(""), &["a.samples=0"]),
-        ["0 | stage `a`: `samples` is 0, wanted 1 to 1000000 | How many samples. Default: 16, two periods."]
+        ["0 | stage `a`: `samples` is 0, wanted 1 to 1000000 | How many samples. Why: two periods. Default: 16."]
     );
     assert_eq!(
         wrong(&stage("params = { samples = 2 }"), &["a.amplitude_v=0"]),

@@ -31,7 +31,7 @@ fn parameters_are_read_from_the_schema() {
         let row = rows.iter().find(|row| row.name == name).expect(name);
         format!("{} | {} | {} | {}", row.kind, row.default.as_deref().unwrap_or("required"), row.range, row.doc)
     };
-    assert_eq!(row("samples"), "whole number | 16 | 1 to 1000000 | How many samples. Default: 16, two periods.");
+    assert_eq!(row("samples"), "whole number | 16 | 1 to 1000000 | How many samples. Why: two periods.");
     assert_eq!(row("amplitude_v"), "number | 1.0 |  | Amplitude in V.");
     assert_eq!(
         row("start"),

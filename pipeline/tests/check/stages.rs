@@ -1,7 +1,7 @@
 //! Small stages for tests of configs and graphs.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Entry, Example, Port, Ports, Registry, Spec, Stage, StageError, Table,
+    Array, Axis, Caching, Context, Entry, Example, Faults, Port, Ports, Registry, Spec, Stage, StageError, Table,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ const WEIGHTS: Port<Table> = Port::optional("weights", "marks", "weights, if the
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sine {
-    /// How many samples. Default: 16, two periods.
+    /// How many samples. Why: two periods.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub samples: usize,
     /// Amplitude in V.
@@ -85,11 +85,9 @@ impl Stage for Sine {
         source: "any textbook",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        if self.amplitude_v == 0.0 && self.noise.std_v == 0.0 {
-            return Err(StageError::new("a sine without amplitude or noise is no signal"));
-        }
-        Ok(())
+    fn check(&self, faults: &mut Faults) {
+        let some = self.amplitude_v != 0.0 || self.noise.std_v != 0.0;
+        faults.require(some, || "a sine without amplitude or noise is no signal".to_owned());
     }
 
     fn run(&self, _inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {

@@ -44,7 +44,7 @@ fn every_value_is_checked_at_its_place() {
         faults("\"a.samples\" = [1, 2, \"x\", 0]\n\"b.start\" = [\"at-peak\", \"at-peek\"]\n"),
         [
             "\"x\" | parameter `samples` of stage `a`: found the string \"x\", wanted a whole number, 0 or more | `afmid stages test.sine` lists the parameters",
-            "0 | stage `a`: `samples` is 0, wanted 1 to 1000000 | How many samples. Default: 16, two periods.",
+            "0 | stage `a`: `samples` is 0, wanted 1 to 1000000 | How many samples. Why: two periods. Default: 16.",
             "\"at-peek\" | parameter `start` of stage `b`: found \"at-peek\", wanted \"at-zero\" or \"at-peak\" | did you mean \"at-peak\"?",
         ]
     );

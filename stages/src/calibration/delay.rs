@@ -5,7 +5,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::reading::within;
 use afmid_kernels::calibration::{OnsetRule, onset_delay};
 
 /// What the averaged snap-off says about the delay, and what it cannot say.
@@ -28,16 +27,17 @@ use afmid_kernels::calibration::{OnsetRule, onset_delay};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Delay {
-    /// Departure from the line before the event in standard errors. Default: 5.
+    /// Departure from the line before the event in standard errors.
     #[schemars(range(min = 2.0, max = 1000.0))]
     pub threshold: f64,
-    /// Samples in a row that must depart. Default: 3.
+    /// Samples in a row that must depart.
     #[schemars(range(min = 1, max = 1000))]
     pub sustained_samples: usize,
-    /// The ringing is fitted from this long after the departure, in s. Default: 2e-5.
+    /// The ringing is fitted from this long after the departure, in s.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub skip_s: f64,
-    /// Real detector poles in Hz, above 0, as far as they are known. Default: none.
+    /// Real detector poles in Hz, as far as they are known. Default: none.
+    #[schemars(inner(range(min = 1.0, max = 1e15)))]
     pub detector_poles_hz: Vec<f64>,
 }
 
@@ -61,13 +61,6 @@ impl Stage for Delay {
         seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        within("threshold", self.threshold, 2.0, 1000.0)?;
-        within("sustained_samples", self.sustained_samples as f64, 1.0, 1000.0)?;
-        within("skip_s", self.skip_s, 0.0, 1.0)?;
-        self.detector_poles_hz.iter().try_for_each(|&pole| within("detector_poles_hz", pole, 1.0, 1e15))
-    }
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
         let average = inputs.get(&AVERAGE)?;

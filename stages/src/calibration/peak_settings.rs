@@ -1,10 +1,9 @@
 //! Parameters that state where the thermal peak of mode 1 lies.
 
-use afmid_pipeline::StageError;
+use afmid_pipeline::Faults;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::reading::within;
 use afmid_kernels::calibration::AveragedPeriodogram;
 use afmid_kernels::spectra::{AveragedDensity, PeakSearch, SeenThrough, SpectrumError, ThermalFit, thermal_peak};
 
@@ -12,16 +11,17 @@ use afmid_kernels::spectra::{AveragedDensity, PeakSearch, SeenThrough, SpectrumE
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PeakSettings {
-    /// Samples per segment of the spectra, even. Default: 16384: bins of 305 Hz at 5 MS/s, a quarter of the paper's
-    /// peak.
+    /// Samples per segment of the spectra, even. Why: bins of 305 Hz at 5 MS/s, a quarter of the paper's peak.
     #[schemars(range(min = 256, max = 4_194_304))]
     pub segment_samples: usize,
-    /// The peak lies above this, in Hz. Default: 10e3.
+    /// The peak lies above this, in Hz.
+    #[schemars(range(min = 0.0))]
     pub lowest_hz: f64,
-    /// The peak lies below this, in Hz, above `lowest_hz`. Default: 150e3: below the paper's mode 2.
+    /// The peak lies below this, in Hz, above `lowest_hz`. Why: below the paper's mode 2.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub highest_hz: f64,
-    /// The fit reaches from `f1 / band` to `f1 band`. Default: 2.5: enough of both flanks for white and 1/f noise, mode
-    /// 2 far off.
+    /// The fit reaches from `f1 / band` to `f1 band`. Why: enough of both flanks for white and 1/f noise, mode 2 far
+    /// off.
     #[schemars(range(min = 1.1, max = 10.0))]
     pub band: f64,
 }
@@ -33,17 +33,12 @@ impl Default for PeakSettings {
 }
 
 impl PeakSettings {
-    pub(super) fn check(&self) -> Result<(), StageError> {
-        within("peak.segment_samples", self.segment_samples as f64, 256.0, 4_194_304.0)?;
-        if self.segment_samples % 2 == 1 {
-            return Err(StageError::new(format!(
-                "`peak.segment_samples` is {}, wanted an even number",
-                self.segment_samples
-            )));
-        }
-        within("peak.lowest_hz", self.lowest_hz, 0.0, 1e12)?;
-        within("peak.highest_hz", self.highest_hz, self.lowest_hz, 1e12)?;
-        within("peak.band", self.band, 1.1, 10.0)
+    pub(super) fn check(&self, faults: &mut Faults) {
+        let (samples, lowest, highest) = (self.segment_samples, self.lowest_hz, self.highest_hz);
+        faults.require(samples % 2 == 0, || format!("`peak.segment_samples` is {samples}, wanted an even number"));
+        faults.require(highest > lowest, || {
+            format!("`peak.highest_hz` is {highest}, wanted above `peak.lowest_hz`, {lowest}")
+        });
     }
 
     /// The peak in an averaged spectrum. Errors: none, or no fit.

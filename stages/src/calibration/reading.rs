@@ -66,11 +66,3 @@ pub(crate) fn common_rate(records: &[Record]) -> Result<f64, StageError> {
         None => Ok(first.sample_rate_hz),
     }
 }
-
-/// `Err` unless `least <= value <= most`.
-pub(crate) fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), StageError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")))
-}

@@ -1,14 +1,14 @@
 //! The stage `calibration.sensitivity`.
 
 use afmid_pipeline::{
-    Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
+    Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::free_rule::FreeSettings;
-use super::reading::{common_rate, read_blocks, read_free, within};
+use super::reading::{common_rate, read_blocks, read_free};
 use afmid_kernels::calibration::{
     ContactSlope, Estimate, Sensitivity, SlopeGauge, SlopeStretch, contact_slope, contact_stretches, sensitivity,
 };
@@ -37,16 +37,18 @@ use afmid_kernels::calibration::{
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Sensitivity")]
 pub struct SlopeSensitivity {
-    /// Travel of the piezo per monitored volt in m/V. Default: 25e-9.
+    /// Travel of the piezo per monitored volt in m/V.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub piezo_m_per_v: f64,
-    /// Its standard uncertainty in m/V, not negative. Default: 0: unknown, left out.
+    /// Its standard uncertainty in m/V, not negative. 0: not known, left out.
+    #[schemars(range(min = 0.0))]
     pub piezo_m_per_v_std: f64,
-    /// Stiffness of the contact in N/m; absent: rigid as far as is known. Default: absent.
+    /// Stiffness of the contact in N/m; absent: rigid as far as is known.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub contact_stiffness_n_per_m: Option<f64>,
-    /// Stiffness of the lever in N/m, above 0, for the correction; absent: no correction here (`calibration.stiffness` corrects both
-    /// together). Default: absent.
+    /// Stiffness of the lever in N/m, for the correction; absent: no correction here (`calibration.stiffness` corrects
+    /// both together). Default: absent.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: Option<f64>,
     /// What counts as a free stretch.
     pub free: FreeSettings,
@@ -108,12 +110,10 @@ impl Stage for SlopeSensitivity {
         source: "H.-J. Butt, B. Cappella and M. Kappl, Surf. Sci. Rep. 59 (2005) 1",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        within("piezo_m_per_v", self.piezo_m_per_v, 1e-12, 1e-3)?;
-        within("piezo_m_per_v_std", self.piezo_m_per_v_std, 0.0, self.piezo_m_per_v)?;
-        within("contact_stiffness_n_per_m", self.contact_stiffness_n_per_m.unwrap_or(1.0), 1e-6, 1e9)?;
-        within("stiffness_n_per_m", self.stiffness_n_per_m.unwrap_or(1.0), 1e-6, 1e6)?;
-        self.free.check()
+    fn check(&self, faults: &mut Faults) {
+        let (value, std) = (self.piezo_m_per_v, self.piezo_m_per_v_std);
+        faults
+            .require(std <= value, || format!("`piezo_m_per_v_std` is {std}, wanted at most `piezo_m_per_v`, {value}"));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -17,7 +17,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "", "");
 fn run_example(entry: &Entry) {
     for example in entry.examples() {
         let stage = entry.parse(afmid_pipeline::toml::from_str(example.params).unwrap()).unwrap();
-        stage.check().unwrap();
+        assert!(stage.faults().is_empty(), "{:?}", stage.faults());
         let cx = Context::new(Path::new("."), 1, &NoProgress);
         let outputs = stage.run(&(example.inputs)().unwrap(), &cx).unwrap();
         println!("{}: {}", entry.spec.name, (example.expect)(&outputs).unwrap());

@@ -1,7 +1,7 @@
 //! The stage `calibration.stiffness`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Port, Ports, Recording, Spec, Stage, StageError,
+    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
-use super::reading::{common_rate, push_free, read_blocks, read_free, within};
+use super::reading::{common_rate, push_free, read_blocks, read_free};
 use super::sensitivity::SensitivitySummary;
 use afmid_kernels::calibration::{Estimate, SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, Welch, spring_constant};
 use afmid_kernels::spectra::{Fitted, ThermalFit};
@@ -37,25 +37,31 @@ use afmid_kernels::spectra::{Fitted, ThermalFit};
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Stiffness")]
 pub struct ThermalStiffness {
-    /// Optical lever sensitivity in V/m, above 0, where `sensitivity` is not wired. Default: absent.
+    /// Optical lever sensitivity in V/m, where `sensitivity` is not wired. Default: absent.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: Option<f64>,
-    /// Its standard error in V/m, not negative. Default: 0.
+    /// Its standard error in V/m, not negative.
+    #[schemars(range(min = 0.0))]
     pub sensitivity_std_v_per_m: f64,
-    /// Contact stiffness in N/m under the contact slope, above 0, where the sensitivity is not corrected yet; absent: as `sensitivity`
-    /// says, or rigid. Default: absent.
+    /// Contact stiffness in N/m under the contact slope, where the sensitivity is not corrected yet; absent: as
+    /// `sensitivity` says, or rigid. Default: absent.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub contact_stiffness_n_per_m: Option<f64>,
-    /// Temperature in K. Default: 295.
+    /// Temperature in K.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub temperature_k: f64,
-    /// Its standard uncertainty in K, not negative. Default: 2.
+    /// Its standard uncertainty in K, not negative.
+    #[schemars(range(min = 0.0))]
     pub temperature_std_k: f64,
-    /// `c_slope_1^2 / c_tip_1`. Default: 0.8175, a uniform beam seen by its end slope. From an identified static share
-    /// of mode 1 of the detector signal: its square / 0.971.
+    /// `c_slope_1^2 / c_tip_1`. Why: a uniform beam seen by its end slope. From an identified static share of mode 1 of
+    /// the detector signal: its square / 0.971.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub mode_shape_factor: f64,
-    /// Its standard uncertainty, not negative. Default: 0.01.
+    /// Its standard uncertainty, not negative.
+    #[schemars(range(min = 0.0))]
     pub mode_shape_factor_std: f64,
-    /// Real detector poles in Hz, above 0: they attenuate the peak (by 0.2 % for the paper's). Default: none.
+    /// Real detector poles in Hz: they attenuate the peak (by 0.2 % for the paper's). Default: none.
+    #[schemars(inner(range(min = 1.0, max = 1e15)))]
     pub detector_poles_hz: Vec<f64>,
     /// Where the peak is sought.
     pub peak: PeakSettings,
@@ -146,19 +152,15 @@ impl Stage for ThermalStiffness {
         source: "H.-J. Butt and M. Jaschke, Nanotechnology 6 (1995) 1; P. Whittle, Ark. Mat. 2 (1953) 423",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        within("sensitivity_v_per_m", self.sensitivity_v_per_m.unwrap_or(1.0), 1e-12, 1e15)?;
-        within("sensitivity_std_v_per_m", self.sensitivity_std_v_per_m, 0.0, 1e15)?;
-        within("contact_stiffness_n_per_m", self.contact_stiffness_n_per_m.unwrap_or(1.0), 1e-6, 1e9)?;
-        within("temperature_k", self.temperature_k, 1e-3, 1e5)?;
-        within("temperature_std_k", self.temperature_std_k, 0.0, self.temperature_k)?;
-        within("mode_shape_factor", self.mode_shape_factor, 1e-6, 1e3)?;
-        within("mode_shape_factor_std", self.mode_shape_factor_std, 0.0, self.mode_shape_factor)?;
-        for &pole in &self.detector_poles_hz {
-            within("detector_poles_hz", pole, 1.0, 1e15)?;
+    fn check(&self, faults: &mut Faults) {
+        let shares = [
+            ("temperature_std_k", self.temperature_std_k, "temperature_k", self.temperature_k),
+            ("mode_shape_factor_std", self.mode_shape_factor_std, "mode_shape_factor", self.mode_shape_factor),
+        ];
+        for (name, std, of, value) in shares {
+            faults.require(std <= value, || format!("`{name}` is {std}, wanted at most `{of}`, {value}"));
         }
-        self.peak.check()?;
-        self.free.check()
+        self.peak.check(faults);
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -1,7 +1,7 @@
 //! The stage `diagnosis.release`.
 
 use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
+    Array, Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -48,23 +48,30 @@ use afmid_kernels::events::EventKind;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReleaseDiagnose {
-    /// Flexural modes of the lever, 1 to 12, or `auto`: as many resonances as ring with falling shares. Default: `auto`.
+    /// Flexural modes of the lever, 1 to 12, or `auto`: as many resonances as ring with falling shares.
     pub modes: ModeNumber,
-    /// Samples of an event that are compared, 512 to 1000000. Default: 8000, 1.6 ms at 5 MS/s: six decay times of the paper's mode 1.
+    /// Samples of an event that are compared. Why: 1.6 ms at 5 MS/s: six decay times of the paper's mode 1.
+    #[schemars(range(min = 512, max = 1_000_000))]
     pub window_samples: usize,
-    /// Samples of it before the release, 8 to 4096. Default: 16.
+    /// Samples of it before the release.
+    #[schemars(range(min = 8, max = 4096))]
     pub before_samples: usize,
     /// Nominal poles of the detector in Hz, 1 to 8 of them. Default: 1.3, 1.9 and 2.4 MHz. They are estimated along.
+    #[schemars(inner(range(min = 1e-6)))]
     pub detector_poles_hz: Vec<f64>,
-    /// Relative standard deviation of what is known of them, 0.001 to 2. Default: 0.15.
+    /// Relative standard deviation of what is known of them.
+    #[schemars(range(min = 0.001, max = 2.0))]
     pub detector_pole_std: f64,
-    /// Probability of any other verdict than `clean` where nothing is wrong, 1e-6 to 0.5. Default: 0.01.
+    /// Probability of any other verdict than `clean` where nothing is wrong.
+    #[schemars(range(min = 1e-6, max = 0.5))]
     pub false_alarm_rate: f64,
-    /// Causes that are not considered, by id. Default: none.
+    /// Causes that are not considered, by id.
     pub without: Vec<String>,
-    /// Most causes named from the events' shapes, 1 to 8. Default: 4.
+    /// Most causes named from the events' shapes.
+    #[schemars(range(min = 1, max = 8))]
     pub most_causes: usize,
-    /// Metres per unit of the piezo channel, above 0. Default: 1e-8.
+    /// Metres per unit of the piezo channel.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub piezo_m_per_unit: f64,
 }
 
@@ -117,32 +124,15 @@ impl Stage for ReleaseDiagnose {
         source: "C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        let modes = self.mode_number();
-        for (name, value, least, most) in [
-            ("modes", modes.unwrap_or(1) as f64, 1.0, 12.0),
-            ("window_samples", self.window_samples as f64, 512.0, 1e6),
-            ("before_samples", self.before_samples as f64, 8.0, 4096.0),
-            ("detector_pole_std", self.detector_pole_std, 1e-3, 2.0),
-            ("false_alarm_rate", self.false_alarm_rate, 1e-6, 0.5),
-            ("most_causes", self.most_causes as f64, 1.0, 8.0),
-            ("piezo_m_per_unit", self.piezo_m_per_unit, f64::MIN_POSITIVE, 1.0),
-            ("number of detector_poles_hz", self.detector_poles_hz.len() as f64, 1.0, 8.0),
-        ] {
-            if !(least..=most).contains(&value) {
-                return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
-            }
+    fn check(&self, faults: &mut Faults) {
+        let (modes, poles) = (self.mode_number().unwrap_or(1), self.detector_poles_hz.len());
+        faults.require((1..=12).contains(&modes), || format!("`modes` is {modes}, wanted 1 to 12"));
+        faults.require((1..=8).contains(&poles), || format!("`detector_poles_hz` has {poles}, wanted 1 to 8"));
+        faults.take(check_cut(self.window_samples, self.before_samples));
+        for id in self.without.iter().filter(|id| find(id).is_none()) {
+            let unknown = StageError::new(format!("`without` names `{id}`, which is no cause"));
+            faults.add(unknown.help("`afmid causes` lists them"));
         }
-        if let Some(pole) = self.detector_poles_hz.iter().find(|pole| !(**pole > 0.0 && pole.is_finite())) {
-            return Err(StageError::new(format!("`detector_poles_hz` holds {pole}, wanted frequencies above 0")));
-        }
-        check_cut(self.window_samples, self.before_samples)?;
-        if let Some(id) = self.without.iter().find(|id| find(id).is_none()) {
-            return Err(
-                StageError::new(format!("`without` names `{id}`, which is no cause")).help("`afmid causes` lists them")
-            );
-        }
-        Ok(())
     }
 
     fn depends_on(&self) -> Vec<String> {

@@ -1,7 +1,7 @@
 //! The stage `diagnosis.replay`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Port, Ports, Recording, Spec, Stage, StageError, Table,
+    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -34,11 +34,14 @@ use afmid_kernels::effects::Instant;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReleaseReplay {
-    /// Samples of an event that are compared, 512 to 1000000. Default: 8000, as in `diagnosis.release`.
+    /// Samples of an event that are compared. Why: as in `diagnosis.release`.
+    #[schemars(range(min = 512, max = 1_000_000))]
     pub window_samples: usize,
-    /// Samples of it before the release, 8 to 4096. Default: 16, as in `diagnosis.release`.
+    /// Samples of it before the release. Why: as in `diagnosis.release`.
+    #[schemars(range(min = 8, max = 4096))]
     pub before_samples: usize,
-    /// Metres per unit of the piezo channel, above 0. Default: 1e-8, as in `diagnosis.release`.
+    /// Metres per unit of the piezo channel. Why: as in `diagnosis.release`.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub piezo_m_per_unit: f64,
 }
 
@@ -68,17 +71,8 @@ impl Stage for ReleaseReplay {
         source: "C. F. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        for (name, value, least, most) in [
-            ("window_samples", self.window_samples as f64, 512.0, 1e6),
-            ("before_samples", self.before_samples as f64, 8.0, 4096.0),
-            ("piezo_m_per_unit", self.piezo_m_per_unit, f64::MIN_POSITIVE, 1.0),
-        ] {
-            if !(least..=most).contains(&value) {
-                return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
-            }
-        }
-        check_cut(self.window_samples, self.before_samples)
+    fn check(&self, faults: &mut Faults) {
+        faults.take(check_cut(self.window_samples, self.before_samples));
     }
 
     fn depends_on(&self) -> Vec<String> {

@@ -1,6 +1,8 @@
 //! The stage `diagnosis.system`.
 
-use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
+use afmid_pipeline::{
+    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -30,17 +32,22 @@ use super::system_story::{error_array, error_table};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SystemDiagnose {
-    /// Parts of the record to judge on, by name. Default: none; then gains are those on folds of the identification stretch.
+    /// Parts of the record to judge on, by name. None: then gains are those on folds of the identification stretch.
     pub parts: Vec<JudgedPart>,
-    /// Rate of false alarms over all candidates together, 1e-6 to 0.2. Default: 0.01.
+    /// Rate of false alarms over all candidates together.
+    #[schemars(range(min = 1e-6, max = 0.2))]
     pub false_alarm_rate: f64,
-    /// Least share by which a cause has to lower the free-run error, 0 to 0.9. Default: 0.0005, below what a significant cause gains in some thousand
-    /// samples of white noise; on measured data, where everything is significant, some per cent keep micro-terms from piling up.
+    /// Least share by which a cause has to lower the free-run error. Why: below what a significant cause gains in some
+    /// thousand samples of white noise; on measured data, where everything is significant, some per cent keep
+    /// micro-terms from piling up.
+    #[schemars(range(min = 0.0, max = 0.9))]
     pub least_gain: f64,
-    /// Remaining systematic misfit over the rest of the residual, as root mean squares, up to which causes are named, 0 to 100. Default: 0.25: six per
-    /// cent of the squared residual; more on measured data whose noise is far below any model.
+    /// Remaining systematic misfit over the rest of the residual, as root mean squares, up to which causes are named.
+    /// Why: six per cent of the squared residual; more on measured data whose noise is far below any model.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub tolerated_misfit: f64,
-    /// Most causes, 1 to 20. Default: 8.
+    /// Most causes.
+    #[schemars(range(min = 1, max = 20))]
     pub most_causes: usize,
     /// Ids of the causes that are tried. Default: all for input and output.
     pub candidates: Vec<String>,
@@ -98,26 +105,13 @@ impl Stage for SystemDiagnose {
         source: "J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        for (name, value, least, most) in [
-            ("false_alarm_rate", self.false_alarm_rate, 1e-6, 0.2),
-            ("least_gain", self.least_gain, 0.0, 0.9),
-            ("tolerated_misfit", self.tolerated_misfit, 0.0, 100.0),
-        ] {
-            if !(least..=most).contains(&value) {
-                return Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")));
-            }
-        }
-        if !(1..=20).contains(&self.most_causes) {
-            return Err(StageError::new(format!("`most_causes` is {}, wanted 1 to 20", self.most_causes)));
-        }
-        if let Some(part) = self.parts.iter().find(|part| part.first >= part.end) {
-            return Err(StageError::new(format!(
+    fn check(&self, faults: &mut Faults) {
+        for part in self.parts.iter().filter(|part| part.first >= part.end) {
+            faults.add(StageError::new(format!(
                 "part `{}` is samples {} to {}, wanted the first sample and one past the last",
                 part.name, part.first, part.end
             )));
         }
-        Ok(())
     }
 
     fn depends_on(&self) -> Vec<String> {

@@ -25,7 +25,8 @@ use super::{Moments, Scatter, Split, moments, scatter, split_halves};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Average {
-    /// Whether to average two random halves beside the whole. Default: true; models are judged on the half that they have not seen.
+    /// Whether to average two random halves beside the whole. Why: models are judged on the half that they have not
+    /// seen.
     pub split: bool,
 }
 

@@ -22,13 +22,13 @@ use super::{DriftSettings, EnsembleError, ShapeDrift, SubEnsemble, shape_drift};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Drift {
-    /// Sub-ensembles of either kind. Default: 4; some twenty events each in an archive like the paper's.
+    /// Sub-ensembles of either kind. Why: some twenty events each in an archive like the paper's.
     #[schemars(range(min = 2, max = 1000))]
     pub groups: usize,
-    /// Random orders. Default: 999; a p-value of one per cent then has a standard error of a third of itself.
+    /// Random orders. Why: a p-value of one per cent then has a standard error of a third of itself.
     #[schemars(range(min = 99, max = 100_000))]
     pub permutations: usize,
-    /// A smaller p-value is a warning. Default: 0.01.
+    /// A smaller p-value is a warning.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub alarm_p_value: f64,
 }

@@ -61,7 +61,7 @@ pub(crate) fn run_examples(stages: &[afmid_pipeline::Entry]) {
         for example in examples {
             let params = afmid_pipeline::toml::from_str(example.params).unwrap();
             let stage = entry.parse(params).unwrap();
-            stage.check().unwrap();
+            assert!(stage.faults().is_empty(), "{:?}", stage.faults());
             let cx = afmid_pipeline::Context::new(std::path::Path::new("."), 7, &NoProgress);
             let outputs = stage.run(&(example.inputs)().unwrap(), &cx).unwrap();
             for (name, artifact) in outputs.iter() {

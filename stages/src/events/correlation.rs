@@ -1,7 +1,8 @@
 //! The stage `events.correlation`.
 
 use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table, Values,
+    Array, Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
+    Values,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -37,45 +38,47 @@ use afmid_kernels::events::{Aligned, AveragingSettings, EventKind, Misfit, corre
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Correlation {
-    /// `snap-off` (the contact ruptures) or `snap-in` (also `snap-to-contact`). Default: `snap-off`.
+    /// `snap-off` (the contact ruptures) or `snap-in` (also `snap-to-contact`).
     pub kind: EventKind,
-    /// Length of the aligned windows. Default: 8192, the paper's.
+    /// Length of the aligned windows. Why: the paper's.
     #[schemars(range(min = 256, max = 4_194_304))]
     pub window_samples: usize,
-    /// Share of the window before the onset. Default: 0.125, twice what a Tukey window of alpha 0.1 tapers and more.
+    /// Share of the window before the onset. Why: twice what a Tukey window of alpha 0.1 tapers and more.
     #[schemars(range(min = 0.01, max = 0.9))]
     pub pre_share: f64,
-    /// Samples in a block of the scan. Default: 16; shorter than half a period of the slowest mode.
+    /// Samples in a block of the scan. Why: shorter than half a period of the slowest mode.
     #[schemars(range(min = 1, max = 1024))]
     pub block_samples: usize,
-    /// Samples on either side of a step that the level is taken from, at least 16 blocks. Default: 1024; some periods of the
+    /// Samples on either side of a step that the level is taken from, at least 16 blocks. Why: some periods of the
     /// slowest mode.
+    #[schemars(range(min = 16, max = 4_194_304))]
     pub level_samples: usize,
-    /// How many robust standard deviations a step, and a jump of level, must exceed. Default: 8; at 5, noise alone
-    /// makes a step in thirty records of a million samples.
+    /// How many robust standard deviations a step, and a jump of level, must exceed. Why: at 5, noise alone makes a
+    /// step in thirty records of a million samples.
     #[schemars(range(min = 5.0, max = 1000.0))]
     pub significance: f64,
-    /// Samples after the onset that are compared in the alignment (and a quarter of it before). Default: 256; the
-    /// steepest slopes, and too short for resonances that differ between events to slip in phase.
+    /// Samples after the onset that are compared in the alignment (and a quarter of it before). Why: the steepest
+    /// slopes, and too short for resonances that differ between events to slip in phase.
     #[schemars(range(min = 16, max = 65_536))]
     pub correlation_samples: usize,
-    /// How far the alignment may move an event from its detected onset, 1 to 1024 samples. Default: 32; less than half a period
+    /// How far the alignment may move an event from its detected onset, in samples. Why: less than half a period
     /// of the slowest mode.
+    #[schemars(range(min = 1, max = 1024))]
     pub max_shift_samples: usize,
-    /// Iterations of the averaging at most. Default: 20; four are usual.
+    /// Iterations of the averaging at most. Why: four are usual.
     #[schemars(range(min = 1, max = 1000))]
     pub max_iterations: usize,
-    /// The averaging ends when no event moves by more, in samples. Default: 0.001; below the noise of any shift.
+    /// The averaging ends when no event moves by more, in samples. Why: below the noise of any shift.
     #[schemars(range(min = 1e-9, max = 1.0))]
     pub tolerance_samples: f64,
-    /// Events that correlate less with the average of the others are rejected. Default: 0.8; ordinary ones reach 0.99.
+    /// Events that correlate less with the average of the others are rejected. Why: ordinary ones reach 0.99.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_correlation: f64,
     /// Events are rejected whose residual against the others is this many times the median one (and 6 robust deviations
-    /// above it). Default: 3.
+    /// above it).
     #[schemars(range(min = 1.0, max = 1e9))]
     pub max_residual_ratio: f64,
-    /// Keep events with samples at the end of the converter's range instead of rejecting them. Default: false.
+    /// Keep events with samples at the end of the converter's range instead of rejecting them.
     pub keep_saturated: bool,
 }
 
@@ -120,20 +123,9 @@ impl Stage for Correlation {
         source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing; Woody, Med. Biol. Eng. 5 (1967) 539",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        let whole =
-            |name: &str, value: usize, least: usize, most: usize| within(name, value as f64, least as f64, most as f64);
-        whole("window_samples", self.window_samples, 256, 1 << 22)?;
-        within("pre_share", self.pre_share, 0.01, 0.9)?;
-        whole("block_samples", self.block_samples, 1, 1024)?;
-        whole("level_samples", self.level_samples, 16 * self.block_samples, 1 << 22)?;
-        within("significance", self.significance, 5.0, 1000.0)?;
-        whole("correlation_samples", self.correlation_samples, 16, 1 << 16)?;
-        whole("max_shift_samples", self.max_shift_samples, 1, 1024)?;
-        whole("max_iterations", self.max_iterations, 1, 1000)?;
-        within("tolerance_samples", self.tolerance_samples, 1e-9, 1.0)?;
-        within("min_correlation", self.min_correlation, 0.0, 1.0)?;
-        within("max_residual_ratio", self.max_residual_ratio, 1.0, 1e9)
+    fn check(&self, faults: &mut Faults) {
+        let (level, least) = (self.level_samples, 16 * self.block_samples);
+        faults.require(level >= least, || format!("`level_samples` is {level}, wanted {least} to 4194304"));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -295,13 +287,6 @@ impl Correlation {
 
 fn middle(values: &[f64]) -> f64 {
     afmid_kernels::statistics::median(&mut values.to_vec())
-}
-
-fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), StageError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")))
 }
 
 fn common_rate(records: &[Record]) -> Result<f64, StageError> {

@@ -32,7 +32,7 @@ fn run(stage: &Correlation, records: Vec<Record>) -> Result<Outcome, StageError>
 }
 
 fn run_on(stage: &Correlation, ports: &Ports) -> Result<Outcome, StageError> {
-    stage.check()?;
+    afmid_pipeline::stage::check(stage)?;
     let context = Context::new(Path::new("."), 1, &NoProgress);
     let outputs = stage.run(ports, &context)?;
     let (ensemble, table) = (outputs.get(&ENSEMBLE)?.clone(), outputs.get(&EVENTS)?.clone());
@@ -194,7 +194,7 @@ fn parameters_out_of_range_are_named() {
         (Correlation { max_iterations: 0, ..default() }, "max_iterations"),
         (Correlation { min_correlation: 1.5, ..default() }, "min_correlation"),
     ] {
-        assert!(stage.check().unwrap_err().to_string().contains(named), "{named}");
+        assert!(afmid_pipeline::stage::check(&stage).unwrap_err().to_string().contains(named), "{named}");
     }
     let stage: Correlation = afmid_pipeline::toml::from_str("kind = \"snap-to-contact\"").unwrap();
     assert_eq!(stage.kind, EventKind::SnapIn);

@@ -276,14 +276,13 @@ fn scene(afm: &Afm, rng: &mut ChaCha8Rng) -> Scene {
 mod tests {
     use super::*;
     use crate::causes::CATALOGUE;
-    use afmid_pipeline::Stage;
 
     #[test]
     fn every_draw_is_a_valid_simulation_and_the_same_again() {
         for seed in 0..12 {
             let one = draw(seed, None, CATALOGUE).unwrap();
             assert_eq!(one, draw(seed, None, CATALOGUE).unwrap());
-            one.afm.check().unwrap();
+            afmid_pipeline::stage::check(&one.afm).unwrap();
             assert_eq!(one.planted.len(), one.afm.hidden.len());
             for planted in &one.planted {
                 assert!(planted.times_limit() > 0.0 && planted.times_limit() <= STRONGEST * 1.0001, "{planted:?}");

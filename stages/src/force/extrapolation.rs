@@ -26,23 +26,27 @@ use afmid_kernels::force::{Event, ExtrapolationSettings, Lines, Onset, OnsetSett
 #[serde(deny_unknown_fields, default)]
 pub struct Extrapolation {
     /// Time left out between the line before and the onset, 0 to 1 s. Default: 10 us, ten times what t0 may be off.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub guard_s: f64,
     /// How far t0 may lie from the onset of the ensemble, above 0 to 1 s. Default: 10 us.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub reach_s: f64,
-    /// A departure counts above this many standard deviations of the mean about its line. Default: 4; noise alone
-    /// crosses it once in 16000 samples, and only a few are looked at.
+    /// A departure counts above this many standard deviations of the mean about its line. Why: noise alone crosses it
+    /// once in 16000 samples, and only a few are looked at.
     #[schemars(range(min = 2.0, max = 100.0))]
     pub departure_sigma: f64,
-    /// Share of the load by which the signal must leave the line to be the event. Default: 0.1.
+    /// Share of the load by which the signal must leave the line to be the event.
     #[schemars(range(min = 0.001, max = 0.9))]
     pub sure_share: f64,
-    /// Line without force: `linear` (offset and slope) or `constant`. Default: linear, since crosstalk of the piezo makes a slope.
+    /// Line without force: `linear` (offset and slope) or `constant`. Why: crosstalk of the piezo makes a slope.
     pub zero_line: ZeroLine,
-    /// t0 in seconds after the ensemble's onset, moved to the next sample, instead of the largest causal one. Default: none.
+    /// t0 in seconds after the ensemble's onset, moved to the next sample, instead of the largest causal one.
+    #[schemars(range(min = -1.0, max = 1.0))]
     pub t0_s: Option<f64>,
-    /// Spring constant in N/m, above 0, for a force in newtons; it comes before the calibration's. Default: none.
+    /// Spring constant in N/m, for a force in newtons; it comes before the calibration's. Default: none.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: Option<f64>,
-    /// Optical lever sensitivity in volts per metre of deflection; it comes before the calibration's. Default: none.
+    /// Optical lever sensitivity in volts per metre of deflection; it comes before the calibration's.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: Option<f64>,
 }
@@ -80,16 +84,6 @@ impl Stage for Extrapolation {
         seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing, Fig. 2(d)",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        within("guard_s", self.guard_s, 0.0, 1.0)?;
-        within("reach_s", self.reach_s, f64::MIN_POSITIVE, 1.0)?;
-        within("departure_sigma", self.departure_sigma, 2.0, 100.0)?;
-        within("sure_share", self.sure_share, 0.001, 0.9)?;
-        within("t0_s", self.t0_s.unwrap_or(0.0), -1.0, 1.0)?;
-        within("stiffness_n_per_m", self.stiffness_n_per_m.unwrap_or(1.0), f64::MIN_POSITIVE, f64::MAX)?;
-        within("sensitivity_v_per_m", self.sensitivity_v_per_m.unwrap_or(1.0), f64::MIN_POSITIVE, f64::MAX)
-    }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let average = inputs.get(&AVERAGE)?;
@@ -215,13 +209,6 @@ fn event_kind(average: &Array) -> Result<Event, StageError> {
         Some("snap-in") => Ok(Event::SnapIn),
         other => Err(StageError::new(format!("attribute `kind` is {other:?}, wanted `snap-off` or `snap-in`"))),
     }
-}
-
-fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), StageError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(StageError::new(format!("`{name}` is {value}, wanted {least} to {most}")))
 }
 
 fn add_pair(

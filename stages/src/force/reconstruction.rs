@@ -43,18 +43,21 @@ use afmid_kernels::force::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Reconstruction {
-    /// Numbers of the events, from 0; empty: all. Default: empty.
+    /// Numbers of the events, from 0; empty: all.
     pub events: Vec<usize>,
-    /// How the force may move: `random-walk`, or `integrated-walk` for forces with smooth slopes. Default: random-walk, which commits least.
+    /// How the force may move: `random-walk`, or `integrated-walk` for forces with smooth slopes. Why: it commits
+    /// least.
     pub prior: ForcePrior,
     /// Seconds before and after the event in which the force may jump, 0 to 1e-3 each; both 0 for no jumps. Default: 2e-6 and 4e-6: what t0 may be off, and a rupture
     /// of some microseconds.
+    #[schemars(inner(range(min = 0.0, max = 1e-3)))]
     pub transition_s: [f64; 2],
-    /// Noise of one sample: `estimated` from each event, or `model`: the model's innovation variance times the number of events that it was averaged from. Default: estimated.
+    /// Noise of one sample: `estimated` from each event, or `model`: the model's innovation variance times the number
+    /// of events that it was averaged from.
     pub noise: NoiseSource,
     /// Line without force: slope too? Default: false; a slope that is not there widens the band before a snap-off.
     pub sloped_line: bool,
-    /// Seconds left out between the event and the line without force. Default: 10e-6, as in `force.extrapolation`.
+    /// Seconds left out between the event and the line without force. Why: as in `force.extrapolation`.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub guard_s: f64,
 }
@@ -109,16 +112,6 @@ impl Stage for Reconstruction {
         seeded: false,
         source: "P. Park, T. Kailath, IEEE Trans. Autom. Control 40 (1995) 727; Stark et al. 2005, Conclusion",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        let within = |name: &str, value: f64, most: f64| match (0.0..=most).contains(&value) {
-            true => Ok(()),
-            false => Err(StageError::new(format!("`{name}` is {value}, wanted 0 to {most}"))),
-        };
-        within("transition_s", self.transition_s[0], 1e-3)?;
-        within("transition_s", self.transition_s[1], 1e-3)?;
-        within("guard_s", self.guard_s, 1.0)
-    }
 
     fn depends_on(&self) -> Vec<String> {
         crate::causes::added()

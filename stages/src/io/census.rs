@@ -2,8 +2,8 @@
 
 use afmid_pipeline::recording::Raw;
 use afmid_pipeline::{
-    Artifact, Caching, Channel, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError,
-    Table,
+    Artifact, Caching, Channel, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage,
+    StageError, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -35,8 +35,9 @@ pub struct Census {
     /// Stored codes that stand for no value, besides the fill code that a file declares. Default: -32768 and 32767, the ends of
     /// 16 bits.
     pub sentinels: Vec<f64>,
-    /// Warn where the deflection's noise reaches less than this share of the sample rate, 0 to 0.5: the recorder has filtered
-    /// it. Default: 0.02; a lever below 50 samples per period would still be seen.
+    /// Warn where the deflection's noise reaches less than this share of the sample rate: the recorder has filtered it.
+    /// Why: a lever below 50 samples per period would still be seen.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub min_bandwidth_share: f64,
 }
 
@@ -62,17 +63,9 @@ impl Stage for Census {
         source: "von Neumann, Ann. Math. Stat. 12 (1941) 367",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        if self.sentinels.iter().any(|code| !code.is_finite()) {
-            return Err(StageError::new("`sentinels` holds a value that is not finite; NaN are counted anyway"));
-        }
-        if !(0.0..=0.5).contains(&self.min_bandwidth_share) {
-            return Err(StageError::new(format!(
-                "`min_bandwidth_share` is {}, wanted 0 to 0.5",
-                self.min_bandwidth_share
-            )));
-        }
-        Ok(())
+    fn check(&self, faults: &mut Faults) {
+        let finite = self.sentinels.iter().all(|code| code.is_finite());
+        faults.require(finite, || "`sentinels` holds a value that is not finite; NaN are counted anyway".to_owned());
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -283,8 +276,8 @@ mod tests {
 
     #[test]
     fn parameters_are_checked_alone() {
-        assert!(Census { sentinels: vec![f64::NAN], ..Census::default() }.check().is_err());
-        assert!(Census { min_bandwidth_share: 0.6, ..Census::default() }.check().is_err());
-        assert!(Census::default().check().is_ok());
+        assert!(afmid_pipeline::stage::check(&Census { sentinels: vec![f64::NAN], ..Census::default() }).is_err());
+        assert!(afmid_pipeline::stage::check(&Census { min_bandwidth_share: 0.6, ..Census::default() }).is_err());
+        assert!(afmid_pipeline::stage::check(&Census::default()).is_ok());
     }
 }

@@ -30,9 +30,9 @@ use super::stretch_extremes::StretchExtremes;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Overview {
-    /// Number of the record, from 0. Default: 0, the first.
+    /// Number of the record, from 0. Why: the first.
     pub record: usize,
-    /// Number of stretches. Default: 2000; twice what a page is wide in pixels.
+    /// Number of stretches. Why: twice what a page is wide in pixels.
     #[schemars(range(min = 2, max = 100_000))]
     pub stretches: usize,
 }
@@ -57,13 +57,6 @@ impl Stage for Overview {
         seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Fig. 2(a)",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        if (2..=100_000).contains(&self.stretches) {
-            return Ok(());
-        }
-        Err(StageError::new(format!("`stretches` is {}, wanted 2 to 100000", self.stretches)))
-    }
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
         let records = &inputs.get(&RECORDS)?.records;
@@ -199,6 +192,6 @@ mod tests {
         let mut uneven = record();
         uneven.channels.push(short);
         assert!(run(&Overview::default(), vec![uneven]).unwrap_err().to_string().contains("`piezo` has 3 samples"));
-        assert!(Overview { stretches: 1, ..Overview::default() }.check().is_err());
+        assert!(afmid_pipeline::stage::check(&Overview { stretches: 1, ..Overview::default() }).is_err());
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::{How, Opened, RawBinary, Reading, Wanted, open_records};
 use afmid_pipeline::{
-    Caching, Context, Document, Example, InputFiles, Port, Ports, Record, Recording, Spec, Stage, StageError,
+    Caching, Context, Document, Example, Faults, InputFiles, Port, Ports, Record, Recording, Spec, Stage, StageError,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -43,24 +43,25 @@ pub struct Records {
     /// any recognised format. Patterns that begin with `../../shared/data/`
     /// begin at the variable `AFMID_DATA` where that is set. Required.
     pub files: Vec<String>,
-    /// The deflection signal, as the file names it: a dataset, channel, column or variable. Default: `/deflection`.
+    /// The deflection signal, as the file names it: a dataset, channel, column or variable.
     pub channel: String,
-    /// The piezo monitor, used where a file has it; empty: not looked for. Default: `/piezo`.
+    /// The piezo monitor, used where a file has it; empty: not looked for.
     pub piezo_channel: String,
-    /// Least sample rate, in Hz. Default: 200000: twenty samples in a period of a 10 kHz lever, the softest in use;
-    /// slower archives are force curves, low-pass filtered, without a ringdown.
+    /// Least sample rate, in Hz. Why: twenty samples in a period of a 10 kHz lever, the softest in use; slower archives
+    /// are force curves, low-pass filtered, without a ringdown.
     #[schemars(range(min = 0.0))]
     pub min_sample_rate_hz: f64,
-    /// Leave out files that cannot be opened, with a warning, instead of stopping. Default: false.
+    /// Leave out files that cannot be opened, with a warning, instead of stopping.
     pub skip_unreadable: bool,
-    /// The files' format: `auto` for what their bytes and names say, `native`, `hdf5` (any layout), `tdms`, `npy`, `npz`, `jpk`, `nanoscope`,
-    /// `uff`, `mat`, `ibw`, `text` (LVM, CSV), `raw`. Default: `auto`.
+    /// The files' format: `auto` for what their bytes and names say, `native`, `hdf5` (any layout), `tdms`, `npy`,
+    /// `npz`, `jpk`, `nanoscope`, `uff`, `mat`, `ibw`, `text` (LVM, CSV), `raw`.
     pub format: String,
-    /// Samples per second in Hz, above 0, of files that state none. Default: none; an error where a file states another.
+    /// Samples per second in Hz, of files that state none. Default: none; an error where a file states another.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sample_rate_hz: Option<f64>,
-    /// Unit of the deflection in files that state none. Default: none; an error where a file states another.
+    /// Unit of the deflection in files that state none. Absent: an error where a file states another.
     pub unit: Option<String>,
-    /// What is in files without a header; their channels are `/channel[0]`, `/channel[1]`, ... Default: none.
+    /// What is in files without a header; their channels are `/channel[0]`, `/channel[1]`, ...
     pub raw: Option<RawBinary>,
 }
 
@@ -95,26 +96,16 @@ impl Stage for Records {
         source: "CF conventions 1.11, section 8.1 (packed data)",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        if self.files.is_empty() {
-            return Err(StageError::new("`files` is empty, wanted at least one pattern such as \"archive/*.h5\""));
-        }
-        if self.channel.is_empty() {
-            return Err(StageError::new("`channel` is empty, wanted a channel such as \"/deflection\""));
-        }
-        if !(self.min_sample_rate_hz >= 0.0 && self.min_sample_rate_hz.is_finite()) {
-            return Err(StageError::new(format!(
-                "`min_sample_rate_hz` is {}, wanted 0 or more",
-                self.min_sample_rate_hz
-            )));
-        }
-        if let Some(rate) = self.sample_rate_hz.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-            return Err(StageError::new(format!("`sample_rate_hz` is {rate}, wanted a number above 0")));
-        }
-        if self.unit.as_deref().is_some_and(|unit| unit.trim().is_empty()) {
-            return Err(StageError::new("`unit` is empty, wanted a unit such as \"V\""));
-        }
-        self.how().reading.check()
+    fn check(&self, faults: &mut Faults) {
+        faults.require(!self.files.is_empty(), || {
+            "`files` is empty, wanted at least one pattern such as \"archive/*.h5\"".to_owned()
+        });
+        faults.require(!self.channel.is_empty(), || {
+            "`channel` is empty, wanted a channel such as \"/deflection\"".to_owned()
+        });
+        let blank = self.unit.as_deref().is_some_and(|unit| unit.trim().is_empty());
+        faults.require(!blank, || "`unit` is empty, wanted a unit such as \"V\"".to_owned());
+        faults.take(self.how().reading.check());
     }
 
     fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {

@@ -56,7 +56,7 @@ fn all() -> Records {
 fn the_example_runs_and_reaches_its_truth() {
     for example in Records::examples() {
         let stage: Records = afmid_pipeline::toml::from_str(example.params).unwrap();
-        stage.check().unwrap();
+        afmid_pipeline::stage::check(&stage).unwrap();
         let inputs = (example.inputs)().unwrap();
         let context = Context::new(Path::new("."), 1, &NoProgress);
         println!("{}", (example.expect)(&stage.run(&inputs, &context).unwrap()).unwrap());
@@ -156,7 +156,7 @@ fn parameters_are_checked_alone() {
         (Records { min_sample_rate_hz: f64::NAN, ..all() }, "min_sample_rate_hz"),
         (Records { min_sample_rate_hz: -1.0, ..all() }, "min_sample_rate_hz"),
     ] {
-        assert!(stage.check().unwrap_err().to_string().contains(named));
+        assert!(afmid_pipeline::stage::check(&stage).unwrap_err().to_string().contains(named));
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::{InputFiles, read_number_attribute, read_series};
-use afmid_pipeline::{Array, Axis, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Axis, Caching, Context, Example, Faults, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -32,23 +32,22 @@ use super::shared_data::moved;
 pub struct Spectrum {
     /// The file, relative to the config file. A path that begins with `../../shared/data/` begins at the variable `AFMID_DATA` where that is set. Required.
     pub file: String,
-    /// Dataset of the frequencies, in Hz. Default: `/x`.
+    /// Dataset of the frequencies, in Hz.
     pub frequency: String,
-    /// Dataset of the one-sided density. Default: `/y`.
+    /// Dataset of the one-sided density.
     pub density: String,
-    /// Unit of the signal whose density it is. Default: V.
+    /// Unit of the signal whose density it is.
     pub unit: String,
-    /// Factor from the stored density to `unit`^2/Hz. Default: 1; 0.5 for a density that has been doubled once too
-    /// often.
+    /// Factor from the stored density to `unit`^2/Hz. Why: 0.5 for a density that has been doubled once too often.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub scale: f64,
     /// Independent spectra that were averaged. Default: the attribute `n_avg` of the density's dataset or of the file.
     #[schemars(range(min = 1.0, max = 1e9))]
     pub averages: Option<f64>,
-    /// Frequencies below are left out, in Hz. Default: 0.
+    /// Frequencies below are left out, in Hz.
     #[schemars(range(min = 0.0))]
     pub lowest_hz: f64,
-    /// Frequencies above are left out, in Hz. Default: none.
+    /// Frequencies above are left out, in Hz.
     pub highest_hz: Option<f64>,
 }
 
@@ -86,26 +85,14 @@ impl Stage for Spectrum {
         source: "P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70",
     };
 
-    fn check(&self) -> Result<(), StageError> {
+    fn check(&self, faults: &mut Faults) {
         for (name, value) in [("file", &self.file), ("frequency", &self.frequency), ("density", &self.density)] {
-            if value.is_empty() {
-                return Err(StageError::new(format!("`{name}` is empty")));
-            }
+            faults.require(!value.is_empty(), || format!("`{name}` is empty"));
         }
-        if !(self.scale.is_finite() && self.scale > 0.0) {
-            return Err(StageError::new(format!("`scale` is {}, wanted above 0", self.scale)));
-        }
-        if let Some(averages) = self.averages.filter(|n| !(1.0..=1e9).contains(n)) {
-            return Err(StageError::new(format!("`averages` is {averages}, wanted 1 to 1e9")));
-        }
-        let highest = self.highest_hz.unwrap_or(f64::INFINITY);
-        if !(self.lowest_hz >= 0.0 && self.lowest_hz.is_finite() && highest > self.lowest_hz) {
-            return Err(StageError::new(format!(
-                "frequencies from {} to {highest} Hz, wanted `lowest_hz` from 0 and below `highest_hz`",
-                self.lowest_hz
-            )));
-        }
-        Ok(())
+        let (lowest, highest) = (self.lowest_hz, self.highest_hz.unwrap_or(f64::INFINITY));
+        faults.require(highest > lowest, || {
+            format!("frequencies from {lowest} to {highest} Hz, wanted `lowest_hz` from 0 and below `highest_hz`")
+        });
     }
 
     fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
@@ -220,10 +207,10 @@ mod tests {
     #[test]
     fn parameters_are_checked_alone() {
         let good = Spectrum { file: "a.h5".to_owned(), ..Spectrum::default() };
-        assert!(good.check().is_ok());
-        assert!(Spectrum::default().check().is_err());
-        assert!(Spectrum { scale: 0.0, ..good.clone() }.check().is_err());
-        assert!(Spectrum { averages: Some(0.5), ..good.clone() }.check().is_err());
-        assert!(Spectrum { highest_hz: Some(0.0), ..good }.check().is_err());
+        assert!(afmid_pipeline::stage::check(&good).is_ok());
+        assert!(afmid_pipeline::stage::check(&Spectrum::default()).is_err());
+        assert!(afmid_pipeline::stage::check(&Spectrum { scale: 0.0, ..good.clone() }).is_err());
+        assert!(afmid_pipeline::stage::check(&Spectrum { averages: Some(0.5), ..good.clone() }).is_err());
+        assert!(afmid_pipeline::stage::check(&Spectrum { highest_hz: Some(0.0), ..good }).is_err());
     }
 }

@@ -31,23 +31,25 @@ use afmid_kernels::validation::{BootstrapSettings, Bootstrapped, bootstrap};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BootstrapIntervals {
-    /// Replicates. Default: 200, a fit each: ends of the intervals to a tenth of their length.
+    /// Replicates. Why: a fit each: ends of the intervals to a tenth of their length.
     #[schemars(range(min = 20, max = 100_000))]
     pub replicates: usize,
-    /// Consecutive events drawn together, 1 to half of the events. Default: 1; more where neighbours are alike, as when the lever drifts.
+    /// Consecutive events drawn together, 1 to half of the events. Why: more where neighbours are alike, as when the
+    /// lever drifts.
     #[schemars(range(min = 1))]
     pub block_events: usize,
-    /// Estimate a constant offset of the response. Default: true.
+    /// Estimate a constant offset of the response.
     pub offset: bool,
-    /// Estimate a linear drift of the response. Default: true; averaged records wander.
+    /// Estimate a linear drift of the response. Why: averaged records wander.
     pub drift: bool,
-    /// Points of the frequency response, logarithmic from `response_from_hz` to half the sample rate. Default: 200.
+    /// Points of the frequency response, logarithmic from `response_from_hz` to half the sample rate.
     #[schemars(range(min = 2, max = 10_000))]
     pub response_points: usize,
-    /// Lowest frequency of the response in Hz. Default: 1000.
+    /// Lowest frequency of the response in Hz.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub response_from_hz: f64,
-    /// What the force does between samples: of `held` the half sample's lag is taken out of the delay, lag and droop out of the response. Default: held, as in `model.modes`.
+    /// What the force does between samples: of `held` the half sample's lag is taken out of the delay, lag and droop
+    /// out of the response. Why: as in `model.modes`.
     pub intersample: Intersample,
 }
 

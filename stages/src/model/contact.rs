@@ -5,7 +5,9 @@ mod reading;
 #[cfg(test)]
 mod tests;
 
-use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
+use afmid_pipeline::{
+    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table,
+};
 use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,7 +16,6 @@ use self::output::{contact_table, share_table, summary};
 use self::reading::ringing;
 use super::ringdown::POLES;
 use crate::calibration::StiffnessSummary;
-use crate::calibration::reading::within;
 use afmid_kernels::contact::{
     FreeLever, JointContact, JointOptions, LOADED_BEAM_SHARES, LawChoice, Ringing, coupled_poles, joint_contact,
 };
@@ -38,22 +39,25 @@ use afmid_kernels::ringdown::{Estimate, ModeEstimate};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactFit {
-    /// Static stiffness of the lever at its tip in N/m, above 0, where `stiffness` is not wired. Default: absent.
+    /// Static stiffness of the lever at its tip in N/m, where `stiffness` is not wired. Default: absent.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: Option<f64>,
-    /// Its relative standard error, where `stiffness` is not wired. Default: 0, errors are then those of the ratio to
-    /// k.
+    /// Its relative standard error, where `stiffness` is not wired. Why: errors are then those of the ratio to k.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub stiffness_error: f64,
-    /// What each free mode has of the tip's static compliance, ascending, above 0, their sum at most 1; the rest counts as static. Their sum is kept, each
-    /// is a start. Default: 0.9713, 0.0247, 0.0032, 0.0008, a beam loaded at its end.
+    /// What each free mode has of the tip's static compliance, ascending, their sum at most 1; the rest counts as
+    /// static. Their sum is kept, each is a start. Default: 0.9713, 0.0247, 0.0032, 0.0008, a beam loaded at its end.
+    #[schemars(inner(range(min = 1e-12, max = 1.0)))]
     pub tip_shares: Vec<f64>,
     /// Relative standard error of each share but the first, which makes up for the others; 0 takes them as they are.
-    /// Default: absent, the data alone say them; wanted where there are fewer coupled poles than shares.
+    /// Absent: the data alone say them; wanted where there are fewer coupled poles than shares.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub tip_share_error: Option<f64>,
-    /// The contact's law: `spring-damper`, `second-order`, or `auto`, which takes the second where it lowers chi square by more than 9. Default: auto.
+    /// The contact's law: `spring-damper`, `second-order`, or `auto`, which takes the second where it lowers chi square
+    /// by more than 9.
     pub law: Law,
-    /// Coupled poles above this frequency in Hz are left out; above 0. Default: absent, all count.
+    /// Coupled poles above this frequency in Hz are left out. Absent: all count.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_frequency_hz: Option<f64>,
 }
 
@@ -110,14 +114,11 @@ impl Stage for ContactFit {
         source: "U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        within("stiffness_n_per_m", self.stiffness_n_per_m.unwrap_or(1.0), 1e-6, 1e6)?;
-        within("max_frequency_hz", self.max_frequency_hz.unwrap_or(1.0), 1e-6, 1e12)?;
-        for &share in &self.tip_shares {
-            within("tip_shares", share, 1e-12, 1.0)?;
-        }
+    fn check(&self, faults: &mut Faults) {
         // 1e-6: rounding of their decimal digits
-        within("sum of `tip_shares`", self.tip_shares.iter().sum(), 1e-12, 1.0 + 1e-6)
+        let sum: f64 = self.tip_shares.iter().sum();
+        let one = self.tip_shares.is_empty() || sum <= 1.0 + 1e-6;
+        faults.require(one, || format!("`tip_shares` add up to {sum}, wanted 1 or less"));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

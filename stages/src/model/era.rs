@@ -1,6 +1,6 @@
 //! The stage `model.era`.
 
-use afmid_pipeline::{Caching, Context, Example, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Caching, Context, Example, Faults, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -24,20 +24,21 @@ use afmid_kernels::subspace::Era;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct EraEstimate {
-    /// Number of states, 1 to 40; 0: at the largest gap between the decay's singular values, up to 40. Default: 11, as in the paper.
+    /// Number of states; 0: at the largest gap between the decay's singular values, up to 40. Default: 11, as in the
+    /// paper.
+    #[schemars(range(min = 0, max = 40))]
     pub order: usize,
-    /// Which data: `all`, `identification` or `verification`. Default: all.
+    /// Which data: `all`, `identification` or `verification`.
     pub set: DataSet,
-    /// Rows of the Hankel matrix, more than the order. Default: 300; many average the noise, a third of the decay is
-    /// best.
+    /// Rows of the Hankel matrix, more than the order. Why: many average the noise, a third of the decay is best.
     #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
-    /// Seconds of the decay left out at its beginning. Default: 0.
+    /// Seconds of the decay left out at its beginning.
     #[schemars(range(min = 0.0))]
     pub skip_s: f64,
-    /// Estimate a constant offset of the response. Default: true.
+    /// Estimate a constant offset of the response.
     pub offset: bool,
-    /// Estimate a linear drift of the response. Default: true; averaged records wander.
+    /// Estimate a linear drift of the response. Why: averaged records wander.
     pub drift: bool,
 }
 
@@ -59,15 +60,9 @@ impl Stage for EraEstimate {
         source: "J. Juang and R. Pappa, J. Guidance 8 (1985) 620",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        if self.order > 40 {
-            return Err(StageError::new(format!("`order` is {}, wanted 0 to 40", self.order)));
-        }
-        let least = (self.order + 1).max(2);
-        if self.block_rows < least {
-            return Err(StageError::new(format!("`block_rows` is {}, wanted {least} to 1000", self.block_rows)));
-        }
-        Ok(())
+    fn check(&self, faults: &mut Faults) {
+        let (rows, least) = (self.block_rows, (self.order + 1).max(2));
+        faults.require(rows >= least, || format!("`block_rows` is {rows}, wanted {least} to 1000"));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -6,7 +6,7 @@ mod tables;
 mod tests;
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
+    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
 };
 use faer::c64;
 use schemars::JsonSchema;
@@ -42,45 +42,46 @@ use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, white
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GreyEstimate {
-    /// Oscillating modes. Default: 4, the paper's.
+    /// Oscillating modes. Why: the paper's.
     #[schemars(range(min = 1, max = 40))]
     pub modes: usize,
-    /// Real poles of detector and electronics. Default: 1; further ones and the delay take each other's place.
+    /// Real poles of detector and electronics. Why: further ones and the delay take each other's place.
     #[schemars(range(min = 0, max = 8))]
     pub real_poles: usize,
-    /// Estimate a delay, or take what is `known` of it. Default: true; without it is none.
+    /// Estimate a delay, or take what is `known` of it. Why: without it is none.
     pub delay: bool,
-    /// Estimate what passes without any mode. Default: true: modes beyond the fitted ones act like that.
+    /// Estimate what passes without any mode. Why: modes beyond the fitted ones act like that.
     pub feedthrough: bool,
-    /// Which events: `all`, or one half (`identification`, `verification`). Default: all.
+    /// Which events: `all`, or one half (`identification`, `verification`).
     pub set: DataSet,
-    /// What the force does between its samples: `held` until the next, or `linear`. Default: held, exact for a step at a sample.
+    /// What the force does between its samples: `held` until the next, or `linear`. Why: exact for a step at a sample.
     pub between: InputBetween,
-    /// Before the first sample the system was `settled` under its first force, at `rest` without any, or `anything` (an initial state is estimated). Default: anything;
-    /// settled says more where it is true, as before a release.
+    /// Before the first sample the system was `settled` under its first force, at `rest` without any, or `anything` (an
+    /// initial state is estimated). Why: settled says more where it is true, as before a release.
     pub history: Before,
-    /// Estimate a constant offset of the response. Default: true.
+    /// Estimate a constant offset of the response.
     pub offset: bool,
-    /// Estimate a linear drift of the response. Default: true; averaged records wander.
+    /// Estimate a linear drift of the response. Why: averaged records wander.
     pub drift: bool,
-    /// Seconds before t0 that are used. Default: none, all of them.
+    /// Seconds before t0 that are used. Absent: all of them.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub before_s: Option<f64>,
-    /// What is known beforehand, such as `{ quantity = "delay_s", fixed = 1e-6 }`, `{ quantity = "gain", mode = 2, between = [0.0, 0.2] }` or
-    /// `{ quantity = "corner_hz", real_pole = 1, about = [1.3e6, 1e5] }`. Default: nothing.
+    /// What is known beforehand, such as `{ quantity = "delay_s", fixed = 1e-6 }`, `{ quantity = "gain", mode = 2,
+    /// between = [0.0, 0.2] }` or `{ quantity = "corner_hz", real_pole = 1, about = [1.3e6, 1e5] }`.
     pub known: Vec<GreyNumber>,
-    /// Modes to start from, `[frequency in Hz, quality factor]` each, as many as `modes`. Default: none, from the port `start` or from subspace estimates.
+    /// Modes to start from, `[frequency in Hz, quality factor]` each, as many as `modes`. None: from the port `start`
+    /// or from subspace estimates.
     pub start_modes: Vec<[f64; 2]>,
-    /// Rows of the Hankel matrix of the start, six more than twice the modes and the real poles, at least. Default: 60.
+    /// Rows of the Hankel matrix of the start, six more than twice the modes and the real poles, at least.
     #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
-    /// Starts that are refined. Default: 3.
+    /// Starts that are refined.
     #[schemars(range(min = 1, max = 100))]
     pub starts: usize,
-    /// Most steps of a search. Default: 60; ten are usual.
+    /// Most steps of a search. Why: ten are usual.
     #[schemars(range(min = 1, max = 10_000))]
     pub max_iterations: usize,
-    /// Standard errors for `white` residuals or by the residual's own spectrum. Default: true, by the spectrum.
+    /// Standard errors for `white` residuals or by the residual's own spectrum. Why: by the spectrum.
     pub coloured: bool,
 }
 
@@ -124,26 +125,19 @@ impl Stage for GreyEstimate {
         source: "L. Ljung, System Identification, 1999; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        let least = 2 * self.modes + self.real_poles + 6;
-        if self.block_rows < least {
-            return Err(StageError::new(format!("`block_rows` is {}, wanted {least} to 1000", self.block_rows)));
+    fn check(&self, faults: &mut Faults) {
+        let (rows, least) = (self.block_rows, 2 * self.modes + self.real_poles + 6);
+        faults.require(rows >= least, || format!("`block_rows` is {rows}, wanted {least} to 1000"));
+        let (found, modes) = (self.start_modes.len(), self.modes);
+        faults.require(found == 0 || found == modes, || {
+            format!("`start_modes` has {found}, wanted {modes} as `modes` says, or none")
+        });
+        for [f, q] in &self.start_modes {
+            faults.require(*f > 0.0 && *q > 0.5 && f.is_finite() && q.is_finite(), || {
+                format!("`start_modes` has [{f}, {q}], wanted a frequency above 0 and a quality factor above 0.5")
+            });
         }
-        if !self.start_modes.is_empty() && self.start_modes.len() != self.modes {
-            let found = self.start_modes.len();
-            return Err(StageError::new(format!(
-                "`start_modes` has {found}, wanted {} as `modes` says, or none",
-                self.modes
-            )));
-        }
-        if let Some([f, q]) =
-            self.start_modes.iter().find(|[f, q]| !(*f > 0.0 && *q > 0.5 && f.is_finite() && q.is_finite()))
-        {
-            return Err(StageError::new(format!(
-                "`start_modes` has [{f}, {q}], wanted a frequency above 0 and a quality factor above 0.5"
-            )));
-        }
-        self.check_known()
+        faults.take(self.check_known());
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

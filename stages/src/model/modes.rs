@@ -2,8 +2,8 @@
 
 use afmid_kernels::spectra::Intersample;
 use afmid_pipeline::{
-    Array, Attribute, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace,
-    Table,
+    Array, Attribute, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError,
+    StateSpace, Table,
 };
 use faer::Mat;
 use num_complex::Complex64;
@@ -39,31 +39,33 @@ use afmid_kernels::validation::{Nuisances, noise_ceiling_percent, simulate_held_
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Modes {
-    /// Least quality factor of a mode. Default: 5; detector poles are real or strongly damped.
+    /// Least quality factor of a mode. Why: detector poles are real or strongly damped.
     #[schemars(extend("exclusiveMinimum" = 0.5))]
     pub min_quality_factor: f64,
-    /// Highest frequency of a mode in Hz. Default: none.
+    /// Highest frequency of a mode in Hz.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_frequency_hz: Option<f64>,
-    /// Least amplitude of a mode's ringing over its standard error. Default: 6; the best of thousands of noise
-    /// frequencies reaches 5.
+    /// Least amplitude of a mode's ringing over its standard error. Why: the best of thousands of noise frequencies
+    /// reaches 5.
     #[schemars(range(min = 0.0))]
     pub min_significance: f64,
-    /// Largest relative standard error of a mode's quality factor. Default: 0.5; a line that does not decay is no mode.
+    /// Largest relative standard error of a mode's quality factor. Why: a line that does not decay is no mode.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_quality_factor_error: f64,
     /// Points of the frequency response, logarithmic from `response_from_hz` to half the sample rate. Default: 2000.
     #[schemars(range(min = 2, max = 100_000))]
     pub response_points: usize,
-    /// Lowest frequency of the response in Hz. Default: 1000.
+    /// Lowest frequency of the response in Hz.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub response_from_hz: f64,
-    /// What the force does between samples, for `response`: `held` (half a sample's lag and droop are taken out, as in `spectrum.etfe`) or
-    /// `sampled`. Default: held, which is exact for a step at a sample.
+    /// What the force does between samples, for `response`: `held` (half a sample's lag and droop are taken out, as in
+    /// `spectrum.etfe`) or `sampled`. Why: it is exact for a step at a sample.
     pub intersample: Intersample,
-    /// Reference frequencies in Hz (a sweep), to compare with. Default: none.
+    /// Reference frequencies in Hz (a sweep), to compare with.
+    #[schemars(inner(range(min = 1e-12)))]
     pub reference_frequency_hz: Vec<f64>,
-    /// Reference quality factors, as many as frequencies, or none. Default: none.
+    /// Reference quality factors, as many as frequencies, or none.
+    #[schemars(inner(range(min = 1e-12)))]
     pub reference_quality_factor: Vec<f64>,
 }
 
@@ -105,22 +107,16 @@ impl Stage for Modes {
         source: "Stark et al., Rev. Sci. Instrum. 2005, Table I and Fig. 5",
     };
 
-    fn check(&self) -> Result<(), StageError> {
+    fn check(&self, faults: &mut Faults) {
         let (f, q) = (self.reference_frequency_hz.len(), self.reference_quality_factor.len());
-        if q > 0 && q != f {
+        faults.require(q == 0 || q == f, || {
             let wanted = match f {
                 0 => "none, since `reference_frequency_hz` has none".to_owned(),
                 _ => format!("{f}, one for each of `reference_frequency_hz`, or none"),
             };
             let values = if q == 1 { "1 value".to_owned() } else { format!("{q} values") };
-            return Err(StageError::new(format!("`reference_quality_factor` has {values}, wanted {wanted}")));
-        }
-        if let Some(value) =
-            self.reference_frequency_hz.iter().chain(&self.reference_quality_factor).find(|v| v.is_nan() || **v <= 0.0)
-        {
-            return Err(wanted("a reference value", *value, "above 0"));
-        }
-        Ok(())
+            format!("`reference_quality_factor` has {values}, wanted {wanted}")
+        });
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -235,10 +231,6 @@ fn onset_ambiguity(model: &StateSpace) -> Option<f64> {
 /// A difference in standard errors; unknown where there is no error.
 fn in_errors(difference: f64, std: f64) -> Option<f64> {
     Some(difference / std).filter(|ratio| ratio.is_finite())
-}
-
-fn wanted(name: &str, value: f64, range: &str) -> StageError {
-    StageError::new(format!("`{name}` is {value}, wanted {range}"))
 }
 
 /// Column `input` of B.

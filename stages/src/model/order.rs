@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use afmid_pipeline::StageError;
 use rayon::prelude::*;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -26,16 +25,6 @@ impl Order {
     /// The given order; `most` where it is to be found.
     pub(super) fn largest(self, most: usize) -> usize {
         if let Self::Fixed(order) = self { order } else { most }
-    }
-
-    /// Errors: an order or a `max_order` that is not 1 to 40.
-    pub(super) fn check(self, most: usize) -> Result<(), StageError> {
-        for (name, value) in [("order", self.largest(1)), ("max_order", most)] {
-            if !(1..=40).contains(&value) {
-                return Err(StageError::new(format!("`{name}` is {value}, wanted 1 to 40")));
-            }
-        }
-        Ok(())
     }
 }
 
@@ -264,7 +253,11 @@ mod tests {
         assert_eq!((read("7").unwrap(), read("\"auto\"").unwrap()), (Order::Fixed(7), Order::Auto));
         assert!(read("\"best\"").unwrap_err().to_string().contains("a whole number, or \"auto\""));
         assert_eq!(serde_json::to_string(&Order::Auto).unwrap(), "\"auto\"");
-        assert!(Order::Fixed(41).check(20).is_err() && Order::Auto.check(0).is_err() && Order::Auto.check(40).is_ok());
+        let refused = |order: Order, max_order: usize| {
+            afmid_pipeline::stage::check(&super::super::Pem { order, max_order, ..super::super::Pem::default() })
+                .is_err()
+        };
+        assert!(refused(Order::Fixed(41), 20) && refused(Order::Auto, 0) && !refused(Order::Auto, 40));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The stage `model.pem`.
 
 use afmid_pipeline::{
-    Array, Attribute, Axis, Caching, Context, Document, Example, Matrix, Port, Ports, Spec, Stage, StageError,
+    Array, Attribute, Axis, Caching, Context, Document, Example, Faults, Matrix, Port, Ports, Spec, Stage, StageError,
     StateSpace,
 };
 use schemars::JsonSchema;
@@ -32,44 +32,48 @@ use afmid_kernels::validation::{Nuisances, TestResult, fit_percent, input_depend
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pem {
-    /// Number of states, 1 to 40, or `auto`: the smallest up to `max_order` whose simulation of the last third of the data, fitted on the rest, is within a
-    /// standard error of the best; after a release the least BIC. Default: 11, as in the paper: four modes and three detector poles.
+    /// Number of states, 1 to 40, or `auto`: the smallest up to `max_order` whose simulation of the last third of the
+    /// data, fitted on the rest, is within a standard error of the best; after a release the least BIC. Why: as in the
+    /// paper: four modes and three detector poles.
     pub order: Order,
-    /// Largest order that `auto` tries. Default: 16; each takes a fit.
+    /// Largest order that `auto` tries. Why: each takes a fit.
     #[schemars(range(min = 1, max = 40))]
     pub max_order: usize,
-    /// Which events: `all`, or one half (`identification`, `verification`). Default: all.
+    /// Which events: `all`, or one half (`identification`, `verification`).
     pub set: DataSet,
-    /// Rows of the Hankel matrix that the start comes from, more than `order`. Default: 60; half as many blur close poles.
+    /// Rows of the Hankel matrix that the start comes from, more than `order`. Why: half as many blur close poles.
     #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
-    /// Most iterations in each stretch of the search. Default: 60; ten to thirty are usual.
+    /// Most iterations in each stretch of the search. Why: ten to thirty are usual.
     #[schemars(range(min = 1, max = 10_000))]
     pub max_iterations: usize,
-    /// Parametrisation of the Kalman gain: `thermal` (white output noise and a white force on every section, one intensity each), `free` (all its
-    /// elements), `white` (none: output error) or `coloured` (none; the errors are whitened by an autoregressive filter of their own, for noise that does not
-    /// pass through the model's poles). Default: thermal; a free gain also fits the dips that the fit itself leaves at resonances.
+    /// Parametrisation of the Kalman gain: `thermal` (white output noise and a white force on every section, one
+    /// intensity each), `free` (all its elements), `white` (none: output error) or `coloured` (none; the errors are
+    /// whitened by an autoregressive filter of their own, for noise that does not pass through the model's poles). Why:
+    /// a free gain also fits the dips that the fit itself leaves at resonances.
     pub noise: NoiseModel,
-    /// Which errors are made small: `prediction` (one sample ahead) or `simulation` (output error, started from the best of the subspace estimates and the
-    /// prediction model; K is zero). Default: prediction, the most efficient where the noise model holds.
+    /// Which errors are made small: `prediction` (one sample ahead) or `simulation` (output error, started from the
+    /// best of the subspace estimates and the prediction model; K is zero). Why: the most efficient where the noise
+    /// model holds.
     pub focus: Focus,
-    /// Starts that are refined. Default: 3; more than three also take subspace estimates with instruments, which
-    /// records of rich input need (8).
+    /// Starts that are refined. Why: more than three also take subspace estimates with instruments, which records of
+    /// rich input need (8).
     #[schemars(range(min = 1, max = 100))]
     pub starts: usize,
-    /// Prior variance of the response outside the excited band: as if white noise of this share of each input's energy had been put in and nothing had come
-    /// out. Default: 0, none. Records that excite a narrow band need one to say anything beyond it: the share of noise in the output, over the samples.
+    /// Prior variance of the response outside the excited band: as if white noise of this share of each input's energy
+    /// had been put in and nothing had come out. Why: records that excite a narrow band need one to say anything
+    /// beyond it: the share of noise in the output, over the samples.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub prior: f64,
-    /// Estimate a constant offset of the response. Default: true.
+    /// Estimate a constant offset of the response.
     pub offset: bool,
-    /// Estimate a linear drift of the response. Default: true; averaged records wander.
+    /// Estimate a linear drift of the response. Why: averaged records wander.
     pub drift: bool,
-    /// Seconds before t0 that are used. Default: none, all of them. After a snap-in a few periods suffice: before it
-    /// the lever is another system.
+    /// Seconds before t0 that are used. Absent: all of them. After a snap-in a few periods suffice: before it the lever
+    /// is another system.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub before_s: Option<f64>,
-    /// Lags of the residual tests, beyond the order. Default: 25.
+    /// Lags of the residual tests, beyond the order.
     #[schemars(range(min = 1, max = 1000))]
     pub test_lags: usize,
 }
@@ -137,13 +141,9 @@ impl Stage for Pem {
         source: "Stark et al., Rev. Sci. Instrum. 2005, Eq. 8; L. Ljung, System Identification, 1999",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        self.order.check(self.max_order)?;
-        let least = self.order.largest(self.max_order) + 1;
-        if self.block_rows < least {
-            return Err(StageError::new(format!("`block_rows` is {}, wanted {least} to 1000", self.block_rows)));
-        }
-        Ok(())
+    fn check(&self, faults: &mut Faults) {
+        let (rows, least) = (self.block_rows, self.order.largest(self.max_order) + 1);
+        faults.require(rows >= least, || format!("`block_rows` is {rows}, wanted {least} to 1000"));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

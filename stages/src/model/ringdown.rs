@@ -10,7 +10,7 @@ mod tables;
 mod tests;
 
 use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Port, Ports, Recording, Spec, Stage, StageError, Table,
+    Array, Caching, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -46,40 +46,45 @@ use afmid_kernels::ringdown::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RingdownFit {
-    /// Oscillating modes, 1 to 20, or `auto`: as many up to `max_modes` as lower the chi square of held-out events by two standard errors each, below 4
-    /// events as the least BIC wants. Default: 4, the paper's.
+    /// Oscillating modes, 1 to 20, or `auto`: as many up to `max_modes` as lower the chi square of held-out events by
+    /// two standard errors each, below 4 events as the least BIC wants. Why: the paper's.
     pub modes: ModeNumber,
-    /// Largest number that `auto` tries. Default: 8; each takes a fit, and three from 4 events on.
+    /// Largest number that `auto` tries. Why: each takes a fit, and three from 4 events on.
     #[schemars(range(min = 1, max = 20))]
     pub max_modes: usize,
-    /// Real poles of the detector. Default: 3, the paper's; they matter in the first samples only.
+    /// Real poles of the detector. Why: the paper's; they matter in the first samples only.
     #[schemars(range(min = 0, max = 8))]
     pub real_poles: usize,
-    /// Samples after the onset that are left out. Default: 0; some where the onset is not sharp.
+    /// Samples after the onset that are left out. Why: some where the onset is not sharp.
     #[schemars(range(min = 0, max = 100_000))]
     pub skip_samples: usize,
-    /// Noise beside the ringing: `estimated` (white, 1/f and thermal) or `white`. Default: estimated.
+    /// Noise beside the ringing: `estimated` (white, 1/f and thermal) or `white`.
     pub noise: JointNoise,
-    /// Where standard errors come from: `noise` (the noise model) or `events` (the scatter of 8 events or more). Default: noise.
+    /// Where standard errors come from: `noise` (the noise model) or `events` (the scatter of 8 events or more).
     pub error_source: ErrorSource,
-    /// Estimate a linear drift of each event beside its offset. Default: true.
+    /// Estimate a linear drift of each event beside its offset.
     pub drift: bool,
-    /// Draws of a bootstrap over events for 95 % intervals. Default: 0, none; 400 know an interval's ends to a tenth of its width.
+    /// Draws of a bootstrap over events for 95 % intervals. 400 know an interval's ends to a tenth of its
+    /// width.
     #[schemars(range(max = 100_000))]
     pub bootstrap_draws: usize,
-    /// Rows of the Hankel matrix of the start, more than its order. Default: 100, a period of the slowest mode.
+    /// Rows of the Hankel matrix of the start, more than its order. Why: a period of the slowest mode.
     #[schemars(range(min = 2, max = 400))]
     pub block_rows: usize,
-    /// Samples after the onset that the start is made from, 0 (all) or 8 per mode, real pole and two more to 10 million. Default: 0; some decay times
-    /// where the ringing fills a small part of the window, as on contact.
+    /// Samples after the onset that the start is made from, 0 (all) or 8 per mode, real pole and two more to 10
+    /// million. Why: some decay times where the ringing fills a small part of the window, as on contact.
+    #[schemars(range(min = 0, max = 10_000_000))]
     pub start_samples: usize,
-    /// Samples after the onset that are missing in every event, each `[first, end]`, the end not included, -1000000 to 1e9. Default: none. Samples that
+    /// Samples after the onset that are missing in every event, each `[first, end]`, the end not included. Samples that
     /// are NaN are missing anyway.
+    #[schemars(inner(inner(range(min = -1_000_000, max = 1_000_000_000))))]
     pub missing: Vec<[i64; 2]>,
-    /// Range of the detector or converter `[least, most]` in V: samples at its ends or beyond are missing, as in events of `keep_saturated`. Default: none.
+    /// Range of the detector or converter `[least, most]` in V: samples at its ends or beyond are missing, as in events
+    /// of `keep_saturated`.
     pub range_v: Option<[f64; 2]>,
-    /// What is known beforehand, such as `{ mode = 2, quantity = "quality_factor", fixed = 193.0 }`, `between = [190, 195]` or `about = [193.0, 0.5]`.
-    /// Default: nothing. A frequency or quality factor of a `mode`, the corner frequency of a `real_pole`.
+    /// What is known beforehand, such as `{ mode = 2, quantity = "quality_factor", fixed = 193.0 }`, `between = [190,
+    /// 195]` or `about = [193.0, 0.5]`. A frequency or quality factor of a `mode`, the corner frequency of a
+    /// `real_pole`.
     pub known: Vec<KnownNumber>,
     /// What counts as a free stretch of the records on port `free`.
     pub free: FreeSettings,
@@ -155,24 +160,16 @@ impl Stage for RingdownFit {
         source: "S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7",
     };
 
-    fn check(&self) -> Result<(), StageError> {
+    fn check(&self, faults: &mut Faults) {
         let modes = self.modes.largest(self.max_modes);
-        let order = 2 * modes + self.real_poles.max(1);
-        let (found, most) = (self.modes.largest(1), 20);
-        if !(1..=most).contains(&found) {
-            return Err(StageError::new(format!("`modes` is {found}, wanted 1 to {most}")));
-        }
-        if self.block_rows < order + 2 {
-            return Err(StageError::new(format!("`block_rows` is {}, wanted {} to 400", self.block_rows, order + 2)));
-        }
-        let least = 8 * (modes + self.real_poles + 2);
-        if self.start_samples != 0 && !(least..=10_000_000).contains(&self.start_samples) {
-            let found = self.start_samples;
-            return Err(StageError::new(format!("`start_samples` is {found}, wanted 0 or {least} to 10000000")));
-        }
-        self.check_missing()?;
-        self.check_known(modes)?;
-        self.free.check()
+        let (rows, least) = (self.block_rows, 2 * modes + self.real_poles.max(1) + 2);
+        faults.require(rows >= least, || format!("`block_rows` is {rows}, wanted {least} to 400"));
+        let (samples, least) = (self.start_samples, 8 * (modes + self.real_poles + 2));
+        faults.require(samples == 0 || samples >= least, || {
+            format!("`start_samples` is {samples}, wanted 0 or {least} to 10000000")
+        });
+        self.check_missing(faults);
+        faults.take(self.check_known(modes));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -230,18 +227,17 @@ impl Stage for RingdownFit {
 }
 
 impl RingdownFit {
-    fn check_missing(&self) -> Result<(), StageError> {
-        for [from, to] in &self.missing {
-            if !(-1_000_000 <= *from && from < to && *to <= 1_000_000_000) {
-                return Err(StageError::new(format!("`missing` has [{from}, {to}], wanted [first, end] ascending"))
-                    .help("samples after the onset, -1000000 to 1000000000"));
-            }
+    fn check_missing(&self, faults: &mut Faults) {
+        for [from, to] in self.missing.iter().filter(|[from, to]| from >= to) {
+            faults.add(
+                StageError::new(format!("`missing` has [{from}, {to}], wanted [first, end] ascending"))
+                    .help("samples after the onset, -1000000 to 1000000000"),
+            );
         }
-        match self.range_v {
-            Some([least, most]) if !(least < most && least.is_finite() && most.is_finite()) => {
-                Err(StageError::new(format!("`range_v` is [{least}, {most}], wanted [least, most] in V")))
-            }
-            _ => Ok(()),
+        if let Some([least, most]) = self.range_v {
+            faults.require(least < most && least.is_finite() && most.is_finite(), || {
+                format!("`range_v` is [{least}, {most}], wanted [least, most] in V")
+            });
         }
     }
 

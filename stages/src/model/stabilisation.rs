@@ -1,6 +1,6 @@
 //! The stage `model.stabilisation`.
 
-use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
+use afmid_pipeline::{Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
 use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,40 +30,39 @@ use afmid_kernels::subspace::{Era, InstrumentalSubspace, Subspace, Weight};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StabilisationDiagram {
-    /// Where the poles come from: `era` (the free decay), `release` (subspace without instruments), `n4sid`, `moesp` or `cva` (inputs that excite). Default: era, as the events here decay
-    /// freely.
+    /// Where the poles come from: `era` (the free decay), `release` (subspace without instruments), `n4sid`, `moesp` or
+    /// `cva` (inputs that excite). Why: as the events here decay freely.
     pub method: PoleMethod,
-    /// Lowest order. Default: 2, one mode.
+    /// Lowest order. Why: one mode.
     #[schemars(range(min = 1))]
     pub from_order: usize,
-    /// Highest order, above the lowest. Default: 40; noise needs room beyond the lever's 11.
+    /// Highest order, above the lowest. Why: noise needs room beyond the lever's 11.
     #[schemars(range(min = 2, max = 100))]
     pub to_order: usize,
-    /// From one order to the next. Default: 1.
+    /// From one order to the next.
     #[schemars(range(min = 1, max = 10))]
     pub step: usize,
-    /// Which data: `all`, `identification` or `verification`. Default: all.
+    /// Which data: `all`, `identification` or `verification`.
     pub set: DataSet,
-    /// Rows of the Hankel matrix, more than the highest order. Default: 300, as in `model.era`.
+    /// Rows of the Hankel matrix, more than the highest order. Why: as in `model.era`.
     #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
-    /// Largest relative change of a stable pole's frequency from one order to the next. Default: 0.01, as is usual.
+    /// Largest relative change of a stable pole's frequency from one order to the next. Why: as is usual.
     #[schemars(range(max = 0.5), extend("exclusiveMinimum" = 0.0))]
     pub frequency: f64,
-    /// Largest relative change of a stable pole's damping. Default: 0.05, as is usual; a mode's damping may spread
-    /// twice as much.
+    /// Largest relative change of a stable pole's damping. Why: as is usual; a mode's damping may spread twice as much.
     #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub damping: f64,
-    /// Least quality factor of a mode. Default: 5, as in `model.modes`.
+    /// Least quality factor of a mode. Why: as in `model.modes`.
     #[schemars(extend("exclusiveMinimum" = 0.5))]
     pub min_quality_factor: f64,
-    /// Least number of orders at which a mode is stable. Default: 4.
+    /// Least number of orders at which a mode is stable.
     #[schemars(range(min = 1))]
     pub min_count: usize,
-    /// Least amplitude of a mode's ringing over its standard error. Default: 6, as in `model.modes`.
+    /// Least amplitude of a mode's ringing over its standard error. Why: as in `model.modes`.
     #[schemars(range(min = 0.0))]
     pub min_significance: f64,
-    /// Least share of the orders from a mode's first on at which it is stable. Default: 0.5.
+    /// Least share of the orders from a mode's first on at which it is stable.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_share: f64,
 }
@@ -121,18 +120,13 @@ impl Stage for StabilisationDiagram {
         source: "H. Van der Auweraer and B. Peeters, Smart Struct. Syst. 1 (2004) 1",
     };
 
-    fn check(&self) -> Result<(), StageError> {
+    fn check(&self, faults: &mut Faults) {
         let (from, to, rows) = (self.from_order, self.to_order, self.block_rows);
-        if to.saturating_sub(from) < self.step {
+        faults.require(to.saturating_sub(from) >= self.step, || {
             let next = from.saturating_add(self.step);
-            return Err(StageError::new(format!(
-                "`to_order` is {to}, wanted {next} (the next after `from_order`) or more"
-            )));
-        }
-        if rows <= to {
-            return Err(StageError::new(format!("`block_rows` is {rows}, wanted more than `to_order`, {to}")));
-        }
-        Ok(())
+            format!("`to_order` is {to}, wanted {next} (the next after `from_order`) or more")
+        });
+        faults.require(rows > to, || format!("`block_rows` is {rows}, wanted more than `to_order`, {to}"));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -1,6 +1,6 @@
 //! The stage `model.subspace`.
 
-use afmid_pipeline::{Array, Caching, Context, Example, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Caching, Context, Example, Faults, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,21 +26,22 @@ use afmid_kernels::subspace::{InstrumentalSubspace, Subspace, Weight};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SubspaceEstimate {
-    /// Number of states, 1 to 40, or `auto`: as in `model.pem`, by output error. Default: 11, as in the paper.
+    /// Number of states, 1 to 40, or `auto`: as in `model.pem`, by output error. Why: as in the paper.
     pub order: Order,
-    /// Largest order that `auto` tries. Default: 16; each takes a fit.
+    /// Largest order that `auto` tries. Why: each takes a fit.
     #[schemars(range(min = 1, max = 40))]
     pub max_order: usize,
-    /// Which data: `all`, `identification` or `verification`. Default: all.
+    /// Which data: `all`, `identification` or `verification`.
     pub set: DataSet,
-    /// Weight: `n4sid`, `moesp`, `cva`, or `release` (no instruments, for inputs that do not excite). Default: release, as the events here are.
+    /// Weight: `n4sid`, `moesp`, `cva`, or `release` (no instruments, for inputs that do not excite). Why: as the
+    /// events here are.
     pub weight: WeightKind,
-    /// Rows of each Hankel matrix, more than the order and at most 1000. Default: 60, a period of the slowest mode or more; few blur close poles, many
-    /// take noise along.
+    /// Rows of each Hankel matrix, more than the order and at most 1000. Why: a period of the slowest mode or more; few
+    /// blur close poles, many take noise along.
     pub block_rows: usize,
-    /// Estimate a constant offset of the response. Default: true.
+    /// Estimate a constant offset of the response.
     pub offset: bool,
-    /// Estimate a linear drift of the response. Default: true; averaged records wander.
+    /// Estimate a linear drift of the response. Why: averaged records wander.
     pub drift: bool,
 }
 
@@ -84,13 +85,9 @@ impl Stage for SubspaceEstimate {
         source: "Van Overschee and De Moor 1996; Verhaegen and Dewilde, Int. J. Control 56 (1992) 1187",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        self.order.check(self.max_order)?;
-        let least = self.order.largest(self.max_order) + 1;
-        if (least..=1000).contains(&self.block_rows) {
-            return Ok(());
-        }
-        Err(StageError::new(format!("`block_rows` is {}, wanted {least} to 1000", self.block_rows)))
+    fn check(&self, faults: &mut Faults) {
+        let (rows, least) = (self.block_rows, self.order.largest(self.max_order) + 1);
+        faults.require(rows >= least, || format!("`block_rows` is {rows}, wanted {least} to 1000"));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

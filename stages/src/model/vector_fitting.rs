@@ -2,7 +2,7 @@
 
 use afmid_kernels::spectra::Intersample;
 use afmid_pipeline::{
-    Array, Attribute, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace,
+    Array, Attribute, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace,
 };
 use faer::c64;
 use schemars::JsonSchema;
@@ -32,29 +32,30 @@ use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFit, VectorFitting, 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VectorFittingEstimate {
-    /// Number of poles. Default: 11, as in the paper: four modes and three detector poles.
+    /// Number of poles. Why: as in the paper: four modes and three detector poles.
     #[schemars(range(min = 1, max = 40))]
     pub order: usize,
-    /// Oscillating pairs among the starting poles, at most half the order; the rest starts real. Default: none, as many as fit. A fit that ends with another number warns: pairs and real poles
-    /// may turn into each other.
+    /// Oscillating pairs among the starting poles, at most half the order; the rest starts real. Absent: as many as
+    /// fit. A fit that ends with another number warns: pairs and real poles may turn into each other.
     pub modes: Option<usize>,
-    /// Lowest frequency that is used, in Hz. Default: 0.
+    /// Lowest frequency that is used, in Hz.
     #[schemars(range(min = 0.0))]
     pub min_frequency_hz: f64,
-    /// Highest frequency that is used, in Hz, above the lowest. Default: none, all that is defined.
+    /// Highest frequency that is used, in Hz, above the lowest. Absent: all that is defined.
     pub max_frequency_hz: Option<f64>,
-    /// How bins count: `variance` (each by its own) or `uniform`. Default: variance.
+    /// How bins count: `variance` (each by its own) or `uniform`.
     pub weight: ResponseWeight,
-    /// What the force does between samples: `held` or `sampled`, as in the stage that made the response. Default: held, as there.
+    /// What the force does between samples: `held` or `sampled`, as in the stage that made the response. Why: as there.
     pub intersample: Intersample,
-    /// What the ends of the window add: `auto` (fitted for a response from differences that is not smoothed), `on` or `off`. Default: auto.
+    /// What the ends of the window add: `auto` (fitted for a response from differences that is not smoothed), `on` or
+    /// `off`.
     pub transient: TransientChoice,
-    /// Relocations of the poles at most. Default: 30; ten are usual.
+    /// Relocations of the poles at most. Why: ten are usual.
     #[schemars(range(min = 1, max = 1000))]
     pub iterations: usize,
-    /// End with Gauss-Newton on the weighted error. Default: true; without, errors are up to a seventh larger.
+    /// End with Gauss-Newton on the weighted error. Why: without, errors are up to a seventh larger.
     pub refine: bool,
-    /// Reflect poles from outside the unit circle into it. Default: false; an unstable pole says that the order is too high.
+    /// Reflect poles from outside the unit circle into it. Why: an unstable pole says that the order is too high.
     pub stable: bool,
 }
 
@@ -102,17 +103,13 @@ impl Stage for VectorFittingEstimate {
         source: "B. Gustavsen, IEEE Trans. Power Delivery 21 (2006) 1587",
     };
 
-    fn check(&self) -> Result<(), StageError> {
+    fn check(&self, faults: &mut Faults) {
         let (modes, most) = (self.modes.unwrap_or(0), self.order / 2);
-        if modes > most {
-            return Err(StageError::new(format!("`modes` is {modes}, wanted at most half the order, {most}")));
-        }
+        faults.require(modes <= most, || format!("`modes` is {modes}, wanted at most half the order, {most}"));
         let (low, high) = (self.min_frequency_hz, self.max_frequency_hz.unwrap_or(f64::MAX));
-        if !(high > low && high.is_finite()) {
-            let problem = format!("`max_frequency_hz` is {high}, wanted above `min_frequency_hz`, {low}");
-            return Err(StageError::new(problem));
-        }
-        Ok(())
+        faults.require(high > low && high.is_finite(), || {
+            format!("`max_frequency_hz` is {high}, wanted above `min_frequency_hz`, {low}")
+        });
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -20,11 +20,11 @@ use afmid_kernels::validation::{Frequency, PoleShift, ZeroPair, compare_zeros, p
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Zeros {
-    /// Least magnitude of the quality factor of a zero that is compared. Default: 5; zeros of lever and tip are as
-    /// sharp as its modes.
+    /// Least magnitude of the quality factor of a zero that is compared. Why: zeros of lever and tip are as sharp as
+    /// its modes.
     #[schemars(range(min = 0.5))]
     pub min_quality_factor: f64,
-    /// Largest relative standard error of a zero's frequency. Default: 0.05; a worse one is compared with nothing.
+    /// Largest relative standard error of a zero's frequency. Why: a worse one is compared with nothing.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_frequency_error: f64,
 }

@@ -7,7 +7,9 @@ use afmid_pipeline::files::{FilledFolder, sweep_beside};
 use afmid_pipeline::recording::{
     Codes, InputFiles, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native_in,
 };
-use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError};
+use afmid_pipeline::{
+    Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError,
+};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -40,28 +42,28 @@ use afmid_kernels::simulate::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Afm {
-    /// Folder for the records, relative to the config; created if missing. The truth is written beside it as `NAME.truth.json`.
-    /// Default: `simulated`.
+    /// Folder for the records, relative to the config; created if missing. The truth is written beside it as
+    /// `NAME.truth.json`.
     pub out: PathBuf,
-    /// Number of records. Default: 12.
+    /// Number of records.
     #[schemars(range(min = 1))]
     pub records: usize,
-    /// Samples per record. Default: 900000 (one cycle of the ramp at 5 MS/s).
+    /// Samples per record. Why: one cycle of the ramp at 5 MS/s.
     #[schemars(range(min = 1))]
     pub samples: usize,
-    /// Sample rate in Hz, above twice the highest mode. Default: 5e6, the paper's.
+    /// Sample rate in Hz, above twice the highest mode. Why: the paper's.
     pub sample_rate_hz: f64,
-    /// Total number of counted snap-ins; absent: as the phases come. Default: absent.
+    /// Total number of counted snap-ins; absent: as the phases come.
     pub snap_ins: Option<usize>,
-    /// Total number of counted snap-offs; absent: as the phases come. Default: absent.
+    /// Total number of counted snap-offs; absent: as the phases come.
     pub snap_offs: Option<usize>,
-    /// Cycle position of the ramp at the start of each record, 0 (top, far away) to 1; absent: drawn and solved for the totals.
-    /// Default: absent.
+    /// Cycle position of the ramp at the start of each record, 0 (top, far away) to 1; absent: drawn and solved for the
+    /// totals.
     pub phases: Option<Vec<f64>>,
-    /// An event counts if it lies at least this far from both ends of its record and from other events, samples; solved phases keep all
-    /// events out of this margin. Default: 20000, more than two windows of the paper.
+    /// An event counts if it lies at least this far from both ends of its record and from other events, samples; solved
+    /// phases keep all events out of this margin. Why: more than two windows of the paper.
     pub margin_samples: usize,
-    /// Static stiffness of the lever at its tip in N/m. Default: 3.8, the paper's.
+    /// Static stiffness of the lever at its tip in N/m. Why: the paper's.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: f64,
     /// Undamped natural frequencies of the modes in Hz, any number, above 0. Default: the paper's Table I.
@@ -72,65 +74,68 @@ pub struct Afm {
     pub tip_shares: Vec<f64>,
     /// Shares of the static detector signal, one per mode, sum 1. Default: the slope near the end of that beam.
     pub detector_shares: Vec<f64>,
-    /// Contact stiffness in N/m. Default: 60.
+    /// Contact stiffness in N/m.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub contact_stiffness_n_per_m: f64,
-    /// Viscous damping of the contact in N s/m, not negative. Default: 8e-6 (the ringing against the sample dies in tens of microseconds).
+    /// Viscous damping of the contact in N s/m, not negative. Why: the ringing against the sample dies in tens of
+    /// microseconds.
     pub contact_damping_n_s_per_m: f64,
-    /// Gap at which the tip is caught in m. Default: 4e-9.
+    /// Gap at which the tip is caught in m.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub snap_in_gap_m: f64,
-    /// Mean pull-off force in N; less three standard deviations it must exceed the catch, `contact_stiffness_n_per_m * snap_in_gap_m`.
-    /// Default: 330e-9, the paper's.
+    /// Mean pull-off force in N; less three standard deviations it must exceed the catch, `contact_stiffness_n_per_m *
+    /// snap_in_gap_m`. Why: the paper's.
     pub adhesion_n: f64,
-    /// Relative standard deviation of the pull-off force from event to event; normal, cut at three. Default: 0.06.
+    /// Relative standard deviation of the pull-off force from event to event; normal, cut at three.
     #[schemars(range(min = 0.0, max = 0.3))]
     pub adhesion_scatter: f64,
-    /// Mean height of the surface on the ramp's scale (0 in its middle) in m. Default: -22e-9: room for the pull-off above it.
+    /// Mean height of the surface on the ramp's scale (0 in its middle) in m. Why: room for the pull-off above it.
     pub surface_m: f64,
-    /// Standard deviation of the surface's height from record to record in m, not negative. Default: 3e-9.
+    /// Standard deviation of the surface's height from record to record in m, not negative.
     pub surface_std_m: f64,
-    /// Cycles of the ramp per second in Hz. Default: 5.58, the paper's.
+    /// Cycles of the ramp per second in Hz. Why: the paper's.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub ramp_hz: f64,
-    /// Range of the ramp in m. Default: 200e-9, the paper's.
+    /// Range of the ramp in m. Why: the paper's.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub ramp_m: f64,
-    /// Travel per monitored volt in m/V. Default: 25e-9.
+    /// Travel per monitored volt in m/V.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub piezo_m_per_v: f64,
-    /// Volts per code of the piezo monitor. Default: 4.88e-3 (20 V over 12 bit).
+    /// Volts per code of the piezo monitor. Why: 20 V over 12 bit.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub piezo_lsb_v: f64,
-    /// White noise of the piezo monitor in V, not negative. Default: 5e-4.
+    /// White noise of the piezo monitor in V, not negative.
     pub piezo_white_v: f64,
-    /// Optical lever sensitivity in V per m of static tip deflection. Default: 1e7 (0.87 V at 330 nN).
+    /// Optical lever sensitivity in V per m of static tip deflection. Why: 0.87 V at 330 nN.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: f64,
     /// Real poles of the detector in Hz, any number, above 0. Default: 1.3, 1.9 and 2.4 MHz.
     pub detector_poles_hz: Vec<f64>,
-    /// Delay of the deflection channel in s, not negative. Default: 0.
+    /// Delay of the deflection channel in s, not negative.
     pub delay_s: f64,
-    /// Temperature in K, not negative; 0 switches thermal motion off. Default: 295.
+    /// Temperature in K, not negative; 0 switches thermal motion off.
     pub temperature_k: f64,
-    /// White noise of the readout in V, not negative. Default: 1.2e-3.
+    /// White noise of the readout in V, not negative.
     pub white_v: f64,
-    /// 1/f noise of the readout between 1 Hz and the Nyquist frequency in V, not negative. Default: 3e-4.
+    /// 1/f noise of the readout between 1 Hz and the Nyquist frequency in V, not negative.
     pub pink_v: f64,
-    /// Wander of the baseline over the archive in V, not negative. Default: 4e-3.
+    /// Wander of the baseline over the archive in V, not negative.
     pub drift_v: f64,
-    /// Bits of the converter. Default: 12, the paper's.
+    /// Bits of the converter. Why: the paper's.
     #[schemars(range(min = 2, max = 16))]
     pub adc_bits: u32,
-    /// Volts per code. Default: 0.977e-3, the paper's.
+    /// Volts per code. Why: the paper's.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub lsb_v: f64,
-    /// Deflate level of the files, 0 (raw) to 9. Default: 4.
+    /// Deflate level of the files, 0 (raw) to 9.
+    #[schemars(range(min = 0, max = 9))]
     pub compression: u8,
-    /// Causes hidden in the simulation, each a table with the id of a cause (`afmid causes`) and all its parameters within their limits, as in
-    /// `{ cause = "quadratic-detector", a2 = 0.012 }`; they are integrated in time and add up. Default: none, the linear microscope.
+    /// Causes hidden in the simulation, each a table with the id of a cause (`afmid causes`) and all its parameters
+    /// within their limits, as in `{ cause = "quadratic-detector", a2 = 0.012 }`; they are integrated in time and add
+    /// up. None: the linear microscope.
     pub hidden: Vec<Hidden>,
-    /// Seed of all random numbers; absent: the pipeline's and the stage's id. Default: absent.
+    /// Seed of all random numbers; absent: the pipeline's and the stage's id.
     pub seed: Option<u64>,
 }
 
@@ -194,24 +199,27 @@ impl Stage for Afm {
         source: "Stark et al., Rev. Sci. Instrum. 2005, Fig. 1; C. F. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395",
     };
 
-    fn check(&self) -> Result<(), StageError> {
+    fn check(&self, faults: &mut Faults) {
         let modes = self.frequencies_hz.len();
+        let mut each = true;
         for (name, found) in [
             ("quality_factors", self.quality_factors.len()),
             ("tip_shares", self.tip_shares.len()),
             ("detector_shares", self.detector_shares.len()),
         ] {
-            if found != modes {
-                return Err(StageError::new(format!(
-                    "`{name}` has {found} values, `frequencies_hz` {modes}: one per mode"
-                )));
-            }
+            each &= found == modes;
+            faults.require(found == modes, || {
+                format!("`{name}` has {found} values, `frequencies_hz` {modes}: one per mode")
+            });
         }
-        if self.compression > 9 {
-            return Err(StageError::new(format!("`compression` is {}, wanted 0 to 9", self.compression)));
+        let hidden = effects(&self.hidden).map(|_| ());
+        let possible = each && hidden.is_ok();
+        faults.take(hidden);
+        // a microscope of as many of everything
+        if possible {
+            faults.take(self.microscope().check().map_err(StageError::from_error));
+            faults.take(self.layout(0).check().map_err(StageError::from_error));
         }
-        effects(&self.hidden)?;
-        self.microscope().check().and_then(|()| self.layout(0).check()).map_err(StageError::from_error)
     }
 
     fn depends_on(&self) -> Vec<String> {

@@ -71,9 +71,9 @@ fn a_folder_with_other_records_is_refused() {
 
 #[test]
 fn lists_of_unequal_length_are_refused() {
-    let error = Afm { quality_factors: vec![40.0], ..Afm::default() }.check().unwrap_err();
+    let error = afmid_pipeline::stage::check(&Afm { quality_factors: vec![40.0], ..Afm::default() }).unwrap_err();
     assert!(error.to_string().contains("one per mode"), "{error}");
-    assert!(Afm::default().check().is_ok());
+    assert!(afmid_pipeline::stage::check(&Afm::default()).is_ok());
 }
 
 #[test]

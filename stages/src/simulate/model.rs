@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Recording, Spec, Stage, StageError};
+use afmid_pipeline::{Caching, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,41 +31,42 @@ use super::lever_model::{LeverModel, MODEL};
 pub struct AfmOfModel {
     /// Folder for the records, relative to the config; created if missing. The truth is written beside it as `NAME.truth.json`. Default: `resimulated`.
     pub out: PathBuf,
-    /// Number of records; absent: as many as were diagnosed. Default: absent.
+    /// Number of records; absent: as many as were diagnosed.
     #[schemars(range(min = 1))]
     pub records: Option<usize>,
-    /// Samples per record. Default: 200000 (40 ms at 5 MS/s, a part of a cycle with one release).
+    /// Samples per record. Why: 40 ms at 5 MS/s, a part of a cycle with one release.
     #[schemars(range(min = 1))]
     pub samples: usize,
-    /// Total number of counted snap-offs; absent: one per record. Default: absent.
+    /// Total number of counted snap-offs; absent: one per record.
     pub snap_offs: Option<usize>,
-    /// An event counts if it lies at least this far from both ends of its record and from other events, samples. Default: 20000, as in `simulate.afm`.
+    /// An event counts if it lies at least this far from both ends of its record and from other events, samples. Why:
+    /// as in `simulate.afm`.
     pub margin_samples: usize,
-    /// Static stiffness of the lever at its tip in N/m. Default: 3.8, the paper's.
+    /// Static stiffness of the lever at its tip in N/m. Why: the paper's.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: f64,
-    /// Optical lever sensitivity in V per m of static tip deflection. Default: 1e7.
+    /// Optical lever sensitivity in V per m of static tip deflection.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: f64,
     /// Mean height of the surface on the ramp's scale (0 in its middle) in m. Default: -100e-9: room for strong loads above it.
     pub surface_m: f64,
-    /// Cycles of the ramp per second in Hz. Default: 2.79, with the range the paper's speed.
+    /// Cycles of the ramp per second in Hz. Why: with the range the paper's speed.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub ramp_hz: f64,
-    /// Range of the ramp in m. Default: 400e-9.
+    /// Range of the ramp in m.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub ramp_m: f64,
-    /// Wander of the baseline over the archive in V, not negative. Default: 4e-3, as in `simulate.afm`.
+    /// Wander of the baseline over the archive in V, not negative. Why: as in `simulate.afm`.
     pub drift_v: f64,
-    /// Bits of the converter. Default: 12, the paper's.
+    /// Bits of the converter. Why: the paper's.
     #[schemars(range(min = 2, max = 16))]
     pub adc_bits: u32,
-    /// Volts per code. Default: 0.977e-3, the paper's.
+    /// Volts per code. Why: the paper's.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub lsb_v: f64,
-    /// Deflate level of the files, 0 (raw) to 9. Default: 4.
+    /// Deflate level of the files, 0 (raw) to 9.
     pub compression: u8,
-    /// Seed of all random numbers; absent: the pipeline's and the stage's id. Default: absent.
+    /// Seed of all random numbers; absent: the pipeline's and the stage's id.
     pub seed: Option<u64>,
 }
 
@@ -108,9 +109,9 @@ impl Stage for AfmOfModel {
         source: "Stark et al., Rev. Sci. Instrum. 2005, Fig. 1; C. F. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395",
     };
 
-    fn check(&self) -> Result<(), StageError> {
+    fn check(&self, faults: &mut Faults) {
         // with the paper's lever in the place of the model's
-        self.afm(self.records.unwrap_or(1)).check()
+        self.afm(self.records.unwrap_or(1)).check(faults);
     }
 
     fn depends_on(&self) -> Vec<String> {
@@ -124,7 +125,7 @@ impl Stage for AfmOfModel {
         }
         let afm = self.afm(self.records.unwrap_or(model.records)).of_model(&model)?;
         let afm = Afm { seed: Some(self.seed.unwrap_or_else(|| cx.seed())), ..caught(afm) };
-        afm.check().map_err(|error| {
+        afmid_pipeline::stage::check(&afm).map_err(|error| {
             StageError::new(format!("with this model: {error}")).help("`afmid stages simulate.afm` lists the ranges")
         })?;
         afm.run(&Ports::new(), cx)

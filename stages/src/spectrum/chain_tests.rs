@@ -42,7 +42,7 @@ fn run<S: Stage>(stage: &S, port: &str, input: &Array) -> Array {
     let cx = Context::new(std::path::Path::new("."), 3, &NoProgress);
     let mut inputs = Ports::new();
     inputs.insert(port, afmid_pipeline::Artifact::Array(std::sync::Arc::new(input.clone())));
-    stage.check().unwrap();
+    afmid_pipeline::stage::check(stage).unwrap();
     let outputs = stage.run(&inputs, &cx).unwrap();
     match outputs.artifact(S::SPEC.outputs[0].name) {
         Some(afmid_pipeline::Artifact::Array(array)) => array.as_ref().clone(),

@@ -31,12 +31,14 @@ pub struct Etfe {
     /// noise.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub bandwidth_hz: f64,
-    /// Bins are undefined where the force is smaller than this share of its median over 32 bins on either side, 0 to below 1.
-    /// Default: 0.05; such a bin holds less than 1/400 of its neighbours' information.
+    /// Bins are undefined where the force is smaller than this share of its median over 32 bins on either side. Why:
+    /// such a bin holds less than 1/400 of its neighbours' information.
+    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1.0))]
     pub vanishing_ratio: f64,
-    /// What the force does between samples: `held` or `sampled` (no correction). Default: held, which is exact for a step at a sample.
+    /// What the force does between samples: `held` or `sampled` (no correction). Why: it is exact for a step at a
+    /// sample.
     pub intersample: Intersample,
-    /// Divide by the quasi-static gain found in the data. Default: true; it is one within the noise for a force in volts.
+    /// Divide by the quasi-static gain found in the data. Why: it is one within the noise for a force in volts.
     pub normalise: bool,
 }
 
@@ -62,17 +64,6 @@ impl Stage for Etfe {
         seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Eqs. 5 to 7",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        if !(self.bandwidth_hz.is_finite() && self.bandwidth_hz > 0.0) {
-            return Err(StageError::new(format!("`bandwidth_hz` is {}, wanted above 0", self.bandwidth_hz)));
-        }
-        if !(0.0..1.0).contains(&self.vanishing_ratio) {
-            let problem = format!("`vanishing_ratio` is {}, wanted 0 to below 1", self.vanishing_ratio);
-            return Err(StageError::new(problem));
-        }
-        Ok(())
-    }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let pair = inputs.get(&PAIR)?;

@@ -35,11 +35,11 @@ pub struct Frf {
     /// Bins above are undefined, in Hz. Default: 1.2 MHz, as for `spectrum.etfe`.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub bandwidth_hz: f64,
-    /// Bins on either side over which levels and variance are averaged. Default: 2; with 24 events the variance is then
-    /// good to a tenth, and a thermal peak two bins wide is widened little.
+    /// Bins on either side over which levels and variance are averaged. Why: with 24 events the variance is then good
+    /// to a tenth, and a thermal peak two bins wide is widened little.
     #[schemars(range(min = 0, max = 1000))]
     pub half_width_bins: usize,
-    /// Chance per bin below which distortion counts in the summary. Default: 1e-4: 0.2 false bins among 2000.
+    /// Chance per bin below which distortion counts in the summary. Why: 0.2 false bins among 2000.
     #[schemars(range(min = 1e-12, max = 0.1))]
     pub significance: f64,
 }
@@ -68,19 +68,6 @@ impl Stage for Frf {
         seeded: false,
         source: "R. Pintelon, J. Schoukens, System Identification, 2012, ch. 2 and 4",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        if !(self.bandwidth_hz.is_finite() && self.bandwidth_hz > 0.0) {
-            return Err(StageError::new(format!("`bandwidth_hz` is {}, wanted above 0", self.bandwidth_hz)));
-        }
-        if self.half_width_bins > 1000 {
-            return Err(StageError::new(format!("`half_width_bins` is {}, wanted 0 to 1000", self.half_width_bins)));
-        }
-        if !(1e-12..=0.1).contains(&self.significance) {
-            return Err(StageError::new(format!("`significance` is {}, wanted 1e-12 to 0.1", self.significance)));
-        }
-        Ok(())
-    }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let (ensemble, pair) = (inputs.get(&ENSEMBLE)?, inputs.get(&PAIR)?);

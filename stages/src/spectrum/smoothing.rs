@@ -26,30 +26,31 @@ use afmid_kernels::spectra::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Smoothing {
-    /// `local-rational` or `local-polynomial`. Default: local-rational.
+    /// `local-rational` or `local-polynomial`.
     pub method: SmoothingMethod,
-    /// Bins on either side of each bin that are used (the most, for an adaptive polynomial). Default: 10, five widths
-    /// of a resonance two bins wide.
+    /// Bins on either side of each bin that are used (the most, for an adaptive polynomial). Why: five widths of a
+    /// resonance two bins wide.
     #[schemars(range(min = 1, max = 1000))]
     pub half_width_bins: usize,
-    /// Order of the rational's numerator. Default: 2.
+    /// Order of the rational's numerator.
     #[schemars(range(min = 0, max = 6))]
     pub numerator_order: usize,
-    /// Order of the rational's denominator. Default: 2, one resonance.
+    /// Order of the rational's denominator. Why: one resonance.
     #[schemars(range(min = 0, max = 6))]
     pub denominator_order: usize,
-    /// Transient in the rational: `auto` (for differences), `on` or `off`. Default: auto; tapered series have their own errors, which it does not describe.
+    /// Transient in the rational: `auto` (for differences), `on` or `off`. Why: tapered series have their own errors,
+    /// which it does not describe.
     pub transient: TransientChoice,
-    /// Order of the transient. Default: 1.
+    /// Order of the transient.
     #[schemars(range(min = 0, max = 6))]
     pub transient_order: usize,
-    /// Degree of the polynomial. Default: 2.
+    /// Degree of the polynomial.
     #[schemars(range(min = 0, max = 6))]
     pub degree: usize,
-    /// Standard errors by which neighbourhoods of the polynomial may disagree; 0 for a fixed neighbourhood. Default: 2.
+    /// Standard errors by which neighbourhoods of the polynomial may disagree; 0 for a fixed neighbourhood.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub adapt_sigma: f64,
-    /// Lines that do not belong to the transfer function. Default: none; the second harmonic of the first mode is the usual one.
+    /// Lines that do not belong to the transfer function. None: the second harmonic of the first mode is the usual one.
     pub lines: Vec<LineParams>,
 }
 
@@ -117,29 +118,6 @@ impl Stage for Smoothing {
         seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005; McKelvey and Guerin, IFAC SYSID 2012",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        let orders = [
-            ("numerator_order", self.numerator_order),
-            ("denominator_order", self.denominator_order),
-            ("transient_order", self.transient_order),
-            ("degree", self.degree),
-        ];
-        if let Some((name, order)) = orders.iter().find(|order| order.1 > 6) {
-            return Err(StageError::new(format!("`{name}` is {order}, wanted 0 to 6")));
-        }
-        if !(1..=1000).contains(&self.half_width_bins) {
-            return Err(StageError::new(format!("`half_width_bins` is {}, wanted 1 to 1000", self.half_width_bins)));
-        }
-        if !(0.0..=100.0).contains(&self.adapt_sigma) {
-            return Err(StageError::new(format!("`adapt_sigma` is {}, wanted 0 to 100", self.adapt_sigma)));
-        }
-        let positive = |value: f64| value.is_finite() && value > 0.0;
-        if let Some(at) = self.lines.iter().position(|l| !positive(l.frequency_hz) || !positive(l.half_width_hz)) {
-            return Err(StageError::new(format!("`lines[{at}]` wants a frequency and a half width above 0")));
-        }
-        Ok(())
-    }
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
         let etfe = inputs.get(&ETFE)?;

@@ -1,7 +1,7 @@
 //! The stage `spectrum.thermal`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table, Values,
+    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table, Values,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -32,18 +32,24 @@ use afmid_kernels::spectra::{AveragedDensity, Fitted, SeenThrough, ThermalFit, T
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Thermal {
-    /// The resonance lies above this, in Hz. Default: 0.
+    /// The resonance lies above this, in Hz.
+    #[schemars(range(min = 0.0))]
     pub lowest_hz: f64,
-    /// The resonance lies below this, in Hz. Default: none, the last bin.
+    /// The resonance lies below this, in Hz. Absent: the last bin.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub highest_hz: Option<f64>,
-    /// Only bins between these two frequencies are fitted, in Hz. Default: none, all but the first three and the last three of a spectrum that begins at zero.
+    /// Only bins between these two frequencies are fitted, in Hz. Absent: all but the first three and the last three of
+    /// a spectrum that begins at zero.
+    #[schemars(inner(range(min = 0.0)))]
     pub fitted_hz: Option<[f64; 2]>,
-    /// The window of the spectra: `auto` (from the input, or else from the correlation of neighbouring bins), `hann`, `rectangular`, or `none` for
-    /// a density that no window has widened. Default: auto.
+    /// The window of the spectra: `auto` (from the input, or else from the correlation of neighbouring bins), `hann`,
+    /// `rectangular`, or `none` for a density that no window has widened.
     pub window: SpectrumWindow,
-    /// 1/f noise: `auto` (kept where the likelihood gains more than chance does once in a hundred spectra), `on` or `off`. Default: auto.
+    /// 1/f noise: `auto` (kept where the likelihood gains more than chance does once in a hundred spectra), `on` or
+    /// `off`.
     pub flicker: Presence,
-    /// Probability that a spectrum without lines loses any bin to the search for lines, 0 (no search) to 0.5. Default: 0.01.
+    /// Probability that a spectrum without lines loses any bin to the search for lines, 0 (no search) to 0.5.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub line_false_alarm: f64,
 }
 
@@ -102,20 +108,15 @@ impl Stage for Thermal {
         source: "P. Whittle, Ark. Mat. 2 (1953) 423; A. M. Sykulski et al., Biometrika 106 (2019) 251",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        let highest = self.highest_hz.unwrap_or(f64::INFINITY);
-        if !(self.lowest_hz >= 0.0 && self.lowest_hz < highest) {
-            let found = format!("`lowest_hz` is {}, wanted from 0 and below `highest_hz`", self.lowest_hz);
-            return Err(StageError::new(found));
+    fn check(&self, faults: &mut Faults) {
+        if let Some(highest) = self.highest_hz {
+            let lowest = self.lowest_hz;
+            faults
+                .require(lowest < highest, || format!("`lowest_hz` is {lowest}, wanted below `highest_hz`, {highest}"));
         }
-        if let Some([from, to]) = self.fitted_hz.filter(|[from, to]| !(*from >= 0.0 && from < to)) {
-            return Err(StageError::new(format!("`fitted_hz` is [{from}, {to}], wanted two ascending frequencies")));
+        if let Some([from, to]) = self.fitted_hz {
+            faults.require(from < to, || format!("`fitted_hz` is [{from}, {to}], wanted two ascending frequencies"));
         }
-        if !(0.0..=0.5).contains(&self.line_false_alarm) {
-            let found = format!("`line_false_alarm` is {}, wanted 0 to 0.5", self.line_false_alarm);
-            return Err(StageError::new(found));
-        }
-        Ok(())
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -1,7 +1,7 @@
 //! The stage `spectrum.welch`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError,
+    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::calibration::FreeSettings;
-use crate::calibration::reading::{common_rate, push_free, read_blocks, read_free, within};
+use crate::calibration::reading::{common_rate, push_free, read_blocks, read_free};
 use crate::io::DENSITY;
 use afmid_kernels::calibration::Welch as Collector;
 use afmid_kernels::spectra::{RecordSpectrum, average_spectra};
@@ -34,7 +34,7 @@ use afmid_kernels::spectra::{RecordSpectrum, average_spectra};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Welch {
-    /// Samples per segment, even. Default: 16384: bins of 305 Hz at 5 MS/s, a quarter of the paper's first peak.
+    /// Samples per segment, even. Why: bins of 305 Hz at 5 MS/s, a quarter of the paper's first peak.
     #[schemars(range(min = 16, max = 4_194_304))]
     pub segment_samples: usize,
     /// What counts as a free stretch.
@@ -63,15 +63,9 @@ impl Stage for Welch {
         source: "P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        within("segment_samples", self.segment_samples as f64, 16.0, 4_194_304.0)?;
-        if self.segment_samples % 2 == 1 {
-            return Err(StageError::new(format!(
-                "`segment_samples` is {}, wanted an even number",
-                self.segment_samples
-            )));
-        }
-        self.free.check()
+    fn check(&self, faults: &mut Faults) {
+        let samples = self.segment_samples;
+        faults.require(samples % 2 == 0, || format!("`segment_samples` is {samples}, wanted an even number"));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -22,12 +22,12 @@ use afmid_kernels::spectra::{Taper, difference, taper, taper_gains};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Window {
-    /// `tukey`, `rectangular` or `hann`. Default: tukey, the paper's.
+    /// `tukey`, `rectangular` or `hann`. Why: the paper's.
     pub kind: WindowKind,
-    /// Tapered share of a Tukey window. Default: 0.1, the paper's.
+    /// Tapered share of a Tukey window. Why: the paper's.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub alpha: f64,
-    /// Take first differences before. Default: false, as in the paper; true with `kind = "rectangular"` is better.
+    /// Take first differences before. Why: as in the paper; true with `kind = "rectangular"` is better.
     pub differenced: bool,
 }
 
@@ -63,10 +63,6 @@ impl Stage for Window {
         seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Eq. 9; Harris, Proc. IEEE 66 (1978) 51",
     };
-
-    fn check(&self) -> Result<(), StageError> {
-        taper(self.taper(), 0).map(|_| ()).map_err(StageError::from_error)
-    }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let pair = inputs.get(&PAIR)?;

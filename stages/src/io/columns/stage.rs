@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::{Array, Caching, Context, Document, Example, InputFiles, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{
+    Array, Caching, Context, Document, Example, Faults, InputFiles, Port, Ports, Spec, Stage, StageError,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -42,26 +44,26 @@ pub struct Columns {
     pub inputs: Vec<Column>,
     /// Column of the output. Default: the second.
     pub output: Column,
-    /// Sample rate in Hz. Default: none: from `time`, or an LVM header. Where it is not known, 1 makes frequencies
-    /// cycles per sample.
+    /// Sample rate in Hz. Absent: from `time`, or an LVM header. Where it is not known, 1 makes frequencies cycles per
+    /// sample.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sample_rate_hz: Option<f64>,
-    /// Column of the time in seconds, for the sample rate; equally spaced to 1 %. Default: none.
+    /// Column of the time in seconds, for the sample rate; equally spaced to 1 %.
     pub time: Option<Column>,
-    /// What separates columns of a text file: `auto`, `comma`, `semicolon`, `tab`, `whitespace`. Default: auto.
+    /// What separates columns of a text file: `auto`, `comma`, `semicolon`, `tab`, `whitespace`.
     pub separator: Separator,
     /// Stretch to fit, as first sample (from 0) and one past the last. Default: the first half.
     pub identification: Option<[usize; 2]>,
     /// Stretch to judge on. Default: the second half.
     pub verification: Option<[usize; 2]>,
-    /// What is taken off inputs and output: `none`, `mean`, `line`; with the identification stretch's constants. Default: mean, since models
-    /// are about an operating point.
+    /// What is taken off inputs and output: `none`, `mean`, `line`; with the identification stretch's constants. Why:
+    /// since models are about an operating point.
     pub remove: Removal,
-    /// Values that stand for no value, such as -9999. Default: none.
+    /// Values that stand for no value, such as -9999.
     pub missing: Vec<f64>,
-    /// Unit of the inputs. Default: 1.
+    /// Unit of the inputs.
     pub input_unit: String,
-    /// Unit of the output. Default: 1.
+    /// Unit of the output.
     pub output_unit: String,
 }
 
@@ -101,27 +103,21 @@ impl Stage for Columns {
         source: "L. Ljung, System Identification, 1999; MathWorks, MAT-File Format, Level 5",
     };
 
-    fn check(&self) -> Result<(), StageError> {
-        if self.file.is_empty() {
-            return Err(StageError::new("`file` is empty, wanted a file such as \"data/flutter.dat\""));
-        }
-        if self.inputs.is_empty() {
-            return Err(StageError::new("`inputs` is empty, wanted at least one column"));
-        }
-        self.inputs.iter().try_for_each(|column| column.check("inputs"))?;
-        self.output.check("output")?;
-        self.time.iter().try_for_each(|column| column.check("time"))?;
-        if let Some(rate) = self.sample_rate_hz.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
-            return Err(StageError::new(format!("`sample_rate_hz` is {rate}, wanted above 0")));
-        }
+    fn check(&self, faults: &mut Faults) {
+        faults.require(!self.file.is_empty(), || {
+            "`file` is empty, wanted a file such as \"data/flutter.dat\"".to_owned()
+        });
+        faults.require(!self.inputs.is_empty(), || "`inputs` is empty, wanted at least one column".to_owned());
+        self.inputs.iter().for_each(|column| faults.take(column.check("inputs")));
+        faults.take(self.output.check("output"));
+        self.time.iter().for_each(|column| faults.take(column.check("time")));
         for (name, stretch) in [("identification", self.identification), ("verification", self.verification)] {
-            if let Some([first, end]) = stretch.filter(|[first, end]| first >= end) {
-                return Err(StageError::new(format!(
-                    "`{name}` is [{first}, {end}], wanted the first sample and one past the last"
-                )));
+            if let Some([first, end]) = stretch {
+                faults.require(first < end, || {
+                    format!("`{name}` is [{first}, {end}], wanted the first sample and one past the last")
+                });
             }
         }
-        Ok(())
     }
 
     fn sources(&self, base: &Path, _files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {

@@ -239,7 +239,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         stage(|s| s.sample_rate_hz = Some(0.0)),
         stage(|s| s.identification = Some([5, 5])),
     ] {
-        assert!(wrong.check().is_err());
+        assert!(afmid_pipeline::stage::check(&wrong).is_err());
     }
     assert!(stage(|s| s.file = "b.csv".to_owned()).sources(folder.path(), &InputFiles::new()).is_err());
 }

@@ -56,7 +56,7 @@ fn event(seed: u64) -> Vec<f64> {
 
 fn run(params: &str, inputs: &Ports) -> Result<(Value, Vec<String>), String> {
     let stage: RingdownFit = afmid_pipeline::toml::from_str(params).map_err(|error| error.to_string())?;
-    stage.check().map_err(|error| error.to_string())?;
+    afmid_pipeline::stage::check(&stage).map_err(|error| error.to_string())?;
     let context = Context::new(std::path::Path::new("."), 1, &NoProgress);
     let outputs = stage.run(inputs, &context).map_err(|error| error.to_string())?;
     Ok((outputs.get(&SUMMARY).unwrap().0.clone(), context.into_warnings()))

@@ -29,7 +29,7 @@ fn pair(seed: u64, noise_v: f64) -> Array {
 /// Runs a stage on one input; its first output.
 fn run<S: Stage>(stage: &S, port: &str, input: Artifact) -> Artifact {
     let cx = Context::new(std::path::Path::new("."), 3, &NoProgress);
-    stage.check().unwrap();
+    afmid_pipeline::stage::check(stage).unwrap();
     let mut inputs = Ports::new();
     inputs.insert(port, input);
     stage.run(&inputs, &cx).unwrap().artifact(S::SPEC.outputs[0].name).unwrap().clone()
@@ -119,5 +119,5 @@ fn parameters_out_of_range_are_refused() {
     ] {
         assert!(afmid_pipeline::stage::check(&wrong).is_err(), "{wrong:?}");
     }
-    assert!(usual().check().is_ok());
+    assert!(afmid_pipeline::stage::check(&usual()).is_ok());
 }
