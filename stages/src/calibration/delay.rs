@@ -36,7 +36,7 @@ pub struct Delay {
     /// The ringing is fitted from this long after the departure, in s.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub skip_s: f64,
-    /// Real detector poles in Hz, as far as they are known. Default: none.
+    /// Real detector poles in Hz, as far as they are known.
     #[schemars(inner(range(min = 1.0, max = 1e15)))]
     pub detector_poles_hz: Vec<f64>,
 }

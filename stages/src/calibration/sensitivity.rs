@@ -47,7 +47,7 @@ pub struct SlopeSensitivity {
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub contact_stiffness_n_per_m: Option<f64>,
     /// Stiffness of the lever in N/m, for the correction; absent: no correction here (`calibration.stiffness` corrects
-    /// both together). Default: absent.
+    /// both together).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: Option<f64>,
     /// What counts as a free stretch.

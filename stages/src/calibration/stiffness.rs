@@ -37,14 +37,14 @@ use afmid_kernels::spectra::{Fitted, ThermalFit};
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Stiffness")]
 pub struct ThermalStiffness {
-    /// Optical lever sensitivity in V/m, where `sensitivity` is not wired. Default: absent.
+    /// Optical lever sensitivity in V/m, where `sensitivity` is not wired.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: Option<f64>,
     /// Its standard error in V/m, not negative.
     #[schemars(range(min = 0.0))]
     pub sensitivity_std_v_per_m: f64,
     /// Contact stiffness in N/m under the contact slope, where the sensitivity is not corrected yet; absent: as
-    /// `sensitivity` says, or rigid. Default: absent.
+    /// `sensitivity` says, or rigid.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub contact_stiffness_n_per_m: Option<f64>,
     /// Temperature in K.
@@ -60,7 +60,7 @@ pub struct ThermalStiffness {
     /// Its standard uncertainty, not negative.
     #[schemars(range(min = 0.0))]
     pub mode_shape_factor_std: f64,
-    /// Real detector poles in Hz: they attenuate the peak (by 0.2 % for the paper's). Default: none.
+    /// Real detector poles in Hz: they attenuate the peak (by 0.2 % for the paper's).
     #[schemars(inner(range(min = 1.0, max = 1e15)))]
     pub detector_poles_hz: Vec<f64>,
     /// Where the peak is sought.

@@ -56,7 +56,7 @@ pub struct ReleaseDiagnose {
     /// Samples of it before the release.
     #[schemars(range(min = 8, max = 4096))]
     pub before_samples: usize,
-    /// Nominal poles of the detector in Hz, 1 to 8 of them. Default: 1.3, 1.9 and 2.4 MHz. They are estimated along.
+    /// Nominal poles of the detector in Hz, 1 to 8 of them. They are estimated along.
     #[schemars(inner(range(min = 1e-6)))]
     pub detector_poles_hz: Vec<f64>,
     /// Relative standard deviation of what is known of them.

@@ -49,7 +49,7 @@ pub struct SystemDiagnose {
     /// Most causes.
     #[schemars(range(min = 1, max = 20))]
     pub most_causes: usize,
-    /// Ids of the causes that are tried. Default: all for input and output.
+    /// Ids of the causes that are tried. Empty: all for input and output.
     pub candidates: Vec<String>,
 }
 

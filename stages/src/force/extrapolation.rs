@@ -25,10 +25,10 @@ use afmid_kernels::force::{Event, ExtrapolationSettings, Lines, Onset, OnsetSett
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Extrapolation {
-    /// Time left out between the line before and the onset, 0 to 1 s. Default: 10 us, ten times what t0 may be off.
+    /// Time left out between the line before and the onset, 0 to 1 s. Why: ten times what t0 may be off.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub guard_s: f64,
-    /// How far t0 may lie from the onset of the ensemble, above 0 to 1 s. Default: 10 us.
+    /// How far t0 may lie from the onset of the ensemble, above 0 to 1 s.
     #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub reach_s: f64,
     /// A departure counts above this many standard deviations of the mean about its line. Why: noise alone crosses it
@@ -43,7 +43,7 @@ pub struct Extrapolation {
     /// t0 in seconds after the ensemble's onset, moved to the next sample, instead of the largest causal one.
     #[schemars(range(min = -1.0, max = 1.0))]
     pub t0_s: Option<f64>,
-    /// Spring constant in N/m, for a force in newtons; it comes before the calibration's. Default: none.
+    /// Spring constant in N/m, for a force in newtons; it comes before the calibration's.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: Option<f64>,
     /// Optical lever sensitivity in volts per metre of deflection; it comes before the calibration's.

@@ -48,7 +48,7 @@ pub struct Reconstruction {
     /// How the force may move: `random-walk`, or `integrated-walk` for forces with smooth slopes. Why: it commits
     /// least.
     pub prior: ForcePrior,
-    /// Seconds before and after the event in which the force may jump, 0 to 1e-3 each; both 0 for no jumps. Default: 2e-6 and 4e-6: what t0 may be off, and a rupture
+    /// Seconds before and after the event in which the force may jump, 0 to 1e-3 each; both 0 for no jumps. Why: what t0 may be off, and a rupture
     /// of some microseconds.
     #[schemars(inner(range(min = 0.0, max = 1e-3)))]
     pub transition_s: [f64; 2],

@@ -56,7 +56,7 @@ pub struct Records {
     /// The files' format: `auto` for what their bytes and names say, `native`, `hdf5` (any layout), `tdms`, `npy`,
     /// `npz`, `jpk`, `nanoscope`, `uff`, `mat`, `ibw`, `text` (LVM, CSV), `raw`.
     pub format: String,
-    /// Samples per second in Hz, of files that state none. Default: none; an error where a file states another.
+    /// Samples per second in Hz, of files that state none. Absent: an error where a file states another.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sample_rate_hz: Option<f64>,
     /// Unit of the deflection in files that state none. Absent: an error where a file states another.

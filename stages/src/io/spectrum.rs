@@ -41,7 +41,7 @@ pub struct Spectrum {
     /// Factor from the stored density to `unit`^2/Hz. Why: 0.5 for a density that has been doubled once too often.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub scale: f64,
-    /// Independent spectra that were averaged. Default: the attribute `n_avg` of the density's dataset or of the file.
+    /// Independent spectra that were averaged. Absent: the attribute `n_avg` of the density's dataset or of the file.
     #[schemars(range(min = 1.0, max = 1e9))]
     pub averages: Option<f64>,
     /// Frequencies below are left out, in Hz.

@@ -39,14 +39,14 @@ use afmid_kernels::ringdown::{Estimate, ModeEstimate};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactFit {
-    /// Static stiffness of the lever at its tip in N/m, where `stiffness` is not wired. Default: absent.
+    /// Static stiffness of the lever at its tip in N/m, where `stiffness` is not wired.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: Option<f64>,
     /// Its relative standard error, where `stiffness` is not wired. Why: errors are then those of the ratio to k.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub stiffness_error: f64,
     /// What each free mode has of the tip's static compliance, ascending, their sum at most 1; the rest counts as
-    /// static. Their sum is kept, each is a start. Default: 0.9713, 0.0247, 0.0032, 0.0008, a beam loaded at its end.
+    /// static. Their sum is kept, each is a start. Why: a beam loaded at its end.
     #[schemars(inner(range(min = 1e-12, max = 1.0)))]
     pub tip_shares: Vec<f64>,
     /// Relative standard error of each share but the first, which makes up for the others; 0 takes them as they are.

@@ -24,8 +24,7 @@ use afmid_kernels::subspace::Era;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct EraEstimate {
-    /// Number of states; 0: at the largest gap between the decay's singular values, up to 40. Default: 11, as in the
-    /// paper.
+    /// Number of states; 0: at the largest gap between the decay's singular values, up to 40. Why: as in the paper.
     #[schemars(range(min = 0, max = 40))]
     pub order: usize,
     /// Which data: `all`, `identification` or `verification`.

@@ -52,7 +52,7 @@ pub struct Modes {
     /// Largest relative standard error of a mode's quality factor. Why: a line that does not decay is no mode.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_quality_factor_error: f64,
-    /// Points of the frequency response, logarithmic from `response_from_hz` to half the sample rate. Default: 2000.
+    /// Points of the frequency response, logarithmic from `response_from_hz` to half the sample rate.
     #[schemars(range(min = 2, max = 100_000))]
     pub response_points: usize,
     /// Lowest frequency of the response in Hz.

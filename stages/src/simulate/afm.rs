@@ -66,13 +66,13 @@ pub struct Afm {
     /// Static stiffness of the lever at its tip in N/m. Why: the paper's.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_per_m: f64,
-    /// Undamped natural frequencies of the modes in Hz, any number, above 0. Default: the paper's Table I.
+    /// Undamped natural frequencies of the modes in Hz, any number, above 0. Why: the paper's Table I.
     pub frequencies_hz: Vec<f64>,
-    /// Quality factors, one per mode, above 0.5. Default: the paper's Table I.
+    /// Quality factors, one per mode, above 0.5. Why: the paper's Table I.
     pub quality_factors: Vec<f64>,
-    /// Shares of the static tip displacement, one per mode, above 0, sum 1. Default: a beam loaded at its end.
+    /// Shares of the static tip displacement, one per mode, above 0, sum 1. Why: a beam loaded at its end.
     pub tip_shares: Vec<f64>,
-    /// Shares of the static detector signal, one per mode, sum 1. Default: the slope near the end of that beam.
+    /// Shares of the static detector signal, one per mode, sum 1. Why: the slope near the end of that beam.
     pub detector_shares: Vec<f64>,
     /// Contact stiffness in N/m.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -110,7 +110,7 @@ pub struct Afm {
     /// Optical lever sensitivity in V per m of static tip deflection. Why: 0.87 V at 330 nN.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: f64,
-    /// Real poles of the detector in Hz, any number, above 0. Default: 1.3, 1.9 and 2.4 MHz.
+    /// Real poles of the detector in Hz, any number, above 0.
     pub detector_poles_hz: Vec<f64>,
     /// Delay of the deflection channel in s, not negative.
     pub delay_s: f64,

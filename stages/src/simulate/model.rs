@@ -29,7 +29,7 @@ use super::lever_model::{LeverModel, MODEL};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AfmOfModel {
-    /// Folder for the records, relative to the config; created if missing. The truth is written beside it as `NAME.truth.json`. Default: `resimulated`.
+    /// Folder for the records, relative to the config; created if missing. The truth is written beside it as `NAME.truth.json`.
     pub out: PathBuf,
     /// Number of records; absent: as many as were diagnosed.
     #[schemars(range(min = 1))]
@@ -48,7 +48,7 @@ pub struct AfmOfModel {
     /// Optical lever sensitivity in V per m of static tip deflection.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sensitivity_v_per_m: f64,
-    /// Mean height of the surface on the ramp's scale (0 in its middle) in m. Default: -100e-9: room for strong loads above it.
+    /// Mean height of the surface on the ramp's scale (0 in its middle) in m. Why: room for strong loads above it.
     pub surface_m: f64,
     /// Cycles of the ramp per second in Hz. Why: with the range the paper's speed.
     #[schemars(extend("exclusiveMinimum" = 0.0))]

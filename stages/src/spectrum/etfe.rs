@@ -27,7 +27,7 @@ use afmid_kernels::spectra::{EndTreatment, EtfeSettings, Intersample, etfe};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Etfe {
-    /// Bins above are undefined, in Hz. Default: 1.2 MHz; beyond the paper's fourth mode the response falls below the
+    /// Bins above are undefined, in Hz. Why: beyond the paper's fourth mode the response falls below the
     /// noise.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub bandwidth_hz: f64,

@@ -32,7 +32,7 @@ use afmid_kernels::spectra::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Frf {
-    /// Bins above are undefined, in Hz. Default: 1.2 MHz, as for `spectrum.etfe`.
+    /// Bins above are undefined, in Hz. Why: as for `spectrum.etfe`.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub bandwidth_hz: f64,
     /// Bins on either side over which levels and variance are averaged. Why: with 24 events the variance is then good

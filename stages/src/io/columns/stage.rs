@@ -52,9 +52,9 @@ pub struct Columns {
     pub time: Option<Column>,
     /// What separates columns of a text file: `auto`, `comma`, `semicolon`, `tab`, `whitespace`.
     pub separator: Separator,
-    /// Stretch to fit, as first sample (from 0) and one past the last. Default: the first half.
+    /// Stretch to fit, as first sample (from 0) and one past the last. Absent: the first half.
     pub identification: Option<[usize; 2]>,
-    /// Stretch to judge on. Default: the second half.
+    /// Stretch to judge on. Absent: the second half.
     pub verification: Option<[usize; 2]>,
     /// What is taken off inputs and output: `none`, `mean`, `line`; with the identification stretch's constants. Why:
     /// since models are about an operating point.
