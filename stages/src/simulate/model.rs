@@ -124,10 +124,11 @@ impl Stage for AfmOfModel {
             cx.warn(format!("{} of `{}` is not known and simulated as zero", cause.assumed.join(", "), cause.id));
         }
         let afm = self.afm(self.records.unwrap_or(model.records)).of_model(&model)?;
-        let afm = Afm { seed: Some(self.seed.unwrap_or_else(|| cx.seed())), ..caught(afm) };
+        let afm = caught(afm);
         afmid_pipeline::stage::check(&afm).map_err(|error| {
             StageError::new(format!("with this model: {error}")).help("`afmid stages simulate.afm` lists the ranges")
         })?;
+        let afm = Afm { seed: Some(self.seed.unwrap_or_else(|| cx.seed())), ..afm };
         afm.run(&Ports::new(), cx)
     }
 
