@@ -7,12 +7,12 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::Duration;
 
-use afmid_kernels::calibration::Welch;
 use afmid_kernels::contact::{CoupledPoles, FreeLever, LOADED_BEAM_SHARES, contact_stiffness, coupled_poles};
 use afmid_kernels::grey::{Before, GreyOptions, GreyStart, fit_grey};
 use afmid_kernels::model::ModelError;
 use afmid_kernels::pem::{Experiment, PemOptions, refit};
 use afmid_kernels::ringdown::{DecayOptions, Estimate, ModeEstimate, RingdownOptions, fit_decay, fit_ringdowns};
+use afmid_kernels::signal::{Detrend, Welch};
 use afmid_kernels::spectra::{
     AveragedDensity, Bins, EndTreatment, EnsembleResponseSettings, EtfeSettings, Intersample, RationalSettings,
     SeenThrough, ThermalFitSettings, TransferEstimate, difference, ensemble_response, etfe, local_rational,
@@ -226,7 +226,7 @@ fn levels(criterion: &mut Criterion) {
 fn spectra(criterion: &mut Criterion) {
     let (rate, segment) = (SAMPLE_RATE_HZ, 8192);
     let series = thermal_motion(1 << 20);
-    let empty = Welch::new(segment, rate).expect("a collector");
+    let empty = Welch::new(segment, rate, Detrend::Mean).expect("a collector");
     let mut group = criterion.benchmark_group("thermal spectrum");
     group.bench_function("Welch, 1048576 samples, segments of 8192", |bench| {
         bench.iter(|| {
@@ -238,8 +238,8 @@ fn spectra(criterion: &mut Criterion) {
     let mut welch = empty.fresh();
     welch.push(&series);
     let found = welch.average().expect("segments");
-    let frequency_hz: Vec<f64> = (2..found.density_v2_per_hz.len()).map(|k| k as f64 * found.bin_hz).collect();
-    let density = &found.density_v2_per_hz[2..];
+    let frequency_hz: Vec<f64> = (2..found.density.len()).map(|k| k as f64 * found.bin_hz).collect();
+    let density = &found.density[2..];
     let settings = ThermalFitSettings { lowest_hz: 20e3, highest_hz: 100e3, line_false_alarm: 1e-3, flicker: None };
     group.bench_function("Whittle fit, 4095 bins", |bench| {
         bench.iter(|| {

@@ -13,7 +13,7 @@
 //! | [`simulate`] | a lever, a contact, a detector | records with their truth |
 //!
 //! From the ground up, each using only those before it:
-//! [`linear_algebra`], [`statistics`], [`effects`] - [`events`], [`calibration`], [`force`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`],
+//! [`linear_algebra`], [`signal`], [`statistics`], [`effects`] - [`optimise`] - [`events`], [`calibration`], [`force`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`],
 //! [`subspace`], [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`].
 //!
 //! ```
@@ -38,6 +38,7 @@ pub mod modes;
 pub mod optimise;
 pub mod pem;
 pub mod ringdown;
+pub mod signal;
 pub mod simulate;
 pub mod spectra;
 pub mod stabilisation;

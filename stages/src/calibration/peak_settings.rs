@@ -4,7 +4,7 @@ use afmid_pipeline::Faults;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use afmid_kernels::calibration::AveragedPeriodogram;
+use afmid_kernels::signal::AveragedPeriodogram;
 use afmid_kernels::spectra::{AveragedDensity, PeakSearch, SeenThrough, SpectrumError, ThermalFit, thermal_peak};
 
 /// Where the thermal peak is sought and how it is fitted.
@@ -35,7 +35,9 @@ impl Default for PeakSettings {
 impl PeakSettings {
     pub(super) fn check(&self, faults: &mut Faults) {
         let (samples, lowest, highest) = (self.segment_samples, self.lowest_hz, self.highest_hz);
-        faults.require(samples % 2 == 0, || format!("`peak.segment_samples` is {samples}, wanted an even number"));
+        faults.require(samples.is_multiple_of(2), || {
+            format!("`peak.segment_samples` is {samples}, wanted an even number")
+        });
         faults.require(highest > lowest, || {
             format!("`peak.highest_hz` is {highest}, wanted above `peak.lowest_hz`, {lowest}")
         });
@@ -45,7 +47,7 @@ impl PeakSettings {
     pub(super) fn fit(&self, spectrum: &AveragedPeriodogram) -> Result<ThermalFit, SpectrumError> {
         let density = AveragedDensity {
             frequency_hz: &spectrum.frequency_hz(),
-            density: &spectrum.density_v2_per_hz,
+            density: &spectrum.density,
             averages: spectrum.independent_segments(),
             through: Some(SeenThrough::Hann),
         };

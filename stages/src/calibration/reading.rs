@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use afmid_pipeline::{Record, StageError};
 
-use afmid_kernels::calibration::{Blocks, FreeRule, FreeStretches, Welch, free_stretches};
+use afmid_kernels::calibration::{Blocks, FreeRule, FreeStretches, free_stretches};
+use afmid_kernels::signal::Welch;
 
 /// Blocks read at once.
 const BLOCKS_AT_ONCE: usize = 256;

@@ -11,7 +11,8 @@ use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
 use super::reading::{common_rate, push_free, read_blocks, read_free};
 use super::sensitivity::SensitivitySummary;
-use afmid_kernels::calibration::{Estimate, SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, Welch, spring_constant};
+use afmid_kernels::calibration::{Estimate, SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, spring_constant};
+use afmid_kernels::signal::{Detrend, Welch};
 use afmid_kernels::spectra::{Fitted, ThermalFit};
 
 /// Spring constant from the thermal motion of mode 1 in the free stretches.
@@ -168,7 +169,7 @@ impl Stage for ThermalStiffness {
         let gauge = self.gauge(inputs.find(&SENSITIVITY)?)?;
         let rate = common_rate(records)?;
         let rule = self.free.rule(rate, self.peak.segment_samples);
-        let empty = Welch::new(self.peak.segment_samples, rate).map_err(StageError::from_error)?;
+        let empty = Welch::new(self.peak.segment_samples, rate, Detrend::Mean).map_err(StageError::from_error)?;
         cx.expect(records.len());
         let parts = records
             .par_iter()
@@ -193,7 +194,7 @@ impl Stage for ThermalStiffness {
         let model: Vec<f64> = frequencies.iter().map(|&f| if f > 0.0 { peak.density(f) } else { f64::NAN }).collect();
         let axis = Axis::new("frequency", "Hz", "frequency", frequencies);
         let spectrum = Array::over(vec![axis])
-            .with("density", "V^2/Hz", "one-sided power spectral density", &["frequency"], average.density_v2_per_hz)
+            .with("density", "V^2/Hz", "one-sided power spectral density", &["frequency"], average.density)
             .with("model", "V^2/Hz", "thermal peak of mode 1, white and 1/f noise", &["frequency"], model)
             .attribute("segments", average.segments);
         let summary = StiffnessSummary {

@@ -12,7 +12,8 @@ use serde_json::{Value, json};
 use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
 use super::reading::{common_rate, push_free, read_blocks, read_free};
-use afmid_kernels::calibration::{AveragedPeriodogram, Stability, Welch, stability};
+use afmid_kernels::calibration::{Stability, stability};
+use afmid_kernels::signal::{AveragedPeriodogram, Detrend, Welch};
 use afmid_kernels::spectra::ThermalFit;
 
 /// Noise control: thermal spectra of the free stretches record by record, to detect a change of the system.
@@ -76,7 +77,7 @@ impl Stage for Thermal {
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let records = &inputs.get(&RECORDS)?.records;
         let rate = common_rate(records)?;
-        let empty = Welch::new(self.peak.segment_samples, rate).map_err(StageError::from_error)?;
+        let empty = Welch::new(self.peak.segment_samples, rate, Detrend::Mean).map_err(StageError::from_error)?;
         cx.expect(records.len());
         let spectra = records
             .par_iter()
@@ -193,7 +194,7 @@ fn as_json(quantity: &str, unit: &str, test: &Stability) -> Value {
 fn spectra_array(spectra: &[Option<AveragedPeriodogram>], rate: f64, segment: usize) -> Array {
     let bins = segment / 2 + 1;
     let density = spectra.iter().flat_map(|spectrum| match spectrum {
-        Some(spectrum) => spectrum.density_v2_per_hz.clone(),
+        Some(spectrum) => spectrum.density.clone(),
         None => vec![f64::NAN; bins],
     });
     let frequencies = (0..bins).map(|k| k as f64 * rate / segment as f64).collect();

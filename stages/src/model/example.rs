@@ -6,7 +6,8 @@ use super::order::Order;
 use super::pem::{self, DataSet, Pem};
 use super::{bootstrap, modes, stabilisation, vector_fitting, zeros};
 use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, release};
-use crate::spectrum::{Etfe, Window, WindowKind};
+use crate::spectrum::{Etfe, Window};
+use afmid_kernels::signal::Taper;
 
 pub(super) fn pem() -> Vec<Example> {
     vec![Example {
@@ -99,7 +100,7 @@ pub(super) fn vector_fitting() -> Vec<Example> {
 /// Transfer function of the release, by the estimate over its differences.
 fn response() -> Result<Array, StageError> {
     let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
-    let window = Window { kind: WindowKind::Rectangular, differenced: true, ..Window::default() };
+    let window = Window { kind: Taper::Rectangular, differenced: true, ..Window::default() };
     let windowed = window.run(&named("pair", pair()), &cx)?;
     let windowed = windowed.get(&Port::<Array>::new(Window::SPEC.outputs[0].name, "", ""))?.clone();
     let etfe = Etfe { bandwidth_hz: 0.5 * SAMPLE_RATE_HZ, ..Etfe::default() }.run(&named("pair", windowed), &cx)?;

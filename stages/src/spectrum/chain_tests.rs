@@ -4,10 +4,11 @@ use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Axis, Context, Ports, Stage};
 use rustfft::num_complex::Complex64;
 
-use super::{Etfe, Smoothing, SmoothingMethod, Window, WindowKind};
+use super::{Etfe, Smoothing, SmoothingMethod, Window};
 use crate::ensemble::Average;
 use crate::fixture::{Lever, white_noise};
 use crate::force::Extrapolation;
+use afmid_kernels::signal::Taper;
 
 const SAMPLES: usize = 8192;
 const ONSET: usize = 1024;
@@ -67,7 +68,7 @@ fn truth(frequency_hz: f64, delay_samples: f64) -> Complex64 {
 
 #[test]
 fn differences_recover_the_lever_within_the_errors_that_they_state() {
-    let window = Window { kind: WindowKind::Rectangular, differenced: true, ..Window::default() };
+    let window = Window { kind: Taper::Rectangular, differenced: true, ..Window::default() };
     for seed in 1..4 {
         let (pair, smooth) = chain(seed, &window, &Smoothing::default());
         let t0 = pair.number("t0_sample").unwrap();

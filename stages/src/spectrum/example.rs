@@ -9,8 +9,9 @@ use rustfft::num_complex::Complex64;
 use super::etfe::{ETFE, Etfe};
 use super::periodogram::PERIODOGRAM;
 use super::smoothing::SMOOTHED;
-use super::window::{PAIR, WINDOWED, Window, WindowKind};
+use super::window::{PAIR, WINDOWED, Window};
 use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, release};
+use afmid_kernels::signal::Taper;
 
 const SAMPLES: usize = 4096;
 
@@ -36,7 +37,7 @@ pub(super) fn periodogram() -> Vec<Example> {
     vec![Example {
         title: "Where one resonance rings",
         params: "",
-        inputs: || prepared(WindowKind::Tukey, false).map(|pair| Ports::new().with(&PAIR, pair)),
+        inputs: || prepared(Taper::Tukey, false).map(|pair| Ports::new().with(&PAIR, pair)),
         expect: |outputs| {
             let array = outputs.get(&PERIODOGRAM).map_err(|error| error.to_string())?;
             let density = array.real("response").map_err(|error| error.to_string())?;
@@ -56,7 +57,7 @@ pub(super) fn etfe() -> Vec<Example> {
     vec![Example {
         title: "One resonance from its release",
         params: "bandwidth_hz = 400e3",
-        inputs: || prepared(WindowKind::Rectangular, true).map(|pair| Ports::new().with(&PAIR, pair)),
+        inputs: || prepared(Taper::Rectangular, true).map(|pair| Ports::new().with(&PAIR, pair)),
         expect: |outputs| {
             let worst = worst_error(outputs.get(&ETFE)).map_err(|error| error.to_string())?;
             // exp(-a t) at the end of the window is 1e-6; folding at 400 kHz is (f / (fs - f))^2 * 1.5 = 1 %
@@ -100,12 +101,12 @@ fn peak_kept(outputs: &Ports, limit: f64) -> Result<String, String> {
 }
 
 fn smoothing_inputs() -> Result<Ports, StageError> {
-    let windowed = prepared(WindowKind::Rectangular, true)?;
+    let windowed = prepared(Taper::Rectangular, true)?;
     let cx = Context::new(std::path::Path::new("."), 0, &NoProgress);
     Etfe { bandwidth_hz: 400e3, ..Etfe::default() }.run(&Ports::new().with(&PAIR, windowed), &cx)
 }
 
-fn prepared(kind: WindowKind, differenced: bool) -> Result<Array, StageError> {
+fn prepared(kind: Taper, differenced: bool) -> Result<Array, StageError> {
     let cx = Context::new(std::path::Path::new("."), 0, &NoProgress);
     let window = Window { kind, differenced, ..Window::default() };
     Ok(window.run(&Ports::new().with(&PAIR, pair()), &cx)?.get(&WINDOWED)?.clone())

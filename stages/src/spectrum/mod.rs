@@ -19,7 +19,7 @@ pub use periodogram::Periodogram;
 pub use smoothing::{LineParams, Smoothing, SmoothingMethod, TransientChoice};
 pub use thermal::{Presence, SpectrumWindow, Thermal};
 pub use welch::Welch;
-pub use window::{Window, WindowKind};
+pub use window::Window;
 
 use afmid_pipeline::Entry;
 

@@ -11,7 +11,7 @@ use serde_json::json;
 use crate::calibration::FreeSettings;
 use crate::calibration::reading::{common_rate, push_free, read_blocks, read_free};
 use crate::io::DENSITY;
-use afmid_kernels::calibration::Welch as Collector;
+use afmid_kernels::signal::{Detrend, Welch as Collector};
 use afmid_kernels::spectra::{RecordSpectrum, average_spectra};
 
 /// Power spectral density of all free stretches, with its uncertainty.
@@ -65,13 +65,13 @@ impl Stage for Welch {
 
     fn check(&self, faults: &mut Faults) {
         let samples = self.segment_samples;
-        faults.require(samples % 2 == 0, || format!("`segment_samples` is {samples}, wanted an even number"));
+        faults.require(samples.is_multiple_of(2), || format!("`segment_samples` is {samples}, wanted an even number"));
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let records = &inputs.get(&RECORDS)?.records;
         let rate = common_rate(records)?;
-        let empty = Collector::new(self.segment_samples, rate).map_err(StageError::from_error)?;
+        let empty = Collector::new(self.segment_samples, rate, Detrend::Mean).map_err(StageError::from_error)?;
         cx.expect(records.len());
         let spectra: Vec<Option<RecordSpectrum>> = records
             .par_iter()
@@ -157,7 +157,7 @@ impl Welch {
         let stretches = free.stretches.iter().filter(|stretch| stretch.len() >= self.segment_samples).count();
         let Ok(average) = collector.average() else { return Ok(None) };
         Ok(Some(RecordSpectrum {
-            density: average.density_v2_per_hz,
+            density: average.density,
             segments: average.segments,
             pairs: average.segments.saturating_sub(stretches),
         }))

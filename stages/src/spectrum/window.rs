@@ -23,7 +23,7 @@ use afmid_kernels::spectra::{Taper, difference, taper, taper_gains};
 #[serde(deny_unknown_fields, default)]
 pub struct Window {
     /// `tukey`, `rectangular` or `hann`. Why: the paper's.
-    pub kind: WindowKind,
+    pub kind: Taper,
     /// Tapered share of a Tukey window. Why: the paper's.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub alpha: f64,
@@ -31,21 +31,9 @@ pub struct Window {
     pub differenced: bool,
 }
 
-/// Kinds of windows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum WindowKind {
-    /// Flat with cosine edges.
-    Tukey,
-    /// All ones.
-    Rectangular,
-    /// Raised cosine.
-    Hann,
-}
-
 impl Default for Window {
     fn default() -> Self {
-        Self { kind: WindowKind::Tukey, alpha: 0.1, differenced: false }
+        Self { kind: Taper::Tukey, alpha: 0.1, differenced: false }
     }
 }
 
@@ -72,7 +60,7 @@ impl Stage for Window {
             );
         }
         let samples = pair.axis("time")?.values.len();
-        let window = taper(self.taper(), samples).map_err(StageError::from_error)?;
+        let window = taper(self.kind, self.alpha, samples).map_err(StageError::from_error)?;
         let t0 = pair.number("t0_sample")?;
         if let Some(&weight) = window.get(t0 as usize)
             && weight < 1.0
@@ -90,14 +78,9 @@ impl Stage for Window {
             values.iter_mut().zip(&window).for_each(|(v, w)| *v *= w);
         }
         let gains = taper_gains(&window);
-        let kind = match self.kind {
-            WindowKind::Tukey => "tukey",
-            WindowKind::Rectangular => "rectangular",
-            WindowKind::Hann => "hann",
-        };
         let result = result
             .with("window", "1", "window", &["time"], window)
-            .attribute("window_kind", kind)
+            .attribute("window_kind", self.kind.name())
             .attribute("differenced", self.differenced)
             .attribute("coherent_gain", gains.coherent)
             .attribute("noise_gain", gains.noise)
@@ -107,15 +90,5 @@ impl Stage for Window {
 
     fn examples() -> Vec<Example> {
         super::example::window()
-    }
-}
-
-impl Window {
-    fn taper(&self) -> Taper {
-        match self.kind {
-            WindowKind::Tukey => Taper::Tukey { alpha: self.alpha },
-            WindowKind::Rectangular => Taper::Rectangular,
-            WindowKind::Hann => Taper::Hann,
-        }
     }
 }

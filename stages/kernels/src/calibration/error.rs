@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::signal::SignalError;
+
 /// Why a calibration cannot be made.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CalibrationError {
@@ -37,6 +39,9 @@ pub enum CalibrationError {
         /// Its range, and why.
         wanted: &'static str,
     },
+    /// A spectrum that cannot be averaged.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
     /// A fit that did not settle.
     #[error("the fit of the thermal peak near {near_hz:.0} Hz did not settle: {reason}")]
     Fit {

@@ -2,9 +2,9 @@
 
 use super::error::CalibrationError;
 use super::sensitivity_model::Estimate;
-use super::welch::Welch;
 use crate::linear_algebra::definite_inverse;
 use crate::optimise::{Damping, Ending, Limits, Objective, Taken, Trial, damped_step, descend};
+use crate::signal::{Detrend, Welch};
 use faer::{Mat, c64};
 
 /// What is known of the onset and the delay. All times on the average's own axis, s.
@@ -304,9 +304,9 @@ fn strongest_line(time: &[f64], values: &[f64]) -> Result<f64, CalibrationError>
     let even = values.len() & !1;
     let (first, last) = (time.first().copied().unwrap_or(0.0), time.last().copied().unwrap_or(0.0));
     let rate = (time.len().max(2) - 1) as f64 / (last - first);
-    let mut welch = Welch::new(even, rate)?;
+    let mut welch = Welch::new(even, rate, Detrend::Mean)?;
     welch.push(values.get(..even).unwrap_or_default());
     let average = welch.average()?;
-    let bins = average.density_v2_per_hz.iter().enumerate().skip(2);
+    let bins = average.density.iter().enumerate().skip(2);
     Ok(bins.max_by(|a, b| a.1.total_cmp(b.1)).map_or(0.0, |(k, _)| k as f64 * average.bin_hz))
 }

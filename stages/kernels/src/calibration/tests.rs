@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::fixture::{Lever as ClosedForm, white_noise};
+use crate::signal::{AveragedPeriodogram, Detrend, Welch};
 use crate::simulate::{
     Adc, Contact, Detector, LinearSystem, Microscope, ModalLever, Mode, PhaseProblem, PiezoMonitor, Place,
     ReadoutNoise, Scatter, SimulatedRecord, Square, Target, TriangleRamp, archive_stream,
@@ -72,7 +73,7 @@ const SEARCH: PeakSearch = PeakSearch { lowest_hz: 10e3, highest_hz: 150e3, band
 fn peak_of(average: &AveragedPeriodogram, search: PeakSearch) -> ThermalFit {
     let spectrum = AveragedDensity {
         frequency_hz: &average.frequency_hz(),
-        density: &average.density_v2_per_hz,
+        density: &average.density,
         averages: average.independent_segments(),
         through: Some(SeenThrough::Hann),
     };
@@ -82,7 +83,7 @@ fn peak_of(average: &AveragedPeriodogram, search: PeakSearch) -> ThermalFit {
 #[test]
 fn calibration_finds_the_simulated_truth() {
     let records = archive(6, 11);
-    let mut welch = Welch::new(16_384, 5e6).unwrap();
+    let mut welch = Welch::new(16_384, 5e6, Detrend::Mean).unwrap();
     let mut stretches = Vec::new();
     let mut off_events = 0;
     for record in &records {
@@ -160,7 +161,7 @@ fn oscillator(samples: usize, frequency_hz: f64, quality: f64, rate: f64, seed: 
 fn thermal_peak_errors_are_honest() {
     let mut scores = Vec::new();
     for seed in 0..30 {
-        let mut welch = Welch::new(2048, 1e6).unwrap();
+        let mut welch = Welch::new(2048, 1e6, Detrend::Mean).unwrap();
         welch.push(&oscillator(120_000, 50e3, 60.0, 1e6, seed));
         let peak = peak_of(&welch.average().unwrap(), PeakSearch { lowest_hz: 10e3, highest_hz: 150e3, band: 2.0 });
         scores.push([
@@ -185,7 +186,7 @@ fn a_line_in_the_band_is_left_out() {
     for (k, x) in signal.iter_mut().enumerate() {
         *x += 0.4 * (std::f64::consts::TAU * 0.0613 * k as f64).sin();
     }
-    let mut welch = Welch::new(2048, 1e6).unwrap();
+    let mut welch = Welch::new(2048, 1e6, Detrend::Mean).unwrap();
     welch.push(&signal);
     let peak = peak_of(&welch.average().unwrap(), PeakSearch { lowest_hz: 10e3, highest_hz: 150e3, band: 2.0 });
     assert!(peak.lines.iter().any(|line| (line.frequency_hz - 61.3e3).abs() < 1e3), "{:?}", peak.lines);

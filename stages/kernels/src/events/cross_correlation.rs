@@ -1,16 +1,12 @@
 //! Normalised cross-correlation with a template, by FFT.
 
-use std::sync::Arc;
-
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use rustfft::num_complex::Complex64;
+use crate::signal::RealTransform;
 
 /// Slides templates of one length over signals of one length. Plans its FFTs once.
 pub struct CrossCorrelator {
     template_samples: usize,
     signal_samples: usize,
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
+    plan: RealTransform,
 }
 
 /// The best place of a template in a signal.
@@ -28,13 +24,7 @@ impl CrossCorrelator {
     /// For templates of `template_samples` in signals of `signal_samples`.
     pub fn new(template_samples: usize, signal_samples: usize) -> Self {
         let size = signal_samples.max(template_samples).max(2).next_power_of_two();
-        let mut planner = RealFftPlanner::new();
-        Self {
-            template_samples,
-            signal_samples,
-            forward: planner.plan_fft_forward(size),
-            inverse: planner.plan_fft_inverse(size),
-        }
+        Self { template_samples, signal_samples, plan: RealTransform::new(size) }
     }
 
     /// Where `template` fits `signal` best.
@@ -80,7 +70,7 @@ impl CrossCorrelator {
         if !shift.is_finite() || !energy.is_finite() || energy <= 0.0 {
             return None;
         }
-        let products = self.products(template.iter().map(|v| v - mean), signal.iter().map(|v| v - shift))?;
+        let products = self.products(template.iter().map(|v| v - mean), signal.iter().map(|v| v - shift));
         let (mut sum, mut squares) = (0.0, 0.0);
         for value in signal[..template.len()].iter().map(|v| v - shift) {
             sum += value;
@@ -100,29 +90,12 @@ impl CrossCorrelator {
         correlations.iter().any(|&value| value != 0.0).then_some(correlations)
     }
 
-    fn products(&self, template: impl Iterator<Item = f64>, signal: impl Iterator<Item = f64>) -> Option<Vec<f64>> {
-        let size = self.forward.len();
-        let spectrum_of = |values: &mut dyn Iterator<Item = f64>| -> Option<Vec<Complex64>> {
-            let mut padded: Vec<f64> = values.collect();
-            padded.resize(size, 0.0);
-            let mut spectrum = self.forward.make_output_vec();
-            self.forward.process(&mut padded, &mut spectrum).ok()?;
-            Some(spectrum)
-        };
-        let (mut template, mut signal) = (template, signal);
-        let template = spectrum_of(&mut template)?;
-        let mut product = spectrum_of(&mut signal)?;
-        for (s, t) in product.iter_mut().zip(&template) {
-            *s *= t.conj() / size as f64;
-        }
-        // the transform of real values is real at both ends: rounding must not say otherwise
-        if let [first, .., last] = &mut product[..] {
-            first.im = 0.0;
-            last.im = 0.0;
-        }
-        let mut products = self.inverse.make_output_vec();
-        self.inverse.process(&mut product, &mut products).ok()?;
-        Some(products)
+    fn products(&self, template: impl Iterator<Item = f64>, signal: impl Iterator<Item = f64>) -> Vec<f64> {
+        let size = self.plan.samples() as f64;
+        let template = self.plan.forward(template);
+        let mut product = self.plan.forward(signal);
+        product.iter_mut().zip(&template).for_each(|(s, t)| *s *= t.conj() / size);
+        self.plan.inverse(product)
     }
 }
 

@@ -3,11 +3,11 @@
 use crate::linear_algebra::{Svd, Symmetric, TallQr};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
-use realfft::num_complex::Complex64;
-use realfft::{RealFftPlanner, RealToComplex};
+use rustfft::num_complex::Complex64;
 
 use crate::linear_algebra::gram_of;
 use crate::model::ModelError;
+use crate::signal::RealTransform;
 
 /// Directions of the scaled Jacobian below this share are not determined by the data.
 const RANK_TOLERANCE: f64 = 1e-12;
@@ -91,29 +91,16 @@ fn by_rotation(columns: &[&[f64]]) -> Result<Mat<f64>, ModelError> {
 /// Fourier transforms of real signals, scaled by `1 / sqrt(N)`: bins 0 to N/2.
 #[derive(Default)]
 pub(crate) struct Transform {
-    plan: Option<(usize, Plan)>,
-    time: Vec<f64>,
-    scratch: Vec<Complex64>,
+    plan: Option<RealTransform>,
 }
-
-type Plan = std::sync::Arc<dyn RealToComplex<f64>>;
 
 impl Transform {
     /// Of one signal; signals of one length share their plan.
     pub fn of(&mut self, signal: &[f64]) -> Vec<Complex64> {
-        let plan = match self.plan.take() {
-            Some((length, plan)) if length == signal.len() => plan,
-            _ => RealFftPlanner::<f64>::new().plan_fft_forward(signal.len()),
-        };
+        let kept = self.plan.take().filter(|plan| plan.samples() == signal.len());
+        let plan = self.plan.insert(kept.unwrap_or_else(|| RealTransform::new(signal.len())));
         let scale = 1.0 / (signal.len() as f64).sqrt();
-        self.time.clear();
-        self.time.extend(signal.iter().map(|value| value * scale));
-        self.scratch.resize(plan.get_scratch_len(), Complex64::ZERO);
-        let mut spectrum = plan.make_output_vec();
-        // lengths are the plan's own: no error is possible
-        let _ = plan.process_with_scratch(&mut self.time, &mut spectrum, &mut self.scratch);
-        self.plan = Some((signal.len(), plan));
-        spectrum
+        plan.forward(signal.iter().map(|value| value * scale))
     }
 }
 

@@ -4,8 +4,8 @@ use super::fitted::Fitted;
 use super::modal_form::{Exponential, columns, weights};
 use super::normal::Freedom;
 use super::records::Records;
-use super::whittle::summed_periodograms;
 use crate::linear_algebra::cholesky;
+use crate::signal::summed_periodograms;
 
 impl Fitted {
     /// Mean tapered periodogram of what the fit has absorbed of the noise, per event.

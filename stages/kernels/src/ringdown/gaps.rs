@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use super::modal_form::signal;
 use super::search::Point;
-use super::whittle::autocorrelation;
 use crate::model::ModelError;
+use crate::signal::autocorrelation;
 
 /// Which samples of which event are missing; an event's mask is empty where none is.
 pub(super) struct Gaps {

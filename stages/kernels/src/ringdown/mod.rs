@@ -61,7 +61,7 @@ pub mod internals {
     pub use super::modal_form::{columns, shared, signal, weights};
     pub use super::noise_estimate::noise_of_stretches;
     pub use super::whitener::{LANES, Whitener};
-    pub use super::whittle::{hann, mean_periodogram};
+    pub use super::whittle::hann;
 }
 
 pub use choice::{CountedRingdown, HELD_OUT_EVENTS, ModeCount, fit_counted_ringdowns};

@@ -8,7 +8,8 @@ use super::noise::{RingdownNoise, ThermalMode, Wander};
 use super::normal::Freedom;
 use super::records::Records;
 use super::search::Point;
-use super::whittle::{autocorrelation, expected_parts, hann, mean_periodogram, variances};
+use super::whittle::{expected_parts, hann, variances};
+use crate::signal::{autocorrelation, mean_periodogram};
 
 /// Thermal motion of every mode and a ladder of wander from the window's own frequency upwards, a decade apart.
 fn parts_of(exponentials: &[Exponential], white: f64, interval_s: f64, samples: usize) -> RingdownNoise {

@@ -12,8 +12,9 @@ use super::noise_estimate::residuals;
 use super::normal::Freedom;
 use super::records::Records;
 use super::search::Point;
-use super::whittle::{expected_parts, hann, mean_periodogram};
+use super::whittle::{expected_parts, hann};
 use crate::model::ModelError;
+use crate::signal::mean_periodogram;
 
 /// Events below which their scatter says too little.
 const SANDWICH_EVENTS: usize = 8;

@@ -8,10 +8,11 @@ use super::modal_form::{EventParameters, Exponential, columns, from_shared, shar
 use super::noise::{RingdownNoise, ThermalMode, Wander};
 use super::start::decay_poles;
 use super::whitener::Whitener;
-use super::whittle::{autocorrelation, expected_parts, hann, mean_periodogram, variances};
+use super::whittle::{expected_parts, hann, variances};
 use super::{NoiseSource, RingdownOptions, fit_ringdowns};
 use crate::fixture::{Lever, white_noise};
 use crate::model::ModelError;
+use crate::signal::{autocorrelation, mean_periodogram};
 
 pub(super) const INTERVAL_S: f64 = 2e-7;
 

@@ -1,49 +1,17 @@
 //! Noise variances from what the events' fits leave.
 
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
 
 use super::noise::RingdownNoise;
+use crate::signal::{RealTransform, hann as raised_cosine};
 
 /// Hann taper of unit mean square.
 pub fn hann(samples: usize) -> Vec<f64> {
     let scale = (8.0f64 / 3.0).sqrt();
-    (0..samples)
-        .map(|k| scale * 0.5 * (1.0 - (std::f64::consts::TAU * (k as f64 + 0.5) / samples as f64).cos()))
-        .collect()
+    raised_cosine(samples, 0.5).into_iter().map(|w| scale * w).collect()
 }
 
-/// Mean of the tapered periodograms `|FFT|^2 / N` of several signals, bins 0 to N/2.
-pub fn mean_periodogram(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f64> {
-    let mut sum = summed_periodograms(signals, taper);
-    sum.iter_mut().for_each(|p| *p /= signals.len().max(1) as f64);
-    sum
-}
-
-/// Sum of the tapered periodograms, in the signals' order.
-pub(super) fn summed_periodograms(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f64> {
-    let n = taper.len();
-    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n);
-    let all: Vec<Vec<f64>> = signals
-        .par_iter()
-        .map(|signal| {
-            let mut tapered: Vec<f64> = signal.iter().zip(taper).map(|(v, w)| v * w).collect();
-            let mut spectrum = fft.make_output_vec();
-            // lengths are the plan's own: it cannot fail
-            if fft.process(&mut tapered, &mut spectrum).is_err() {
-                return vec![0.0; n / 2 + 1];
-            }
-            spectrum.iter().map(|s| s.norm_sqr() / n as f64).collect()
-        })
-        .collect();
-    let mut sum = vec![0.0; n / 2 + 1];
-    for one in all {
-        sum.iter_mut().zip(one).for_each(|(s, p)| *s += p);
-    }
-    sum
-}
-
-/// Expected tapered periodogram of each part of the noise at unit variance: parts x bins; `lag_weights`: [`autocorrelation`] of the taper, gaps cut out
+/// Expected tapered periodogram of each part of the noise at unit variance: parts x bins; `lag_weights`: [`autocorrelation`](crate::signal::autocorrelation) of the taper, gaps cut out
 /// of it.
 ///
 /// # Method
@@ -52,37 +20,15 @@ pub(super) fn summed_periodograms(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f6
 /// A. M. Sykulski, S. C. Olhede, A. P. Guillaumin, J. M. Lilly, J. J. Early, Biometrika 106 (2019) 251.
 pub(super) fn expected_parts(noise: &RingdownNoise, interval_s: f64, lag_weights: &[f64]) -> Vec<Vec<f64>> {
     let n = lag_weights.len();
-    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let plan = RealTransform::new(n);
     (0..noise.parts())
         .into_par_iter()
         .map(|part| {
             let at = |lag: usize| noise.unit_covariance(part, lag as f64 * interval_s) * lag_weights[lag];
-            let mut folded: Vec<f64> = (0..n).map(|lag| if lag == 0 { at(0) } else { at(lag) + at(n - lag) }).collect();
-            let mut spectrum = fft.make_output_vec();
-            if fft.process(&mut folded, &mut spectrum).is_err() {
-                return vec![0.0; n / 2 + 1];
-            }
-            spectrum.iter().map(|s| s.re.max(0.0)).collect()
+            let folded = (0..n).map(|lag| if lag == 0 { at(0) } else { at(lag) + at(n - lag) });
+            plan.forward(folded).iter().map(|bin| bin.re.max(0.0)).collect()
         })
         .collect()
-}
-
-/// `sum_k w(k) w(k + lag) / N`.
-pub(super) fn autocorrelation(taper: &[f64]) -> Vec<f64> {
-    let n = taper.len();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, backward) = (planner.plan_fft_forward(2 * n), planner.plan_fft_inverse(2 * n));
-    let mut padded: Vec<f64> = taper.iter().copied().chain(std::iter::repeat_n(0.0, n)).collect();
-    let mut spectrum = forward.make_output_vec();
-    let mut lags = vec![0.0; 2 * n];
-    let done = forward.process(&mut padded, &mut spectrum).is_ok();
-    spectrum.iter_mut().for_each(|s| *s = num_complex::Complex64::new(s.norm_sqr(), 0.0));
-    if !done || backward.process(&mut spectrum, &mut lags).is_err() {
-        return vec![1.0; n];
-    }
-    lags.truncate(n);
-    lags.iter_mut().for_each(|lag| *lag /= (2 * n * n) as f64);
-    lags
 }
 
 /// Iterations of the scoring: five are usual.

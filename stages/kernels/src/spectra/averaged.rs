@@ -82,8 +82,8 @@ pub fn average_spectra(records: &[RecordSpectrum]) -> Result<AveragedSpectrum, S
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::Welch;
     use crate::fixture::white_noise;
+    use crate::signal::{Detrend, Welch};
 
     #[test]
     fn both_errors_are_the_scatter_over_seeds() {
@@ -92,11 +92,11 @@ mod tests {
         for seed in 0..seeds {
             let records: Vec<RecordSpectrum> = (0..stretches)
                 .map(|record| {
-                    let mut welch = Welch::new(64, 1.0).unwrap();
+                    let mut welch = Welch::new(64, 1.0, Detrend::Mean).unwrap();
                     welch.push(&white_noise(samples, 1.0, seed * 100 + record));
                     let average = welch.average().unwrap();
                     let pairs = average.segments - 1;
-                    RecordSpectrum { density: average.density_v2_per_hz, segments: average.segments, pairs }
+                    RecordSpectrum { density: average.density, segments: average.segments, pairs }
                 })
                 .collect();
             let got = average_spectra(&records).unwrap();

@@ -1,9 +1,9 @@
 //! The discrete Fourier transform of real series.
 
-use realfft::RealFftPlanner;
-use rustfft::num_complex::Complex64;
+use num_complex::Complex64;
 
 use super::error::finite;
+use crate::signal::RealTransform;
 use crate::spectra::error::SpectrumError;
 
 /// Transforms series of one length with one plan.
@@ -25,19 +25,16 @@ pub fn transform(series: &[&[f64]]) -> Result<Vec<Vec<Complex64>>, SpectrumError
     if n < 2 {
         return Err(SpectrumError::TooShort { got: n, wanted: 2 });
     }
-    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let plan = RealTransform::new(n);
     let scale = 1.0 / (n as f64).sqrt();
     series
         .iter()
         .map(|x| {
             finite("the series", x)?;
-            let mut time = x.to_vec();
-            let mut bins = plan.make_output_vec();
-            plan.process(&mut time, &mut bins).map_err(|_| SpectrumError::Lengths {
-                name: "a series",
-                got: x.len(),
-                wanted: n,
-            })?;
+            if x.len() != n {
+                return Err(SpectrumError::Lengths { name: "a series", got: x.len(), wanted: n });
+            }
+            let mut bins = plan.forward(x.iter().copied());
             bins.iter_mut().for_each(|b| *b *= scale);
             Ok(bins)
         })

@@ -45,10 +45,10 @@ mod neighbours;
 mod power;
 mod ratio;
 mod seen_oscillator;
-mod taper;
 mod thermal_fit;
 mod thermal_peak;
 
+pub use crate::signal::{Taper, TaperGains, taper, taper_gains};
 pub use averaged::{AveragedSpectrum, RecordSpectrum, average_spectra};
 pub use ensemble_response::{EnsembleResponse, EnsembleResponseSettings, ensemble_response};
 pub use error::SpectrumError;
@@ -59,6 +59,5 @@ pub use neighbours::{Bins, Smoothed, SuppressedLine};
 pub use power::{PowerSpectrum, power_spectrum};
 pub use ratio::{EndTreatment, EtfeSettings, Intersample, TransferEstimate, difference, etfe};
 pub use seen_oscillator::SeenThrough;
-pub use taper::{Taper, TaperGains, taper, taper_gains};
 pub use thermal_fit::{AveragedDensity, Fitted, FoundLine, ThermalFit, ThermalFitSettings, thermal_fit};
 pub use thermal_peak::{PeakSearch, thermal_peak};

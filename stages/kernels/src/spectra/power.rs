@@ -51,7 +51,7 @@ pub fn power_spectrum(series: &[f64], window_power: f64, sample_rate_hz: f64) ->
 mod tests {
     use super::*;
     use crate::fixture::white_noise;
-    use crate::spectra::taper::{Taper, taper};
+    use crate::signal::{Taper, taper};
 
     #[test]
     fn the_integral_is_the_mean_square() {
@@ -67,8 +67,8 @@ mod tests {
 
     #[test]
     fn white_noise_has_its_density_under_any_window() {
-        for kind in [Taper::Rectangular, Taper::Hann, Taper::Tukey { alpha: 0.1 }] {
-            let w = taper(kind, 4096).unwrap();
+        for kind in [Taper::Rectangular, Taper::Hann, Taper::Tukey] {
+            let w = taper(kind, 0.1, 4096).unwrap();
             let mut mean = 0.0;
             for seed in 0..8 {
                 let x: Vec<f64> = white_noise(4096, 1e-3, seed).iter().zip(&w).map(|(x, w)| x * w).collect();

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use realfft::RealFftPlanner;
+use afmid_kernels::signal::{Detrend, Welch};
 
 /// Mean periodogram of one record.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,40 +43,13 @@ pub(super) fn line_spectra(samples: &[f64], stretches: &[Range<usize>], interval
 
 /// Mean of half-overlapping Hann periodograms, each less its own straight line (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70).
 fn mean_periodogram(samples: &[f64], stretches: &[Range<usize>], length: usize, interval_s: f64) -> Option<Spectrum> {
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
-    let taper: Vec<f64> =
-        (0..length).map(|k| 0.5 - 0.5 * (std::f64::consts::TAU * k as f64 / length as f64).cos()).collect();
-    let scale = 2.0 * interval_s / taper.iter().map(|w| w * w).sum::<f64>();
-    let (mut buffer, mut bins) = (transform.make_input_vec(), transform.make_output_vec());
-    let mut scratch = transform.make_scratch_vec();
-    let mut sum = vec![0.0; bins.len()];
-    let mut windows = 0usize;
+    let mut welch = Welch::new(length, 1.0 / interval_s, Detrend::Line).ok()?;
     for stretch in stretches {
-        let part = samples.get(stretch.clone()).unwrap_or(&[]);
-        for start in (0..(part.len() + 1).saturating_sub(length)).step_by(length / 2) {
-            detrended(&part[start..start + length], &taper, &mut buffer);
-            if !buffer.iter().all(|value| value.is_finite())
-                || transform.process_with_scratch(&mut buffer, &mut bins, &mut scratch).is_err()
-            {
-                continue;
-            }
-            sum.iter_mut().zip(&bins).for_each(|(sum, bin)| *sum += bin.norm_sqr());
-            windows += 1;
-        }
+        welch.push(samples.get(stretch.clone()).unwrap_or(&[]));
     }
-    let density = sum.iter().map(|sum| (sum * scale / windows as f64) as f32).collect();
-    (windows > 0).then_some(Spectrum { length, windows, density })
-}
-
-/// The values less their straight line, times the taper.
-fn detrended(values: &[f64], taper: &[f64], into: &mut [f64]) {
-    let n = values.len() as f64;
-    let (middle, mean) = (0.5 * (n - 1.0), values.iter().sum::<f64>() / n);
-    let moment: f64 = values.iter().enumerate().map(|(k, value)| (k as f64 - middle) * value).sum();
-    let slope = moment * 12.0 / (n * (n * n - 1.0));
-    for (k, ((out, value), weight)) in into.iter_mut().zip(values).zip(taper).enumerate() {
-        *out = (value - mean - slope * (k as f64 - middle)) * weight;
-    }
+    let average = welch.average().ok()?;
+    let density = average.density.iter().map(|value| *value as f32).collect();
+    Some(Spectrum { length, windows: average.segments, density })
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What a fit leaves: residuals in volts, whitened, and over time and frequency.
 
+use afmid_kernels::signal::RealTransform;
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
 
 use super::problem::Problem;
 use super::state::State;
@@ -93,15 +93,9 @@ const BAND: usize = 8;
 /// Model: a stretch of n samples has n/2 - 1 independent periodogram values, each chi-square with two degrees of freedom.
 pub fn tiles(values: &[f64], before: usize, interval_s: f64) -> Vec<Tile> {
     let mut out = Vec::new();
-    let mut planner = RealFftPlanner::<f64>::new();
     let (mut from, mut length) = (0usize, 256usize);
     while from + length <= values.len() {
-        let fft = planner.plan_fft_forward(length);
-        let mut input = values[from..from + length].to_vec();
-        let mut spectrum = fft.make_output_vec();
-        if fft.process(&mut input, &mut spectrum).is_err() {
-            break;
-        }
+        let spectrum = RealTransform::new(length).forward(values[from..from + length].iter().copied());
         // chi-square with two degrees of freedom
         let power: Vec<f64> = spectrum.iter().map(|z| 2.0 * z.norm_sqr() / length as f64).collect();
         let resolution = 1.0 / (length as f64 * interval_s);
@@ -133,13 +127,7 @@ pub fn peaks(values: &[f64], interval_s: f64, count: usize) -> Vec<f64> {
     if length < 16 {
         return Vec::new();
     }
-    let mut planner = RealFftPlanner::<f64>::new();
-    let fft = planner.plan_fft_forward(length);
-    let mut input = values[..length].to_vec();
-    let mut spectrum = fft.make_output_vec();
-    if fft.process(&mut input, &mut spectrum).is_err() {
-        return Vec::new();
-    }
+    let spectrum = RealTransform::new(length).forward(values[..length].iter().copied());
     // resonances that are worth a mode are wider than a bin: three together
     let power: Vec<f64> = spectrum.windows(3).map(|w| w.iter().map(|z| z.norm_sqr()).sum()).collect();
     let mut order: Vec<usize> = (1..power.len().saturating_sub(1)).collect();

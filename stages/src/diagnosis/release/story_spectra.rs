@@ -1,8 +1,8 @@
 //! Spectra of the mean residual before and after, against what noise leaves in a mean of so many events.
 
+use afmid_kernels::signal::RealTransform;
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex64;
+use rustfft::num_complex::Complex64;
 
 use super::residuals::common;
 use super::state::State;
@@ -53,12 +53,7 @@ pub(super) fn mean_spectra(
 }
 
 pub(super) fn transform(values: &[f64]) -> Vec<Complex64> {
-    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(values.len());
-    let mut out = fft.make_output_vec();
-    match fft.process(&mut values.to_vec(), &mut out) {
-        Ok(()) => out,
-        Err(_) => Vec::new(),
-    }
+    RealTransform::new(values.len()).forward(values.iter().copied())
 }
 
 fn smoothed(values: &[f64]) -> Vec<f64> {

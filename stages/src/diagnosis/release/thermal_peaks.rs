@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use afmid_kernels::ringdown::internals::{hann, mean_periodogram};
+use afmid_kernels::ringdown::internals::hann;
+use afmid_kernels::signal::mean_periodogram;
 use afmid_kernels::statistics::gamma_tail;
 
 /// A resonance that the lever's thermal motion shows.

@@ -1,7 +1,7 @@
 //! Which causes could make what a model leaves: a score test aimed at each.
 
+use afmid_kernels::signal::{RealTransform, hann};
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
 
 use super::bench::Bench;
 use super::blocks::Blocks;
@@ -130,14 +130,8 @@ fn scene(bench: &Bench, fit: &Fit) -> Scene {
 /// Frequencies of the largest peaks of the Hann periodogram, each by a parabola through its logarithms.
 pub(super) fn peaks(residual: &[f64], interval_s: f64) -> Vec<f64> {
     let n = residual.len();
-    let hann = |k: usize| 0.5 - 0.5 * (2.0 * std::f64::consts::PI * (k as f64 + 0.5) / n as f64).cos();
-    let mut tapered: Vec<f64> = residual.iter().enumerate().map(|(k, r)| r * hann(k)).collect();
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
-    let mut spectrum = transform.make_output_vec();
-    if transform.process(&mut tapered, &mut spectrum).is_err() {
-        return Vec::new();
-    }
-    let power: Vec<f64> = spectrum.iter().map(|z| z.norm_sqr()).collect();
+    let tapered = residual.iter().zip(hann(n, 0.5)).map(|(r, w)| r * w);
+    let power = RealTransform::new(n).power(tapered);
     let mut tops: Vec<usize> = (2..power.len().saturating_sub(2))
         .filter(|&i| power[i] > power[i - 1] && power[i] >= power[i + 1] && power[i] > 0.0)
         .collect();

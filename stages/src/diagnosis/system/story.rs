@@ -3,7 +3,7 @@
 use super::bench::{Bench, Part, Recorded};
 use super::model::Model;
 use super::validation::free_run_part;
-use afmid_kernels::calibration::Welch;
+use afmid_kernels::signal::{Detrend, Welch};
 
 /// Errors of the linear and of the extended model.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,7 +99,7 @@ impl Errors {
         // missing samples count as none: a gap is short, or the spectrum says little
         let density = |values: &[f64]| {
             let whole: Vec<f64> = values.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect();
-            let mut welch = Welch::new(segment, 1.0 / interval_s).ok()?;
+            let mut welch = Welch::new(segment, 1.0 / interval_s, Detrend::Mean).ok()?;
             welch.push(&whole);
             welch.average().ok()
         };
@@ -109,10 +109,10 @@ impl Errors {
             return Spectra { frequency_hz: none(), output: none(), before: none(), after: none() };
         };
         Spectra {
-            frequency_hz: (0..output.density_v2_per_hz.len()).map(|k| k as f64 * output.bin_hz).collect(),
-            output: output.density_v2_per_hz,
-            before: before.density_v2_per_hz,
-            after: after.density_v2_per_hz,
+            frequency_hz: (0..output.density.len()).map(|k| k as f64 * output.bin_hz).collect(),
+            output: output.density,
+            before: before.density,
+            after: after.density,
         }
     }
 }

@@ -5,7 +5,8 @@ use afmid_pipeline::{Array, Artifact, Axis, Context, Ports, Stage, StateSpace};
 
 use crate::fixture::{Lever, white_noise};
 use crate::model::{Modes, ResponseWeight, VectorFittingEstimate};
-use crate::spectrum::{Etfe, Smoothing, TransientChoice, Window, WindowKind};
+use crate::spectrum::{Etfe, Smoothing, TransientChoice, Window};
+use afmid_kernels::signal::Taper;
 
 const SAMPLES: usize = 4096;
 const T0: usize = 500;
@@ -36,7 +37,7 @@ fn run<S: Stage>(stage: &S, port: &str, input: Artifact) -> Artifact {
 }
 
 fn etfe(seed: u64, noise_v: f64, differenced: bool, bandwidth_hz: f64) -> Artifact {
-    let kind = if differenced { WindowKind::Rectangular } else { WindowKind::Tukey };
+    let kind = if differenced { Taper::Rectangular } else { Taper::Tukey };
     let window = Window { kind, differenced, ..Window::default() };
     let windowed = run(&window, "pair", Artifact::Array(std::sync::Arc::new(pair(seed, noise_v))));
     run(&Etfe { bandwidth_hz, ..Etfe::default() }, "pair", windowed)

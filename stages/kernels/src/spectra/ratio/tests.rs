@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::fixture::{Lever, white_noise};
+use crate::signal::{Taper, taper};
 use crate::spectra::local_rational::{RationalSettings, local_rational};
 use crate::spectra::neighbours::Bins;
-use crate::spectra::taper::{Taper, taper};
 
 const N: usize = 8192;
 const T0: usize = 1024;
@@ -57,7 +57,7 @@ fn differenced() -> TransferEstimate {
 
 #[test]
 fn the_papers_window_is_good_to_two_per_cent_at_resonances() {
-    let w = taper(Taper::Tukey { alpha: 0.1 }, N).unwrap();
+    let w = taper(Taper::Tukey, 0.1, N).unwrap();
     let (u, y) = (multiply(&step(N), &w), multiply(&release(), &w));
     let got = etfe(&u, &y, &[0.0; N], settings(EndTreatment::Windowed)).unwrap();
     // measured: 1.5e-2, 4.0e-3, 8.4e-4, 4.0e-4; the taper ahead of the event acts like 1 / f^2
@@ -122,7 +122,7 @@ fn a_held_input_lags_by_half_a_sample() {
 #[test]
 fn the_quasi_static_gain_is_divided_out() {
     let louder: Vec<f64> = release().iter().map(|y| 3.7 * y).collect();
-    let w = taper(Taper::Tukey { alpha: 0.1 }, N).unwrap();
+    let w = taper(Taper::Tukey, 0.1, N).unwrap();
     let windowed =
         etfe(&multiply(&step(N), &w), &multiply(&louder, &w), &[0.0; N], settings(EndTreatment::Windowed)).unwrap();
     let offset: Vec<f64> = louder.iter().map(|y| y + 2.0).collect();
@@ -137,7 +137,7 @@ fn the_quasi_static_gain_is_divided_out() {
 
 #[test]
 fn the_variance_is_that_of_repeated_measurements() {
-    let w = taper(Taper::Tukey { alpha: 0.1 }, N).unwrap();
+    let w = taper(Taper::Tukey, 0.1, N).unwrap();
     let sigma = 2.5e-4;
     let trials = 60;
     for ends in [EndTreatment::Windowed, EndTreatment::Differenced] {

@@ -5,8 +5,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Gamma};
 
 use super::*;
-use crate::calibration::Welch;
 use crate::fixture::white_noise;
+use crate::signal::{Detrend, Welch};
 
 const AVERAGES: f64 = 32.0;
 
@@ -72,11 +72,11 @@ fn a_resonance_of_two_bins_seen_through_hann_segments_is_unbiased() {
     let seeds = 60;
     for seed in 0..seeds {
         let x = oscillator(f0, quality, rate, 160_000, seed);
-        let mut welch = Welch::new(segment, rate).unwrap();
+        let mut welch = Welch::new(segment, rate, Detrend::Mean).unwrap();
         welch.push(&x);
         let average = welch.average().unwrap();
         let n = average.segments as f64;
-        let p = &average.density_v2_per_hz[3..160];
+        let p = &average.density[3..160];
         let f: Vec<f64> = (3..160).map(|k| k as f64 * average.bin_hz).collect();
         let data = AveragedDensity {
             frequency_hz: &f,

@@ -1,21 +1,33 @@
 //! Windows in time.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
-use crate::spectra::error::SpectrumError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// A window.
-#[derive(Debug, Clone, Copy, PartialEq)]
+use super::error::SignalError;
+
+/// Kinds of windows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Taper {
-    /// Flat with cosine edges; `alpha` is the tapered share of the length, half of it at either end.
-    Tukey {
-        /// Zero (rectangular) to one (Hann).
-        alpha: f64,
-    },
+    /// Flat with cosine edges.
+    Tukey,
     /// All ones.
     Rectangular,
     /// Raised cosine.
     Hann,
+}
+
+impl Taper {
+    /// Its name in configs and results.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tukey => "tukey",
+            Self::Rectangular => "rectangular",
+            Self::Hann => "hann",
+        }
+    }
 }
 
 /// What a window does to amplitudes and powers.
@@ -29,7 +41,8 @@ pub struct TaperGains {
     pub equivalent_bins: f64,
 }
 
-/// Values of a window of the given length.
+/// Values of a window of the given length; `alpha`: share of a Tukey window that is tapered, half of it at either end, from
+/// zero (rectangular) to one (Hann).
 ///
 /// # Model
 /// Tukey: `w = (1 + cos(pi (x - 1))) / 2` for `x = 2 k / (alpha (N - 1)) < 1` at the start, mirrored at the end, one between.
@@ -47,14 +60,14 @@ pub struct TaperGains {
 ///
 /// # Source
 /// Harris, Proc. IEEE 66 (1978) 51; Stark et al. 2005, Eq. 9.
-pub fn taper(kind: Taper, samples: usize) -> Result<Vec<f64>, SpectrumError> {
+pub fn taper(kind: Taper, alpha: f64, samples: usize) -> Result<Vec<f64>, SignalError> {
     let alpha = match kind {
         Taper::Rectangular => 0.0,
         Taper::Hann => 1.0,
-        Taper::Tukey { alpha } => alpha,
+        Taper::Tukey => alpha,
     };
     if !(0.0..=1.0).contains(&alpha) {
-        return Err(SpectrumError::Setting { name: "alpha", got: alpha, wanted: "0 to 1" });
+        return Err(SignalError::Alpha(alpha));
     }
     let edge = 0.5 * alpha * samples.saturating_sub(1) as f64;
     let value = |k: usize| {
@@ -62,6 +75,13 @@ pub fn taper(kind: Taper, samples: usize) -> Result<Vec<f64>, SpectrumError> {
         if x >= edge { 1.0 } else { 0.5 * (1.0 + (PI * (x / edge - 1.0)).cos()) }
     };
     Ok((0..samples).map(value).collect())
+}
+
+/// Hann's window by position: `(1 - cos(2 pi (k + offset) / N)) / 2`. With `offset` 0 half-overlapping segments add up to one; with 0.5 the
+/// window is symmetric and nowhere zero.
+pub fn hann(samples: usize, offset: f64) -> Vec<f64> {
+    let angle = |k: usize| TAU * (k as f64 + offset) / samples as f64;
+    (0..samples).map(|k| 0.5 * (1.0 - angle(k).cos())).collect()
 }
 
 /// Gains of a window; an empty one has none.
@@ -93,7 +113,7 @@ mod tests {
         // cos(pi / 9) and cos(11 pi / 18): three digits
         assert!((as_printed(start + 1e-9, n, alpha) - 0.970).abs() < 5e-4);
         assert!((as_printed(n, n, alpha) - 0.329).abs() < 5e-4);
-        let meant = taper(Taper::Tukey { alpha }, 8193).unwrap();
+        let meant = taper(Taper::Tukey, alpha, 8193).unwrap();
         assert!(meant.windows(2).all(|w| (w[1] - w[0]).abs() < 0.004)); // steepest: pi/2 / 409.6 samples
         assert!(meant[0].abs() < 1e-15 && meant[8192].abs() < 1e-15);
         // the tapered share is alpha
@@ -103,20 +123,20 @@ mod tests {
 
     #[test]
     fn special_cases_and_gains() {
-        let hann = taper(Taper::Hann, 101).unwrap();
-        let same = taper(Taper::Tukey { alpha: 1.0 }, 101).unwrap();
+        let hann = taper(Taper::Hann, 0.0, 101).unwrap();
+        let same = taper(Taper::Tukey, 1.0, 101).unwrap();
         assert_eq!(hann, same);
         assert!((hann[25] - 0.5).abs() < 1e-15 && hann[50] == 1.0);
-        assert_eq!(taper(Taper::Tukey { alpha: 0.0 }, 5).unwrap(), vec![1.0; 5]);
-        let gains = taper_gains(&taper(Taper::Hann, 100_001).unwrap());
+        assert_eq!(taper(Taper::Tukey, 0.0, 5).unwrap(), vec![1.0; 5]);
+        let gains = taper_gains(&taper(Taper::Hann, 0.0, 100_001).unwrap());
         // 1/2, 3/8 and 3/2, but for the one sample that makes it symmetric
         assert!((gains.coherent - 0.5).abs() < 1e-5 && (gains.noise - 0.375).abs() < 1e-5);
         assert!((gains.equivalent_bins - 1.5).abs() < 3e-5);
-        let tukey = taper_gains(&taper(Taper::Tukey { alpha: 0.1 }, 100_001).unwrap());
+        let tukey = taper_gains(&taper(Taper::Tukey, 0.1, 100_001).unwrap());
         // 1 - alpha / 2 and 1 - 5 alpha / 8
         assert!((tukey.coherent - 0.95).abs() < 2e-5 && (tukey.noise - 0.9375).abs() < 2e-5);
-        assert_eq!(taper(Taper::Rectangular, 0).unwrap(), Vec::<f64>::new());
-        assert!(taper(Taper::Tukey { alpha: 1.1 }, 5).is_err());
-        assert!(taper(Taper::Tukey { alpha: f64::NAN }, 5).is_err());
+        assert_eq!(taper(Taper::Rectangular, 0.0, 0).unwrap(), Vec::<f64>::new());
+        assert!(taper(Taper::Tukey, 1.1, 5).is_err());
+        assert!(taper(Taper::Tukey, f64::NAN, 5).is_err());
     }
 }

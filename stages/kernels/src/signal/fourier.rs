@@ -1,0 +1,98 @@
+//! The Fourier transform of real signals of one length.
+
+use std::sync::{Arc, OnceLock};
+
+use num_complex::Complex64;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+
+/// A plan for signals of N samples: bins 0 to N/2 of `X_k = sum_n x_n exp(-i 2 pi k n / N)`, and back.
+///
+/// Cost: planning some transforms, each transform `N log N`.
+#[derive(Clone)]
+pub struct RealTransform {
+    forward: Arc<dyn RealToComplex<f64>>,
+    /// Planned when it is first needed.
+    inverse: OnceLock<Arc<dyn ComplexToReal<f64>>>,
+}
+
+impl RealTransform {
+    /// For signals of `samples`.
+    pub fn new(samples: usize) -> Self {
+        Self { forward: RealFftPlanner::new().plan_fft_forward(samples), inverse: OnceLock::new() }
+    }
+
+    /// Samples of a signal.
+    pub fn samples(&self) -> usize {
+        self.forward.len()
+    }
+
+    /// Bins of a transform, `N / 2 + 1`.
+    pub fn bins(&self) -> usize {
+        self.samples() / 2 + 1
+    }
+
+    /// Transform of a signal, zeros added or the end cut off to N samples.
+    pub fn forward(&self, signal: impl IntoIterator<Item = f64>) -> Vec<Complex64> {
+        let mut time = Vec::with_capacity(self.samples());
+        time.extend(signal);
+        time.resize(self.samples(), 0.0);
+        let mut bins = self.forward.make_output_vec();
+        // lengths are the plan's own: it cannot fail
+        let _ = self.forward.process(&mut time, &mut bins);
+        bins
+    }
+
+    /// Squared absolute values of the transform.
+    pub fn power(&self, signal: impl IntoIterator<Item = f64>) -> Vec<f64> {
+        self.forward(signal).iter().map(Complex64::norm_sqr).collect()
+    }
+
+    /// N times the signal of these bins. What rounding left of imaginary parts at zero and half the sample rate is
+    /// dropped.
+    pub fn inverse(&self, mut bins: Vec<Complex64>) -> Vec<f64> {
+        bins.resize(self.bins(), Complex64::ZERO);
+        if let Some(first) = bins.first_mut() {
+            first.im = 0.0;
+        }
+        if self.samples().is_multiple_of(2)
+            && let Some(last) = bins.last_mut()
+        {
+            last.im = 0.0;
+        }
+        let inverse = self.inverse.get_or_init(|| RealFftPlanner::new().plan_fft_inverse(self.samples()));
+        let mut time = inverse.make_output_vec();
+        let _ = inverse.process(&mut bins, &mut time);
+        time
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::white_noise;
+
+    #[test]
+    fn the_transform_is_the_sum_and_its_inverse_the_signal() {
+        for n in [1, 2, 15, 64, 101] {
+            let x = white_noise(n, 1.0, n as u64);
+            let plan = RealTransform::new(n);
+            let bins = plan.forward(x.iter().copied());
+            assert_eq!((bins.len(), plan.samples()), (plan.bins(), n));
+            for (k, bin) in bins.iter().enumerate() {
+                let turn = |t: usize| -std::f64::consts::TAU * (k * t % n) as f64 / n as f64;
+                let slow: Complex64 = x.iter().enumerate().map(|(t, v)| Complex64::from_polar(*v, turn(t))).sum();
+                // a hundred roundings of numbers of order one, ten of them added
+                assert!((bin - slow).norm() < 1e-12);
+            }
+            let again = plan.inverse(bins);
+            assert!(again.iter().zip(&x).all(|(a, x)| (a / n as f64 - x).abs() < 1e-13)); // rounding
+        }
+    }
+
+    #[test]
+    fn short_signals_are_filled_with_zeros_and_long_ones_cut() {
+        let plan = RealTransform::new(8);
+        assert_eq!(plan.forward([1.0, 2.0]), plan.forward([1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        assert_eq!(plan.forward((0..9).map(f64::from)), plan.forward((0..8).map(f64::from)));
+    }
+}
