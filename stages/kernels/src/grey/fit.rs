@@ -36,7 +36,7 @@ const ROUNDS: usize = 4;
 /// # Units
 /// Seconds, Hz; gains in units of y over those of u.
 /// # Accuracy
-/// The Cramer-Rao bound in white noise (docs/accuracy.md). Under coloured noise it is least squares; standard errors follow the residual's spectrum. Further real
+/// The Cramer-Rao bound in white noise (docs/results/grey.md). Under coloured noise it is least squares; standard errors follow the residual's spectrum. Further real
 /// poles, and real poles far above half the sample rate, are hard to tell from a delay: their errors say so.
 /// # Errors
 /// Lengths, samples that are not finite, too few samples, parameters out of range, a constant output, fewer oscillations than modes. No convergence is no
