@@ -30,7 +30,7 @@ const ROUNDS: usize = 4;
 /// # Method
 /// Each exponential of the partial fractions is discretised in closed form for the input between samples, delay included (modified z-transform). Gains, d0, offsets
 /// and initial states are eliminated by variable projection; Levenberg-Marquardt with analytic slopes on ln w, ln Q, ln p and d. Start: subspace estimates, then
-/// a grid of real poles and delays. A step costs `2 N m^2` operations for N samples and m raw columns (8 per mode and 4 per real pole with an initial state): docs/performance.md.
+/// a grid of real poles and delays. A step costs `2 N m^2` operations for N samples and m raw columns (8 per mode and 4 per real pole with an initial state): docs/results/timings.md.
 /// # Shapes
 /// N samples of output per experiment, NaN where missing; inputs one after the other.
 /// # Units
