@@ -1,7 +1,7 @@
 //! The estimators beside the main job's: `cargo bench --bench estimators`.
 //!
 //! Inputs are noisy releases of the paper's lever in closed form, as in `kernels`; noise is white where nothing else is
-//! said. Results in docs/performance.md.
+//! said. Results in docs/results/timings.md.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;

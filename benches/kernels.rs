@@ -1,7 +1,7 @@
 //! The kernels that the main job spends its time in, each at three sizes: `cargo bench --bench kernels`.
 //!
 //! Inputs are noisy releases of the paper's lever in closed form. What a size means is said at each bench; results in
-//! docs/performance.md.
+//! docs/results/timings.md.
 
 use std::hint::black_box;
 use std::time::Duration;

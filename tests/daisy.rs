@@ -38,7 +38,7 @@ fn data(scratch: &Path, name: &str, inputs: usize, outputs: usize) -> (PathBuf, 
 fn the_daisy_records_are_simulated_on_the_half_that_was_not_fitted() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
-    // a little below what docs/accuracy.md lists; N4SID reaches less
+    // a little below what docs/results/daisy.md lists; N4SID reaches less
     for (name, file, inputs, outputs, least) in [
         ("daisy-flutter", "flutter.dat", 1, 1, 40.0),
         ("daisy-robot-arm", "robot_arm.dat", 1, 1, 96.5),

@@ -1,4 +1,5 @@
-//! A short exam of the shipped config: causes are hidden in recordings, `afmid exam` judges what is said of them. The full one: docs/diagnosis.md.
+//! A short exam of the shipped config: causes are hidden in recordings, `afmid exam` judges what is said of them. The
+//! full one: docs/results/exam.md.
 
 mod common;
 

@@ -40,6 +40,10 @@ fn contents(registry: &Registry) -> String {
     for (title, file) in CHAPTERS {
         text.push_str(&format!("- [{title}]({file})\n"));
     }
+    text.push_str("- [Results](results/README.md)\n");
+    for (title, file) in RESULTS {
+        text.push_str(&format!("  - [{title}](results/{file})\n"));
+    }
     text.push_str("- [Stages](stages/README.md)\n");
     for entry in registry.entries() {
         text.push_str(&format!("  - [{0}](stages/{0}.md)\n", entry.spec.name));
@@ -57,6 +61,25 @@ const TUTORIALS: [(&str, &str); 4] = [
     ("My own recordings", "recordings.md"),
     ("Find what my model misses", "diagnosis.md"),
     ("My own stage", "stage.md"),
+];
+
+/// What was measured: accuracy, performance, diagnosis.
+const RESULTS: [(&str, &str); 15] = [
+    ("Modes from ringdowns", "ringdown.md"),
+    ("Models from a frequency response", "frequency-response.md"),
+    ("The grey modal form", "grey.md"),
+    ("Contact stiffness", "contact.md"),
+    ("Measured input-output data", "daisy.md"),
+    ("Spectra, responses, forces", "spectra.md"),
+    ("Time per kernel, estimator and plugin call", "timings.md"),
+    ("The main job", "main-job.md"),
+    ("Time against the number of items", "scaling.md"),
+    ("One free decay", "free-decay.md"),
+    ("Exam of the diagnosis", "exam.md"),
+    ("Diagnosis of releases", "releases.md"),
+    ("Diagnosis of releases: method", "release-method.md"),
+    ("Replay of diagnosed events", "replay.md"),
+    ("Diagnosis of input and output", "input-output.md"),
 ];
 
 /// The largest page that is compared.

@@ -1,4 +1,4 @@
-//! Monte Carlo check of the contact stiffness from snap-ins and snap-offs; the figures of docs/accuracy.md.
+//! Monte Carlo check of the contact stiffness from snap-ins and snap-offs; the figures of docs/results/contact.md.
 //!
 //! `cargo run -p afmid-stages --example contact -- 50`: seeds 1 to 50, 24 snap-ins and 24 snap-offs each; `-- 50 51`: seeds 51 to 100.
 

@@ -1,7 +1,8 @@
 //! The HDF5 library itself, for the small objects of which a result has hundreds.
 //!
 //! Its safe wrapper makes new property lists and spaces for every object and asks back about each: half of the time
-//! that files took (docs/performance.md). Here they are made once. All unsafe code of this package is in this file.
+//! that files took (docs/results/main-job.md). Here they are made once. All unsafe code of this package
+//! is in this file.
 #![allow(unsafe_code)]
 
 use std::ffi::{CString, c_char, c_int, c_void};

@@ -1,4 +1,4 @@
-//! Monte Carlo check of the joint ringdown fit against the Cramer-Rao bound; the figures of docs/accuracy.md.
+//! Monte Carlo check of the joint ringdown fit against the Cramer-Rao bound; the figures of docs/results/ringdown.md.
 //!
 //! `cargo run --release -p afmid-stages --example accuracy -- real 0.06 200`: the microscope's noise, adhesion scatter 6 %, seeds 1 to 200.
 //! `cargo run --release -p afmid-stages --example accuracy -- white 200`: white noise alone, the mean of 84 events.

@@ -30,7 +30,7 @@ use afmid_kernels::ringdown::{Estimate, ModeEstimate};
 /// detector at once. Without residues, or where they do not fit (p below 0.01, a warning), poles alone.
 /// Shapes: `contact` by coupled pole, ascending; `shares` by free mode.
 /// Units: N/m, N s/m, kg, Hz.
-/// Accuracy: to first order in the errors; known stiffness, damping and shares recovered within their errors over 100 simulated archives (docs/accuracy.md).
+/// Accuracy: to first order in the errors; known stiffness, damping and shares recovered within their errors over 100 simulated archives (docs/results/contact.md).
 /// Bias: modes beyond the free lever's count as a static compliance only, of what the given shares leave of one; a second-order term below its
 /// threshold shifts shares and stiffness. A relative error of k is the same relative error of the contact.
 /// Errors: as many shares as free modes are wanted; no stiffness; poles that no linear contact on this lever gives; fewer poles than shares and contact

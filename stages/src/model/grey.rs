@@ -33,7 +33,7 @@ use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, white
 /// Shapes: `modes` by mode, `parameters` by parameter; `residual` and `prediction` (here the simulation) over time; `model` as of `model.pem`, with one or two poles at z = 0 for
 /// the delay.
 /// Units: Hz, seconds; gains in volts per volt where the force is given as static deflection.
-/// Accuracy: the Cramer-Rao bound in white noise, unbiased, 95 % intervals that hold (docs/accuracy.md); the errors follow the residual's own spectrum, but under thermal noise
+/// Accuracy: the Cramer-Rao bound in white noise, unbiased, 95 % intervals that hold (docs/results/grey.md); the errors follow the residual's own spectrum, but under thermal noise
 /// `model.ringdown` is more precise. A delay is distinguished from a real pole by the shape of the first samples alone: the errors say how well. `model` is exact up to two samples of delay, beyond
 /// which whole samples are reported as `dead_samples` and warned of.
 /// Errors: too few samples, values that are not finite, a response that is constant, fewer oscillations than `modes`, knowledge of what is not fitted. No convergence is a warning, and

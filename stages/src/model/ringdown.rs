@@ -38,7 +38,7 @@ use afmid_kernels::ringdown::{
 /// Shapes: `modes` by mode ascending in frequency, `events` by event, `spectrum` over frequency, `poles`, their residues and covariances over real
 /// and imaginary part of each mode in turn.
 /// Units: Hz; volts; onsets in seconds after the ensemble's first sample used.
-/// Accuracy: rms errors within a few per cent of the Cramer-Rao bound and intervals that hold, for one event and for many (docs/accuracy.md). Standard
+/// Accuracy: rms errors within a few per cent of the Cramer-Rao bound and intervals that hold, for one event and for many (docs/results/ringdown.md). Standard
 /// errors count thermal, 1/f and white noise; `error_source = "events"` takes them from the events' scatter, right under a wrong noise model too.
 /// Errors: fewer samples than the shape needs, values that are not finite, fewer oscillations than `modes`, knowledge of what is not fitted. No convergence is a warning, and so is a
 /// number on a bound, whose error is unknown.

@@ -81,7 +81,7 @@ const ARRIVED: f64 = 1e-9;
 /// # Units
 /// rad/s, N/m, N s/m.
 /// # Accuracy
-/// Standard errors to first order; 50 simulated archives: docs/accuracy.md. **Bias**: modes beyond the free lever's act as a static compliance only
+/// Standard errors to first order; 50 simulated archives: docs/results/contact.md. **Bias**: modes beyond the free lever's act as a static compliance only
 /// (what the shares leave of one); a pole near the highest free mode feels the first one that is missing. Errors of frequencies and quality
 /// factors of the free lever are taken as independent of each other and of the coupled poles. Wrong shares bias every pole differently: the chi square
 /// shows it, `tip_share_error` counts it.

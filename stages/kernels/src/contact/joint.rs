@@ -53,7 +53,7 @@ const RESIDUES_MISFIT: f64 = 0.01;
 /// # Units
 /// rad/s, N/m, N s/m, kg.
 /// # Accuracy
-/// To first order in the errors; rms z over simulated archives: docs/accuracy.md. Degrees of freedom count what the data determine of the corners.
+/// To first order in the errors; rms z over simulated archives: docs/results/contact.md. Degrees of freedom count what the data determine of the corners.
 /// **Bias**: modes beyond the free lever's act as a static compliance only, of what the given shares leave of one; a second-order
 /// term below its threshold shifts the shares and, through them, the stiffness by up to three errors of what they would have beside that term.
 /// # Errors

@@ -30,13 +30,13 @@ const ROUNDS: usize = 4;
 /// # Method
 /// Each exponential of the partial fractions is discretised in closed form for the input between samples, delay included (modified z-transform). Gains, d0, offsets
 /// and initial states are eliminated by variable projection; Levenberg-Marquardt with analytic slopes on ln w, ln Q, ln p and d. Start: subspace estimates, then
-/// a grid of real poles and delays. A step costs `2 N m^2` operations for N samples and m raw columns (8 per mode and 4 per real pole with an initial state): docs/performance.md.
+/// a grid of real poles and delays. A step costs `2 N m^2` operations for N samples and m raw columns (8 per mode and 4 per real pole with an initial state): docs/results/timings.md.
 /// # Shapes
 /// N samples of output per experiment, NaN where missing; inputs one after the other.
 /// # Units
 /// Seconds, Hz; gains in units of y over those of u.
 /// # Accuracy
-/// The Cramer-Rao bound in white noise (docs/accuracy.md). Under coloured noise it is least squares; standard errors follow the residual's spectrum. Further real
+/// The Cramer-Rao bound in white noise (docs/results/grey.md). Under coloured noise it is least squares; standard errors follow the residual's spectrum. Further real
 /// poles, and real poles far above half the sample rate, are hard to tell from a delay: their errors say so.
 /// # Errors
 /// Lengths, samples that are not finite, too few samples, parameters out of range, a constant output, fewer oscillations than modes. No convergence is no

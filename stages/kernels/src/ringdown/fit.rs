@@ -36,7 +36,7 @@ const NOISE_ROUNDS: usize = 3;
 /// # Units
 /// Volts, seconds, rad/s.
 /// # Accuracy
-/// The Cramer-Rao bound within a few per cent (docs/accuracy.md). About 3 ms per record of 8192 samples and noise round on one core,
+/// The Cramer-Rao bound within a few per cent (docs/results/ringdown.md). About 3 ms per record of 8192 samples and noise round on one core,
 /// ten times that for one with gaps, whose filter and basis are its own.
 /// # Errors
 /// No event, unequal lengths, values that are not finite, too few samples, no oscillation, knowledge of what is not fitted.

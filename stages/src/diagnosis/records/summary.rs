@@ -68,7 +68,7 @@ pub struct RecordSummary {
 /// # Errors
 /// [`RecordError`]: fewer than 256 samples, channels of different length, an event beyond the record, an interval that is none.
 /// # Source
-/// docs/diagnosis.md.
+/// docs/results/release-method.md.
 pub fn summarise(record: &RecordInput) -> Result<RecordSummary, RecordError> {
     check(record)?;
     let points = points(record.deflection, record.piezo);

@@ -138,7 +138,7 @@ fn names(diagnosis: &Diagnosis) -> Vec<String> {
     diagnosis.causes.iter().map(|cause| cause.id.clone()).collect()
 }
 
-/// Rounds of all causes; `AFMID_ROUNDS` raises it for the figures of docs/diagnosis.md.
+/// Rounds of all causes; `AFMID_ROUNDS` raises it for the figures of docs/results/input-output.md.
 fn rounds(default: u64) -> u64 {
     std::env::var("AFMID_ROUNDS").ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
@@ -213,7 +213,7 @@ fn two_hidden_causes_are_both_named() {
         .collect();
     let right = results.iter().filter(|right| **right).count();
     println!("pairs: {right} of {count} fully named");
-    // 90 % are the aim, docs/diagnosis.md has what is reached; a quarter may miss
+    // 90 % are the aim, docs/results/input-output.md has what is reached; a quarter may miss
     assert!(right as f64 >= 0.75 * count as f64 - 1.0);
 }
 

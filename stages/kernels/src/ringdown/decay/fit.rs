@@ -85,7 +85,7 @@ const VALLEY: f64 = 0.25;
 /// # Accuracy
 /// The Cramer-Rao bound of free amplitudes, unbiased, in white noise; under coloured noise its errors are too small: see
 /// [`super::super::fit_ringdowns`]. The triangle squares the condition: residuals below `1e-7` of the signal, and modes closer than a thousandth of
-/// their width, are lost in rounding. `N modes` operations per step (docs/performance.md).
+/// their width, are lost in rounding. `N modes` operations per step (docs/results/timings.md).
 /// # Errors
 /// Too few samples, values that are not finite, a constant record, fewer oscillations than `modes`.
 /// # Source
