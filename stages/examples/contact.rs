@@ -1,6 +1,7 @@
 //! Monte Carlo check of the contact stiffness from snap-ins and snap-offs; the figures of docs/results/contact.md.
 //!
-//! `cargo run -p afmid-stages --example contact -- 50`: seeds 1 to 50, 24 snap-ins and 24 snap-offs each; `-- 50 51`: seeds 51 to 100.
+//! `cargo run -p afmid-stages --example contact -- 50`: seeds 1 to 50, 24 snap-ins and 24 snap-offs each; `-- 50 51`:
+//! seeds 51 to 100.
 
 #[allow(dead_code, reason = "the world serves the example `accuracy` too")]
 #[path = "accuracy/world.rs"]
@@ -109,7 +110,8 @@ fn print(name: &str, found: &[&JointContact], seeds: u64, truth: f64, pick: impl
     );
 }
 
-/// Everything from the records of one seed: nothing but the lever's stiffness is given, and its tip shares where the way says so.
+/// Everything from the records of one seed: nothing but the lever's stiffness is given, and its tip shares where the
+/// way says so.
 fn estimates(seed: u64) -> Result<Vec<JointContact>, ModelError> {
     let snap_offs: Vec<Vec<f64>> = (0..EVENTS).map(|event| real_event(seed, event, SCATTER, SAMPLES).0).collect();
     let snap_ins: Vec<Vec<f64>> = (0..EVENTS).map(|event| snap_in(seed, event, SAMPLES)).collect();
@@ -151,7 +153,8 @@ fn fit(events: &[Vec<f64>], start_samples: Option<usize>) -> Result<Ringdown, Mo
     fit_ringdowns(&borrowed, &[], 1.0 / RATE_HZ, &RingdownOptions { start_samples, ..RingdownOptions::default() })
 }
 
-/// One catch through the whole microscope, as [`real_event`] makes a release; the samples from the first one after it on.
+/// One catch through the whole microscope, as [`real_event`] makes a release; the samples from the first one after it
+/// on.
 fn snap_in(seed: u64, event: usize, samples: usize) -> Vec<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(SNAP_IN_STREAM + event as u64);

@@ -161,7 +161,8 @@ fn lacks(decl: &StageDecl, entry: &Entry, path: &[String], field: &str) -> Probl
         .help(format!("it has no default: add `{field} = ...`; {}", entry.manual()))
 }
 
-/// A parameter out of its range, or the error of [`DynStage::check`]: at the parameter that its message begins with, or at the whole table.
+/// A parameter out of its range, or the error of [`DynStage::check`]: at the parameter that its message begins with, or
+/// at the whole table.
 fn unchecked(decl: &StageDecl, error: &StageError) -> Problem {
     let message = error.to_string();
     let named = message.starts_with('`').then(|| quoted(&message).next().map(steps)).flatten().unwrap_or_default();

@@ -23,8 +23,8 @@ pub(super) fn spectrum(told: &Told<'_>) -> Option<Panel> {
     Some(marks(told).into_iter().fold(panel, |panel, (at, label)| panel.with(Mark::at_x(at, &label))))
 }
 
-/// Most bins on either side that a drawn density is averaged over, and the bins of which that is one: a periodogram scatters by as much as it is, and
-/// no peak may vanish, so the average is narrower than a fiftieth of the frequency.
+/// Most bins on either side that a drawn density is averaged over, and the bins of which that is one: a periodogram
+/// scatters by as much as it is, and no peak may vanish, so the average is narrower than a fiftieth of the frequency.
 const SIDE: usize = 6;
 const NARROW: usize = 50;
 

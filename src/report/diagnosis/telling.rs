@@ -76,7 +76,8 @@ pub(super) fn telling(id: &str) -> View {
     }
 }
 
-/// The cause that a picture is chosen for: the rung that bought most, the first named one without gains, the nearest where there is no name.
+/// The cause that a picture is chosen for: the rung that bought most, the first named one without gains, the nearest
+/// where there is no name.
 pub(super) fn main_cause(answer: &Diagnosis) -> Option<&str> {
     let gain = |rung: &&afmid_stages::diagnosis::Rung| rung.log_likelihood_gain.unwrap_or(0.0);
     let best = answer.ladder.iter().skip(1).max_by(|a, b| gain(a).total_cmp(&gain(b)));

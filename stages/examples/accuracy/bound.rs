@@ -1,6 +1,7 @@
 //! The Cramer-Rao bound of modal frequencies and quality factors, by a Kalman filter of the whole microscope.
 //!
-//! Shares nothing with the estimator: dense matrices of the simulator's own linear system, its 1/f noise, closed-form releases.
+//! Shares nothing with the estimator: dense matrices of the simulator's own linear system, its 1/f noise, closed-form
+//! releases.
 
 use faer::{Mat, c64};
 
@@ -28,7 +29,8 @@ pub enum Noise {
 /// Standard deviations of `f/f0, Q/Q0` of each mode in turn, from `weight` events of unit square amplitude.
 ///
 /// Model: shared poles and residues; amplitude, onset, offset and slope per event; noise covariance known.
-/// Method: whitened derivatives, the eight numbers' columns last in a QR factorisation: nuisances may be as collinear as they like.
+/// Method: whitened derivatives, the eight numbers' columns last in a QR factorisation: nuisances may be as collinear
+/// as they like.
 pub fn bound(noise: Noise, samples: usize, weight: f64, slope: bool) -> Vec<f64> {
     let (poles, residues) = closed_form();
     let at = |k: usize, p: c64, r: c64| r * (p * (k as f64 / RATE_HZ)).exp();

@@ -1,9 +1,10 @@
 //! Monte Carlo check of the joint ringdown fit against the Cramer-Rao bound; the figures of docs/results/ringdown.md.
 //!
-//! `cargo run --release -p afmid-stages --example accuracy -- real 0.06 200`: the microscope's noise, adhesion scatter 6 %, seeds 1 to 200.
-//! `cargo run --release -p afmid-stages --example accuracy -- white 200`: white noise alone, the mean of 84 events.
-//! `... -- speed`: time of a fit of 8192 samples, and of 84 events of them; `... -- export SEED EVENTS`: such a mean, a sample per line.
-//! `... -- variants 0.06 100`: what simpler ways lose at 24 events. `... -- fit SEED EVENTS`: f and Q of a white mean, with the bound, as JSON.
+//! `cargo run --release -p afmid-stages --example accuracy -- real 0.06 200`: the microscope's noise, adhesion scatter
+//! 6 %, seeds 1 to 200. `cargo run --release -p afmid-stages --example accuracy -- white 200`: white noise alone, the
+//! mean of 84 events. `... -- speed`: time of a fit of 8192 samples, and of 84 events of them; `... -- export SEED
+//! EVENTS`: such a mean, a sample per line. `... -- variants 0.06 100`: what simpler ways lose at 24 events. `... --
+//! fit SEED EVENTS`: f and Q of a white mean, with the bound, as JSON.
 
 mod bound;
 mod table;
@@ -57,7 +58,8 @@ fn real(scatter: f64, seeds: u64) {
     let results: Vec<Vec<(Vec<Outcome>, f64)>> = (1..=seeds)
         .into_par_iter()
         .map(|seed| {
-            // the first event brings the rest of its record: one event alone cannot tell thermal motion from its own ringing
+            // the first event brings the rest of its record: one event alone cannot tell thermal motion from its own
+            // ringing
             let (long, load) = real_event(seed, 0, scatter, (2 + FREE_WINDOWS) * SAMPLES);
             let (mut data, mut loads) = (vec![long[..SAMPLES].to_vec()], vec![load]);
             for e in 1..EVENTS[0] {

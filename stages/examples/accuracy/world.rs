@@ -65,7 +65,8 @@ pub fn real_event(seed: u64, event: usize, scatter: f64, samples: usize) -> (Vec
         }
     };
     let pull_off = [ADHESION_N * (1.0 + scatter * deviate)];
-    // wide scatter wants a longer way, at the same speed, for strong contacts to let go, and a nearer catch for weak ones not to come back
+    // wide scatter wants a longer way, at the same speed, for strong contacts to let go, and a nearer catch for weak
+    // ones not to come back
     let (range_m, snap_in_gap_m) = if scatter > 0.1 { (500e-9, 1e-9) } else { (200e-9, contact.snap_in_gap_m) };
     let contact = Contact { snap_in_gap_m, ..contact };
     let ramp = TriangleRamp { frequency_hz: 5.58 * 200e-9 / range_m, range_m, phase: 0.0 };

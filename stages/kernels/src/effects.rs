@@ -16,7 +16,8 @@ pub struct Motion<'a> {
     pub omega: &'a [f64],
     /// Displacement of the tip since its release, V.
     pub gap: f64,
-    /// Standard deviation of the first mode's thermal motion, as far as `position` is without it, V: a mean motion; 0 where it is the motion itself.
+    /// Standard deviation of the first mode's thermal motion, as far as `position` is without it, V: a mean motion; 0
+    /// where it is the motion itself.
     pub thermal: f64,
 }
 
@@ -33,8 +34,8 @@ pub struct Instant {
     pub piezo_m: f64,
 }
 
-/// Share of the load that still acts `t` seconds after the release (t >= 0); the unhurt release leaves none. What acts again later than 120 samples after it must
-/// last 8 samples to be seen by the diagnosis.
+/// Share of the load that still acts `t` seconds after the release (t >= 0); the unhurt release leaves none. What acts
+/// again later than 120 samples after it must last 8 samples to be seen by the diagnosis.
 pub type RemainingLoad = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
 /// Adds to the acceleration of each mode, V/s^2.
 pub type ModalForce = Arc<dyn Fn(&Motion<'_>, &mut [f64]) + Send + Sync>;
@@ -45,7 +46,8 @@ pub type FrequencyChange = Arc<dyn Fn(&Instant) -> f64 + Send + Sync>;
 /// Volts added behind the electronics.
 pub type Added = Arc<dyn Fn(&Instant) -> f64 + Send + Sync>;
 
-/// A load that outlasts the release as `Re(share exp(rate t))` of what it was: as a [`RemainingLoad`], but followed exactly and at no cost.
+/// A load that outlasts the release as `Re(share exp(rate t))` of what it was: as a [`RemainingLoad`], but followed
+/// exactly and at no cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecayingLoad {
     /// Share of the load, with its phase.
@@ -90,7 +92,8 @@ pub enum Intersample {
 
 /// Everything that causes add to a simulation; empty: nothing is wrong.
 ///
-/// Parts of one kind add up (forces, loads, volts) or follow one another in order (maps, sections), so that causes compose.
+/// Parts of one kind add up (forces, loads, volts) or follow one another in order (maps, sections), so that causes
+/// compose.
 #[derive(Clone, Default)]
 pub struct Effects {
     /// Loads that outlast the release.

@@ -78,7 +78,8 @@ impl Lever {
             .collect()
     }
 
-    /// Noise-free release: `load` (in volts, negative when the tip is pulled down) before `t0_samples`, ringing about zero after.
+    /// Noise-free release: `load` (in volts, negative when the tip is pulled down) before `t0_samples`, ringing about
+    /// zero after.
     pub fn release(&self, samples: usize, t0_samples: f64, load: f64) -> Vec<f64> {
         let residues = self.step_residues();
         (0..samples)

@@ -1,4 +1,5 @@
-//! Kernels of afmid, for any program: slices in, plain structs out; no files, no pipeline, no clock, nothing that lives as long as the process.
+//! Kernels of afmid, for any program: slices in, plain structs out; no files, no pipeline, no clock, nothing that lives
+//! as long as the process.
 //!
 //! Front doors, each with its model, its cost and an example from data to numbers with errors:
 //!

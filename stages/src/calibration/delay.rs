@@ -10,8 +10,9 @@ use afmid_kernels::calibration::{OnsetRule, onset_delay};
 /// What the averaged snap-off says about the delay, and what it cannot say.
 ///
 /// # Model
-/// A delay and a later rupture are the same signal: only rupture + delay shows. Causality bounds it from above (the first departure); the phase of mode 1
-/// measures rupture + delay + the lag of the detector's poles, so that it is known as well as these poles are.
+/// A delay and a later rupture are the same signal: only rupture + delay shows. Causality bounds it from above (the
+/// first departure); the phase of mode 1 measures rupture + delay + the lag of the detector's poles, so that it is
+/// known as well as these poles are.
 /// # Method
 /// First sustained departure from the line before the event; fit of one decaying oscillation to the ringing.
 /// # Shapes
@@ -19,7 +20,8 @@ use afmid_kernels::calibration::{OnsetRule, onset_delay};
 /// # Units
 /// s, on the average's own time axis.
 /// # Accuracy
-/// 3 ns from other modes for the paper's lever, and white-noise standard errors; fast poles that are not given enter in full.
+/// 3 ns from other modes for the paper's lever, and white-noise standard errors; fast poles that are not given enter in
+/// full.
 /// # Errors
 /// No departure; no decaying oscillation.
 /// # Source

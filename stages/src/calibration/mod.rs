@@ -1,4 +1,5 @@
-//! The stages of calibration and noise control: sensitivity, spring constant, delay, thermal spectra. Kernels: [`afmid_kernels::calibration`].
+//! The stages of calibration and noise control: sensitivity, spring constant, delay, thermal spectra. Kernels:
+//! [`afmid_kernels::calibration`].
 
 mod delay;
 mod example;

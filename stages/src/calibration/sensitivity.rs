@@ -16,19 +16,19 @@ use afmid_kernels::calibration::{
 /// Optical lever sensitivity from the slope of the deflection against the piezo while the tip is in contact.
 ///
 /// # Model
-/// Lever and contact share the piezo's travel: the slope reads `S k_c / (k + k_c)`. 60 N/m under 3.8 N/m read 6 % low; a
-/// spring constant taken from that sensitivity is 12 % low and must be multiplied by 1.13. Where both stiffnesses are given, the
-/// slope is corrected.
+/// Lever and contact share the piezo's travel: the slope reads `S k_c / (k + k_c)`. 60 N/m under 3.8 N/m read 6 % low;
+/// a spring constant taken from that sensitivity is 12 % low and must be multiplied by 1.13. Where both stiffnesses are
+/// given, the slope is corrected.
 /// # Method
-/// Straight contact stretches by local slopes, without their ends (turning point, ringing); approach and retract apart; a line
-/// through each; mean weighted by travel squared.
+/// Straight contact stretches by local slopes, without their ends (turning point, ringing); approach and retract apart;
+/// a line through each; mean weighted by travel squared.
 /// # Shapes
 /// `slopes`: one row per stretch.
 /// # Units
 /// V/m; the slope in V of deflection per V of piezo monitor.
 /// # Accuracy
-/// Standard error from the scatter of the stretches and the piezo's own uncertainty: 0.03 % for the paper's archive. Not
-/// covered: a contact that is softer than stated, and a detector that is not linear over its range.
+/// Standard error from the scatter of the stretches and the piezo's own uncertainty: 0.03 % for the paper's archive.
+/// Not covered: a contact that is softer than stated, and a detector that is not linear over its range.
 /// # Errors
 /// No piezo channel; fewer than two straight stretches.
 /// # Source

@@ -18,18 +18,19 @@ use afmid_kernels::spectra::{Fitted, ThermalFit};
 /// Spring constant from the thermal motion of mode 1 in the free stretches.
 ///
 /// # Model
-/// Equipartition: `<q_1^2> = c_tip_1 k_B T / k`. The detector sees `S (c_slope_1 / c_tip_1) q_1`, so that
-/// `k = S^2 chi k_B T |D(f1)|^2 / <v_1^2>`, `chi = c_slope_1^2 / c_tip_1`. With a soft contact `S = S_a (1 + k / k_c)`, and both are
+/// Equipartition: `<q_1^2> = c_tip_1 k_B T / k`. The detector sees `S (c_slope_1 / c_tip_1) q_1`, so that `k = S^2 chi
+/// k_B T |D(f1)|^2 / <v_1^2>`, `chi = c_slope_1^2 / c_tip_1`. With a soft contact `S = S_a (1 + k / k_c)`, and both are
 /// solved together.
 /// # Method
-/// Free stretches by level and noise; averaged Hann periodograms; harmonic oscillator, white and 1/f noise by Whittle's likelihood.
+/// Free stretches by level and noise; averaged Hann periodograms; harmonic oscillator, white and 1/f noise by Whittle's
+/// likelihood.
 /// # Shapes
 /// `spectrum`: density and fitted model over frequency.
 /// # Units
 /// N/m; V^2/Hz.
 /// # Accuracy
-/// Relative variance of the peak `1 / sqrt(pi f1 T / Q)` for T seconds of free flight: 0.9 % for the paper's archive; twice the
-/// sensitivity's, the temperature's and the mode shape's uncertainty added in squares.
+/// Relative variance of the peak `1 / sqrt(pi f1 T / Q)` for T seconds of free flight: 0.9 % for the paper's archive;
+/// twice the sensitivity's, the temperature's and the mode shape's uncertainty added in squares.
 /// # Errors
 /// No free stretch of a segment's length, no peak, no sensitivity, a contact too soft for any lever.
 /// # Source

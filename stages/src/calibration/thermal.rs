@@ -19,17 +19,18 @@ use afmid_kernels::spectra::ThermalFit;
 /// Noise control: thermal spectra of the free stretches record by record, to detect a change of the system.
 ///
 /// # Model
-/// A record's spectrum is a harmonic oscillator (mode 1), white and 1/f noise. If nothing changes, frequency, quality factor, thermal variance and
-/// white level of all records agree within their standard errors.
+/// A record's spectrum is a harmonic oscillator (mode 1), white and 1/f noise. If nothing changes, frequency, quality
+/// factor, thermal variance and white level of all records agree within their standard errors.
 /// # Method
-/// Averaged Hann periodograms, Whittle fit per record as in `spectrum.thermal`; two tests per quantity: chi-square of the scatter about the weighted mean, and a
-/// weighted line against the record's index.
+/// Averaged Hann periodograms, Whittle fit per record as in `spectrum.thermal`; two tests per quantity: chi-square of
+/// the scatter about the weighted mean, and a weighted line against the record's index.
 /// # Shapes
 /// `spectra`: density over record and frequency; `peaks`: one row per record.
 /// # Units
 /// Hz, V^2, V^2/Hz.
 /// # Accuracy
-/// Standard errors allow for correlated bins and segments; the tests hold their level within the normal approximation (some thirty segments per record).
+/// Standard errors allow for correlated bins and segments; the tests hold their level within the normal approximation
+/// (some thirty segments per record).
 /// # Errors
 /// Fewer than three records with a free stretch and a peak.
 /// # Source

@@ -18,11 +18,13 @@ pub enum CauseError {
     Wrong(&'static str, String),
 }
 
-/// Adds a cause of one's own to this process: `simulate.afm` can hide it from now on, and the diagnosis names it like any other.
+/// Adds a cause of one's own to this process: `simulate.afm` can hide it from now on, and the diagnosis names it like
+/// any other.
 ///
 /// `version` is part of the content address of whatever may use it: raise it when the same numbers mean another effect.
 /// # Errors
-/// An id that is taken or no lower-case word; a text that is missing; limits that are no range; trials outside them, or that add nothing.
+/// An id that is taken or no lower-case word; a text that is missing; limits that are no range; trials outside them, or
+/// that add nothing.
 pub fn add(cause: &'static dyn Cause, version: u32) -> Result<(), CauseError> {
     let id = cause.about().id;
     holds(cause).map_err(|reason| CauseError::Wrong(id, reason))?;

@@ -35,7 +35,8 @@ pub enum Domain {
 pub struct Parameter {
     /// Its name, as in configs and results.
     pub name: &'static str,
-    /// Its unit. `V` stands for the output's unit where that is another, `input` for the unit of a general system's input.
+    /// Its unit. `V` stands for the output's unit where that is another, `input` for the unit of a general system's
+    /// input.
     pub unit: &'static str,
     /// What it means.
     pub meaning: &'static str,
@@ -100,13 +101,15 @@ pub struct Scene {
     pub noise_v: f64,
     /// Frequencies at which residuals peak, Hz, strongest first.
     pub residual_peaks_hz: Vec<f64>,
-    /// Where in the archive the events are, 0 its first record, 1 its last, ascending, each place once; empty where nothing is known of it.
+    /// Where in the archive the events are, 0 its first record, 1 its last, ascending, each place once; empty where
+    /// nothing is known of it.
     pub places: Vec<f64>,
 }
 
 /// A cause: one way in which a linear simulation can be wrong.
 ///
-/// The same object serves the simulator (to hide it), the diagnosis (to find it) and the user (to simulate with it afterwards).
+/// The same object serves the simulator (to hide it), the diagnosis (to find it) and the user (to simulate with it
+/// afterwards).
 pub trait Cause: Sync {
     /// What it is.
     fn about(&self) -> &About;
@@ -119,17 +122,20 @@ pub trait Cause: Sync {
     /// The first value of each is a strength that changes the response by about a hundredth.
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>>;
 
-    /// Numbers that differ from record to record by chance, a line's phase among them: each must be found anew in every record.
+    /// Numbers that differ from record to record by chance, a line's phase among them: each must be found anew in every
+    /// record.
     fn free_in_each_record(&self) -> usize {
         0
     }
 
-    /// Part of what it explains of events that its model in a fit still gets wrong, where that is known: signs weaker than this are not named beside it.
+    /// Part of what it explains of events that its model in a fit still gets wrong, where that is known: signs weaker
+    /// than this are not named beside it.
     fn inexact(&self) -> f64 {
         0.0
     }
 
-    /// The parameter that says between which events the effect sets in: it has no slope, its trials are all there is, and its error is the distance of those events.
+    /// The parameter that says between which events the effect sets in: it has no slope, its trials are all there is,
+    /// and its error is the distance of those events.
     fn sets_in(&self) -> Option<usize> {
         None
     }

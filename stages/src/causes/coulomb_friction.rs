@@ -30,7 +30,8 @@ const ABOUT: About = About {
 /// Speed at which friction is three quarters of its full size, in units of omega times the deflection that it holds.
 const CREEP: f64 = 0.2;
 
-/// By how much more thermal motion rounds: a tanh is an erf stretched by sqrt(pi) / 2, whose normal law has twice the variance.
+/// By how much more thermal motion rounds: a tanh is an erf stretched by sqrt(pi) / 2, whose normal law has twice the
+/// variance.
 const ROUNDS: f64 = 1.2533;
 
 impl Cause for CoulombFriction {
@@ -44,8 +45,9 @@ impl Cause for CoulombFriction {
             if let (Some(a), Some(v), Some(w)) =
                 (acceleration.first_mut(), motion.velocity.first(), motion.omega.first())
             {
-                // rounded below a creep of this speed: a jump of the force would stall every integrator. Thermal motion rounds what acts on the mean
-                // motion: the mean of erf(v) over a normal spread of v is an erf of a wider one
+                // rounded below a creep of this speed: a jump of the force would stall every integrator. Thermal motion
+                // rounds what acts on the mean motion: the mean of erf(v) over a normal spread of v is an erf of a
+                // wider one
                 let creep = w * ((CREEP * c).powi(2) + (ROUNDS * motion.thermal).powi(2)).sqrt();
                 if c != 0.0 {
                     *a -= w * w * c * (v / creep).tanh();
@@ -55,7 +57,8 @@ impl Cause for CoulombFriction {
     }
 
     fn inexact(&self) -> f64 {
-        // each event's own thermal motion rounds its friction otherwise than the mean does: some tenths of a per cent are left, of which a linear frequency, a spring and more take their parts
+        // each event's own thermal motion rounds its friction otherwise than the mean does: some tenths of a per cent
+        // are left, of which a linear frequency, a spring and more take their parts
         0.01
     }
 

@@ -1,7 +1,7 @@
 //! What a linear simulation gets wrong: the catalogue of causes, each a file.
 //!
-//! A [`Cause`] adds [`Effects`] to a simulation. The simulator integrates them in time to hide them, the diagnosis evaluates them with its own
-//! numerics to find them, and the extended model simulates with them afterwards.
+//! A [`Cause`] adds [`Effects`] to a simulation. The simulator integrates them in time to hide them, the diagnosis
+//! evaluates them with its own numerics to find them, and the extended model simulates with them afterwards.
 
 mod catalogue;
 mod cause;

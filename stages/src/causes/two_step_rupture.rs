@@ -41,8 +41,8 @@ impl Cause for TwoStepRupture {
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
-        // fifths of a decade from four samples to an eighth of the window, no further apart than a third of the first mode's period: beyond, one delay's
-        // ringing is another's with the opposite sign
+        // fifths of a decade from four samples to an eighth of the window, no further apart than a third of the first
+        // mode's period: beyond, one delay's ringing is another's with the opposite sign
         let (first, last) = (4.0 * scene.interval_s, scene.window_s / 8.0);
         let period = scene.frequency_hz.iter().copied().fold(f64::INFINITY, f64::min).recip();
         let further = |delay: &f64| Some((delay * 10f64.powf(0.2)).min(delay + period.max(1e-3 * last) / 3.0));

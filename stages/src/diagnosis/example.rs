@@ -30,7 +30,8 @@ pub(super) fn examples() -> Vec<Example> {
     }]
 }
 
-/// The oscillator under a held sum of sines in a little noise, by explicit Euler steps so short that their error is far below the noise.
+/// The oscillator under a held sum of sines in a little noise, by explicit Euler steps so short that their error is far
+/// below the noise.
 fn pair() -> Array {
     const STEPS: usize = 400;
     let omega = std::f64::consts::TAU * 80.0;

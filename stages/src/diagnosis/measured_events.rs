@@ -29,7 +29,8 @@ pub(super) fn check_cut(window_samples: usize, before_samples: usize) -> Result<
     Ok(())
 }
 
-/// An event of record `number` with [`MARGIN`] on either side, and its samples in the record; none where it leaves the record or has gaps.
+/// An event of record `number` with [`MARGIN`] on either side, and its samples in the record; none where it leaves the
+/// record or has gaps.
 pub(super) fn cut_out(
     recording: &Recording,
     number: usize,

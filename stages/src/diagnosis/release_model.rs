@@ -33,7 +33,8 @@ pub(super) fn lever_model(
     })
 }
 
-/// Lever and detector with errors from the fit's covariance: ln w and ln Q per mode, shares of all modes but the first, ln of the poles.
+/// Lever and detector with errors from the fit's covariance: ln w and ln Q per mode, shares of all modes but the first,
+/// ln of the poles.
 fn linear(fitted: &JointFit) -> LinearPart {
     let lever = &fitted.state.lever;
     let modes = lever.modes.len();

@@ -24,25 +24,31 @@ use crate::model::ModeNumber;
 use crate::simulate::LEVER_MODEL;
 use afmid_kernels::events::EventKind;
 
-/// Says what a linear lever and detector get wrong in snap-off events: names the causes, extends the model, measures the gain.
+/// Says what a linear lever and detector get wrong in snap-off events: names the causes, extends the model, measures
+/// the gain.
 ///
 /// # Model
-/// Modes with real static shares behind real detector poles, released from a load at an instant of each event's own; white, 1/f and thermal noise.
-/// Whatever else there is, is a cause of the catalogue (`afmid causes`).
+/// Modes with real static shares behind real detector poles, released from a load at an instant of each event's own;
+/// white, 1/f and thermal noise. Whatever else there is, is a cause of the catalogue (`afmid causes`).
 /// # Method
-/// Whole records first: codes, lines, piezo position. Then the events, jointly: score screen of all causes with the joint distribution of all
-/// scores, the strongest fitted in full, judged on held-out halves and against the best of another class, greedily; names that later ones make needless are taken back. At last three tests
-/// for causes outside the catalogue: of the residual common to all events, of the events' own frequencies, and whether a named strength changes with the amplitude.
-/// Foreign lines that the records show are taken off the events where these don't end clean.
+/// Whole records first: codes, lines, piezo position. Then the events, jointly: score screen of all causes with the
+/// joint distribution of all scores, the strongest fitted in full, judged on held-out halves and against the best of
+/// another class, greedily; names that later ones make needless are taken back. At last three tests for causes outside
+/// the catalogue: of the residual common to all events, of the events' own frequencies, and whether a named strength
+/// changes with the amplitude. Foreign lines that the records show are taken off the events where these don't end
+/// clean.
 /// # Shapes
-/// `summary`: the answer as JSON; `residuals` over time, frequency and event: mean event, models, residuals, their spectra, each event's numbers; `tiles`:
-/// the residual's energy by time and frequency; `model`: lever, detector, noise and causes with all their parameters, for later configs (`diagnosis.replay`, `simulate.model`, `force.reconstruction`).
+/// `summary`: the answer as JSON; `residuals` over time, frequency and event: mean event, models, residuals, their
+/// spectra, each event's numbers; `tiles`: the residual's energy by time and frequency; `model`: lever, detector, noise
+/// and causes with all their parameters, for later configs (`diagnosis.replay`, `simulate.model`,
+/// `force.reconstruction`).
 /// # Units
 /// V, Hz, s; strengths relative to volts of static deflection.
 /// # Accuracy
 /// Right names, parameters and false alarms over many seeds, and what falls short: docs/diagnosis.md.
 /// # Errors
-/// No event, a record without the channel, windows that leave their records, fewer oscillations than `modes`, an unknown cause in `without`.
+/// No event, a record without the channel, windows that leave their records, fewer oscillations than `modes`, an
+/// unknown cause in `without`.
 /// # Source
 /// C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50; R. W. Stark et al., Rev. Sci. Instrum. 76 (2005).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -112,7 +112,8 @@ mod tests {
         let of = |name: &str| array.real(name).expect("a variable");
         let levels = &array.axis("level").expect("levels").values;
         assert!(levels.len() > 10 && levels.is_sorted());
-        // what is left by the extended model at a level is noise: of some sixty levels a few exceed three of their errors, as many neighbours share their noise
+        // what is left by the extended model at a level is noise: of some sixty levels a few exceed three of their
+        // errors, as many neighbours share their noise
         let beyond = of("level_after").iter().zip(of("level_after_std")).filter(|(mean, std)| mean.abs() > 3.0 * **std);
         assert!(beyond.count() * 5 < levels.len());
         let mean_square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;

@@ -17,7 +17,8 @@ pub(super) fn examples() -> Vec<Example> {
             let found = &outputs.get(&SUMMARY).map_err(|error| error.to_string())?.0;
             let ratio = |part: &str| found[part]["mean_over_noise"].as_f64().unwrap_or(f64::NAN);
             let (before, after) = (ratio("before"), ratio("after"));
-            // the mean of 4000 values of white noise: its rms scatters by 1.1 %, four of them; two rows of five fit parameters take less
+            // the mean of 4000 values of white noise: its rms scatters by 1.1 %, four of them; two rows of five fit
+            // parameters take less
             if before > 2.0 && (after - 1.0).abs() < 0.05 {
                 Ok(format!("the mean residual falls from {before:.1} to {after:.2} times what noise leaves."))
             } else {

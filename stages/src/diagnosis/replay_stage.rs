@@ -18,15 +18,17 @@ use afmid_kernels::effects::Instant;
 /// # Model
 /// The extended model of `diagnosis.release`: lever and detector without causes (its baseline), and with them.
 /// # Method
-/// The integrator of `simulate.afm`, which shares no numerics with the fit; for each event its own load, instant (between samples), offset and slope by least squares,
-/// for both models; lines take each event's own phase. Lever and causes stay as the diagnosis left them.
+/// The integrator of `simulate.afm`, which shares no numerics with the fit; for each event its own load, instant
+/// (between samples), offset and slope by least squares, for both models; lines take each event's own phase. Lever and
+/// causes stay as the diagnosis left them.
 /// # Shapes
-/// `residuals` over the time of an event: mean over the events, before and after the extension; `events` one row per event; `summary` with both as numbers.
+/// `residuals` over the time of an event: mean over the events, before and after the extension; `events` one row per
+/// event; `summary` with both as numbers.
 /// # Units
 /// V, s.
 /// # Accuracy
-/// Load to 1e-5, instant to a thousandth of a sample. Noise is the model's white, thermal and fast 1/f noise; thermal motion is alike from event to event
-/// only on average: over ten events its ratio scatters by a few per cent.
+/// Load to 1e-5, instant to a thousandth of a sample. Noise is the model's white, thermal and fast 1/f noise; thermal
+/// motion is alike from event to event only on average: over ten events its ratio scatters by a few per cent.
 /// # Errors
 /// Another sample rate than the model's, causes that the catalogue does not hold, no event with a whole window.
 /// # Source

@@ -82,7 +82,8 @@ fn a_hidden_bend_is_found_simulated_again_and_found_again() {
     assert_eq!(model.causes.len(), 1);
     assert_eq!(model.causes[0].id, "quadratic-detector");
     let first = model.causes[0].parameters["a2"];
-    // single events: 80,000 samples, 0.25 %; thermal and 1/f noise of ten windows scatter by some per cent of their small part
+    // single events: 80,000 samples, 0.25 %; thermal and 1/f noise of ten windows scatter by some per cent of their
+    // small part
     assert!((ratio(&replay, "after", "over_noise") - 1.0).abs() < 0.04, "{replay:#}");
     assert!(ratio(&replay, "before", "over_noise") > 1.1, "{replay:#}");
     // 8000 samples of the mean: 0.8 %, thermal and 1/f parts more
@@ -102,7 +103,8 @@ fn a_hidden_bend_is_found_simulated_again_and_found_again() {
     assert!((ratio(&replay, "after", "over_noise") - 1.0).abs() < 0.04, "{replay:#}");
 }
 
-/// A release torn off on the moving ramp, without noise, against the same one let go: instant and load are fitted, lever and cause are the truth.
+/// A release torn off on the moving ramp, without noise, against the same one let go: instant and load are fitted,
+/// lever and cause are the truth.
 #[test]
 fn a_release_that_tears_off_by_itself_is_simulated_again() {
     let place = Place { record: 0, records: 2, samples: 200_000, margin_samples: 0, seed: 1 };

@@ -9,26 +9,31 @@ use serde::{Deserialize, Serialize};
 use super::system::{Part, Recorded, SystemDiagnosis, SystemOptions, diagnose_system};
 use super::system_story::{error_array, error_table};
 
-/// Says what a linear oscillator gets wrong in a measured input and output: names the causes, extends the model, measures the gain.
+/// Says what a linear oscillator gets wrong in a measured input and output: names the causes, extends the model,
+/// measures the gain.
 ///
 /// # Model
-/// `q'' + (w/Q) q' + w^2 q = w^2 g u(t)`, y = q, free-running from a free state, the input held between samples; whatever else there is, is a cause of the
-/// catalogue (`afmid causes`): stiffness, damping, friction, static maps of input and output, another course of the input between samples, offset,
-/// drift, lines. An input that is zero throughout makes it a free decay.
+/// `q'' + (w/Q) q' + w^2 q = w^2 g u(t)`, y = q, free-running from a free state, the input held between samples;
+/// whatever else there is, is a cause of the catalogue (`afmid causes`): stiffness, damping, friction, static maps of
+/// input and output, another course of the input between samples, offset, drift, lines. An input that is zero
+/// throughout makes it a free decay.
 /// # Method
-/// Least squares of the free-run error on the identification stretch; causes by score screen, joint refits, F tests by blocks against the part of the residual
-/// that no general term predicts, corrected for all trials; greedily, each held against its absence and its best rival at the end.
+/// Least squares of the free-run error on the identification stretch; causes by score screen, joint refits, F tests by
+/// blocks against the part of the residual that no general term predicts, corrected for all trials; greedily, each held
+/// against its absence and its best rival at the end.
 /// # Shapes
-/// `summary`: the answer as JSON; `ladder` by model; `simulation` over the identification stretch's time; `errors` by frequency and by the
-/// output's size; `judged` by stretches of time of the parts.
+/// `summary`: the answer as JSON; `ladder` by model; `simulation` over the identification stretch's time; `errors` by
+/// frequency and by the output's size; `judged` by stretches of time of the parts.
 /// # Units
 /// Those of `pair`; seconds, Hz.
 /// # Accuracy
-/// Right names, errors and false alarms over many seeds, and measured benchmarks: docs/diagnosis.md, "Input and output".
+/// Right names, errors and false alarms over many seeds, and measured benchmarks: docs/diagnosis.md, "Input and
+/// output".
 /// # Errors
 /// Several inputs, a missing input, parts beyond the record, an output that does not move, an unknown candidate.
 /// # Source
-/// J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28; S. A. Billings, Nonlinear System Identification, 2013, chapter 3.
+/// J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28; S. A. Billings, Nonlinear System Identification, 2013,
+/// chapter 3.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SystemDiagnose {
@@ -63,7 +68,8 @@ pub struct JudgedPart {
     pub first: usize,
     /// One past the last.
     pub end: usize,
-    /// Samples at its beginning that fit its initial state and are not scored; 0: the simulation of the identification stretch goes on into it.
+    /// Samples at its beginning that fit its initial state and are not scored; 0: the simulation of the identification
+    /// stretch goes on into it.
     pub state_samples: usize,
 }
 

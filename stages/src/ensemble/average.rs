@@ -11,13 +11,14 @@ use super::{Moments, Scatter, Split, moments, scatter, split_halves};
 
 /// Averages aligned events: all of them, and two halves drawn at random.
 ///
-/// Model: every event is a common shape times an amplitude, plus an offset, a loading ramp on either side of the onset, a fraction of a
-/// sample of misalignment, and noise.
-/// Method: mean and variance per sample (corrected two-pass). Each event is regressed on the mean, its slope, a constant and the ramps; what
-/// remains is noise, whose variance over the number of events is the squared standard error. Adhesion scatter is therefore in
-/// `variance`, not in `standard_error`. The halves are a random split seeded by the pipeline.
-/// Shapes: `ensemble.signal` is events x samples; `mean` and the rest are one value per sample, the same with `_identification` and
-/// `_verification` for the halves; `amplitude`, `offset`, `lag`, `rms`, `half` one per event.
+/// Model: every event is a common shape times an amplitude, plus an offset, a loading ramp on either side of the onset,
+/// a fraction of a sample of misalignment, and noise.
+/// Method: mean and variance per sample (corrected two-pass). Each event is regressed on the mean, its slope, a
+/// constant and the ramps; what remains is noise, whose variance over the number of events is the squared standard
+/// error. Adhesion scatter is therefore in `variance`, not in `standard_error`. The halves are a random split seeded by
+/// the pipeline.
+/// Shapes: `ensemble.signal` is events x samples; `mean` and the rest are one value per sample, the same with
+/// `_identification` and `_verification` for the halves; `amplitude`, `offset`, `lag`, `rms`, `half` one per event.
 /// Units: those of the ensemble; `amplitude` is relative to the mean, `lag` in seconds.
 /// Accuracy: a noise variance from n events has a relative standard error of sqrt(2 / (n - 1)) per sample.
 /// Errors: fewer than two events, values that are not finite, a mean without shape.
@@ -42,7 +43,8 @@ const AVERAGE: Port<Array> =
 const SUMMARY: Port<Document> =
     Port::new("summary", "summary", "how many events, how they scatter, how noisy they are");
 
-/// Misalignment above this share of a sample is worth a warning: at the paper's fourth mode it turns phases by 8 degrees.
+/// Misalignment above this share of a sample is worth a warning: at the paper's fourth mode it turns phases by 8
+/// degrees.
 const LAG_LIMIT_SAMPLES: f64 = 0.1;
 
 impl Stage for Average {

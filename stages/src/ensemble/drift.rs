@@ -11,13 +11,16 @@ use super::{DriftSettings, EnsembleError, ShapeDrift, SubEnsemble, shape_drift};
 
 /// Asks whether the shape of the events changes slowly over the archive.
 ///
-/// Model: without drift, what is left of the events after amplitude, offset, ramps and lag are taken out may be put in any order.
-/// Method: the squared norm of the remainders' linear, quadratic and cubic trend over the event index, against the same for random
-/// orders: a permutation test. Beside it, ordered and randomised sub-ensembles, each correlated with the mean of all other events.
+/// Model: without drift, what is left of the events after amplitude, offset, ramps and lag are taken out may be put in
+/// any order.
+/// Method: the squared norm of the remainders' linear, quadratic and cubic trend over the event index, against the same
+/// for random orders: a permutation test. Beside it, ordered and randomised sub-ensembles, each correlated with the
+/// mean of all other events.
 /// Shapes: one row per sub-ensemble in `groups`.
 /// Units: correlation coefficients and probabilities.
 /// Accuracy: the p-value is at least 1 / (1 + permutations); its standard error is sqrt(p (1 - p) / permutations).
-/// Errors: values that are not finite. Fewer than eight events, or than two per group: a warning, and the p-value is unknown.
+/// Errors: values that are not finite. Fewer than eight events, or than two per group: a warning, and the p-value is
+/// unknown.
 /// Source: Stark et al. 2005, section Data processing; Phipson and Smyth, Stat. Appl. Genet. Mol. Biol. 9 (2010) 39.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -63,7 +66,8 @@ impl Stage for Drift {
         let settings = DriftSettings { groups: self.groups, permutations: self.permutations, seed: cx.seed() };
         let found = match shape_drift(rows, onset_sample(ensemble)?, settings) {
             Ok(found) => found,
-            // a small archive is no reason to lose the rest of the pipeline: nothing is known of drift, and that is said
+            // a small archive is no reason to lose the rest of the pipeline: nothing is known of drift, and that is
+            // said
             Err(error @ EnsembleError::TooFewEvents { .. }) => {
                 cx.warn(format!("{error}: whether the events drift is unknown"));
                 let unknown = ShapeDrift { groups: Vec::new(), p_value: f64::NAN, z_score: f64::NAN };

@@ -22,10 +22,11 @@ const PIECE: usize = 512;
 /// Inner products of all pairs of remainders, `[event][event]`.
 ///
 /// # Method
-/// Remainders are made block by block, those of the held rows once, those of later rows once per held block; the products are symmetric, bit
-/// for bit. Each is one sum over the samples in their order.
+/// Remainders are made block by block, those of the held rows once, those of later rows once per held block; the
+/// products are symmetric, bit for bit. Each is one sum over the samples in their order.
 ///
-/// Memory: the products, 8 bytes per pair of events (5.6 MB for 840), and the blocks. Cost: `count^2 samples` additions.
+/// Memory: the products, 8 bytes per pair of events (5.6 MB for 840), and the blocks. Cost: `count^2 samples`
+/// additions.
 ///
 /// # Errors
 /// Rows that cannot be read.
@@ -59,7 +60,8 @@ pub(super) fn gram(rows: &dyn RowSource, remainders: &Remainders<'_>) -> Result<
     Ok(products)
 }
 
-/// Products of each of `a` with all of `b`, into columns from `column` on; of rows with themselves (`same`), each pair once.
+/// Products of each of `a` with all of `b`, into columns from `column` on; of rows with themselves (`same`), each pair
+/// once.
 ///
 /// Piece of time after piece of time, so that pieces of all rows are near the processor: sums go on where they were.
 fn fill(products: &mut [Vec<f64>], column: usize, a: &[Vec<f64>], b: &[Vec<f64>], same: bool) {

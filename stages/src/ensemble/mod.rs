@@ -1,9 +1,9 @@
 //! Averages over aligned events, and what their spread says.
 //!
-//! An ensemble is a row-major array `[event, time]`: every row one event, aligned so that the release (or the snap) lies on
-//! the same sample. The rows differ by an amplitude (adhesion scatters by 6 to 30 %), by an offset (records wander by
-//! millivolts) and by the slope with which the piezo loads the lever; what is left is noise, and only this enters standard
-//! errors.
+//! An ensemble is a row-major array `[event, time]`: every row one event, aligned so that the release (or the snap)
+//! lies on the same sample. The rows differ by an amplitude (adhesion scatters by 6 to 30 %), by an offset (records
+//! wander by millivolts) and by the slope with which the piezo loads the lever; what is left is noise, and only this
+//! enters standard errors.
 
 use afmid_pipeline::Entry;
 

@@ -23,12 +23,13 @@ pub struct Moments {
 /// Mean and unbiased variance per sample over the chosen events.
 ///
 /// # Model
-/// None: plain moments. Amplitude scatter counts as variance here; see [`scatter`](super::scatter()) for the noise alone.
+/// None: plain moments. Amplitude scatter counts as variance here; see [`scatter`](super::scatter()) for the noise
+/// alone.
 ///
 /// # Method
 /// Corrected two-pass: the mean, improved by the mean of the deviations from it, then the squared deviations less the
-/// square of their sum. Sums run over the events in the order given, so the result depends neither on threads nor on where
-/// the rows lie. Two passes over the rows.
+/// square of their sum. Sums run over the events in the order given, so the result depends neither on threads nor on
+/// where the rows lie. Two passes over the rows.
 ///
 /// # Shapes
 /// `rows` `[event, time]`; results `[time]`.

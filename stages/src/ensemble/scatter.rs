@@ -33,15 +33,15 @@ impl Scatter {
 /// Regresses each chosen event on the mean, its slope, a constant, and a ramp on either side of the event.
 ///
 /// # Model
-/// `y_i(t) = a_i (m(t) - l_i m'(t)) + b_i + c_i min(t, 0) + d_i max(t, 0) + e_i(t)`, `t = 0` at sample `zero`. A stronger adhesion
-/// makes the whole ringing larger (`a_i`), but not the slope at which the piezo loads the lever (`c_i`, `d_i`); records wander
-/// by an offset (`b_i`), and alignment leaves a fraction of a sample (`l_i`). None of this is noise.
+/// `y_i(t) = a_i (m(t) - l_i m'(t)) + b_i + c_i min(t, 0) + d_i max(t, 0) + e_i(t)`, `t = 0` at sample `zero`. A
+/// stronger adhesion makes the whole ringing larger (`a_i`), but not the slope at which the piezo loads the lever
+/// (`c_i`, `d_i`); records wander by an offset (`b_i`), and alignment leaves a fraction of a sample (`l_i`). None of
+/// this is noise.
 ///
 /// # Method
-/// Least squares by twice repeated Gram-Schmidt on the five columns (a ramp with less than eight samples is left out, and
-/// so is a slope that vanishes); `m'` by central differences.
-/// Noise variance: sum of squares over `n - 1`, since the mean holds a share of each event, times `T / (T - p)` for the
-/// `p` coefficients per event.
+/// Least squares by twice repeated Gram-Schmidt on the five columns (a ramp with less than eight samples is left out,
+/// and so is a slope that vanishes); `m'` by central differences. Noise variance: sum of squares over `n - 1`, since
+/// the mean holds a share of each event, times `T / (T - p)` for the `p` coefficients per event.
 ///
 /// # Shapes
 /// `rows` `[event, time]`, `mean` `[time]`; results per chosen event or `[time]`.
@@ -50,8 +50,8 @@ impl Scatter {
 /// Those of the rows; amplitude is a ratio.
 ///
 /// # Accuracy
-/// The variance of one sample has a relative standard error of `sqrt(2 / (n - 1))`. Noise slower than the window is partly
-/// taken for an offset or a ramp.
+/// The variance of one sample has a relative standard error of `sqrt(2 / (n - 1))`. Noise slower than the window is
+/// partly taken for an offset or a ramp.
 ///
 /// # Errors
 /// Fewer than two events, fewer than sixteen samples, an index outside, or a constant mean.
@@ -163,7 +163,8 @@ impl<'a> Basis<'a> {
     }
 }
 
-/// Appends what `column` adds to the others, normalised, and returns its norm; zero, and nothing appended, if it adds nothing.
+/// Appends what `column` adds to the others, normalised, and returns its norm; zero, and nothing appended, if it adds
+/// nothing.
 fn orthogonalise(columns: &mut Vec<Vec<f64>>, mut column: Vec<f64>) -> f64 {
     let size = dot(&column, &column).sqrt();
     // twice is enough (Giraud, Langou, Rozloznik 2005)

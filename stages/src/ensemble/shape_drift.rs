@@ -56,15 +56,15 @@ const TREND_ORDERS: usize = 3;
 /// Tests whether neighbouring events resemble each other more than events drawn at random.
 ///
 /// # Model
-/// Each event is amplitude times a common shape, plus offset, loading ramps and noise (see [`scatter`](super::scatter())).
-/// Under the null hypothesis the remainders may be put in any order.
+/// Each event is amplitude times a common shape, plus offset, loading ramps and noise (see
+/// [`scatter`](super::scatter())). Under the null hypothesis the remainders may be put in any order.
 ///
 /// # Method
-/// With the remainders' Gram matrix `K` and orthonormal polynomials `c_p` of order 1 to 3 in the event index, the statistic
-/// is `sum_p sum_(i != j) c_pi c_pj K_ij`: the squared norm of the remainder's trend over the archive, less each event's own
-/// noise power. Amplitude scatter has been regressed out and cannot enter. The p-value is
-/// `(1 + exceedances) / (1 + permutations)`, exact for exchangeable events.
-/// Beside it: consecutive and randomised groups, each correlated with the mean of all other events.
+/// With the remainders' Gram matrix `K` and orthonormal polynomials `c_p` of order 1 to 3 in the event index, the
+/// statistic is `sum_p sum_(i != j) c_pi c_pj K_ij`: the squared norm of the remainder's trend over the archive, less
+/// each event's own noise power. Amplitude scatter has been regressed out and cannot enter. The p-value is `(1 +
+/// exceedances) / (1 + permutations)`, exact for exchangeable events. Beside it: consecutive and randomised groups,
+/// each correlated with the mean of all other events.
 ///
 /// # Shapes
 /// `rows` `[event, time]` in the order of the archive.
@@ -73,14 +73,15 @@ const TREND_ORDERS: usize = 3;
 /// Correlation, z-score and p-value are numbers.
 ///
 /// # Accuracy
-/// The p-value is no smaller than `1 / (1 + permutations)` and has a standard error of `sqrt(p (1 - p) / permutations)`.
+/// The p-value is no smaller than `1 / (1 + permutations)` and has a standard error of `sqrt(p (1 - p) /
+/// permutations)`.
 ///
 /// # Errors
 /// Fewer than two groups, fewer than two events per group, fewer than eight events, no permutations, a constant mean.
 ///
 /// # Source
-/// Stark et al. 2005, "subensembles (ordered as well as randomized) were created and compared"; permutation tests: Phipson
-/// and Smyth, Stat. Appl. Genet. Mol. Biol. 9 (2010) 39.
+/// Stark et al. 2005, "subensembles (ordered as well as randomized) were created and compared"; permutation tests:
+/// Phipson and Smyth, Stat. Appl. Genet. Mol. Biol. 9 (2010) 39.
 pub fn shape_drift(rows: impl RowSource, zero: usize, settings: DriftSettings) -> Result<ShapeDrift, EnsembleError> {
     let count = rows.rows();
     let wanted = (2 * settings.groups).max(8);

@@ -97,7 +97,8 @@ fn every_event_of_the_archives_is_found_and_none_is_false() {
             assert_eq!(index.len(), truth.len(), "{name} {kind:?}");
             for ((index, shift), truth) in index.iter().zip(shift).zip(truth) {
                 let late = *index as f64 + shift - truth;
-                // the truth is the first sample after the event; a rupture over 1.3 us and the detector's poles are seen two samples late
+                // the truth is the first sample after the event; a rupture over 1.3 us and the detector's poles are
+                // seen two samples late
                 assert!((-1.0..3.0).contains(&late), "{name} {kind:?}: {late} samples after {truth}");
             }
         }

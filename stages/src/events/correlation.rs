@@ -17,20 +17,20 @@ use afmid_kernels::events::{Aligned, AveragingSettings, EventKind, Misfit, corre
 /// Finds snap-off or snap-to-contact events in records and aligns them by iterative correlation averaging.
 ///
 /// # Model
-/// An event is a sudden change of level of a deflection that is otherwise piecewise straight, with hum, drift and noise; all
-/// events of a kind have one shape, each with its amplitude and offset.
+/// An event is a sudden change of level of a deflection that is otherwise piecewise straight, with hum, drift and
+/// noise; all events of a kind have one shape, each with its amplitude and offset.
 /// # Method
-/// Block means of each record, jumps of level that stand out from the record's own noise and drift, the onset as the first
-/// sustained departure, correlation averaging to a fraction of a sample, windows by band-limited interpolation. A record
-/// without an event is listed with the reason.
+/// Block means of each record, jumps of level that stand out from the record's own noise and drift, the onset as the
+/// first sustained departure, correlation averaging to a fraction of a sample, windows by band-limited interpolation. A
+/// record without an event is listed with the reason.
 /// # Shapes
 /// `ensemble` is events x window samples, the onset of the average at sample `onset_sample` of every window.
 /// # Units
 /// The channel's.
 /// # Accuracy
 /// Alignment to 0.006 samples rms for 0.9 V releases in 1.2 mV of noise, 0.02 for snaps to contact of 40 mV (simulated
-/// archives); interpolation adds 5e-5 of the jump at the onset, 1e-6 elsewhere. The rupture itself lies one to three samples
-/// before the onset, the same in all events.
+/// archives); interpolation adds 5e-5 of the jump at the onset, 1e-6 elsewhere. The rupture itself lies one to three
+/// samples before the onset, the same in all events.
 /// # Errors
 /// No event in any record; a record that cannot be read.
 /// # Source

@@ -66,7 +66,8 @@ fn expect(outputs: &Ports) -> Result<String, String> {
         onsets.iter().zip(RUPTURES.iter().flatten()).map(|(onset, rupture)| onset * RATE - rupture).collect();
     let rejected = table.text("rejected").map_err(fail)?;
     let spread = late.iter().fold(0.0f64, |spread, value| spread.max((value - late[0]).abs()));
-    // 0.9 V in 1 mV of noise: 0.003 samples; the release bends sharply at its onset, which interpolation sees: some hundredths
+    // 0.9 V in 1 mV of noise: 0.003 samples; the release bends sharply at its onset, which interpolation sees: some
+    // hundredths
     if onsets.len() != 3
         || spread > 0.05
         || !(0.0..4.0).contains(&late[0])

@@ -56,7 +56,8 @@ pub struct Extraction {
     pub refused: Vec<Refused>,
 }
 
-/// Samples of a record that are kept while it is searched; a longer record is read again round its events, as is one that costs nothing to decode.
+/// Samples of a record that are kept while it is searched; a longer record is read again round its events, as is one
+/// that costs nothing to decode.
 const KEPT_SAMPLES: usize = 1 << 24;
 
 /// Samples over which the line before an onset is fitted.
@@ -72,10 +73,10 @@ struct Samples<'a> {
 /// Finds the events of one kind in one channel.
 ///
 /// # Method
-/// One pass over the chunks for the block means, [`detect`], then round each candidate the first sustained departure from the
-/// line before it. A window that leaves the record, holds another event, missing samples, or samples at the converter's full
-/// scale, is refused. Memory: the record's own samples as stored if they are to be inflated or parsed (at most 32 MB of int16; others are read
-/// again round the candidates), and the segments.
+/// One pass over the chunks for the block means, [`detect`], then round each candidate the first sustained departure
+/// from the line before it. A window that leaves the record, holds another event, missing samples, or samples at the
+/// converter's full scale, is refused. Memory: the record's own samples as stored if they are to be inflated or parsed
+/// (at most 32 MB of int16; others are read again round the candidates), and the segments.
 /// # Errors
 /// Those of the channel's source.
 pub fn extract(channel: &Channel, settings: &ExtractionSettings) -> Result<Extraction, StageError> {

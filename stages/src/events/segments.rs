@@ -15,7 +15,8 @@ pub(super) struct Seen {
     pub(super) start: usize,
     /// Samples at the end of the converter's range.
     pub(super) saturated: usize,
-    /// Number of its segment. Which event has which depends on the order in which threads come by: nothing else may depend on it.
+    /// Number of its segment. Which event has which depends on the order in which threads come by: nothing else may
+    /// depend on it.
     pub(super) segment: usize,
     /// What the alignment looks at.
     pub(super) stretch: Vec<f64>,
@@ -39,8 +40,8 @@ pub(super) struct Stretch {
 impl Stretch {
     /// Of segments with so many samples before and after the onset.
     ///
-    /// An event is moved by twice the largest shift at most (its own, less the mean of all), and interpolated from some samples to either side:
-    /// with these the alignment has the same bits as with whole segments.
+    /// An event is moved by twice the largest shift at most (its own, less the mean of all), and interpolated from some
+    /// samples to either side: with these the alignment has the same bits as with whole segments.
     pub(super) fn new(averaging: &AveragingSettings, before: usize, after: usize) -> Self {
         let spare = 2 * averaging.max_shift_samples.max(1) + 2 * REACH + 4;
         let ahead = before.min(averaging.lead_samples() + spare);

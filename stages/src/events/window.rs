@@ -54,7 +54,8 @@ pub struct EventWindow {
 pub struct Windows {
     /// In the order of the events.
     pub events: Vec<EventWindow>,
-    /// The signals, band-limited interpolated so that the onset of the average is sample `pre_samples`: a row of `window_samples` per event.
+    /// The signals, band-limited interpolated so that the onset of the average is sample `pre_samples`: a row of
+    /// `window_samples` per event.
     pub values: Values,
     /// The onset of the average after the detected onsets, in samples; 0 if the average shows none.
     pub onset_correction: i64,
@@ -64,23 +65,25 @@ pub struct Windows {
 ///
 /// # Method
 /// 1. Windows at the aligned positions.
-/// 2. The onset of their average, whose noise is the root of their number smaller: the first sustained departure beyond 4
-///    standard deviations, for 4 samples; all windows move by it as one, in whole samples.
-/// 3. Lines before and after (its second half) give the jump of the average; each event's own is its share of it, by the
-///    amplitude of the correlation.
+/// 2. The onset of their average, whose noise is the root of their number smaller: the first sustained departure beyond
+///   4 standard deviations, for 4 samples; all windows move by it as one, in whole samples.
+/// 3. Lines before and after (its second half) give the jump of the average; each event's own is its share of it, by
+///   the amplitude of the correlation.
 /// 4. Each event is regressed on the average of the others and 1, after the onset, for the quality.
 ///
 /// `loaded_before`: a snap-off is free after the onset, a snap-to-contact before: there the offset is read.
 /// # Shapes
-/// Segments with [`WindowSettings::margins`] round `onset`; `chosen` are numbers of segments, each with its alignment. Windows go to `writer`; no
-/// more of them than a block is in memory otherwise.
+/// Segments with [`WindowSettings::margins`] round `onset`; `chosen` are numbers of segments, each with its alignment.
+/// Windows go to `writer`; no more of them than a block is in memory otherwise.
 /// # Units
 /// As the segments; positions in samples.
 /// # Accuracy
-/// Interpolation 5e-5 of the jump at the onset, 1e-6 elsewhere (see [`fractional_shift`](afmid_kernels::events::fractional_shift)); the onset
-/// is late by the samples that the signal stays within the average's noise, one to three, alike in all events.
+/// Interpolation 5e-5 of the jump at the onset, 1e-6 elsewhere (see
+/// [`fractional_shift`](afmid_kernels::events::fractional_shift)); the onset is late by the samples that the signal
+/// stays within the average's noise, one to three, alike in all events.
 /// # Errors
-/// Segments that cannot be read, windows that cannot be written. Segments shorter than that are padded with their end values.
+/// Segments that cannot be read, windows that cannot be written. Segments shorter than that are padded with their end
+/// values.
 pub fn cut_windows(
     segments: &dyn RowSource,
     onset: usize,
@@ -154,8 +157,8 @@ impl Cutting<'_> {
     }
 }
 
-/// Indices of events whose quality is out of line: beyond the median by `significance` robust deviations and by a factor of
-/// `factor`.
+/// Indices of events whose quality is out of line: beyond the median by `significance` robust deviations and by a
+/// factor of `factor`.
 pub fn quality_outliers(qualities: &[f64], significance: f64, factor: f64) -> Vec<usize> {
     let (center, scale) = median_and_scale(&mut qualities.to_vec());
     let limit = (center + significance * scale).max(factor * center);
@@ -186,8 +189,8 @@ fn levels(window: &[f64], pre: usize) -> Option<Levels> {
     Some(Levels { before: before.at(pre as f64), after, noise_std: before.noise_std })
 }
 
-/// The least-squares line through `values` with Hann weights, at `position` (of `values`): a ringing of many periods averages
-/// out.
+/// The least-squares line through `values` with Hann weights, at `position` (of `values`): a ringing of many periods
+/// averages out.
 fn extrapolated_past_ringing(values: &[f64], position: f64) -> Option<f64> {
     let n = values.len() as f64;
     if values.len() < 8 {
@@ -271,7 +274,8 @@ mod tests {
             let late = event.onset - (onset as f64 + shift);
             // the average's noise is 0.3 mV: the release leaves it within two samples
             assert!((-0.1..2.1).contains(&late), "{late}");
-            // levels from lines over 480 and 2048 samples (1.2 mV / sqrt(480) * 2 = 0.1 mV), the rest of the ringing: 0.3 %
+            // levels from lines over 480 and 2048 samples (1.2 mV / sqrt(480) * 2 = 0.1 mV), the rest of the ringing:
+            // 0.3 %
             assert!((event.amplitude / -load - 1.0).abs() < 3e-3, "{} for {load}", event.amplitude);
             assert!((event.offset - offset).abs() < 3e-3, "{} for {offset}", event.offset);
             assert!((event.noise_std / 1.2e-3 - 1.0).abs() < 0.15, "{}", event.noise_std);
@@ -279,7 +283,8 @@ mod tests {
             assert!((event.quality - 1.0).abs() < 0.15, "{}", event.quality);
             let clean = lever.release(4096, 512.0 - late, load);
             let squares: f64 = signal.iter().zip(&clean).map(|(y, c)| (y - c - offset).powi(2)).sum();
-            // interpolation leaves white noise as it is, less what lies above 0.45 of the rate: the rms must stay the noise's
+            // interpolation leaves white noise as it is, less what lies above 0.45 of the rate: the rms must stay the
+            // noise's
             let rms = (squares / 4096.0).sqrt();
             assert!((0.8..1.1).contains(&(rms / 1.2e-3)), "{rms:.2e}");
         }

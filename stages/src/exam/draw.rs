@@ -82,9 +82,10 @@ const ATTEMPTS: usize = 40;
 /// Draws an archive: lever, records, scatter, causes and strengths.
 ///
 /// # Method
-/// Kinds in the shares 25 % clean, 45 % one, 15 % mixtures, 15 % left out, unless given. Causes of equal chance among those of `catalogue` that act on releases
-/// and can be named; further parameters from one of the cause's own trials, up to 25 % off; strength log-uniform from the limit to 30 times (a left-out
-/// cause from 10 times). Records are parts of a cycle with one release or none; one archive in ten has records of several cycles.
+/// Kinds in the shares 25 % clean, 45 % one, 15 % mixtures, 15 % left out, unless given. Causes of equal chance among
+/// those of `catalogue` that act on releases and can be named; further parameters from one of the cause's own trials,
+/// up to 25 % off; strength log-uniform from the limit to 30 times (a left-out cause from 10 times). Records are parts
+/// of a cycle with one release or none; one archive in ten has records of several cycles.
 ///
 /// # Errors
 /// None: nothing if the catalogue holds no such cause.
@@ -168,8 +169,8 @@ fn archive(seed: u64, rng: &mut ChaCha8Rng) -> (Afm, usize) {
     (afm, if long { records } else { records - idle })
 }
 
-/// Every record but the last `idle` ones around a release, which comes somewhere in its middle (adhesion that scatters may move it further, even out of the
-/// record); those are free all the time.
+/// Every record but the last `idle` ones around a release, which comes somewhere in its middle (adhesion that scatters
+/// may move it further, even out of the record); those are free all the time.
 fn with_phases(afm: Afm, idle: usize, rng: &mut ChaCha8Rng) -> Afm {
     let height_m = afm.surface_m + afm.adhesion_n * (1.0 / afm.stiffness_n_per_m + 1.0 / afm.contact_stiffness_n_per_m);
     // cycle position of the release on the way up, and the cycles of a record

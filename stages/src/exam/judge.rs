@@ -42,8 +42,8 @@ pub struct Judged {
 /// Judges the JSON of a diagnosis (`None`: the run failed).
 ///
 /// # Method
-/// A hidden cause is found if a named one is of its class, as either of the two declares it; each name serves one hidden cause. A left-out cause asks for
-/// `unexplained`. Only the JSON and the draw are looked at.
+/// A hidden cause is found if a named one is of its class, as either of the two declares it; each name serves one
+/// hidden cause. A left-out cause asks for `unexplained`. Only the JSON and the draw are looked at.
 pub fn judge(draw: &Draw, json: Option<&Value>) -> Judged {
     let nothing = Value::Null;
     let json = json.unwrap_or(&nothing);

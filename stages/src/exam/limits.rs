@@ -7,7 +7,8 @@ use afmid_kernels::ringdown::internals::Whitener;
 use afmid_kernels::ringdown::{RingdownNoise, ThermalMode};
 use afmid_kernels::simulate::{BOLTZMANN_J_PER_K, Cut, Microscope, Place};
 
-/// Expected gain of the log likelihood over the archive at the limit, after what numbers found anew in every record cost.
+/// Expected gain of the log likelihood over the archive at the limit, after what numbers found anew in every record
+/// cost.
 pub const LIMIT_GAIN: f64 = 10.0;
 
 /// The window in which an effect is measured, as the diagnosis cuts it.
@@ -33,9 +34,10 @@ pub struct Count {
 /// What a baseline can follow, and the noise that hides the rest.
 ///
 /// # Method
-/// Noise-free releases at five places of the archive; what the baseline follows by itself, to first order: amplitude, offset, slope and instant of each
-/// event, and every shared parameter (frequencies, quality factors, shares, detector poles) by a central difference of simulated releases. The expected gain is half
-/// the sum of squares that is left of a cause's difference, whitened by white and thermal noise, for all events.
+/// Noise-free releases at five places of the archive; what the baseline follows by itself, to first order: amplitude,
+/// offset, slope and instant of each event, and every shared parameter (frequencies, quality factors, shares, detector
+/// poles) by a central difference of simulated releases. The expected gain is half the sum of squares that is left of a
+/// cause's difference, whitened by white and thermal noise, for all events.
 ///
 /// # Accuracy
 /// First order; amplitudes of five events stand for those of all.
@@ -55,7 +57,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// For an archive of so many events and records of so many samples, above a surface at that height, m; nothing if the microscope never releases its tip.
+    /// For an archive of so many events and records of so many samples, above a surface at that height, m; nothing if
+    /// the microscope never releases its tip.
     pub fn new(microscope: &Microscope, count: Count, samples: usize, surface_m: f64) -> Option<Self> {
         let plain = releases(microscope, &Effects::default(), count)?;
         let mut followed = event_columns(&plain);
@@ -92,14 +95,15 @@ impl Limits {
         Some(windows + self.record_gain(effects, degree))
     }
 
-    /// The same of what is added to whole records while the lever is free, where each record has a polynomial in time of its own and white and 1/f
-    /// noise as at [`HUM_HZ`].
+    /// The same of what is added to whole records while the lever is free, where each record has a polynomial in time
+    /// of its own and white and 1/f noise as at [`HUM_HZ`].
     fn record_gain(&self, effects: &Effects, degree: i32) -> f64 {
         if effects.added.is_empty() {
             return 0.0;
         }
         let (noise, rate) = (&self.microscope.noise, self.microscope.sample_rate_hz);
-        // one-sided densities, V^2/Hz: the 1/f noise spreads its variance evenly over the logarithm from 1 Hz to half the rate
+        // one-sided densities, V^2/Hz: the 1/f noise spreads its variance evenly over the logarithm from 1 Hz to half
+        // the rate
         let white = 2.0 * noise.white_v.powi(2) / rate;
         let pink = noise.pink_v.powi(2) / (0.5 * rate).ln() / HUM_HZ;
         let variance_v2 = self.variance_v2 * (1.0 + pink / white.max(f64::MIN_POSITIVE));
@@ -119,7 +123,8 @@ impl Limits {
         (0..records).map(gain).sum()
     }
 
-    /// Time since the record began and height of the base, where the lever is free, and how many samples that stands for: of a record shorter than a cycle
+    /// Time since the record began and height of the base, where the lever is free, and how many samples that stands
+    /// for: of a record shorter than a cycle
     /// [`FREE`], after a release; of a longer one all above the height of the release.
     fn free_path(&self) -> (Vec<(f64, f64)>, f64) {
         let microscope = &self.microscope;
@@ -141,18 +146,20 @@ impl Limits {
     }
 }
 
-/// The strength (first of `values`) at which the expected gain is [`LIMIT_GAIN`]; nothing if the limits of the parameter do not hold it.
+/// The strength (first of `values`) at which the expected gain is [`LIMIT_GAIN`]; nothing if the limits of the
+/// parameter do not hold it.
 ///
 /// # Method
-/// Secant steps on the logarithms of gain and strength, halved intervals where those leave the bracket (a gain may jump where a release passes a
-/// sample), up to 16, to 5 %.
+/// Secant steps on the logarithms of gain and strength, halved intervals where those leave the bracket (a gain may jump
+/// where a release passes a sample), up to 16, to 5 %.
 pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> {
     let about = cause.about();
     let (parameter, first) = (about.parameters.first()?, *values.first()?);
     let (sign, highest) = (first.signum(), if first < 0.0 { -parameter.low } else { parameter.high });
     // held out, a number that is found anew in every record costs half a unit there
     let found_anew = 0.5 * (limits.count.events * cause.free_in_each_record()) as f64;
-    // a sine of a phase of its own is sought beside all that a slow contact or a fringe can do: a cubic; other shapes beside an offset and a drift
+    // a sine of a phase of its own is sought beside all that a slow contact or a fringe can do: a cubic; other shapes
+    // beside an offset and a drift
     let degree = if found_anew > 0.0 { 3 } else { 1 };
     let gain = |strength: f64| {
         let mut values = values.to_vec();
@@ -175,8 +182,9 @@ pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> 
             above = above.min(strength);
         }
         if (now / LIMIT_GAIN).ln().abs() < 0.05 * power || (strength == above && above < 1.05 * below) {
-            // more must show more, a level such as that of clipping is no strength; and much more much more, at least as the root: a step that a release takes
-            // past a sample is no effect, however small the strength that takes it
+            // more must show more, a level such as that of clipping is no strength; and much more much more, at least
+            // as the root: a step that a release takes past a sample is no effect, however small the strength that
+            // takes it
             let higher = (4.0 * strength).min(highest);
             let more = gain(higher)?;
             let less = gain(0.25 * strength)?;
@@ -324,7 +332,8 @@ mod tests {
         )
         .unwrap();
         for (id, values, low, high) in [
-            // smallest strengths that a prototype named with 12 records: 0.5e-3 /V, 1.5e-3 /V^2, 0.3 us; the limit asks for less than naming does
+            // smallest strengths that a prototype named with 12 records: 0.5e-3 /V, 1.5e-3 /V^2, 0.3 us; the limit asks
+            // for less than naming does
             ("quadratic-detector", vec![0.01], 0.5e-4, 1e-3),
             ("cubic-detector", vec![0.01], 0.5e-4, 3e-3),
             // 0.3 us with nominal poles; free poles follow most of it

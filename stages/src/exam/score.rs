@@ -45,7 +45,8 @@ pub struct Score {
     pub false_alarms: Share,
     /// Its 95 % Clopper-Pearson interval; null without clean archives.
     pub false_alarm_interval: Option<(f64, f64)>,
-    /// Distance of the clean archives' p-values from uniform, and the probability of a larger one; null where the diagnosis states none.
+    /// Distance of the clean archives' p-values from uniform, and the probability of a larger one; null where the
+    /// diagnosis states none.
     pub null_p_values: Option<(f64, f64)>,
     /// Archives with names beyond what was hidden.
     pub invented: Share,

@@ -43,7 +43,8 @@ fn at_most(hits: usize, trials: usize, p: f64) -> f64 {
     sum.min(1.0)
 }
 
-/// Kolmogorov and Smirnov's distance of `values` from a uniform distribution on 0 to 1, and the probability of a larger one; nothing without values.
+/// Kolmogorov and Smirnov's distance of `values` from a uniform distribution on 0 to 1, and the probability of a larger
+/// one; nothing without values.
 ///
 /// # Method
 /// Kolmogorov's series at `sqrt(n) + 0.12 + 0.11 / sqrt(n)` times the distance.

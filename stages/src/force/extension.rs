@@ -6,7 +6,8 @@ use crate::simulate::{Afm, LeverModel};
 use afmid_kernels::effects::Effects;
 use afmid_kernels::simulate::AfmSystem;
 
-/// Lever, detector and linear causes as a discrete model, maps of the detector to be inverted, and what is left as it is.
+/// Lever, detector and linear causes as a discrete model, maps of the detector to be inverted, and what is left as it
+/// is.
 pub(super) struct Extension {
     /// From force (V of static deflection, held between samples) to response.
     pub model: StateSpace,
@@ -17,8 +18,8 @@ pub(super) struct Extension {
 
 impl Extension {
     /// # Model
-    /// Modes, poles, further modes, sections and feedthrough in continuous time; exact under a held force. Causes in the force itself (tails, slow ruptures)
-    /// are what is reconstructed.
+    /// Modes, poles, further modes, sections and feedthrough in continuous time; exact under a held force. Causes in
+    /// the force itself (tails, slow ruptures) are what is reconstructed.
     /// # Errors
     /// Causes that are unknown or out of their limits.
     pub fn new(model: &LeverModel) -> Result<Self, StageError> {
@@ -47,7 +48,8 @@ impl Extension {
     /// Turns what the detector shows of an event, above its free line, into what a straight detector would have shown.
     ///
     /// # Method
-    /// The map is inverted behind the poles. Map and poles change places but for `(f / pole)^2` of what the map adds: a delay is the same on either side.
+    /// The map is inverted behind the poles. Map and poles change places but for `(f / pole)^2` of what the map adds: a
+    /// delay is the same on either side.
     /// # Errors
     /// A value that the map does not reach.
     pub fn straighten(&self, volts: &mut [f64]) -> Result<(), StageError> {

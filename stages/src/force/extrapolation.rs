@@ -9,17 +9,21 @@ use afmid_kernels::force::{Event, ExtrapolationSettings, Lines, Onset, OnsetSett
 
 /// Derives the force that acted from the averaged event: input and response of the identification.
 ///
-/// Model: at a snap-off the lever follows the load along a line before t0 and rings about the line without force after it; the force is
-/// the difference of the lines before t0 and zero from t0 on. At a snap-in the force is zero before t0, then a step and a ramp as
-/// the piezo goes on: the true contact force is not linear, and this is only the line about which the signal rings.
-/// Method: a uniform line before the event, a Hann-weighted one after it, which suppresses ringing without a model of it. t0 is the last
-/// sample that still lies on the line before: the largest that leaves the transfer function causal. It is found once, from all events,
-/// and used for both halves; each half has its own lines. Each value of the force is held until the next sample.
-/// Shapes: `force`, `response`, `standard_error` over time since t0; the same with `_identification` and `_verification`.
-/// Units: volts of static deflection, so that the transfer function is one at rest; `force_newton` where stiffness and sensitivity are given.
-/// Accuracy: the load's standard error counts the noise of the mean and its correlation over a window, not slower drift. t0 has an ambiguity of
-/// some samples, reported: an earlier t0 is the same as a delay. It reaches from the earliest that the data allow to the t0 that is used, also to
-/// one that is given by `t0_s`.
+/// Model: at a snap-off the lever follows the load along a line before t0 and rings about the line without force after
+/// it; the force is the difference of the lines before t0 and zero from t0 on. At a snap-in the force is zero before
+/// t0, then a step and a ramp as the piezo goes on: the true contact force is not linear, and this is only the line
+/// about which the signal rings.
+/// Method: a uniform line before the event, a Hann-weighted one after it, which suppresses ringing without a model of
+/// it. t0 is the last sample that still lies on the line before: the largest that leaves the transfer function causal.
+/// It is found once, from all events, and used for both halves; each half has its own lines. Each value of the force is
+/// held until the next sample.
+/// Shapes: `force`, `response`, `standard_error` over time since t0; the same with `_identification` and
+/// `_verification`.
+/// Units: volts of static deflection, so that the transfer function is one at rest; `force_newton` where stiffness and
+/// sensitivity are given.
+/// Accuracy: the load's standard error counts the noise of the mean and its correlation over a window, not slower
+/// drift. t0 has an ambiguity of some samples, reported: an earlier t0 is the same as a delay. It reaches from the
+/// earliest that the data allow to the t0 that is used, also to one that is given by `t0_s`.
 /// Errors: no departure near the onset, lines shorter than 32 samples, a load that does not stand out from the noise.
 /// Source: Stark et al. 2005, section Data processing and Fig. 2(d).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -97,7 +101,8 @@ impl Stage for Extrapolation {
         let lines = match self.given_onset(onset, rate) {
             None => causal.map_err(StageError::from_error)?,
             Some(mut given) => {
-                // the data know the event no better because somebody chose a t0: the interval still begins where they say
+                // the data know the event no better because somebody chose a t0: the interval still begins where they
+                // say
                 if let Ok(causal) = &causal {
                     given.earliest = given.earliest.min(causal.onset.earliest);
                 }

@@ -19,27 +19,34 @@ use afmid_kernels::force::{
 /// Tip force against time, from single events and an identified model, with its error band.
 ///
 /// # Model
-/// The model's input is unknown: a random walk from sample to sample, of one strength before and another after the event, with jumps about it. The response is measured from the line without
-/// force, fitted where the lever is free: after a snap-off, before a snap-in.
+/// The model's input is unknown: a random walk from sample to sample, of one strength before and another after the
+/// event, with jumps about it. The response is measured from the line without force, fitted where the lever is free:
+/// after a snap-off, before a snap-in.
 /// # Method
-/// Square-root Kalman filter and fixed-interval smoother on the model with its input as a further state; sizes of walks, jumps and noise of each event by maximum
-/// likelihood, nothing by hand.
+/// Square-root Kalman filter and fixed-interval smoother on the model with its input as a further state; sizes of
+/// walks, jumps and noise of each event by maximum likelihood, nothing by hand.
 /// # Shapes
 /// `force`, `standard_error` over event and time; one row per event in `events`.
 /// # Units
-/// Volts of static deflection, as the model's input; newtons too where the pair has them. `force` at a time holds until the next.
+/// Volts of static deflection, as the model's input; newtons too where the pair has them. `force` at a time holds until
+/// the next.
 /// # Accuracy
-/// The band is that of measurement noise, prior and line, widened until it holds what is found where no force acts (`band_inflation`: 1/f noise looks like a force):
-/// 68 % of the true force lies within one of it and 95 % within two (tested over seeds, against the simulator's force). It leaves out errors of the model and of its t0 (a
-/// shift of the whole trace by less than t0's ambiguity), the force's course within a sample, and, while the tip is held, the contact's own thermal force: that is no
-/// walk, and what is faster than the smoother's memory is averaged. A step comes out no sharper than the detector lets it: `rise_time_s` of a sudden release is
-/// that limit. Cost: 30 ms per pass of the filter over 8192 samples and 12 states, some 25 passes.
-/// With `extension`, the model is the diagnosed lever behind its detector, and maps of the detector are inverted on the event first (but for `(f / pole)^2` of what
-/// they add); linear causes are in the model, those in the force are what is found; others are named in a warning and stay.
+/// The band is that of measurement noise, prior and line, widened until it holds what is found where no force acts
+/// (`band_inflation`: 1/f noise looks like a force): 68 % of the true force lies within one of it and 95 % within two
+/// (tested over seeds, against the simulator's force). It leaves out errors of the model and of its t0 (a shift of the
+/// whole trace by less than t0's ambiguity), the force's course within a sample, and, while the tip is held, the
+/// contact's own thermal force: that is no walk, and what is faster than the smoother's memory is averaged. A step
+/// comes out no sharper than the detector lets it: `rise_time_s` of a sudden release is that limit. Cost: 30 ms per
+/// pass of the filter over 8192 samples and 12 states, some 25 passes. With `extension`, the model is the diagnosed
+/// lever behind its detector, and maps of the detector are inverted on the event first (but for `(f / pole)^2` of what
+/// they add); linear causes are in the model, those in the force are what is found; others are named in a warning and
+/// stay.
 /// # Errors
-/// Neither or both of `model` and `extension`, a model of several inputs or outputs, another sample rate, an event number that is none, too few samples.
+/// Neither or both of `model` and `extension`, a model of several inputs or outputs, another sample rate, an event
+/// number that is none, too few samples.
 /// # Source
-/// H. Rauch, F. Tung, C. Striebel, AIAA J. 3 (1965) 1445; P. Park, T. Kailath, IEEE Trans. Autom. Control 40 (1995) 727; Stark et al. 2005, Conclusion.
+/// H. Rauch, F. Tung, C. Striebel, AIAA J. 3 (1965) 1445; P. Park, T. Kailath, IEEE Trans. Autom. Control 40 (1995)
+/// 727; Stark et al. 2005, Conclusion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Reconstruction {
@@ -48,8 +55,8 @@ pub struct Reconstruction {
     /// How the force may move: `random-walk`, or `integrated-walk` for forces with smooth slopes. Why: it commits
     /// least.
     pub prior: ForcePrior,
-    /// Seconds before and after the event in which the force may jump, 0 to 1e-3 each; both 0 for no jumps. Why: what t0 may be off, and a rupture
-    /// of some microseconds.
+    /// Seconds before and after the event in which the force may jump, 0 to 1e-3 each; both 0 for no jumps. Why: what
+    /// t0 may be off, and a rupture of some microseconds.
     #[schemars(inner(range(min = 0.0, max = 1e-3)))]
     pub transition_s: [f64; 2],
     /// Noise of one sample: `estimated` from each event, or `model`: the model's innovation variance times the number

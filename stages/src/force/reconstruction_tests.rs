@@ -156,9 +156,11 @@ fn the_band_holds_the_simulators_true_force() {
     let warm = shares(0..3, 295.0);
     // 3.8 and 1.7 %, three of them
     assert!((warm.after[0] - 0.683).abs() < 0.12 && (warm.after[1] - 0.954).abs() < 0.06, "{warm:?}");
-    // a sudden release through three poles and the noise comes out within two samples; the load within the noise of a plateau of 120 samples
+    // a sudden release through three poles and the noise comes out within two samples; the load within the noise of a
+    // plateau of 120 samples
     assert!(warm.rise_us < 1.0 && (warm.load - 1.0).abs() < 0.003, "{warm:?}");
-    // while the tip is held at 295 K the contact's damper pushes with a random force that the simulator does not tell: no truth there
+    // while the tip is held at 295 K the contact's damper pushes with a random force that the simulator does not tell:
+    // no truth there
     let cold = shares(10..12, 0.0);
     assert!((cold.after[0] - 0.683).abs() < 0.15 && (cold.after[1] - 0.954).abs() < 0.08, "{cold:?}");
     // 16 events of some four independent values: 6 and 2.6 %, three of them

@@ -15,8 +15,8 @@ use super::memory::{memory_channel, memory_record};
 /// Counts what is wrong with stored samples: missing ones, sentinels, saturation; and what is noise.
 ///
 /// # Model
-/// A stored sample is not finite, the declared fill code, a sentinel, or valid; valid ones that pile up at an end of their
-/// range are saturated.
+/// A stored sample is not finite, the declared fill code, a sentinel, or valid; valid ones that pile up at an end of
+/// their range are saturated.
 /// # Method
 /// One streaming pass over every channel of every record.
 /// # Shapes
@@ -32,8 +32,8 @@ use super::memory::{memory_channel, memory_record};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Census {
-    /// Stored codes that stand for no value, besides the fill code that a file declares. Default: -32768 and 32767, the ends of
-    /// 16 bits.
+    /// Stored codes that stand for no value, besides the fill code that a file declares. Default: -32768 and 32767, the
+    /// ends of 16 bits.
     pub sentinels: Vec<f64>,
     /// Warn where the deflection's noise reaches less than this share of the sample rate: the recorder has filtered it.
     /// Why: a lever below 50 samples per period would still be seen.

@@ -21,16 +21,17 @@ pub struct CensusSettings {
 /// Counts of one channel, chunk by chunk.
 ///
 /// # Method
-/// Each sample is NaN (or infinite), the declared fill code, a sentinel, or valid. Of the valid ones the five largest and
-/// smallest distinct values are counted: samples are saturated if the extreme occurs 8 times or more, and over four times as
-/// often as each of the next four (a signal that merely turns there visits them alike). Noise: the median over stretches of 256
-/// samples of the variance about a line. Bandwidth: from the mean square of successive differences over twice that variance, `r
-/// = 1 - sin(x) / x`, `x = 2 pi B / rate` for noise that is flat up to B (von Neumann's ratio).
+/// Each sample is NaN (or infinite), the declared fill code, a sentinel, or valid. Of the valid ones the five largest
+/// and smallest distinct values are counted: samples are saturated if the extreme occurs 8 times or more, and over four
+/// times as often as each of the next four (a signal that merely turns there visits them alike). Noise: the median over
+/// stretches of 256 samples of the variance about a line. Bandwidth: from the mean square of successive differences
+/// over twice that variance, `r = 1 - sin(x) / x`, `x = 2 pi B / rate` for noise that is flat up to B (von Neumann's
+/// ratio).
 /// # Units
 /// Stored codes; [`Found`] likewise.
 /// # Accuracy
-/// Noise to 5 % on a record of 10^5 samples; the bandwidth is that of the noise, rounding included: an order of magnitude.
-/// Cost: one pass, memory 8 bytes per 256 samples.
+/// Noise to 5 % on a record of 10^5 samples; the bandwidth is that of the noise, rounding included: an order of
+/// magnitude. Cost: one pass, memory 8 bytes per 256 samples.
 /// # Source
 /// Von Neumann, Ann. Math. Stat. 12 (1941) 367.
 #[derive(Debug, Clone, PartialEq)]

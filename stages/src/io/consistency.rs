@@ -22,8 +22,8 @@ pub struct Consistency {
 /// Checks records against the first one.
 ///
 /// # Method
-/// Sample rates must agree to 1e-6, units of each channel exactly; lengths, scale factors and the presence of a piezo channel
-/// may differ and are remarked on. Channels of one record must be of one length.
+/// Sample rates must agree to 1e-6, units of each channel exactly; lengths, scale factors and the presence of a piezo
+/// channel may differ and are remarked on. Channels of one record must be of one length.
 /// # Errors
 /// No record; a rate or unit that differs, with both files; an empty record; channels of different lengths.
 pub fn check_consistency(records: &[Record]) -> Result<Consistency, StageError> {

@@ -10,14 +10,15 @@ use rayon::prelude::*;
 
 use super::natural_order::natural_order;
 
-/// The files that match `patterns`, relative to `base`, each once: patterns in their order, the matches of each in natural order.
+/// The files that match `patterns`, relative to `base`, each once: patterns in their order, the matches of each in
+/// natural order.
 ///
 /// # Method
-/// `*`, `?`, `[...]` and `**` as in a shell, names that begin with a dot not matched by them; a pattern that names a folder
-/// means its `*.h5` or, if there are none, its files of any format that is recognised.
+/// `*`, `?`, `[...]` and `**` as in a shell, names that begin with a dot not matched by them; a pattern that names a
+/// folder means its `*.h5` or, if there are none, its files of any format that is recognised.
 /// # Errors
-/// A pattern that is none, a folder that cannot be read, or one without a match: with the pattern, the folder that was looked
-/// at, and what is there.
+/// A pattern that is none, a folder that cannot be read, or one without a match: with the pattern, the folder that was
+/// looked at, and what is there.
 pub fn matching_files(patterns: &[String], base: &Path, files: &InputFiles) -> Result<Vec<Match>, StageError> {
     let mut all = Vec::new();
     for pattern in patterns {

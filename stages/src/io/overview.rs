@@ -17,8 +17,8 @@ use super::stretch_extremes::StretchExtremes;
 /// # Method
 /// One streaming pass over every channel of the record.
 /// # Shapes
-/// `minimum` and `maximum` of the deflection over time, one value per stretch at its middle; other channels as `ROLE_minimum`
-/// and `ROLE_maximum`.
+/// `minimum` and `maximum` of the deflection over time, one value per stretch at its middle; other channels as
+/// `ROLE_minimum` and `ROLE_maximum`.
 /// # Units
 /// The channels'.
 /// # Accuracy

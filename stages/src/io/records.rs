@@ -18,30 +18,32 @@ use super::shared_data::moved;
 /// Opens records of any format by pattern.
 ///
 /// # Model
-/// value = stored * scale_factor + add_offset. Native records are HDF5 with the file attributes `sample_rate_hz`, `started_at` and one dataset per
-/// channel; other formats are recognised by their first bytes and their name (`afmid inspect FILE`, docs/archives.md).
+/// value = stored * scale_factor + add_offset. Native records are HDF5 with the file attributes `sample_rate_hz`,
+/// `started_at` and one dataset per channel; other formats are recognised by their first bytes and their name (`afmid
+/// inspect FILE`, docs/archives.md).
 /// # Method
-/// Files in natural order; nothing but headers is read here (tables of text are parsed), samples are streamed by the stages that need
-/// them. Sample rate and unit must agree over all files; other lengths are reported. What a file does not state is given as a parameter; what
-/// it states is not overruled. Results of afmid's own that a pattern matches are left out and counted in a warning, as are remarks of readers.
+/// Files in natural order; nothing but headers is read here (tables of text are parsed), samples are streamed by the
+/// stages that need them. Sample rate and unit must agree over all files; other lengths are reported. What a file does
+/// not state is given as a parameter; what it states is not overruled. Results of afmid's own that a pattern matches
+/// are left out and counted in a warning, as are remarks of readers.
 /// # Shapes
-/// One record per file, with the roles `deflection` and, where the file has it, `piezo`; where a recording was interrupted (restarts, lost
-/// buffers), one per uninterrupted stretch, `file.tdms[1]`, `file.tdms[2]`.
+/// One record per file, with the roles `deflection` and, where the file has it, `piezo`; where a recording was
+/// interrupted (restarts, lost buffers), one per uninterrupted stretch, `file.tdms[1]`, `file.tdms[2]`.
 /// # Units
 /// The channels' own.
 /// # Accuracy
 /// Codes stay codes; 64-bit integers are rounded beyond 2^53.
 /// # Errors
-/// A pattern without a match; files that are of no format, cut short or damaged; a missing channel; a rate or unit that neither the file
-/// nor a parameter states, or that differ; a rate too low for a ringdown.
+/// A pattern without a match; files that are of no format, cut short or damaged; a missing channel; a rate or unit that
+/// neither the file nor a parameter states, or that differ; a rate too low for a ringdown.
 /// # Source
 /// The CF conventions for scale_factor and add_offset; docs/archives.md for the formats.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Records {
-    /// Files, as patterns relative to the config file (`archive/*.h5`); a folder means its `*.h5` or, if there are none, its files of
-    /// any recognised format. Patterns that begin with `../../shared/data/`
-    /// begin at the variable `AFMID_DATA` where that is set. Required.
+    /// Files, as patterns relative to the config file (`archive/*.h5`); a folder means its `*.h5` or, if there are
+    /// none, its files of any recognised format. Patterns that begin with `../../shared/data/` begin at the variable
+    /// `AFMID_DATA` where that is set. Required.
     pub files: Vec<String>,
     /// The deflection signal, as the file names it: a dataset, channel, column or variable.
     pub channel: String,
@@ -154,8 +156,8 @@ impl Stage for Records {
 }
 
 impl Records {
-    /// The files that match: those to be opened, and afmid's own stage and result files, which lie beside the records where a run was to
-    /// write there. Errors: as [`matching_files`]; nothing but results.
+    /// The files that match: those to be opened, and afmid's own stage and result files, which lie beside the records
+    /// where a run was to write there. Errors: as [`matching_files`]; nothing but results.
     fn matches(&self, base: &Path, input_files: &InputFiles) -> Result<(Vec<PathBuf>, Vec<PathBuf>), StageError> {
         let root = std::env::var_os("AFMID_DATA");
         let root = root.as_deref().map(Path::new);
@@ -217,7 +219,8 @@ impl Records {
 /// Kinds of remarks that are said; more are counted.
 const MOST_REMARKS: usize = 20;
 
-/// What the readers remark, each kind once: the first of it, and in how many files. Remarks that differ in numbers alone are of one kind.
+/// What the readers remark, each kind once: the first of it, and in how many files. Remarks that differ in numbers
+/// alone are of one kind.
 fn said_once(opened: &[Opened]) -> Vec<String> {
     let mut kinds: Vec<(String, usize)> = Vec::new();
     let mut places: HashMap<String, usize> = HashMap::new();

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-/// A path into the shared data folder, with its root moved: `../../shared/data/afm/x/*.h5` becomes `ROOT/afm/x/*.h5`; any other stays.
+/// A path into the shared data folder, with its root moved: `../../shared/data/afm/x/*.h5` becomes `ROOT/afm/x/*.h5`;
+/// any other stays.
 pub(super) fn moved(path: &str, root: Option<&Path>) -> String {
     const SHARED: &str = "../../shared/data/";
     match (root, path.strip_prefix(SHARED)) {

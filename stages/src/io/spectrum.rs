@@ -13,8 +13,8 @@ use super::shared_data::moved;
 /// Opens a power spectral density that another program has averaged and stored.
 ///
 /// # Model
-/// Two one-dimensional HDF5 datasets of one length: frequencies, equally spaced and ascending, and the one-sided density at them. Each value is the mean of
-/// `averages` independent periodograms.
+/// Two one-dimensional HDF5 datasets of one length: frequencies, equally spaced and ascending, and the one-sided
+/// density at them. Each value is the mean of `averages` independent periodograms.
 /// # Method
 /// Both are read and checked; frequencies outside the range are left out. Nothing is rescaled but by `scale`.
 /// # Shapes
@@ -24,13 +24,15 @@ use super::shared_data::moved;
 /// # Accuracy
 /// `standard_error` is the density over the square root of the number of averages.
 /// # Errors
-/// No such file or dataset; lengths that differ; frequencies that do not ascend in equal steps; a density that is not positive; no number of averages.
+/// No such file or dataset; lengths that differ; frequencies that do not ascend in equal steps; a density that is not
+/// positive; no number of averages.
 /// # Source
 /// P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70, for the scatter of an average.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Spectrum {
-    /// The file, relative to the config file. A path that begins with `../../shared/data/` begins at the variable `AFMID_DATA` where that is set. Required.
+    /// The file, relative to the config file. A path that begins with `../../shared/data/` begins at the variable
+    /// `AFMID_DATA` where that is set. Required.
     pub file: String,
     /// Dataset of the frequencies, in Hz.
     pub frequency: String,

@@ -2,8 +2,8 @@
 
 /// Least and largest values of consecutive stretches, filled chunk by chunk.
 ///
-/// Model: stretch k holds the samples from `k * stretch_samples`; the last one may be shorter. NaN and infinities are passed
-/// over; a stretch without a finite value is NaN. Cost: one pass, two values kept per stretch.
+/// Model: stretch k holds the samples from `k * stretch_samples`; the last one may be shorter. NaN and infinities are
+/// passed over; a stretch without a finite value is NaN. Cost: one pass, two values kept per stretch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StretchExtremes {
     stretch_samples: usize,

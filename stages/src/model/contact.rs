@@ -21,21 +21,27 @@ use afmid_kernels::contact::{
 };
 use afmid_kernels::ringdown::{Estimate, ModeEstimate};
 
-/// Stiffness and damping of the contact, contact resonances and tip shares, from the ringings of the free lever and of the lever on the surface.
+/// Stiffness and damping of the contact, contact resonances and tip shares, from the ringings of the free lever and of
+/// the lever on the surface.
 ///
-/// Model: the free lever as its tip sees it is G(s) = (1/k) (sum_n c_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + 1 - sum_n c_n), as the detector sees it H(s) D(s),
-/// H with real gains in the place of the tip shares c_n, D a chain of real poles. The contact is kappa(s) = k_c + eta s + mu s^2. Poles of the coupled lever are
-/// where 1 + kappa G = 0; its response is H D / (1 + kappa G): zeros and detector are the free lever's. Both ringings follow a step of the tip's force.
-/// Method: generalised least squares of all poles and residues, each ringing with its full covariance, over contact, tip shares, free poles, gains and
-/// detector at once. Without residues, or where they do not fit (p below 0.01, a warning), poles alone.
+/// Model: the free lever as its tip sees it is G(s) = (1/k) (sum_n c_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + 1 - sum_n
+/// c_n), as the detector sees it H(s) D(s), H with real gains in the place of the tip shares c_n, D a chain of real
+/// poles. The contact is kappa(s) = k_c + eta s + mu s^2. Poles of the coupled lever are where 1 + kappa G = 0; its
+/// response is H D / (1 + kappa G): zeros and detector are the free lever's. Both ringings follow a step of the tip's
+/// force.
+/// Method: generalised least squares of all poles and residues, each ringing with its full covariance, over contact,
+/// tip shares, free poles, gains and detector at once. Without residues, or where they do not fit (p below 0.01, a
+/// warning), poles alone.
 /// Shapes: `contact` by coupled pole, ascending; `shares` by free mode.
 /// Units: N/m, N s/m, kg, Hz.
-/// Accuracy: to first order in the errors; known stiffness, damping and shares recovered within their errors over 100 simulated archives (docs/results/contact.md).
-/// Bias: modes beyond the free lever's count as a static compliance only, of what the given shares leave of one; a second-order term below its
-/// threshold shifts shares and stiffness. A relative error of k is the same relative error of the contact.
-/// Errors: as many shares as free modes are wanted; no stiffness; poles that no linear contact on this lever gives; fewer poles than shares and contact
-/// ask for. Poles that disagree are a warning.
-/// Source: U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281; A. C. Aitken, Proc. R. Soc. Edinb. 55 (1936) 42.
+/// Accuracy: to first order in the errors; known stiffness, damping and shares recovered within their errors over 100
+/// simulated archives (docs/results/contact.md). Bias: modes beyond the free lever's count as a static compliance only,
+/// of what the given shares leave of one; a second-order term below its threshold shifts shares and stiffness. A
+/// relative error of k is the same relative error of the contact.
+/// Errors: as many shares as free modes are wanted; no stiffness; poles that no linear contact on this lever gives;
+/// fewer poles than shares and contact ask for. Poles that disagree are a warning.
+/// Source: U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281; A. C. Aitken, Proc. R. Soc. Edinb. 55
+/// (1936) 42.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactFit {

@@ -13,13 +13,15 @@ use afmid_kernels::subspace::Era;
 /// Estimates a state-space model from the free decay at the end of a record: eigensystem realization.
 ///
 /// Model: where the force no longer changes, y(t) = C A^t x0 about a rest; before, x(t+Ts) = A x + B u, y = C x + D u.
-/// Method: the decay begins where the force last changes; its mean over the last tenth is the rest. Singular value decomposition of its Hankel matrix, A by shift
-/// invariance; B, D, initial state, offset and drift by least squares of the simulation over the whole record. Unstable poles are reflected.
+/// Method: the decay begins where the force last changes; its mean over the last tenth is the rest. Singular value
+/// decomposition of its Hankel matrix, A by shift invariance; B, D, initial state, offset and drift by least squares of
+/// the simulation over the whole record. Unstable poles are reflected.
 /// Shapes: as `model.pem`.
 /// Units: those of the pair.
-/// Accuracy: exact without noise; with white noise above the bound, the less the more rows up to a third of the decay. Damping is
-/// biased by the noise: a start value, or a check of `model.pem`.
-/// Errors: a decay shorter than twice the block rows, values that are missing or not finite, a response that is constant.
+/// Accuracy: exact without noise; with white noise above the bound, the less the more rows up to a third of the decay.
+/// Damping is biased by the noise: a start value, or a check of `model.pem`.
+/// Errors: a decay shorter than twice the block rows, values that are missing or not finite, a response that is
+/// constant.
 /// Source: J. Juang and R. Pappa, J. Guidance 8 (1985) 620.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]

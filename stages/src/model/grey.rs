@@ -25,20 +25,24 @@ use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, white
 
 /// Fits modes, real poles, delay and feedthrough to force and response: the grey modal form.
 ///
-/// Model: G(s) = exp(-s d) [sum g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + d0] prod p_k / (s + p_k); y = G u + offset + drift + e, with e unfiltered (output error). The
-/// delay may be any part of a sample; several inputs (`force` over `input` and time) have gains and d0 each and share the rest.
-/// Method: each partial fraction discretised in closed form for the force between its samples, delay included (modified z-transform); gains, d0, offset, drift and initial state by
-/// variable projection, the rest by Levenberg-Marquardt with analytic slopes. Starts from subspace estimates, given modes or the poles of the model on port `start`, and a grid of real
-/// poles and delays. Missing responses are left out.
-/// Shapes: `modes` by mode, `parameters` by parameter; `residual` and `prediction` (here the simulation) over time; `model` as of `model.pem`, with one or two poles at z = 0 for
-/// the delay.
+/// Model: G(s) = exp(-s d) [sum g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + d0] prod p_k / (s + p_k); y = G u + offset +
+/// drift + e, with e unfiltered (output error). The delay may be any part of a sample; several inputs (`force` over
+/// `input` and time) have gains and d0 each and share the rest.
+/// Method: each partial fraction discretised in closed form for the force between its samples, delay included (modified
+/// z-transform); gains, d0, offset, drift and initial state by variable projection, the rest by Levenberg-Marquardt
+/// with analytic slopes. Starts from subspace estimates, given modes or the poles of the model on port `start`, and a
+/// grid of real poles and delays. Missing responses are left out.
+/// Shapes: `modes` by mode, `parameters` by parameter; `residual` and `prediction` (here the simulation) over time;
+/// `model` as of `model.pem`, with one or two poles at z = 0 for the delay.
 /// Units: Hz, seconds; gains in volts per volt where the force is given as static deflection.
-/// Accuracy: the Cramer-Rao bound in white noise, unbiased, 95 % intervals that hold (docs/results/grey.md); the errors follow the residual's own spectrum, but under thermal noise
-/// `model.ringdown` is more precise. A delay is distinguished from a real pole by the shape of the first samples alone: the errors say how well. `model` is exact up to two samples of delay, beyond
-/// which whole samples are reported as `dead_samples` and warned of.
-/// Errors: too few samples, values that are not finite, a response that is constant, fewer oscillations than `modes`, knowledge of what is not fitted. No convergence is a warning, and
-/// so is a number on a bound, whose error is unknown.
-/// Source: L. Ljung, System Identification, 1999, chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1; E. I. Jury, Theory and Application of the z-Transform Method, 1964.
+/// Accuracy: the Cramer-Rao bound in white noise, unbiased, 95 % intervals that hold (docs/results/grey.md); the errors
+/// follow the residual's own spectrum, but under thermal noise `model.ringdown` is more precise. A delay is
+/// distinguished from a real pole by the shape of the first samples alone: the errors say how well. `model` is exact up
+/// to two samples of delay, beyond which whole samples are reported as `dead_samples` and warned of.
+/// Errors: too few samples, values that are not finite, a response that is constant, fewer oscillations than `modes`,
+/// knowledge of what is not fitted. No convergence is a warning, and so is a number on a bound, whose error is unknown.
+/// Source: L. Ljung, System Identification, 1999, chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003)
+/// R1; E. I. Jury, Theory and Application of the z-Transform Method, 1964.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GreyEstimate {

@@ -1,4 +1,5 @@
-//! The stages of parametric estimates: prediction error method, subspace, ringdown, modes, zeros. A stage finds its kernel by name in [`afmid_kernels`].
+//! The stages of parametric estimates: prediction error method, subspace, ringdown, modes, zeros. A stage finds its
+//! kernel by name in [`afmid_kernels`].
 
 mod bootstrap;
 mod contact;

@@ -22,18 +22,22 @@ use afmid_kernels::validation::{Nuisances, noise_ceiling_percent, simulate_held_
 
 /// Extracts modes, poles and zeros from a model, each with its standard error, and judges the model on held-out events.
 ///
-/// Model: s = ln(z) / Ts, f = |s| / 2 pi, Q = |s| / (-2 Re s), pole by pole; a mode is an established, weakly damped pair; the rest are detector
-/// poles, doubtful pairs, and real negative ones, which have no continuous counterpart.
-/// Method: zeros are the invariant zeros of (A, B, C, D). Standard errors by the delta method from the model's covariance. Held-out fit: the model of
-/// the identification half simulated on the verification half's force, initial state, offset and drift fitted again. The error of a static share counts the ambiguity of t0: an event
-/// that was d earlier turns and raises the mode's amplitude by exp(-s d); the root mean square over the pair's `t0_ambiguity_s`, at least one
-/// sample, is added in squares. Intervals are those of 95 %: normal for frequencies, quality factors, gain and delay, log-normal for the response's magnitude; the phase's is 1.96 `phase_std` on
-/// either side.
-/// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency. Of a model with several inputs zeros,
-/// shares and response are those of the first. `at_rest` in the summary: static gain, and the group delay at zero frequency, without the hold's half sample if `intersample` is held.
+/// Model: s = ln(z) / Ts, f = |s| / 2 pi, Q = |s| / (-2 Re s), pole by pole; a mode is an established, weakly damped
+/// pair; the rest are detector poles, doubtful pairs, and real negative ones, which have no continuous counterpart.
+/// Method: zeros are the invariant zeros of (A, B, C, D). Standard errors by the delta method from the model's
+/// covariance. Held-out fit: the model of the identification half simulated on the verification half's force, initial
+/// state, offset and drift fitted again. The error of a static share counts the ambiguity of t0: an event that was d
+/// earlier turns and raises the mode's amplitude by exp(-s d); the root mean square over the pair's `t0_ambiguity_s`,
+/// at least one sample, is added in squares. Intervals are those of 95 %: normal for frequencies, quality factors, gain
+/// and delay, log-normal for the response's magnitude; the phase's is 1.96 `phase_std` on either side.
+/// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency. Of
+/// a model with several inputs zeros, shares and response are those of the first. `at_rest` in the summary: static
+/// gain, and the group delay at zero frequency, without the hold's half sample if `intersample` is held.
 /// Units: Hz; static shares are parts of the static gain.
-/// Accuracy: first order in the errors; over 300 seeds of a second-order system the intervals of zeros, gain, delay and response cover 90 to 99 % each (test). A static share is the mode's own partial fraction: within the detector's roll-off it is turned and damped by it.
-/// Zeros map as poles do; the hold makes them differ from the continuous system's by 2e-3 in frequency (closed-form test).
+/// Accuracy: first order in the errors; over 300 seeds of a second-order system the intervals of zeros, gain, delay and
+/// response cover 90 to 99 % each (test). A static share is the mode's own partial fraction: within the detector's
+/// roll-off it is turned and damped by it. Zeros map as poles do; the hold makes them differ from the continuous
+/// system's by 2e-3 in frequency (closed-form test).
 /// Errors: a model that is not one of `model.pem`, or without covariance; a pair of another sample rate.
 /// Source: Stark et al. 2005, Table I and Fig. 5; L. Ljung, System Identification, 1999, section 9.4.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -221,8 +225,8 @@ impl Modes {
     }
 }
 
-/// Width of the interval in which t0 may lie, as `force.extrapolation` states it; at least a sample, since t0 lies on the grid and the event
-/// does not. None for a pair that says nothing of it.
+/// Width of the interval in which t0 may lie, as `force.extrapolation` states it; at least a sample, since t0 lies on
+/// the grid and the event does not. None for a pair that says nothing of it.
 fn onset_ambiguity(model: &StateSpace) -> Option<f64> {
     let stated = model.attributes.get("t0_ambiguity_s").and_then(Attribute::as_f64)?;
     Some(stated.max(model.sample_time_s))

@@ -77,7 +77,8 @@ pub struct OrderCandidate {
     pub order: usize,
     /// `N ln(mean square of e) + k ln N` of the whole training record; NaN where no model could be had.
     pub bic: f64,
-    /// FIT % of the simulation of the record's last third, by a model of its first two thirds; NaN where this cannot be judged.
+    /// FIT % of the simulation of the record's last third, by a model of its first two thirds; NaN where this cannot be
+    /// judged.
     pub held_out_percent: f64,
 }
 
@@ -102,10 +103,12 @@ const BLOCKS: usize = 10;
 /// # Model
 /// That of [`identify`] with `options`, its order replaced.
 /// # Method
-/// Each order is fitted to the first two thirds and simulated over the last: the smallest order whose squared error is within one standard error
-/// (over ten blocks) of the least. Where the last third has no input of its own (a release), the least Bayesian information criterion instead.
+/// Each order is fitted to the first two thirds and simulated over the last: the smallest order whose squared error is
+/// within one standard error (over ten blocks) of the least. Where the last third has no input of its own (a release),
+/// the least Bayesian information criterion instead.
 /// # Accuracy
-/// The true order or one of the next two in most of 20 records with output noise of standard deviation 0.05 (test); no more than the data need, not the truth.
+/// The true order or one of the next two in most of 20 records with output noise of standard deviation 0.05 (test); no
+/// more than the data need, not the truth.
 /// # Errors
 /// No order can be fitted.
 /// # Source

@@ -18,16 +18,17 @@ use afmid_kernels::validation::{Nuisances, TestResult, fit_percent, input_depend
 /// Identifies a state-space model in innovations form from force and response.
 ///
 /// Model: Eq. 8, x(t+Ts) = A x + B u + K e, y = C x + D u + e + offset + drift; the initial state is estimated along.
-/// Method: minimum of the squared one-step prediction errors by Levenberg-Marquardt with analytic sensitivities; all that enters linearly is
-/// eliminated exactly. Poles and predictor are stable by construction: sections of second order in reflection coefficients. Starts from a
-/// subspace estimate at every order up to the wanted one.
-/// Shapes: `residual`, `prediction` over time; A order x order; covariance of the 2 order + 1 parameters of A, B and D. Several inputs (`force` over
-/// `input` and time) give B and D as many columns.
+/// Method: minimum of the squared one-step prediction errors by Levenberg-Marquardt with analytic sensitivities; all
+/// that enters linearly is eliminated exactly. Poles and predictor are stable by construction: sections of second order
+/// in reflection coefficients. Starts from a subspace estimate at every order up to the wanted one.
+/// Shapes: `residual`, `prediction` over time; A order x order; covariance of the 2 order + 1 parameters of A, B and D.
+/// Several inputs (`force` over `input` and time) give B and D as many columns.
 /// Units: volts to volts where the force is given as static deflection.
-/// Accuracy: the Cramer-Rao bound within some per cent where the noise is white plus thermal. The covariance follows the residual's own
-/// spectrum, so wander that the model leaves is counted.
-/// Errors: too few samples for the order, values that are not finite, a response that is constant; missing outputs, unless the errors that are made small
-/// are those of the simulation without noise filter (`noise = "white"`), which leaves them out. No convergence is a warning.
+/// Accuracy: the Cramer-Rao bound within some per cent where the noise is white plus thermal. The covariance follows
+/// the residual's own spectrum, so wander that the model leaves is counted.
+/// Errors: too few samples for the order, values that are not finite, a response that is constant; missing outputs,
+/// unless the errors that are made small are those of the simulation without noise filter (`noise = "white"`), which
+/// leaves them out. No convergence is a warning.
 /// Source: Stark et al. 2005, Eq. 8; L. Ljung, System Identification, 1999, chapters 7 and 10.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -288,7 +289,8 @@ pub(super) fn ending(ending: Ending) -> &'static str {
     }
 }
 
-/// The artifact: matrices in the sections' observer form, parameters a, then b and d of each input, with their covariance.
+/// The artifact: matrices in the sections' observer form, parameters a, then b and d of each input, with their
+/// covariance.
 pub(super) fn state_space(fit: &Identified, set: DataSet, first: usize) -> Result<StateSpace, StageError> {
     let model = &fit.model;
     let n = model.order();

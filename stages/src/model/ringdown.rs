@@ -27,22 +27,26 @@ use afmid_kernels::ringdown::{
     ModeCount, ModeEstimate, NoiseSource, Quantity, Ringdown, RingdownOptions, fit_counted_ringdowns, fit_ringdowns,
 };
 
-/// Fits the modes of all events at once: one set of poles, each event with its own amplitude, sub-sample onset, offset and slope.
+/// Fits the modes of all events at once: one set of poles, each event with its own amplitude, sub-sample onset, offset
+/// and slope.
 ///
-/// Model: after its release every event is a(e) sum Re(rho_j exp(s_j (t - t_e))) + offset + slope, in thermal noise of every mode, 1/f and white
-/// noise. Residues are free, so no input is needed and none is assumed.
-/// Method: maximum likelihood; records whitened by the noise's own Kalman filter, compressed, fitted by Levenberg-Marquardt with the
-/// events' own parameters eliminated; noise variances by a restricted Whittle likelihood of the residuals, and of the free stretches of the records where
-/// they are wired to `free`, in turns with the fit. Missing samples are predicted by the noise's filter and weigh nothing; for the noise's variances they
-/// are cut out of the taper and of what is expected of it alike. Bounds by an active set.
-/// Shapes: `modes` by mode ascending in frequency, `events` by event, `spectrum` over frequency, `poles`, their residues and covariances over real
-/// and imaginary part of each mode in turn.
+/// Model: after its release every event is a(e) sum Re(rho_j exp(s_j (t - t_e))) + offset + slope, in thermal noise of
+/// every mode, 1/f and white noise. Residues are free, so no input is needed and none is assumed.
+/// Method: maximum likelihood; records whitened by the noise's own Kalman filter, compressed, fitted by
+/// Levenberg-Marquardt with the events' own parameters eliminated; noise variances by a restricted Whittle likelihood
+/// of the residuals, and of the free stretches of the records where they are wired to `free`, in turns with the fit.
+/// Missing samples are predicted by the noise's filter and weigh nothing; for the noise's variances they are cut out of
+/// the taper and of what is expected of it alike. Bounds by an active set.
+/// Shapes: `modes` by mode ascending in frequency, `events` by event, `spectrum` over frequency, `poles`, their
+/// residues and covariances over real and imaginary part of each mode in turn.
 /// Units: Hz; volts; onsets in seconds after the ensemble's first sample used.
-/// Accuracy: rms errors within a few per cent of the Cramer-Rao bound and intervals that hold, for one event and for many (docs/results/ringdown.md). Standard
-/// errors count thermal, 1/f and white noise; `error_source = "events"` takes them from the events' scatter, right under a wrong noise model too.
-/// Errors: fewer samples than the shape needs, values that are not finite, fewer oscillations than `modes`, knowledge of what is not fitted. No convergence is a warning, and so is a
-/// number on a bound, whose error is unknown.
-/// Source: S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7; D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320.
+/// Accuracy: rms errors within a few per cent of the Cramer-Rao bound and intervals that hold, for one event and for
+/// many (docs/results/ringdown.md). Standard errors count thermal, 1/f and white noise; `error_source = "events"` takes
+/// them from the events' scatter, right under a wrong noise model too.
+/// Errors: fewer samples than the shape needs, values that are not finite, fewer oscillations than `modes`, knowledge
+/// of what is not fitted. No convergence is a warning, and so is a number on a bound, whose error is unknown.
+/// Source: S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7; D. A. Harville, J. Am. Stat.
+/// Assoc. 72 (1977) 320.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RingdownFit {
@@ -142,8 +146,8 @@ pub(super) const POLES: Port<Array> =
     Port::new("poles", "ringdown-poles", "poles and residues of the modes with their full covariance");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "modes, noise, convergence");
 
-/// Standard errors from the events' scatter that differ from the noise model's by this factor are worth a warning: with 24 events theirs scatters
-/// by 15 %.
+/// Standard errors from the events' scatter that differ from the noise model's by this factor are worth a warning: with
+/// 24 events theirs scatters by 15 %.
 const DISAGREEMENT: f64 = 1.6;
 /// Reduced chi square beyond which the noise model does not hold.
 const EXCESS: f64 = 1.1;

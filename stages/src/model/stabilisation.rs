@@ -16,17 +16,22 @@ use afmid_kernels::subspace::{Era, InstrumentalSubspace, Subspace, Weight};
 
 /// Shows which poles stay where they are as the order grows, and names the modes and the order.
 ///
-/// Model: a physical mode has one pole at every order that can hold it; a pole that noise needs moves as the order changes.
-/// Method: one Hankel matrix and one singular value decomposition; the poles of every order from it by shift invariance. A pole is stable if the next lower order has one within
-/// `frequency` and `damping`. Stable poles of at least `min_quality_factor` are grouped around the frequencies at which most orders agree; a group of enough orders, whose
-/// damping agrees, is a mode if it rings: all of them are fitted to the record together, and those with an amplitude below `min_significance` standard errors are dropped, since one
-/// record's noise is the same at every order and has poles that stay, too. The proposed order is the least at which all of them are there and stay.
+/// Model: a physical mode has one pole at every order that can hold it; a pole that noise needs moves as the order
+/// changes.
+/// Method: one Hankel matrix and one singular value decomposition; the poles of every order from it by shift
+/// invariance. A pole is stable if the next lower order has one within `frequency` and `damping`. Stable poles of at
+/// least `min_quality_factor` are grouped around the frequencies at which most orders agree; a group of enough orders,
+/// whose damping agrees, is a mode if it rings: all of them are fitted to the record together, and those with an
+/// amplitude below `min_significance` standard errors are dropped, since one record's noise is the same at every order
+/// and has poles that stay, too. The proposed order is the least at which all of them are there and stay.
 /// Shapes: `poles`: one row per order and pair; `modes`: one row per mode.
 /// Units: Hz; damping is 1 / 2Q.
-/// Accuracy: on the paper's lever in noise exactly its 3 or 4 modes over 12 seeds (test). Median and spread over orders are no estimate with an error: noise that all orders share is in
-/// no spread. Use `model.pem` or `model.ringdown` at the order that this stage proposes.
+/// Accuracy: on the paper's lever in noise exactly its 3 or 4 modes over 12 seeds (test). Median and spread over orders
+/// are no estimate with an error: noise that all orders share is in no spread. Use `model.pem` or `model.ringdown` at
+/// the order that this stage proposes.
 /// Errors: too few samples for the block rows, values that are missing or not finite.
-/// Source: H. Van der Auweraer and B. Peeters, Smart Struct. Syst. 1 (2004) 1; B. Peeters and G. De Roeck, J. Dyn. Syst. Meas. Control 123 (2001) 659.
+/// Source: H. Van der Auweraer and B. Peeters, Smart Struct. Syst. 1 (2004) 1; B. Peeters and G. De Roeck, J. Dyn.
+/// Syst. Meas. Control 123 (2001) 659.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StabilisationDiagram {

@@ -14,15 +14,17 @@ use afmid_kernels::subspace::{InstrumentalSubspace, Subspace, Weight};
 /// Estimates a state-space model from the column space of Hankel matrices, without iteration.
 ///
 /// Model: x(t+Ts) = A x + B u + K e, y = C x + D u + e + offset + drift; K is not estimated.
-/// Method: A by shift invariance of the observability matrix: past inputs and outputs predict the future, weighted as N4SID, MOESP or CVA do; or,
-/// for inputs that do not excite (a release), the future's own Hankel matrix with the input's directions removed. B, D, initial state, offset and
-/// drift by least squares of the simulation. Unstable poles are reflected.
+/// Method: A by shift invariance of the observability matrix: past inputs and outputs predict the future, weighted as
+/// N4SID, MOESP or CVA do; or, for inputs that do not excite (a release), the future's own Hankel matrix with the
+/// input's directions removed. B, D, initial state, offset and drift by least squares of the simulation. Unstable poles
+/// are reflected.
 /// Shapes: as `model.pem`; `force` over `input` and time gives several inputs.
 /// Units: those of the pair.
-/// Accuracy: consistent, but not efficient: above the errors of `model.pem`, without its iterations. The covariance takes the poles' errors as those
-/// of output error at this point.
+/// Accuracy: consistent, but not efficient: above the errors of `model.pem`, without its iterations. The covariance
+/// takes the poles' errors as those of output error at this point.
 /// Errors: too few samples for the block rows, values that are missing or not finite, a response that is constant.
-/// Source: P. Van Overschee and B. De Moor, Subspace Identification for Linear Systems, 1996; M. Verhaegen and P. Dewilde, Int. J. Control 56 (1992) 1187.
+/// Source: P. Van Overschee and B. De Moor, Subspace Identification for Linear Systems, 1996; M. Verhaegen and P.
+/// Dewilde, Int. J. Control 56 (1992) 1187.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SubspaceEstimate {

@@ -17,17 +17,23 @@ use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFit, VectorFitting, 
 
 /// Fits a rational transfer function to a frequency response: relaxed vector fitting in the z plane.
 ///
-/// Model: G(z) = sum c / (z - p) + d at z = exp(i w Ts), plus noise of the variance given; with a transient, exp(i w t0) T(z) of the same poles. The hold's lag and droop, which
-/// the spectrum stages took out, are put back first: a sampled decay is rational in z, not in s.
-/// Method: poles relocated to the zeros of sigma(z) until they settle (Gustavsen 2006), from three sets of starting poles; then, unless `refine` is false, Gauss-Newton on the
-/// weighted error. Poles outside the unit circle are kept, with a warning, unless `stable` is true.
-/// Shapes: as `model.pem`; one input. K, x0, offset and drift are zero: a spectrum does not hold them; nor does it hold the variance of e, which is NaN.
+/// Model: G(z) = sum c / (z - p) + d at z = exp(i w Ts), plus noise of the variance given; with a transient, exp(i w
+/// t0) T(z) of the same poles. The hold's lag and droop, which the spectrum stages took out, are put back first: a
+/// sampled decay is rational in z, not in s.
+/// Method: poles relocated to the zeros of sigma(z) until they settle (Gustavsen 2006), from three sets of starting
+/// poles; then, unless `refine` is false, Gauss-Newton on the weighted error. Poles outside the unit circle are kept,
+/// with a warning, unless `stable` is true.
+/// Shapes: as `model.pem`; one input. K, x0, offset and drift are zero: a spectrum does not hold them; nor does it hold
+/// the variance of e, which is NaN.
 /// Units: the response's.
-/// Accuracy: rounding without noise. With `refine` the maximum of the likelihood for the variance given, on the paper's lever with 0.2 to 0.4 of the errors of `model.subspace` and 0.6 to 0.8 of those of `model.era`, without bias over 40 seeds
-/// (test); plain vector fitting is up to a seventh worse, since sigma weights the noise. The
-/// covariance is that of the last weighted least squares times the misfit; of a smoothed response also times the correlation of neighbouring residuals, which leaves them some 1.7 times too large (8 seeds, test). Window ends that no transient
+/// Accuracy: rounding without noise. With `refine` the maximum of the likelihood for the variance given, on the paper's
+/// lever with 0.2 to 0.4 of the errors of `model.subspace` and 0.6 to 0.8 of those of `model.era`, without bias over 40
+/// seeds (test); plain vector fitting is up to a seventh worse, since sigma weights the noise. The covariance is that
+/// of the last weighted least squares times the misfit; of a smoothed response also times the correlation of
+/// neighbouring residuals, which leaves them some 1.7 times too large (8 seeds, test). Window ends that no transient
 /// describes (tapered series) are model error and in no error bar.
-/// Errors: a response with fewer defined bins than coefficients; a transient for a response that does not say when the event was.
+/// Errors: a response with fewer defined bins than coefficients; a transient for a response that does not say when the
+/// event was.
 /// Source: B. Gustavsen, IEEE Trans. Power Delivery 21 (2006) 1587; B. Gustavsen and A. Semlyen, ibid. 14 (1999) 1052.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]

@@ -7,11 +7,14 @@ use serde_json::{Value, json};
 
 use afmid_kernels::validation::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
 
-/// Compares the zeros of the surface-coupled lever with the free lever's, and reports how far the contact moves the poles.
+/// Compares the zeros of the surface-coupled lever with the free lever's, and reports how far the contact moves the
+/// poles.
 ///
-/// Model: the contact is a feedback from tip deflection to tip force. It moves the poles up; the zeros belong to the sensor and stay.
-/// Method: zeros of the free lever between its lowest and highest mode, each with the coupled lever's nearest in ratio, used once; differences in combined
-/// standard errors. Each free mode with the highest coupled resonance below the next free one.
+/// Model: the contact is a feedback from tip deflection to tip force. It moves the poles up; the zeros belong to the
+/// sensor and stay.
+/// Method: zeros of the free lever between its lowest and highest mode, each with the coupled lever's nearest in ratio,
+/// used once; differences in combined standard errors. Each free mode with the highest coupled resonance below the next
+/// free one.
 /// Shapes: one row per zero of the free lever (`zeros`), one per mode (`shifts`).
 /// Units: Hz; differences relative, and in combined standard errors.
 /// Accuracy: both sets of errors are taken as independent. The contact's own nonlinearity is in neither.

@@ -23,22 +23,27 @@ use afmid_kernels::simulate::{
 /// Simulates force curves of an atomic force microscope in the time domain and writes them as native records.
 ///
 /// # Model
-/// A modal lever (point force at the tip), a piezo ramp, a tip-sample contact with adhesion as nonlinear output feedback, thermal
-/// force on every mode, detector poles and delay, white, 1/f and slowly wandering noise of the readout, a converter.
+/// A modal lever (point force at the tip), a piezo ramp, a tip-sample contact with adhesion as nonlinear output
+/// feedback, thermal force on every mode, detector poles and delay, white, 1/f and slowly wandering noise of the
+/// readout, a converter.
 /// # Method
-/// Between events the system is linear: exact propagation by matrix exponentials with exact noise covariances; events are located to 1e-8 of a
-/// sample. Start phases of the ramp are solved for, so that the archive holds the stated numbers of events. Hidden causes are integrated in time:
-/// loads on straight lines between exact steps, modal forces by Strang splitting, maps of the optics on eight points per sample.
+/// Between events the system is linear: exact propagation by matrix exponentials with exact noise covariances; events
+/// are located to 1e-8 of a sample. Start phases of the ramp are solved for, so that the archive holds the stated
+/// numbers of events. Hidden causes are integrated in time: loads on straight lines between exact steps, modal forces
+/// by Strang splitting, maps of the optics on eight points per sample.
 /// # Shapes
-/// `records` files of `samples` samples in the folder `out`, channels `deflection` and `piezo`; the truth in `out`.truth.json.
+/// `records` files of `samples` samples in the folder `out`, channels `deflection` and `piezo`; the truth in
+/// `out`.truth.json.
 /// # Units
 /// SI; channels in volts. Deflection away from the sample is positive.
 /// # Accuracy
-/// No integration error with nothing hidden, below 1 % of a hidden effect otherwise. The inertia of the moving base is left out; crossings of a threshold and back within one sample are missed.
+/// No integration error with nothing hidden, below 1 % of a hidden effect otherwise. The inertia of the moving base is
+/// left out; crossings of a threshold and back within one sample are missed.
 /// # Errors
 /// Parameters out of range, an unknown cause, event totals out of reach, a folder that holds other records already.
 /// # Source
-/// Stark et al., Rev. Sci. Instrum. 2005, Fig. 1 and section Setup; C. F. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395.
+/// Stark et al., Rev. Sci. Instrum. 2005, Fig. 1 and section Setup; C. F. Van Loan, IEEE Trans. Automat. Contr. 23
+/// (1978) 395.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Afm {
@@ -404,7 +409,8 @@ const CHANNELS: [Wanted<'static>; 2] = [
     Wanted { role: "piezo", location: "/piezo", required: true },
 ];
 
-/// Whether a file is a simulated record of this number, by what it says of itself: versions that kept no list of what they wrote are known by it.
+/// Whether a file is a simulated record of this number, by what it says of itself: versions that kept no list of what
+/// they wrote are known by it.
 fn is_simulated(path: &Path, number: usize) -> bool {
     let named = |record: &Record, role, name| record.channel(role).is_ok_and(|channel| channel.long_name == name);
     open_native(&InputFiles::new(), path, &CHANNELS).is_ok_and(|record| {
@@ -417,8 +423,8 @@ fn is_simulated(path: &Path, number: usize) -> bool {
 const DEFLECTION: &str = "photodiode signal";
 const PIEZO: &str = "z piezo monitor";
 
-/// Makes the folder; refuses one that holds records of another archive, which a pattern would pick up together with the new ones, and files under the
-/// names of the new ones that no simulation wrote.
+/// Makes the folder; refuses one that holds records of another archive, which a pattern would pick up together with the
+/// new ones, and files under the names of the new ones that no simulation wrote.
 fn prepare(folder: &Path, names: &[String]) -> Result<FilledFolder, StageError> {
     let failed = |error: std::io::Error| StageError::new(format!("the folder cannot be used: {error}")).at(folder);
     std::fs::create_dir_all(folder).map_err(failed)?;

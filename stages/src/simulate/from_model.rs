@@ -10,8 +10,8 @@ impl Afm {
     /// These parameters with lever, detector and sample rate of a part of `model`.
     ///
     /// # Model
-    /// Displacements of the tip are not seen: their shares are a uniform beam's, inversely as the square of the frequency. They set the thermal motion and the
-    /// motion against the contact, not the release.
+    /// Displacements of the tip are not seen: their shares are a uniform beam's, inversely as the square of the
+    /// frequency. They set the thermal motion and the motion against the contact, not the release.
     pub fn with_lever(self, model: &LeverModel, part: &LinearPart) -> Self {
         let frequencies_hz: Vec<f64> = part.modes.iter().map(|mode| mode.frequency_hz.value).collect();
         let weights: Vec<f64> = frequencies_hz.iter().map(|f| f.powi(-2)).collect();
@@ -30,8 +30,9 @@ impl Afm {
     /// These parameters with everything that `model` says: extended lever, causes, noise, loads.
     ///
     /// # Model
-    /// Newtons are those of this stiffness and sensitivity. The temperature is what gives the first mode the thermal motion that was seen; white noise is
-    /// less the converter's rounding, `lsb^2 / 12`; 1/f noise has per decade what the model's has on average.
+    /// Newtons are those of this stiffness and sensitivity. The temperature is what gives the first mode the thermal
+    /// motion that was seen; white noise is less the converter's rounding, `lsb^2 / 12`; 1/f noise has per decade what
+    /// the model's has on average.
     ///
     /// # Errors
     /// Causes that are unknown or out of their limits.

@@ -39,7 +39,8 @@ impl Hidden {
     /// The cause and its values in the order of its parameters.
     ///
     /// # Errors
-    /// No cause, an unknown one, one of another kind of data; a parameter that is unknown, missing, no number or out of its limits.
+    /// No cause, an unknown one, one of another kind of data; a parameter that is unknown, missing, no number or out of
+    /// its limits.
     pub fn resolve(&self) -> Result<(&'static dyn Cause, Vec<f64>), StageError> {
         let id = match self.0.get(CAUSE) {
             Some(Setting::Text(id)) => id,

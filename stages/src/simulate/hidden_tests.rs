@@ -252,7 +252,8 @@ fn quadratic_detector_makes_the_squares_lines() {
     };
     let difference: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
     let worst = worst(&difference, t0, expected);
-    // straight lines between 8 points per sample: (w/8e6)^2 / 12 of a2 s^2 = 9 mV, of which a tenth lies at the second mode and above
+    // straight lines between 8 points per sample: (w/8e6)^2 / 12 of a2 s^2 = 9 mV, of which a tenth lies at the second
+    // mode and above
     assert!(worst < 2e-5, "{worst:e}");
     assert!((difference[START - 10] - a2 * LOAD_V * LOAD_V).abs() < 1e-9);
 }

@@ -105,10 +105,11 @@ pub struct ModelAmplitude {
     pub events: usize,
 }
 
-/// A lever as a diagnosis leaves it: an artifact that later configs use (`diagnosis.replay`, `simulate.model`, `force.reconstruction`).
+/// A lever as a diagnosis leaves it: an artifact that later configs use (`diagnosis.replay`, `simulate.model`,
+/// `force.reconstruction`).
 ///
-/// `baseline` is the best lever and detector without causes, `extended` with them; the two are the same where no cause changes the events' shape.
-/// Causes are empty for every verdict but `named`.
+/// `baseline` is the best lever and detector without causes, `extended` with them; the two are the same where no cause
+/// changes the events' shape. Causes are empty for every verdict but `named`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeverModel {

@@ -12,8 +12,9 @@ use super::lever_model::{LeverModel, MODEL};
 /// Simulates force curves with a diagnosed lever and writes them as native records.
 ///
 /// # Model
-/// That of `simulate.afm`. Lever, detector, causes, loads, noise and sample rate come from the port `model` alone: there are no parameters for them.
-/// Shares of the tip's displacement, which no detector shows, are a uniform beam's; the temperature gives the first mode the thermal motion that was seen.
+/// That of `simulate.afm`. Lever, detector, causes, loads, noise and sample rate come from the port `model` alone:
+/// there are no parameters for them. Shares of the tip's displacement, which no detector shows, are a uniform beam's;
+/// the temperature gives the first mode the thermal motion that was seen.
 /// # Method
 /// That of `simulate.afm`: exact propagation, causes integrated in time.
 /// # Shapes
@@ -25,11 +26,13 @@ use super::lever_model::{LeverModel, MODEL};
 /// # Errors
 /// A model without loads, causes that the catalogue does not hold, and all of `simulate.afm`.
 /// # Source
-/// Stark et al., Rev. Sci. Instrum. 2005, Fig. 1 and section Setup; C. F. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395.
+/// Stark et al., Rev. Sci. Instrum. 2005, Fig. 1 and section Setup; C. F. Van Loan, IEEE Trans. Automat. Contr. 23
+/// (1978) 395.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AfmOfModel {
-    /// Folder for the records, relative to the config; created if missing. The truth is written beside it as `NAME.truth.json`.
+    /// Folder for the records, relative to the config; created if missing. The truth is written beside it as
+    /// `NAME.truth.json`.
     pub out: PathBuf,
     /// Number of records; absent: as many as were diagnosed.
     #[schemars(range(min = 1))]

@@ -1,4 +1,5 @@
-//! The example of `simulate.model`: a lever behind a photodiode that bends. The examples of `diagnosis` release the same one.
+//! The example of `simulate.model`: a lever behind a photodiode that bends. The examples of `diagnosis` release the
+//! same one.
 
 use std::collections::BTreeMap;
 

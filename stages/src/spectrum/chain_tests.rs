@@ -81,7 +81,8 @@ fn differences_recover_the_lever_within_the_errors_that_they_state() {
         let score = |from: usize, to: usize| {
             (from..to).map(|k| (g[k] - truth(f[k], T0 - t0)).norm_sqr() / v[k]).sum::<f64>() / (to - from) as f64
         };
-        // neighbours share their data: 10 kHz to 1.1 MHz holds some 200 independent values; folding adds at antiresonances
+        // neighbours share their data: 10 kHz to 1.1 MHz holds some 200 independent values; folding adds at
+        // antiresonances
         let whole = score(16, 1800);
         assert!((0.7..1.4).contains(&whole), "seed {seed}: {whole}");
         for resonance in [46.3e3, 247.4e3, 580.8e3, 1051.2e3] {

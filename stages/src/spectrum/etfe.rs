@@ -13,15 +13,17 @@ use afmid_kernels::spectra::{EndTreatment, EtfeSettings, Intersample, etfe};
 /// Empirical transfer function estimate: the ratio of the transforms of response and force.
 ///
 /// Model: the system is linear; nothing else is assumed.
-/// Method: G = Y / U (Eqs. 5 to 7), the transforms scaled by 1 / sqrt(N). Undefined (NaN) where the force vanishes and above the bandwidth limit.
-/// The force is a step at a sample: held until the next one, so that the plain ratio lags by half a sample and droops by
-/// sin(x) / x, x = pi f / fs; `intersample = "held"` takes both out. Divided by the quasi-static gain.
+/// Method: G = Y / U (Eqs. 5 to 7), the transforms scaled by 1 / sqrt(N). Undefined (NaN) where the force vanishes and
+/// above the bandwidth limit. The force is a step at a sample: held until the next one, so that the plain ratio lags by
+/// half a sample and droops by sin(x) / x, x = pi f / fs; `intersample = "held"` takes both out. Divided by the
+/// quasi-static gain.
 /// Shapes: one complex value per bin k fs / N, from zero to half the sample rate.
 /// Units: dimensionless, since the force is given as static deflection.
-/// Accuracy: `variance` is the expected squared error phi / abs(U)^2 with phi from the standard error of the mean, taken as white. On the paper's
-/// lever in closed form, with its window: 1.5 % at the first resonance, 0.05 % at the fourth, up to half the value at antiresonances. With
-/// `spectrum.window` set to `differenced` and rectangular, and smoothed with a transient: 2e-6, 5e-6, 5e-5 and 4e-4 at the four resonances, below 4e-5 of the static
-/// gain elsewhere (folding about half the sample rate, which no ratio of sampled series can avoid).
+/// Accuracy: `variance` is the expected squared error phi / abs(U)^2 with phi from the standard error of the mean,
+/// taken as white. On the paper's lever in closed form, with its window: 1.5 % at the first resonance, 0.05 % at the
+/// fourth, up to half the value at antiresonances. With `spectrum.window` set to `differenced` and rectangular, and
+/// smoothed with a transient: 2e-6, 5e-6, 5e-5 and 4e-4 at the four resonances, below 4e-5 of the static gain elsewhere
+/// (folding about half the sample rate, which no ratio of sampled series can avoid).
 /// Errors: a force that is zero throughout, fewer than eight samples.
 /// Source: Stark et al. 2005, Eqs. 5 to 7 and 10; Ljung, System Identification, 1999, ch. 6.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -14,17 +14,20 @@ use afmid_kernels::spectra::{
 /// Frequency response of all events at once, with noise, timing and distortion distinguished by their scatter.
 ///
 /// # Model
-/// Each event is the linear response to a force of its own size, a lag, a distortion that goes with the size, and noise.
+/// Each event is the linear response to a force of its own size, a lag, a distortion that goes with the size, and
+/// noise.
 /// # Method
-/// The pair's force times each event's amplitude; first differences of both; sum of cross spectra over sum of the force's power. What scatters between events is split
-/// by regression on a shift in time and on the force's size. A held force's lag and droop are taken out as in `spectrum.etfe`.
+/// The pair's force times each event's amplitude; first differences of both; sum of cross spectra over sum of the
+/// force's power. What scatters between events is split by regression on a shift in time and on the force's size. A
+/// held force's lag and droop are taken out as in `spectrum.etfe`.
 /// # Shapes
-/// One value per bin, from zero to half the sample rate; `lag` one per event. `spectrum.smoothing` takes `frf` with its own variance per bin.
+/// One value per bin, from zero to half the sample rate; `lag` one per event. `spectrum.smoothing` takes `frf` with its
+/// own variance per bin.
 /// # Units
 /// Dimensionless; levels in V^2, transforms scaled by 1 / sqrt(N).
 /// # Accuracy
-/// `variance` is measured, not assumed: its relative standard error is 1 / sqrt((n - 1) (2 h + 1)) for n events and h bins. The window's end (0.7 % of the first
-/// peak) is left to the smoothing, which fits it.
+/// `variance` is measured, not assumed: its relative standard error is 1 / sqrt((n - 1) (2 h + 1)) for n events and h
+/// bins. The window's end (0.7 % of the first peak) is left to the smoothing, which fits it.
 /// # Errors
 /// Fewer than four events; a pair of another length than the events.
 /// # Source

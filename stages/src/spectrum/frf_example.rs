@@ -19,7 +19,8 @@ pub(super) fn examples() -> Vec<Example> {
                 (1..g.len()).filter(|&k| g[k].re.is_finite()).max_by(|&a, &b| g[a].norm().total_cmp(&g[b].norm()));
             let Some(k) = peak else { return Err("nothing is defined".to_owned()) };
             let error = v[k].sqrt();
-            // the nearest bin: 120 kHz lies 0.3 bins from one, a twentieth of the width; the force scales with the mean amplitude, 3 % of 12
+            // the nearest bin: 120 kHz lies 0.3 bins from one, a twentieth of the width; the force scales with the mean
+            // amplitude, 3 % of 12
             if (f[k] - FREQUENCY_HZ).abs() < 1.3e3 && (g[k].norm() / QUALITY_FACTOR - 1.0).abs() < 0.12 && error < 0.05
             {
                 Ok(format!("It peaks at {:.1} kHz with {:.2} +- {error:.3}.", 1e-3 * f[k], g[k].norm()))

@@ -10,8 +10,9 @@ use afmid_kernels::spectra::{bin_frequencies, power_spectrum};
 /// Periodograms of force and response: their power spectral densities, as a first look.
 ///
 /// Model: the normalised absolute square of the Fourier transform.
-/// Method: P = 2 abs(X)^2 / (fs sum w^2), without the factor two at zero and at half the sample rate, with the sum over the window that the pair went through (its
-/// number of samples if none). For a transient this is its energy spectrum over the window's length.
+/// Method: P = 2 abs(X)^2 / (fs sum w^2), without the factor two at zero and at half the sample rate, with the sum over
+/// the window that the pair went through (its number of samples if none). For a transient this is its energy spectrum
+/// over the window's length.
 /// Shapes: one value per bin, from zero to half the sample rate.
 /// Units: V^2/Hz, one-sided; its sum times the bin width is the mean square.
 /// Accuracy: a bin of noise scatters by 100 %; `noise` is the level that the standard error of the response makes.

@@ -11,18 +11,23 @@ use afmid_kernels::spectra::{
 
 /// Smooths a transfer function by local models of real and imaginary parts.
 ///
-/// Model: around each bin a quotient of two polynomials (`local-rational`: one resonance and one antiresonance are exact in it) or a polynomial
-/// (`local-polynomial`, the paper's). Magnitudes are never smoothed: noise adds phi / abs(U)^2 to their square (Eq. 10).
-/// Method: rational: Levy's least squares reweighted (Sanathanan and Koerner), then Gauss-Newton; a plain polynomial is averaged with it by the weights of the
-/// corrected Akaike criterion. A transient, which turns with the delay of the event, takes up what the ends of the window add.
-/// Polynomial: the widest neighbourhood whose value agrees with all narrower ones. Bins of a line in `lines` are left out and filled in.
+/// Model: around each bin a quotient of two polynomials (`local-rational`: one resonance and one antiresonance are
+/// exact in it) or a polynomial (`local-polynomial`, the paper's). Magnitudes are never smoothed: noise adds phi /
+/// abs(U)^2 to their square (Eq. 10).
+/// Method: rational: Levy's least squares reweighted (Sanathanan and Koerner), then Gauss-Newton; a plain polynomial is
+/// averaged with it by the weights of the corrected Akaike criterion. A transient, which turns with the delay of the
+/// event, takes up what the ends of the window add. Polynomial: the widest neighbourhood whose value agrees with all
+/// narrower ones. Bins of a line in `lines` are left out and filled in.
 /// Shapes: as the estimate's; `half_width_bins` says how many bins on either side each value comes from.
 /// Units: the estimate's.
-/// Accuracy: noise-free, the rational lowers no resonance two bins wide by more than 1e-6; a fixed parabola over 8 bins on either side lowers the
-/// paper's by 48 to 67 %. `variance` is that of the local models and of what they differ by, good to 2 % over seeds; `misfit` is its residual per degree of freedom over the variance given, one if that is right.
+/// Accuracy: noise-free, the rational lowers no resonance two bins wide by more than 1e-6; a fixed parabola over 8 bins
+/// on either side lowers the paper's by 48 to 67 %. `variance` is that of the local models and of what they differ by,
+/// good to 2 % over seeds; `misfit` is its residual per degree of freedom over the variance given, one if that is
+/// right.
 /// Errors: a neighbourhood with too few bins for the coefficients.
-/// Source: Stark et al. 2005, Eq. 10; McKelvey and Guerin, IFAC SYSID 2012; Pintelon and Schoukens, System Identification, 2012, ch. 7; Buckland et al., Biometrics 53 (1997) 603;
-/// Goldenshluger and Nemirovski, Math. Meth. Stat. 6 (1997) 135.
+/// Source: Stark et al. 2005, Eq. 10; McKelvey and Guerin, IFAC SYSID 2012; Pintelon and Schoukens, System
+/// Identification, 2012, ch. 7; Buckland et al., Biometrics 53 (1997) 603; Goldenshluger and Nemirovski, Math. Meth.
+/// Stat. 6 (1997) 135.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Smoothing {

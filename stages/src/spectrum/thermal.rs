@@ -13,22 +13,25 @@ use afmid_kernels::spectra::{AveragedDensity, Fitted, SeenThrough, ThermalFit, T
 /// Fits a thermal spectrum: resonance, quality factor, level, white and 1/f noise.
 ///
 /// # Model
-/// One-sided density `A (2/pi) (f0^3/Q) / ((f0^2 - f^2)^2 + (f f0/Q)^2) + W + B/f`, seen through the window that the spectra were made with. An average of n
-/// spectra is gamma distributed about it with shape n.
+/// One-sided density `A (2/pi) (f0^3/Q) / ((f0^2 - f^2)^2 + (f f0/Q)^2) + W + B/f`, seen through the window that the
+/// spectra were made with. An average of n spectra is gamma distributed about it with shape n.
 /// # Method
-/// Maximum of Whittle's likelihood by Fisher scoring; lines (bins that chance does not explain at the stated false-alarm rate, and those that the
-/// window spreads them to) are set aside and the fit repeated until they stay the same.
+/// Maximum of Whittle's likelihood by Fisher scoring; lines (bins that chance does not explain at the stated
+/// false-alarm rate, and those that the window spreads them to) are set aside and the fit repeated until they stay the
+/// same.
 /// # Shapes
 /// `fit`: density, model and ratio over the frequencies fitted; `lines`: one row per line.
 /// # Units
 /// Hz; `variance` in the signal's unit squared, `white` the same per hertz.
 /// # Accuracy
-/// `std` from the Fisher information, the correlation of the window's bins counted; `robust_std` from the misfits (sandwich), which also allows for a wrong number of
-/// averages. Resonances two bins wide are unbiased. Cost: 0.2 us per bin and step, some twenty steps.
+/// `std` from the Fisher information, the correlation of the window's bins counted; `robust_std` from the misfits
+/// (sandwich), which also allows for a wrong number of averages. Resonances two bins wide are unbiased. Cost: 0.2 us
+/// per bin and step, some twenty steps.
 /// # Errors
 /// Fewer than 24 bins in the band, no resonance between the limits, no convergence.
 /// # Source
-/// P. Whittle, Ark. Mat. 2 (1953) 423; A. M. Sykulski et al., Biometrika 106 (2019) 251; H. White, Econometrica 50 (1982) 1.
+/// P. Whittle, Ark. Mat. 2 (1953) 423; A. M. Sykulski et al., Biometrika 106 (2019) 251; H. White, Econometrica 50
+/// (1982) 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Thermal {

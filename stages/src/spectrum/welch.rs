@@ -19,14 +19,16 @@ use afmid_kernels::spectra::{RecordSpectrum, average_spectra};
 /// # Model
 /// Stationary noise while the lever is free: each segment's periodogram is exponentially distributed about the density.
 /// # Method
-/// Segments under a Hann window, each overlapping the next by half, their means removed; averaged over all free stretches of all records.
+/// Segments under a Hann window, each overlapping the next by half, their means removed; averaged over all free
+/// stretches of all records.
 /// # Shapes
 /// One value per bin, from zero to half the sample rate.
 /// # Units
 /// V^2/Hz, one-sided; its sum times the bin width is the mean square.
 /// # Accuracy
-/// `standard_error` from the number of independent segments (overlap counted), `record_error` from the scatter between records, which also holds drift: where the
-/// second is larger, the noise is not stationary. A bin sees an equivalent noise bandwidth of 1.5 bins; neighbours correlate by 4/9 and 1/36.
+/// `standard_error` from the number of independent segments (overlap counted), `record_error` from the scatter between
+/// records, which also holds drift: where the second is larger, the noise is not stationary. A bin sees an equivalent
+/// noise bandwidth of 1.5 bins; neighbours correlate by 4/9 and 1/36.
 /// # Errors
 /// No free stretch as long as a segment; records of two rates.
 /// # Source

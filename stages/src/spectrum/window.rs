@@ -8,14 +8,16 @@ use afmid_kernels::spectra::{Taper, difference, taper, taper_gains};
 
 /// Multiplies force and response by a window in time.
 ///
-/// Model: none; a window trades leakage for resolution. The paper's is Tukey's with alpha = 0.1: flat, with cosine edges over 5 % of the length
-/// at either end. Its Eq. 9 as printed jumps from 1 to 0.97 where the taper starts and ends at 0.33; what is meant is computed here.
-/// Method: with `differenced`, force and response are replaced by their first differences before: the step becomes a pulse, nothing jumps from the
-/// end of the window to its start, and the transfer function is the same. With a rectangular window and a transient in
-/// `spectrum.smoothing`, the closed-form lever is recovered to 1e-5 at resonances, against 1.5e-2 with the paper's window.
+/// Model: none; a window trades leakage for resolution. The paper's is Tukey's with alpha = 0.1: flat, with cosine
+/// edges over 5 % of the length at either end. Its Eq. 9 as printed jumps from 1 to 0.97 where the taper starts and
+/// ends at 0.33; what is meant is computed here.
+/// Method: with `differenced`, force and response are replaced by their first differences before: the step becomes a
+/// pulse, nothing jumps from the end of the window to its start, and the transfer function is the same. With a
+/// rectangular window and a transient in `spectrum.smoothing`, the closed-form lever is recovered to 1e-5 at
+/// resonances, against 1.5e-2 with the paper's window.
 /// Shapes: as the pair's, with the variable `window` beside.
-/// Units: the pair's; a difference is per sample. Attributes: `coherent_gain` (mean of the window), `noise_gain` (mean square) and `equivalent_bins`
-/// (noise-equivalent bandwidth, noise gain over the squared coherent gain).
+/// Units: the pair's; a difference is per sample. Attributes: `coherent_gain` (mean of the window), `noise_gain` (mean
+/// square) and `equivalent_bins` (noise-equivalent bandwidth, noise gain over the squared coherent gain).
 /// Accuracy: rounding.
 /// Errors: alpha outside 0 to 1.
 /// Source: Stark et al. 2005, Eq. 9; Harris, Proc. IEEE 66 (1978) 51.

@@ -48,8 +48,8 @@ const TRIM: f64 = 0.06;
 ///
 /// # Method
 /// A local slope of deflection against piezo in a sliding window of 16 blocks; among blocks that are not free the
-/// half-sample mode of the slopes is the contact's. Runs of blocks whose local slope lies within 15 % of it are cut at the piezo's turning point and trimmed
-/// by 6 % (at least a window) at either end; each is fitted by a line.
+/// half-sample mode of the slopes is the contact's. Runs of blocks whose local slope lies within 15 % of it are cut at
+/// the piezo's turning point and trimmed by 6 % (at least a window) at either end; each is fitted by a line.
 ///
 /// # Errors
 /// No piezo channel. A record without contact gives an empty list.

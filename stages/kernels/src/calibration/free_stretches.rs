@@ -38,13 +38,14 @@ const RINGING_RATIO: f64 = 1.5;
 /// Finds the free stretches of a record.
 ///
 /// # Method
-/// In contact the deflection ramps, so its block means spread; out of contact they pile up: the half-sample mode of the means is the
-/// free level. The variance of the quiet is the median variance of the blocks next to the level. A block is free where mean
-/// and variance agree with these; a run of free blocks that is long enough, less settling and guard, is a stretch. Where the contact's
-/// ramp crosses the level it makes a run too short to count.
+/// In contact the deflection ramps, so its block means spread; out of contact they pile up: the half-sample mode of the
+/// means is the free level. The variance of the quiet is the median variance of the blocks next to the level. A block
+/// is free where mean and variance agree with these; a run of free blocks that is long enough, less settling and guard,
+/// is a stretch. Where the contact's ramp crosses the level it makes a run too short to count.
 ///
 /// # Accuracy
-/// Ends are good to one block; the ringing left after `settle_samples` is `exp(-settle pi f1 / Q1)` of a thermal amplitude or so.
+/// Ends are good to one block; the ringing left after `settle_samples` is `exp(-settle pi f1 / Q1)` of a thermal
+/// amplitude or so.
 ///
 /// # Errors
 /// Fewer than 16 blocks.

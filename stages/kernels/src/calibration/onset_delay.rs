@@ -38,19 +38,20 @@ pub struct OnsetRule {
 /// What the average says.
 ///
 /// # Model
-/// A delay `exp(-s T)` and a later rupture are the same signal: only their sum shows. Two things are known of it. Causality: it is not later
-/// than the first departure from the line before. Phase: mode 1 of a released lever rings as
-/// `Re[(1 - i sigma/w) D(p) e^{p (t - t0 - T)}]` with `p = -sigma + i w`, so its phase gives `t0 + T - arg D(p) / w`, where the detector's
-/// poles lag by about the sum of their time constants. Poles above the bandwidth are in turn a delay: the sum is known only as
-/// well as they are. t0 and T apart are not knowable from the response.
+/// A delay `exp(-s T)` and a later rupture are the same signal: only their sum shows. Two things are known of it.
+/// Causality: it is not later than the first departure from the line before. Phase: mode 1 of a released lever rings as
+/// `Re[(1 - i sigma/w) D(p) e^{p (t - t0 - T)}]` with `p = -sigma + i w`, so its phase gives `t0 + T - arg D(p) / w`,
+/// where the detector's poles lag by about the sum of their time constants. Poles above the bandwidth are in turn a
+/// delay: the sum is known only as well as they are. t0 and T apart are not knowable from the response.
 ///
 /// # Method
-/// Line through the first three quarters of the stretch before time 0; first sample from which `sustained_samples` depart by `threshold` standard
-/// errors in one sense; Gauss-Newton on `f1, Q1`, offset and complex amplitude over the ringing.
+/// Line through the first three quarters of the stretch before time 0; first sample from which `sustained_samples`
+/// depart by `threshold` standard errors in one sense; Gauss-Newton on `f1, Q1`, offset and complex amplitude over the
+/// ringing.
 ///
 /// # Accuracy
-/// Standard errors are those of white noise of the given size. Other modes leak by their share over their distance in line widths: 3 ns for the
-/// paper's lever.
+/// Standard errors are those of white noise of the given size. Other modes leak by their share over their distance in
+/// line widths: 3 ns for the paper's lever.
 ///
 /// # Errors
 /// Lengths differ; no departure; the fit of mode 1 does not settle.
@@ -163,8 +164,8 @@ struct RingingMode {
 }
 
 impl RingingMode {
-    /// `y = offset + Re[C e^{p t}]`: Gauss-Newton on Re C, Im C, offset, sigma, w, from the strongest line of the spectrum and the
-    /// best of a ladder of quality factors.
+    /// `y = offset + Re[C e^{p t}]`: Gauss-Newton on Re C, Im C, offset, sigma, w, from the strongest line of the
+    /// spectrum and the best of a ladder of quality factors.
     fn fit(time: &[f64], values: &[f64], noise: f64) -> Result<Self, CalibrationError> {
         let guess_hz = strongest_line(time, values)?;
         let mut best: Option<(f64, Self)> = None;

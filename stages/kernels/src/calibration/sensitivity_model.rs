@@ -38,9 +38,9 @@ pub struct Sensitivity {
 /// Sensitivity from the slope.
 ///
 /// # Model
-/// The piezo's travel is shared by lever and contact in series: `|dV/dz| = S k_c / (k + k_c)`, so
-/// `S = |dV/dz| (1 + k / k_c)`. 60 N/m under 3.8 N/m: the slope reads 6.0 % low, and a spring constant taken from it, which
-/// goes as `S^2`, 11.6 % low: it must be multiplied by 1.13.
+/// The piezo's travel is shared by lever and contact in series: `|dV/dz| = S k_c / (k + k_c)`, so `S = |dV/dz| (1 + k /
+/// k_c)`. 60 N/m under 3.8 N/m: the slope reads 6.0 % low, and a spring constant taken from it, which goes as `S^2`,
+/// 11.6 % low: it must be multiplied by 1.13.
 ///
 /// # Errors
 /// Stiffnesses or piezo calibration not above zero.

@@ -10,7 +10,8 @@ const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
 /// What the thermal method needs beside the peak.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalGauge {
-    /// Sensitivity, V/m: corrected, or as the contact slope reads it if `contact_stiffness_n_per_m` is to correct it here.
+    /// Sensitivity, V/m: corrected, or as the contact slope reads it if `contact_stiffness_n_per_m` is to correct it
+    /// here.
     pub sensitivity_v_per_m: Estimate,
     /// Contact stiffness for a joint correction; `None`: the sensitivity is taken as it is.
     pub contact_stiffness_n_per_m: Option<f64>,
@@ -40,12 +41,11 @@ pub struct SpringConstant {
 /// Stiffness from the variance of the signal in mode 1.
 ///
 /// # Model
-/// Equipartition gives mode n of a lever driven at its tip the stiffness `k_n = k / c_tip_n` and `<q_n^2> = c_tip_n k_B T / k`. The
-/// detector sees `v_n = S (c_slope_n / c_tip_n) q_n`. Hence `<v_1^2> = S^2 (c_slope_1^2 / c_tip_1) k_B T / k`, and
-/// `k = S^2 chi k_B T |D(f1)|^2 / <v_1^2>` with `chi = c_slope_1^2 / c_tip_1` (0.8175 for a uniform beam seen by its end slope:
-/// `c_tip_1 = 0.9707`, `c_slope_1 = 0.8908`).
-/// With a soft contact `S = S_a (1 + k/k_c)`; `r = S_a^2 chi k_B T |D|^2 / <v_1^2>` then gives
-/// `k = r (1 + k/k_c)^2`, of which the smaller root is the spring constant.
+/// Equipartition gives mode n of a lever driven at its tip the stiffness `k_n = k / c_tip_n` and `<q_n^2> = c_tip_n k_B
+/// T / k`. The detector sees `v_n = S (c_slope_n / c_tip_n) q_n`. Hence `<v_1^2> = S^2 (c_slope_1^2 / c_tip_1) k_B T /
+/// k`, and `k = S^2 chi k_B T |D(f1)|^2 / <v_1^2>` with `chi = c_slope_1^2 / c_tip_1` (0.8175 for a uniform beam seen
+/// by its end slope: `c_tip_1 = 0.9707`, `c_slope_1 = 0.8908`). With a soft contact `S = S_a (1 + k/k_c)`; `r = S_a^2
+/// chi k_B T |D|^2 / <v_1^2>` then gives `k = r (1 + k/k_c)^2`, of which the smaller root is the spring constant.
 ///
 /// # Accuracy
 /// First-order error propagation; with a soft contact all relative errors grow by `(1 + k/k_c) / (1 - k/k_c)`.
@@ -121,8 +121,9 @@ fn attenuation(frequency_hz: f64, pole_hz: &[f64]) -> f64 {
 /// The mode-shape factor of a uniform beam seen by the slope of its end.
 ///
 /// # Model
-/// `c_tip_1 = 12 / alpha^4 = 0.9707` (`alpha = 1.8751`, first root of `1 + cos cosh = 0`). Mode 1 has 1.3765/L of end slope per end
-/// displacement, the statically bent beam 1.5/L: `c_slope_1 = 0.9707 * 1.3765 / 1.5 = 0.8908`; `0.8908^2 / 0.9707 = 0.8175`.
+/// `c_tip_1 = 12 / alpha^4 = 0.9707` (`alpha = 1.8751`, first root of `1 + cos cosh = 0`). Mode 1 has 1.3765/L of end
+/// slope per end displacement, the statically bent beam 1.5/L: `c_slope_1 = 0.9707 * 1.3765 / 1.5 = 0.8908`; `0.8908^2
+/// / 0.9707 = 0.8175`.
 pub const UNIFORM_BEAM_FACTOR: f64 = 0.8175;
 
 /// Decay time of a mode's amplitude, s: `Q / (pi f)`.

@@ -23,7 +23,8 @@ pub struct Stability {
     pub drift_p_value: f64,
 }
 
-/// Tests `values` with standard errors `stds` for scatter beyond the errors and for a steady drift with the record's index.
+/// Tests `values` with standard errors `stds` for scatter beyond the errors and for a steady drift with the record's
+/// index.
 ///
 /// # Model
 /// Independent normal errors of known size. Values that are not finite, or have no positive error, are left out.

@@ -50,9 +50,9 @@ const FOUND: f64 = 1e-9;
 /// # Model
 /// `1 + kappa(s) G(s) = 0`, exact for a modal lever with a linear contact at the tip.
 /// # Method
-/// Newton's method on the polynomial that this is the quotient of, in product form, the roots found by the other starts and all
-/// conjugates divided out, all at once (Ehrlich and Aberth): distinct starts end in distinct roots. None without convergence, or where a root does
-/// not oscillate. About `20 M N` operations a round for M starts and N modes.
+/// Newton's method on the polynomial that this is the quotient of, in product form, the roots found by the other starts
+/// and all conjugates divided out, all at once (Ehrlich and Aberth): distinct starts end in distinct roots. None
+/// without convergence, or where a root does not oscillate. About `20 M N` operations a round for M starts and N modes.
 /// # Source
 /// O. Aberth, Math. Comp. 27 (1973) 339.
 pub fn coupled_poles(lever: &FreeLever, contact: impl Into<ContactLaw>, start: &[c64]) -> Option<Vec<c64>> {

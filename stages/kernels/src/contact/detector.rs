@@ -27,8 +27,8 @@ impl Detector {
     /// `count` corners that turn the free modes' residues onto a common onset.
     ///
     /// # Method
-    /// A release of a lever of real gains has residues of equal phase before the detector. One corner for all poles of the chain, by trial, least
-    /// squares of what phases remain beyond the reference's.
+    /// A release of a lever of real gains has residues of equal phase before the detector. One corner for all poles of
+    /// the chain, by trial, least squares of what phases remain beyond the reference's.
     pub fn start(free: &Ringing, reference: usize, count: usize) -> Self {
         let highest = free.poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
         let trial = |i: usize| highest * CORNERS[0] * (CORNERS[1] / CORNERS[0]).powf(i as f64 / (TRIALS - 1) as f64);
@@ -55,7 +55,8 @@ impl Detector {
     }
 }
 
-/// Residue of a mode of gain one in the ringing after a unit load is taken off, less the detector: `Res_p[w^2 / ((s-p)(s-p*))] / p`, a pair as one.
+/// Residue of a mode of gain one in the ringing after a unit load is taken off, less the detector: `Res_p[w^2 /
+/// ((s-p)(s-p*))] / p`, a pair as one.
 pub(super) fn release(p: c64) -> c64 {
     let two_i = c64::new(0.0, 2.0 * p.im);
     c64::new(2.0 * p.norm_sqr(), 0.0) / (two_i * p)

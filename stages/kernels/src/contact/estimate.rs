@@ -70,10 +70,12 @@ const ARRIVED: f64 = 1e-9;
 /// Contact stiffness and damping from the poles that the contact moves.
 ///
 /// # Model
-/// A lever of `N` modes on a linear contact at its tip: `kappa(s) = k_c + eta s = -1 / G(s)` at every pole `s` of the two together. Free lever,
-/// contact and readout are otherwise arbitrary: neither detector nor excitation enters the poles.
+/// A lever of `N` modes on a linear contact at its tip: `kappa(s) = k_c + eta s = -1 / G(s)` at every pole `s` of the
+/// two together. Free lever, contact and readout are otherwise arbitrary: neither detector nor excitation enters the
+/// poles.
 /// # Method
-/// Each pole alone gives `eta = Im kappa / Im s`, `k_c = Re kappa - eta Re s`. Together: generalised least squares of the measured poles against
+/// Each pole alone gives `eta = Im kappa / Im s`, `k_c = Re kappa - eta Re s`. Together: generalised least squares of
+/// the measured poles against
 /// [`coupled_poles`], Gauss-Newton with halved steps, weighted by the covariance of the poles plus that of the lever's own
 /// parameters carried to the poles by implicit derivatives, at the present estimate.
 /// # Shapes
@@ -81,10 +83,11 @@ const ARRIVED: f64 = 1e-9;
 /// # Units
 /// rad/s, N/m, N s/m.
 /// # Accuracy
-/// Standard errors to first order; 50 simulated archives: docs/results/contact.md. **Bias**: modes beyond the free lever's act as a static compliance only
-/// (what the shares leave of one); a pole near the highest free mode feels the first one that is missing. Errors of frequencies and quality
-/// factors of the free lever are taken as independent of each other and of the coupled poles. Wrong shares bias every pole differently: the chi square
-/// shows it, `tip_share_error` counts it.
+/// Standard errors to first order; 50 simulated archives: docs/results/contact.md. **Bias**: modes beyond the free
+/// lever's act as a static compliance only (what the shares leave of one); a pole near the highest free mode feels the
+/// first one that is missing. Errors of frequencies and quality factors of the free lever are taken as independent of
+/// each other and of the coupled poles. Wrong shares bias every pole differently: the chi square shows it,
+/// `tip_share_error` counts it.
 /// # Errors
 /// No pole, a covariance of another size, values that are not finite, poles that no contact on this lever gives.
 /// # Source

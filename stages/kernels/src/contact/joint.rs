@@ -27,8 +27,8 @@ pub enum LawChoice {
 pub struct JointOptions {
     /// The contact's law.
     pub law: LawChoice,
-    /// Relative standard error of the given tip shares but the first, which makes up for the others: none where the data alone shall say them, zero
-    /// where they are exact.
+    /// Relative standard error of the given tip shares but the first, which makes up for the others: none where the
+    /// data alone shall say them, zero where they are exact.
     pub share_error: Option<f64>,
 }
 
@@ -37,27 +37,32 @@ const LAW_GAIN: f64 = 9.0;
 /// Residues of a step at the tip give a smaller p-value once in a hundred archives.
 const RESIDUES_MISFIT: f64 = 0.01;
 
-/// Stiffness and damping of the contact, tip shares and contact resonances from the ringings of the free lever and of the lever on the contact.
+/// Stiffness and damping of the contact, tip shares and contact resonances from the ringings of the free lever and of
+/// the lever on the contact.
 ///
 /// # Model
-/// A force at the tip moves what the detector sees by `H(s) D(s)`, the tip by `G(s)`; `H` and `G` are sums over the free modes, with real gains
-/// `g_n` and tip shares `c_n`; `D` is a chain of real poles. On the contact the force of the catch gives `H D / (1 + kappa G)`: zeros and detector are the free
-/// lever's, poles are where `1 + kappa G = 0`. The free ringing follows a step of the force, and so does the coupled one: the tip
-/// is caught at rest, or in the shape of a load at the tip, which a thermal peak has. Amplitudes and onsets are the events' own.
+/// A force at the tip moves what the detector sees by `H(s) D(s)`, the tip by `G(s)`; `H` and `G` are sums over the
+/// free modes, with real gains `g_n` and tip shares `c_n`; `D` is a chain of real poles. On the contact the force of
+/// the catch gives `H D / (1 + kappa G)`: zeros and detector are the free lever's, poles are where `1 + kappa G = 0`.
+/// The free ringing follows a step of the force, and so does the coupled one: the tip is caught at rest, or in the
+/// shape of a load at the tip, which a thermal peak has. Amplitudes and onsets are the events' own.
 /// # Method
-/// Generalised least squares of all poles and residues, each ringing with its full covariance, over contact, shares, free poles, gains and detector
-/// at once. Detector corners are held to a factor of 1.6 (one standard error) round the single corner that suits the residues best. Residues are used where
-/// they raise chi square by no more than their number allows (p above 0.01), else poles alone.
+/// Generalised least squares of all poles and residues, each ringing with its full covariance, over contact, shares,
+/// free poles, gains and detector at once. Detector corners are held to a factor of 1.6 (one standard error) round the
+/// single corner that suits the residues best. Residues are used where they raise chi square by no more than their
+/// number allows (p above 0.01), else poles alone.
 /// # Shapes
 /// `N` free modes with a tip share each, `M` coupled ones, `M <= N`.
 /// # Units
 /// rad/s, N/m, N s/m, kg.
 /// # Accuracy
-/// To first order in the errors; rms z over simulated archives: docs/results/contact.md. Degrees of freedom count what the data determine of the corners.
-/// **Bias**: modes beyond the free lever's act as a static compliance only, of what the given shares leave of one; a second-order
-/// term below its threshold shifts the shares and, through them, the stiffness by up to three errors of what they would have beside that term.
+/// To first order in the errors; rms z over simulated archives: docs/results/contact.md. Degrees of freedom count what
+/// the data determine of the corners. **Bias**: modes beyond the free lever's act as a static compliance only, of what
+/// the given shares leave of one; a second-order term below its threshold shifts the shares and, through them, the
+/// stiffness by up to three errors of what they would have beside that term.
 /// # Errors
-/// As many shares as free modes are wanted; poles that no contact on this lever gives; fewer numbers than are asked for.
+/// As many shares as free modes are wanted; poles that no contact on this lever gives; fewer numbers than are asked
+/// for.
 /// # Source
 /// U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281 (contact resonances);
 /// A. C. Aitken, Proc. R. Soc. Edinb. 55 (1936) 42 (generalised least squares).

@@ -185,7 +185,8 @@ impl<'a> JointModel<'a> {
 }
 
 impl State {
-    /// Residue of the pair at `s` in the ringing after the contact has caught the tip, less amplitude: `Res_s[H(s) D(s) / (s (1 + kappa G))]`.
+    /// Residue of the pair at `s` in the ringing after the contact has caught the tip, less amplitude: `Res_s[H(s) D(s)
+    /// / (s (1 + kappa G))]`.
     fn caught(&self, s: c64) -> c64 {
         let lever = self.poles.iter().zip(&self.gain).fold(c64::new(0.0, 0.0), |sum, (p, gain)| {
             sum + c64::new(gain * p.norm_sqr(), 0.0) / ((s - p) * (s - p.conj()))

@@ -20,7 +20,8 @@ pub struct ContactResonance {
     pub measured: ModeEstimate,
     /// As everything together has it.
     pub estimated: ModeEstimate,
-    /// What this pole says alone, with the estimated tip shares taken as exact, and what it and its residue count in the estimate.
+    /// What this pole says alone, with the estimated tip shares taken as exact, and what it and its residue count in
+    /// the estimate.
     pub alone: PoleContact,
 }
 
@@ -65,7 +66,8 @@ pub struct JointContact {
     pub correlation: f64,
     /// Tip shares of the free modes; their sum is given.
     pub tip_shares: Vec<Estimate>,
-    /// What the detector sees of each mode over the first one, times what it passes of static deflection; empty without residues.
+    /// What the detector sees of each mode over the first one, times what it passes of static deflection; empty without
+    /// residues.
     pub detector_gains: Vec<Estimate>,
     /// Contact resonances.
     pub resonances: Vec<ContactResonance>,
@@ -112,7 +114,8 @@ impl<'a> Solved<'a> {
         self.model.parameters.iter().position(|p| p.quantity == quantity)
     }
 
-    /// Value and error of a number; a relative error of the lever's stiffness comes on top where it is proportional to it.
+    /// Value and error of a number; a relative error of the lever's stiffness comes on top where it is proportional to
+    /// it.
     fn estimate(&self, quantity: Quantity, scale_error: f64) -> Option<Estimate> {
         let p = self.index(quantity)?;
         let value = self.minimum.values[p];
@@ -209,7 +212,8 @@ impl<'a> Solved<'a> {
         &by * &self.minimum.covariance * by.transpose()
     }
 
-    /// What each coupled pole with its residue counts in stiffness and damping: gain times slope of its rows; all sum to one.
+    /// What each coupled pole with its residue counts in stiffness and damping: gain times slope of its rows; all sum
+    /// to one.
     fn weights(&self) -> Vec<[f64; 2]> {
         let (slope, gain) = self.rows();
         let width = self.model.coupled.width();
@@ -251,7 +255,8 @@ impl<'a> Solved<'a> {
     }
 }
 
-/// Rows of data, and of what is known of shares, less what they determine: the rows' leverage, of which the hold on the corners takes some.
+/// Rows of data, and of what is known of shares, less what they determine: the rows' leverage, of which the hold on the
+/// corners takes some.
 fn freedom(model: &JointModel<'_>, minimum: &Minimum) -> usize {
     let known = model.parameters.iter().filter(|p| p.prior.is_some());
     let corner: Vec<bool> =

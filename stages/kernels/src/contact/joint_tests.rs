@@ -59,7 +59,8 @@ fn residues(system: &LinearSystem, input: &[f64], weights: &[f64], poles: &[c64]
         .collect()
 }
 
-/// A ringing of some amplitude and onset, its largest residue the reference; errors are shares of each pole's decay rate and of the largest residue.
+/// A ringing of some amplitude and onset, its largest residue the reference; errors are shares of each pole's decay
+/// rate and of the largest residue.
 fn ringing(poles: Vec<c64>, residues: &[c64], amplitude: f64, onset_s: f64, errors: [f64; 2]) -> Ringing {
     let largest = |all: &[c64]| (0..all.len()).max_by(|&a, &b| all[a].norm().total_cmp(&all[b].norm())).unwrap();
     let residues: Vec<c64> = poles.iter().zip(residues).map(|(p, r)| r * (-p * onset_s).exp() * amplitude).collect();

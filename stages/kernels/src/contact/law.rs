@@ -5,8 +5,8 @@ use faer::c64;
 /// A linear contact to second order in frequency: `kappa(s) = k_c + eta s + mu s^2`, tip force over indentation.
 ///
 /// # Model
-/// A spring and a damper, and what comes next: `mu > 0` is a mass that moves with the tip; `mu < 0` a contact that stiffens with frequency, as one
-/// that relaxes in a time `tau` (`mu = -eta tau`), or whose force comes late.
+/// A spring and a damper, and what comes next: `mu > 0` is a mass that moves with the tip; `mu < 0` a contact that
+/// stiffens with frequency, as one that relaxes in a time `tau` (`mu = -eta tau`), or whose force comes late.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactLaw {
     /// `k_c`, N/m.

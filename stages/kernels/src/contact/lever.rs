@@ -9,8 +9,8 @@ use crate::ringdown::{Estimate, ModeEstimate};
 /// The free lever: stiffness, modes, and what each mode has of the tip's static compliance.
 ///
 /// # Model
-/// `G(s) = (1/k) (sum_n c_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + 1 - sum_n c_n)`, m/N: tip displacement over tip force. What the shares leave
-/// of one is the compliance of all higher modes, taken as static.
+/// `G(s) = (1/k) (sum_n c_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + 1 - sum_n c_n)`, m/N: tip displacement over tip force.
+/// What the shares leave of one is the compliance of all higher modes, taken as static.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeLever {
     pub(super) stiffness_n_per_m: Estimate,
@@ -30,8 +30,8 @@ pub(super) struct Compliance {
 }
 
 impl FreeLever {
-    /// A lever of `stiffness` (N/m) with `modes` and as many `tip_share`s, each but the first known to the relative standard
-    /// error `tip_share_error`; the first makes up for the others' errors, as the sum is known.
+    /// A lever of `stiffness` (N/m) with `modes` and as many `tip_share`s, each but the first known to the relative
+    /// standard error `tip_share_error`; the first makes up for the others' errors, as the sum is known.
     ///
     /// # Errors
     /// No mode, unequal numbers, values that are not above zero, shares that sum to more than one.

@@ -42,5 +42,6 @@ pub use law::ContactLaw;
 pub use lever::FreeLever;
 pub use ringing::Ringing;
 
-/// Tip shares of the first four modes of a beam that carries a small load at its end: `simulate.afm`'s, an assumption about the lever.
+/// Tip shares of the first four modes of a beam that carries a small load at its end: `simulate.afm`'s, an assumption
+/// about the lever.
 pub const LOADED_BEAM_SHARES: [f64; 4] = [0.9713, 0.0247, 0.0032, 0.0008];

@@ -34,12 +34,14 @@ pub(super) struct Parameter {
 const STEP: f64 = 1e-5;
 /// The same of a pole: a thousandth of a linewidth of Q = 1e4.
 const POLE_STEP: f64 = 1e-7;
-/// The corners' logarithms are held to this round the start: residues show the chain as a whole, and single corners would run away.
+/// The corners' logarithms are held to this round the start: residues show the chain as a whole, and single corners
+/// would run away.
 const CORNER_WIDTH: f64 = 0.5;
 
 /// All numbers of an estimate.
 ///
-/// `share_error` is the relative standard error of the given tip shares: none where nothing is known of them, zero where they are exact.
+/// `share_error` is the relative standard error of the given tip shares: none where nothing is known of them, zero
+/// where they are exact.
 pub(super) fn quantities(
     lever: &FreeLever,
     free: &Ringing,

@@ -10,8 +10,8 @@ use crate::ringdown::internals::{pole_of, slopes};
 
 /// Oscillating poles of a lever with their residues, `y(t) = sum Re(rho_j exp(s_j t))`.
 ///
-/// Amplitude and onset of a ringing are its events' own. One residue is their reference: it is given, without error, and the others are relative to
-/// it, as in a joint fit.
+/// Amplitude and onset of a ringing are its events' own. One residue is their reference: it is given, without error,
+/// and the others are relative to it, as in a joint fit.
 #[derive(Debug, Clone)]
 pub struct Ringing {
     /// Upper poles of pairs, rad/s.

@@ -33,9 +33,9 @@ sample!(i16 => i32, i32 => i64, f32 => f64, f64 => f64);
 /// Means of consecutive blocks of one record, in the channel's unit without its offset.
 ///
 /// # Method
-/// Integer sums of `block_samples` codes (at most 32768, so that an `i32` holds them), scaled once per block. Missing samples
-/// (NaN, infinities, the file's fill code) are left out; a block without any other repeats the block before it, so that a gap
-/// makes no step.
+/// Integer sums of `block_samples` codes (at most 32768, so that an `i32` holds them), scaled once per block. Missing
+/// samples (NaN, infinities, the file's fill code) are left out; a block without any other repeats the block before it,
+/// so that a gap makes no step.
 /// # Units
 /// The channel's.
 /// Cost: one addition per sample; memory 4 bytes per block.

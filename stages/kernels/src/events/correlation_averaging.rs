@@ -73,18 +73,19 @@ pub struct Averaging {
 /// # Model
 /// `segment(n + shift) = a T(n) + b + c n + noise`: one shape, with an amplitude, offset and slope for each event.
 /// # Method
-/// T is the average of the aligned events, each normalised to unit rms so that none dominates; every event is compared with the
-/// average of the *others* (its own noise would hold it in place): FFT cross-correlation finds the place, Gauss-Newton least
-/// squares the fraction of a sample; then average again, until no event moves by more than the tolerance. Events below
-/// `min_correlation` leave (at most half in a round) and the rest is aligned again. Only the first samples after the onset
-/// count: they hold the steepest slopes, and a resonance that differs from event to event has not yet slipped in phase.
+/// T is the average of the aligned events, each normalised to unit rms so that none dominates; every event is compared
+/// with the average of the *others* (its own noise would hold it in place): FFT cross-correlation finds the place,
+/// Gauss-Newton least squares the fraction of a sample; then average again, until no event moves by more than the
+/// tolerance. Events below `min_correlation` leave (at most half in a round) and the rest is aligned again. Only the
+/// first samples after the onset count: they hold the steepest slopes, and a resonance that differs from event to event
+/// has not yet slipped in phase.
 /// # Shapes
 /// Segments of one length, with [`AveragingSettings::margins`] round `onset`.
 /// # Units
 /// Shifts in samples, amplitudes as the signal.
 /// # Accuracy
-/// 0.006 samples rms for 0.9 V releases in 1.2 mV of noise, 0.02 for 40 mV snaps to contact (simulated archives); amplitudes
-/// may scatter by 30 % (tested).
+/// 0.006 samples rms for 0.9 V releases in 1.2 mV of noise, 0.02 for 40 mV snaps to contact (simulated archives);
+/// amplitudes may scatter by 30 % (tested).
 /// # Errors
 /// None; an event that cannot be aligned says why. A single event is its own average: shift 0, correlation 1.
 /// # Source

@@ -32,10 +32,12 @@ impl CrossCorrelator {
     /// # Model
     /// `signal[n + lag] = a template[n] + b + noise`, a > 0.
     /// # Method
-    /// `r(lag) = sum (t - mean t) s[n + lag] / (|t - mean t| |s - local mean s|)`; numerators by one circular FFT correlation
-    /// (long enough that nothing wraps), local energies by running sums; the peak refined by a parabola through three points.
+    /// `r(lag) = sum (t - mean t) s[n + lag] / (|t - mean t| |s - local mean s|)`; numerators by one circular FFT
+    /// correlation (long enough that nothing wraps), local energies by running sums; the peak refined by a parabola
+    /// through three points.
     /// # Accuracy
-    /// Whole samples certain, fractions to some hundredths: refine with [`refine_shift`](crate::events::shift_refinement::refine_shift).
+    /// Whole samples certain, fractions to some hundredths: refine with
+    /// [`refine_shift`](crate::events::shift_refinement::refine_shift).
     /// # Shapes
     /// The lengths given to [`CrossCorrelator::new`].
     /// # Errors

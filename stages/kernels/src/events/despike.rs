@@ -1,11 +1,11 @@
 //! Spikes taken out of block means.
 
-/// Replaces outliers of one or two blocks by the line between their neighbours; returns their first blocks (crests of a ringing
-/// may be among them).
+/// Replaces outliers of one or two blocks by the line between their neighbours; returns their first blocks (crests of a
+/// ringing may be among them).
 ///
 /// # Method
-/// One or two blocks that differ from the line between their neighbours by more than `threshold`, in one direction, while those
-/// neighbours agree within it. An edge is kept: its sides differ.
+/// One or two blocks that differ from the line between their neighbours by more than `threshold`, in one direction,
+/// while those neighbours agree within it. An edge is kept: its sides differ.
 /// # Shapes
 /// `means` is changed in place.
 /// # Units

@@ -86,15 +86,15 @@ const RISE_BLOCKS: usize = 8;
 /// Finds snap-off and snap-to-contact events in the block means of one record.
 ///
 /// # Model
-/// The deflection is piecewise straight, with hum, 1/f drift and noise; an event is a sudden change of level (a kink of the piezo
-/// triangle changes the slope alone, a spike neither, a ringing only follows).
+/// The deflection is piecewise straight, with hum, 1/f drift and noise; an event is a sudden change of level (a kink of
+/// the piezo triangle changes the slope alone, a spike neither, a ringing only follows).
 /// # Method
 /// Spikes of one or two blocks are bridged. Then:
-/// 1. Steps `b[k+1] - b[k-1]`, less the local slope, that exceed `significance` times their median absolute deviation in this
-///    record; of a ringing only the first.
-/// 2. At each of them lines fitted before and after give the jump of level. It must exceed `significance` times its own scale
-///    over the record (so hum and drift raise the bar by what they do), the jump that the change of slope could feign, and 0.7
-///    times the ringing (a released oscillator rings with at most 0.71 rms of its step).
+/// 1. Steps `b[k+1] - b[k-1]`, less the local slope, that exceed `significance` times their median absolute deviation
+///   in this record; of a ringing only the first.
+/// 2. At each of them lines fitted before and after give the jump of level. It must exceed `significance` times its own
+///   scale over the record (so hum and drift raise the bar by what they do), the jump that the change of slope could
+///   feign, and 0.7 times the ringing (a released oscillator rings with at most 0.71 rms of its step).
 /// 3. Up is a snap-off; down, and followed by a rising slope, a snap-to-contact.
 ///
 /// All thresholds are relative to the record: nothing is tuned to volts.
@@ -162,7 +162,8 @@ fn compensated_steps(means: &[f32]) -> Vec<f64> {
     steps
 }
 
-/// Robust standard deviation of the steps, at least that of rounding (the codes', and the single precision of the means).
+/// Robust standard deviation of the steps, at least that of rounding (the codes', and the single precision of the
+/// means).
 fn step_noise(steps: &[f64], settings: &DetectionSettings) -> f64 {
     let stride = (steps.len() / (1 << 14)).max(1);
     let mut some: Vec<f64> = steps.iter().copied().step_by(stride).collect();
@@ -189,7 +190,8 @@ fn null_scales(means: &[f32], settings: &DetectionSettings, step_noise: f64) -> 
         }
     }
     let n = span as f64;
-    // white noise: variance 4 / n of a line's end, 12 / n^3 of its slope, twice for two lines; a step has twice a block's variance
+    // white noise: variance 4 / n of a line's end, 12 / n^3 of its slope, twice for two lines; a step has twice a
+    // block's variance
     let (white_jump, white_slope) = (step_noise * (4.0 / n).sqrt(), step_noise * (12.0 / n.powi(3)).sqrt());
     let scale = |values: &mut [f64]| if values.len() < 8 { 0.0 } else { median_and_scale(values).1 };
     NullScales { jump: scale(&mut jumps).max(white_jump), slope: scale(&mut slopes).max(white_slope) }

@@ -13,12 +13,12 @@ const KAISER_BETA: f64 = 10.0;
 /// `values` at the positions `start + k + shift`, `k = 0..count`, by windowed-sinc interpolation.
 ///
 /// # Model
-/// The signal has no content above 0.9 of half the sample rate. A release through three detector poles has so little there that
-/// the error at its onset is 5e-5 of the release, a twentieth of one event's noise (tested).
+/// The signal has no content above 0.9 of half the sample rate. A release through three detector poles has so little
+/// there that the error at its onset is 5e-5 of the release, a twentieth of one event's noise (tested).
 /// # Method
 /// Sinc times a Kaiser window (beta 10) over 64 samples; weights normalised to sum 1, so constants are kept exactly. A
-/// whole-sample shift copies. No feedback, so nothing but the 32 samples on either side matters, and an onset cannot ring
-/// further ahead than these.
+/// whole-sample shift copies. No feedback, so nothing but the 32 samples on either side matters, and an onset cannot
+/// ring further ahead than these.
 /// # Shapes
 /// Needs `REACH` samples on either side of what is asked for; beyond the ends the edge value is held.
 /// # Accuracy
@@ -37,8 +37,8 @@ pub fn fractional_shift(values: &[f64], start: usize, count: usize, shift: f64) 
 /// The derivative per sample of the same interpolation, at `start + k`, `k = 0..count`.
 ///
 /// # Method
-/// The derivative of the kernel above. Accuracy: sines of up to 0.4 of the sample rate to 5e-5 of their amplitude per sample
-/// (tested).
+/// The derivative of the kernel above. Accuracy: sines of up to 0.4 of the sample rate to 5e-5 of their amplitude per
+/// sample (tested).
 pub fn band_limited_derivative(values: &[f64], start: usize, count: usize) -> Vec<f64> {
     let half = 1e-3;
     let (ahead, behind) = (raw_weights(half), raw_weights(-half));
@@ -133,7 +133,8 @@ impl pulp::WithSimd for Sums<'_> {
     }
 }
 
-/// Modified Bessel function of the first kind, order 0, by its power series (converges for every argument; 30 terms at 10).
+/// Modified Bessel function of the first kind, order 0, by its power series (converges for every argument; 30 terms at
+/// 10).
 fn bessel_i0(x: f64) -> f64 {
     let quarter = 0.25 * x * x;
     let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);

@@ -81,8 +81,8 @@ pub(super) fn jump_and_slope(means: &[f32], block: usize, span: usize) -> Option
 /// The change of level at `block`, from up to `span` blocks on either side within `[low, high)`.
 ///
 /// # Method
-/// The blocks `block - 1`, `block` and `block + 1` may hold the edge and are left out; least-squares lines through what lies
-/// before and after are extrapolated to `block`. A parabola (hum, drift) bends both sides alike and cancels.
+/// The blocks `block - 1`, `block` and `block + 1` may hold the edge and are left out; least-squares lines through what
+/// lies before and after are extrapolated to `block`. A parabola (hum, drift) bends both sides alike and cancels.
 /// # Errors
 /// `None` where a side has fewer than `span / 4` blocks (at least 2).
 pub fn level_change(means: &[f32], block: usize, span: usize, low: usize, high: usize) -> Option<LevelChange> {

@@ -80,17 +80,18 @@ fn fit(stretch: &[f64], start: f64, limit: f64, about: Option<&Baseline>) -> Opt
 /// `significance` times its noise.
 ///
 /// # Method
-/// The line and its noise come from the `baseline_samples` before `search`. Not the steepest slope, which a slow detector or a
-/// heavy mode puts late; not a single sample, which a spike may be.
+/// The line and its noise come from the `baseline_samples` before `search`. Not the steepest slope, which a slow
+/// detector or a heavy mode puts late; not a single sample, which a spike may be.
 /// # Units
 /// `noise_floor` as the values: the least noise to assume (rounding).
 /// # Accuracy
-/// Late by the samples during which the signal is within the noise; two or three for one event of a lever with three detector
-/// poles.
+/// Late by the samples during which the signal is within the noise; two or three for one event of a lever with three
+/// detector poles.
 /// # Errors
 /// `None` if nothing departs, or too little lies before.
 /// # Source
-/// The sustained-threshold picker that is usual for the arrival of transients (Allen, Bull. Seismol. Soc. Am. 68 (1978) 1521).
+/// The sustained-threshold picker that is usual for the arrival of transients (Allen, Bull. Seismol. Soc. Am. 68 (1978)
+/// 1521).
 pub fn first_sustained_departure(
     values: &[f64],
     search: Range<usize>,

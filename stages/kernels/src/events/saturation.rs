@@ -3,12 +3,12 @@
 /// How many samples sit at an end of the range, if they pile up there; 0 if not.
 ///
 /// # Model
-/// A converter or amplifier that runs out of range returns its last code again and again, while a signal that merely turns
-/// there takes its extreme code about as often as the codes next to it.
+/// A converter or amplifier that runs out of range returns its last code again and again, while a signal that merely
+/// turns there takes its extreme code about as often as the codes next to it.
 /// # Method
-/// At either end, the count of the extreme value must be 8 or more and over four times that of each of the next four values.
-/// Limits: a limit that acts before the noise is added gives no pile-up and is not seen; a noise-free constant stretch at the
-/// extreme is.
+/// At either end, the count of the extreme value must be 8 or more and over four times that of each of the next four
+/// values. Limits: a limit that acts before the noise is added gives no pile-up and is not seen; a noise-free constant
+/// stretch at the extreme is.
 /// # Shapes
 /// One window of values; equal codes must be equal values. NaN are ignored. Cost: one to five passes.
 pub fn saturated_samples(values: &[f64]) -> usize {

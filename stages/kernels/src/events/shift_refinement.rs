@@ -19,8 +19,9 @@ pub struct Refined {
 /// # Model
 /// `event(n + shift) = a T(n) + b + c n + noise`; amplitude, offset and slope are free for each event.
 /// # Method
-/// The event moved by the present shift is regressed on `T`, its derivative, 1 and n; the derivative's coefficient over the
-/// amplitude is the error of the shift. Repeated `steps` times. For white noise this is the maximum-likelihood shift.
+/// The event moved by the present shift is regressed on `T`, its derivative, 1 and n; the derivative's coefficient over
+/// the amplitude is the error of the shift. Repeated `steps` times. For white noise this is the maximum-likelihood
+/// shift.
 /// # Shapes
 /// `template` runs over `count + 2 REACH` samples, its sample `REACH` belonging to `event[start]`.
 /// # Accuracy

@@ -73,12 +73,12 @@ const LINE_SAMPLES: usize = 32;
 /// Extrapolates both lines to the moment of the event.
 ///
 /// # Model
-/// Snap-off: the lever follows the load quasi-statically along a line before `t0` and rings about the zero-force line after.
-/// Snap-in: it follows the zero-force line before, and rings about a line after that rises with the piezo.
+/// Snap-off: the lever follows the load quasi-statically along a line before `t0` and rings about the zero-force line
+/// after. Snap-in: it follows the zero-force line before, and rings about a line after that rises with the piezo.
 ///
 /// # Method
-/// Uniform line before, up to `guard` samples ahead of the expected event; Hann-weighted line after, from the expected event
-/// to the end, which suppresses ringing (46 kHz, Q = 40) to a millionth without a model of it. With `t0` given
+/// Uniform line before, up to `guard` samples ahead of the expected event; Hann-weighted line after, from the expected
+/// event to the end, which suppresses ringing (46 kHz, Q = 40) to a millionth without a model of it. With `t0` given
 /// (sub-ensembles), it is used; otherwise [`find_onset`] looks for it.
 ///
 /// # Shapes
@@ -88,8 +88,8 @@ const LINE_SAMPLES: usize = 32;
 /// Samples and the unit of the mean (volts).
 ///
 /// # Accuracy
-/// The load's standard error counts white noise, enlarged by the correlation of the residual before the event. Noise slower
-/// than the stretches is not seen by it.
+/// The load's standard error counts white noise, enlarged by the correlation of the residual before the event. Noise
+/// slower than the stretches is not seen by it.
 ///
 /// # Errors
 /// Stretches under 32 samples, values not finite, no departure, or a load within three standard errors of zero.
@@ -146,9 +146,9 @@ pub fn extrapolate(
 /// Input and response on the grid of the mean.
 ///
 /// # Model
-/// Snap-off: `u = load(t)` before `t0`, zero from it on. Snap-in: zero before, `load(t)` from `t0` on. The response is the
-/// deflection above the zero-force line. Each value of `u` is held until the next sample, so the step lies on `t0` exactly,
-/// where the response has not moved yet.
+/// Snap-off: `u = load(t)` before `t0`, zero from it on. Snap-in: zero before, `load(t)` from `t0` on. The response is
+/// the deflection above the zero-force line. Each value of `u` is held until the next sample, so the step lies on `t0`
+/// exactly, where the response has not moved yet.
 ///
 /// # Shapes
 /// All `[time]`.

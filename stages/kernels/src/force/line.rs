@@ -5,8 +5,8 @@
 pub enum Weighting {
     /// All alike: the least variance for white noise.
     Uniform,
-    /// A Hann window over the stretch. Decaying oscillations of at least ten periods drop out: by parts, three times, the bias is
-    /// below `A (2 pi)^2 / |s L|^3` for amplitude `A`, pole `s` and length `L`. The variance doubles.
+    /// A Hann window over the stretch. Decaying oscillations of at least ten periods drop out: by parts, three times,
+    /// the bias is below `A (2 pi)^2 / |s L|^3` for amplitude `A`, pole `s` and length `L`. The variance doubles.
     Hann,
 }
 
@@ -43,12 +43,12 @@ impl Line {
 /// Line plus white noise, plus anything that the weighting suppresses.
 ///
 /// # Method
-/// Weighted least squares about the weighted centre, where level and slope are uncorrelated up to the weights' second order.
-/// `sloped = false` fits the level alone.
+/// Weighted least squares about the weighted centre, where level and slope are uncorrelated up to the weights' second
+/// order. `sloped = false` fits the level alone.
 ///
 /// # Shapes
-/// `values` `[time]`; the stretch must lie inside and hold at least two samples (a lone sample gives its value with slope
-/// zero, an empty stretch a line of zeros).
+/// `values` `[time]`; the stretch must lie inside and hold at least two samples (a lone sample gives its value with
+/// slope zero, an empty stretch a line of zeros).
 ///
 /// # Units
 /// Those of the values, per sample for the slope.
@@ -89,8 +89,8 @@ pub fn fit_line(values: &[f64], from: usize, to: usize, weighting: Weighting, sl
     }
 }
 
-/// By how much correlation of the residual enlarges the standard error of a mean: square root of the Bartlett-weighted sum of
-/// its autocorrelations up to `lags` (Newey and West 1987), never below one.
+/// By how much correlation of the residual enlarges the standard error of a mean: square root of the Bartlett-weighted
+/// sum of its autocorrelations up to `lags` (Newey and West 1987), never below one.
 pub fn correlation_inflation(residual: &[f64], lags: usize) -> f64 {
     let power: f64 = residual.iter().map(|e| e * e).sum();
     if power <= 0.0 {

@@ -1,8 +1,8 @@
 //! The force that acted: the input of the identification.
 //!
-//! Nobody measures the force in the contact. At a rupture it is known all the same: before it the lever bends quasi-statically
-//! under the load, after it there is none. Both lines are extrapolated to the moment `t0`, and their difference is the input,
-//! in volts of static deflection, so that the quasi-static gain is one.
+//! Nobody measures the force in the contact. At a rupture it is known all the same: before it the lever bends
+//! quasi-statically under the load, after it there is none. Both lines are extrapolated to the moment `t0`, and their
+//! difference is the input, in volts of static deflection, so that the quasi-static gain is one.
 
 mod error;
 mod extrapolate;

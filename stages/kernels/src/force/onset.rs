@@ -34,15 +34,16 @@ impl Onset {
 /// Finds the latest `t0` compatible with a causal transfer function.
 ///
 /// # Model
-/// Up to `t0` the signal follows the extrapolated line; after it, it departs with a power of time that the lever and the
-/// detector set together: two for a lever alone, effectively up to four with detector poles below the sampling rate.
+/// Up to `t0` the signal follows the extrapolated line; after it, it departs with a power of time that the lever and
+/// the detector set together: two for a lever alone, effectively up to four with detector poles below the sampling
+/// rate.
 ///
 /// # Method
 /// From the first sample that has left the line by `sure_share` of the load, back to the last one within
-/// `departure_sigma` standard errors: any later `t0` would have the response come first. An earlier one is compatible too,
-/// with a delay in the transfer function instead: lines through the 2nd to 4th root of the first departures give
-/// the earliest. A fraction of a sample cannot be distinguished from that delay, so `t0` lies on the grid, where a held input
-/// represents it exactly.
+/// `departure_sigma` standard errors: any later `t0` would have the response come first. An earlier one is compatible
+/// too, with a delay in the transfer function instead: lines through the 2nd to 4th root of the first departures give
+/// the earliest. A fraction of a sample cannot be distinguished from that delay, so `t0` lies on the grid, where a held
+/// input represents it exactly.
 ///
 /// # Shapes
 /// `departure` `[time]`, the signal less the line before; `load` the step that is expected, of either sign.

@@ -11,7 +11,8 @@ use crate::model::{InnovationsModel, InputGains, Section};
 
 /// Poles at zero that sections can hold: two; further whole samples of delay stand beside the model.
 const ZEROS: usize = 2;
-/// Step of the differences that carry the covariance over: the map is analytic, and its second differences are of this order squared.
+/// Step of the differences that carry the covariance over: the map is analytic, and its second differences are of this
+/// order squared.
 const STEP: f64 = 1e-5;
 
 /// A model of parallel sections.
@@ -52,7 +53,8 @@ struct Terms {
     inverse: [c64; 2],
 }
 
-/// `z^-zeros (earlier + before z + now z^2) / (z - a)`, split; where no delay is, `earlier` is zero and one power is saved.
+/// `z^-zeros (earlier + before z + now z^2) / (z - a)`, split; where no delay is, `earlier` is zero and one power is
+/// saved.
 fn terms(hold: &Hold, delay: Delay) -> Terms {
     let [earlier, before, now] = hold.gains;
     let (a, zero) = (hold.step, c64::new(0.0, 0.0));

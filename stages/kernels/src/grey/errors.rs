@@ -89,7 +89,8 @@ struct TimeDomain {
     residuals: Vec<Vec<f64>>,
 }
 
-/// Jacobian and residual sample by sample, each experiment's own parameters projected out; zero where a sample does not count.
+/// Jacobian and residual sample by sample, each experiment's own parameters projected out; zero where a sample does not
+/// count.
 fn time_domain(problem: &Problem<'_>, at: &Evaluation, normal: &Normal) -> TimeDomain {
     let fractions = Fractions::of(&at.point);
     let count = normal.shared.len() + problem.rules.free.len();

@@ -1,6 +1,7 @@
 //! Variable projection: all that enters linearly is solved for at every trial of modes, poles and delay.
 //!
-//! G. H. Golub and V. Pereyra, Inverse Problems 19 (2003) R1, with L. Kaufman's Jacobian (BIT 15 (1975) 49), on triangles that stand for the samples.
+//! G. H. Golub and V. Pereyra, Inverse Problems 19 (2003) R1, with L. Kaufman's Jacobian (BIT 15 (1975) 49), on
+//! triangles that stand for the samples.
 
 use crate::linear_algebra::{Qr, product};
 use faer::{Mat, MatRef};
@@ -38,7 +39,8 @@ pub(super) struct Evaluation {
     pub triangles: Vec<Mat<f64>>,
 }
 
-/// The linearised problem at a trial: `R` of `[shared | point | residual]` over all experiments, each's own parameters eliminated.
+/// The linearised problem at a trial: `R` of `[shared | point | residual]` over all experiments, each's own parameters
+/// eliminated.
 pub(super) struct Normal {
     /// Per experiment, before the expectations are added.
     pub parts: Vec<Mat<f64>>,

@@ -17,32 +17,39 @@ use crate::model::{ModelError, finite};
 use crate::pem::{Experiment, PemOptions, longest_complete};
 use crate::ringdown::{Estimate, Knowledge};
 
-/// Samples that the start leaves out while it does not know the delay: its grid ends at 16, and a step may go one beyond.
+/// Samples that the start leaves out while it does not know the delay: its grid ends at 16, and a step may go one
+/// beyond.
 const START_MASK: usize = 18;
-/// Rounds in which the samples that hold earlier input are set again, and with them the noise that expectations are weighed with.
+/// Rounds in which the samples that hold earlier input are set again, and with them the noise that expectations are
+/// weighed with.
 const ROUNDS: usize = 4;
 
 /// Fits modes, real poles, delay and feedthrough to inputs and output.
 ///
 /// # Model
-/// `G(s) = exp(-s d) [sum_n g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + d0] prod_k p_k / (s + p_k)`; `y = G u + offset + slope t + what was left from before + e`, e not
-/// filtered (output error). Poles and delay are shared by all experiments and inputs, gains and d0 by all experiments.
+/// `G(s) = exp(-s d) [sum_n g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + d0] prod_k p_k / (s + p_k)`; `y = G u + offset +
+/// slope t + what was left from before + e`, e not filtered (output error). Poles and delay are shared by all
+/// experiments and inputs, gains and d0 by all experiments.
 /// # Method
-/// Each exponential of the partial fractions is discretised in closed form for the input between samples, delay included (modified z-transform). Gains, d0, offsets
-/// and initial states are eliminated by variable projection; Levenberg-Marquardt with analytic slopes on ln w, ln Q, ln p and d. Start: subspace estimates, then
-/// a grid of real poles and delays. A step costs `2 N m^2` operations for N samples and m raw columns (8 per mode and 4 per real pole with an initial state): docs/results/timings.md.
+/// Each exponential of the partial fractions is discretised in closed form for the input between samples, delay
+/// included (modified z-transform). Gains, d0, offsets and initial states are eliminated by variable projection;
+/// Levenberg-Marquardt with analytic slopes on ln w, ln Q, ln p and d. Start: subspace estimates, then a grid of real
+/// poles and delays. A step costs `2 N m^2` operations for N samples and m raw columns (8 per mode and 4 per real pole
+/// with an initial state): docs/results/timings.md.
 /// # Shapes
 /// N samples of output per experiment, NaN where missing; inputs one after the other.
 /// # Units
 /// Seconds, Hz; gains in units of y over those of u.
 /// # Accuracy
-/// The Cramer-Rao bound in white noise (docs/results/grey.md). Under coloured noise it is least squares; standard errors follow the residual's spectrum. Further real
-/// poles, and real poles far above half the sample rate, are hard to tell from a delay: their errors say so.
+/// The Cramer-Rao bound in white noise (docs/results/grey.md). Under coloured noise it is least squares; standard
+/// errors follow the residual's spectrum. Further real poles, and real poles far above half the sample rate, are hard
+/// to tell from a delay: their errors say so.
 /// # Errors
-/// Lengths, samples that are not finite, too few samples, parameters out of range, a constant output, fewer oscillations than modes. No convergence is no
-/// error: see the verdict.
+/// Lengths, samples that are not finite, too few samples, parameters out of range, a constant output, fewer
+/// oscillations than modes. No convergence is no error: see the verdict.
 /// # Source
-/// L. Ljung, System Identification (1999), chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1; E. I. Jury (1964), chapter 1.
+/// L. Ljung, System Identification (1999), chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1; E.
+/// I. Jury (1964), chapter 1.
 pub fn fit_grey(experiments: &[Experiment<'_>], sample_time_s: f64, options: &GreyOptions) -> Result<Grey, ModelError> {
     let options = &settled(options);
     let mut problem = checked(experiments, sample_time_s, options)?;

@@ -14,7 +14,8 @@ pub(super) struct Fraction {
 /// Residues of `mode_n chain` at the mode's own upper pole and at every real pole, and of the chain alone.
 ///
 /// # Model
-/// `w_n^2 / (s^2 + w_n/Q_n s + w_n^2) prod p_k/(s + p_k) = 2 Re-part(own / (s - s_n)) + sum_k rest_k / (s + p_k)`; chain: `prod p_k/(s + p_k)`.
+/// `w_n^2 / (s^2 + w_n/Q_n s + w_n^2) prod p_k/(s + p_k) = 2 Re-part(own / (s - s_n)) + sum_k rest_k / (s + p_k)`;
+/// chain: `prod p_k/(s + p_k)`.
 pub(super) struct Fractions {
     pub upper: Vec<c64>,
     /// Slopes of the upper poles by ln w and ln Q.

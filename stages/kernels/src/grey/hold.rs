@@ -19,8 +19,8 @@ pub enum InputBetween {
 /// `x(k) = exp(mu) x(k-1) + now u(k-D) + before u(k-1-D) + earlier u(k-2-D)`, with the slopes of the three by mu.
 ///
 /// # Model
-/// `x' = mu x + u(t - tau)`, time in samples, `tau = D + f`, `0 <= f < 1`: of the interval that ends at k the first f have the input of the interval
-/// before (the modified z-transform).
+/// `x' = mu x + u(t - tau)`, time in samples, `tau = D + f`, `0 <= f < 1`: of the interval that ends at k the first f
+/// have the input of the interval before (the modified z-transform).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hold {
     pub step: c64,

@@ -4,8 +4,8 @@ use faer::c64;
 
 use super::fractions::Fractions;
 
-/// Columns of one experiment: per input each mode's response (real and imaginary part) and its slope by the pole, each real pole's, the delayed
-/// input and its slope; the same of the initial state; one; a ramp from -1 to 1.
+/// Columns of one experiment: per input each mode's response (real and imaginary part) and its slope by the pole, each
+/// real pole's, the delayed input and its slope; the same of the initial state; one; a ramp from -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
     pub modes: usize,
@@ -89,7 +89,8 @@ pub(super) struct Linear {
 }
 
 impl Weights {
-    /// `levels`: what each input was before the first sample; its response to that is the same constant, as every mode and the chain are one at rest.
+    /// `levels`: what each input was before the first sample; its response to that is the same constant, as every mode
+    /// and the chain are one at rest.
     pub fn of(layout: Layout, fractions: &Fractions, linear: Linear, levels: &[f64]) -> Self {
         let zero = || vec![0.0; layout.width()];
         let mut shared = Vec::new();
@@ -133,7 +134,8 @@ impl Weights {
     }
 }
 
-/// What a step of each of the point's values (ln w, ln Q, ln p, delay) has in the raw columns, at these linear parameters.
+/// What a step of each of the point's values (ln w, ln Q, ln p, delay) has in the raw columns, at these linear
+/// parameters.
 pub(super) fn slopes(
     layout: Layout,
     fractions: &Fractions,

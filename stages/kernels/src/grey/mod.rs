@@ -1,4 +1,5 @@
-//! Modes, real poles, delay and feedthrough from inputs and outputs: the grey modal form, fitted at the limit of white noise.
+//! Modes, real poles, delay and feedthrough from inputs and outputs: the grey modal form, fitted at the limit of white
+//! noise.
 //!
 //! ```
 //! use afmid_kernels::grey::{GreyOptions, GreyQuantity, fit_grey};

@@ -7,7 +7,8 @@ use crate::ringdown::Knowledge;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A parameter of the grey form that something can be known of; modes ascend in frequency, everything is counted from 0.
+/// A parameter of the grey form that something can be known of; modes ascend in frequency, everything is counted from
+/// 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GreyQuantity {
     /// `w / 2 pi` of a mode, Hz.
@@ -66,8 +67,8 @@ impl GreyKnown {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Before {
-    /// Anything: an initial state of its own is estimated for each experiment. The input is taken as what it is at the first sample; samples that hold
-    /// what was put in earlier (as many as the delay has) say nothing.
+    /// Anything: an initial state of its own is estimated for each experiment. The input is taken as what it is at the
+    /// first sample; samples that hold what was put in earlier (as many as the delay has) say nothing.
     Anything,
     /// It rested under its first input, for long.
     Settled,

@@ -22,7 +22,8 @@ pub struct GreyMode {
 /// Modes, real poles, delay and feedthrough.
 ///
 /// # Model
-/// `G(s) = exp(-s d) [sum_n g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + d0] prod_k p_k / (s + p_k)`, gains and feedthrough for each input.
+/// `G(s) = exp(-s d) [sum_n g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + d0] prod_k p_k / (s + p_k)`, gains and feedthrough
+/// for each input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GreyModel {
     /// Ascending in frequency.
@@ -89,7 +90,8 @@ pub struct GreyExperiment {
     pub offset: Estimate,
     /// Change of that level over half the record.
     pub slope: Estimate,
-    /// Amplitudes at its first sample of what it still had from before: cosine and sine of each mode, each real pole; empty unless estimated.
+    /// Amplitudes at its first sample of what it still had from before: cosine and sine of each mode, each real pole;
+    /// empty unless estimated.
     pub initial: Vec<Estimate>,
     /// y less the model; NaN where missing or not counted.
     pub residual: Vec<f64>,
@@ -100,11 +102,13 @@ pub struct GreyExperiment {
 pub struct Grey {
     /// The model.
     pub model: GreyModel,
-    /// Its parameters: frequency and quality factor of each mode, real poles, delay, then per input each mode's gain and the feedthrough.
+    /// Its parameters: frequency and quality factor of each mode, real poles, delay, then per input each mode's gain
+    /// and the feedthrough.
     pub parameters: Vec<GreyParameter>,
     /// Their covariance, in Hz, 1, Hz, s, gains: 0 for what is not estimated.
     pub covariance: Mat<f64>,
-    /// The same from the experiments' scatter, right under a wrong noise model too; with two or more experiments, worth something from eight on.
+    /// The same from the experiments' scatter, right under a wrong noise model too; with two or more experiments, worth
+    /// something from eight on.
     pub sandwich: Option<Mat<f64>>,
     /// Each experiment.
     pub experiments: Vec<GreyExperiment>,

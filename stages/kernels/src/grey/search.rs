@@ -103,7 +103,8 @@ impl Objective for Fit<'_, '_> {
     }
 }
 
-/// Information and gradient of the point's values, the linear ones eliminated; what is pushed against its limit is taken out.
+/// Information and gradient of the point's values, the linear ones eliminated; what is pushed against its limit is
+/// taken out.
 ///
 /// Source: D. P. Bertsekas, SIAM J. Control Optim. 20 (1982) 221 (projected Newton methods).
 fn reduced(problem: &Problem<'_>, normal: &Normal, values: &[f64]) -> (Mat<f64>, Vec<f64>) {

@@ -12,7 +12,8 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Partial sums of [`dot_in_lanes`].
 const LANES: usize = 8;
 
-/// Inner product of two slices of one length in eight partial sums, for the processor's vector units. Another order of summing: other last bits than [`dot`].
+/// Inner product of two slices of one length in eight partial sums, for the processor's vector units. Another order of
+/// summing: other last bits than [`dot`].
 #[inline]
 pub fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());

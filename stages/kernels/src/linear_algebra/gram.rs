@@ -1,6 +1,7 @@
 //! Inner products of the columns of tall matrices.
 //!
-//! A third of the operations of a QR, at the full rate of the vector units, for half the digits: for columns whose condition is checked.
+//! A third of the operations of a QR, at the full rate of the vector units, for half the digits: for columns whose
+//! condition is checked.
 
 use crate::linear_algebra::product;
 use faer::{Mat, MatRef};

@@ -5,7 +5,8 @@ use faer::Mat;
 use super::dot::dot_in_lanes;
 use super::orthogonal::{Svd, Symmetric, product};
 
-/// `X Y^T` of the Hankel matrices of two signals of equal length, `rows` rows each: entry (i, j) is `sum_t x(t + i) y(t + j)`.
+/// `X Y^T` of the Hankel matrices of two signals of equal length, `rows` rows each: entry (i, j) is `sum_t x(t + i) y(t
+/// + j)`.
 pub fn hankel_products(x: &[f64], y: &[f64], rows: usize) -> Mat<f64> {
     let windows = x.len() - rows + 1;
     let mut out = Mat::zeros(rows, rows);
@@ -38,9 +39,11 @@ pub fn hankel_row_sums(y: &[f64], rows: usize) -> Vec<f64> {
 /// How many times its estimated rounding the weakest direction must be.
 const CLEAR: f64 = 1e4;
 
-/// Left singular vectors and singular values of the output's Hankel matrix without the row space of `[1; U]`, from products alone.
+/// Left singular vectors and singular values of the output's Hankel matrix without the row space of `[1; U]`, from
+/// products alone.
 ///
-/// `input`: eigenvectors of `[1; U] [1; U]^T` and how many count. None: the weakest singular value would be rounding, or a decomposition fails.
+/// `input`: eigenvectors of `[1; U] [1; U]^T` and how many count. None: the weakest singular value would be rounding,
+/// or a decomposition fails.
 pub fn remaining_row_space(u: &[f64], y: &[f64], rows: usize, input: (&Svd, usize)) -> Option<(Mat<f64>, Vec<f64>)> {
     let (axes, rank) = input;
     let (both, own, ones) = (hankel_products(u, y, rows), hankel_products(y, y, rows), hankel_row_sums(y, rows));

@@ -1,7 +1,7 @@
 //! QR of tall matrices: blocks of rows that fit the cache, folded one after the other into one triangle.
 //!
-//! Source: J. Demmel, L. Grigori, M. Hoemmen, J. Langou, SIAM J. Sci. Comput. 34 (2012) A206; products of reflectors: R. Schreiber and
-//! C. Van Loan, SIAM J. Sci. Stat. Comput. 10 (1989) 53.
+//! Source: J. Demmel, L. Grigori, M. Hoemmen, J. Langou, SIAM J. Sci. Comput. 34 (2012) A206; products of reflectors:
+//! R. Schreiber and C. Van Loan, SIAM J. Sci. Stat. Comput. 10 (1989) 53.
 
 use faer::{Mat, MatMut, MatRef};
 
@@ -48,7 +48,8 @@ impl TallQr {
         upper(&self.triangle, self.columns, self.padded)
     }
 
-    /// `Q^T other`: returns the rows beside the triangle (columns of the factored matrix x columns of `other`) and leaves the others in `other`.
+    /// `Q^T other`: returns the rows beside the triangle (columns of the factored matrix x columns of `other`) and
+    /// leaves the others in `other`.
     pub fn apply_transpose(&self, other: MatMut<'_, f64>) -> Mat<f64> {
         pulp::Arch::new().dispatch(Apply(self, other))
     }

@@ -164,7 +164,8 @@ impl InnovationsModel {
         (a, b, c, k)
     }
 
-    /// The model of these matrices, in the layout of [`InnovationsModel::matrices`]. Errors: shapes, or another structure of A or C.
+    /// The model of these matrices, in the layout of [`InnovationsModel::matrices`]. Errors: shapes, or another
+    /// structure of A or C.
     pub fn from_matrices(
         a: &Mat<f64>,
         b: &[f64],
@@ -230,8 +231,8 @@ impl InnovationsModel {
 
 /// Kalman gains from predictor poles: partial fractions of `prod c_i / prod a_i - 1`.
 ///
-/// Method: `k_i = prod_l c_l / prod_(l /= i) a_l` modulo `a_i`, in the ring of polynomials modulo `a_i`: exact for real, complex and double
-/// poles within a section. Errors: two sections share a pole.
+/// Method: `k_i = prod_l c_l / prod_(l /= i) a_l` modulo `a_i`, in the ring of polynomials modulo `a_i`: exact for
+/// real, complex and double poles within a section. Errors: two sections share a pole.
 pub(crate) fn kalman_gains(order: usize, a: &[Coefficients], c: &[Coefficients]) -> Result<Vec<[f64; 2]>, ModelError> {
     (0..a.len())
         .map(|i| {

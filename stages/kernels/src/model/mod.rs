@@ -1,4 +1,5 @@
-//! The model that all parametric estimates share: the innovations form in sections of order two, its parameters, its zeros, its Kalman gain.
+//! The model that all parametric estimates share: the innovations form in sections of order two, its parameters, its
+//! zeros, its Kalman gain.
 mod error;
 mod innovations;
 mod parametrisation;

@@ -1,13 +1,14 @@
 //! Polynomials that are stable whatever their coordinates: products of sections in reflection coefficients.
 //!
 //! A polynomial of order n is a product of n/2 sections `1 + a1 q^-1 + a2 q^-2`, and one `1 + a1 q^-1` if n is odd.
-//! Coordinates p are unbounded: `a2 = tanh(p2)`, `a1 = tanh(p1) (1 + a2)`; first order `a1 = tanh(p1)`. The image is the whole open
-//! stability triangle, so a section's roots may be a complex pair or two real ones, and pass from one to the other smoothly.
-//! Roots are distinct parameters up to the order of the sections: nothing is redundant.
+//! Coordinates p are unbounded: `a2 = tanh(p2)`, `a1 = tanh(p1) (1 + a2)`; first order `a1 = tanh(p1)`. The image is
+//! the whole open stability triangle, so a section's roots may be a complex pair or two real ones, and pass from one to
+//! the other smoothly. Roots are distinct parameters up to the order of the sections: nothing is redundant.
 
 use faer::c64;
 
-/// Largest coordinate: `1 - tanh(9) = 3e-8`, a decay over some 10^8 samples. Slower ones cannot be distinguished from undamped in any window.
+/// Largest coordinate: `1 - tanh(9) = 3e-8`, a decay over some 10^8 samples. Slower ones cannot be distinguished from
+/// undamped in any window.
 pub(crate) const LIMIT: f64 = 9.0;
 
 /// `[a1, a2]` of a section; `a2 = 0` in a section of first order.
@@ -58,7 +59,8 @@ pub(crate) fn coordinates(roots: &[c64]) -> Vec<f64> {
     a.into_iter().enumerate().flat_map(own).collect()
 }
 
-/// Sections of the polynomial with these roots, wherever they lie: complex pairs, then real ones by two, the closest together.
+/// Sections of the polynomial with these roots, wherever they lie: complex pairs, then real ones by two, the closest
+/// together.
 ///
 /// Complex roots must come with their conjugates (only those with positive imaginary part are read).
 pub(crate) fn sections_of_roots(roots: &[c64]) -> Vec<Coefficients> {

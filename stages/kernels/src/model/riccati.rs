@@ -10,7 +10,8 @@ use super::error::ModelError;
 /// # Model
 /// `x+ = A x + w`, `y = C x + v`, `E w w^T = Q`, `E v^2 = r > 0`, A stable.
 /// # Method
-/// Structure-preserving doubling of the discrete Riccati equation; each step squares the closed loop, so some fifteen suffice.
+/// Structure-preserving doubling of the discrete Riccati equation; each step squares the closed loop, so some fifteen
+/// suffice.
 /// # Shapes
 /// A, Q: n x n; C: n.
 /// # Units

@@ -16,8 +16,8 @@ const LARGEST: f64 = 1e6;
 /// # Model
 /// z with `det [A - zI, B; C, D] = 0`.
 /// # Method
-/// The pencil `M - z N` is inverted at a shift: eigenvalues `1 / (z - shift)` of `(M - shift N)^-1 N`, so a vanishing D needs no special case
-/// (infinite zeros become 0). Each zero is then polished by Newton's method on `G(z) / G'(z)`.
+/// The pencil `M - z N` is inverted at a shift: eigenvalues `1 / (z - shift)` of `(M - shift N)^-1 N`, so a vanishing D
+/// needs no special case (infinite zeros become 0). Each zero is then polished by Newton's method on `G(z) / G'(z)`.
 /// # Shapes
 /// At most n zeros, conjugates exact and together, the upper one first.
 /// # Units

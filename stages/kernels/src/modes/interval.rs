@@ -20,7 +20,8 @@ impl Interval {
         Self { low: value - REACH * std, high: value + REACH * std }
     }
 
-    /// Of a positive estimate: its logarithm is taken as normal, so that the interval stays positive and is right for small errors.
+    /// Of a positive estimate: its logarithm is taken as normal, so that the interval stays positive and is right for
+    /// small errors.
     pub fn positive(value: f64, std: f64) -> Self {
         let ratio = (REACH * std / value).exp();
         Self { low: value / ratio, high: value * ratio }

@@ -4,8 +4,8 @@ use faer::{Mat, c64};
 
 /// A pole or a zero in continuous terms.
 ///
-/// `s = ln(z) / Ts`, `f = |s| / 2 pi`, `Q = |s| / (-2 Re s)`: 0.5 for a real one, negative for a zero in the right half plane. A negative real z has
-/// no real logarithm; its principal one is taken, with imaginary part `pi / Ts`.
+/// `s = ln(z) / Ts`, `f = |s| / 2 pi`, `Q = |s| / (-2 Re s)`: 0.5 for a real one, negative for a zero in the right half
+/// plane. A negative real z has no real logarithm; its principal one is taken, with imaginary part `pi / Ts`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Root {
     /// In the z plane.
@@ -23,7 +23,8 @@ pub struct Root {
 }
 
 impl Root {
-    /// Maps a root whose derivatives to the parameters are `slopes`, of covariance `covariance`. A root at zero is a delay: its numbers are NaN (unknown).
+    /// Maps a root whose derivatives to the parameters are `slopes`, of covariance `covariance`. A root at zero is a
+    /// delay: its numbers are NaN (unknown).
     pub fn new(z: c64, slopes: &[c64], covariance: &Mat<f64>, sample_time_s: f64) -> Self {
         if z.norm_sqr() == 0.0 {
             let (unknown, s) = (f64::NAN, c64::new(f64::NAN, f64::NAN));

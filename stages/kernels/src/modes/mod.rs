@@ -1,4 +1,5 @@
-//! Modal extraction: poles and zeros in continuous terms, static shares, frequency response, each with its standard error.
+//! Modal extraction: poles and zeros in continuous terms, static shares, frequency response, each with its standard
+//! error.
 
 #[cfg(test)]
 mod coverage_tests;

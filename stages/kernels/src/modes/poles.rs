@@ -42,11 +42,13 @@ pub struct Pole {
     pub kind: PoleKind,
     /// Its section's part of the static gain `G(1)`; a section of two real poles counts as a whole, at each.
     pub static_share: f64,
-    /// Standard error of the static share, for a t0 that is known; see [`share_error_from_onset`](super::share_error_from_onset).
+    /// Standard error of the static share, for a t0 that is known; see
+    /// [`share_error_from_onset`](super::share_error_from_onset).
     pub static_share_std: f64,
     /// Amplitude of its ringing after a released unit load, over the static gain: `A` in `2 Re(A exp(s t))`.
     pub amplitude: c64,
-    /// Amplitude of its ringing after a released unit load, over its standard error (root of chi-square over two; `>= 0`).
+    /// Amplitude of its ringing after a released unit load, over its standard error (root of chi-square over two; `>=
+    /// 0`).
     pub significance: f64,
 }
 
@@ -77,16 +79,18 @@ impl Default for ModeCriteria {
 /// All poles, ascending in frequency.
 ///
 /// # Model
-/// A section `(b1 z + b2) / (z^2 + a1 z + a2)` with the poles p: residue `R = (b1 p + b2) / (2 p + a1)`; its ringing after a released load is
-/// `R / (1 - p)` times the load.
+/// A section `(b1 z + b2) / (z^2 + a1 z + a2)` with the poles p: residue `R = (b1 p + b2) / (2 p + a1)`; its ringing
+/// after a released load is `R / (1 - p)` times the load.
 /// # Method
-/// `s = ln(z) / Ts` pole by pole; standard errors by the delta method, with `dp/da1 = -p / (2p + a1)`, `dp/da2 = -1 / (2p + a1)`.
+/// `s = ln(z) / Ts` pole by pole; standard errors by the delta method, with `dp/da1 = -p / (2p + a1)`, `dp/da2 = -1 /
+/// (2p + a1)`.
 /// # Shapes
 /// `covariance`: (2n + 1) x (2n + 1), of [`InnovationsModel::parameters`].
 /// # Units
 /// Hertz; shares and quality factors have none.
 /// # Accuracy
-/// First order in the errors. Static shares are those of the partial fractions: a mode within the detector's roll-off is turned and damped by it.
+/// First order in the errors. Static shares are those of the partial fractions: a mode within the detector's roll-off
+/// is turned and damped by it.
 /// # Errors
 /// A covariance of another shape.
 /// # Source
@@ -195,8 +199,8 @@ fn classify(root: &Root, significance: f64, criteria: &ModeCriteria) -> PoleKind
 
 /// All transmission zeros, ascending in frequency, with standard errors; of a pair only the upper one.
 ///
-/// Method: implicit function theorem, `dz/dtheta = -(dG/dtheta) / (dG/dz)` at the zero. Errors: see [`transmission_zeros`], and a covariance of
-/// another shape.
+/// Method: implicit function theorem, `dz/dtheta = -(dG/dtheta) / (dG/dz)` at the zero. Errors: see
+/// [`transmission_zeros`], and a covariance of another shape.
 pub fn zeros(model: &InnovationsModel, covariance: &Mat<f64>) -> Result<Vec<Root>, ModelError> {
     let count = 2 * model.order() + 1;
     if covariance.shape() != (count, count) {

@@ -39,7 +39,8 @@ impl ResponsePoint {
     }
 }
 
-/// The response at each frequency, by the delta method. Errors: a covariance of another shape than [`InnovationsModel::parameters`] wants.
+/// The response at each frequency, by the delta method. Errors: a covariance of another shape than
+/// [`InnovationsModel::parameters`] wants.
 pub fn response(
     model: &InnovationsModel,
     covariance: &Mat<f64>,

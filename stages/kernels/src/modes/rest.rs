@@ -12,13 +12,15 @@ pub struct AtRest {
     pub gain: f64,
     /// Its standard error.
     pub gain_std: f64,
-    /// Group delay at zero frequency, `-Ts G'(1) / G(1)`: from sequence to sequence, so that a held input counts half a sample.
+    /// Group delay at zero frequency, `-Ts G'(1) / G(1)`: from sequence to sequence, so that a held input counts half a
+    /// sample.
     pub delay_s: f64,
     /// Its standard error.
     pub delay_std_s: f64,
 }
 
-/// Static gain and delay, by the delta method. Errors: a covariance of another shape than [`InnovationsModel::parameters`] wants.
+/// Static gain and delay, by the delta method. Errors: a covariance of another shape than
+/// [`InnovationsModel::parameters`] wants.
 pub fn at_rest(model: &InnovationsModel, covariance: &Mat<f64>) -> Result<AtRest, ModelError> {
     let count = 2 * model.order() + 1;
     if covariance.shape() != (count, count) {

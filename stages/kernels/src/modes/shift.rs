@@ -2,18 +2,20 @@
 
 use faer::c64;
 
-/// Steps of Simpson's rule per radian of the mode's phase: its error is below 1e-8 of the share, since the fourth power of a step of 1/32 is 1e-6
-/// and its factor 1/180.
+/// Steps of Simpson's rule per radian of the mode's phase: its error is below 1e-8 of the share, since the fourth power
+/// of a step of 1/32 is 1e-6 and its factor 1/180.
 const STEPS_PER_RADIAN: f64 = 32.0;
 
-/// Root mean square error of a mode's static share when t0 may have been anywhere in the `width_s` before the one that was assumed.
+/// Root mean square error of a mode's static share when t0 may have been anywhere in the `width_s` before the one that
+/// was assumed.
 ///
 /// # Model
-/// After t0 a mode rings as `2 Re(A exp(s (t - t0)))` for a load of one, and its share of the static response is `2 Re(A)`. If the event was `d`
-/// earlier, its amplitude then was `A exp(-s d)`. `d` is uniform from 0 to `width_s`.
+/// After t0 a mode rings as `2 Re(A exp(s (t - t0)))` for a load of one, and its share of the static response is `2
+/// Re(A)`. If the event was `d` earlier, its amplitude then was `A exp(-s d)`. `d` is uniform from 0 to `width_s`.
 /// # Method
-/// `sqrt(mean over d of (2 Re(A exp(-s d)) - 2 Re(A))^2)`, by Simpson's rule: a phase of radians at the highest modes, where first order is no use.
-/// About the share that is stated, not about the mean over d, since it is the stated one that may be wrong.
+/// `sqrt(mean over d of (2 Re(A exp(-s d)) - 2 Re(A))^2)`, by Simpson's rule: a phase of radians at the highest modes,
+/// where first order is no use. About the share that is stated, not about the mean over d, since it is the stated one
+/// that may be wrong.
 /// # Shapes
 /// Scalars; `amplitude` and `pole` are those of the upper one of a pair, or of a real pole.
 /// # Units
@@ -51,7 +53,8 @@ mod tests {
         let small = 1e-9;
         let first = (2.0 * (amplitude * pole).re).abs() * small / 3f64.sqrt();
         assert!((share_error_from_onset(amplitude, pole, small) / first - 1.0).abs() < 1e-2);
-        // many turns: the mean square of 2 |A| cos(...) - 2 Re(A) is 2 |A|^2 + 4 Re(A)^2; damping takes 1 % in a microsecond
+        // many turns: the mean square of 2 |A| cos(...) - 2 Re(A) is 2 |A|^2 + 4 Re(A)^2; damping takes 1 % in a
+        // microsecond
         let many = share_error_from_onset(amplitude, pole, 4e-6);
         let limit = (2.0 * amplitude.norm_sqr() + 4.0 * amplitude.re.powi(2)).sqrt();
         assert!((many / limit - 1.0).abs() < 0.05, "{many} {limit}");

@@ -29,7 +29,8 @@ impl Damping {
         (damping * self.rise * self.rise_growth.powi(failures)).max(self.after_failure)
     }
 
-    /// After a step that was taken; `kept`: fall of the cost over the one that the local model promised (Nielsen's rule).
+    /// After a step that was taken; `kept`: fall of the cost over the one that the local model promised (Nielsen's
+    /// rule).
     pub(super) fn lowered(&self, damping: f64, kept: Option<f64>) -> f64 {
         let factor = kept.map_or(FALL, |kept| (1.0 - (2.0 * kept - 1.0).powi(3)).clamp(FALL, self.rise));
         (damping * factor).max(self.least)

@@ -9,7 +9,8 @@ pub enum Ending {
     Minimum,
     /// The residual is rounding alone: the data are noise-free for this model.
     Exact,
-    /// No step lowers the cost any more, though the gradient is not yet small: rounding, or a limit of the parametrisation.
+    /// No step lowers the cost any more, though the gradient is not yet small: rounding, or a limit of the
+    /// parametrisation.
     Stalled,
     /// The steps or trials were used up.
     IterationLimit,

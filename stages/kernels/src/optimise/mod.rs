@@ -1,14 +1,15 @@
 //! Damped least squares: one search for every fit of the crate.
 //!
 //! # Model
-//! A cost that is a sum of squares near its minimum: `cost(p + d) = cost(p) - 2 g'd + d'F d`, with half the falling gradient `g` and the
-//! information `F` (for a likelihood Fisher's).
+//! A cost that is a sum of squares near its minimum: `cost(p + d) = cost(p) - 2 g'd + d'F d`, with half the falling
+//! gradient `g` and the information `F` (for a likelihood Fisher's).
 //! # Method
-//! Levenberg and Marquardt: steps `(F + damping diag F)^-1 g`; [`descend`] chooses the damping, takes a step if the cost falls, and says why
-//! it ended. What a step does to a point, which parameters are eliminated or held, and what counts as arrived is the [`Objective`]'s.
+//! Levenberg and Marquardt: steps `(F + damping diag F)^-1 g`; [`descend`] chooses the damping, takes a step if the
+//! cost falls, and says why it ended. What a step does to a point, which parameters are eliminated or held, and what
+//! counts as arrived is the [`Objective`]'s.
 //! # Source
-//! D. W. Marquardt, J. SIAM 11 (1963) 431; H. B. Nielsen, IMM-REP-1999-05, Technical University of Denmark (rule for the damping);
-//! J. J. Moré, Lecture Notes in Mathematics 630 (1978) 105 (scaling).
+//! D. W. Marquardt, J. SIAM 11 (1963) 431; H. B. Nielsen, IMM-REP-1999-05, Technical University of Denmark (rule for
+//! the damping); J. J. Moré, Lecture Notes in Mathematics 630 (1978) 105 (scaling).
 //!
 //! ```
 //! use std::convert::Infallible;

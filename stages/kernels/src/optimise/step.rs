@@ -16,8 +16,8 @@ pub fn damped_step(information: &Mat<f64>, gradient: &[f64], damping: f64) -> (V
     (step, inverse)
 }
 
-/// The same step from the singular values of a Jacobian with columns of unit length: `V (s^2 + damping s_1^2)^-1 s along`, in units of
-/// those columns; directions with less than `tolerance` of the largest value are held.
+/// The same step from the singular values of a Jacobian with columns of unit length: `V (s^2 + damping s_1^2)^-1 s
+/// along`, in units of those columns; directions with less than `tolerance` of the largest value are held.
 ///
 /// Shapes: `along` the residual along each left vector.
 pub fn damped_svd_step(svd: &Svd, along: &[f64], damping: f64, tolerance: f64) -> Vec<f64> {

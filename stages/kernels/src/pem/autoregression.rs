@@ -16,9 +16,11 @@ const ROUNDS: usize = 3;
 const LARGEST: usize = 24;
 const SAMPLES_EACH: usize = 20;
 
-/// Refits an output error with its residual whitened: generalised least squares for Box and Jenkins' model with noise `1 / A_e`.
+/// Refits an output error with its residual whitened: generalised least squares for Box and Jenkins' model with noise
+/// `1 / A_e`.
 ///
-/// Method: Levinson's recursion on the autocovariance of the simulation's error, order by BIC; then poles under that filter, in turn.
+/// Method: Levinson's recursion on the autocovariance of the simulation's error, order by BIC; then poles under that
+/// filter, in turn.
 /// Source: L. Ljung, System Identification (1999), section 10.4; G. Box and G. Jenkins, Time Series Analysis (1970).
 pub(crate) fn whitened(problem: &Problem, mut state: State, limits: Limits) -> Result<State, ModelError> {
     for _ in 0..ROUNDS {

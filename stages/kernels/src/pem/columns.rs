@@ -1,7 +1,7 @@
 //! Tall columns, side by side: regressors and sensitivities.
 //!
-//! The second column of a section is its first one row later. Where one record fills all rows, both are the same numbers, seen from two places: half
-//! to write, half to read.
+//! The second column of a section is its first one row later. Where one record fills all rows, both are the same
+//! numbers, seen from two places: half to write, half to read.
 
 use std::sync::{Arc, Mutex};
 
@@ -110,7 +110,8 @@ impl Columns {
         }
     }
 
-    /// A signal for each of up to [`SIDE_BY_SIDE`] sections, through `1 / a`, into the rows of one record: `signals` writes those from a row on.
+    /// A signal for each of up to [`SIDE_BY_SIDE`] sections, through `1 / a`, into the rows of one record: `signals`
+    /// writes those from a row on.
     pub fn respond(
         &mut self,
         place: Place,
@@ -203,8 +204,8 @@ impl Bank {
 const SPARE: usize = 4;
 const LARGEST: usize = 1 << 19;
 
-/// Storage of columns that are no longer used, kept for the next ones: an iteration makes and drops as many as it has steps, and the system clears
-/// the pages that it hands out. Clones share it.
+/// Storage of columns that are no longer used, kept for the next ones: an iteration makes and drops as many as it has
+/// steps, and the system clears the pages that it hands out. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Shelf(Arc<Mutex<Vec<Vec<f64>>>>);
 

@@ -92,10 +92,12 @@ pub(super) fn conclude(
     })
 }
 
-/// Gradient share below which an iteration counts as converged however it ended: a tenth of a standard error at 8192 samples.
+/// Gradient share below which an iteration counts as converged however it ended: a tenth of a standard error at 8192
+/// samples.
 const SMALL_GRADIENT: f64 = 1e-3;
 
-/// Covariance of all a, then all b and D of each input; everything else (c, x0, offset, slope) is estimated along and left out.
+/// Covariance of all a, then all b and D of each input; everything else (c, x0, offset, slope) is estimated along and
+/// left out.
 fn parameter_covariance(
     problem: &Problem,
     state: &State,

@@ -1,8 +1,8 @@
 //! Covariance of the estimates, whatever the colour of the residual.
 //!
-//! `cov = J^+ Omega J^+T` with J the Jacobian to all parameters and Omega the autocovariance of the errors, diagonal in frequency. Its spectrum is
-//! the residual's local mean over the share that the fit left of it: near a resonance the fit absorbs a good part of the noise, and a residual
-//! taken at face value would promise too much.
+//! `cov = J^+ Omega J^+T` with J the Jacobian to all parameters and Omega the autocovariance of the errors, diagonal in
+//! frequency. Its spectrum is the residual's local mean over the share that the fit left of it: near a resonance the
+//! fit absorbs a good part of the noise, and a residual taken at face value would promise too much.
 
 use crate::linear_algebra::product;
 use faer::Mat;
@@ -23,7 +23,8 @@ pub enum ResidualColour {
     White,
 }
 
-/// Covariance of the parameters, one for each of the Jacobian's `columns` (rows of all experiments), e of the same rows, split at `lengths`.
+/// Covariance of the parameters, one for each of the Jacobian's `columns` (rows of all experiments), e of the same
+/// rows, split at `lengths`.
 pub(crate) fn covariance(
     columns: &[&[f64]],
     e: &[f64],

@@ -8,7 +8,8 @@ use crate::model::{ModelError, finite};
 /// Inputs, one after the other, and output.
 pub(super) type Record = (Vec<f64>, Vec<f64>);
 
-/// Input and output of each input's prior: an impulse of the share's energy, and silence. Errors: a share that is negative or not finite.
+/// Input and output of each input's prior: an impulse of the share's energy, and silence. Errors: a share that is
+/// negative or not finite.
 pub(super) fn prior_records(
     experiments: &[Experiment<'_>],
     inputs: usize,
@@ -36,7 +37,8 @@ pub(super) fn prior_records(
     Ok((0..inputs).map(record).collect())
 }
 
-/// The longest stretch of an experiment without a missing output, its inputs one after the other. Errors: it is too short for the start.
+/// The longest stretch of an experiment without a missing output, its inputs one after the other. Errors: it is too
+/// short for the start.
 pub(crate) fn complete<'a>(
     experiment: &Experiment<'a>,
     options: &PemOptions,

@@ -1,7 +1,7 @@
 //! Sensitivities of the prediction errors to poles and predictor poles, by filters of second order.
 //!
-//! `de/da_ij = q^-j / a_i (H^-1 x_i + e)` with `x_i` section i's deterministic output: its filtered form is the regressors of section i
-//! times their parameters, already at hand. `de/dc_ij = -q^-j / c_i e`.
+//! `de/da_ij = q^-j / a_i (H^-1 x_i + e)` with `x_i` section i's deterministic output: its filtered form is the
+//! regressors of section i times their parameters, already at hand. `de/dc_ij = -q^-j / c_i e`.
 
 use super::columns::{Columns, Part, Place, SIDE_BY_SIDE};
 use super::predictor::Problem;

@@ -17,24 +17,26 @@ use crate::subspace::Subspace;
 /// Identifies a model in innovations form by minimising its one-step prediction errors.
 ///
 /// # Model
-/// Eq. 8: `x(t+Ts) = A x + B u + K e`, `y = C x + D u + e + offset + slope t`; x0, offset and slope per experiment; any number of inputs.
+/// Eq. 8: `x(t+Ts) = A x + B u + K e`, `y = C x + D u + e + offset + slope t`; x0, offset and slope per experiment; any
+/// number of inputs.
 /// # Method
-/// Parallel sections of second order in reflection coefficients (stable by construction, A as well as A - K C, and without
-/// redundancy); b, D, x0, offset and slope eliminated by variable projection; Levenberg-Marquardt with analytic sensitivities on the rest,
-/// from several starts: subspace estimates with and without instruments. The linear part by inner
-/// products of the columns where these keep enough digits, which is checked, by rotations elsewhere. Cost per iteration: about `N (3 n)^2` operations, twice as
-/// many by rotations.
+/// Parallel sections of second order in reflection coefficients (stable by construction, A as well as A - K C, and
+/// without redundancy); b, D, x0, offset and slope eliminated by variable projection; Levenberg-Marquardt with analytic
+/// sensitivities on the rest, from several starts: subspace estimates with and without instruments. The linear part by
+/// inner products of the columns where these keep enough digits, which is checked, by rotations elsewhere. Cost per
+/// iteration: about `N (3 n)^2` operations, twice as many by rotations.
 /// # Shapes
 /// N samples per experiment; any number of experiments.
 /// # Units
 /// Those of u and y.
 /// # Accuracy
-/// Restricted maximum likelihood for Gaussian noise, white plus thermal (same poles). Over 60 seeds of the paper's lever in such noise the rms
-/// errors of f and Q are 0.85 to 1.13 of the Cramer-Rao bound, and their squares 0.86 to 1.3 of the squared standard errors. Noise-free data
-/// are recovered to rounding. The covariance allows for a coloured residual.
+/// Restricted maximum likelihood for Gaussian noise, white plus thermal (same poles). Over 60 seeds of the paper's
+/// lever in such noise the rms errors of f and Q are 0.85 to 1.13 of the Cramer-Rao bound, and their squares 0.86 to
+/// 1.3 of the squared standard errors. Noise-free data are recovered to rounding. The covariance allows for a coloured
+/// residual.
 /// # Errors
-/// Lengths, samples that are not finite, too few samples, parameters out of range, a constant output, no finite fit. No convergence is
-/// no error: see the verdict.
+/// Lengths, samples that are not finite, too few samples, parameters out of range, a constant output, no finite fit. No
+/// convergence is no error: see the verdict.
 /// # Source
 /// L. Ljung, System Identification (1999), chapters 7 and 10; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1.
 pub fn identify(
@@ -78,9 +80,11 @@ pub fn identify(
     conclude(&problem, &state, sample_time_s, options, subspace.singular_values().to_vec())
 }
 
-/// The model of these poles (order many) whose simulation is closest: b, D, x0, offset and slope by least squares, no iteration; K = 0.
+/// The model of these poles (order many) whose simulation is closest: b, D, x0, offset and slope by least squares, no
+/// iteration; K = 0.
 ///
-/// For estimates that give poles: subspace methods, ERA, vector fitting. Unstable poles are reflected. Errors: as [`identify`].
+/// For estimates that give poles: subspace methods, ERA, vector fitting. Unstable poles are reflected. Errors: as
+/// [`identify`].
 pub fn with_poles(
     experiments: &[Experiment<'_>],
     sample_time_s: f64,
@@ -93,7 +97,8 @@ pub fn with_poles(
     conclude(&problem, &state, sample_time_s, &options, Vec::new())
 }
 
-/// The model of output error from these poles on (order many): for the same model on other data, where [`identify`]'s search is not needed again.
+/// The model of output error from these poles on (order many): for the same model on other data, where [`identify`]'s
+/// search is not needed again.
 ///
 /// Errors: as [`identify`].
 pub fn refit(

@@ -1,17 +1,21 @@
 //! Prediction error method: the innovations form of Eq. 8, fitted by minimum one-step prediction error.
 //!
 //! # Model
-//! Eq. 8 of the paper: `x(t+1) = A x(t) + B u(t) + K e(t)`, `y(t) = C x(t) + D u(t) + e(t)`, e white. A is built of sections of order two
-//! ([`InnovationsModel`](crate::model::InnovationsModel)). Per experiment: x0, an offset and a slope of y.
+//! Eq. 8 of the paper: `x(t+1) = A x(t) + B u(t) + K e(t)`, `y(t) = C x(t) + D u(t) + e(t)`, e white. A is built of
+//! sections of order two ([`InnovationsModel`](crate::model::InnovationsModel)). Per experiment: x0, an offset and a
+//! slope of y.
 //! # Method
-//! Start by subspace identification ([`crate::subspace`]), then damped Gauss-Newton steps on the one-step prediction errors, with x0, offset, slope, B and D
-//! eliminated in every step (variable projection). [`identify`] minimises; [`refit`] starts from a model; [`with_poles`] keeps the poles.
+//! Start by subspace identification ([`crate::subspace`]), then damped Gauss-Newton steps on the one-step prediction
+//! errors, with x0, offset, slope, B and D eliminated in every step (variable projection). [`identify`] minimises;
+//! [`refit`] starts from a model; [`with_poles`] keeps the poles.
 //! # Shapes
-//! u and y: N samples per experiment, several inputs one after the other; covariance: (2n + 1) x (2n + 1) and n + 1 more for each further input.
+//! u and y: N samples per experiment, several inputs one after the other; covariance: (2n + 1) x (2n + 1) and n + 1
+//! more for each further input.
 //! # Cost
 //! Per iteration O(N n^2); the start O(N s + s^3) for s block rows.
 //! # Source
-//! L. Ljung, System Identification (1999), chapters 7 and 10; G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
+//! L. Ljung, System Identification (1999), chapters 7 and 10; G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973)
+//! 413.
 //!
 //! ```
 //! use afmid_kernels::pem::{Experiment, PemOptions, identify};

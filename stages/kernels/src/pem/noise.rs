@@ -1,8 +1,9 @@
 //! Kalman gain from noise intensities: white noise of the output, and white forces that drive the sections.
 //!
-//! Thermal noise passes through the same poles as the force. Each section has one intensity, not negative; intensities are estimated from the
-//! residual's spectrum, allowing for what the fit has absorbed (a restricted likelihood), and give K by the Riccati equation: A - K C is
-//! stable whatever they are. A free K has twice as many parameters and fits the dips that the fit itself leaves at the resonances.
+//! Thermal noise passes through the same poles as the force. Each section has one intensity, not negative; intensities
+//! are estimated from the residual's spectrum, allowing for what the fit has absorbed (a restricted likelihood), and
+//! give K by the Riccati equation: A - K C is stable whatever they are. A free K has twice as many parameters and fits
+//! the dips that the fit itself leaves at the resonances.
 
 use crate::linear_algebra::eigenvalues;
 use faer::c64;
@@ -38,8 +39,9 @@ pub(crate) struct Seen<'a> {
 
 /// Estimates the intensities from the spectra of residuals whitened by `whitening` (numerator, denominator).
 ///
-/// Method: Whittle's likelihood on periodogram over remaining share, weighted with that share; multiplicative updates of Itakura-Saito
-/// type keep every intensity positive. Source: C. Fevotte, N. Bertin, J. Durrieu, Neural Computation 21 (2009) 793.
+/// Method: Whittle's likelihood on periodogram over remaining share, weighted with that share; multiplicative updates
+/// of Itakura-Saito type keep every intensity positive. Source: C. Fevotte, N. Bertin, J. Durrieu, Neural Computation
+/// 21 (2009) 793.
 pub(crate) fn intensities(
     a: &[Coefficients],
     whitening: &(Vec<Coefficients>, Vec<Coefficients>),

@@ -1,7 +1,8 @@
 //! The search on the projected problem.
 //!
-//! Steps are scaled column by column; a coordinate at its limit that pulls outwards is held. The gradient is measured as the share of the
-//! residual that lies in the tangent space: `share * sqrt(N)` is the distance to the minimum in standard errors.
+//! Steps are scaled column by column; a coordinate at its limit that pulls outwards is held. The gradient is measured
+//! as the share of the residual that lies in the tangent space: `share * sqrt(N)` is the distance to the minimum in
+//! standard errors.
 
 use faer::c64;
 
@@ -31,7 +32,8 @@ const NEARLY_EXACT: f64 = 1e-22;
 /// Real poles of different sections that merge cannot become a complex pair: so often are they paired again.
 const PAIRINGS: usize = 3;
 
-/// Iterates to the minimum or to a limit; where it stalls, real poles are paired again. Errors: the starting point cannot be evaluated.
+/// Iterates to the minimum or to a limit; where it stalls, real poles are paired again. Errors: the starting point
+/// cannot be evaluated.
 pub(crate) fn minimise(problem: &Problem, start: State, limits: Limits) -> Result<State, ModelError> {
     let mut state = search(problem, start, limits)?;
     for _ in 0..PAIRINGS {

@@ -14,7 +14,8 @@ use crate::optimise::Ending;
 pub struct Experiment<'a> {
     /// u, N samples; of several inputs one after the other, a multiple of N.
     pub input: &'a [f64],
-    /// y, N samples; NaN where missing, which only output error allows ([`NoiseModel::White`] or [`Focus::Simulation`]).
+    /// y, N samples; NaN where missing, which only output error allows ([`NoiseModel::White`] or
+    /// [`Focus::Simulation`]).
     pub output: &'a [f64],
 }
 
@@ -37,10 +38,12 @@ pub struct PemOptions {
     pub focus: Focus,
     /// Starts that are refined, at least 1; default 3. Measured records of rich input need more: 8.
     pub starts: usize,
-    /// Prior against responses that the data do not ask for, 0 or more: as if white noise of this share of each input's energy had been put in and nothing had
-    /// come out. Default 0: none. It biases every estimate; the covariance does not count that.
+    /// Prior against responses that the data do not ask for, 0 or more: as if white noise of this share of each input's
+    /// energy had been put in and nothing had come out. Default 0: none. It biases every estimate; the covariance does
+    /// not count that.
     pub prior: f64,
-    /// Share of the residual in the tangent space that counts as zero gradient; default 1e-4: a hundredth of a standard error at 8192 samples.
+    /// Share of the residual in the tangent space that counts as zero gradient; default 1e-4: a hundredth of a standard
+    /// error at 8192 samples.
     pub gradient_tolerance: f64,
     /// How the covariance treats the residual; default its own spectrum.
     pub colour: ResidualColour,
@@ -70,11 +73,13 @@ impl Default for PemOptions {
 pub enum NoiseModel {
     /// K = 0: output error.
     White,
-    /// K from the intensities of white output noise and of white forces on the sections (thermal noise): one parameter per section.
+    /// K from the intensities of white output noise and of white forces on the sections (thermal noise): one parameter
+    /// per section.
     Thermal,
     /// K free: n parameters.
     Free,
-    /// K = 0, the noise whitened by an autoregressive filter of its own (Box and Jenkins): for noise that does not pass through the model's poles.
+    /// K = 0, the noise whitened by an autoregressive filter of its own (Box and Jenkins): for noise that does not pass
+    /// through the model's poles.
     Coloured,
 }
 
@@ -84,8 +89,8 @@ pub enum NoiseModel {
 pub enum Focus {
     /// One-step prediction errors: most efficient where the noise model holds.
     Prediction,
-    /// Simulation errors: output error, refined from the best of the subspace estimates and the prediction model; K = 0. For models of too low an order,
-    /// this spreads what they cannot follow as the input's use asks.
+    /// Simulation errors: output error, refined from the best of the subspace estimates and the prediction model; K =
+    /// 0. For models of too low an order, this spreads what they cannot follow as the input's use asks.
     Simulation,
 }
 
@@ -98,7 +103,8 @@ pub struct Verdict {
     pub converged: bool,
     /// Accepted steps, from the best start on.
     pub iterations: usize,
-    /// Norm of the residual's part in the tangent space over the residual's norm; times `sqrt(N)`: standard errors from the minimum.
+    /// Norm of the residual's part in the tangent space over the residual's norm; times `sqrt(N)`: standard errors from
+    /// the minimum.
     pub gradient: f64,
     /// Coordinates at the limit of the parametrisation (undamped within any window).
     pub at_limit: usize,

@@ -1,7 +1,7 @@
 //! One-step prediction errors of the innovations form, as products of sections.
 //!
-//! `e = H^-1 (y - sum_i b_i/a_i u - D u - x0 response - offset)`, `H^-1 = prod_i a_i / c_i`: with a and c fixed, e is linear in all the
-//! rest, and the filtered regressors are the columns of a least-squares problem.
+//! `e = H^-1 (y - sum_i b_i/a_i u - D u - x0 response - offset)`, `H^-1 = prod_i a_i / c_i`: with a and c fixed, e is
+//! linear in all the rest, and the filtered regressors are the columns of a least-squares problem.
 
 use super::columns::{Columns, Part, Place, SIDE_BY_SIDE, Shelf};
 use super::whitening::{IMPULSE, INPUT, LANES, ONE, OUTPUT, RAMP, Signals, Whitened};
@@ -34,9 +34,11 @@ impl<'a> Problem<'a> {
         &self.experiments[..self.experiments.len() - self.priors]
     }
 
-    /// The same with each experiment ended where hardly anything happens any more, if that is much shorter: enough to tell starts apart.
+    /// The same with each experiment ended where hardly anything happens any more, if that is much shorter: enough to
+    /// tell starts apart.
     ///
-    /// What happens: squared differences of the output. Those of white noise go on to the end, so a noisy record is not cut.
+    /// What happens: squared differences of the output. Those of white noise go on to the end, so a noisy record is not
+    /// cut.
     pub fn shortened(&self) -> Option<Problem<'a>> {
         if self.inputs > 1 || !self.missing.is_empty() || self.priors > 0 {
             return None;

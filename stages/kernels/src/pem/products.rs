@@ -1,8 +1,9 @@
 //! Least squares by inner products, refined once and checked: a third of the operations of a rotation.
 //!
-//! Method: Cholesky factor of the scaled Gram matrix; the solution corrected by the residual's own products with the regressors (corrected
-//! seminormal equations). What the correction finds is the check: where rounding has left a share of the residual in the space that the regressors
-//! span, nothing here is used. Source: A. Bjorck, Linear Algebra Appl. 88/89 (1987) 31.
+//! Method: Cholesky factor of the scaled Gram matrix; the solution corrected by the residual's own products with the
+//! regressors (corrected seminormal equations). What the correction finds is the check: where rounding has left a share
+//! of the residual in the space that the regressors span, nothing here is used. Source: A. Bjorck, Linear Algebra Appl.
+//! 88/89 (1987) 31.
 
 use crate::linear_algebra::Symmetric;
 use faer::Mat;
@@ -11,11 +12,13 @@ use super::gradient::residual;
 use super::projection::{Sensitivities, Solution};
 use crate::linear_algebra::{cross_of, gram_of};
 
-/// Least energy that a regressor of unit length keeps beside those before it: the correction then leaves less than a hundred-thousandth of itself.
+/// Least energy that a regressor of unit length keeps beside those before it: the correction then leaves less than a
+/// hundred-thousandth of itself.
 const LEAST_PIVOT: f64 = 1e-10;
 /// Most energy that the first solution may leave along the regressors, as a share of the residual's.
 const MOST_LEFT: f64 = 1e-4;
-/// Least energy that a sensitivity must keep beside the regressors, over its own and over the least pivot: ten thousand roundings.
+/// Least energy that a sensitivity must keep beside the regressors, over its own and over the least pivot: ten thousand
+/// roundings.
 const LEAST_KEPT: f64 = 1e-12;
 
 /// Cholesky factor of the regressors' products.
@@ -28,7 +31,8 @@ pub(super) struct Products {
 }
 
 impl Products {
-    /// Solves for all linear parameters; the last of `columns` is the filtered output. None: too ill-conditioned for products.
+    /// Solves for all linear parameters; the last of `columns` is the filtered output. None: too ill-conditioned for
+    /// products.
     pub fn new(columns: &[&[f64]]) -> Option<(Self, Solution)> {
         let p = columns.len() - 1;
         let products = gram_of(columns);
@@ -78,7 +82,8 @@ impl Products {
         }
     }
 
-    /// The Jacobian without the directions that the linear parameters reach. None: too little of it is left for products.
+    /// The Jacobian without the directions that the linear parameters reach. None: too little of it is left for
+    /// products.
     pub fn sensitivities(&self, regressors: &[&[f64]], e: &[f64], jacobian: &[&[f64]]) -> Option<Sensitivities> {
         let (p, q) = (self.scale.len(), jacobian.len());
         let shared = cross_of(&regressors[..p], jacobian);

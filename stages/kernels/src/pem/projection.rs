@@ -1,7 +1,8 @@
 //! Separable least squares: everything that enters the prediction error linearly is eliminated exactly.
 //!
-//! Golub and Pereyra's variable projection with Kaufman's Jacobian: b, D, x0, offset and slope are solved for at every trial of
-//! the poles (a) and predictor poles (c), which alone are left to iterate on: by inner products where these keep enough digits, by rotations elsewhere.
+//! Golub and Pereyra's variable projection with Kaufman's Jacobian: b, D, x0, offset and slope are solved for at every
+//! trial of the poles (a) and predictor poles (c), which alone are left to iterate on: by inner products where these
+//! keep enough digits, by rotations elsewhere.
 
 use faer::Mat;
 
@@ -32,7 +33,8 @@ enum Factor {
     Rotation(Rotation),
 }
 
-/// The projected Jacobian and the residual in one orthonormal frame, a few rows in place of all samples: the residual's part in the Jacobian's span is whole.
+/// The projected Jacobian and the residual in one orthonormal frame, a few rows in place of all samples: the residual's
+/// part in the Jacobian's span is whole.
 pub(crate) struct Sensitivities {
     /// Rows x coordinates.
     pub rows: Mat<f64>,
@@ -41,7 +43,8 @@ pub(crate) struct Sensitivities {
 }
 
 impl Projection {
-    /// Solves for all linear parameters; the last column of `regressors` is the filtered output. Errors: no finite solution.
+    /// Solves for all linear parameters; the last column of `regressors` is the filtered output. Errors: no finite
+    /// solution.
     pub fn new(problem: &Problem, regressors: &Columns) -> Result<Self, ModelError> {
         let present = present(problem, regressors);
         let (factor, Solution { theta, cost }) = match Products::new(&present.slices()) {

@@ -19,7 +19,8 @@ pub(super) struct Rotation {
 }
 
 impl Rotation {
-    /// Solves for all linear parameters; the last column of `matrix` is the filtered output. Errors: no finite solution.
+    /// Solves for all linear parameters; the last column of `matrix` is the filtered output. Errors: no finite
+    /// solution.
     pub fn new(matrix: MatRef<'_, f64>) -> Result<(Self, Solution), ModelError> {
         let p = matrix.ncols() - 1;
         let qr = TallQr::new(matrix);

@@ -6,8 +6,10 @@ use super::linearised::unscaled;
 
 /// The part of the cost's curvature that the Jacobian does not hold, from the gradients along the way.
 ///
-/// Where the residual is noise and a pole is hardly determined by it, this part is as large as the other, and steps without it go astray.
-/// Source: J. Dennis, D. Gay and R. Welsch, ACM Trans. Math. Softw. 7 (1981) 348 (NL2SOL), with `J^T J` at the new point for its products.
+/// Where the residual is noise and a pole is hardly determined by it, this part is as large as the other, and steps
+/// without it go astray.
+/// Source: J. Dennis, D. Gay and R. Welsch, ACM Trans. Math. Softw. 7 (1981) 348 (NL2SOL), with `J^T J` at the new
+/// point for its products.
 #[derive(Clone)]
 pub(crate) struct Secant {
     /// In coordinates.
@@ -38,7 +40,8 @@ impl Secant {
         }
     }
 
-    /// Learns from a step (coordinates), the gradients before and after it (half the cost's), and `J^T J step` after it.
+    /// Learns from a step (coordinates), the gradients before and after it (half the cost's), and `J^T J step` after
+    /// it.
     fn learn(&mut self, step: &[f64], before: &[f64], after: &[f64], normal: &[f64]) {
         let q = step.len();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -121,7 +124,8 @@ mod tests {
         for (i, j) in [(0, 0), (0, 1), (1, 1)] {
             assert!((carried.curvature[(i, j)] - other.curvature[(i, j)]).abs() < 1e-14); // rounding
         }
-        // from an exact fit, whose cost is rounding, to a real one: as it stands, the old curvature would rule every step
+        // from an exact fit, whose cost is rounding, to a real one: as it stands, the old curvature would rule every
+        // step
         for factor in [1e20, 0.0, f64::INFINITY, f64::NAN] {
             let mut carried = own.clone();
             carried.trusted = true;

@@ -1,7 +1,8 @@
 //! Where the iteration begins: several sets of poles, the most promising refined first.
 //!
-//! Strong modes come from the subspace estimate of every order up to the wanted one; what is missing is filled with real poles spread over
-//! the fast part of the unit interval, where detectors lie. A weak mode needs the high orders, detector poles the low ones.
+//! Strong modes come from the subspace estimate of every order up to the wanted one; what is missing is filled with
+//! real poles spread over the fast part of the unit interval, where detectors lie. A weak mode needs the high orders,
+//! detector poles the low ones.
 
 use crate::linear_algebra::{eigenvalues, least_squares};
 use faer::{Mat, c64};
@@ -17,7 +18,8 @@ use crate::subspace::{InstrumentalSubspace, Subspace, Weight};
 const FILL: [f64; 6] = [0.15, 0.5, 0.3, 0.7, 0.05, 0.85];
 /// Iterations for each, at most: enough to tell basins apart.
 const TRIAL_ITERATIONS: usize = 8;
-/// Twice the log-likelihood that the rest of the way to the minimum may still be worth: less than any choice between starts turns on.
+/// Twice the log-likelihood that the rest of the way to the minimum may still be worth: less than any choice between
+/// starts turns on.
 const TRIAL_REST: f64 = 0.5;
 
 /// How far a start is followed before it is compared with the others.
@@ -43,7 +45,8 @@ pub(crate) fn candidates(subspace: &Subspace, order: usize) -> Result<Vec<Vec<c6
     Ok(starts)
 }
 
-/// The poles of an ARX model and of instrumental subspace estimates, every weight, few and many block rows; none where these cannot be had.
+/// The poles of an ARX model and of instrumental subspace estimates, every weight, few and many block rows; none where
+/// these cannot be had.
 ///
 /// They need an input that excites throughout, and see noise that is not white.
 pub(crate) fn instrumental(u: &[f64], y: &[f64], order: usize, block_rows: usize) -> Vec<Vec<c64>> {
@@ -75,7 +78,8 @@ pub(crate) fn ranked(problem: &Problem, starts: &[Vec<c64>], count: usize) -> Re
     if states.is_empty() { Err(failure) } else { Ok(states) }
 }
 
-/// Points with a free noise filter: all poles, each with predictor poles at rest (an ARX model), half way and near, and those of the output error.
+/// Points with a free noise filter: all poles, each with predictor poles at rest (an ARX model), half way and near, and
+/// those of the output error.
 pub(crate) fn predictors(problem: &Problem, poles: &[Vec<c64>], states: &[State]) -> Vec<Point> {
     let order = problem.order;
     let refined = states.iter().map(|state| {
@@ -99,7 +103,8 @@ const SHRUNK: [f64; 3] = [0.0, 0.5, 0.9];
 /// Starts that are followed to their minimum.
 const FOLLOWED: usize = 3;
 
-/// The lowest minimum from these points: the `count` lowest are refined by a few iterations, the best of these followed to the end.
+/// The lowest minimum from these points: the `count` lowest are refined by a few iterations, the best of these followed
+/// to the end.
 ///
 /// Errors: no point can be evaluated.
 pub(crate) fn lowest(problem: &Problem, points: Vec<Point>, count: usize, limits: Limits) -> Result<State, ModelError> {
@@ -143,9 +148,11 @@ fn arx(u: &[f64], y: &[f64], order: usize) -> Result<Vec<c64>, ModelError> {
     Ok(eigenvalues(&companion)?)
 }
 
-/// Refines each state by a few iterations and takes the best: least cost over its variance, plus `2 ln N` for every complex pair.
+/// Refines each state by a few iterations and takes the best: least cost over its variance, plus `2 ln N` for every
+/// complex pair.
 ///
-/// A resonance may lie at any of N frequencies: it must gain more than the best of so many by chance. Errors: no state can be refined.
+/// A resonance may lie at any of N frequencies: it must gain more than the best of so many by chance. Errors: no state
+/// can be refined.
 pub(crate) fn refined(problem: &Problem, states: Vec<State>, limits: Limits) -> Result<State, ModelError> {
     let trial = trial(problem, limits);
     let mut failure = ModelError::Degenerate("no start could be refined");

@@ -66,7 +66,8 @@ impl State {
         })
     }
 
-    /// The same model seen through another whitening or in other data: iterations go on; what was learnt of the curvature goes on in proportion to the costs.
+    /// The same model seen through another whitening or in other data: iterations go on; what was learnt of the
+    /// curvature goes on in proportion to the costs.
     pub fn carried(problem: &Problem, point: Point, from: &Self) -> Result<Self, ModelError> {
         let next = Self::new(problem, point)?;
         let memory = if next.point.len() == from.point.len() {

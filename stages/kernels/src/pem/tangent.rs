@@ -12,7 +12,8 @@ use crate::signal::RealTransform;
 /// Directions of the scaled Jacobian below this share are not determined by the data.
 const RANK_TOLERANCE: f64 = 1e-12;
 
-/// Least energy of a direction of the scaled Jacobian that products resolve: to some five digits, of errors and shares that noise blurs in the second.
+/// Least energy of a direction of the scaled Jacobian that products resolve: to some five digits, of errors and shares
+/// that noise blurs in the second.
 const LEAST_CLEAR: f64 = 1e-9;
 
 /// Rows multiplied at a time: they stay in the first-level cache, before and after.
@@ -36,7 +37,8 @@ impl<'a> Tangent<'a> {
         Ok(Self { columns, spread })
     }
 
-    /// The basis within one experiment (rows `top..top + length`), transformed: real and imaginary part of each bin x rank.
+    /// The basis within one experiment (rows `top..top + length`), transformed: real and imaginary part of each bin x
+    /// rank.
     ///
     /// Columns are transformed, then combined block by block: the basis in time is never made.
     pub fn transformed(&self, top: usize, length: usize, transform: &mut Transform) -> Mat<f64> {
@@ -109,7 +111,8 @@ pub(crate) fn periodogram(residual: &[Complex64]) -> Vec<f64> {
     residual.iter().map(Complex64::norm_sqr).collect()
 }
 
-/// Share of the noise power in each bin that the fit has not absorbed: `E |E|^2 / N = S * remaining`. Of the transformed basis.
+/// Share of the noise power in each bin that the fit has not absorbed: `E |E|^2 / N = S * remaining`. Of the
+/// transformed basis.
 pub(crate) fn remaining(basis: MatRef<'_, f64>) -> Vec<f64> {
     let mut absorbed = vec![0.0; basis.nrows()];
     for direction in basis.col_iter() {
@@ -149,7 +152,8 @@ mod tests {
             let columns: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
             let ours = by_products(&columns).expect("clear enough");
             let exact = by_rotation(&columns).expect("enough rows");
-            // roundings of sums of 400 products, over the least energy, which goes with the square of what tells the columns apart
+            // roundings of sums of 400 products, over the least energy, which goes with the square of what tells the
+            // columns apart
             let tolerance = 1e-14 / (apart * apart);
             let square = |spread: &Mat<f64>| spread * spread.transpose();
             let (mine, own) = (square(&ours), square(&exact));

@@ -25,7 +25,8 @@ fn release() -> Vec<f64> {
     Lever::paper().release(N, T0 as f64 + 0.3, -0.8)
 }
 
-/// Thermal noise of each mode of the paper's lever, rms as in the mean of 24 events: exact steps of a damped, rotating phasor.
+/// Thermal noise of each mode of the paper's lever, rms as in the mean of 24 events: exact steps of a damped, rotating
+/// phasor.
 fn thermal_noise(seed: u64) -> Vec<f64> {
     let lever = Lever::paper();
     let rms = [67e-6, 34e-6, 20e-6, 14.5e-6];
@@ -290,7 +291,8 @@ fn a_release_is_cut_where_it_has_died_away_and_noise_is_not() {
     let (u, y, noise) = (force(), averaged(1), white_noise(N, 1.0, 1));
     let whole = problem(&u, &y);
     let cut = whole.shortened().unwrap();
-    // the first mode's energy falls by a hundred in 2.3 Q / (pi f) = 600 us, 3000 samples; it has nearly all of the changes
+    // the first mode's energy falls by a hundred in 2.3 Q / (pi f) = 600 us, 3000 samples; it has nearly all of the
+    // changes
     let kept = cut.rows() - T0;
     assert!((2000..4000).contains(&kept), "{kept}");
     assert_eq!(cut.experiments[0].1, &y[..cut.rows()]);

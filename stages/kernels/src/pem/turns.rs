@@ -50,13 +50,14 @@ pub(super) fn simulation(
     lowest(problem, points, count + 1, limits)
 }
 
-/// Rounds of noise, then poles, after the starts' competition: the first changes either by a fraction of its error, the second by less than a hundredth.
+/// Rounds of noise, then poles, after the starts' competition: the first changes either by a fraction of its error, the
+/// second by less than a hundredth.
 const THERMAL_ROUNDS: usize = 2;
 
 /// Poles and noise intensities in turn.
 ///
-/// The noise comes first from the best start alone; under its whitening all starts compete: unwhitened, a spare pole would rather fit the
-/// thermal noise of a strong mode than the detector.
+/// The noise comes first from the best start alone; under its whitening all starts compete: unwhitened, a spare pole
+/// would rather fit the thermal noise of a strong mode than the detector.
 fn thermal(problem: &Problem, short: &Problem, starts: Vec<State>, limits: Limits) -> Result<State, ModelError> {
     let mut poles: Vec<Vec<f64>> = starts.iter().map(|state| state.point.poles.clone()).collect();
     let first = refined(short, starts.into_iter().take(1).collect(), limits)?;
@@ -88,7 +89,8 @@ fn thermal(problem: &Problem, short: &Problem, starts: Vec<State>, limits: Limit
 
 /// Exchanges real poles slower than the window for a fast one, unless the data insist on them.
 ///
-/// What such a pole explains is the business of offset and drift; its static gain is arbitrary and spoils everyone's share of it.
+/// What such a pole explains is the business of offset and drift; its static gain is arbitrary and spoils everyone's
+/// share of it.
 fn without_drift(problem: &Problem, state: State, limits: Limits) -> Result<State, ModelError> {
     let rows = problem.rows() as f64;
     let all: Vec<c64> =

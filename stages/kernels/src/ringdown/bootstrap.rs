@@ -15,7 +15,8 @@ const BOOTSTRAP_ARRIVED: f64 = 1e-2;
 
 /// Shared parameters of fits to events drawn with replacement, noise model and weights held.
 ///
-/// Method: compressed events are drawn, not records, so that a draw costs a few steps of the search. Source: B. Efron, Ann. Stat. 7 (1979) 1.
+/// Method: compressed events are drawn, not records, so that a draw costs a few steps of the search. Source: B. Efron,
+/// Ann. Stat. 7 (1979) 1.
 pub(super) fn bootstrap(fitted: &Fitted, point: &Point, freedom: &Freedom, options: &RingdownOptions) -> Vec<Vec<f64>> {
     let count = point.events.len();
     let draw = |number: usize| {

@@ -23,9 +23,11 @@ pub struct ModeCount {
     pub chi_square: f64,
     /// Chi square and `ln N` per estimated parameter; NaN where there is no fit.
     pub bic: f64,
-    /// Whitened energy of the residuals of each half of the events under the shape of the other half; NaN with fewer than [`HELD_OUT_EVENTS`] events.
+    /// Whitened energy of the residuals of each half of the events under the shape of the other half; NaN with fewer
+    /// than [`HELD_OUT_EVENTS`] events.
     pub held_out: f64,
-    /// How much more than the number chosen before it this held out, in standard errors of the events' own differences; negative: better.
+    /// How much more than the number chosen before it this held out, in standard errors of the events' own differences;
+    /// negative: better.
     pub worse_by: f64,
 }
 
@@ -42,8 +44,8 @@ pub struct CountedRingdown {
 
 /// Events from which the number is judged by held-out events: two halves of two.
 pub const HELD_OUT_EVENTS: usize = 4;
-/// Standard errors by which a further mode must do better on held-out events: one that is not there does so once in some ten thousand, one that is
-/// there does where its amplitude is known to a quarter.
+/// Standard errors by which a further mode must do better on held-out events: one that is not there does so once in
+/// some ten thousand, one that is there does where its amplitude is known to a quarter.
 const CLEARLY: f64 = 2.0;
 /// Standard errors from the best at which all that rings is known well enough: another fit begins there.
 const BEGUN: f64 = 0.1;
@@ -54,18 +56,21 @@ const BEYOND_RINGING: usize = 4;
 /// [`fit_ringdowns`] with the number of modes chosen among 1 to `most`.
 ///
 /// # Method
-/// One Hankel matrix gives the poles; of these the one that takes most off the mean's residual is added to the fit before, one by one, until two have
-/// brought the BIC under white noise no further. All numbers are then fitted again under the noise of the best of these, so that chi squares compare. From
-/// four events on, a further mode must lower the chi square of held-out halves (shape
-/// frozen, each event's own four parameters fitted) by two standard errors of the events' differences and its BIC as well; with fewer the BIC alone.
+/// One Hankel matrix gives the poles; of these the one that takes most off the mean's residual is added to the fit
+/// before, one by one, until two have brought the BIC under white noise no further. All numbers are then fitted again
+/// under the noise of the best of these, so that chi squares compare. From four events on, a further mode must lower
+/// the chi square of held-out halves (shape frozen, each event's own four parameters fitted) by two standard errors of
+/// the events' differences and its BIC as well; with fewer the BIC alone.
 /// # Shapes
 /// As [`fit_ringdowns`]; `options.modes` is not used.
 /// # Units
 /// Volts, seconds, rad/s.
 /// # Accuracy
-/// A mode is found where its ringing is some four standard errors of its own amplitude. Two fits per number, four from four events on.
+/// A mode is found where its ringing is some four standard errors of its own amplitude. Two fits per number, four from
+/// four events on.
 /// # Errors
-/// Those of [`fit_ringdowns`] with one mode; `most` of 0; given start values or knowledge of single modes, which have no meaning yet.
+/// Those of [`fit_ringdowns`] with one mode; `most` of 0; given start values or knowledge of single modes, which have
+/// no meaning yet.
 /// # Source
 /// G. Schwarz, Ann. Stat. 6 (1978) 461; M. Stone, J. R. Stat. Soc. B 36 (1974) 111.
 pub fn fit_counted_ringdowns(

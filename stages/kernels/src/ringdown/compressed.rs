@@ -69,8 +69,9 @@ const HEAD: usize = 64;
 /// [`compress`] for white noise, where only the first samples see the real poles.
 ///
 /// # Method
-/// The rest of the record by the Cholesky factor of the Gram matrix of the modes' columns (well conditioned), stacked under the first samples
-/// as they are: the orthogonal factorisation is of a hundred rows. A real pole slower than that gets the long way.
+/// The rest of the record by the Cholesky factor of the Gram matrix of the modes' columns (well conditioned), stacked
+/// under the first samples as they are: the orthogonal factorisation is of a hundred rows. A real pole slower than that
+/// gets the long way.
 fn compress_white(scale: f64, reference: &[Exponential], whitened: &[Vec<f64>], interval_s: f64) -> Compressed {
     let samples = whitened.first().map_or(0, Vec::len);
     let basis = columns(reference, interval_s, samples);

@@ -1,4 +1,5 @@
-//! The coordinates that the search moves in: a pole's real and imaginary part, or angular frequency and quality factor where something is known of one.
+//! The coordinates that the search moves in: a pole's real and imaginary part, or angular frequency and quality factor
+//! where something is known of one.
 
 use faer::{Mat, c64};
 

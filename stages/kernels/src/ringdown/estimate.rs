@@ -46,7 +46,8 @@ pub struct Ringdown {
     pub event_std: Vec<EventParameters>,
     /// Covariance of [`Self::parameters`], from the noise model; zero for the two that fix the gauge.
     pub covariance: Mat<f64>,
-    /// Covariance of the same from the scatter of the events' scores: right under a wrong noise model too; none with fewer than 8 events.
+    /// Covariance of the same from the scatter of the events' scores: right under a wrong noise model too; none with
+    /// fewer than 8 events.
     pub sandwich: Option<Mat<f64>>,
     /// Shared parameters of every draw of the bootstrap over events; empty if none was asked for.
     pub bootstrap: Vec<Vec<f64>>,
@@ -81,7 +82,8 @@ impl Ringdown {
         self.modes_with(&self.covariance)
     }
 
-    /// Interval of each mode's frequency (Hz) and quality factor that holds `share` of the bootstrap's draws; none without draws.
+    /// Interval of each mode's frequency (Hz) and quality factor that holds `share` of the bootstrap's draws; none
+    /// without draws.
     pub fn bootstrap_intervals(&self, share: f64) -> Option<Vec<[(f64, f64); 2]>> {
         let draws: Vec<Vec<ModeEstimate>> = self
             .bootstrap

@@ -22,27 +22,30 @@ const NOISE_ROUNDS: usize = 3;
 /// Fits one set of exponentials to several ringdowns at once.
 ///
 /// # Model
-/// `y_e(k) = a_e sum_j Re(rho_j exp(s_j (k T - t_e))) + c_e + d_e k + n(k)`: poles and residues shared, amplitude, sub-sample onset, offset
-/// and slope each event's own, `n` of a [`RingdownNoise`].
+/// `y_e(k) = a_e sum_j Re(rho_j exp(s_j (k T - t_e))) + c_e + d_e k + n(k)`: poles and residues shared, amplitude,
+/// sub-sample onset, offset and slope each event's own, `n` of a [`RingdownNoise`].
 /// # Method
-/// Maximum likelihood. Records are whitened exactly ([`RingdownNoise`]'s Kalman filter), projected on the three dozen directions that
-/// the shape can reach, and fitted there by Levenberg-Marquardt with the events' own parameters eliminated; noise variances by a
-/// Whittle likelihood of the residuals with what the fit absorbed added back (restricted likelihood), fit and noise in turns. Over missing samples
-/// the filter predicts without correcting; for the noise's variances gaps are cut out of the taper, and the expected periodograms are exact for
-/// the taper that is left: neither is biased, and no window is lost. Modes of which something is known are searched in frequency and quality
-/// factor, bounds by an active set.
+/// Maximum likelihood. Records are whitened exactly ([`RingdownNoise`]'s Kalman filter), projected on the three dozen
+/// directions that the shape can reach, and fitted there by Levenberg-Marquardt with the events' own parameters
+/// eliminated; noise variances by a Whittle likelihood of the residuals with what the fit absorbed added back
+/// (restricted likelihood), fit and noise in turns. Over missing samples the filter predicts without correcting; for
+/// the noise's variances gaps are cut out of the taper, and the expected periodograms are exact for the taper that is
+/// left: neither is biased, and no window is lost. Modes of which something is known are searched in frequency and
+/// quality factor, bounds by an active set.
 /// # Shapes
-/// `events`: E records of equal length, each from the first sample after its release on, [`RingdownOptions::missing`] their gaps; `free`: stretches of noise alone, any length.
+/// `events`: E records of equal length, each from the first sample after its release on, [`RingdownOptions::missing`]
+/// their gaps; `free`: stretches of noise alone, any length.
 /// # Units
 /// Volts, seconds, rad/s.
 /// # Accuracy
-/// The Cramer-Rao bound within a few per cent (docs/results/ringdown.md). About 3 ms per record of 8192 samples and noise round on one core,
-/// ten times that for one with gaps, whose filter and basis are its own.
+/// The Cramer-Rao bound within a few per cent (docs/results/ringdown.md). About 3 ms per record of 8192 samples and
+/// noise round on one core, ten times that for one with gaps, whose filter and basis are its own.
 /// # Errors
-/// No event, unequal lengths, values that are not finite, too few samples, no oscillation, knowledge of what is not fitted.
+/// No event, unequal lengths, values that are not finite, too few samples, no oscillation, knowledge of what is not
+/// fitted.
 /// # Source
-/// S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7; G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413;
-/// D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320 (restricted likelihood).
+/// S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7; G. H. Golub, V. Pereyra, SIAM J. Numer.
+/// Anal. 10 (1973) 413; D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320 (restricted likelihood).
 pub fn fit_ringdowns(
     events: &[&[f64]],
     free: &[&[f64]],

@@ -86,9 +86,9 @@ impl Fitted {
         self.data.rest.iter_mut().for_each(|rest| *rest /= excess);
         for block in &mut self.blocks {
             block.cost /= excess;
+            block.information = grow(&block.information, 1.0 / excess);
             let part = &mut block.eliminated;
             part.own_inverse = grow(&part.own_inverse, excess);
-            part.information = grow(&part.information, 1.0 / excess);
             part.score.iter_mut().for_each(|score| *score /= excess);
         }
     }

@@ -15,11 +15,13 @@ use super::search::Point;
 use super::start::start;
 use crate::model::ModelError;
 
-/// Times that gaps are filled by the first guess and it is made again: each leaves of the bridges' error the share of what is missing.
+/// Times that gaps are filled by the first guess and it is made again: each leaves of the bridges' error the share of
+/// what is missing.
 const REFILLS: usize = 4;
 
-/// The better of two starts by the fit under white noise: from all samples, gaps filled by the guess itself in turns, and from the longest stretch
-/// without a gap. Clipped tops hide the fast modes from the first, a late or short stretch from the second.
+/// The better of two starts by the fit under white noise: from all samples, gaps filled by the guess itself in turns,
+/// and from the longest stretch without a gap. Clipped tops hide the fast modes from the first, a late or short stretch
+/// from the second.
 pub(super) fn gap_start(records: &Records<'_>, options: &RingdownOptions) -> Result<Point, ModelError> {
     let mut found = refilled(records, options);
     let Some(exponentials) = clean_start(records, options) else { return found };

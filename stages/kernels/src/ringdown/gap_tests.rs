@@ -168,8 +168,8 @@ fn gaps_do_not_bias_the_noise() {
         holed[1] / full[1],
         holed[2] / full[2]
     );
-    // the fastest wander is white but for its last octave: they share the level, and the whole is what counts. Equal events, a twentieth missing:
-    // sqrt(0.05 / 60000 bins) = 0.1 % and the odd trade between parts
+    // the fastest wander is white but for its last octave: they share the level, and the whole is what counts. Equal
+    // events, a twentieth missing: sqrt(0.05 / 60000 bins) = 0.1 % and the odd trade between parts
     let all = |sums: &[f64]| sums[0] + 0.5 * (sums[1] + sums[2]);
     assert!((all(&holed) / all(&full) - 1.0).abs() < 0.02, "{holed:?} {full:?}");
     // 240 numbers: 4.6 %; four of these, and the noise's own error from four short windows on top

@@ -3,7 +3,8 @@
 use super::modal_form::Exponential;
 use crate::model::ModelError;
 
-/// A number of the shape that something can be known of; modes and real poles are counted from 0, ascending in frequency and as started.
+/// A number of the shape that something can be known of; modes and real poles are counted from 0, ascending in
+/// frequency and as started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// `abs(s) / 2 pi` of a mode, Hz.
@@ -17,7 +18,8 @@ pub enum Quantity {
 /// What is known of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Knowledge {
-    /// Nothing; a real pole loses the prior of [`RingdownOptions::real_pole_std`](super::RingdownOptions::real_pole_std).
+    /// Nothing; a real pole loses the prior of
+    /// [`RingdownOptions::real_pole_std`](super::RingdownOptions::real_pole_std).
     Free,
     /// The value: not estimated.
     Fixed(f64),

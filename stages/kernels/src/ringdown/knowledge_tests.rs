@@ -54,7 +54,8 @@ fn a_fixed_quality_factor_stays_and_the_errors_of_the_rest_hold() {
                 assert!((value / truth[3] - 1.0).abs() < 1e-12 && std == 0.0, "{value} {std}");
                 continue;
             }
-            // modes are nearly orthogonal and so are f and Q; the curvature is that at the estimate, where real poles move it by half a per cent
+            // modes are nearly orthogonal and so are f and Q; the curvature is that at the estimate, where real poles
+            // move it by half a per cent
             assert!((0.97..1.02).contains(&(std / before)), "{i}: {std} {before}");
             z += ((value - truth[i]) / std).powi(2) / 350.0;
         }
@@ -102,7 +103,8 @@ fn a_prior_weighs_as_its_variance_says() {
     let (value, std) = numbers(&plain)[3];
     let with_prior = fitted(5, known(Q2, Knowledge::About(value + 2.0 * std, std)));
     let (found, error) = numbers(&with_prior)[3];
-    // equal weights: half way, and the error falls by the root of two; the likelihood's curvature changes by some per cent over two errors
+    // equal weights: half way, and the error falls by the root of two; the likelihood's curvature changes by some per
+    // cent over two errors
     assert!(((found - value) / std - 1.0).abs() < 0.05, "{value} {std} {found}");
     assert!((error * 2f64.sqrt() / std - 1.0).abs() < 0.03, "{error} {std}");
 }

@@ -19,8 +19,9 @@ pub(super) struct Ladder {
     pub best: usize,
 }
 
-/// Fits under white noise with a further pole of the Hankel matrix each, up to `most` modes and `beyond` more than the best: one that is not there may
-/// hide the next. Each fit ends `arrived` standard errors from its best. Errors: those of the fit with one.
+/// Fits under white noise with a further pole of the Hankel matrix each, up to `most` modes and `beyond` more than the
+/// best: one that is not there may hide the next. Each fit ends `arrived` standard errors from its best. Errors: those
+/// of the fit with one.
 pub(super) fn ladder(
     all: &Data<'_>,
     most: usize,

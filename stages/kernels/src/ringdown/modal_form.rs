@@ -5,7 +5,8 @@ use faer::c64;
 /// One exponential of the ringing.
 ///
 /// # Model
-/// A mode adds `Re(residue exp(pole t))` with its pole in the upper half plane; a real pole adds `residue.re exp(pole.re t)`.
+/// A mode adds `Re(residue exp(pole t))` with its pole in the upper half plane; a real pole adds `residue.re
+/// exp(pole.re t)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exponential {
     /// Pole, rad/s; imaginary part 0 for a real one.
@@ -49,10 +50,11 @@ pub struct EventParameters {
     pub slope: f64,
 }
 
-/// Columns of the basis round reference poles: per exponential `t^m exp(pole t)`, m = 0, 1, 2 (real and imaginary part), time in
-/// decay times; then 1 and a ramp from -1 to 1.
+/// Columns of the basis round reference poles: per exponential `t^m exp(pole t)`, m = 0, 1, 2 (real and imaginary
+/// part), time in decay times; then 1 and a ramp from -1 to 1.
 ///
-/// Changes of a pole move the signal within this space up to the third order: events are projected on it once per reference.
+/// Changes of a pole move the signal within this space up to the third order: events are projected on it once per
+/// reference.
 pub fn columns(reference: &[Exponential], interval_s: f64, samples: usize) -> Vec<Vec<f64>> {
     let mut all = Vec::with_capacity(width(reference));
     for exponential in reference {
@@ -128,7 +130,8 @@ pub(super) fn from_shared(like: &[Exponential], values: &[f64]) -> Vec<Exponenti
 /// Weights of an event of `exponentials` in the basis of `reference`.
 ///
 /// # Method
-/// `a rho exp(s (t - t0)) = sum_m c_m t^m exp(s_ref t)`, `c_m = a rho exp(-s t0) d^m / m!`, `d = (s - s_ref)` in decay rates.
+/// `a rho exp(s (t - t0)) = sum_m c_m t^m exp(s_ref t)`, `c_m = a rho exp(-s t0) d^m / m!`, `d = (s - s_ref)` in decay
+/// rates.
 pub fn weights(reference: &[Exponential], exponentials: &[Exponential], event: &EventParameters) -> Weights {
     let total = width(reference);
     let mut out = Weights { value: vec![0.0; total], shared: Vec::new(), own: vec![vec![0.0; total]; 4] };

@@ -11,7 +11,8 @@ pub struct ThermalMode {
     pub variance: f64,
 }
 
-/// One exponentially correlated part of the readout's noise (an Ornstein-Uhlenbeck process): several, a decade apart, make 1/f noise.
+/// One exponentially correlated part of the readout's noise (an Ornstein-Uhlenbeck process): several, a decade apart,
+/// make 1/f noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wander {
     /// Inverse of the correlation time, 1/s.
@@ -23,8 +24,9 @@ pub struct Wander {
 /// Noise of a ringdown: all that is not the event itself.
 ///
 /// # Model
-/// Independent sum of white noise (rounding included), of [`Wander`] and of [`ThermalMode`], each stationary:
-/// `r(t) = sum_n v_n exp(-a_n t) (cos(b_n t) + a_n/b_n sin(b_n t)) + sum_i v_i exp(-t/t_i) + white delta(t)`, poles `-a_n + i b_n`.
+/// Independent sum of white noise (rounding included), of [`Wander`] and of [`ThermalMode`], each stationary: `r(t) =
+/// sum_n v_n exp(-a_n t) (cos(b_n t) + a_n/b_n sin(b_n t)) + sum_i v_i exp(-t/t_i) + white delta(t)`, poles `-a_n + i
+/// b_n`.
 /// # Units
 /// Volts squared; rates and poles in 1/s and rad/s.
 /// # Accuracy
@@ -50,7 +52,8 @@ impl RingdownNoise {
         self.thermal.iter().all(|mode| mode.variance <= 0.0) && self.wander.iter().all(|part| part.variance <= 0.0)
     }
 
-    /// The parts with unit variance, in the order white, thermal, wander: functions of the lag in seconds; white is 1 at lag 0 alone.
+    /// The parts with unit variance, in the order white, thermal, wander: functions of the lag in seconds; white is 1
+    /// at lag 0 alone.
     pub fn unit_covariance(&self, part: usize, lag_s: f64) -> f64 {
         if part == 0 {
             return if lag_s == 0.0 { 1.0 } else { 0.0 };

@@ -43,7 +43,8 @@ pub(super) fn residuals(records: &Records<'_>, point: &Point, taper: &[f64]) -> 
 
 /// The noise under which the residuals, what the fit absorbed added back, and the free stretches are likeliest.
 ///
-/// Gaps are cut out of the taper, event by event, and the expected periodogram is that of the same tapers: it stays without bias.
+/// Gaps are cut out of the taper, event by event, and the expected periodogram is that of the same tapers: it stays
+/// without bias.
 pub(super) fn estimated(
     records: &Records<'_>,
     point: &Point,
@@ -75,10 +76,12 @@ pub(super) fn estimated(
     likeliest(&observed, &parts, interval_s, &lag_weights)
 }
 
-/// Least number of windows in free stretches from which alone the noise is estimated: a quarter of a line's power is its scatter then.
+/// Least number of windows in free stretches from which alone the noise is estimated: a quarter of a line's power is
+/// its scatter then.
 const ALONE: usize = 16;
 
-/// The noise of free stretches alone: what a fit to the events leaves unexplained is not in it. None where they hold too few windows of `samples`.
+/// The noise of free stretches alone: what a fit to the events leaves unexplained is not in it. None where they hold
+/// too few windows of `samples`.
 ///
 /// Thermal motion at the oscillating ones of `exponentials`, wander and white noise, as in a fit of ringdowns.
 pub fn noise_of_stretches(

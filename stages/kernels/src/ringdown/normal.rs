@@ -30,6 +30,8 @@ pub(super) struct Freedom {
 /// One event's part of the normal equations.
 pub(super) struct EventBlock {
     pub eliminated: Eliminated,
+    /// Schur complement: shared x shared.
+    pub information: Mat<f64>,
     /// Squared residual within the basis.
     pub cost: f64,
 }
@@ -99,5 +101,6 @@ fn block(
     let gradient: Vec<f64> =
         (0..shared + own).map(|j| jacobian.col(j).iter().zip(&residual).map(|(a, b)| a * b).sum()).collect();
     let eliminated = Eliminated::of(&gram, &gradient, shared, damping);
-    EventBlock { eliminated, cost: residual.iter().map(|r| r * r).sum() }
+    let information = eliminated.information(&gram);
+    EventBlock { eliminated, information, cost: residual.iter().map(|r| r * r).sum() }
 }

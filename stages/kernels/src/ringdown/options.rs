@@ -19,18 +19,22 @@ pub struct RingdownOptions {
     pub noise: NoiseSource,
     /// Estimate a linear drift of each event beside its offset; default true.
     pub slope: bool,
-    /// Relative standard deviation of what is known beforehand of a real pole; default 0.5. They hardly show in what follows the first samples.
+    /// Relative standard deviation of what is known beforehand of a real pole; default 0.5. They hardly show in what
+    /// follows the first samples.
     pub real_pole_std: f64,
     /// Draws of the bootstrap over events, default 0: none.
     pub bootstrap_draws: usize,
     /// Seed of those draws.
     pub bootstrap_seed: u64,
-    /// Start from these exponentials instead of the Hankel matrix; default none. Their number replaces `modes` and `real_poles`.
+    /// Start from these exponentials instead of the Hankel matrix; default none. Their number replaces `modes` and
+    /// `real_poles`.
     pub start: Option<Vec<Exponential>>,
-    /// Make the start from this many first samples of the events' mean, each event's level and drift from the second half of its window;
-    /// default none: from the whole mean, no drift at the start. For ringing that fills a small part of the window, like a coupled lever's.
+    /// Make the start from this many first samples of the events' mean, each event's level and drift from the second
+    /// half of its window; default none: from the whole mean, no drift at the start. For ringing that fills a small
+    /// part of the window, like a coupled lever's.
     pub start_samples: Option<usize>,
-    /// Samples of each event that are missing, clipped say: one list of ranges per event; default empty: none. What stands there is never used.
+    /// Samples of each event that are missing, clipped say: one list of ranges per event; default empty: none. What
+    /// stands there is never used.
     pub missing: Vec<Vec<Range<usize>>>,
     /// What is known beforehand of frequencies, quality factors and real poles; default empty: nothing.
     pub known: Vec<Known>,

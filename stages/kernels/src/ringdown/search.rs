@@ -30,7 +30,7 @@ pub(super) fn assembled(blocks: &[EventBlock], freedom: &Freedom, values: &[f64]
     let mut information = Mat::<f64>::zeros(n, n);
     let mut gradient = vec![0.0; n];
     for block in blocks {
-        information += &block.eliminated.information;
+        information += &block.information;
         gradient.iter_mut().zip(&block.eliminated.score).for_each(|(g, s)| *g += s);
     }
     for (k, &parameter) in freedom.shared.iter().enumerate() {
@@ -56,8 +56,8 @@ const VALLEY: f64 = 0.06;
 /// # Method
 /// [`descend`] with the events' own parameters eliminated by Schur complements. Steps that leave the stable half plane, or
 /// make the fit worse, are repeated shorter; parameters on a bound are held while they push beyond it. Ends when no
-/// parameter of a mode moves by `tolerance` of its standard error and all of them together by less than a quarter of one:
-/// real poles that nearly coincide make a long flat valley, along which nothing else changes.
+/// parameter of a mode moves by `tolerance` of its standard error and all of them together by less than a quarter of
+/// one: real poles that nearly coincide make a long flat valley, along which nothing else changes.
 pub(super) fn search(
     data: &Projected,
     reference: &[Exponential],
@@ -138,7 +138,7 @@ impl Objective for Fit<'_> {
         let (mut step, inverse) = damped_step(&information, &gradient, damping);
         freedom.cut(&values, &mut step);
         let gain: f64 = step.iter().zip(&gradient).map(|(s, g)| s * g).sum::<f64>()
-            + parts.iter().map(|part| part.eliminated.own_gain).sum::<f64>();
+            + parts.iter().map(|part| part.eliminated.own_gain()).sum::<f64>();
         let distance = (0..step.len())
             .filter(|&k| self.of_mode[freedom.shared[k]])
             .map(|k| step[k].abs() / inverse[(k, k)].sqrt().max(f64::MIN_POSITIVE))

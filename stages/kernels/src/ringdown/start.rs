@@ -9,8 +9,9 @@ use crate::model::ModelError;
 /// Poles of a decaying record, an offset allowed.
 ///
 /// # Method
-/// Shift invariance of the dominant column space of the Hankel matrix with `rows` rows, its rows' means removed. The space comes from the
-/// eigenvectors of the Gram matrix, whose diagonals are running sums: `N rows` operations and one eigenproblem of size `rows`.
+/// Shift invariance of the dominant column space of the Hankel matrix with `rows` rows, its rows' means removed. The
+/// space comes from the eigenvectors of the Gram matrix, whose diagonals are running sums: `N rows` operations and one
+/// eigenproblem of size `rows`.
 /// # Accuracy
 /// Signals below `1e-8` of the strongest are lost in the Gram matrix's rounding.
 /// # Source
@@ -53,7 +54,8 @@ fn dominant_space(gram: &Mat<f64>, order: usize) -> Result<Mat<f64>, ModelError>
     Ok(svd.u.as_ref().get(.., ..order).to_owned())
 }
 
-/// The `modes` strongest oscillating exponentials of a decay, and `real_poles` spread over the upper part of the spectrum.
+/// The `modes` strongest oscillating exponentials of a decay, and `real_poles` spread over the upper part of the
+/// spectrum.
 ///
 /// # Method
 /// [`decay_poles`] at an order that leaves room, the amplitudes by least squares, the strongest kept by energy.
@@ -105,8 +107,8 @@ fn spread(count: usize, interval_s: f64) -> impl Iterator<Item = Exponential> {
 
 /// Least-squares residues of given poles, an offset beside them.
 ///
-/// Method: normal equations of columns scaled to unit length; three real poles beyond the sample rate are nearly dependent, so a ridge of
-/// `1e-12` keeps them finite: start values need no more.
+/// Method: normal equations of columns scaled to unit length; three real poles beyond the sample rate are nearly
+/// dependent, so a ridge of `1e-12` keeps them finite: start values need no more.
 pub(super) fn amplitudes(exponentials: &mut [Exponential], values: &[f64], interval_s: f64) {
     let samples = values.len();
     let mut columns: Vec<Vec<f64>> = Vec::new();

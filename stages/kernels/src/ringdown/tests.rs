@@ -149,7 +149,8 @@ fn many_events_give_the_modes_with_standard_errors_that_hold() {
         let fit = fit_ringdowns(&borrowed, &[], INTERVAL_S, &options).unwrap();
         for (interval, mode) in fit.bootstrap_intervals(0.68).iter().flatten().zip(fit.modes()) {
             let half = 0.5 * (interval[0].1 - interval[0].0) / mode.frequency_hz.std;
-            // ten events drawn again and again: their own scatter is known to 24 %, and draws of ten are narrower by 5 %
+            // ten events drawn again and again: their own scatter is known to 24 %, and draws of ten are narrower by 5
+            // %
             assert!((0.3..1.9).contains(&half), "{half}");
         }
         assert!(fit.verdict.converged, "{:?}", fit.verdict);

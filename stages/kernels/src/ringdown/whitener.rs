@@ -8,9 +8,10 @@ pub const LANES: usize = 8;
 /// A filter that turns noise of a [`RingdownNoise`] into white noise of unit variance.
 ///
 /// # Method
-/// The Kalman filter of the noise's state space, started in the stationary state: `e(k) = (v(k) - H x(k|k-1)) / sqrt(S(k))` is linear in `v`
-/// and multiplies `v` by the inverse of the Cholesky factor of its covariance. Gains are computed once, for every record. Over a missing sample the
-/// state is predicted and not corrected; the filtered record is zero there, so that its energy is that of the samples that are there.
+/// The Kalman filter of the noise's state space, started in the stationary state: `e(k) = (v(k) - H x(k|k-1)) /
+/// sqrt(S(k))` is linear in `v` and multiplies `v` by the inverse of the Cholesky factor of its covariance. Gains are
+/// computed once, for every record. Over a missing sample the state is predicted and not corrected; the filtered record
+/// is zero there, so that its energy is that of the samples that are there.
 /// # Shapes
 /// States: two per thermal mode, one per wander; about `10 states` operations per sample and record.
 /// # Accuracy
@@ -23,7 +24,8 @@ pub struct Whitener {
     decays: Vec<f64>,
     /// `A K` and `1 / sqrt(S)` of each sample; the last entry serves all later ones.
     gains: Vec<(Vec<f64>, f64)>,
-    /// Where samples are missing: which of the gains is each sample's, none for a missing one. Empty where every sample is there.
+    /// Where samples are missing: which of the gains is each sample's, none for a missing one. Empty where every sample
+    /// is there.
     order: Vec<Option<usize>>,
 }
 
@@ -31,7 +33,8 @@ pub struct Whitener {
 const SETTLED: f64 = 1e-12;
 
 impl Whitener {
-    /// The filter for records of at most `samples` samples `interval_s` apart, some of which are `missing` (empty: none).
+    /// The filter for records of at most `samples` samples `interval_s` apart, some of which are `missing` (empty:
+    /// none).
     pub fn new(noise: &RingdownNoise, interval_s: f64, samples: usize, missing: &[bool]) -> Self {
         let thermal: Vec<_> = noise.thermal.iter().filter(|mode| mode.variance > 0.0).collect();
         let wander: Vec<_> = noise.wander.iter().filter(|part| part.variance > 0.0).collect();
@@ -149,7 +152,8 @@ impl Whitener {
         let Some(last) = self.gains.len().checked_sub(1) else { return };
         for k in 0..samples {
             let mut error = [0.0; LANES];
-            // where every sample is there they take the gains in turn; over a missing one the error is zero: nothing is corrected
+            // where every sample is there they take the gains in turn; over a missing one the error is zero: nothing is
+            // corrected
             let chosen = if self.order.is_empty() { Some(k) } else { self.order.get(k).copied().flatten() };
             let (gain, scale) = &self.gains[chosen.unwrap_or(last).min(last)];
             if chosen.is_some() {

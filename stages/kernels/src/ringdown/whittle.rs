@@ -11,8 +11,8 @@ pub fn hann(samples: usize) -> Vec<f64> {
     raised_cosine(samples, 0.5).into_iter().map(|w| scale * w).collect()
 }
 
-/// Expected tapered periodogram of each part of the noise at unit variance: parts x bins; `lag_weights`: [`autocorrelation`](crate::signal::autocorrelation) of the taper, gaps cut out
-/// of it.
+/// Expected tapered periodogram of each part of the noise at unit variance: parts x bins; `lag_weights`:
+/// [`autocorrelation`](crate::signal::autocorrelation) of the taper, gaps cut out of it.
 ///
 /// # Method
 /// Exact for the finite window: the Fourier transform of autocovariance times the taper's autocorrelation, folded to N.
@@ -39,7 +39,8 @@ const ROUNDS: usize = 40;
 /// `observed`: mean periodogram, what the fit has absorbed added. Bins from 1 on: the mean is the events' own offset.
 ///
 /// # Method
-/// Fisher scoring: weighted non-negative least squares with weights `1 / level^2`, by cyclic coordinate descent, repeated.
+/// Fisher scoring: weighted non-negative least squares with weights `1 / level^2`, by cyclic coordinate descent,
+/// repeated.
 pub(super) fn variances(observed: &[f64], parts: &[Vec<f64>], start: &[f64]) -> Vec<f64> {
     let mut values = start.to_vec();
     let mut level = levels(parts, &values);

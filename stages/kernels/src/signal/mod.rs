@@ -1,7 +1,7 @@
 //! Sampled signals: tapers, Fourier transforms, periodograms.
 //!
-//! Nothing is planned behind the caller's back: a [`RealTransform`] is the plan for one length, made once and used for many signals, on
-//! any number of threads.
+//! Nothing is planned behind the caller's back: a [`RealTransform`] is the plan for one length, made once and used for
+//! many signals, on any number of threads.
 //!
 //! ```
 //! use afmid_kernels::signal::{Detrend, Welch};

@@ -41,13 +41,14 @@ pub struct TaperGains {
     pub equivalent_bins: f64,
 }
 
-/// Values of a window of the given length; `alpha`: share of a Tukey window that is tapered, half of it at either end, from
-/// zero (rectangular) to one (Hann).
+/// Values of a window of the given length; `alpha`: share of a Tukey window that is tapered, half of it at either end,
+/// from zero (rectangular) to one (Hann).
 ///
 /// # Model
-/// Tukey: `w = (1 + cos(pi (x - 1))) / 2` for `x = 2 k / (alpha (N - 1)) < 1` at the start, mirrored at the end, one between.
-/// Eq. 9 as printed has `1 + alpha` for `1 - alpha` in its limits and twice the taper's length under the cosine: at alpha = 0.1
-/// it would fall from 1 to 0.97 where the taper starts and end at 0.33. This is the window that it means.
+/// Tukey: `w = (1 + cos(pi (x - 1))) / 2` for `x = 2 k / (alpha (N - 1)) < 1` at the start, mirrored at the end, one
+/// between. Eq. 9 as printed has `1 + alpha` for `1 - alpha` in its limits and twice the taper's length under the
+/// cosine: at alpha = 0.1 it would fall from 1 to 0.97 where the taper starts and end at 0.33. This is the window that
+/// it means.
 ///
 /// # Shapes
 /// `[samples]`, symmetric.
@@ -77,8 +78,8 @@ pub fn taper(kind: Taper, alpha: f64, samples: usize) -> Result<Vec<f64>, Signal
     Ok((0..samples).map(value).collect())
 }
 
-/// Hann's window by position: `(1 - cos(2 pi (k + offset) / N)) / 2`. With `offset` 0 half-overlapping segments add up to one; with 0.5 the
-/// window is symmetric and nowhere zero.
+/// Hann's window by position: `(1 - cos(2 pi (k + offset) / N)) / 2`. With `offset` 0 half-overlapping segments add up
+/// to one; with 0.5 the window is symmetric and nowhere zero.
 pub fn hann(samples: usize, offset: f64) -> Vec<f64> {
     let angle = |k: usize| TAU * (k as f64 + offset) / samples as f64;
     (0..samples).map(|k| 0.5 * (1.0 - angle(k).cos())).collect()

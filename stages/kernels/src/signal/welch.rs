@@ -37,7 +37,8 @@ pub enum Detrend {
     Line,
 }
 
-/// Collects segments: Hann window, half overlap, each segment's mean or line removed; segments with values that are not finite are left out.
+/// Collects segments: Hann window, half overlap, each segment's mean or line removed; segments with values that are not
+/// finite are left out.
 ///
 /// # Model
 /// `P(k) = 2 |sum_t w(t) (x(t) - mean) exp(-i 2 pi k t / N)|^2 / (rate sum w^2)`; the two ends are not doubled. Its sum

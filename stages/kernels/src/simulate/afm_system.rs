@@ -17,11 +17,12 @@ pub const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
 ///
 /// # Model
 /// State: per mode `q_n` and `p_n = q_n' / w_n` (both m), then the detector's poles in series (m of static deflection).
-/// `q_n' = w_n p_n`, `p_n' = -w_n q_n - (w_n/Q_n) p_n + (w_n/k_n) F`; `d_1' = w_1 (s - d_1)`, `d_i' = w_i (d_{i-1} - d_i)`.
-/// Free: `F = 0`. Attached: `F = -k_c (h + sum q) - eta (h' + sum w_n p_n)`, `h` the base above the surface.
-/// Noise intensities: `2 k_B T w_n / (Q_n k_n)` on `p_n`; attached, the damper's `2 k_B T eta` through `w_n/k_n` on all.
-/// What is hidden in it: a further mode of share `g` is a mode of stiffness `k / |g|` that the tip's force drives and whose `q` the detector
-/// sees with the sign of `g`, but that does not move the tip; sections follow the poles; feedthrough adds `d0 F / k` to `s`.
+/// `q_n' = w_n p_n`, `p_n' = -w_n q_n - (w_n/Q_n) p_n + (w_n/k_n) F`; `d_1' = w_1 (s - d_1)`, `d_i' = w_i (d_{i-1} -
+/// d_i)`. Free: `F = 0`. Attached: `F = -k_c (h + sum q) - eta (h' + sum w_n p_n)`, `h` the base above the surface.
+/// Noise intensities: `2 k_B T w_n / (Q_n k_n)` on `p_n`; attached, the damper's `2 k_B T eta` through `w_n/k_n` on
+/// all. What is hidden in it: a further mode of share `g` is a mode of stiffness `k / |g|` that the tip's force drives
+/// and whose `q` the detector sees with the sign of `g`, but that does not move the tip; sections follow the poles;
+/// feedthrough adds `d0 F / k` to `s`.
 ///
 /// # Accuracy
 /// Exact: fluctuation and dissipation are paired, so either regime's stationary state is the Boltzmann distribution.

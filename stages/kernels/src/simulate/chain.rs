@@ -15,11 +15,12 @@ pub(super) struct Tap {
     pub static_gain: f64,
 }
 
-/// Appends the chain to a system from state `first` on, one state per pole and section; returns the tap behind it and the static gain of each
-/// new state.
+/// Appends the chain to a system from state `first` on, one state per pole and section; returns the tap behind it and
+/// the static gain of each new state.
 ///
 /// # Model
-/// A pole: `d' = w (in - d)`, out `d`. A section `(high s + low w) / (s + w)`: `e' = w (in - e)`, out `high in + (low - high) e`.
+/// A pole: `d' = w (in - d)`, out `d`. A section `(high s + low w) / (s + w)`: `e' = w (in - e)`, out `high in + (low -
+/// high) e`.
 pub(super) fn append(
     dynamics: &mut Square,
     force_input: &mut [f64],

@@ -99,8 +99,8 @@ impl LinearSystem {
     /// The stationary covariance of a stable system.
     ///
     /// # Method
-    /// Doubling: with `P_T` the covariance accumulated over `T`, `P_2T = P_T + Phi_T P_T Phi_T^T` and `Phi_2T = Phi_T^2`,
-    /// until the slowest pole has decayed by `exp(-40)`.
+    /// Doubling: with `P_T` the covariance accumulated over `T`, `P_2T = P_T + Phi_T P_T Phi_T^T` and `Phi_2T =
+    /// Phi_T^2`, until the slowest pole has decayed by `exp(-40)`.
     ///
     /// # Accuracy
     /// About 1e-12 relative.

@@ -15,20 +15,22 @@ use std::f64::consts::TAU;
 /// Simulates a record with causes hidden in it.
 ///
 /// # Model
-/// As [`simulate_motion`], and: from a release on, the tip feels the share of the pull-off force that [`Effects::load`] leaves; modal forces act
-/// always, with the gap since the release (the base's own motion included; zero while attached; the distance from the surface before any release); the
-/// optics' maps act on the lever's signal before the poles. Further modes, sections and feedthrough are part of `system`.
+/// As [`simulate_motion`], and: from a release on, the tip feels the share of the pull-off force that [`Effects::load`]
+/// leaves; modal forces act always, with the gap since the release (the base's own motion included; zero while
+/// attached; the distance from the surface before any release); the optics' maps act on the lever's signal before the
+/// poles. Further modes, sections and feedthrough are part of `system`.
 ///
 /// # Method
-/// Exact linear propagation between instants so close that the load runs straight from one to the next within a millionth (halved where it does
-/// not), which is exact for a straight load. Modal forces by Strang splitting: half a kick, the exact linear flow with its thermal noise, half a kick, in steps in
-/// which the fastest mode turns by less than a fraction of a radian while the lever rings, of a sample while it rests. Optics: what a map adds to the lever's signal goes through poles and sections
-/// by itself, on straight lines between several points per sample.
+/// Exact linear propagation between instants so close that the load runs straight from one to the next within a
+/// millionth (halved where it does not), which is exact for a straight load. Modal forces by Strang splitting: half a
+/// kick, the exact linear flow with its thermal noise, half a kick, in steps in which the fastest mode turns by less
+/// than a fraction of a radian while the lever rings, of a sample while it rests. Optics: what a map adds to the
+/// lever's signal goes through poles and sections by itself, on straight lines between several points per sample.
 ///
 /// # Accuracy
-/// Loads: 1e-6 of the pull-off force. Modal forces: second order, about `STEP_RADIANS^2 / 12`, 1 % of their effect on the fastest mode and 1e-4 of that on a
-/// mode ten times slower (halving tested). Optics: `(w / (8 rate))^2 / 12` of what they add, 0.2 % at a fifth of the rate. With nothing hidden: the
-/// bits of [`simulate_motion`].
+/// Loads: 1e-6 of the pull-off force. Modal forces: second order, about `STEP_RADIANS^2 / 12`, 1 % of their effect on
+/// the fastest mode and 1e-4 of that on a mode ten times slower (halving tested). Optics: `(w / (8 rate))^2 / 12` of
+/// what they add, 0.2 % at a fifth of the rate. With nothing hidden: the bits of [`simulate_motion`].
 #[allow(clippy::too_many_arguments, reason = "the microscope's parts, and what is hidden")]
 pub fn simulate_hidden(
     system: &AfmSystem,

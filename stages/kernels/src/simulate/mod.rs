@@ -5,8 +5,8 @@
 //! [`PhaseProblem`] chooses start phases so that an archive holds a stated number of events.
 //!
 //! # Model
-//! Modes of a lever on a moved base, free or in contact with a spring and a damper; between events linear, propagated exactly (matrix exponential). Crossings
-//! are found to 1e-8 of a sample.
+//! Modes of a lever on a moved base, free or in contact with a spring and a damper; between events linear, propagated
+//! exactly (matrix exponential). Crossings are found to 1e-8 of a sample.
 //! # Cost
 //! O(modes^2) per sample.
 //!

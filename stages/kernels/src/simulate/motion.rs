@@ -136,7 +136,8 @@ pub(super) struct Run<'a> {
     pub(super) held_n: Option<f64>,
     /// Force on the free tip at the start of a step and its rate, N and N/s, where one is hidden.
     pub(super) load: Option<(f64, f64)>,
-    /// Acceleration of the tip by modal forces (m/s^2) and length of the step (s), whose half the state has got in advance.
+    /// Acceleration of the tip by modal forces (m/s^2) and length of the step (s), whose half the state has got in
+    /// advance.
     pub(super) kicked: (f64, f64),
     armed: bool,
     events: Vec<ContactEvent>,
@@ -287,7 +288,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Tension of the contact with `state` at `t_s` within the present step; what a kick gave too early or still owes is put right.
+    /// Tension of the contact with `state` at `t_s` within the present step; what a kick gave too early or still owes
+    /// is put right.
     fn tension_n(&self, state: &[f64], t_s: f64) -> f64 {
         let height = self.drive.height_m(self.half, t_s);
         let velocity = self.drive.ramp.velocity_m_per_s(self.half);

@@ -61,7 +61,8 @@ impl<'a> Optics<'a> {
         }
     }
 
-    /// What the maps add at the present sample behind poles and sections, as static deflection, m. To be called once per sample.
+    /// What the maps add at the present sample behind poles and sections, as static deflection, m. To be called once
+    /// per sample.
     pub fn added_m(&mut self, run: &Run) -> f64 {
         let rows = &self.rows[usize::from(run.held_n.is_some())];
         let (height, velocity) = run.base();

@@ -82,9 +82,9 @@ impl PhaseProblem {
     /// Phases of all records, such that the totals are `target`'s.
     ///
     /// # Method
-    /// Each record tries a grid of phases from a seeded start and notes the first phase for each attainable pair of counts;
-    /// pairs are then assigned greedily in a seeded order of the records, each step staying within what the remaining
-    /// records can still make up (exact by dynamic programming over the two totals).
+    /// Each record tries a grid of phases from a seeded start and notes the first phase for each attainable pair of
+    /// counts; pairs are then assigned greedily in a seeded order of the records, each step staying within what the
+    /// remaining records can still make up (exact by dynamic programming over the two totals).
     ///
     /// # Errors
     /// Totals out of reach; a record without any phase that keeps its events off its ends.

@@ -46,7 +46,8 @@ impl TriangleRamp {
         (0.5 * (half + 1) as f64 - self.phase) / self.frequency_hz
     }
 
-    /// When the base passes `height_m` in half-cycle `half`, s; outside the half-cycle where the height is out of range.
+    /// When the base passes `height_m` in half-cycle `half`, s; outside the half-cycle where the height is out of
+    /// range.
     pub fn passes_s(&self, half: i64, height_m: f64) -> f64 {
         let share = 0.5 - height_m / (self.range_m * self.direction(half));
         (0.5 * (half as f64 + share) - self.phase) / self.frequency_hz

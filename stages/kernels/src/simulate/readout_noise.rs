@@ -10,8 +10,8 @@ use std::f64::consts::{PI, TAU};
 ///
 /// # Model
 /// `white` at each sample; `pink`, the sum of Ornstein-Uhlenbeck processes of equal variance with corner frequencies
-/// two per decade from [`PINK_LOWEST_HZ`] to the Nyquist frequency: `1/f` within 0.2 dB between the ends; `drift`, three sines
-/// of half, one and one and a half periods over the whole archive with seeded phases.
+/// two per decade from [`PINK_LOWEST_HZ`] to the Nyquist frequency: `1/f` within 0.2 dB between the ends; `drift`,
+/// three sines of half, one and one and a half periods over the whole archive with seeded phases.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReadoutNoise {
     /// Standard deviation of the white noise, V.
@@ -123,7 +123,8 @@ mod tests {
                 *p += s.norm_sqr();
             }
         }
-        // four or five of twelve processes are constant in a run: the mean square scatters by sqrt(2 * 4.5) / 12 / sqrt(40) = 4 %
+        // four or five of twelve processes are constant in a run: the mean square scatters by sqrt(2 * 4.5) / 12 /
+        // sqrt(40) = 4 %
         assert!((square - 1.0).abs() < 0.16, "{square}");
         let band = |f: f64| {
             let k = (f * n as f64 / rate) as usize;

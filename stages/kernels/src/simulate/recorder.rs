@@ -162,8 +162,8 @@ impl Microscope {
     /// Simulates one record.
     ///
     /// # Accuracy
-    /// The motion is exact (`simulate_motion`); the rest is arithmetic. The same seed gives the same codes on any number of
-    /// threads: each record has its own streams.
+    /// The motion is exact (`simulate_motion`); the rest is arithmetic. The same seed gives the same codes on any
+    /// number of threads: each record has its own streams.
     pub fn record(&self, plan: &RecordPlan, phase: f64, drift: &Drift, place: Place) -> SimulatedRecord {
         self.record_with(plan, phase, drift, place, &Effects::default())
     }
@@ -171,8 +171,9 @@ impl Microscope {
     /// Simulates one record with causes hidden in it ([`simulate_hidden`]).
     ///
     /// # Model
-    /// Frequencies are those of the record's middle; the sampling instants of the whole record are shifted by one draw of the jitter; volts are added behind
-    /// the electronics and before the noise, limits act in front of the converter.
+    /// Frequencies are those of the record's middle; the sampling instants of the whole record are shifted by one draw
+    /// of the jitter; volts are added behind the electronics and before the noise, limits act in front of the
+    /// converter.
     ///
     /// # Accuracy
     /// With nothing hidden: the bits of [`Microscope::record`].

@@ -25,7 +25,8 @@ pub struct Release {
 
 /// Samples for which a lever under modal forces settles while it is held.
 const SETTLE: usize = 3000;
-/// Range of a piezo that stands still, and a catch that lies beyond it: the tip is held, and once let go never caught again.
+/// Range of a piezo that stands still, and a catch that lies beyond it: the tip is held, and once let go never caught
+/// again.
 const STILL: TriangleRamp = TriangleRamp { frequency_hz: 0.0, range_m: 10.0, phase: 0.75 };
 const NEVER_M: f64 = -1.0;
 
@@ -35,8 +36,9 @@ impl Microscope {
     /// # Model
     /// The base stands still; the tip is held by the contact until it is let go, whatever the tension.
     /// # Method
-    /// The integrator of [`simulate_hidden`](crate::simulate::hidden_motion::simulate_hidden) at zero temperature: exact linear propagation, loads on straight lines, modal forces by
-    /// Strang splitting, optics on points between samples. The instants of the samples are shifted, so that the release falls anywhere between two.
+    /// The integrator of [`simulate_hidden`](crate::simulate::hidden_motion::simulate_hidden) at zero temperature:
+    /// exact linear propagation, loads on straight lines, modal forces by Strang splitting, optics on points between
+    /// samples. The instants of the samples are shifted, so that the release falls anywhere between two.
     /// # Accuracy
     /// That of `simulate_hidden`.
     pub fn released(&self, release: &Release, effects: &Effects, cut: Cut) -> Vec<f64> {

@@ -64,8 +64,8 @@ fn snap_off_rings_down_as_the_closed_form_does() {
     let deflection = -330e-9 / 3.8;
     let closed = ClosedForm::paper().release(40_000, t0, deflection);
     let worst = (t0 as usize + 1..40_000).map(|k| (result.signal_m[k] - closed[k]).abs()).fold(0.0, f64::max);
-    // the closed form holds the load before the release, the simulated base moves on: 2.2 um/s times the detector's 0.27 us
-    // and 2.2 um/s / w1 of velocity in mode 1, 1e-11 m together; 87 nm is the scale
+    // the closed form holds the load before the release, the simulated base moves on: 2.2 um/s times the detector's
+    // 0.27 us and 2.2 um/s / w1 of velocity in mode 1, 1e-11 m together; 87 nm is the scale
     assert!(worst < 1.2e-11, "{worst:e}");
     let before = result.signal_m[t0 as usize - 10];
     let load = deflection + 10.0 * interval_s * 2.232e-6 * 60.0 / 63.8;
@@ -192,8 +192,8 @@ fn a_record_holds_what_its_plan_says() {
     for (event, (kind, time)) in record.events.iter().zip(&predicted) {
         assert!(event.counted);
         assert_eq!(event.event.kind, *kind);
-        // attached: the contact's thermal tension of 60 N/m * 8 pm = 0.5 nN over 8 nN/ms of ramp, 63 us, and its maximum
-        // over the approach to the threshold: 5 sigma (free: 33 pm over 2.2 um/s, 15 us)
+        // attached: the contact's thermal tension of 60 N/m * 8 pm = 0.5 nN over 8 nN/ms of ramp, 63 us, and its
+        // maximum over the approach to the threshold: 5 sigma (free: 33 pm over 2.2 um/s, 15 us)
         assert!((event.event.time_s - time).abs() < 3e-4, "{} {time}", event.event.time_s);
     }
     // quasi-static load before the release: F / k in codes

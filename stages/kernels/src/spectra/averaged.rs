@@ -34,11 +34,13 @@ const HALF_OVERLAP: f64 = 1.0 / 36.0;
 /// Averages the spectra of several records.
 ///
 /// # Model
-/// Each bin of a segment is exponentially distributed about the density; neighbours that overlap by half correlate by 1/36 under a Hann window.
+/// Each bin of a segment is exponentially distributed about the density; neighbours that overlap by half correlate by
+/// 1/36 under a Hann window.
 ///
 /// # Method
-/// Weighted by segments. `S` segments with `P` overlapping pairs are worth `S^2 / (S + P / 18)` independent ones: twice as many degrees of freedom.
-/// `record_error`: `sum w_r^2 (P_r - P)^2 / (1 - w_r)`, `w_r` a record's share of the segments.
+/// Weighted by segments. `S` segments with `P` overlapping pairs are worth `S^2 / (S + P / 18)` independent ones: twice
+/// as many degrees of freedom. `record_error`: `sum w_r^2 (P_r - P)^2 / (1 - w_r)`, `w_r` a record's share of the
+/// segments.
 ///
 /// # Shapes
 /// Every record has as many bins.
@@ -47,7 +49,8 @@ const HALF_OVERLAP: f64 = 1.0 / 36.0;
 /// Those of the densities.
 ///
 /// # Accuracy
-/// Exact for stationary Gaussian noise whose density is flat over the window's width. The first two bins hold the removed mean.
+/// Exact for stationary Gaussian noise whose density is flat over the window's width. The first two bins hold the
+/// removed mean.
 ///
 /// # Errors
 /// No segment, or lengths that differ.

@@ -43,12 +43,13 @@ pub struct EnsembleResponseSettings {
 /// Estimates a frequency response from several events with inputs of their own size.
 ///
 /// # Model
-/// `Y_i = G U_i (1 - i w l_i) + a_i U_i D + N_i`: linear response, a lag of each event, a distortion in proportion to the input's deviation `a_i` from the mean
-/// size (the first term that a nonlinearity adds), and noise.
+/// `Y_i = G U_i (1 - i w l_i) + a_i U_i D + N_i`: linear response, a lag of each event, a distortion in proportion to
+/// the input's deviation `a_i` from the mean size (the first term that a nonlinearity adds), and noise.
 ///
 /// # Method
-/// `G = sum Y U* / sum |U|^2`; the scatter `Y - G U` over `n - 1`; lags by least squares over all bins weighted with the scatter; distortion by
-/// regression on `a_i U_i`, its expected noise subtracted, its chance from the F distribution with 2 and 2 (n - 3) degrees of freedom.
+/// `G = sum Y U* / sum |U|^2`; the scatter `Y - G U` over `n - 1`; lags by least squares over all bins weighted with
+/// the scatter; distortion by regression on `a_i U_i`, its expected noise subtracted, its chance from the F
+/// distribution with 2 and 2 (n - 3) degrees of freedom.
 ///
 /// # Shapes
 /// `inputs`, `responses`: events of equal length N; results `[N/2 + 1]`.
@@ -57,14 +58,16 @@ pub struct EnsembleResponseSettings {
 /// Response over input; levels in the response's unit squared.
 ///
 /// # Accuracy
-/// The variance of a bin has a relative standard error of `1 / sqrt((n - 1) (2 h + 1))` for h bins on either side. An input that is itself
-/// scaled by the response holds the mean amplitude's noise, a share of 1/N. What rings beyond the window's end is in all events alike and not in the variance.
+/// The variance of a bin has a relative standard error of `1 / sqrt((n - 1) (2 h + 1))` for h bins on either side. An
+/// input that is itself scaled by the response holds the mean amplitude's noise, a share of 1/N. What rings beyond the
+/// window's end is in all events alike and not in the variance.
 ///
 /// # Errors
 /// Fewer than four events, unequal lengths, values not finite, an input that is zero.
 ///
 /// # Source
-/// R. Pintelon, J. Schoukens, System Identification (2012), ch. 2 and 4; J. S. Bendat, A. G. Piersol, Random Data (2010), ch. 9.
+/// R. Pintelon, J. Schoukens, System Identification (2012), ch. 2 and 4; J. S. Bendat, A. G. Piersol, Random Data
+/// (2010), ch. 9.
 pub fn ensemble_response(
     inputs: &[Vec<f64>],
     responses: &[Vec<f64>],
@@ -183,7 +186,8 @@ mod tests {
     const EVENTS: usize = 24;
     const SETTINGS: EnsembleResponseSettings = EnsembleResponseSettings { half_width_bins: 2, band_bins: 900 };
 
-    /// Differences of releases of the paper's lever, adhesion scattered by a fifth, through a detector `v = s + a2 s^2`.
+    /// Differences of releases of the paper's lever, adhesion scattered by a fifth, through a detector `v = s + a2
+    /// s^2`.
     fn ensemble(noise: f64, a2: f64, seed: u64) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let shape = Lever::paper().release(N, 500.0, -0.9);
         let amplitude = white_noise(EVENTS, 0.2, 40 + seed);
@@ -231,13 +235,15 @@ mod tests {
         // second harmonic of the first mode, 92.6 kHz, and its neighbours
         let k = (92.6e3_f64 / 5e6 * N as f64).round() as usize;
         assert!(got.distortion_p[k] < 1e-6 && got.distortion[k] > 10.0 * got.noise[k]);
-        // (Y - G U) of event i is a2 S (size^2 - size w): level (a2 S)^2 times the variance of size (size - w), w the power-weighted mean size
+        // (Y - G U) of event i is a2 S (size^2 - size w): level (a2 S)^2 times the variance of size (size - w), w the
+        // power-weighted mean size
         let square: Vec<f64> = Lever::paper().release(N, 500.0, -0.9).iter().map(|s| s * s).collect();
         let s2 = transform(&[&difference(&square)]).unwrap().remove(0)[k].norm_sqr() * 0.05 * 0.05;
         let size: Vec<f64> = white_noise(EVENTS, 0.2, 47).iter().map(|a| 1.0 + a).collect();
         let (p2, p3) = (size.iter().map(|s| s.powi(2)).sum::<f64>(), size.iter().map(|s| s.powi(3)).sum::<f64>());
         let expected = s2 * size.iter().map(|s| (s * s - s * p3 / p2).powi(2)).sum::<f64>() / (EVENTS as f64 - 1.0);
-        // noise of 1e-4 makes a hundredth of it; the lag takes up a part that is in phase with it, and size stands for size (size - w)
+        // noise of 1e-4 makes a hundredth of it; the lag takes up a part that is in phase with it, and size stands for
+        // size (size - w)
         assert!((got.distortion[k] / expected - 1.0).abs() < 0.15, "{} {expected}", got.distortion[k]);
         // one event half a sample late: Nyquist apart, a shift by interpolation of its neighbours at low frequencies
         let late: Vec<f64> = (0..N).map(|k| 0.5 * (y[3][k] + y[3][k.saturating_sub(1)])).collect();

@@ -9,8 +9,8 @@ use crate::spectra::error::SpectrumError;
 /// Transforms series of one length with one plan.
 ///
 /// # Method
-/// `X_k = N^(-1/2) sum_(n=0)^(N-1) x_n exp(-i 2 pi k n / N)`, `k = 0 ... N/2`. The paper sums from one to N, which turns all
-/// transforms by the same phase and leaves ratios as they are.
+/// `X_k = N^(-1/2) sum_(n=0)^(N-1) x_n exp(-i 2 pi k n / N)`, `k = 0 ... N/2`. The paper sums from one to N, which
+/// turns all transforms by the same phase and leaves ratios as they are.
 ///
 /// # Shapes
 /// Each series `[N]`, each result `[N/2 + 1]`.

@@ -44,15 +44,16 @@ pub(super) struct Fraction {
 
 /// Reweighted linear steps: peaks two bins wide settle within four.
 const LINEAR_STEPS: usize = 6;
-/// Change of the squares, as a share, after which further steps would move the value by less than a thousandth of its standard error.
+/// Change of the squares, as a share, after which further steps would move the value by less than a thousandth of its
+/// standard error.
 const SETTLED: f64 = 1e-6;
 /// Gauss-Newton steps at most: they end the bias that reweighting leaves in noise.
 const NEWTON_STEPS: usize = 8;
 /// Lengths that are tried of each.
 const HALVINGS: usize = 5;
 
-/// Fits by Levy's linear problem, reweighted (Sanathanan and Koerner 1963), then by Gauss-Newton on the true residual; each of `points`, all of as many
-/// values, for itself.
+/// Fits by Levy's linear problem, reweighted (Sanathanan and Koerner 1963), then by Gauss-Newton on the true residual;
+/// each of `points`, all of as many values, for itself.
 pub(super) fn fit_fractions(points: &[Points], orders: Orders) -> Vec<Fraction> {
     pulp::Arch::new().dispatch(Fit { points, orders })
 }

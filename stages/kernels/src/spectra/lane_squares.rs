@@ -1,6 +1,7 @@
 //! Small complex least squares, one problem per lane of the vector units.
 //!
-//! Plain loops throughout: a closure is a function of its own, compiled without the vector units that its caller was dispatched to.
+//! Plain loops throughout: a closure is a function of its own, compiled without the vector units that its caller was
+//! dispatched to.
 
 use pulp::Simd;
 
@@ -20,12 +21,13 @@ pub(super) struct Factored<S: Simd> {
 /// A column counts as dependent when less than this share of it lies outside the columns before.
 const DEPENDENT: f64 = 1e-9;
 
-/// A column that keeps more than this share of its length outside the columns before is orthogonal to them within ten roundings; shorter ones
-/// are made so once more.
+/// A column that keeps more than this share of its length outside the columns before is orthogonal to them within ten
+/// roundings; shorter ones are made so once more.
 const CLOSE: f64 = 0.1;
 
 impl<S: Simd> Factored<S> {
-    /// Gram-Schmidt, twice where a column of any lane is close to those before, in the order given: the columns that matter most come first.
+    /// Gram-Schmidt, twice where a column of any lane is close to those before, in the order given: the columns that
+    /// matter most come first.
     #[inline(always)]
     pub fn new(lanes: Lanes<S>, mut columns: Vec<Complex<S>>, rows: usize) -> Self {
         let simd = lanes.0;
@@ -85,7 +87,8 @@ impl<S: Simd> Factored<S> {
         x
     }
 
-    /// Variance of the first coefficient when every row of `b` has variance one: the first diagonal element of `(C^H C)^-1`.
+    /// Variance of the first coefficient when every row of `b` has variance one: the first diagonal element of `(C^H
+    /// C)^-1`.
     #[inline(always)]
     pub fn first_variance(&self, lanes: Lanes<S>) -> S::f64s {
         let count = self.inverse.len();
@@ -126,7 +129,8 @@ mod tests {
         white_noise(2 * n, 1.0, seed).chunks(2).map(|c| Complex64::new(c[0], c[1])).collect()
     }
 
-    /// Solution, variance of the first coefficient and rank of the first and the last lane: the first has a copy as its last column, the last has not.
+    /// Solution, variance of the first coefficient and rank of the first and the last lane: the first has a copy as its
+    /// last column, the last has not.
     struct Solved<'a>(&'a [Vec<Complex64>], &'a [Complex64]);
 
     impl WithSimd for Solved<'_> {

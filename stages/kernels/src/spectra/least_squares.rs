@@ -66,12 +66,13 @@ pub(super) struct Factored {
 /// A column counts as dependent when less than this share of it lies outside the columns before.
 const DEPENDENT: f64 = 1e-9;
 
-/// A column that keeps more than this share of its length outside the columns before is orthogonal to them within ten roundings; shorter ones
-/// are made so once more.
+/// A column that keeps more than this share of its length outside the columns before is orthogonal to them within ten
+/// roundings; shorter ones are made so once more.
 const CLOSE: f64 = 0.1;
 
 impl Factored {
-    /// Gram-Schmidt, twice where a column is close to those before, in the order given: the columns that matter most come first.
+    /// Gram-Schmidt, twice where a column is close to those before, in the order given: the columns that matter most
+    /// come first.
     pub fn new(columns: &Columns) -> Self {
         pulp::Arch::new().dispatch(Orthogonalise(columns))
     }

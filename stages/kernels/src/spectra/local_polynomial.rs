@@ -15,15 +15,16 @@ pub struct PolynomialSettings {
     pub degree: usize,
     /// Widest neighbourhood, in bins on either side.
     pub half_width_bins: usize,
-    /// Narrows the neighbourhood where the data contradict a wide one by more than so many standard errors; `None` keeps it fixed.
+    /// Narrows the neighbourhood where the data contradict a wide one by more than so many standard errors; `None`
+    /// keeps it fixed.
     pub adapt_sigma: Option<f64>,
 }
 
 /// Smooths by a polynomial through the neighbours of each bin.
 ///
 /// # Model
-/// `G(f_k + d) = sum_j b_j d^j` over the neighbourhood, complex coefficients: the same as real and imaginary parts one by
-/// one. Magnitudes must not be smoothed: noise adds `phi / |U|^2` to their square (Eq. 10).
+/// `G(f_k + d) = sum_j b_j d^j` over the neighbourhood, complex coefficients: the same as real and imaginary parts one
+/// by one. Magnitudes must not be smoothed: noise adds `phi / |U|^2` to their square (Eq. 10).
 ///
 /// # Method
 /// Weighted least squares, evaluated at the bin. Adaptive: from the narrowest exact neighbourhood (as many bins as

@@ -22,22 +22,23 @@ pub struct RationalSettings {
     pub denominator_order: usize,
     /// Neighbourhood, in bins on either side.
     pub half_width_bins: usize,
-    /// Order of a transient that turns with the delay from the start of the window to the event, given in samples over the
-    /// length of the window (turns per bin); `None` for no transient.
+    /// Order of a transient that turns with the delay from the start of the window to the event, given in samples over
+    /// the length of the window (turns per bin); `None` for no transient.
     pub transient: Option<(usize, f64)>,
 }
 
 /// Smooths by a quotient of polynomials through the neighbours of each bin.
 ///
 /// # Model
-/// `G(f_k + d) = (B(d) + exp(i 2 pi c d) T(d)) / A(d)` over the neighbourhood: a resonance and an antiresonance are exact in it.
-/// `T` is what the ends of the window add to the response (it starts at the window, not at the event, hence the turning phase
-/// `c` turns per bin); it is fitted and left out of the result.
+/// `G(f_k + d) = (B(d) + exp(i 2 pi c d) T(d)) / A(d)` over the neighbourhood: a resonance and an antiresonance are
+/// exact in it. `T` is what the ends of the window add to the response (it starts at the window, not at the event,
+/// hence the turning phase `c` turns per bin); it is fitted and left out of the result.
 ///
 /// # Method
 /// Levy's linear least squares with offsets scaled to one, reweighted by the last denominator (Sanathanan and Koerner),
-/// then Gauss-Newton. A plain polynomial numerator (no denominator) is fitted beside it, and the two are averaged with the weights of the corrected
-/// Akaike criterion: no denominator is invented from noise, and none is dropped by it. Bins of a suppressed line are left out and filled in.
+/// then Gauss-Newton. A plain polynomial numerator (no denominator) is fitted beside it, and the two are averaged with
+/// the weights of the corrected Akaike criterion: no denominator is invented from noise, and none is dropped by it.
+/// Bins of a suppressed line are left out and filled in.
 ///
 /// # Shapes
 /// `[bins]` throughout.
@@ -46,14 +47,16 @@ pub struct RationalSettings {
 /// Those of the estimate.
 ///
 /// # Accuracy
-/// Noise-free, resonances two bins wide are lowered by less than 0.1 %; a parabola of the same width lowers them by tens of per cent.
-/// The variance is that of the linearised local models, from the variance given, or from the residual if that is unknown, and what they differ by.
+/// Noise-free, resonances two bins wide are lowered by less than 0.1 %; a parabola of the same width lowers them by
+/// tens of per cent. The variance is that of the linearised local models, from the variance given, or from the residual
+/// if that is unknown, and what they differ by.
 ///
 /// # Errors
 /// A neighbourhood with fewer bins than one more than the coefficients, too few defined bins, unequal lengths.
 ///
 /// # Source
-/// McKelvey and Guerin, IFAC SYSID 2012; Buckland, Burnham and Augustin, Biometrics 53 (1997) 603; Pintelon and Schoukens, System Identification, 2012, ch. 7.
+/// McKelvey and Guerin, IFAC SYSID 2012; Buckland, Burnham and Augustin, Biometrics 53 (1997) 603; Pintelon and
+/// Schoukens, System Identification, 2012, ch. 7.
 pub fn local_rational(
     bins: Bins<'_>,
     settings: RationalSettings,
@@ -121,8 +124,9 @@ struct Local {
 
 /// Quotient and plain polynomial, weighted by how well each explains the values (Akaike weights).
 ///
-/// To take the better of the two and forget the other counts the choice as certain: the variance then comes out a tenth too low wherever noise decides.
-/// Weighted, it is `(sum w sqrt(v + |g - mean|^2))^2` (Buckland, Burnham and Augustin 1997, Eq. 9).
+/// To take the better of the two and forget the other counts the choice as certain: the variance then comes out a tenth
+/// too low wherever noise decides. Weighted, it is `(sum w sqrt(v + |g - mean|^2))^2` (Buckland, Burnham and Augustin
+/// 1997, Eq. 9).
 fn average(points: &[Points], full: Orders, known_variance: bool, pull: f64) -> Vec<Local> {
     let fractions = fit_fractions(points, full);
     if full.denominator == 0 {
@@ -175,10 +179,11 @@ fn misfit(points: &Points, fit: &Fraction) -> f64 {
     fit.squares / points.offset.len().saturating_sub(fit.rank).max(1) as f64
 }
 
-/// How much too small the average's misfit is where nothing resonates: a denominator that looks for the best place to resonate in noise has more
-/// freedom than coefficients. Where the data hold a resonance (`share` near 0) it has not.
+/// How much too small the average's misfit is where nothing resonates: a denominator that looks for the best place to
+/// resonate in noise has more freedom than coefficients. Where the data hold a resonance (`share` near 0) it has not.
 ///
-/// Found by fitting noise, 400 draws from a fixed seed, against the plain polynomial's misfit, whose expectation is exactly one.
+/// Found by fitting noise, 400 draws from a fixed seed, against the plain polynomial's misfit, whose expectation is
+/// exactly one.
 /// Source: J. Ye, J. Am. Stat. Assoc. 93 (1998) 120 (generalised degrees of freedom).
 fn overfit(usable: &Usable<'_>, full: Orders, count: usize, turns: f64) -> f64 {
     const DRAWS: u64 = 400;

@@ -1,7 +1,7 @@
 //! Parameter-free estimates: windows, periodograms, ETFE, smoothing.
 //!
-//! Sign and scale: `X_k = N^(-1/2) sum_n x_n exp(-i 2 pi k n / N)` at the bins `k f_s / N` from zero to half the sample rate.
-//! Undefined values are NaN.
+//! Sign and scale: `X_k = N^(-1/2) sum_n x_n exp(-i 2 pi k n / N)` at the bins `k f_s / N` from zero to half the sample
+//! rate. Undefined values are NaN.
 //!
 //! [`etfe`] divides transforms (Eqs. 5 to 7), [`local_rational`] and [`local_polynomial`] smooth it, [`power_spectrum`] and [`average_spectra`] are for noise,
 //! [`thermal_fit`] reads modes

@@ -16,11 +16,13 @@ pub struct PowerSpectrum {
 /// Periodogram of a series that has been multiplied by a window.
 ///
 /// # Model
-/// The normalised absolute square of the Fourier transform, an estimate of the power spectral density with 100 % scatter.
+/// The normalised absolute square of the Fourier transform, an estimate of the power spectral density with 100 %
+/// scatter.
 ///
 /// # Method
-/// `P_k = 2 N |X_k|^2 / (f_s sum w^2)`, without the factor two at zero and at half the sample rate; its integral over frequency
-/// is the mean square of a stationary series. `window_power` is `sum w^2`, the number of samples for a rectangular window.
+/// `P_k = 2 N |X_k|^2 / (f_s sum w^2)`, without the factor two at zero and at half the sample rate; its integral over
+/// frequency is the mean square of a stationary series. `window_power` is `sum w^2`, the number of samples for a
+/// rectangular window.
 ///
 /// # Shapes
 /// `series` `[N]`, result `[N/2 + 1]`.

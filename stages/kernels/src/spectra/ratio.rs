@@ -15,8 +15,8 @@ use crate::spectra::fourier::{bin_frequencies, transform};
 pub enum EndTreatment {
     /// Force and response as they are, multiplied by a window that makes their ends meet (the paper).
     Windowed,
-    /// First differences of both, from [`difference`]: the step has become a pulse, and the jump from the end of the window to
-    /// its start is never seen.
+    /// First differences of both, from [`difference`]: the step has become a pulse, and the jump from the end of the
+    /// window to its start is never seen.
     Differenced,
 }
 
@@ -24,8 +24,8 @@ pub enum EndTreatment {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Intersample {
-    /// It is held until the next sample, as a force that is released at a sample is. The ratio of the transforms then lags by
-    /// half a sample and droops by `sin(x) / x`, `x = pi f / f_s`; both are taken out.
+    /// It is held until the next sample, as a force that is released at a sample is. The ratio of the transforms then
+    /// lags by half a sample and droops by `sin(x) / x`, `x = pi f / f_s`; both are taken out.
     Held,
     /// Nothing is corrected: the transfer function from sequence to sequence.
     Sampled,
@@ -73,12 +73,12 @@ const MEDIAN_REACH: usize = 32;
 ///
 /// # Method
 /// `G = Y / U` (Eqs. 5 to 7). Windowed: the tapered response to a force is not the response to the tapered force; for a
-/// Tukey window with alpha = 0.1 over 8192 samples this costs 1.5 % at the paper's first resonance, and up to half of the value
-/// at antiresonances. Differenced: the ratio is the same for a linear system, the input's spectrum is flat and has no zeros, and only
-/// what still rings at the end is missing (0.7 %), as a transient that [`local_rational`](super::local_rational())
-/// takes out to 1e-5. Held input: `G` is multiplied by `i w T / (1 - exp(-i w T))`.
-/// The quasi-static gain is the regression of the response on the force with Hann weights, which suppress the ringing: over
-/// the stretch where the force acts, or, from differences, over either side of the largest step.
+/// Tukey window with alpha = 0.1 over 8192 samples this costs 1.5 % at the paper's first resonance, and up to half of
+/// the value at antiresonances. Differenced: the ratio is the same for a linear system, the input's spectrum is flat
+/// and has no zeros, and only what still rings at the end is missing (0.7 %), as a transient that
+/// [`local_rational`](super::local_rational()) takes out to 1e-5. Held input: `G` is multiplied by `i w T / (1 - exp(-i
+/// w T))`. The quasi-static gain is the regression of the response on the force with Hann weights, which suppress the
+/// ringing: over the stretch where the force acts, or, from differences, over either side of the largest step.
 ///
 /// # Shapes
 /// `force`, `response`, `noise_std` `[N]`; results `[N/2 + 1]`.
@@ -87,9 +87,10 @@ const MEDIAN_REACH: usize = 32;
 /// Response over force.
 ///
 /// # Accuracy
-/// `variance = phi / |U|^2` with `phi` the noise's transform squared (times `|1 - exp(-i w T)|^2 + 2 / N` when differenced).
-/// Real and imaginary parts hold half each. Folding about half the sample rate is not corrected: below 3e-5 of the static
-/// gain up to 1.2 MHz for the paper's lever at 5 MS/s, which is 12 % of the value at the antiresonance near 900 kHz.
+/// `variance = phi / |U|^2` with `phi` the noise's transform squared (times `|1 - exp(-i w T)|^2 + 2 / N` when
+/// differenced). Real and imaginary parts hold half each. Folding about half the sample rate is not corrected: below
+/// 3e-5 of the static gain up to 1.2 MHz for the paper's lever at 5 MS/s, which is 12 % of the value at the
+/// antiresonance near 900 kHz.
 ///
 /// # Errors
 /// Under eight samples, unequal lengths, values not finite, settings out of range, a force that is zero throughout.
@@ -184,7 +185,8 @@ fn static_gain(force: &[f64], response: &[f64]) -> f64 {
     uy / uu
 }
 
-/// The same from differences: their sums are regressed with a free offset, Hann weights on either side of the largest step.
+/// The same from differences: their sums are regressed with a free offset, Hann weights on either side of the largest
+/// step.
 fn summed_gain(force: &[f64], response: &[f64]) -> f64 {
     let event = (0..force.len()).max_by(|&a, &b| force[a].abs().total_cmp(&force[b].abs())).unwrap_or(0);
     let (mut u, mut y) = (0.0, 0.0);

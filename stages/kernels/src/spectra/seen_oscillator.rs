@@ -37,13 +37,14 @@ impl SeenThrough {
 /// Expected one-sided density of a harmonic oscillator of variance one, and its relative slopes.
 ///
 /// # Model
-/// Autocovariance `C(t) = exp(-g t) (cos w t + (g / w) sin w t)`, `g = w0 / 2 Q`, `w^2 = w0^2 - g^2`. A segment of length T under a window whose
-/// autocorrelation is `r(t / T)` has the expected periodogram `4 int_0^T r C cos(2 pi f t) dt`: exact for any width of the
-/// resonance against the bins, where the density itself would be too narrow and too high.
+/// Autocovariance `C(t) = exp(-g t) (cos w t + (g / w) sin w t)`, `g = w0 / 2 Q`, `w^2 = w0^2 - g^2`. A segment of
+/// length T under a window whose autocorrelation is `r(t / T)` has the expected periodogram `4 int_0^T r C cos(2 pi f
+/// t) dt`: exact for any width of the resonance against the bins, where the density itself would be too narrow and too
+/// high.
 ///
 /// # Method
-/// Closed form: `C` is a sum of exponentials and `r` of `(1 - x)`, `(1 - x) cos 2 pi x` and `sin 2 pi x` (Hann), so that all is made of
-/// `h(z) = (1 - exp(-z)) / z` and `F(z) = (1 - h(z)) / z`.
+/// Closed form: `C` is a sum of exponentials and `r` of `(1 - x)`, `(1 - x) cos 2 pi x` and `sin 2 pi x` (Hann), so
+/// that all is made of `h(z) = (1 - exp(-z)) / z` and `F(z) = (1 - h(z)) / z`.
 ///
 /// # Units
 /// Hz; result 1/Hz.

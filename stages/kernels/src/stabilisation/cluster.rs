@@ -19,7 +19,8 @@ pub struct PhysicalMode {
     pub count: usize,
     /// The lowest of them.
     pub first_order: usize,
-    /// Amplitude of its ringing over its standard error; NaN before [`Stabilisation::established`](super::Stabilisation::established).
+    /// Amplitude of its ringing over its standard error; NaN before
+    /// [`Stabilisation::established`](super::Stabilisation::established).
     pub significance: f64,
 }
 
@@ -65,7 +66,8 @@ pub(super) fn clustered(
     found.into_iter().map(|(mode, _)| mode).collect()
 }
 
-/// The poles, one per order, round the one with the most orders within the tolerance; of equals the lowest. None is left: none.
+/// The poles, one per order, round the one with the most orders within the tolerance; of equals the lowest. None is
+/// left: none.
 fn largest(poles: &[OrderedPole], left: &[usize], tolerance: f64) -> Option<Vec<usize>> {
     let around = |centre: usize| {
         let distance = |i: usize| (poles[i].frequency_hz / poles[centre].frequency_hz).ln().abs();

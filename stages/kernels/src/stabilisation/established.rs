@@ -13,8 +13,9 @@ const DETECTOR: [f64; 3] = [0.1, 0.4, 0.7];
 impl Stabilisation {
     /// Without the modes whose ringing in `experiment` is below `min_significance` standard errors.
     ///
-    /// Noise has poles that stay, too: one record's noise is the same at every order. What sets a mode apart is its amplitude. The simulation with all modes' median poles, and
-    /// three real ones, is fitted by least squares; the amplitude's error allows for a coloured residual. Errors: as [`with_poles`].
+    /// Noise has poles that stay, too: one record's noise is the same at every order. What sets a mode apart is its
+    /// amplitude. The simulation with all modes' median poles, and three real ones, is fitted by least squares; the
+    /// amplitude's error allows for a coloured residual. Errors: as [`with_poles`].
     pub fn established(
         mut self,
         experiment: Experiment<'_>,

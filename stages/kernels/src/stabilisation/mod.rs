@@ -15,9 +15,11 @@ pub use self::cluster::PhysicalMode;
 /// When a pole counts as stable, and stable poles as a mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StabilisationCriteria {
-    /// Largest relative change of the frequency from the next lower order, above 0; also the half width of a cluster. Default 0.01.
+    /// Largest relative change of the frequency from the next lower order, above 0; also the half width of a cluster.
+    /// Default 0.01.
     pub frequency: f64,
-    /// Largest relative change of the damping, above 0; also the largest relative spread of a mode's damping. Default 0.05.
+    /// Largest relative change of the damping, above 0; also the largest relative spread of a mode's damping. Default
+    /// 0.05.
     pub damping: f64,
     /// Least quality factor of a mode, above 0.5; default 5, as for `model.modes`.
     pub min_quality_factor: f64,
@@ -80,20 +82,23 @@ pub struct Stabilisation {
 /// # Model
 /// A physical mode has one pole at every order that can hold it; a pole that noise needs moves as the order changes.
 /// # Method
-/// Each pole is compared with the nearest in frequency at the next lower order that was tried. The stable ones with enough quality are grouped around the frequency at which
-/// most orders agree, one per order, and so on with the rest; a gathering is a mode if it has enough orders and its damping agrees. One record's noise is the same at every order, and has
-/// poles that stay, too: [`Stabilisation::established`] drops what does not ring.
+/// Each pole is compared with the nearest in frequency at the next lower order that was tried. The stable ones with
+/// enough quality are grouped around the frequency at which most orders agree, one per order, and so on with the rest;
+/// a gathering is a mode if it has enough orders and its damping agrees. One record's noise is the same at every order,
+/// and has poles that stay, too: [`Stabilisation::established`] drops what does not ring.
 /// # Shapes
 /// `candidates`: order and its poles, conjugates included.
 /// # Units
 /// Hertz; damping has none.
 /// # Accuracy
-/// On the paper's lever in noise, 3 or 4 modes, exactly those, once established, over 12 seeds and both start methods (test). Medians are no better than the start method: its spread over orders says
-/// nothing of its bias, nor of the noise that all orders share.
+/// On the paper's lever in noise, 3 or 4 modes, exactly those, once established, over 12 seeds and both start methods
+/// (test). Medians are no better than the start method: its spread over orders says nothing of its bias, nor of the
+/// noise that all orders share.
 /// # Errors
 /// Fewer than two orders, orders that do not ascend, criteria out of range.
 /// # Source
-/// H. Van der Auweraer and B. Peeters, Smart Struct. Syst. 1 (2004) 1; B. Peeters and G. De Roeck, J. Dyn. Syst. Meas. Control 123 (2001) 659.
+/// H. Van der Auweraer and B. Peeters, Smart Struct. Syst. 1 (2004) 1; B. Peeters and G. De Roeck, J. Dyn. Syst. Meas.
+/// Control 123 (2001) 659.
 pub fn stabilisation(
     candidates: &[(usize, Vec<c64>)],
     sample_time_s: f64,

@@ -38,7 +38,8 @@ pub fn binomial_tail(hits: usize, trials: usize, p: f64) -> f64 {
 /// The regularised incomplete beta function `I_x(a, b)`; NaN if `x` is.
 ///
 /// # Method
-/// Its continued fraction by Lentz's method, on the side where that converges fast: accurate far into the tail, where 1 - cdf would be 0.
+/// Its continued fraction by Lentz's method, on the side where that converges fast: accurate far into the tail, where 1
+/// - cdf would be 0.
 ///
 /// # Accuracy
 /// 1e-12 relative for `a` and `b` up to a thousand.

@@ -17,8 +17,8 @@ pub fn chi_square_tail(value: f64, degrees: usize) -> f64 {
     gamma_tail(0.5 * degrees as f64, 0.5 * value)
 }
 
-/// Probability that a gamma variable of shape `a >= 0.5` and scale one exceeds `x`: the mean of `K` periodograms over its expectation is one of shape
-/// `K`, divided by `K`.
+/// Probability that a gamma variable of shape `a >= 0.5` and scale one exceeds `x`: the mean of `K` periodograms over
+/// its expectation is one of shape `K`, divided by `K`.
 ///
 /// # Method
 /// As [`chi_square_tail`].

@@ -22,7 +22,8 @@ pub fn median(values: &mut [f64]) -> f64 {
 ///
 /// # Method
 /// 1.4826 times the median absolute deviation, the standard deviation of a Gaussian; up to half of the values may be
-/// arbitrary. Codes of a coarse converter make it 0 where more than half of the values agree: callers put a floor under it.
+/// arbitrary. Codes of a coarse converter make it 0 where more than half of the values agree: callers put a floor under
+/// it.
 /// # Source
 /// Hampel, J. Am. Stat. Assoc. 69 (1974) 383.
 pub fn median_and_scale(values: &mut [f64]) -> (f64, f64) {
@@ -64,7 +65,8 @@ mod tests {
                 *value = 1e6;
             }
             let (center, scale) = median_and_scale(&mut values);
-            // a fifth of one-sided outliers moves the median to the 62nd percentile (0.32 sigma) and widens the scale by 1.35
+            // a fifth of one-sided outliers moves the median to the 62nd percentile (0.32 sigma) and widens the scale
+            // by 1.35
             assert!(center.abs() < 0.4 * 2.0, "{center}");
             assert!((scale / 2.0 - 1.35).abs() < 0.1, "{scale}");
         }

@@ -9,16 +9,18 @@ use crate::model::{ModelError, finite};
 /// The column space of a free decay's Hankel matrix.
 ///
 /// # Model
-/// `y(t) = C A^t x0 + noise`, no input: a sum of damped exponentials. A rest that stays (an offset) is one more pole, at one.
+/// `y(t) = C A^t x0 + noise`, no input: a sum of damped exponentials. A rest that stays (an offset) is one more pole,
+/// at one.
 /// # Method
-/// Singular values of the Hankel matrix of `block_rows` rows; the strongest left vectors span the observability matrix; A by shift invariance.
+/// Singular values of the Hankel matrix of `block_rows` rows; the strongest left vectors span the observability matrix;
+/// A by shift invariance.
 /// # Shapes
 /// y: N samples; singular values: at most `block_rows`.
 /// # Units
 /// Poles in the z plane.
 /// # Accuracy
-/// Exact without noise. With white noise above the Cramer-Rao bound, the less the more rows up to a third of N; damping is biased upwards by the noise's
-/// own energy. Start values.
+/// Exact without noise. With white noise above the Cramer-Rao bound, the less the more rows up to a third of N; damping
+/// is biased upwards by the noise's own energy. Start values.
 /// # Errors
 /// Values that are not finite, fewer than 2 `block_rows` samples, no convergence.
 /// # Source

@@ -20,22 +20,26 @@ pub enum Weight {
 /// The observability matrix's column space, estimated from what the past says about the future.
 ///
 /// # Model
-/// Innovations form, one output: `x(t+1) = A x + B u + K e`, `y = C x + D u + e`; an offset of y is allowed. The noise may be coloured.
+/// Innovations form, one output: `x(t+1) = A x + B u + K e`, `y = C x + D u + e`; an offset of y is allowed. The noise
+/// may be coloured.
 /// # Method
-/// QR of `[1; U_f]`, past `[U_p; Y_p]`, `Y_f`; singular value decomposition of the part of `Y_f` that the past explains, weighted; A by shift
-/// invariance, in the least-squares sense.
+/// QR of `[1; U_f]`, past `[U_p; Y_p]`, `Y_f`; singular value decomposition of the part of `Y_f` that the past
+/// explains, weighted; A by shift invariance, in the least-squares sense.
 /// # Shapes
 /// u, y: N samples, several inputs one after the other; singular values: `block_rows`.
 /// # Units
 /// Poles in the z plane; each signal is scaled to its peak first.
 /// # Accuracy
-/// Consistent as N and the block rows grow, if the input excites 2 `block_rows` rows: start values, some per cent from the likelihood's maximum.
-/// The weights differ in the metric alone in which the order is cut off: with noise below the weakest state, or a white input, N4SID and MOESP agree to a per cent, and CVA gains 4 to 10 %
-/// where the noise is coloured; a coloured input sets N4SID behind MOESP (60 seeds, test). Singular values always differ.
+/// Consistent as N and the block rows grow, if the input excites 2 `block_rows` rows: start values, some per cent from
+/// the likelihood's maximum. The weights differ in the metric alone in which the order is cut off: with noise below the
+/// weakest state, or a white input, N4SID and MOESP agree to a per cent, and CVA gains 4 to 10 % where the noise is
+/// coloured; a coloured input sets N4SID behind MOESP (60 seeds, test). Singular values always differ.
 /// # Errors
-/// Lengths, values that are not finite, fewer than `(4 + 2 inputs) block_rows` samples, no convergence of a decomposition.
+/// Lengths, values that are not finite, fewer than `(4 + 2 inputs) block_rows` samples, no convergence of a
+/// decomposition.
 /// # Source
-/// P. Van Overschee and B. De Moor, Subspace Identification for Linear Systems (1996), chapter 4; L. Ljung (1999), section 10.6.
+/// P. Van Overschee and B. De Moor, Subspace Identification for Linear Systems (1996), chapter 4; L. Ljung (1999),
+/// section 10.6.
 #[derive(Debug, Clone)]
 pub struct InstrumentalSubspace {
     left: Mat<f64>,
@@ -90,7 +94,8 @@ impl InstrumentalSubspace {
     }
 }
 
-/// Poles from the first `order` columns of a basis of the observability matrix. Errors: order 0, or no fewer columns or rows than that.
+/// Poles from the first `order` columns of a basis of the observability matrix. Errors: order 0, or no fewer columns or
+/// rows than that.
 pub(super) fn shift_invariant_poles(basis: &Mat<f64>, order: usize) -> Result<Vec<c64>, ModelError> {
     let rows = basis.nrows();
     if order == 0 || order >= rows || order > basis.ncols() {

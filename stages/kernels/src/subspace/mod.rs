@@ -7,7 +7,8 @@
 //! | a free decay | [`Era`] | none |
 //!
 //! # Cost
-//! For N samples and s block rows: O(N s) to form the products, O(s^3) to decompose them; O(N s^2) where the products keep too few digits and QR takes over.
+//! For N samples and s block rows: O(N s) to form the products, O(s^3) to decompose them; O(N s^2) where the products
+//! keep too few digits and QR takes over.
 //!
 //! ```
 //! use afmid_kernels::modes::Root;

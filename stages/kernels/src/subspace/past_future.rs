@@ -12,17 +12,20 @@ use crate::model::{ModelError, finite};
 /// # Model
 /// `x(t+1) = A x(t) + B u(t)`, `y(t) = C x(t) + D u(t) + v(t)`, v white; an offset of y is allowed.
 /// # Method
-/// MOESP: `Y_f` (block rows x windows) is projected onto the orthogonal complement of the row space of `[1; U_f]`, by their products where these keep enough digits, by QR elsewhere; the left
-/// singular vectors of what remains span the observability matrix, and A follows from its shift invariance. A released ramp does not
-/// excite persistently: only the directions that `U_f` really spans are removed, and the free decay, which remains, carries A.
+/// MOESP: `Y_f` (block rows x windows) is projected onto the orthogonal complement of the row space of `[1; U_f]`, by
+/// their products where these keep enough digits, by QR elsewhere; the left singular vectors of what remains span the
+/// observability matrix, and A follows from its shift invariance. A released ramp does not excite persistently: only
+/// the directions that `U_f` really spans are removed, and the free decay, which remains, carries A.
 /// # Shapes
 /// u, y: N samples; several inputs one after the other, a multiple of N; singular values: `block_rows`.
 /// # Units
 /// Poles in the z plane.
 /// # Accuracy
-/// Consistent for white v as N grows; a few standard errors of the prediction error estimate on averaged releases: start values.
+/// Consistent for white v as N grows; a few standard errors of the prediction error estimate on averaged releases:
+/// start values.
 /// # Errors
-/// Unequal lengths, samples that are not finite, fewer than `3 block_rows` samples, a decomposition without convergence.
+/// Unequal lengths, samples that are not finite, fewer than `3 block_rows` samples, a decomposition without
+/// convergence.
 /// # Source
 /// M. Verhaegen and P. Dewilde, Int. J. Control 56 (1992) 1187; L. Ljung, System Identification (1999), section 10.6.
 #[derive(Debug, Clone)]
@@ -31,7 +34,8 @@ pub struct Subspace {
     singular_values: Vec<f64>,
 }
 
-/// Energy of an input direction, as a share of the strongest, below which it counts as not excited: well above a Gram matrix's rounding.
+/// Energy of an input direction, as a share of the strongest, below which it counts as not excited: well above a Gram
+/// matrix's rounding.
 const INPUT_TOLERANCE: f64 = 1e-12;
 
 impl Subspace {

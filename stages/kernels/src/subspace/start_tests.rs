@@ -104,8 +104,8 @@ fn coloured_noise_biases_no_weight_and_the_likelihood_is_at_the_bound() {
     let rms = |i: usize| (errors.iter().map(|e| e[i].powi(2)).sum::<f64>() / errors.len() as f64).sqrt();
     let (n4sid, moesp, cva, pem) = (rms(0), rms(1), rms(2), rms(3));
     println!("rms distance of the worst pole: N4SID {n4sid:.6}, MOESP {moesp:.6}, CVA {cva:.6}, PEM {pem:.6}");
-    // the real pole at 0.7 is the worst known: its bound is 0.0216 (inverse information of these 2000 samples); over 20 seeds an rms
-    // scatters by 16 %, and four of that are allowed; subspace estimates are allowed half as much again
+    // the real pole at 0.7 is the worst known: its bound is 0.0216 (inverse information of these 2000 samples); over 20
+    // seeds an rms scatters by 16 %, and four of that are allowed; subspace estimates are allowed half as much again
     assert!(n4sid.max(moesp).max(cva) < 1.5 * 1.64 * 0.0216, "{n4sid} {moesp} {cva}");
     assert!(pem < 1.64 * 0.0216, "{pem}");
 }

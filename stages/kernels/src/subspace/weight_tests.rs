@@ -22,7 +22,8 @@ fn truth() -> InnovationsModel {
     InnovationsModel { sections, feedthrough: 0.2, sample_time_s: 1.0 }
 }
 
-/// Input coloured by a pole at `colour`, and the response to it, both with a peak of one; e of standard deviation `sigma`.
+/// Input coloured by a pole at `colour`, and the response to it, both with a peak of one; e of standard deviation
+/// `sigma`.
 fn record(samples: usize, colour: f64, sigma: f64, seed: u64) -> (Vec<f64>, Vec<f64>) {
     let mut state = 0.0;
     let white = white_noise(samples, 1.0, seed);
@@ -45,8 +46,8 @@ fn record(samples: usize, colour: f64, sigma: f64, seed: u64) -> (Vec<f64>, Vec<
     (scaled(&u), scaled(&y))
 }
 
-/// Singular values and poles by the definitions, window by window: `O = W_p L` with L from the regression of `Y_f` on `W_p` beside `[1; U_f]`, weighted as in Van Overschee and De
-/// Moor, Table 4.1.
+/// Singular values and poles by the definitions, window by window: `O = W_p L` with L from the regression of `Y_f` on
+/// `W_p` beside `[1; U_f]`, weighted as in Van Overschee and De Moor, Table 4.1.
 fn by_definition(u: &[f64], y: &[f64], s: usize, weight: Weight) -> (Vec<f64>, Vec<c64>) {
     let windows = y.len() - 2 * s + 1;
     let hankel = |x: &[f64], from: usize| Mat::from_fn(windows, s, |t, j| x[from + t + j]);
@@ -127,7 +128,8 @@ fn the_weights_agree_for_white_inputs_and_part_for_coloured_ones() {
     };
     let (white, coloured) = (rms(0.0, 25), rms(0.95, 25));
     println!("weights: white {white:.5?}, coloured {coloured:.5?}");
-    // a white input's future is orthogonal to the past but for 1 / sqrt(800): removing it or not is the same; one record each, so that no scatter of seeds is in the ratio
+    // a white input's future is orthogonal to the past but for 1 / sqrt(800): removing it or not is the same; one
+    // record each, so that no scatter of seeds is in the ratio
     assert!((white[1] / white[0] - 1.0).abs() < 0.01, "{white:?}");
     // a coloured one's is not: what N4SID keeps of it is noise to the others
     assert!(coloured[1] < 0.98 * coloured[0], "{coloured:?}");

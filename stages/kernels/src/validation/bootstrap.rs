@@ -12,7 +12,8 @@ use crate::modes::Interval;
 pub struct BootstrapSettings {
     /// Replicates, 20 to 100 000; default 200: ends of a 95 % interval to a tenth of its length.
     pub replicates: usize,
-    /// Events that are drawn together, at least 1, at most half of them; default 1. More where neighbouring events are alike.
+    /// Events that are drawn together, at least 1, at most half of them; default 1. More where neighbouring events are
+    /// alike.
     pub block_events: usize,
     /// Seed of the drawing; default 0.
     pub seed: u64,
@@ -40,9 +41,10 @@ pub struct Bootstrapped {
 /// # Model
 /// Events are drawn from one population; neighbours within a block may depend on each other.
 /// # Method
-/// Moving blocks on a circle (Kuensch). Every replicate has a random stream of its own, so that any number of threads gives the same bits. Intervals: quantiles of the replicates'
-/// distance from the value, widened by `sqrt(n / (n - b))`, since n events drawn from themselves scatter by that much too little. Replicates that fail, and numbers that are NaN, are
-/// left out.
+/// Moving blocks on a circle (Kuensch). Every replicate has a random stream of its own, so that any number of threads
+/// gives the same bits. Intervals: quantiles of the replicates' distance from the value, widened by `sqrt(n / (n -
+/// b))`, since n events drawn from themselves scatter by that much too little. Replicates that fail, and numbers that
+/// are NaN, are left out.
 /// # Shapes
 /// `statistic` takes event indices, as many as there are events, and gives as many numbers each time.
 /// # Units
@@ -50,7 +52,8 @@ pub struct Bootstrapped {
 /// # Accuracy
 /// For 16 events 95 % intervals cover some 93 % (tests); for fewer than ten too little, whatever is resampled.
 /// # Errors
-/// Settings out of range, fewer than four events, a statistic of all events that fails, fewer than half of the replicates.
+/// Settings out of range, fewer than four events, a statistic of all events that fails, fewer than half of the
+/// replicates.
 /// # Source
 /// B. Efron and R. Tibshirani, An Introduction to the Bootstrap (1993); H. Kuensch, Ann. Statist. 17 (1989) 1217.
 pub fn bootstrap(
@@ -134,7 +137,8 @@ mod tests {
             // 200 replicates: 5 %, four of them
             assert!((found.std / textbook - 1.0).abs() < 0.2, "{seed}");
         }
-        // 95 % less what a normal interval loses to Student's at 15 degrees of freedom, 2 %; 200 trials scatter by 1.6 %
+        // 95 % less what a normal interval loses to Student's at 15 degrees of freedom, 2 %; 200 trials scatter by 1.6
+        // %
         assert!((177..=199).contains(&covered), "{covered}");
     }
 

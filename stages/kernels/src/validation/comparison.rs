@@ -34,8 +34,8 @@ impl ZeroPair {
 
 /// Pairs each zero of the free lever with a zero of the coupled one, each used once, closest ratios first.
 ///
-/// Model: zeros belong to the sensor, not to the contact; they are the same within errors. Shapes: any numbers of zeros; the result is in
-/// the order of `free`. Source: paper, text to Fig. 4.
+/// Model: zeros belong to the sensor, not to the contact; they are the same within errors. Shapes: any numbers of
+/// zeros; the result is in the order of `free`. Source: paper, text to Fig. 4.
 pub fn compare_zeros(free: &[Frequency], coupled: &[Frequency]) -> Vec<ZeroPair> {
     let mut distances: Vec<(f64, usize, usize)> = Vec::new();
     for (i, f) in free.iter().enumerate() {
@@ -78,7 +78,8 @@ impl PoleShift {
 
 /// Each free mode with the coupled resonance that it becomes: the highest below the next free mode.
 ///
-/// Model: a spring at the tip raises every pole, none beyond the next zero and so none beyond the next free pole (Rayleigh's interlacing).
+/// Model: a spring at the tip raises every pole, none beyond the next zero and so none beyond the next free pole
+/// (Rayleigh's interlacing).
 /// Shapes: both ascending; the result is in the order of `free`.
 pub fn pole_shifts(free: &[Frequency], coupled: &[Frequency]) -> Vec<PoleShift> {
     free.iter()

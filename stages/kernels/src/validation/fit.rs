@@ -51,7 +51,8 @@ pub struct Simulation {
 /// Simulates `u` through a frozen model and fits initial state, offset and drift to `y`.
 ///
 /// # Model
-/// `y = G u + C A^t x0 + offset + drift t`, with `t` from -1 to 1 over the window; `further` are the gains of inputs beyond the first.
+/// `y = G u + C A^t x0 + offset + drift t`, with `t` from -1 to 1 over the window; `further` are the gains of inputs
+/// beyond the first.
 /// # Method
 /// Linear least squares by QR and singular values, over the samples of y that are not missing.
 /// # Shapes
@@ -152,7 +153,8 @@ fn nuisance_matrix(model: &InnovationsModel, samples: usize, nuisances: Nuisance
 
 /// FIT % of a perfect model, given the standard error of y: `100 (1 - sqrt(sum se^2) / |y - mean(y)|)`.
 ///
-/// `standard_error` must be that of the noise alone: scatter of the events' amplitudes, which the input carries as well, is no part of it. Errors: lengths, values that are not finite, a constant y.
+/// `standard_error` must be that of the noise alone: scatter of the events' amplitudes, which the input carries as
+/// well, is no part of it. Errors: lengths, values that are not finite, a constant y.
 pub fn noise_ceiling_percent(y: &[f64], standard_error: &[f64]) -> Result<f64, ModelError> {
     if y.len() != standard_error.len() {
         return Err(ModelError::Length { what: "standard error", found: standard_error.len(), wanted: y.len() });
@@ -193,7 +195,8 @@ mod tests {
         let y: Vec<f64> = (0..1000).map(|k| clean[k] + 0.5 + 0.3 * (k as f64 - 499.5) / 499.5 + noise[k]).collect();
         let both = Nuisances { offset: true, slope: true };
         let found = simulate_held_out(&model(), &[], &u, &y, both).unwrap();
-        // 1000 samples of 0.02: 0.0006 and 0.0011 for offset and drift, 0.05 for a state that decays in 20 samples; four of them
+        // 1000 samples of 0.02: 0.0006 and 0.0011 for offset and drift, 0.05 for a state that decays in 20 samples;
+        // four of them
         assert!((found.offset - 0.5).abs() < 0.0026 && (found.drift - 0.3).abs() < 0.0045);
         assert!((found.initial_state[0] - 3.0).abs() < 0.2);
         let ceiling = noise_ceiling_percent(&y, &[0.02; 1000]).unwrap();

@@ -69,8 +69,8 @@ pub fn whiteness(e: &[f64], lags: usize, fitted: usize) -> Result<TestResult, Mo
 /// Whether e still depends on the input: its projection on u and `lags` delays of u.
 ///
 /// # Model
-/// e white and independent of u: the energy of the projection over the variance of e is chi-square with as many degrees of freedom as
-/// the delays of u span.
+/// e white and independent of u: the energy of the projection over the variance of e is chi-square with as many degrees
+/// of freedom as the delays of u span.
 /// # Method
 /// QR and rank of the delayed inputs, their means removed: a step spans few directions, and only those are counted.
 /// # Shapes

@@ -32,7 +32,8 @@ impl Poles {
         self.0.iter().flat_map(|&p| if p.im > 0.0 { both(p) } else { vec![(z - p).inv()] }).collect()
     }
 
-    /// `A - b c^T / d` of the realisation with these poles: its eigenvalues are the zeros of `sum c phi + d` (Gustavsen and Semlyen 1999, Eq. B.2).
+    /// `A - b c^T / d` of the realisation with these poles: its eigenvalues are the zeros of `sum c phi + d` (Gustavsen
+    /// and Semlyen 1999, Eq. B.2).
     pub fn zero_matrix(&self, c: &[f64], d: f64) -> Mat<f64> {
         let n = c.len();
         let mut a = Mat::zeros(n, n);

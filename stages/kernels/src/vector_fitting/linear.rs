@@ -61,7 +61,8 @@ impl Points {
         2 * n + 1 + if self.turn.is_some() { n + 1 } else { 0 }
     }
 
-    /// Rows of a real problem: each point's columns, times its weight, real and imaginary parts below each other; then `extra` rows of zeros.
+    /// Rows of a real problem: each point's columns, times its weight, real and imaginary parts below each other; then
+    /// `extra` rows of zeros.
     pub fn rows(&self, columns: usize, extra: usize, of: impl Fn(usize) -> Vec<c64>) -> Mat<f64> {
         let count = self.len();
         let mut matrix = Mat::zeros(2 * count + extra, columns);
@@ -75,7 +76,8 @@ impl Points {
     }
 }
 
-/// Solution of a least-squares problem whose last column is the right-hand side; columns are scaled first. Errors: no finite solution.
+/// Solution of a least-squares problem whose last column is the right-hand side; columns are scaled first. Errors: no
+/// finite solution.
 pub(super) fn solved(mut stacked: Mat<f64>) -> Result<Vec<f64>, ModelError> {
     let p = stacked.ncols() - 1;
     let scale: Vec<f64> =

@@ -20,7 +20,8 @@ pub struct MeasuredResponse<'a> {
     pub frequency_hz: &'a [f64],
     /// From the held input to the output, both as sequences; points that are not finite are left out.
     pub transfer: &'a [c64],
-    /// Expected squared error of each value; none, or zero anywhere: all points count alike. Points without a finite variance are left out.
+    /// Expected squared error of each value; none, or zero anywhere: all points count alike. Points without a finite
+    /// variance are left out.
     pub variance: Option<&'a [f64]>,
 }
 
@@ -33,11 +34,14 @@ pub struct VectorFitting {
     pub pairs: Option<usize>,
     /// Relocations of the poles at most, at least 1; default 30: ten are usual.
     pub iterations: usize,
-    /// Ends with Gauss-Newton on the weighted error itself; default true. Without, sigma weights the noise: rms errors of a noisy event's Q grow by up to a seventh (test).
+    /// Ends with Gauss-Newton on the weighted error itself; default true. Without, sigma weights the noise: rms errors
+    /// of a noisy event's Q grow by up to a seventh (test).
     pub refine: bool,
-    /// Reflects poles from outside the unit circle into it; default false: an unstable pole says that the order is too high, and may.
+    /// Reflects poles from outside the unit circle into it; default false: an unstable pole says that the order is too
+    /// high, and may.
     pub stable: bool,
-    /// Fits what the ends of the window add, for an input that is a pulse this many seconds after the first sample; default none.
+    /// Fits what the ends of the window add, for an input that is a pulse this many seconds after the first sample;
+    /// default none.
     pub transient_delay_s: Option<f64>,
     /// Bins over which neighbouring errors are correlated (a smoothed response); default 0.
     pub correlated_bins: usize,
@@ -66,7 +70,8 @@ pub struct VectorFit {
     pub covariance: Mat<f64>,
     /// The transient as a further input's gains, where it was fitted.
     pub transient: Option<InputGains>,
-    /// Mean squared error over the variance given, per degree of freedom: one if variance and model are right; with equal weights the variance itself.
+    /// Mean squared error over the variance given, per degree of freedom: one if variance and model are right; with
+    /// equal weights the variance itself.
     pub misfit: f64,
     /// Share of the response's power (about its mean, weighted) that is explained, as FIT %.
     pub fit_percent: f64,
@@ -74,7 +79,8 @@ pub struct VectorFit {
     pub points: usize,
     /// Relocations and Gauss-Newton steps of the start that won.
     pub iterations: usize,
-    /// Whether the poles settled: gradient share below 1e-3, a last step that gained less than 1e-4 of a chi-square, or what is left is rounding.
+    /// Whether the poles settled: gradient share below 1e-3, a last step that gained less than 1e-4 of a chi-square, or
+    /// what is left is rounding.
     pub converged: bool,
     /// The residual's part along the parameters over its norm.
     pub gradient: f64,
@@ -87,21 +93,27 @@ pub struct VectorFit {
 /// Fits `G(z) = sum_m c_m / (z - p_m) + d` to a frequency response.
 ///
 /// # Model
-/// `G(exp(i w Ts))` plus complex noise of the variance given; with a transient `exp(i w delay) T(z)`, T of the same poles. A sampled decay is
-/// rational in z, not in s, so the fit is made on the unit circle itself: no bilinear map, no warping.
+/// `G(exp(i w Ts))` plus complex noise of the variance given; with a transient `exp(i w delay) T(z)`, T of the same
+/// poles. A sampled decay is rational in z, not in s, so the fit is made on the unit circle itself: no bilinear map, no
+/// warping.
 /// # Method
-/// Relaxed vector fitting: `sigma(z) G = N(z)` with `sigma = sum c~_m / (z - p_m) + d~`, linear in everything; the zeros of sigma are the next poles;
-/// instead of `d~ = 1` the sum of sigma over the points is fixed. From three sets of starting poles (linear, logarithmic, at the peaks); then, as sigma weights the noise too,
-/// Gauss-Newton with a trust region on the weighted error in section coefficients, all else eliminated (variable projection), from each; the least error wins. One response has nothing to gain from
-/// block-wise QR. Cost per iteration: `4 K (3 n)^2` operations for K points.
+/// Relaxed vector fitting: `sigma(z) G = N(z)` with `sigma = sum c~_m / (z - p_m) + d~`, linear in everything; the
+/// zeros of sigma are the next poles; instead of `d~ = 1` the sum of sigma over the points is fixed. From three sets of
+/// starting poles (linear, logarithmic, at the peaks); then, as sigma weights the noise too, Gauss-Newton with a trust
+/// region on the weighted error in section coefficients, all else eliminated (variable projection), from each; the
+/// least error wins. One response has nothing to gain from block-wise QR. Cost per iteration: `4 K (3 n)^2` operations
+/// for K points.
 /// # Shapes
 /// K points each; covariance (2 n + 1) x (2 n + 1).
 /// # Units
 /// Those of the response.
 /// # Accuracy
-/// Rounding without noise. With noise: the maximum of the likelihood for the variance given. Over 40 seeds of the paper's lever (the mean of 84 events, 4096 samples) rms errors of f and Q
-/// are 0.2 to 0.4 of those of [`Subspace`](crate::subspace::Subspace) with 60 rows and 0.6 to 0.8 of those of [`Era`](crate::subspace::Era) with 300; any bias is below what 40 seeds show, 0.63 of a standard error, and the squares
-/// of the errors are 0.7 to 1.3 of the stated ones (tests). The covariance is that of the last linearised least squares, scaled by the misfit; for a smoothed response also by the residual's correlation.
+/// Rounding without noise. With noise: the maximum of the likelihood for the variance given. Over 40 seeds of the
+/// paper's lever (the mean of 84 events, 4096 samples) rms errors of f and Q are 0.2 to 0.4 of those of
+/// [`Subspace`](crate::subspace::Subspace) with 60 rows and 0.6 to 0.8 of those of [`Era`](crate::subspace::Era) with
+/// 300; any bias is below what 40 seeds show, 0.63 of a standard error, and the squares of the errors are 0.7 to 1.3 of
+/// the stated ones (tests). The covariance is that of the last linearised least squares, scaled by the misfit; for a
+/// smoothed response also by the residual's correlation.
 /// # Errors
 /// Lengths, settings out of range, too few points, no finite fit. No convergence is no error: see the fit.
 /// # Source

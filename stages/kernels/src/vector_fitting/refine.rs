@@ -24,7 +24,8 @@ const FIRST: f64 = 1e-8;
 const STEPS: usize = 100;
 /// Gradient share that counts as none: a hundredth of a standard error at 8192 points, as in `model.pem`.
 const GRADIENT: f64 = 1e-4;
-/// Gain of twice the log-likelihood that ends the iteration: no estimate moves by more than a hundredth of its error. A pole that the data hardly know may go on creeping.
+/// Gain of twice the log-likelihood that ends the iteration: no estimate moves by more than a hundredth of its error. A
+/// pole that the data hardly know may go on creeping.
 const SETTLED: f64 = 1e-4;
 /// Singular values below this share of the largest span no direction that the data know.
 const RANK: f64 = 1e-13;
@@ -48,8 +49,8 @@ pub(super) fn refined(
     let found = descend(&mut Fit { points, settings }, state, &mut { FIRST }, Damping::STANDARD, limits)?;
     let stalled = found.ending == Ending::Stalled;
     let mut best = Refined { steps: steps + found.steps, ..found.point };
-    // no damping helps any more: what gradient is left lies along poles that the data hardly determine, and is less than
-    // one standard error in all
+    // no damping helps any more: what gradient is left lies along poles that the data hardly determine, and is less
+    // than one standard error in all
     best.settled |= stalled && best.gradient * (2.0 * points.len() as f64).sqrt() < 1.0;
     Ok(best)
 }
@@ -230,7 +231,8 @@ fn fit_percent(points: &Points, cost: f64) -> f64 {
     100.0 * (1.0 - (cost / about).sqrt())
 }
 
-/// `1 + 2 sum (1 - l / (L + 1)) rho_l` over the lags up to L: how much less neighbours that share data tell; at least one.
+/// `1 + 2 sum (1 - l / (L + 1)) rho_l` over the lags up to L: how much less neighbours that share data tell; at least
+/// one.
 fn correlation_factor(residual: &[f64], lags: usize) -> f64 {
     let half = residual.len() / 2;
     let lags = lags.min(half / 4);

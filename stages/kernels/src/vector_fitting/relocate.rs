@@ -10,7 +10,8 @@ use crate::model::ModelError;
 
 /// Least d~ that is divided by (Gustavsen 2006, section VI): smaller ones send poles to infinity.
 const LEAST: f64 = 1e-8;
-/// Largest move of a pole, in the z plane, that counts as none: a thousandth of a 1-ppm frequency error at an angle of one.
+/// Largest move of a pole, in the z plane, that counts as none: a thousandth of a 1-ppm frequency error at an angle of
+/// one.
 const SETTLED: f64 = 1e-9;
 
 /// Poles after at most the wanted relocations, and how many it took. Errors: no finite solution.
@@ -39,7 +40,8 @@ fn farthest(next: &[c64], old: &[c64]) -> f64 {
     next.iter().map(nearest).fold(0.0, f64::max)
 }
 
-/// Zeros of sigma: `sum c phi + d [+ turn (sum t phi + t0)] - G (sum c~ phi + d~) = 0`, with the sum of sigma over the points fixed (Eq. 9 of 2006).
+/// Zeros of sigma: `sum c phi + d [+ turn (sum t phi + t0)] - G (sum c~ phi + d~) = 0`, with the sum of sigma over the
+/// points fixed (Eq. 9 of 2006).
 fn next_poles(points: &Points, poles: &Poles) -> Result<Poles, ModelError> {
     let (count, n) = (points.len(), poles.all().len());
     let numerators = if points.turn.is_some() { 2 } else { 1 };

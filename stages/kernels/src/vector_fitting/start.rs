@@ -6,7 +6,8 @@ use super::VectorFitting;
 use super::basis::Poles;
 use super::linear::Points;
 
-/// Damping of starting pairs over their angle, as Gustavsen and Semlyen (1999) advise: weak, for a well-conditioned start.
+/// Damping of starting pairs over their angle, as Gustavsen and Semlyen (1999) advise: weak, for a well-conditioned
+/// start.
 const DAMPING: f64 = 0.01;
 /// Where real starting poles lie: a detector's, decaying within a few samples.
 const REAL: (f64, f64) = (0.1, 0.8);
@@ -36,7 +37,8 @@ pub(super) fn starting_poles(points: &Points, settings: &VectorFitting) -> Vec<P
         .collect()
 }
 
-/// Angles of local maxima of the magnitude, the most prominent first: in a difference, not a ratio, noise where there is no signal hardly stands out.
+/// Angles of local maxima of the magnitude, the most prominent first: in a difference, not a ratio, noise where there
+/// is no signal hardly stands out.
 fn peaks(points: &Points) -> Vec<f64> {
     let size: Vec<f64> = points.g.iter().map(|g| g.norm().max(f64::MIN_POSITIVE)).collect();
     let mut found: Vec<(f64, f64)> = (1..size.len().saturating_sub(1))

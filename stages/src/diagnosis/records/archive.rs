@@ -1,4 +1,5 @@
-//! Archives for tests, cheap and of known truth: triangular ramp, snap-in, contact, rupture, one ringing mode, white and 1/f noise, wander.
+//! Archives for tests, cheap and of known truth: triangular ramp, snap-in, contact, rupture, one ringing mode, white
+//! and 1/f noise, wander.
 //!
 //! Shares nothing with the estimators: samples are written in time, one by one.
 

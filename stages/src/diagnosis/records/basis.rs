@@ -5,8 +5,8 @@ use afmid_kernels::linear_algebra::dot;
 /// Orthonormal columns of equal length.
 ///
 /// # Method
-/// Modified Gram-Schmidt, twice ("twice is enough": L. Giraud et al., Numer. Math. 101 (2005) 87). A column that the ones before it
-/// explain to `1e-9` of its length is left out.
+/// Modified Gram-Schmidt, twice ("twice is enough": L. Giraud et al., Numer. Math. 101 (2005) 87). A column that the
+/// ones before it explain to `1e-9` of its length is left out.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Basis {
     columns: Vec<Vec<f64>>,
@@ -43,7 +43,8 @@ impl Basis {
     }
 }
 
-/// Polynomials of `x` up to `degree`, orthonormal on these points. Legendre polynomials of `x` scaled to -1..1 keep the columns well conditioned.
+/// Polynomials of `x` up to `degree`, orthonormal on these points. Legendre polynomials of `x` scaled to -1..1 keep the
+/// columns well conditioned.
 pub(super) fn polynomials(x: &[f64], degree: usize) -> Basis {
     let mut basis = Basis::default();
     for d in 0..=degree {

@@ -1,7 +1,8 @@
 //! False alarms, power and coverage over seeds.
 //!
-//! Clean, 200 archives of 10 records, 4 channels at 1 %: 8 alarms in 800 (1.0 %; Clopper-Pearson, 95 %: 0.43 to 1.96 %): slow lines 2, fast lines 3,
-//! position 3, clipping 0. Found in half of 16 archives of that kind: hum 1.8e-4 V, crosstalk 3.5e3 V/m, fringe 4e-4 to 5e-4 V.
+//! Clean, 200 archives of 10 records, 4 channels at 1 %: 8 alarms in 800 (1.0 %; Clopper-Pearson, 95 %: 0.43 to 1.96
+//! %): slow lines 2, fast lines 3, position 3, clipping 0. Found in half of 16 archives of that kind: hum 1.8e-4 V,
+//! crosstalk 3.5e3 V/m, fringe 4e-4 to 5e-4 V.
 
 use super::archive::Archive;
 use super::{JudgeOptions, RecordSign, judge};
@@ -10,7 +11,8 @@ fn signs(archive: &Archive, seed: u64) -> Vec<RecordSign> {
     judge(&archive.summaries(seed), &JudgeOptions::default())
 }
 
-/// Whether the cause is found in each of four archives, its parameter within 4 of its standard errors (and a per cent) of the truth.
+/// Whether the cause is found in each of four archives, its parameter within 4 of its standard errors (and a per cent)
+/// of the truth.
 fn finds(archive: Archive, id: &str, parameter: &str, truth: f64) {
     for seed in 0..4 {
         let all = signs(&archive, seed);
@@ -18,7 +20,8 @@ fn finds(archive: Archive, id: &str, parameter: &str, truth: f64) {
             all.iter().find(|sign| sign.id == id).unwrap_or_else(|| panic!("{id} not found, seed {seed}: {all:?}"));
         let found = &sign.parameters.iter().find(|(name, _)| *name == parameter).unwrap().1;
         let (value, std) = (found.value.unwrap(), found.std.unwrap());
-        // jackknife errors of ten records are good to a quarter; block means and the window's lobe cost up to a per cent
+        // jackknife errors of ten records are good to a quarter; block means and the window's lobe cost up to a per
+        // cent
         assert!((value.abs() - truth).abs() < 4.0 * std + 0.01 * truth, "{id} seed {seed}: {value} +- {std}");
         if let (Some(before), Some(after)) = (sign.gain.rms_before, sign.gain.rms_after) {
             assert!(after < before, "{id} seed {seed}: {before} {after}");
@@ -87,7 +90,8 @@ fn half_of_the_archives_show_the_stated_strengths() {
     {
         let (strong, weak) = (share(4.0 * half), share(0.25 * half));
         println!("{name}: {:.2} at {half:e}, {strong:.2} at four times as much, {weak:.2} at a quarter", share(half));
-        // one of 16 may miss by chance; at a quarter only false alarms, and half of the archives would be far above them
+        // one of 16 may miss by chance; at a quarter only false alarms, and half of the archives would be far above
+        // them
         assert!(strong > 0.9 && weak < 0.3, "{name}: {strong} {weak}");
     }
 }

@@ -7,8 +7,9 @@ use super::summary::RecordSummary;
 use super::yardstick::of_many;
 use afmid_kernels::statistics::binomial_tail;
 
-/// Largest share of the extreme code among itself and its fullest neighbour that a signal which merely turns there can have: a noise-free parabola
-/// dwells `sqrt(1)` in its last code and `sqrt(2) - 1` in the one before; noise only lowers it.
+/// Largest share of the extreme code among itself and its fullest neighbour that a signal which merely turns there can
+/// have: a noise-free parabola dwells `sqrt(1)` in its last code and `sqrt(2) - 1` in the one before; noise only lowers
+/// it.
 const TURNING_SHARE: f64 = 0.707;
 /// Fewest samples that make a pile.
 const FEWEST: usize = 8;
@@ -25,8 +26,9 @@ struct Pile {
 /// The extreme values, of all records together and of each: piled up beyond what a turning point leaves there?
 ///
 /// # Method
-/// Towards the end of its range a histogram falls, save where values are cut off. The count of the extreme value against the fullest of the next
-/// four, as a binomial draw; corrected for both ends and all records. Not where a free lever rests at that value.
+/// Towards the end of its range a histogram falls, save where values are cut off. The count of the extreme value
+/// against the fullest of the next four, as a binomial draw; corrected for both ends and all records. Not where a free
+/// lever rests at that value.
 pub(super) fn judge_clipping(records: &[RecordSummary], false_alarm_rate: f64) -> Option<RecordSign> {
     let mut piles = Vec::new();
     for (end, sign) in [(low as fn(&RecordSummary) -> &Tally, -1.0), (high, 1.0)] {

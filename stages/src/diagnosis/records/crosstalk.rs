@@ -16,7 +16,8 @@ const LIGHT_M: (f64, f64) = (6.0e-7, 9.0e-7);
 /// A straight line in the position, alike in all records, before contact and after the rupture.
 ///
 /// # Method
-/// The slope of each record, a t test over records. A fringe of common light that fits the held-out records as well is a tie, and said to be one.
+/// The slope of each record, a t test over records. A fringe of common light that fits the held-out records as well is
+/// a tie, and said to be one.
 pub(super) fn crosstalk(level: &FreeLevel) -> Option<Candidate> {
     let slopes = slopes(&level.records.iter().collect::<Vec<_>>());
     if slopes.len() < FEWEST_RECORDS {
@@ -24,7 +25,8 @@ pub(super) fn crosstalk(level: &FreeLevel) -> Option<Candidate> {
     }
     let of = |kind| level.records.iter().filter_map(|record| record.slope(kind)).collect::<Vec<_>>();
     let (before, after) = (mean_and_error(&of(SegmentKind::Approach)), mean_and_error(&of(SegmentKind::Retract)));
-    // the nuisances took a part of either slope: what is left of them must have the slope's sign and lie within 3 errors of one another
+    // the nuisances took a part of either slope: what is left of them must have the slope's sign and lie within 3
+    // errors of one another
     let apart = (before.0 - after.0) / before.1.hypot(after.1);
     if level.two_way && student_two_sided(apart, slopes.len() as f64 - 1.0) < 0.003 && before.0 * after.0 <= 0.0 {
         return None;

@@ -10,13 +10,15 @@ use super::sign::{RecordSign, gain, value};
 /// A high-pass of first order, alike in all records.
 ///
 /// # Model
-/// `y = x - s`, `s' = w x - w s = w y`: while the lever is free (`x` constant) `y` falls by `w` times the integral of `y` itself, which holds the whole record
-/// before, contact and rupture included. No start value is needed: it is in the stretch's offset.
+/// `y = x - s`, `s' = w x - w s = w y`: while the lever is free (`x` constant) `y` falls by `w` times the integral of
+/// `y` itself, which holds the whole record before, contact and rupture included. No start value is needed: it is in
+/// the stretch's offset.
 /// # Method
 /// The factor of that integral in each record, a t test over records; it must be negative.
 pub(super) fn droop(level: &FreeLevel) -> Option<Candidate> {
     let all: Vec<&FreeRecord> = level.records.iter().collect();
-    // a drift of each record's own costs the weak their curvature and takes the wander off the strong: whichever is surer
+    // a drift of each record's own costs the weak their curvature and takes the wander off the strong: whichever is
+    // surer
     let ways = [false, true].map(|drifting| (drifting, factors(&all, drifting)));
     let error = |factors: &[Weighted]| weighted_mean_and_error(factors).1;
     let surer = ways.iter().filter(|(_, factors)| factors.len() >= FEWEST_RECORDS);

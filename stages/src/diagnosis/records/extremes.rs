@@ -21,7 +21,8 @@ pub struct Extremes {
     pub high: Tally,
 }
 
-/// The five extreme values at either end, in one pass. Equal codes must be equal values; NaN and infinities are left out.
+/// The five extreme values at either end, in one pass. Equal codes must be equal values; NaN and infinities are left
+/// out.
 pub(super) fn extremes(samples: &[f64]) -> Extremes {
     let high = tally(samples.iter().copied());
     let mut low = tally(samples.iter().map(|value| -value));

@@ -28,7 +28,8 @@ pub(super) struct FreeRecord {
     pub time_s: Vec<f64>,
     /// Deflection, V, less what the nuisances explain.
     pub left_v: Vec<f64>,
-    /// An offset for each stretch, slow lines, what was found before; a drift in time where it can be told from the position.
+    /// An offset for each stretch, slow lines, what was found before; a drift in time where it can be told from the
+    /// position.
     pub nuisance: Basis,
     stretches: Vec<Range>,
     /// Share of the position's variance that a drift in time leaves.
@@ -156,8 +157,8 @@ impl FreeRecord {
         self.left_v = self.nuisance.residual(&self.left_v);
     }
 
-    /// Least-squares factor of `shape`, less what the nuisances and `lower` shapes explain. It counts as the shape's mean square: 1/f noise is as
-    /// strong in a short stretch as in a long one.
+    /// Least-squares factor of `shape`, less what the nuisances and `lower` shapes explain. It counts as the shape's
+    /// mean square: 1/f noise is as strong in a short stretch as in a long one.
     pub fn factor(&self, shape: &[f64], lower: &[Vec<f64>]) -> Option<Weighted> {
         let mut basis = self.nuisance.clone();
         for column in lower {

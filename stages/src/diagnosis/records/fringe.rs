@@ -16,8 +16,8 @@ const HIGHEST_DEGREE: usize = 5;
 /// A wave in the position, alike in all records.
 ///
 /// # Method
-/// The free level on Legendre polynomials of the position, lower ones projected out; t tests over records of degrees 2 to 5: a bend is what a straight line
-/// can't give. Then a wave by least squares.
+/// The free level on Legendre polynomials of the position, lower ones projected out; t tests over records of degrees 2
+/// to 5: a bend is what a straight line can't give. Then a wave by least squares.
 pub(super) fn fringe(level: &FreeLevel) -> Option<Candidate> {
     let track = level.records.iter().map(|record| span(&record.position_m));
     let common = track.fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
@@ -59,7 +59,8 @@ fn bend_p(records: &[FreeRecord], common: (f64, f64), degree: usize) -> f64 {
     t_test(&records.iter().filter_map(factor).collect::<Vec<_>>())
 }
 
-/// What a fringe fitted to the records of the other parity takes off each record; its wavelength bounded, if `light` is given.
+/// What a fringe fitted to the records of the other parity takes off each record; its wavelength bounded, if `light` is
+/// given.
 pub(super) fn fringe_held_out(level: &FreeLevel, light: Option<(f64, f64)>) -> HeldOut {
     let fits = [1, 0].map(|other| fit_fringe(level.half(other), light));
     HeldOut::new(level, |parity, record| fits[parity].as_ref().map(|fit| fit.shape(&record.position_m)))

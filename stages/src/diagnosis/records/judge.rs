@@ -8,7 +8,8 @@ use super::sign::{Abstention, RecordSign};
 use super::slow_lines::{lowest_line_hz, slow_lines, slow_signs};
 use super::summary::RecordSummary;
 
-/// Channels that [`judge`] looks at, each at its own false-alarm rate: for all of them together multiply p-values by it.
+/// Channels that [`judge`] looks at, each at its own false-alarm rate: for all of them together multiply p-values by
+/// it.
 pub const CHANNELS: usize = 4;
 
 /// A resonance of the lever: its thermal motion is no foreign line.
@@ -29,7 +30,8 @@ pub struct JudgeOptions {
     pub mains_hz: Vec<f64>,
     /// Multiples of each that are looked at. Default: 8.
     pub mains_orders: usize,
-    /// Known resonances; three widths round each, no line is sought. A resonance wider than some bins is told from a line without.
+    /// Known resonances; three widths round each, no line is sought. A resonance wider than some bins is told from a
+    /// line without.
     pub resonances: Vec<Resonance>,
 }
 
@@ -42,9 +44,11 @@ impl Default for JudgeOptions {
 /// What the records show of causes that act on them rather than on the ringdown.
 ///
 /// # Method
-/// Clipping by the histogram's ends; slow lines by regression over the whole record; faster lines by periodograms; then, with the
-/// slow lines taken out, the free level against the piezo's position and the integral of what was measured before. Each channel keeps its own false-alarm rate and corrects for all that it
-/// looks at. Records are replicates and neighbouring frequencies the yardstick, so that 1/f noise, wander and unequal records don't feign a cause.
+/// Clipping by the histogram's ends; slow lines by regression over the whole record; faster lines by periodograms;
+/// then, with the slow lines taken out, the free level against the piezo's position and the integral of what was
+/// measured before. Each channel keeps its own false-alarm rate and corrects for all that it looks at. Records are
+/// replicates and neighbouring frequencies the yardstick, so that 1/f noise, wander and unequal records don't feign a
+/// cause.
 /// # Shapes
 /// Records in order of time: even ones fit what odd ones judge, and the other way round.
 /// # Units
@@ -54,7 +58,8 @@ impl Default for JudgeOptions {
 /// # Errors
 /// None: what can't be asked of these records is listed by [`abstentions`].
 /// # Source
-/// Periodograms against their neighbours: D. J. Thomson, Proc. IEEE 70 (1982) 1055. Replicates: R. A. Fisher, The Design of Experiments, 1935.
+/// Periodograms against their neighbours: D. J. Thomson, Proc. IEEE 70 (1982) 1055. Replicates: R. A. Fisher, The
+/// Design of Experiments, 1935.
 pub fn judge(records: &[RecordSummary], options: &JudgeOptions) -> Vec<RecordSign> {
     Begun::judge(records, options).finish(records, options)
 }
@@ -84,7 +89,8 @@ impl Begun {
         self.signs.iter().find(|sign| sign.id == "ac-coupling")?.parameters.first()?.1.value
     }
 
-    /// The free level against the piezo's position, before and after what was found is taken out; nothing where no record has positions.
+    /// The free level against the piezo's position, before and after what was found is taken out; nothing where no
+    /// record has positions.
     pub fn course(&self) -> &[PositionCourse] {
         &self.course
     }

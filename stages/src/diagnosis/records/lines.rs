@@ -11,14 +11,15 @@ use super::yardstick::{Yardstick, of_many};
 const LOBE: usize = 1;
 /// Neighbours on either side that a line is compared with: beyond its lobe, nearer than the spectrum bends.
 const NEAR: (usize, usize) = (4, 11);
-/// Independent powers among the neighbours over those in the lobe. Hann's bins correlate by 4/9 and 1/36 at one and two bins: the mean of three has 0.537 of one
-/// bin's variance, that of two times eight 0.114.
+/// Independent powers among the neighbours over those in the lobe. Hann's bins correlate by 4/9 and 1/36 at one and two
+/// bins: the mean of three has 0.537 of one bin's variance, that of two times eight 0.114.
 const NEIGHBOURS: f64 = 0.537 / 0.114;
 /// First bin looked at: below, the spectrum is too steep (and the slow channel sees it).
 const FIRST_BIN: usize = 12;
 /// Lines looked at before giving up: resonances among them are passed over.
 const MOST_PEAKS: usize = 64;
-/// A resonance's excess over its neighbours that still counts as a line's at the short length. A line's density falls to a quarter there.
+/// A resonance's excess over its neighbours that still counts as a line's at the short length. A line's density falls
+/// to a quarter there.
 const QUARTER: f64 = 0.25;
 
 /// The spectra of an archive, each scaled by its own median level.
@@ -38,9 +39,10 @@ struct Line {
 /// The strongest line that is none of a resonance's.
 ///
 /// # Method
-/// Per record the mean Hann periodogram of its stretches, over its median; averaged over records, each as much as it has windows. Three bins against the
-/// sixteen at 4 to 11 bins on either side; the law of that ratio from all bins. A line is as narrow as the window: nothing is left two and three
-/// bins off, and at a quarter of the length its density falls to a quarter, while that of a resonance stays.
+/// Per record the mean Hann periodogram of its stretches, over its median; averaged over records, each as much as it
+/// has windows. Three bins against the sixteen at 4 to 11 bins on either side; the law of that ratio from all bins. A
+/// line is as narrow as the window: nothing is left two and three bins off, and at a quarter of the length its density
+/// falls to a quarter, while that of a resonance stays.
 pub(super) fn judge_lines(records: &[RecordSummary], slow_hz: &[f64], options: &JudgeOptions) -> Option<RecordSign> {
     let archive = Archive::new(records)?;
     let long = archive.mean(|spectra| &spectra.long, |_| true);
@@ -96,7 +98,8 @@ fn background(density: &[f64], k: usize) -> Option<f64> {
     Some(sum / (2 * (far - near + 1)) as f64)
 }
 
-/// Whether the window's side lobes of a line reach that bin: amplitude `1 / (pi d^3)` at `d` bins (F. J. Harris, Proc. IEEE 66 (1978) 51).
+/// Whether the window's side lobes of a line reach that bin: amplitude `1 / (pi d^3)` at `d` bins (F. J. Harris, Proc.
+/// IEEE 66 (1978) 51).
 fn leaks(line: &Line, k: usize, ratio: f64) -> bool {
     let d = k.abs_diff(line.bin) as f64;
     ratio < 10.0 * 3.0 * line.ratio / (std::f64::consts::PI * d.powi(3)).powi(2) + 1.0
@@ -106,7 +109,8 @@ fn leaks(line: &Line, k: usize, ratio: f64) -> bool {
 fn is_narrow(long: &[f64], short: &[f64], k: usize, of_long: &Yardstick, of_short: &Yardstick) -> bool {
     let Some(level) = background(long, k) else { return false };
     let excess = lobe(long, k) - level;
-    // skirt: two bins off by up to half a bin's offset (Hann: 3 % of the peak), and three; four bins have 3/4 of a lobe's variance
+    // skirt: two bins off by up to half a bin's offset (Hann: 3 % of the peak), and three; four bins have 3/4 of a
+    // lobe's variance
     let skirt = (long[k - 3] + long[k - 2] + long[k + 2] + long[k + 3]) / 4.0 - level;
     if skirt > 0.1 * excess + 4.0 * of_long.spread() * level {
         return false;
@@ -133,7 +137,8 @@ impl<'a> Archive<'a> {
         let commonest = keys.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?[0];
         let level = |spectra: &LineSpectra| {
             let mut bins: Vec<f64> = spectra.long.density.iter().map(|&d| f64::from(d)).collect();
-            // median over mean of a chi-square variable of two degrees for each window (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931) 684)
+            // median over mean of a chi-square variable of two degrees for each window (E. B. Wilson, M. M. Hilferty,
+            // PNAS 17 (1931) 684)
             afmid_kernels::statistics::median(&mut bins)
                 / (1.0 - 1.0 / (9.0 * spectra.long.windows.max(1) as f64)).powi(3)
         };
@@ -222,8 +227,8 @@ impl<'a> Archive<'a> {
         }
     }
 
-    /// Rms of all stretches, V, without and with the line: what the other half's amplitude, at a free phase, takes from (or, where it is too
-    /// large, leaves in) the power at its bin.
+    /// Rms of all stretches, V, without and with the line: what the other half's amplitude, at a free phase, takes from
+    /// (or, where it is too large, leaves in) the power at its bin.
     fn held_out(&self, k: usize) -> (f64, f64) {
         if self.spectra.len() < 2 {
             return (f64::NAN, f64::NAN);

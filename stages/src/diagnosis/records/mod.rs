@@ -1,9 +1,10 @@
 //! The whole-record channels of a diagnosis: what shows in the records themselves, before any ringdown is fitted.
 //!
 //! [`summarise`] reduces one record at a time to a small [`RecordSummary`]; [`judge`] looks at all of them and returns a [`RecordSign`] per cause
-//! found: `clipping` from the histogram of the extreme values, `mains-hum` and slow lines from a regression over the whole record, faster lines
-//! (`spurious-line`) from periodograms of the free stretches, `piezo-crosstalk`, `interference-fringe` and `ac-coupling` from the free
-//! level against the piezo's position and what was measured before. Noise is never assumed white: records are the replicates, neighbouring frequencies the yardstick.
+//! found: `clipping` from the histogram of the extreme values, `mains-hum` and slow lines from a regression over the
+//! whole record, faster lines (`spurious-line`) from periodograms of the free stretches, `piezo-crosstalk`,
+//! `interference-fringe` and `ac-coupling` from the free level against the piezo's position and what was measured
+//! before. Noise is never assumed white: records are the replicates, neighbouring frequencies the yardstick.
 
 mod basis;
 mod clipping;

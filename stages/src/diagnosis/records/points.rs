@@ -16,7 +16,8 @@ pub(super) struct Points {
     pub piezo: Option<Vec<f64>>,
 }
 
-/// Block means; samples that are not finite are left out, a block of nothing else repeats the one before. The last, unfinished block is dropped.
+/// Block means; samples that are not finite are left out, a block of nothing else repeats the one before. The last,
+/// unfinished block is dropped.
 pub(super) fn points(deflection: &[f64], piezo: Option<&[f64]>) -> Points {
     let step = deflection.len().div_ceil(POINTS).max(1);
     let (values, variances) = blocks(deflection, step);

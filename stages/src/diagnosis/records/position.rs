@@ -52,9 +52,11 @@ pub(super) struct OfPosition {
 /// Causes of the free level, the strongest first.
 ///
 /// # Method
-/// Per record the free level, less an offset for each stretch, the slow lines and (where the lever is free on both ways) a drift in time. Each candidate has a
-/// shape of one size for all records and a t test over them. Among the significant ones that gain on held-out records the one that gains most is named;
-/// its shape, of any size in each record, is a nuisance from then on. At last each name is asked again with the others for nuisances, and dropped if it no longer stands.
+/// Per record the free level, less an offset for each stretch, the slow lines and (where the lever is free on both
+/// ways) a drift in time. Each candidate has a shape of one size for all records and a t test over them. Among the
+/// significant ones that gain on held-out records the one that gains most is named; its shape, of any size in each
+/// record, is a nuisance from then on. At last each name is asked again with the others for nuisances, and dropped if
+/// it no longer stands.
 pub(super) fn judge_position(records: &[RecordSummary], slow: &[SlowLine], false_alarm_rate: f64) -> OfPosition {
     let level = FreeLevel::new(records, slow);
     if !level.can_judge() {

@@ -26,8 +26,8 @@ const RIDGE: f64 = 1e-6;
 /// The course before and after; nothing where no record has positions.
 ///
 /// # Method
-/// Least squares of one step function of the position for all records, each record's nuisances (offsets of stretches, drift, slow lines) taken out; errors
-/// from the records' scores, so that no noise model is needed.
+/// Least squares of one step function of the position for all records, each record's nuisances (offsets of stretches,
+/// drift, slow lines) taken out; errors from the records' scores, so that no noise model is needed.
 /// # Source
 /// H. White, Econometrica 48 (1980) 817, by clusters.
 pub(super) fn position_course(before: &FreeLevel, after: &FreeLevel) -> Vec<PositionCourse> {
@@ -104,7 +104,8 @@ mod tests {
             }
             xy / xx
         };
-        // the free travel is a part of the whole: what lies beyond is not seen and held at zero by the ridge, so that the slope is bounded, not exact
+        // the free travel is a part of the whole: what lies beyond is not seen and held at zero by the ridge, so that
+        // the slope is bounded, not exact
         let (before, after) = (middle(|c| c.before[0]), middle(|c| c.after[0]));
         assert!(before > 0.3 * kappa && before < 1.5 * kappa, "{before:e}");
         // the slope is fitted to some 2 %

@@ -13,7 +13,8 @@ pub(super) fn mean_and_error(values: &[f64]) -> (f64, f64) {
 /// A value of each record, and how much it counts.
 pub(super) type Weighted = (f64, f64);
 
-/// Most that a replicate may count, in medians of all weights: weights are a guess, and one record must not decide alone.
+/// Most that a replicate may count, in medians of all weights: weights are a guess, and one record must not decide
+/// alone.
 const MOST_WEIGHT: f64 = 4.0;
 
 /// The same where the replicates' variances are as the inverse of their weights.
@@ -27,7 +28,8 @@ pub(super) fn weighted_mean_and_error(values: &[Weighted]) -> (f64, f64) {
     (mean, (variance / sum).sqrt())
 }
 
-/// Two-sided p-value of Student's t test that the mean of the replicates is zero; 1 where it can't be asked (fewer than three).
+/// Two-sided p-value of Student's t test that the mean of the replicates is zero; 1 where it can't be asked (fewer than
+/// three).
 pub(super) fn t_test(values: &[Weighted]) -> f64 {
     if values.len() < 3 {
         return 1.0;

@@ -26,7 +26,8 @@ pub struct Segment {
     pub first: usize,
     /// Deflection, V.
     pub values: Vec<f64>,
-    /// Deflection summed up from the record's beginning to the middle of the block, V times blocks: what a coupling capacitor has taken up.
+    /// Deflection summed up from the record's beginning to the middle of the block, V times blocks: what a coupling
+    /// capacitor has taken up.
     pub sums: Vec<f64>,
     /// Piezo position, m, smoothed by a polynomial in time: its noise would enter through the contact's steep slope.
     pub piezo: Option<Vec<f64>>,
@@ -47,8 +48,8 @@ pub(super) struct Stretch {
     pub end: usize,
 }
 
-/// The stretches of a record. Between two ruptures (or the record's start and one) without a snap-in in between, the contact is taken to begin
-/// where two straight lines fit best.
+/// The stretches of a record. Between two ruptures (or the record's start and one) without a snap-in in between, the
+/// contact is taken to begin where two straight lines fit best.
 pub(super) fn stretches(points: &Points, events: &[RecordEvent]) -> Vec<Stretch> {
     let mut marks: Vec<(usize, EventKind)> =
         events.iter().map(|event| (event.sample / points.step, event.kind)).collect();
@@ -99,12 +100,14 @@ fn between(
                 _ => add(free, range.start, range.end),
             }
         }
-        // without events nothing tells free from loaded; a contact that never ruptures, or two snap-ins in a row, is not judged
+        // without events nothing tells free from loaded; a contact that never ruptures, or two snap-ins in a row, is
+        // not judged
         _ => {}
     }
 }
 
-/// Rise of a free stretch, of the mean rise in contact: a hundred times what a free lever does, a third of what one in contact does near a turn.
+/// Rise of a free stretch, of the mean rise in contact: a hundred times what a free lever does, a third of what one in
+/// contact does near a turn.
 const LEVEL: f64 = 0.1;
 
 /// Whether a stretch is level beside a contact.
@@ -129,8 +132,8 @@ fn rise(values: &[f64], block: usize, after: &std::ops::Range<usize>) -> f64 {
 
 /// First block after an event at `block` where its ringing has gone.
 ///
-/// The variance within the blocks shows the ringing until it falls to 1.5 times that of the quiet; as much time again takes it as far below the
-/// noise as it stood above.
+/// The variance within the blocks shows the ringing until it falls to 1.5 times that of the quiet; as much time again
+/// takes it as far below the noise as it stood above.
 fn settled(points: &Points, block: usize, kind: EventKind, end: usize) -> usize {
     let first = block + if kind == EventKind::SnapOff { 1 } else { GUARD };
     if end <= first + 8 {
@@ -143,7 +146,8 @@ fn settled(points: &Points, block: usize, kind: EventKind, end: usize) -> usize 
     first + (2 * ringing + 1).min((end - first) / 2)
 }
 
-/// Where two straight lines fit the blocks up to their highest best: the lever touches. None where too few lie before the highest.
+/// Where two straight lines fit the blocks up to their highest best: the lever touches. None where too few lie before
+/// the highest.
 fn contact_onset(values: &[f64], range: std::ops::Range<usize>) -> Option<usize> {
     let stretch = values.get(range.clone())?;
     let peak = (0..stretch.len()).max_by(|&a, &b| stretch[a].total_cmp(&stretch[b]))?;

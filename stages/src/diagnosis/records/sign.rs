@@ -7,9 +7,11 @@ use crate::diagnosis::{Gain, RunnerUp, Value};
 pub struct RecordSign {
     /// Its id in the catalogue of causes.
     pub id: &'static str,
-    /// Probability of so large a sign without it, corrected for all that its channel looked at (not for the number of channels).
+    /// Probability of so large a sign without it, corrected for all that its channel looked at (not for the number of
+    /// channels).
     pub p_value: f64,
-    /// Its parameters, named as in the catalogue. Those that differ from record to record (phases of lines) are left out.
+    /// Its parameters, named as in the catalogue. Those that differ from record to record (phases of lines) are left
+    /// out.
     pub parameters: Vec<(&'static str, Value)>,
     /// What gave it away.
     pub evidence: String,

@@ -16,8 +16,9 @@ const HIGHEST_HZ: f64 = 1e3;
 const LOWEST: usize = 3;
 /// Neighbours of a frequency, in half resolutions: near enough for the same noise, far enough for the line's own width.
 const NEIGHBOURS: std::ops::RangeInclusive<f64> = 3.9..=11.1;
-/// Independent powers among the neighbours, sixteen half a resolution apart: powers of a sine's regression correlate by sinc^2, 0.405 at one step and 0.045 at three,
-/// so that the mean of many has 1.9 times the variance of as many independent ones.
+/// Independent powers among the neighbours, sixteen half a resolution apart: powers of a sine's regression correlate by
+/// sinc^2, 0.405 at one step and 0.045 at three, so that the mean of many has 1.9 times the variance of as many
+/// independent ones.
 const INDEPENDENT: f64 = 16.0 / 1.9;
 /// Lines taken out of an archive at most.
 const MOST_LINES: usize = 6;
@@ -50,9 +51,10 @@ struct Look {
 /// The slow lines, strongest first.
 ///
 /// # Method
-/// In every record, each stretch (free or loaded, one way of the piezo) is freed from a cubic in the piezo position and weighted by what that
-/// leaves; then a sine of one phase for the whole record. Its power, averaged over records, over that at neighbouring frequencies of the
-/// same regression; its law is taken from all other frequencies. Greedily: a line found is taken out, with its phase in each record.
+/// In every record, each stretch (free or loaded, one way of the piezo) is freed from a cubic in the piezo position and
+/// weighted by what that leaves; then a sine of one phase for the whole record. Its power, averaged over records, over
+/// that at neighbouring frequencies of the same regression; its law is taken from all other frequencies. Greedily: a
+/// line found is taken out, with its phase in each record.
 pub(super) fn slow_lines(records: &[RecordSummary], options: &JudgeOptions) -> Vec<SlowLine> {
     let mut known: Vec<Vec<Sine>> = vec![Vec::new(); records.len()];
     let mut lines = Vec::new();
@@ -113,7 +115,8 @@ fn mean_power(slow: &[Option<SlowRecord>], frequency_hz: f64) -> f64 {
     powers.iter().sum::<f64>() / powers.len() as f64
 }
 
-/// Power over that of the neighbours, both means over records (which are weighted alike); a straight line in logarithms interpolates the neighbours.
+/// Power over that of the neighbours, both means over records (which are weighted alike); a straight line in logarithms
+/// interpolates the neighbours.
 fn look(slow: &[Option<SlowRecord>], powers: &[f64], grid: &[f64], frequency_hz: f64, step: f64) -> Option<Look> {
     let near = |f: f64| NEIGHBOURS.contains(&((f - frequency_hz).abs() / step));
     let neighbours = (0..grid.len()).filter(|&k| near(grid[k]));
@@ -206,7 +209,8 @@ fn refined(slow: &[Option<SlowRecord>], frequency_hz: f64, step: f64) -> (f64, f
     (around, jackknife(&left_out))
 }
 
-/// Rms of the last free stretches without and with the sine: frequency from the records of the other parity, phase from the other stretches.
+/// Rms of the last free stretches without and with the sine: frequency from the records of the other parity, phase from
+/// the other stretches.
 fn held_out(slow: &[Option<SlowRecord>], step: f64, frequency_hz: f64) -> (f64, f64) {
     let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
     for parity in 0..2 {

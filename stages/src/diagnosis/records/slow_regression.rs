@@ -129,7 +129,8 @@ impl SlowRecord {
         left
     }
 
-    /// Mean squares of the last free stretch about its mean, without and with the sine that all others show at that frequency.
+    /// Mean squares of the last free stretch about its mean, without and with the sine that all others show at that
+    /// frequency.
     pub fn held_out(&self, frequency_hz: f64) -> Option<(f64, f64)> {
         let last = self.parts.iter().rposition(|part| part.kind != SegmentKind::Contact)?;
         let sine = self.fit_to(frequency_hz, |k| k != last)?;

@@ -15,7 +15,8 @@ pub struct Spectrum {
     pub density: Vec<f32>,
 }
 
-/// The same stretches at two lengths: a line grows against its neighbours with the length, a resonance once resolved does not.
+/// The same stretches at two lengths: a line grows against its neighbours with the length, a resonance once resolved
+/// does not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineSpectra {
     /// A quarter of the long length.
@@ -27,8 +28,8 @@ pub struct LineSpectra {
 /// Longest and shortest long window. 32768 at 5 MS/s resolve 150 Hz: a fifth of the width of the paper's lowest mode.
 const LENGTHS: (usize, usize) = (512, 1 << 15);
 
-/// Spectra of those stretches of samples; none where they are too short. The length depends on the record's length alone, so that all records of
-/// an archive have the same.
+/// Spectra of those stretches of samples; none where they are too short. The length depends on the record's length
+/// alone, so that all records of an archive have the same.
 pub(super) fn line_spectra(samples: &[f64], stretches: &[Range<usize>], interval_s: f64) -> Option<LineSpectra> {
     // a random phase in each window: the longer the window, the weaker a line shows
     let sixth = (samples.len() / 6).max(1);
@@ -41,7 +42,8 @@ pub(super) fn line_spectra(samples: &[f64], stretches: &[Range<usize>], interval
     Some(LineSpectra { short, long })
 }
 
-/// Mean of half-overlapping Hann periodograms, each less its own straight line (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70).
+/// Mean of half-overlapping Hann periodograms, each less its own straight line (P. D. Welch, IEEE Trans. Audio
+/// Electroacoust. 15 (1967) 70).
 fn mean_periodogram(samples: &[f64], stretches: &[Range<usize>], length: usize, interval_s: f64) -> Option<Spectrum> {
     let mut welch = Welch::new(length, 1.0 / interval_s, Detrend::Line).ok()?;
     for stretch in stretches {

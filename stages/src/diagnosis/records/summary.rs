@@ -56,9 +56,9 @@ pub struct RecordSummary {
 /// Reduces one record.
 ///
 /// # Method
-/// A thousand block means of deflection and piezo. Events divide them into free and loaded stretches; the ringing after a rupture is left out as
-/// long as the blocks' variance shows it, and as long again. Hann periodograms of all stretches at two lengths; the five extreme values at
-/// either end with their counts.
+/// A thousand block means of deflection and piezo. Events divide them into free and loaded stretches; the ringing after
+/// a rupture is left out as long as the blocks' variance shows it, and as long again. Hann periodograms of all
+/// stretches at two lengths; the five extreme values at either end with their counts.
 /// # Shapes
 /// As many piezo samples as deflection samples.
 /// # Units

@@ -2,12 +2,14 @@
 
 use afmid_kernels::statistics::{incomplete_beta, median_and_scale};
 
-/// The law of a ratio of powers: a gamma variable of mean `mean` and shape `shape`, over an independent one of `neighbours` times that shape.
+/// The law of a ratio of powers: a gamma variable of mean `mean` and shape `shape`, over an independent one of
+/// `neighbours` times that shape.
 ///
 /// # Method
-/// Averages of periodograms are gamma variables, and so are those of their neighbours: the ratio follows Fisher's law, whose upper tail is heavier than a gamma
-/// variable's of the same spread. Median and robust scale of the logarithm over all frequencies give mean and shape; lines and resonances among them
-/// don't count. `ln` of a gamma variable of shape `v` has variance `1 / (v - 1/2)` and a median `ln(1 - 1/(3 v))` times its mean (to a per cent for v >= 1.5).
+/// Averages of periodograms are gamma variables, and so are those of their neighbours: the ratio follows Fisher's law,
+/// whose upper tail is heavier than a gamma variable's of the same spread. Median and robust scale of the logarithm
+/// over all frequencies give mean and shape; lines and resonances among them don't count. `ln` of a gamma variable of
+/// shape `v` has variance `1 / (v - 1/2)` and a median `ln(1 - 1/(3 v))` times its mean (to a per cent for v >= 1.5).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Yardstick {
     pub mean: f64,
@@ -19,13 +21,15 @@ pub(super) struct Yardstick {
 const FEWEST: usize = 24;
 
 impl Yardstick {
-    /// From the ratios at all frequencies, sought ones among them. `neighbours`: how many times as much power the neighbours average.
+    /// From the ratios at all frequencies, sought ones among them. `neighbours`: how many times as much power the
+    /// neighbours average.
     pub fn new(ratios: &[f64], neighbours: f64) -> Option<Self> {
         let mut logarithms: Vec<f64> = ratios.iter().map(|ratio| ratio.ln()).filter(|log| log.is_finite()).collect();
         if logarithms.len() < FEWEST {
             return None;
         }
-        // a finite sample's scale may come out small: one standard error of it, 1.17 / sqrt(2 n) (P. J. Rousseeuw, C. Croux, 1993), on the safe side
+        // a finite sample's scale may come out small: one standard error of it, 1.17 / sqrt(2 n) (P. J. Rousseeuw, C.
+        // Croux, 1993), on the safe side
         let safety = 1.0 + 1.17 / (logarithms.len() as f64).sqrt();
         let (middle, scale) = median_and_scale(&mut logarithms);
         let spread = (safety * scale).max(1e-6);

@@ -14,9 +14,11 @@ use afmid_kernels::ringdown::Exponential;
 /// Least factor by which a cause is taken to weaken a mode.
 const SHRUNK: f64 = 0.03;
 
-/// Moves onsets, shares and amplitudes by what the last hypothesis does to the modes, so that a fit that begins with it begins in phase and at the rings seen.
+/// Moves onsets, shares and amplitudes by what the last hypothesis does to the modes, so that a fit that begins with it
+/// begins in phase and at the rings seen.
 ///
-/// A slow release delays all modes alike, by several samples: more than the search could find from there, since the high modes turn within one.
+/// A slow release delays all modes alike, by several samples: more than the search could find from there, since the
+/// high modes turn within one.
 pub fn aligned(problem: &Problem<'_>, state: &mut State, starts: &mut [usize]) -> Result<(), ModelError> {
     problem.starts(state, starts)?;
     let mut before = state.clone();
@@ -61,17 +63,19 @@ pub fn aligned(problem: &Problem<'_>, state: &mut State, starts: &mut [usize]) -
     problem.starts(state, starts)
 }
 
-/// Part of the first mode's period on either side within which the release is looked for, and steps per period of the last mode.
+/// Part of the first mode's period on either side within which the release is looked for, and steps per period of the
+/// last mode.
 const AROUND: f64 = 0.4;
 const STEPS: f64 = 40.0;
 /// Cosine of the phase below which a mode rings the other way round.
 const OTHER_WAY: f64 = -0.5;
 
-/// When a `lever` was released so that it rings in the phase of `exponentials`, s after their time zero and near `guess_s`; modes that ring the other way
-/// round then have a negative share.
+/// When a `lever` was released so that it rings in the phase of `exponentials`, s after their time zero and near
+/// `guess_s`; modes that ring the other way round then have a negative share.
 ///
-/// Events are found to a few samples, in which a high mode turns by more than a search could mend. Modes count by their share: what is wrong with
-/// the nominal detector turns each by some tenths of a radian, but what weakens a high mode may have turned it round.
+/// Events are found to a few samples, in which a high mode turns by more than a search could mend. Modes count by their
+/// share: what is wrong with the nominal detector turns each by some tenths of a radian, but what weakens a high mode
+/// may have turned it round.
 pub fn in_phase(exponentials: &[Exponential], lever: &mut Lever, guess_s: f64) -> f64 {
     let turned: Vec<(f64, f64, f64)> = exponentials
         .iter()

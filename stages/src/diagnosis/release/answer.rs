@@ -14,8 +14,8 @@ use crate::diagnosis::verdict::{DiagnosedMode, Diagnosis, NamedCause, Rung, Runn
 
 /// Puts shapes and whole records together.
 ///
-/// What records show is named whatever the shapes say, unless those end without a name: `unexplained` names nothing. It is the verdict as well where records
-/// show what may not be named (`left_out`).
+/// What records show is named whatever the shapes say, unless those end without a name: `unexplained` names nothing. It
+/// is the verdict as well where records show what may not be named (`left_out`).
 pub fn answer(
     problem: &Problem<'_>,
     naming: &Naming,
@@ -75,7 +75,8 @@ fn between(problem: &Problem<'_>, place: f64) -> Option<f64> {
     Some((after - before) / 12f64.sqrt())
 }
 
-/// What a model that is not exact may add to a strength, the first parameter: what it leaves of its effect, as a share of the energy, it may have along it as well.
+/// What a model that is not exact may add to a strength, the first parameter: what it leaves of its effect, as a share
+/// of the energy, it may have along it as well.
 fn bias(cause: &dyn Cause, parameter: usize, value: f64) -> f64 {
     if parameter == 0 { cause.inexact().sqrt() * value.abs() } else { 0.0 }
 }

@@ -15,8 +15,9 @@ use afmid_kernels::ringdown::{EventParameters, Exponential};
 /// An orthonormal basis of whitened releases near a lever.
 ///
 /// # Method
-/// Modes and slow poles by `t^m exp(s t)`, m up to 2: right to the third order of a pole's change. Fast poles, which may come to lie on one another, by the
-/// first samples after the release, each for itself: right at any distance. Then level, ramp, and level before the release.
+/// Modes and slow poles by `t^m exp(s t)`, m up to 2: right to the third order of a pole's change. Fast poles, which
+/// may come to lie on one another, by the first samples after the release, each for itself: right at any distance. Then
+/// level, ramp, and level before the release.
 pub(super) struct Basis {
     reference: Vec<Exponential>,
     /// Which of a lever's exponentials the reference has.
@@ -28,7 +29,8 @@ pub(super) struct Basis {
 
 /// Most samples that fast poles may take.
 const EARLY: usize = 64;
-/// Decay times after which a fast pole is gone: to a ten-millionth of its amplitude, a thousandth of a converter's step.
+/// Decay times after which a fast pole is gone: to a ten-millionth of its amplitude, a thousandth of a converter's
+/// step.
 const GONE: f64 = 16.0;
 /// The same with room for a pole that becomes slower.
 const ROOM: f64 = 23.0;
@@ -71,7 +73,8 @@ impl Basis {
         product(self.directions.q.transpose(), signals)
     }
 
-    /// How far a lever is from the one that the basis was made for: largest change of a pole in decay rates, 1 where the basis no longer holds.
+    /// How far a lever is from the one that the basis was made for: largest change of a pole in decay rates, 1 where
+    /// the basis no longer holds.
     pub fn distance(&self, lever: &Lever) -> f64 {
         let release = lever.release();
         let change = |(origin, &i): (&Exponential, &usize)| match release.get(i) {
@@ -84,7 +87,8 @@ impl Basis {
         if slow { f64::max(far, 1.0) } else { far }
     }
 
-    /// What whitened signals near the lever multiply the complex residue of each of its modes by: `1 + change / residue`.
+    /// What whitened signals near the lever multiply the complex residue of each of its modes by: `1 + change /
+    /// residue`.
     pub fn residue_ratios(&self, change: &[f64], own: &EventParameters, modes: usize) -> Vec<c64> {
         let width = self.directions.r.ncols();
         let mut weights: Vec<f64> = {

@@ -1,4 +1,5 @@
-//! Equivalence classes, checked by the rank of the joint sensitivities: what two causes change in an archive, beside everything that is fitted.
+//! Equivalence classes, checked by the rank of the joint sensitivities: what two causes change in an archive, beside
+//! everything that is fitted.
 
 use std::f64::consts::TAU;
 
@@ -15,8 +16,8 @@ use afmid_kernels::ringdown::{EventParameters, RingdownNoise};
 
 const INTERVAL_S: f64 = 2e-7;
 const EVENTS: usize = 10;
-/// Share of a cause's energy that another must leave to be told from it: at ten times the limit the gain is a thousand, and half a per cent of that
-/// is as much as a tie.
+/// Share of a cause's energy that another must leave to be told from it: at ten times the limit the gain is a thousand,
+/// and half a per cent of that is as much as a tie.
 const TOLD_APART: f64 = 0.005;
 
 fn lever() -> Lever {
@@ -51,7 +52,8 @@ fn windows(state: &State, cut: &Cut) -> Vec<EventWindow> {
     state.events.iter().enumerate().map(one).collect()
 }
 
-/// Causes that act on releases, with their trials' Gram matrix beside everything that is fitted, and each trial's length before that.
+/// Causes that act on releases, with their trials' Gram matrix beside everything that is fitted, and each trial's
+/// length before that.
 struct Seen {
     trials: Vec<(&'static dyn Cause, Vec<f64>)>,
     gram: Mat<f64>,
@@ -98,7 +100,8 @@ impl Seen {
         self.of(id).into_iter().map(|i| self.gram[(i, i)] / self.raw[i]).fold(0.0, f64::max)
     }
 
-    /// Share of `id`'s trials that `by` leaves, the least and the largest of them: by one of its own trials of any size, or two neighbouring ones of one sign, which stand for a shape between them.
+    /// Share of `id`'s trials that `by` leaves, the least and the largest of them: by one of its own trials of any
+    /// size, or two neighbouring ones of one sign, which stand for a shape between them.
     fn left(&self, id: &str, by: &str) -> [f64; 2] {
         let others = self.of(by);
         let g = |i: usize, j: usize| self.gram[(i, j)];
@@ -143,7 +146,8 @@ fn classes_are_what_joint_sensitivities_can_not_tell_apart() {
             }
         }
     }
-    // a shape or two may look like another cause's (a short rupture like a second step just after it): such verdicts tie. A class is alike in all of them
+    // a shape or two may look like another cause's (a short rupture like a second step just after it): such verdicts
+    // tie. A class is alike in all of them
     let shapes = |id: &&&str| find(id).unwrap().about().identifiable == Identifiable::Shape;
     for a in ids.iter().filter(shapes) {
         for b in ids.iter().filter(shapes).filter(|b| *b != a) {

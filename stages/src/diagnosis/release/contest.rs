@@ -15,16 +15,18 @@ use crate::causes::Cause;
 const LEADER: usize = 3 * EVALUATIONS;
 /// Share of the leader's gain that a few events must promise for a fit to all.
 const HOPELESS: f64 = 0.8;
-/// A rival so far behind the leader (part of its gain, and at least, in the cost) is not fitted any further, unless it falls so fast that it may get
-/// there: so many times as far as in its last steps.
+/// A rival so far behind the leader (part of its gain, and at least, in the cost) is not fitted any further, unless it
+/// falls so fast that it may get there: so many times as far as in its last steps.
 const NEAR: (f64, f64) = (0.05, 20.0);
 const COMES_UP: f64 = 3.0;
 
-/// Events that choose who is fitted to all, where they promise such a fall of the cost; whoever is so much behind there may still win.
+/// Events that choose who is fitted to all, where they promise such a fall of the cost; whoever is so much behind there
+/// may still win.
 const FEW: usize = 4;
 const PLAIN: f64 = 60.0;
 const BEHIND: f64 = 20.0;
-/// Decay times of the slowest mode after which less than a twentieth of its energy is left to be seen, and the fewest samples.
+/// Decay times of the slowest mode after which less than a twentieth of its energy is left to be seen, and the fewest
+/// samples.
 const DECAYED: f64 = 1.6;
 const LEAST: usize = 1500;
 
@@ -50,7 +52,8 @@ impl Refits {
         self.finalists.iter().map(|trial| (trial.cause, trial.gain)).chain(self.rest.iter().copied())
     }
 
-    /// Those of an earlier round come back, with what they gain on the present base: of two fits of one cause the better stays.
+    /// Those of an earlier round come back, with what they gain on the present base: of two fits of one cause the
+    /// better stays.
     pub fn admit(&mut self, earlier: Vec<Trial>) {
         self.finalists.extend(earlier);
         self.finalists.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -65,8 +68,9 @@ impl Refits {
         self.all().find(|(cause, _)| !same_class(*cause, best.cause))
     }
 
-    /// The base fitted from where the best has led it, where that gained more than its sign promised, and whether the base had most of that for itself: then the
-    /// signs are to be sought anew. Otherwise its part is taken off all gains.
+    /// The base fitted from where the best has led it, where that gained more than its sign promised, and whether the
+    /// base had most of that for itself: then the signs are to be sought anew. Otherwise its part is taken off all
+    /// gains.
     pub fn renewed(&mut self, problem: &Problem<'_>, base: &JointFit) -> Option<(JointFit, bool)> {
         let best = self.finalists.first().filter(|best| best.beyond_promise(base))?;
         let better = refitted(problem, base, best)?;
@@ -91,8 +95,8 @@ pub(super) struct Contest<'a> {
 /// The strongest candidates fitted from the present fit.
 ///
 /// # Method
-/// Every candidate has some steps; then the leader goes on until it has arrived, and whoever is not far behind or comes up: candidates that do not fit cost
-/// little. Where the signs are plain, few events decide who is worth a fit to all.
+/// Every candidate has some steps; then the leader goes on until it has arrived, and whoever is not far behind or comes
+/// up: candidates that do not fit cost little. Where the signs are plain, few events decide who is worth a fit to all.
 pub(super) fn refits(
     problem: &Problem<'_>,
     base: &JointFit,

@@ -6,8 +6,8 @@ use afmid_kernels::statistics::chi_square_tail;
 /// What the events' own frequencies would gain.
 ///
 /// # Model
-/// Every mode's frequency changed in proportion, in each event by itself; the events' own parameters fitted along, the shared ones held. Whatever changes the lever from event
-/// to event shows here, in the catalogue or not.
+/// Every mode's frequency changed in proportion, in each event by itself; the events' own parameters fitted along, the
+/// shared ones held. Whatever changes the lever from event to event shows here, in the catalogue or not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detuning {
     /// Fall of the sum of squares, that of a change common to all events taken off.
@@ -19,7 +19,8 @@ pub struct Detuning {
 }
 
 impl Detuning {
-    /// From the events' shares of the normal equations, `modes` modes of the lever first; scores scatter `widened` times as much as the noise model says.
+    /// From the events' shares of the normal equations, `modes` modes of the lever first; scores scatter `widened`
+    /// times as much as the noise model says.
     pub(super) fn of(events: &[Scores], modes: usize, widened: f64) -> Self {
         // ln w stands at every other place
         let places: Vec<usize> = (0..modes).map(|mode| 2 * mode).collect();

@@ -10,8 +10,8 @@ use afmid_kernels::statistics::normal_two_sided;
 /// By which power of the event's amplitude a named cause's strength changes, beyond its own law.
 ///
 /// # Model
-/// `strength (a / mean a)^b`, to first order in `b`, with everything that is fitted fitted along: zero for the right law. A loss that grows with the amplitude, named for one that grows
-/// with its square, leaves -1.
+/// `strength (a / mean a)^b`, to first order in `b`, with everything that is fitted fitted along: zero for the right
+/// law. A loss that grows with the amplitude, named for one that grows with its square, leaves -1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exponent {
     /// Estimate.
@@ -24,7 +24,8 @@ pub struct Exponent {
 const VISIBLE: f64 = 1e-8;
 
 impl Exponent {
-    /// Of every hypothesis, in their order; none where the events' amplitudes are too much alike. Scores scatter `widened` times as much as the noise model says.
+    /// Of every hypothesis, in their order; none where the events' amplitudes are too much alike. Scores scatter
+    /// `widened` times as much as the noise model says.
     pub(super) fn all(problem: &Problem<'_>, state: &State, events: &[Scores], widened: f64) -> Vec<Option<Self>> {
         let count = state.events.len().max(1) as f64;
         let logarithms: Vec<f64> = state.events.iter().map(|own| own.amplitude.abs().ln()).collect();
@@ -87,7 +88,8 @@ mod tests {
     use crate::diagnosis::release::{Cut, Hypothesis, Lever, Prepared};
     use afmid_kernels::ringdown::{EventParameters, RingdownNoise};
 
-    /// Exponents of a strength of 2e-3 that goes as that power of the amplitude, known to a tenth of itself in each event.
+    /// Exponents of a strength of 2e-3 that goes as that power of the amplitude, known to a tenth of itself in each
+    /// event.
     fn exponents(amplitudes: &[f64], power: f64) -> Vec<Option<Exponent>> {
         let problem = Problem {
             windows: &[],

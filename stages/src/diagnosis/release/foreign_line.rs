@@ -12,11 +12,12 @@ use super::window::EventWindow;
 /// Periods of a line that a window must hold: slower ones are in the events' own offsets and slopes.
 const LEAST_PERIODS: f64 = 4.0;
 
-/// The windows less sines of those frequencies, Hz, each of the amplitude and phase that a baseline's residual shows in its event; those too slow for the windows
-/// stay. None where nothing is taken off.
+/// The windows less sines of those frequencies, Hz, each of the amplitude and phase that a baseline's residual shows in
+/// its event; those too slow for the windows stay. None where nothing is taken off.
 ///
 /// # Method
-/// Least squares, event by event. Ten events' phases are never quite evenly spread: what is left of the line in their weighted mean would be named for a resonance.
+/// Least squares, event by event. Ten events' phases are never quite evenly spread: what is left of the line in their
+/// weighted mean would be named for a resonance.
 pub fn without_lines(problem: &Problem<'_>, baseline: &JointFit, frequencies_hz: &[f64]) -> Option<Vec<EventWindow>> {
     let cut = problem.cut;
     let length_s = cut.samples as f64 * cut.interval_s;

@@ -13,12 +13,14 @@ use crate::causes::Cause;
 use crate::diagnosis::verdict::RunnerUp;
 use afmid_kernels::model::ModelError;
 
-/// Puts one cause in the place of several named ones where it alone explains the events as well, parameters paid: `fits` holds the baseline, then one fit per name. Says
-/// whether one was put.
+/// Puts one cause in the place of several named ones where it alone explains the events as well, parameters paid:
+/// `fits` holds the baseline, then one fit per name. Says whether one was put.
 ///
 /// # Method
-/// All names, or two of them, are taken out while lever and events stay where they have led them; each of these causes is fitted alone in their place, from the strength that
-/// fits best there. A baseline far from the truth gets the strength of the right cause wrong, and further names then mend that; from where they have led, the right strength is near.
+/// All names, or two of them, are taken out while lever and events stay where they have led them; each of these causes
+/// is fitted alone in their place, from the strength that fits best there. A baseline far from the truth gets the
+/// strength of the right cause wrong, and further names then mend that; from where they have led, the right strength is
+/// near.
 /// # Errors
 /// Those of the screen and of the fits.
 pub(super) fn gather(

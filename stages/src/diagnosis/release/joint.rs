@@ -44,7 +44,8 @@ const ARRIVED: f64 = 0.05;
 /// Distance from the basis' lever beyond which the basis is made anew, and beyond which a step is not believed.
 const NEAR: f64 = 0.03;
 const FAR: f64 = 1.0;
-/// The first while steps promise so much: the cost is right to one or two then (errors grow with the third power of the distance).
+/// The first while steps promise so much: the cost is right to one or two then (errors grow with the third power of the
+/// distance).
 const ON_THE_WAY: (f64, f64) = (0.1, 50.0);
 /// Damping at first, at least, after a failure at least, and where the search gives up.
 const DAMPING: [f64; 4] = [1e-6, 1e-9, 1e-4, 1e8];
@@ -129,7 +130,8 @@ pub(super) struct Linear {
     point: Point,
 }
 
-/// The same fit with errors from every event's own derivatives at the fit's own steps: the search gets along with coarser ones.
+/// The same fit with errors from every event's own derivatives at the fit's own steps: the search gets along with
+/// coarser ones.
 pub(super) fn with_errors(problem: &Problem<'_>, fitted: JointFit) -> Result<JointFit, ModelError> {
     let linear = Linear::with(problem, &fitted, Crossing::Exact)?;
     let Linear { basis, slopes, .. } = &linear;
@@ -163,9 +165,10 @@ impl Linear {
 /// Fits lever, causes and events from `state` on.
 ///
 /// # Method
-/// Gauss-Newton with damping (Levenberg, Marquardt), the events' own parameters eliminated by Schur complements; the lever's part in an orthonormal
-/// basis of whitened releases, made anew where the lever has moved; causes by difference quotients of their simulated change. A step counts if the cost has fallen
-/// in the basis of where it leads to. Parameters stay within their limits.
+/// Gauss-Newton with damping (Levenberg, Marquardt), the events' own parameters eliminated by Schur complements; the
+/// lever's part in an orthonormal basis of whitened releases, made anew where the lever has moved; causes by difference
+/// quotients of their simulated change. A step counts if the cost has fallen in the basis of where it leads to.
+/// Parameters stay within their limits.
 /// # Errors
 /// Onsets that leave their windows, a search without a finite result.
 /// # Source
@@ -178,7 +181,8 @@ pub fn fit(problem: &Problem<'_>, state: State, starts: Vec<usize>, hold: Hold) 
 const SETTLING: usize = 6;
 const ROUGH: f64 = 1e-3;
 
-/// The events' own parameters fitted to lever and causes as they are: a search from levels that are off goes astray with everything else.
+/// The events' own parameters fitted to lever and causes as they are: a search from levels that are off goes astray
+/// with everything else.
 ///
 /// # Errors
 /// Those of [`fit`].

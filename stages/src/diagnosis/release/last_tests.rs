@@ -13,10 +13,12 @@ const REMAINDER: f64 = 0.05;
 /// Safety of the omnibus test, whose tiles are counted but whose noise model is an estimate.
 const OMNIBUS: f64 = 0.1;
 
-/// Power of the amplitude by which a strength must change to be another law's: laws differ by whole powers, inexact models by little.
+/// Power of the amplitude by which a strength must change to be another law's: laws differ by whole powers, inexact
+/// models by little.
 const ANOTHER_LAW: f64 = 0.25;
 
-/// Tiles of the common residual, judged by what the events have there each for themselves: the noise model is an estimate.
+/// Tiles of the common residual, judged by what the events have there each for themselves: the noise model is an
+/// estimate.
 pub(super) fn tiles_of(problem: &Problem<'_>, fitted: &JointFit) -> Vec<Tile> {
     let (before, interval_s) = (problem.cut.before, problem.cut.interval_s);
     let single = whitened(problem, &residuals(problem, &fitted.state, &fitted.starts));
@@ -59,7 +61,8 @@ pub(super) fn remainder(before: &[Tile], after: &[Tile], false_alarm_rate: f64) 
 
 /// A name whose strength follows the amplitude, where its law says that it does not.
 pub(super) fn of_another_law(named: &[Named], exponents: &[Option<Exponent>], false_alarm_rate: f64) -> Option<String> {
-    // what changes the lever from record to record has no law in the amplitude, and of friction the fit knows its action on the mean motion only
+    // what changes the lever from record to record has no law in the amplitude, and of friction the fit knows its
+    // action on the mean motion only
     let has_a_law = |named: &Named| named.cause.about().part != Part::Archive && named.cause.inexact() == 0.0;
     let of_events = named.iter().zip(exponents).filter(|(named, _)| has_a_law(named));
     let all = of_events.filter_map(|(named, exponent)| Some((named.cause.about().id, (*exponent)?)));
@@ -73,14 +76,16 @@ pub(super) fn of_another_law(named: &[Named], exponents: &[Option<Exponent>], fa
     ))
 }
 
-/// What remains of the events' own frequencies, if it is more than noise and more than a small share of what there was, and of what the names have explained.
+/// What remains of the events' own frequencies, if it is more than noise and more than a small share of what there was,
+/// and of what the names have explained.
 pub(super) fn restless(
     [before, after]: [Detuning; 2],
     named: &[Named],
     fits: &[JointFit],
     false_alarm_rate: f64,
 ) -> Option<String> {
-    // friction makes each event's own thermal motion a part of its damping and its frequency: no noise model knows by how much
+    // friction makes each event's own thermal motion a part of its damping and its frequency: no noise model knows by
+    // how much
     if named.iter().any(|named| named.cause.inexact() > 0.0) {
         return None;
     }

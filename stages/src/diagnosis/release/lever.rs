@@ -84,9 +84,11 @@ impl Lever {
         out
     }
 
-    /// By how much the detector's delay, `sum 1 / p`, has changed in `next` beyond what a `step` of the parameters says to first order, s.
+    /// By how much the detector's delay, `sum 1 / p`, has changed in `next` beyond what a `step` of the parameters says
+    /// to first order, s.
     ///
-    /// Onsets and delay show as their sum: a step that keeps the sum to first order alone leads off the ridge as soon as poles move by some per cent.
+    /// Onsets and delay show as their sum: a step that keeps the sum to first order alone leads off the ridge as soon
+    /// as poles move by some per cent.
     pub fn bent_delay_s(&self, step: &[f64], next: &Self) -> f64 {
         let steps = step[step.len() - self.poles.len()..].iter();
         let bent = |((old, new), step): ((&f64, &f64), &f64)| 1.0 / new - (1.0 - step) / old;

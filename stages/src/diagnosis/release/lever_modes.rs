@@ -5,17 +5,21 @@ use afmid_kernels::ringdown::Exponential;
 
 /// Least quality factor of a mode: below it, an exponential stands for a drift or a tail.
 const LEAST_QUALITY: f64 = 3.0;
-/// Least ratio of neighbouring modes: flexural ones are farther apart; closer ones are one mode whose frequency moves, or another part's.
+/// Least ratio of neighbouring modes: flexural ones are farther apart; closer ones are one mode whose frequency moves,
+/// or another part's.
 const LEAST_RATIO: f64 = 1.25;
 /// By how much a highest mode's share, or its thermal motion, may lie below the power law of those under it.
 const BELOW_THE_LAW: f64 = 5.0;
-/// Part of the quality factor under it below which a highest one without thermal motion is an edge of the detector, not a mode.
+/// Part of the quality factor under it below which a highest one without thermal motion is an edge of the detector, not
+/// a mode.
 const LEAST_QUALITY_SHARE: f64 = 0.25;
-/// Part of half the sample rate above which nothing is a mode: there a detector's edge, a few samples long, looks like a ringing.
+/// Part of half the sample rate above which nothing is a mode: there a detector's edge, a few samples long, looks like
+/// a ringing.
 const HIGHEST: f64 = 0.8;
 /// Turns within an event below which nothing is a mode: an exponential that slow is a tail's, or the offset's.
 const LEAST_TURNS: f64 = 2.0;
-/// Part of the first mode's decay rate below which no other mode's is: viscous losses and those inside the lever rise with frequency.
+/// Part of the first mode's decay rate below which no other mode's is: viscous losses and those inside the lever rise
+/// with frequency.
 const LEAST_RATE: f64 = 0.25;
 /// Most resonances that are sorted out exhaustively.
 const MOST: usize = 12;
@@ -23,12 +27,15 @@ const MOST: usize = 12;
 /// Which of a fit's exponentials are the flexural modes of one lever; `lines` are set aside.
 ///
 /// # Model
-/// A force at the tip bends the modes of a lever by shares of the static deflection that fall with frequency (for a beam as its inverse square, seen by the slope
-/// as somewhat less). What rings out of that order, or close beside a stronger one, is something else: torsion, holder, a cause.
+/// A force at the tip bends the modes of a lever by shares of the static deflection that fall with frequency (for a
+/// beam as its inverse square, seen by the slope as somewhat less). What rings out of that order, or close beside a
+/// stronger one, is something else: torsion, holder, a cause.
 /// # Method
-/// The largest set that holds the strongest resonance as its lowest and whose shares fall; then, from the third on, while the highest is far below the
-/// power law of the others, or decays much faster than they do, it is taken off; unless its thermal motion is not: a slow rupture weakens the high modes, and
-/// leaves that. Shares as the nominal detector shows them; an event has so many `samples`, `interval_s` apart; `thermal` has the variances of the oscillating exponentials, in their order.
+/// The largest set that holds the strongest resonance as its lowest and whose shares fall; then, from the third on,
+/// while the highest is far below the power law of the others, or decays much faster than they do, it is taken off;
+/// unless its thermal motion is not: a slow rupture weakens the high modes, and leaves that. Shares as the nominal
+/// detector shows them; an event has so many `samples`, `interval_s` apart; `thermal` has the variances of the
+/// oscillating exponentials, in their order.
 pub(super) fn lever_modes(
     exponentials: &[Exponential],
     thermal: &[f64],
@@ -85,7 +92,8 @@ fn in_order(seen: &[Seen]) -> Vec<usize> {
         return Vec::new();
     };
     let rate = |i: usize| seen[i].omega / seen[i].quality_factor;
-    // what decays more slowly than the first mode by far is another part's; what is broader than the modes on either side, too
+    // what decays more slowly than the first mode by far is another part's; what is broader than the modes on either
+    // side, too
     let foreign = |i: usize| {
         let beside =
             |k: usize| seen.get(k).is_some_and(|s| seen[i].quality_factor < LEAST_QUALITY_SHARE * s.quality_factor);

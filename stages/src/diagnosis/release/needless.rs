@@ -7,14 +7,16 @@ use super::search::{Named, PENALTY};
 use super::state::{Hold, State};
 use afmid_kernels::model::ModelError;
 
-/// A name is asked again where its parameters' error ellipsoid promises that it is missed by less than so many times what it must pay.
+/// A name is asked again where its parameters' error ellipsoid promises that it is missed by less than so many times
+/// what it must pay.
 const DOUBTFUL: f64 = 2.0;
 
 /// Takes names back that the causes named after them explain as well: `fits` holds the baseline, then one fit per name.
 ///
 /// # Method
-/// Backward elimination: every name but the newest is left out in turn, where its parameters over their errors do not speak for it anyway; if the cost then rises by less than the
-/// parameters must pay, it goes, and what was named after it is fitted and judged anew without it. The first wrong guess beside two causes often stands for a part of both.
+/// Backward elimination: every name but the newest is left out in turn, where its parameters over their errors do not
+/// speak for it anyway; if the cost then rises by less than the parameters must pay, it goes, and what was named after
+/// it is fitted and judged anew without it. The first wrong guess beside two causes often stands for a part of both.
 /// # Errors
 /// Those of [`fit`].
 /// # Source
@@ -34,8 +36,8 @@ pub(super) fn take_back(
     Ok(())
 }
 
-/// The fits once more where the name at `place` has gone: those before it stay, of those after it the ones up to `steps` names lose it, and `last` ends them; what was named from there on
-/// is judged anew. Errors: those of [`fit`].
+/// The fits once more where the name at `place` has gone: those before it stay, of those after it the ones up to
+/// `steps` names lose it, and `last` ends them; what was named from there on is judged anew. Errors: those of [`fit`].
 pub(super) fn rebuilt(
     problem: &Problem<'_>,
     named: &mut [Named],

@@ -55,7 +55,8 @@ impl<'a> AllCrossed<'a> {
     }
 }
 
-/// Products of one event's columns (lever unless held, causes, extra ones, own four) with each other and with the residual.
+/// Products of one event's columns (lever unless held, causes, extra ones, own four) with each other and with the
+/// residual.
 pub(super) struct Products {
     gram: Mat<f64>,
     right: Vec<f64>,
@@ -70,7 +71,8 @@ struct Column {
 
 impl Event<'_> {
     /// # Method
-    /// A column is a place in the basis, a signal, or both: what lies in the basis is multiplied there, and only signals at full length.
+    /// A column is a place in the basis, a signal, or both: what lies in the basis is multiplied there, and only
+    /// signals at full length.
     pub fn products(
         &self,
         basis: &Basis,
@@ -163,9 +165,11 @@ pub(super) struct Normal {
 }
 
 impl Products {
-    /// Takes the last columns, the event's own four, out.
-    pub fn eliminated(&self) -> Eliminated {
-        Eliminated::of(&self.gram, &self.right, self.right.len() - 4, 0.0)
+    /// Takes the last columns, the event's own four, out; beside it the information of the others.
+    pub fn eliminated(&self) -> (Eliminated, Mat<f64>) {
+        let eliminated = Eliminated::of(&self.gram, &self.right, self.right.len() - 4, 0.0);
+        let information = eliminated.blocked_information(&self.gram);
+        (eliminated, information)
     }
 }
 
@@ -181,24 +185,25 @@ impl Normal {
         let count = if hold == Hold::Shared { 0 } else { state.lever.parameters().len() + state.causes() };
         let crossed = AllCrossed::of(basis, slopes);
         let one = |(i, event): (usize, &Event<'_>)| event.products(basis, crossed.get(i), hold, None).eliminated();
-        let events: Vec<Eliminated> = events.par_iter().enumerate().map(one).collect();
+        let events: Vec<(Eliminated, Mat<f64>)> = events.par_iter().enumerate().map(one).collect();
         let mut information = Mat::zeros(count, count);
         let mut gradient = vec![0.0; count];
-        for event in &events {
-            information += &event.information;
+        for (event, own_information) in &events {
+            information += own_information;
             gradient.iter_mut().zip(&event.score).for_each(|(g, e)| *g += e);
         }
         if hold == Hold::Nothing {
             problem.add_prior(&state.lever, &mut information, &mut gradient);
         }
-        Self { information, gradient, events }
+        Self { information, gradient, events: events.into_iter().map(|(event, _)| event).collect() }
     }
 
     /// The step of a search whose diagonal is enlarged by `damping`.
     pub fn solve(&self, damping: f64) -> Step {
         let (shared, _) = damped_step(&self.information, &self.gradient, damping);
-        let of_own: f64 = self.events.iter().map(|event| event.own_gain).sum();
-        let promised = shared.iter().zip(&self.gradient).map(|(s, g)| s * g).sum::<f64>() + of_own;
+        let of_shared: f64 = shared.iter().zip(&self.gradient).map(|(s, g)| s * g).sum();
+        let of_own = self.events.iter().flat_map(|event| event.own_step.iter().zip(&event.own_gradient));
+        let promised = of_own.fold(of_shared, |sum, (s, g)| sum + s * g);
         let own = self
             .events
             .iter()

@@ -26,7 +26,8 @@ pub struct Problem<'a> {
     pub nominal_poles: Vec<f64>,
     /// Standard deviation of their logarithms.
     pub pole_std: f64,
-    /// What free exponentials say of the modes; weakly held, so that no weak mode runs off to absorb a misfit of another kind.
+    /// What free exponentials say of the modes; weakly held, so that no weak mode runs off to absorb a misfit of
+    /// another kind.
     pub seen: Vec<SeenMode>,
     /// What follows from cut and noise, made when it is asked for; `Prepared::default()`.
     pub prepared: Prepared,
@@ -41,8 +42,8 @@ pub struct SeenMode {
     pub std: [f64; 2],
 }
 
-/// Samples by which an onset may pass its interval: a release begins with the fifth power of time (a mode and three poles), so that at a fifth of a sample
-/// the model still is right to a hundred-thousandth.
+/// Samples by which an onset may pass its interval: a release begins with the fifth power of time (a mode and three
+/// poles), so that at a fifth of a sample the model still is right to a hundred-thousandth.
 const SLACK: f64 = 0.2;
 
 impl Problem<'_> {

@@ -13,12 +13,15 @@ use crate::causes::Cause;
 use crate::diagnosis::verdict::RunnerUp;
 use afmid_kernels::model::ModelError;
 
-/// Puts another cause in the place of a named one where that explains the events better beside all others: `fits` holds the baseline, then one fit per name. Says whether one was put.
+/// Puts another cause in the place of a named one where that explains the events better beside all others: `fits` holds
+/// the baseline, then one fit per name. Says whether one was put.
 ///
 /// # Method
-/// Every name is taken out in turn while lever and events stay where it has led them: there the residual is its own effect and whatever it could not explain, and the signs of all other candidates are sought beside
-/// the lever's own. The strongest are fitted in full; the best replaces the name if the cost, parameters paid, falls by more than a tie. A search from a baseline that had bent to a strong
-/// cause often names a neighbour of it first; from where that has led, the right one is near.
+/// Every name is taken out in turn while lever and events stay where it has led them: there the residual is its own
+/// effect and whatever it could not explain, and the signs of all other candidates are sought beside the lever's own.
+/// The strongest are fitted in full; the best replaces the name if the cost, parameters paid, falls by more than a tie.
+/// A search from a baseline that had bent to a strong cause often names a neighbour of it first; from where that has
+/// led, the right one is near.
 /// # Errors
 /// Those of the screen and of the fits.
 /// # Source

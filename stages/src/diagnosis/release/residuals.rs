@@ -90,7 +90,8 @@ const BAND: usize = 8;
 
 /// Energy of a white signal over tiles: time in stretches that double, frequency in bands of eight bins.
 ///
-/// Model: a stretch of n samples has n/2 - 1 independent periodogram values, each chi-square with two degrees of freedom.
+/// Model: a stretch of n samples has n/2 - 1 independent periodogram values, each chi-square with two degrees of
+/// freedom.
 pub fn tiles(values: &[f64], before: usize, interval_s: f64) -> Vec<Tile> {
     let mut out = Vec::new();
     let (mut from, mut length) = (0usize, 256usize);

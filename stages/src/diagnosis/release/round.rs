@@ -11,7 +11,8 @@ use crate::diagnosis::verdict::{Gain, RunnerUp};
 
 /// Difference of penalised gains below which two classes tie, unless held-out events decide.
 pub(super) const TIE: f64 = 6.0;
-/// Gain of the log likelihood on held-out events that one more cause must bring beside others, for the same reason: odds of 20 to 1.
+/// Gain of the log likelihood on held-out events that one more cause must bring beside others, for the same reason:
+/// odds of 20 to 1.
 const ONE_MORE: f64 = 3.0;
 
 /// Candidates after their refits, and what they are beside.
@@ -33,8 +34,8 @@ pub(super) enum Judged {
 
 impl Round<'_> {
     /// # Method
-    /// The best must pay for its parameters, must not ring at a combination of the lever's lines or end at a limit, must gain on held-out halves, and must beat the
-    /// best of another class, there if need be.
+    /// The best must pay for its parameters, must not ring at a combination of the lever's lines or end at a limit,
+    /// must gain on held-out halves, and must beat the best of another class, there if need be.
     pub fn judged(&self) -> Judged {
         let Some(best) = self.trials.finalists.first() else {
             let reason = "signs of a cause, but no candidate could be fitted".to_string();

@@ -62,12 +62,13 @@ const VISIBLE: f64 = 1e-4;
 /// Screens candidates at a finished fit.
 ///
 /// # Model
-/// Scores are linear in the residuals: normal without any cause, their covariance known. Each is taken at a secant of its candidate, the
-/// lever's parameters, those of causes already found and each event's own projected out; where most trials' scores scatter from event to event by
-/// more than the noise model says, all standard deviations are widened by as much.
+/// Scores are linear in the residuals: normal without any cause, their covariance known. Each is taken at a secant of
+/// its candidate, the lever's parameters, those of causes already found and each event's own projected out; where most
+/// trials' scores scatter from event to event by more than the noise model says, all standard deviations are widened by
+/// as much.
 /// # Method
-/// The probability of the strongest of all comes from draws of that joint distribution, beyond them from its effective number of
-/// independent scores.
+/// The probability of the strongest of all comes from draws of that joint distribution, beyond them from its effective
+/// number of independent scores.
 /// # Errors
 /// An event that leaves its samples.
 /// # Source
@@ -181,8 +182,8 @@ impl Sensitivities {
     }
 }
 
-/// Median scatter of the events' scores over what the noise model says, at least 1: of most trials, since a cause that acts on few events makes
-/// its own scatter.
+/// Median scatter of the events' scores over what the noise model says, at least 1: of most trials, since a cause that
+/// acts on few events makes its own scatter.
 fn widening(mut scatters: Vec<f64>, events: usize) -> f64 {
     if events < SCATTER_EVENTS || scatters.is_empty() {
         return 1.0;
@@ -202,10 +203,10 @@ pub(super) struct Scores {
 
 impl Scores {
     fn of(event: &Event<'_>, basis: &Basis, crossed: Option<&Crossed<'_>>, trials: &Signals) -> Self {
-        let eliminated = event.products(basis, crossed, Hold::Nothing, Some(trials)).eliminated();
+        let (eliminated, information) = event.products(basis, crossed, Hold::Nothing, Some(trials)).eliminated();
         let raw: Vec<f64> = (0..trials.count()).map(|i| trials.get(i).iter().map(|v| v * v).sum()).collect();
         let known = eliminated.score.len() - raw.len();
-        Self { known, information: eliminated.information, gradient: eliminated.score, raw }
+        Self { known, information, gradient: eliminated.score, raw }
     }
 }
 
@@ -240,8 +241,9 @@ impl Projection {
 
 /// Probability that the largest squared score at picked frequencies exceeds `strongest` without any cause.
 ///
-/// As that of the largest of N independent scores. The frequencies are picked by energy, not by score: a low maximum is one of few, a high one
-/// would have been picked wherever it had been. N as 60 clean archives of the exam (windows of 8000 samples) show it, within a factor of two of white noise.
+/// As that of the largest of N independent scores. The frequencies are picked by energy, not by score: a low maximum is
+/// one of few, a high one would have been picked wherever it had been. N as 60 clean archives of the exam (windows of
+/// 8000 samples) show it, within a factor of two of white noise.
 fn picked_probability(strongest: f64, samples: usize) -> f64 {
     let alone = normal_two_sided(strongest.max(0.0).sqrt());
     let number = (10.0 * (0.2 * strongest).exp()).min(0.25 * samples as f64);

@@ -66,7 +66,8 @@ pub struct Naming {
     pub evidence: Vec<String>,
 }
 
-/// Fall of the sum of squares that a parameter must bring, over the logarithm of the number of samples: as the Bayesian information criterion.
+/// Fall of the sum of squares that a parameter must bring, over the logarithm of the number of samples: as the Bayesian
+/// information criterion.
 pub(super) const PENALTY: f64 = 1.0;
 /// What may be named: of members of one class the first stands for all.
 fn candidates(catalogue: &[&'static dyn Cause], without: &[String]) -> Vec<&'static dyn Cause> {
@@ -117,11 +118,13 @@ pub fn scene(problem: &Problem<'_>, fitted: &JointFit, common: &[f64]) -> Scene 
 /// Names what a baseline leaves unexplained.
 ///
 /// # Method
-/// Greedy: a score screen of all candidates; the strongest fitted in full, from the present fit; the one that gains most, its parameters
-/// paid for, is held against held-out events (two halves in turn, shared parameters frozen) and against the best of another class. It is
-/// named if it wins both and is not at a limit of its parameters; what an earlier name explained beside it may make that needless, which is then taken back. The search ends when no
-/// sign is stronger than the false-alarm rate allows, or than what the named causes' models leave. At last three tests ask what is left: tiles of the residual common to all events, the events' own
-/// frequencies, and whether a named strength follows the amplitude; each makes the verdict `unexplained`.
+/// Greedy: a score screen of all candidates; the strongest fitted in full, from the present fit; the one that gains
+/// most, its parameters paid for, is held against held-out events (two halves in turn, shared parameters frozen) and
+/// against the best of another class. It is named if it wins both and is not at a limit of its parameters; what an
+/// earlier name explained beside it may make that needless, which is then taken back. The search ends when no sign is
+/// stronger than the false-alarm rate allows, or than what the named causes' models leave. At last three tests ask what
+/// is left: tiles of the residual common to all events, the events' own frequencies, and whether a named strength
+/// follows the amplitude; each makes the verdict `unexplained`.
 /// # Errors
 /// Those of [`super::fit`] on the baseline.
 pub fn name_causes(

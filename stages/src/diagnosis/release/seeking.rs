@@ -18,8 +18,8 @@ use afmid_kernels::model::ModelError;
 /// Times that names may give way to others.
 const REPLACEMENTS: usize = 3;
 
-/// Probability of a sign beside named causes above which it does not take their names away, and the share of what they have explained below which it does
-/// not either: their own model is not exact.
+/// Probability of a sign beside named causes above which it does not take their names away, and the share of what they
+/// have explained below which it does not either: their own model is not exact.
 const FAINT: [f64; 2] = [1e-6, 1e-3];
 
 /// Where a search stands: a fit with all names so far, those before it, and who may still be named.
@@ -89,7 +89,8 @@ impl<'a> Seeking<'a> {
         screen(self.problem, self.base(), &self.candidates, &scene_of(self.problem, self.base()), self.options.seed)
     }
 
-    /// One step after a screen: a name more, another base, another name in the place of one; or the end. Errors: those of the fits.
+    /// One step after a screen: a name more, another base, another name in the place of one; or the end. Errors: those
+    /// of the fits.
     pub fn step(&mut self, screen: &Screen) -> Result<Option<Ending>, ModelError> {
         if screen.p_value >= self.options.false_alarm_rate {
             return Ok(Some(Ending::default()));
@@ -136,7 +137,8 @@ impl<'a> Seeking<'a> {
         }
     }
 
-    /// A sign is left and nobody is its name: another cause may stand in the place of a named one; or the sign is faint, or unexplained.
+    /// A sign is left and nobody is its name: another cause may stand in the place of a named one; or the sign is
+    /// faint, or unexplained.
     fn refused(
         &mut self,
         screen: &Screen,
@@ -161,7 +163,8 @@ impl<'a> Seeking<'a> {
         Ok(Some(Ending { evidence: Some(reason), unexplained: Some(nearest) }))
     }
 
-    /// Whether one cause stands now in the place of several: then the signs are to be sought anew, once. Errors: those of the fits.
+    /// Whether one cause stands now in the place of several: then the signs are to be sought anew, once. Errors: those
+    /// of the fits.
     pub fn gathered(&mut self) -> Result<bool, ModelError> {
         if self.named.len() < 2 || self.replacements > REPLACEMENTS {
             return Ok(false);

@@ -17,12 +17,15 @@ pub(super) struct SilentMode {
 const SAME: f64 = 0.02;
 /// How much larger a peak may be than that of the mode under it: variances of peaks are right to a factor of two.
 const LARGER: f64 = 2.0;
-/// Powers of the frequency by which shares and quality factors go where a single mode rings: as a beam's seen by its slope, and the paper's.
+/// Powers of the frequency by which shares and quality factors go where a single mode rings: as a beam's seen by its
+/// slope, and the paper's.
 const POWERS: [f64; 2] = [-1.5, 0.85];
 
-/// The modes of a lever that ring too weakly to be seen, between or above those that do (ascending): a rupture as long as a period leaves nothing of a mode.
+/// The modes of a lever that ring too weakly to be seen, between or above those that do (ascending): a rupture as long
+/// as a period leaves nothing of a mode.
 ///
-/// A peak counts unless something rings there after all (`heard`, rad/s), which is no mode then, and if the motion falls from mode to mode up to it: what moves more than the mode under it is another part's.
+/// A peak counts unless something rings there after all (`heard`, rad/s), which is no mode then, and if the motion
+/// falls from mode to mode up to it: what moves more than the mode under it is another part's.
 pub(super) fn silent_modes(
     peaks: &[ThermalPeak],
     ringing: &[LeverMode],

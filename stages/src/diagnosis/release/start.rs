@@ -33,7 +33,8 @@ pub struct Start {
 const SKIPPED: usize = 4;
 /// A line this close to a combination of stronger modes is one, relative.
 const NEAR: f64 = 0.006;
-/// How far the fit may go from free exponentials, in their standard errors, and at least (relative, of f and Q): a cause biases them.
+/// How far the fit may go from free exponentials, in their standard errors, and at least (relative, of f and Q): a
+/// cause biases them.
 const HELD_ERRORS: f64 = 5.0;
 const HELD_LEAST: [f64; 2] = [1e-3, 0.05];
 /// The same of a mode that only thermal motion shows: its width is not measured.
@@ -45,7 +46,8 @@ const MOST: usize = 10;
 /// Tries with more exponentials where combinations took the place of modes.
 const TRIES: usize = 3;
 
-/// Fits free exponentials to all events, `modes` of them a lever's or (none) as many as seem to be; combination lines (2 f1, 3 f1, f2 +- f1: signs of a nonlinearity, not modes) set aside.
+/// Fits free exponentials to all events, `modes` of them a lever's or (none) as many as seem to be; combination lines
+/// (2 f1, 3 f1, f2 +- f1: signs of a nonlinearity, not modes) set aside.
 ///
 /// # Errors
 /// Those of [`fit_ringdowns`]; an event whose window leaves its samples.
@@ -116,7 +118,8 @@ fn kept(fitted: &Ringdown, chosen: &[usize]) -> (Vec<Exponential>, Vec<ModeEstim
     kept.into_iter().unzip()
 }
 
-/// An event's own parameters: its levels before and long after, its release `after_s` behind the first sample that the exponentials were fitted to.
+/// An event's own parameters: its levels before and long after, its release `after_s` behind the first sample that the
+/// exponentials were fitted to.
 fn begun(window: &EventWindow, start: usize, after_s: f64, cut: &Cut) -> EventParameters {
     let level = |from: usize, to: usize| {
         let part = &window.values[from.min(to)..to];

@@ -30,7 +30,8 @@ pub struct State {
     pub lever: Lever,
     /// What has been added to them.
     pub hypotheses: Vec<Hypothesis>,
-    /// Per event amplitude (V, positive for a load that pulled down), onset (s after its window's release sample: 0 or less), offset, slope.
+    /// Per event amplitude (V, positive for a load that pulled down), onset (s after its window's release sample: 0 or
+    /// less), offset, slope.
     pub events: Vec<EventParameters>,
 }
 
@@ -55,7 +56,8 @@ impl State {
 
     /// Effects of those hypotheses that are linear by themselves.
     ///
-    /// What a further cause changes beside the others, which are small, it changes without them: an approximation of second order that saves most steps.
+    /// What a further cause changes beside the others, which are small, it changes without them: an approximation of
+    /// second order that saves most steps.
     pub(super) fn linear_effects(&self) -> Effects {
         let mut effects = Effects::default();
         for hypothesis in &self.hypotheses {

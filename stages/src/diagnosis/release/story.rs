@@ -1,4 +1,5 @@
-//! What a report shows of a diagnosis: the mean event and what either model leaves of it, in time, in frequency and event by event.
+//! What a report shows of a diagnosis: the mean event and what either model leaves of it, in time, in frequency and
+//! event by event.
 
 use rayon::prelude::*;
 
@@ -25,7 +26,8 @@ pub struct Story {
     pub events: Vec<EventStory>,
     /// Level by level of the recorded signal.
     pub levels: Vec<LevelStory>,
-    /// Tiles of time and frequency of the common residual, of the linear and of the extended model, in order of time and frequency.
+    /// Tiles of time and frequency of the common residual, of the linear and of the extended model, in order of time
+    /// and frequency.
     pub tiles: Vec<[Tile; 2]>,
 }
 
@@ -39,8 +41,9 @@ impl Story {
 /// Collects the story of a search.
 ///
 /// # Method
-/// Means weighted by the amplitudes, `sum a_i y_i / sqrt(n sum a_i^2)`: the noise of the mean is that of one event over the root of their number. Windows are
-/// those of the last fit; residuals of the first are put to the same samples, since a cause may have moved the onsets.
+/// Means weighted by the amplitudes, `sum a_i y_i / sqrt(n sum a_i^2)`: the noise of the mean is that of one event over
+/// the root of their number. Windows are those of the last fit; residuals of the first are put to the same samples,
+/// since a cause may have moved the onsets.
 pub fn story(problem: &Problem<'_>, naming: &Naming) -> Option<Story> {
     let (first, last) = naming.fits.first().zip(naming.fits.last())?;
     let before = aligned_residuals(problem, first, last);

@@ -29,7 +29,8 @@ pub struct EventStory {
     pub frequency_shift_std: f64,
 }
 
-/// Steps of the difference quotients: in the logarithm of the frequency a twentieth of a radian at the end of the paper's window; in the onset far below a sample.
+/// Steps of the difference quotients: in the logarithm of the frequency a twentieth of a radian at the end of the
+/// paper's window; in the onset far below a sample.
 const FREQUENCY_STEP: f64 = 1e-4;
 const ONSET_STEP_S: f64 = 1e-9;
 
@@ -54,9 +55,9 @@ pub(super) fn event_stories(problem: &Problem<'_>, [first, last]: [&JointFit; 2]
 /// Relative shift of the first mode's frequency that explains most of an event's residual, and its standard error.
 ///
 /// # Method
-/// One Gauss-Newton step, unweighted; the event's own onset, amplitude, offset and slope are fitted along by taking their directions out first
-/// (Gram-Schmidt). The error holds the noise as it is at the frequencies that the step looks at, thermal motion of the mode included: its density
-/// is averaged over the energy of the direction's transform.
+/// One Gauss-Newton step, unweighted; the event's own onset, amplitude, offset and slope are fitted along by taking
+/// their directions out first (Gram-Schmidt). The error holds the noise as it is at the frequencies that the step looks
+/// at, thermal motion of the mode included: its density is averaged over the energy of the direction's transform.
 fn frequency_shift(cut: &Cut, lever: &Lever, own: &EventParameters, residual: &[f64], noise: &[f64]) -> (f64, f64) {
     let (before, samples) = (cut.before, residual.len());
     let shape = |lever: &Lever, onset_s: f64| -> Vec<f64> {
@@ -145,7 +146,8 @@ mod tests {
             let residual: Vec<f64> =
                 truth.iter().zip(signal_of(&model, &own)).map(|(t, m)| t - m + 1.2e-3 * normal()).collect();
             let (found, std) = frequency_shift(&cut, &model, &own, &residual, &noise);
-            // second order in a shift of 6e-4: the phase at the decay time moves by 0.03 rad, a thousandth of which is of higher order
+            // second order in a shift of 6e-4: the phase at the decay time moves by 0.03 rad, a thousandth of which is
+            // of higher order
             assert!((found - shift).abs() < 4.5 * std + 1e-3 * shift.abs(), "{seed}: {found} +- {std}, truth {shift}");
             worst = worst.max((found - shift).abs() / std);
         }

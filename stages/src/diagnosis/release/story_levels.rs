@@ -26,7 +26,8 @@ const FEWEST: usize = 4;
 /// Mean residuals by level; both lists of residuals are at the samples of `fitted`'s windows.
 ///
 /// # Method
-/// Means event by event and bin by bin, then over events: their scatter is the standard error, whatever the colour of the noise.
+/// Means event by event and bin by bin, then over events: their scatter is the standard error, whatever the colour of
+/// the noise.
 pub(super) fn level_stories(
     problem: &Problem<'_>,
     fitted: &JointFit,

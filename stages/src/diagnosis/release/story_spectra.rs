@@ -23,11 +23,13 @@ pub struct MeanSpectra {
 /// Bins on either side that the noise level is averaged over: it is smooth but near resonances, which are as wide.
 const SIDE: usize = 4;
 
-/// Spectra of the mean residual `before`, and of the residuals `after` of all events with the noise of their mean; beside them the noise of one event, bin by bin.
+/// Spectra of the mean residual `before`, and of the residuals `after` of all events with the noise of their mean;
+/// beside them the noise of one event, bin by bin.
 ///
 /// # Method
-/// Periodograms without a taper, since what decays from the release on has no edge at its end. With unit weights w of the events and transforms X,
-/// `sum |X|^2 - |sum w X|^2` is n - 1 times the noise of `sum w X`; the mean's is an n-th of that.
+/// Periodograms without a taper, since what decays from the release on has no edge at its end. With unit weights w of
+/// the events and transforms X, `sum |X|^2 - |sum w X|^2` is n - 1 times the noise of `sum w X`; the mean's is an n-th
+/// of that.
 pub(super) fn mean_spectra(
     state: &State,
     before: &[f64],

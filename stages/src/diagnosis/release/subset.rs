@@ -20,7 +20,8 @@ impl<'a> Subset<'a> {
         Self { whole, chosen, windows, cut: whole.cut }
     }
 
-    /// At most `count` of them, the first, the last, and between these evenly: what drifts shows from one to the next; cut to `samples` at most.
+    /// At most `count` of them, the first, the last, and between these evenly: what drifts shows from one to the next;
+    /// cut to `samples` at most.
     pub fn spread(whole: &'a Problem<'a>, count: usize, samples: usize) -> Self {
         let last = whole.windows.len().saturating_sub(1);
         let mut chosen: Vec<usize> = (0..count).map(|i| (i * last + (count - 1) / 2) / (count - 1).max(1)).collect();
@@ -56,7 +57,8 @@ impl<'a> Subset<'a> {
         (state, self.chosen.iter().map(|&i| starts[i]).collect())
     }
 
-    /// What was found with these events, for all of them: the others' instants and amplitudes, as they are in `base`, change by these events' median.
+    /// What was found with these events, for all of them: the others' instants and amplitudes, as they are in `base`,
+    /// change by these events' median.
     pub fn carried(&self, found: &JointFit, base: &JointFit) -> (State, Vec<usize>) {
         let interval_s = self.whole.cut.interval_s;
         let pairs = || self.chosen.iter().zip(found.state.events.iter().zip(&found.starts));

@@ -29,10 +29,12 @@ pub(super) const APART: f64 = 1.25;
 /// Peaks of the mean spectrum of free stretches that noise of a smooth level does not make, ascending.
 ///
 /// # Model
-/// Tapered periodograms of `samples` each, independent: their mean over the level is gamma distributed. Power of thermal motion scatters from one to the
-/// next as much as it is large, that of a line does not: peaks that are steadier than thermal motion is are left out.
+/// Tapered periodograms of `samples` each, independent: their mean over the level is gamma distributed. Power of
+/// thermal motion scatters from one to the next as much as it is large, that of a line does not: peaks that are
+/// steadier than thermal motion is are left out.
 /// # Method
-/// Level: median of the bins around, corrected to the mean of the gamma law (its median is one third of a unit below, in units of its shape).
+/// Level: median of the bins around, corrected to the mean of the gamma law (its median is one third of a unit below,
+/// in units of its shape).
 pub(super) fn thermal_peaks(free: &[&[f64]], samples: usize, interval_s: f64) -> Vec<ThermalPeak> {
     let taper = hann(samples);
     let bins = samples / 2 + 1;
@@ -57,7 +59,8 @@ pub(super) fn thermal_peaks(free: &[&[f64]], samples: usize, interval_s: f64) ->
     };
     let steady = |k: usize, ratio: f64| {
         let scatter = (squares[k] / (count * mean[k].powi(2)) - 1.0) * count / (count - 1.0);
-        // a line of power r - 1 on noise of power 1 scatters by 1 - (1 - 1/r)^2, thermal motion by 1, the estimate of that by sqrt(8 / count), lopsided
+        // a line of power r - 1 on noise of power 1 scatters by 1 - (1 - 1/r)^2, thermal motion by 1, the estimate of
+        // that by sqrt(8 / count), lopsided
         let between = 1.0 - 0.5 * (1.0 - 1.0 / ratio).powi(2);
         scatter < between.min(1.0 - 1.5 * (8.0 / count).sqrt())
     };
@@ -99,7 +102,8 @@ mod tests {
     const SAMPLES: usize = 4000;
     const INTERVAL_S: f64 = 2e-7;
 
-    /// White noise of variance 1, resonances of given frequency (Hz), width (1/s) and variance, and a line of amplitude `line` at 700 kHz.
+    /// White noise of variance 1, resonances of given frequency (Hz), width (1/s) and variance, and a line of amplitude
+    /// `line` at 700 kHz.
     fn stretches(count: usize, modes: &[(f64, f64, f64)], line: f64, seed: u64) -> Vec<Vec<f64>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };

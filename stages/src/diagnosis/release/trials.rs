@@ -67,8 +67,8 @@ const BETTER: f64 = 2.0;
 const LOOK: usize = 6;
 /// Cost over the base's beyond which the first steps have led nowhere.
 const NOT_LOST: f64 = 1.5;
-/// A base has left what it may have bent to where its cost exceeds the number of samples by what the noise's level is known to, and so many standard deviations
-/// of a chi square.
+/// A base has left what it may have bent to where its cost exceeds the number of samples by what the noise's level is
+/// known to, and so many standard deviations of a chi square.
 const BENT: (f64, f64) = (0.01, 2.0);
 
 /// Whether a fit leaves more than noise.
@@ -81,7 +81,8 @@ const GRADE: f64 = 0.8;
 const GRADES: std::ops::RangeInclusive<i32> = -10..=6;
 
 impl Trial {
-    /// The first steps of a candidate, from the present fit and, where that has not arrived, from where free exponentials did.
+    /// The first steps of a candidate, from the present fit and, where that has not arrived, from where free
+    /// exponentials did.
     pub fn begin(contest: &Contest<'_>, sign: &Sign) -> Vec<Self> {
         let base = contest.base;
         let settled = |lever: &State, starts: &[usize], part: f64| {

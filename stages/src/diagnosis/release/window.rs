@@ -25,7 +25,8 @@ pub struct Cut {
 }
 
 impl EventWindow {
-    /// First value of the window for a release at `onset`, so that sample `before` is the first one after it; none where values are missing.
+    /// First value of the window for a release at `onset`, so that sample `before` is the first one after it; none
+    /// where values are missing.
     pub fn start(&self, onset: f64, cut: &Cut) -> Option<usize> {
         let first_after = onset.ceil();
         if !(first_after.is_finite() && first_after >= cut.before as f64) {

@@ -32,7 +32,8 @@ pub struct ReplayedEvent {
     pub converged: bool,
 }
 
-/// Steps of a fit, and how small the last one must be: of the amplitude, and in samples. Together they leave some 20 uV of a signal of 1 V.
+/// Steps of a fit, and how small the last one must be: of the amplitude, and in samples. Together they leave some 20 uV
+/// of a signal of 1 V.
 const STEPS: usize = 15;
 const ARRIVED: [f64; 2] = [1e-5, 1e-3];
 /// Shift for the derivative with respect to the instant, samples: the release begins with the fifth power of time.
@@ -46,7 +47,8 @@ impl Replayer {
         Self { microscope: microscope(model, &model.baseline), effects: Effects::default(), lines_hz: Vec::new(), cut }
     }
 
-    /// Lever, detector and causes. Lines take each event's own phase; those slower than the window are in its offset and slope.
+    /// Lever, detector and causes. Lines take each event's own phase; those slower than the window are in its offset
+    /// and slope.
     ///
     /// # Errors
     /// Causes that are unknown or out of their limits.
@@ -67,10 +69,12 @@ impl Replayer {
         Ok(Self { microscope: microscope(model, &model.extended), effects, lines_hz, cut })
     }
 
-    /// Simulates an event again with the amplitude, instant, offset and slope that suit it best; `piezo_m` beside the window's values, or empty.
+    /// Simulates an event again with the amplitude, instant, offset and slope that suit it best; `piezo_m` beside the
+    /// window's values, or empty.
     ///
     /// # Method
-    /// Gauss-Newton on least squares; derivatives are those of the lever without causes, which differ by a few per cent: a step more or two.
+    /// Gauss-Newton on least squares; derivatives are those of the lever without causes, which differ by a few per
+    /// cent: a step more or two.
     /// # Accuracy
     /// Steps end at a thousandth of a sample and a hundred-thousandth of the load.
     pub fn replay(&self, event: &EventWindow, piezo_m: &[f64]) -> Option<ReplayedEvent> {

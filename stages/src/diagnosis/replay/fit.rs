@@ -5,7 +5,8 @@ const PIVOT: f64 = 1e-9;
 
 /// Fits `values` where `seen` by `columns`, each scaled to length one; none where the columns depend on one another.
 ///
-/// Method: normal equations by Cholesky, every sum in order: the same bits on any number of threads. Steps of a fit need no more digits.
+/// Method: normal equations by Cholesky, every sum in order: the same bits on any number of threads. Steps of a fit
+/// need no more digits.
 pub(super) fn least_squares(columns: &[&[f64]], values: &[f64], seen: &[bool]) -> Option<Vec<f64>> {
     let n = columns.len();
     let product =

@@ -15,7 +15,8 @@ pub struct Part {
     pub first: usize,
     /// One past the last.
     pub end: usize,
-    /// Samples at its beginning that its initial state is fitted to and that are not scored; 0: the simulation of the training part goes on.
+    /// Samples at its beginning that its initial state is fitted to and that are not scored; 0: the simulation of the
+    /// training part goes on.
     pub state_samples: usize,
 }
 
@@ -32,8 +33,8 @@ pub struct Recorded<'a> {
 
 /// Fewest samples of a training part: a hundred periods' worth of nothing is not enough, a few of a ringdown are.
 const LEAST_SAMPLES: usize = 128;
-/// Largest angle of a step, rad: the scheme's error is its fourth power over a hundred of what is not linear. Records of more than [`LONG`] samples take the
-/// second, whose error is still a thousandth of what a cause has to buy there.
+/// Largest angle of a step, rad: the scheme's error is its fourth power over a hundred of what is not linear. Records
+/// of more than [`LONG`] samples take the second, whose error is still a thousandth of what a cause has to buy there.
 const ANGLES: [f64; 2] = [0.15, 0.45];
 /// Samples beyond which time counts.
 const LONG: usize = 16_384;
@@ -62,7 +63,8 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Scales a record by its training part; the input between samples is built for all three assumptions, at a step that suits `highest_hz`.
+    /// Scales a record by its training part; the input between samples is built for all three assumptions, at a step
+    /// that suits `highest_hz`.
     ///
     /// # Errors
     /// See [`SystemError`].

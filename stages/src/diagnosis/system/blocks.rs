@@ -1,4 +1,5 @@
-//! Sums over blocks of the training part: errors that hold for coloured residuals, and what a fit loses on what it has not seen.
+//! Sums over blocks of the training part: errors that hold for coloured residuals, and what a fit loses on what it has
+//! not seen.
 
 use super::linear_algebra::{Cholesky, dot};
 
@@ -71,7 +72,8 @@ impl Moments {
         total
     }
 
-    /// Covariance of the estimates, sandwiched between curvatures: right under coloured residuals that forget within a block.
+    /// Covariance of the estimates, sandwiched between curvatures: right under coloured residuals that forget within a
+    /// block.
     ///
     /// Source: H. White, Econometrica 48 (1980) 817; K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986) 13.
     pub fn sandwich(&self) -> Vec<Vec<f64>> {
@@ -94,7 +96,8 @@ impl Moments {
 
     /// Loss of each block under the fit to the folds that the block is not in, to first order.
     ///
-    /// Source: T. Hastie, R. Tibshirani, J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, section 7.10.
+    /// Source: T. Hastie, R. Tibshirani, J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, section
+    /// 7.10.
     pub fn held_out(&self, ridge: f64) -> Vec<f64> {
         let mut losses = self.loss.clone();
         for fold in 0..FOLDS {

@@ -81,13 +81,16 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Adds causes until nothing is significant, drops what later ones make superfluous, exchanges what a rival does better.
+    /// Adds causes until nothing is significant, drops what later ones make superfluous, exchanges what a rival does
+    /// better.
     ///
     /// # Method
-    /// Score screen, joint refits of the best five to a sample, the largest gain of the log likelihood less the Bayesian penalty; a cause stays
-    /// while its F test by blocks, corrected for the number of trials, and its share of the held-out error both pass.
+    /// Score screen, joint refits of the best five to a sample, the largest gain of the log likelihood less the
+    /// Bayesian penalty; a cause stays while its F test by blocks, corrected for the number of trials, and its share of
+    /// the held-out error both pass.
     /// # Source
-    /// S. A. Billings, Nonlinear System Identification, 2013, chapter 3, on forward selection; G. Schwarz, Ann. Stat. 6 (1978) 461.
+    /// S. A. Billings, Nonlinear System Identification, 2013, chapter 3, on forward selection; G. Schwarz, Ann. Stat. 6
+    /// (1978) 461.
     pub fn run(&self, baseline: Fit) -> Choice {
         let mut ladder = vec![Judged::new(baseline, &self.blocks)];
         let mut chosen = Vec::new();
@@ -153,7 +156,8 @@ impl Search<'_> {
     /// Whether a promise, taken at its word, could be significant or large: a fit of what is neither is time lost.
     fn could_matter(&self, current: &Judged, promise: &Promise) -> bool {
         let mean_square = current.fit.loss / self.bench.count as f64;
-        // a cause that only works beside refitted others holds far more than its secant promises: where fits are cheap they decide
+        // a cause that only works beside refitted others holds far more than its secant promises: where fits are cheap
+        // they decide
         let cheap = self.sample.count == self.bench.count;
         promise.gain > 2.0 * mean_square && (cheap || 5.0 * promise.gain / current.fit.loss > self.options.least_gain)
     }
@@ -267,7 +271,8 @@ impl Search<'_> {
         let mut ladder = vec![baseline.clone()];
         for added in &model.causes {
             let Some(current) = ladder.last() else { break };
-            // from what this rung asks for, not from values that only hold beside the causes to come; where that diverges, from what hardly acts
+            // from what this rung asks for, not from values that only hold beside the causes to come; where that
+            // diverges, from what hardly acts
             let promise = screen(self.bench, &current.fit, &[added.cause]).into_iter().next();
             let asked = promise.into_iter().flat_map(|promise| [promise.values, promise.trial]);
             let next = asked

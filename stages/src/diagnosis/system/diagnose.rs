@@ -34,7 +34,8 @@ pub struct SystemDiagnosis {
 
 /// Fewest and most blocks: fewer leave the errors' own error above a fifth, more gain nothing.
 const BLOCKS: (usize, usize) = (24, 128);
-/// Periods of the oscillator in a block at least. Much longer blocks would hold all that a decay tells of its large swings in one.
+/// Periods of the oscillator in a block at least. Much longer blocks would hold all that a decay tells of its large
+/// swings in one.
 const PERIODS: f64 = 2.0;
 
 /// Samples that candidates are compared on; all samples fit what was chosen.
@@ -43,11 +44,13 @@ const SAMPLE: usize = 16_384;
 /// Says what a linear oscillator gets wrong in a measured input and output.
 ///
 /// # Model
-/// `q'' + (w/Q) q' + w^2 q = w^2 g u(t)`, y = q, free-running from a free state; the input held between samples; all else is a cause.
+/// `q'' + (w/Q) q' + w^2 q = w^2 g u(t)`, y = q, free-running from a free state; the input held between samples; all
+/// else is a cause.
 /// # Method
-/// Least squares of the free-run error on the training part; causes added by score screen, joint refits of the best five, and likelihood less the Bayesian
-/// penalty; dropped or exchanged where later ones do better; each tested by blocks against its best rival. What a library of general terms still
-/// predicts of the residual decides whether the causes are the whole story.
+/// Least squares of the free-run error on the training part; causes added by score screen, joint refits of the best
+/// five, and likelihood less the Bayesian penalty; dropped or exchanged where later ones do better; each tested by
+/// blocks against its best rival. What a library of general terms still predicts of the residual decides whether the
+/// causes are the whole story.
 /// # Shapes
 /// Input and output of equal length; the answer's simulations are those of the training part.
 /// # Units
@@ -57,7 +60,8 @@ const SAMPLE: usize = 16_384;
 /// # Errors
 /// Parts beyond the record, a missing input, an output that does not move, an unknown candidate: see [`SystemError`].
 /// # Source
-/// L. Ljung, System Identification, 2nd ed., 1999, chapter 7; J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28.
+/// L. Ljung, System Identification, 2nd ed., 1999, chapter 7; J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019)
+/// 28.
 pub fn diagnose_system(record: &Recorded<'_>, options: &SystemOptions) -> Result<SystemDiagnosis, SystemError> {
     let coarse = Bench::new(record, options.training, 0.0)?;
     options.parts.iter().try_for_each(|part| check_part(part, &coarse, record.output.len()))?;

@@ -4,12 +4,14 @@ use std::f64::consts::PI;
 
 use afmid_kernels::effects::{Intersample, StaticMap};
 
-/// Samples on either side that the band-limited signal is built from: what lies further away weighs less than 1e-4 up to 0.9 of the Nyquist frequency.
+/// Samples on either side that the band-limited signal is built from: what lies further away weighs less than 1e-4 up
+/// to 0.9 of the Nyquist frequency.
 const REACH: usize = 32;
 /// Kaiser's shape parameter: side lobes 80 dB down.
 const KAISER: f64 = 8.0;
 
-/// An input at the nodes of an integrator: for each interval between samples `2 steps + 1` values at equal distances, both ends included.
+/// An input at the nodes of an integrator: for each interval between samples `2 steps + 1` values at equal distances,
+/// both ends included.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FineInput {
     /// The values, interval by interval.
@@ -22,8 +24,9 @@ impl FineInput {
     /// The input of all intervals of a record; one fewer than samples.
     ///
     /// # Method
-    /// Held: the sample at an interval's beginning. Linear: the straight line. Band-limited: the samples' sinc series, cut to 32 samples on either
-    /// side by a Kaiser window and normalised to pass a constant; beyond its ends the record is taken to stay at its first and last sample.
+    /// Held: the sample at an interval's beginning. Linear: the straight line. Band-limited: the samples' sinc series,
+    /// cut to 32 samples on either side by a Kaiser window and normalised to pass a constant; beyond its ends the
+    /// record is taken to stay at its first and last sample.
     /// # Source
     /// A. V. Oppenheim, R. W. Schafer, Discrete-Time Signal Processing, 3rd ed., 2010, sections 4.6 and 7.5.3.
     pub fn new(samples: &[f64], kind: Intersample, steps: usize) -> Self {

@@ -1,6 +1,7 @@
 //! Small symmetric systems.
 
-/// Cholesky factor of a symmetric matrix plus `ridge` of its diagonal; a row whose pivot vanishes is left out (its solution is 0).
+/// Cholesky factor of a symmetric matrix plus `ridge` of its diagonal; a row whose pivot vanishes is left out (its
+/// solution is 0).
 pub(super) struct Cholesky {
     lower: Vec<Vec<f64>>,
     scale: Vec<f64>,

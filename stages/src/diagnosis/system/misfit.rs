@@ -30,10 +30,11 @@ const RIDGE: f64 = 1e-6;
 /// How much of a fit's residual a library of general terms predicts.
 ///
 /// # Method
-/// Regression, by folds of blocks, on what any smooth force or sensor would do to first order: all monomials up to degree five of deflection and rate,
-/// their absolute values and signs, once as forces through the oscillator and once directly; powers of the input; another course of the input between
-/// samples; slow polynomials in time and the residual's largest lines. Noise that does not depend on the motion cannot be predicted, so that no
-/// noise model is needed.
+/// Regression, by folds of blocks, on what any smooth force or sensor would do to first order: all monomials up to
+/// degree five of deflection and rate, their absolute values and signs, once as forces through the oscillator and once
+/// directly; powers of the input; another course of the input between samples; slow polynomials in time and the
+/// residual's largest lines. Noise that does not depend on the motion cannot be predicted, so that no noise model is
+/// needed.
 /// # Source
 /// T. Hastie, R. Tibshirani, J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, section 7.10.
 pub(super) fn misfit(bench: &Bench, fit: &Fit, blocks: &Blocks) -> Misfit {
@@ -46,7 +47,8 @@ pub(super) fn misfit(bench: &Bench, fit: &Fit, blocks: &Blocks) -> Misfit {
     Misfit { ratio, significance: paired(&differences) }
 }
 
-/// What a fit's parameters and the library together leave of its residual: the nearest to pure noise that can be had without a noise model.
+/// What a fit's parameters and the library together leave of its residual: the nearest to pure noise that can be had
+/// without a noise model.
 pub(super) struct Floor {
     /// Sample by sample.
     pub residual: Vec<f64>,

@@ -28,8 +28,8 @@ pub struct Span {
 /// Output at the samples of a stretch, free-running from a state (deflection, rate / omega).
 ///
 /// # Model
-/// Motion as in [`Oscillator`] under the input at `nodes` (see [`super::FineInput`]: `2 steps + 1` per interval), seen through the effects' static maps, plus
-/// what they add.
+/// Motion as in [`Oscillator`] under the input at `nodes` (see [`super::FineInput`]: `2 steps + 1` per interval), seen
+/// through the effects' static maps, plus what they add.
 /// # Method
 /// Exponential time differencing of fourth order; exact for a linear oscillator under a held input.
 /// # Shapes

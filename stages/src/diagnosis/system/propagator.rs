@@ -3,8 +3,9 @@
 /// Matrices of one step of exponential Runge-Kutta time differencing for the state (deflection, rate / omega).
 ///
 /// # Method
-/// `x' = A x + N`, A = [[0, w], [-w, -w / Q]]. The linear part is exact, N of fourth order: the scheme of Cox and Matthews with
-/// phi_k(A h) by Taylor series, which loses no digits for small A h. N has a second component only, so that second columns suffice.
+/// `x' = A x + N`, A = [[0, w], [-w, -w / Q]]. The linear part is exact, N of fourth order: the scheme of Cox and
+/// Matthews with phi_k(A h) by Taylor series, which loses no digits for small A h. N has a second component only, so
+/// that second columns suffice.
 /// # Source
 /// S. M. Cox, P. C. Matthews, J. Comput. Phys. 176 (2002) 430, equations (26) to (29).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +41,8 @@ impl Propagator {
     }
 }
 
-/// exp, phi1, phi2, phi3 of `angle [[0, 1], [-1, -loss]]`, phi3 by its series and the others by phi_k = M phi_(k+1) + 1/k!.
+/// exp, phi1, phi2, phi3 of `angle [[0, 1], [-1, -loss]]`, phi3 by its series and the others by phi_k = M phi_(k+1) +
+/// 1/k!.
 fn functions(angle: f64, loss: f64) -> [Matrix; 4] {
     let m = [[0.0, angle], [-angle, -angle * loss]];
     let mut term = [[1.0 / 6.0, 0.0], [0.0, 1.0 / 6.0]];

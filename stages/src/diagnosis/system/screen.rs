@@ -47,8 +47,8 @@ pub(super) fn beyond(fit: &Fit, mut direction: Vec<f64>, left_out: std::ops::Ran
 /// Candidates by falling promise, each at its best trial.
 ///
 /// # Method
-/// Score test with secants: the change of the output at each trial value, the baseline's sensitivities projected out, against the residual. A secant at a
-/// finite value has a length where the derivative at zero has none.
+/// Score test with secants: the change of the output at each trial value, the baseline's sensitivities projected out,
+/// against the residual. A secant at a finite value has a length where the derivative at zero has none.
 /// # Source
 /// C. R. Rao, Linear Statistical Inference and Its Applications, 2nd ed., 1973, section 6e.
 pub(super) fn screen(bench: &Bench, fit: &Fit, candidates: &[&'static dyn Cause]) -> Vec<Promise> {
@@ -149,17 +149,20 @@ pub(super) fn peaks(residual: &[f64], interval_s: f64) -> Vec<f64> {
 pub(super) struct Significance {
     /// Probability of so large a gain without the cause, before any correction.
     pub p_value: f64,
-    /// How much longer the score's scatter between blocks is than white residuals would make it, as a ratio of variances.
+    /// How much longer the score's scatter between blocks is than white residuals would make it, as a ratio of
+    /// variances.
     pub inflation: f64,
 }
 
-/// Tests cause `which` of a model by the gain of its loss; the scatter is taken from a fit to a sample, `scale` times shorter.
+/// Tests cause `which` of a model by the gain of its loss; the scatter is taken from a fit to a sample, `scale` times
+/// shorter.
 ///
 /// # Method
-/// The gain over the floor's mean square times the scatter of the cause's score between blocks, as an F ratio of the cause's parameters and one fewer than
-/// the blocks: a t test by blocks for one parameter, right for residuals that are coloured or not the same everywhere. The floor, not the residual, because
-/// what other causes still have to explain is no noise; for what is added to the record (a line, a drift) the residual, because a transient
-/// that other causes leave is no line.
+/// The gain over the floor's mean square times the scatter of the cause's score between blocks, as an F ratio of the
+/// cause's parameters and one fewer than the blocks: a t test by blocks for one parameter, right for residuals that are
+/// coloured or not the same everywhere. The floor, not the residual, because what other causes still have to explain is
+/// no noise; for what is added to the record (a line, a drift) the residual, because a transient that other causes
+/// leave is no line.
 pub(super) fn significance(sample: &Sample<'_>, model: &Model, which: usize, gain: f64, scale: f64) -> Significance {
     let bench = sample.bench;
     let fit = sample.fit;

@@ -20,8 +20,9 @@ const STARTS: usize = 4;
 /// The best linear oscillator.
 ///
 /// # Method
-/// On the window of the largest output, every pair of a grid of frequencies and quality factors with gain and initial state by linear least squares; the
-/// best few different ones fitted on windows that grow fourfold until they reach the training part's end, and then on all of it. The least error wins.
+/// On the window of the largest output, every pair of a grid of frequencies and quality factors with gain and initial
+/// state by linear least squares; the best few different ones fitted on windows that grow fourfold until they reach the
+/// training part's end, and then on all of it. The least error wins.
 pub(super) fn baseline(bench: &Bench) -> Option<Fit> {
     let samples = bench.output.len();
     let window = WINDOW.min(samples);

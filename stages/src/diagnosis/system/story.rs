@@ -1,4 +1,5 @@
-//! What a report shows of a diagnosis: the errors of either model in frequency, against the output's size, and over the time of the judged parts.
+//! What a report shows of a diagnosis: the errors of either model in frequency, against the output's size, and over the
+//! time of the judged parts.
 
 use super::bench::{Bench, Part, Recorded};
 use super::model::Model;
@@ -42,7 +43,8 @@ pub struct Binned {
     pub after: f64,
 }
 
-/// Longest segment of the spectra, and their fewest number; stretches of a part; bins of the output's size, with the fewest samples of one.
+/// Longest segment of the spectra, and their fewest number; stretches of a part; bins of the output's size, with the
+/// fewest samples of one.
 const SEGMENT: usize = 4096;
 const SEGMENTS: usize = 8;
 const STRETCHES: usize = 400;
@@ -152,7 +154,8 @@ mod tests {
         with_gap[17] = f64::NAN;
         let errors = Errors::new(&with_gap, [&before, &output], 2.0);
         for bin in errors.by_size() {
-            // the error is 0.1 y^2 in scaled units: within a bin of width 1/6 of the output (-2 to 2) it varies by y / 6
+            // the error is 0.1 y^2 in scaled units: within a bin of width 1/6 of the output (-2 to 2) it varies by y /
+            // 6
             let truth = 2.0 * 0.1 * (bin.at / 2.0).powi(2);
             assert!((bin.before - truth).abs() < 0.1 * bin.at.abs() / 6.0 + 1e-3, "{bin:?} {truth}");
             assert_eq!(bin.after, 0.0);

@@ -22,8 +22,9 @@ pub(super) struct FreeRun {
 /// Simulates a part in free run; none if it does not lie in the record.
 ///
 /// # Method
-/// Parameters frozen. Only deflection and rate at the part's first sample are fitted, by Gauss-Newton to its first `state_samples`, which are then not scored;
-/// with none the simulation of the training part goes on into the part. What a cause adds to the record itself (a drift, a line) stays as fitted.
+/// Parameters frozen. Only deflection and rate at the part's first sample are fitted, by Gauss-Newton to its first
+/// `state_samples`, which are then not scored; with none the simulation of the training part goes on into the part.
+/// What a cause adds to the record itself (a drift, a line) stays as fitted.
 pub(super) fn free_run_part(bench: &Bench, record: &Recorded<'_>, model: &Model, part: &Part) -> Option<FreeRun> {
     let output: Vec<f64> = record.output.get(part.first..part.end)?.iter().map(|y| y / bench.output_scale).collect();
     let (skipped, simulated) = if part.state_samples == 0 {

@@ -10,17 +10,17 @@ use super::table::{ColumnError, ColumnTable, NamedColumn};
 const HEADER: usize = 128;
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
-/// Reads all real two-dimensional matrices: a vector is one column of the variable's name, a matrix `x` of k columns is `x:1` to `x:k`.
+/// Reads all real two-dimensional matrices: a vector is one column of the variable's name, a matrix `x` of k columns is
+/// `x:1` to `x:k`.
 ///
 /// # Method
-/// Data elements one after the other, compressed ones unpacked; either byte order; all numeric classes become `f64` (64-bit integers beyond
-/// 2^53 are rounded). Structs, cells, texts, sparse and complex matrices are named, not read.
+/// Data elements one after the other, compressed ones unpacked; either byte order; all numeric classes become `f64`
+/// (64-bit integers beyond 2^53 are rounded). Structs, cells, texts, sparse and complex matrices are named, not read.
 /// # Shapes
 /// A row vector counts as a column. Columns of different variables may differ in length.
 /// # Errors
-/// Version 4 or 7.3; a file that is cut short or contradicts itself; unpacked variables of more than 64 MiB and 32 times the file, or numbers of half
-/// of that;
-/// no matrix at all.
+/// Version 4 or 7.3; a file that is cut short or contradicts itself; unpacked variables of more than 64 MiB and 32
+/// times the file, or numbers of half of that; no matrix at all.
 /// # Source
 /// MathWorks, MAT-File Format, chapter 1 (Level 5 MAT-file format).
 pub fn read_mat(bytes: &[u8]) -> Result<ColumnTable, ColumnError> {

@@ -15,30 +15,34 @@ use super::table::read_columns;
 use super::text::Separator;
 use crate::io::shared_data::moved;
 
-/// Reads measured input and output from the columns of a file, and splits them into a stretch to fit and one to judge on.
+/// Reads measured input and output from the columns of a file, and splits them into a stretch to fit and one to judge
+/// on.
 ///
 /// # Model
-/// Equally sampled inputs u and one output y, in columns of a CSV, DAT, LVM or other text file, or variables of a MATLAB file (version 5 to 7).
+/// Equally sampled inputs u and one output y, in columns of a CSV, DAT, LVM or other text file, or variables of a
+/// MATLAB file (version 5 to 7).
 /// # Method
-/// Two stretches of time, identification and verification. Mean or line are taken off with the constants of the identification stretch alone, also
-/// from the other, which so stays unseen. Missing samples (empty, NaN, the given codes) stay missing: nothing is interpolated.
+/// Two stretches of time, identification and verification. Mean or line are taken off with the constants of the
+/// identification stretch alone, also from the other, which so stays unseen. Missing samples (empty, NaN, the given
+/// codes) stay missing: nothing is interpolated.
 /// # Shapes
-/// `response`, `force` over `time`, the whole record; the same with `_identification` and `_verification` over axes of their own, which may differ in
-/// length. With several inputs `force` is over (`input`, time).
+/// `response`, `force` over `time`, the whole record; the same with `_identification` and `_verification` over axes of
+/// their own, which may differ in length. With several inputs `force` is over (`input`, time).
 /// # Units
 /// Those given; no conversion.
 /// # Accuracy
 /// Numbers as in the file; 64-bit integers beyond 2^53 are rounded.
 /// # Errors
-/// A file that is no table or damaged, MATLAB 7.3; a column that is not there or holds text; no sample rate, a time column that is not
-/// equally spaced; stretches beyond the record; missing inputs; an output that is missing altogether.
+/// A file that is no table or damaged, MATLAB 7.3; a column that is not there or holds text; no sample rate, a time
+/// column that is not equally spaced; stretches beyond the record; missing inputs; an output that is missing
+/// altogether.
 /// # Source
 /// L. Ljung, System Identification, 1999, sections 14.1 and 16.5; MathWorks, MAT-File Format, Level 5.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Columns {
-    /// The file, relative to the config file; `.mat` is MATLAB, anything else text. A path that begins with `../../shared/data/` begins at the
-    /// variable `AFMID_DATA` where that is set. Required.
+    /// The file, relative to the config file; `.mat` is MATLAB, anything else text. A path that begins with
+    /// `../../shared/data/` begins at the variable `AFMID_DATA` where that is set. Required.
     pub file: String,
     /// Columns of the inputs, each a number from 1 or a name, at least one. Default: the first column.
     pub inputs: Vec<Column>,

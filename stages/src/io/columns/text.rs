@@ -25,11 +25,13 @@ pub enum Separator {
 /// Reads lines of numbers.
 ///
 /// # Method
-/// Lines that begin with `#`, `%` or `//` and empty ones are passed over. Data begin at the first line whose first entry is a number; the line
-/// before them, if it has as many entries, is the header. Empty entries, `NaN`, `NA` and `null` are missing; a decimal comma is read wherever it does
-/// not separate columns. A file that begins with `LabVIEW Measurement` is read by its own header.
+/// Lines that begin with `#`, `%` or `//` and empty ones are passed over. Data begin at the first line whose first
+/// entry is a number; the line before them, if it has as many entries, is the header. Empty entries, `NaN`, `NA` and
+/// `null` are missing; a decimal comma is read wherever it does not separate columns. A file that begins with `LabVIEW
+/// Measurement` is read by its own header.
 /// # Errors
-/// No numbers; text in the midst of them; an LVM header without end. Text within a column is kept: an error only to those who want that column.
+/// No numbers; text in the midst of them; an LVM header without end. Text within a column is kept: an error only to
+/// those who want that column.
 pub fn read_text(bytes: &[u8], separator: Separator) -> Result<ColumnTable, ColumnError> {
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}');

@@ -1,6 +1,7 @@
 use crate::fixture::{Lever, white_noise};
 
-/// t0 one sample late turns mode 4 by 76 degrees: its share moves far beyond the error for a known t0, and within the one that counts t0.
+/// t0 one sample late turns mode 4 by 76 degrees: its share moves far beyond the error for a known t0, and within the
+/// one that counts t0.
 #[test]
 fn static_shares_lie_within_errors_that_count_the_ambiguity_of_t0() {
     use crate::model::{Modes, Pem};
@@ -40,7 +41,8 @@ fn static_shares_lie_within_errors_that_count_the_ambiguity_of_t0() {
         let (found, std) = shares(seed, 1, Some(2e-7));
         assert_eq!((found.len(), &found), (4, &known), "the ambiguity changes no estimate");
         for n in 0..4 {
-            // the true t0 lies at the interval's end, where the error is at most sqrt(3) of its rms to first order; 2 more for the noise
+            // the true t0 lies at the interval's end, where the error is at most sqrt(3) of its rms to first order; 2
+            // more for the noise
             assert!((found[n] - truth[n]).abs() < 4.0 * std[n], "{n}: {} +- {} {}", found[n], std[n], truth[n]);
         }
         let off = (known[3] - truth[3]).abs() / known_std[3];

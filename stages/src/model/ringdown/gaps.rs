@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-/// Per event, runs of samples that are NaN, beyond `limits`, or in `ranges` (samples from the first one used, the end not included).
+/// Per event, runs of samples that are NaN, beyond `limits`, or in `ranges` (samples from the first one used, the end
+/// not included).
 pub(super) fn gaps(events: &[&[f64]], ranges: &[[i64; 2]], limits: Option<[f64; 2]>) -> Vec<Vec<Range<usize>>> {
     let beyond = |value: f64| limits.is_some_and(|[least, most]| value <= least || value >= most);
     let listed = |k: usize| ranges.iter().any(|[from, to]| (*from..*to).contains(&(k as i64)));

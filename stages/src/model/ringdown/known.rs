@@ -13,7 +13,8 @@ pub struct KnownNumber {
     /// Which mode, 1 the lowest. Either this or `real_pole`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mode: Option<usize>,
-    /// Which real pole, 1 the first of the start (0.256 of the sample rate, each further one's decay per sample half of the one before).
+    /// Which real pole, 1 the first of the start (0.256 of the sample rate, each further one's decay per sample half of
+    /// the one before).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub real_pole: Option<usize>,
     /// `frequency_hz` (of a real pole: its corner) or `quality_factor`.

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use crate::calibration::FreeSettings;
 use crate::calibration::reading::{common_rate, read_blocks, read_free};
 
-/// Windows that are used of all records together: their variances are known to some per cent then, and they fit in memory.
+/// Windows that are used of all records together: their variances are known to some per cent then, and they fit in
+/// memory.
 const WINDOWS: usize = 256;
 
 /// Windows of `samples` samples from the free stretches of the records, as many of each record, evenly spread over it.

@@ -33,8 +33,9 @@ pub(super) struct Filtered {
 /// Filters `y`. The first `2 size` samples settle the start and are not counted.
 ///
 /// # Method
-/// Measurement update of the triangular factor by Carlson's recursion, time update by Householder reflections of `[F S, G]`: covariances are
-/// never formed and cannot lose their sign. For the likelihood alone a gain that has settled is kept until the next transition.
+/// Measurement update of the triangular factor by Carlson's recursion, time update by Householder reflections of `[F S,
+/// G]`: covariances are never formed and cannot lose their sign. For the likelihood alone a gain that has settled is
+/// kept until the next transition.
 ///
 /// # Source
 /// N. A. Carlson, AIAA J. 11 (1973) 1259; T. Kailath, A. Sayed, B. Hassibi, Linear Estimation (2000), ch. 12.
@@ -82,7 +83,8 @@ pub(super) fn filter(system: &Augmented, y: &[f64], strengths: &Strengths, keep:
     done
 }
 
-/// Whether variance and gain have stopped changing, as far as a likelihood can tell: 1e-8 per step leaves 1e-5 even where 1000 steps are correlated.
+/// Whether variance and gain have stopped changing, as far as a likelihood can tell: 1e-8 per step leaves 1e-5 even
+/// where 1000 steps are correlated.
 fn settled(before: &(f64, Vec<f64>), variance: f64, gain: &[f64]) -> bool {
     const STILL: f64 = 1e-8;
     let largest = gain.iter().fold(0.0_f64, |a, g| a.max(g.abs()));

@@ -65,7 +65,8 @@ pub struct Reconstruction {
     pub std: Vec<f64>,
     /// One-step innovations over their standard deviation: white and of size one if model and prior hold.
     pub innovations: Vec<f64>,
-    /// Standard deviation of the walk's step per sample (of its change of slope if integrated), up to the transition and after it.
+    /// Standard deviation of the walk's step per sample (of its change of slope if integrated), up to the transition
+    /// and after it.
     pub walk_std: [f64; 2],
     /// Standard deviation of a jump per sample of the transition; 0 without one.
     pub jump_std: f64,
@@ -82,12 +83,14 @@ pub struct Reconstruction {
 /// Reconstructs the input of an identified model from its output.
 ///
 /// # Model
-/// The model, with its input as one more state: a random walk (or an integrated one), of one strength up to the event and another after it (a tip in contact
-/// feels more than a free one), and jumps of their own size in the samples of the transition. The innovation form is solved for e, `x+ = (A - K C) x + (B - K D) u + K y`, so that what drives the states is known and only the force is uncertain.
+/// The model, with its input as one more state: a random walk (or an integrated one), of one strength up to the event
+/// and another after it (a tip in contact feels more than a free one), and jumps of their own size in the samples of
+/// the transition. The innovation form is solved for e, `x+ = (A - K C) x + (B - K D) u + K y`, so that what drives the
+/// states is known and only the force is uncertain.
 ///
 /// # Method
-/// Square-root Kalman filter and square-root Rauch-Tung-Striebel smoother. Sizes of walks and jumps, and of the noise unless given, by maximum likelihood
-/// (the noise eliminated in closed form, the others searched in logarithms).
+/// Square-root Kalman filter and square-root Rauch-Tung-Striebel smoother. Sizes of walks and jumps, and of the noise
+/// unless given, by maximum likelihood (the noise eliminated in closed form, the others searched in logarithms).
 ///
 /// # Shapes
 /// `y` `[N]`; results `[N]`.
@@ -96,16 +99,18 @@ pub struct Reconstruction {
 /// y in the model's output unit above the line without force, the force in its input's.
 ///
 /// # Accuracy
-/// The band is that of measurement noise and prior: where these hold, 68 and 95 % of the values lie within one and two of them (tested over seeds). It leaves
-/// out: readout noise slower than the model's ([`band_inflation`] counts it), errors of the model, of its t0 (a shift in time), of the line without force, and of the strengths themselves; the force's shape within a sample.
-/// Cost: some `n^3` operations per sample and pass.
+/// The band is that of measurement noise and prior: where these hold, 68 and 95 % of the values lie within one and two
+/// of them (tested over seeds). It leaves out: readout noise slower than the model's ([`band_inflation`] counts it),
+/// errors of the model, of its t0 (a shift in time), of the line without force, and of the strengths themselves; the
+/// force's shape within a sample. Cost: some `n^3` operations per sample and pass.
 ///
 /// # Errors
 /// Shapes that do not fit, values that are not finite, fewer than eight samples per state, a response that is constant.
 ///
 /// # Source
-/// R. E. Kalman, J. Basic Eng. 82 (1960) 35; H. Rauch, F. Tung, C. Striebel, AIAA J. 3 (1965) 1445; P. Park, T. Kailath, IEEE Trans. Autom. Control 40 (1995) 727;
-/// A. C. Harvey, Forecasting, Structural Time Series Models and the Kalman Filter (1989), ch. 3 and 4.
+/// R. E. Kalman, J. Basic Eng. 82 (1960) 35; H. Rauch, F. Tung, C. Striebel, AIAA J. 3 (1965) 1445; P. Park, T.
+/// Kailath, IEEE Trans. Autom. Control 40 (1995) 727; A. C. Harvey, Forecasting, Structural Time Series Models and the
+/// Kalman Filter (1989), ch. 3 and 4.
 pub fn reconstruct(
     model: IdentifiedModel<'_>,
     y: &[f64],
@@ -135,15 +140,16 @@ pub fn reconstruct(
 
 /// By how much a band is too narrow where no force acts: rms of force over band in the free stretch, never below one.
 ///
-/// Readout noise that is slower than the model's (1/f, mains) looks like a force and is followed as one; where the force is known to be zero, what
-/// is found there is error. `None` for a stretch outside or without samples.
+/// Readout noise that is slower than the model's (1/f, mains) looks like a force and is followed as one; where the
+/// force is known to be zero, what is found there is error. `None` for a stretch outside or without samples.
 pub fn band_inflation(force: &[f64], band: &[f64], free: std::ops::Range<usize>) -> Option<f64> {
     let (force, band) = (force.get(free.clone())?, band.get(free)?);
     let mean = force.iter().zip(band).map(|(f, b)| (f / b).powi(2)).sum::<f64>() / force.len() as f64;
     mean.is_finite().then(|| mean.sqrt().max(1.0))
 }
 
-/// Start of the search: noise from the differences of the second half, a walk of a hundredth of it, jumps as large as the response.
+/// Start of the search: noise from the differences of the second half, a walk of a hundredth of it, jumps as large as
+/// the response.
 fn guess(y: &[f64], settings: &ReconstructionSettings, size: usize) -> Strengths {
     let largest = y.iter().fold(0.0_f64, |a, y| a.max(y.abs()));
     let rough = settings.noise_variance.map_or_else(
@@ -162,7 +168,8 @@ fn guess(y: &[f64], settings: &ReconstructionSettings, size: usize) -> Strengths
         walk: [if integrated { 1e-4 } else { 1e-2 }; 2],
         jump: (largest / noise / lasting.sqrt()).max(1e-2),
         transition: settings.transition.clone(),
-        // loose against anything that the response can hold: a state of these models is some ten times the response at most
+        // loose against anything that the response can hold: a state of these models is some ten times the response at
+        // most
         start: 1e2 * (largest / noise).max(1.0) * (size as f64).sqrt(),
     }
 }

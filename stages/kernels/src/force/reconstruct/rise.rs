@@ -13,10 +13,11 @@ pub struct Rise {
     pub middle: f64,
 }
 
-/// Rise time of a force about an event: 10 to 90 % of the change between its means over `reach` samples before and after the transition.
+/// Rise time of a force about an event: 10 to 90 % of the change between its means over `reach` samples before and
+/// after the transition.
 ///
-/// Crossings by linear interpolation, outwards from the half-way crossing that is nearest to the transition's centre. `None` where the window
-/// ends before, or the change is within four standard deviations of zero.
+/// Crossings by linear interpolation, outwards from the half-way crossing that is nearest to the transition's centre.
+/// `None` where the window ends before, or the change is within four standard deviations of zero.
 pub fn rise(force: &[f64], std: &[f64], transition: std::ops::Range<usize>, reach: usize) -> Option<Rise> {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let from = transition.start.checked_sub(reach)?;

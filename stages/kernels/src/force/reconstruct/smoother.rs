@@ -7,11 +7,13 @@ use super::triangle::Rows;
 /// Smoothed force and its standard deviation in units of the measurement noise, per sample.
 ///
 /// # Method
-/// Rauch, Tung and Striebel in factors: `[F S, G; S, 0]` made triangular gives `[X, 0; Y, Z]` with the gain `J = Y X^-1` and the part `Z Z'` of the filtered
-/// covariance that the future cannot tell; the smoothed factor is `[Z, J S+]` made triangular. A sum of squares throughout.
+/// Rauch, Tung and Striebel in factors: `[F S, G; S, 0]` made triangular gives `[X, 0; Y, Z]` with the gain `J = Y
+/// X^-1` and the part `Z Z'` of the filtered covariance that the future cannot tell; the smoothed factor is `[Z, J S+]`
+/// made triangular. A sum of squares throughout.
 ///
 /// # Source
-/// H. Rauch, F. Tung, C. Striebel, AIAA J. 3 (1965) 1445; P. Park, T. Kailath, IEEE Trans. Autom. Control 40 (1995) 727.
+/// H. Rauch, F. Tung, C. Striebel, AIAA J. 3 (1965) 1445; P. Park, T. Kailath, IEEE Trans. Autom. Control 40 (1995)
+/// 727.
 pub(super) fn smooth(
     system: &Augmented,
     y: &[f64],

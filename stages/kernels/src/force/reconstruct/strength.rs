@@ -26,7 +26,8 @@ const FIRST_STEP: f64 = 1.5;
 const WEAKEST: f64 = 1e-4;
 const STRONGEST: f64 = 1e8;
 
-/// Maximises the likelihood over both walks and the jump, one after the other, twice; a parabola through the best three ends each search.
+/// Maximises the likelihood over both walks and the jump, one after the other, twice; a parabola through the best three
+/// ends each search.
 pub(super) fn strongest(system: &Augmented, y: &[f64], start: Strengths, noise_variance: Option<f64>) -> Found {
     let mut evaluations = 0;
     let mut strengths = start;

@@ -3,9 +3,11 @@
 use super::triangle::Rows;
 use super::{ForcePrior, IdentifiedModel};
 
-/// `z+ = F z + gain y + w`, `y = h z + e`: the innovation form solved for e, so that process and measurement noise are independent.
+/// `z+ = F z + gain y + w`, `y = h z + e`: the innovation form solved for e, so that process and measurement noise are
+/// independent.
 ///
-/// States: those of the model, the force, and (integrated walk) its change per sample. `F = [A - K C, B - K D; 0, walk]`.
+/// States: those of the model, the force, and (integrated walk) its change per sample. `F = [A - K C, B - K D; 0,
+/// walk]`.
 pub(super) struct Augmented {
     /// Model's states.
     pub order: usize,

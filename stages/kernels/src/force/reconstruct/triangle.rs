@@ -22,7 +22,8 @@ impl Rows {
 
     /// Rotates columns so that the first `top` rows become lower triangular: `M M'` stays the same.
     ///
-    /// Householder reflections from the right, one per row; rows below take part. Cost: `4 sum (rows - i) (width - i)` operations.
+    /// Householder reflections from the right, one per row; rows below take part. Cost: `4 sum (rows - i) (width - i)`
+    /// operations.
     pub fn triangularise(&mut self, top: usize) {
         let (width, rows) = (self.width, self.values.len() / self.width);
         let mut v = vec![0.0; width];

@@ -21,7 +21,8 @@ pub struct DecayOptions {
     pub real_poles: usize,
     /// Rows of the start's Hankel matrix, default 64: half a period of the slowest mode or more.
     pub rows: usize,
-    /// Slowest real pole allowed, per sample; default 0.45: gone after 64 samples. Slower ones make the head longer and the fit slower.
+    /// Slowest real pole allowed, per sample; default 0.45: gone after 64 samples. Slower ones make the head longer and
+    /// the fit slower.
     pub slowest_decay: f64,
 }
 
@@ -55,16 +56,19 @@ impl Decay {
 
 /// Exponent below which nothing is left of a real pole: `exp(-28)` is `1e-12`.
 const GONE: f64 = 28.0;
-/// Relative standard deviation of what is known beforehand of a real pole's decay: they hardly show beyond the first samples.
+/// Relative standard deviation of what is known beforehand of a real pole's decay: they hardly show beyond the first
+/// samples.
 const POLE_STD: f64 = 0.5;
 /// Most trial steps.
 const TRIALS: usize = 40;
 /// Damping of the first step: the start is near.
 const FIRST_DAMPING: f64 = 1e-9;
-/// Promised fall of the sum of squares, in noise variances, that ends the search: a step of a thirtieth of a standard error.
+/// Promised fall of the sum of squares, in noise variances, that ends the search: a step of a thirtieth of a standard
+/// error.
 const ARRIVED: f64 = 1e-3;
 
-/// Step of every mode's pole, in its standard errors, that ends the search too, if what all parameters together still promise is less than
+/// Step of every mode's pole, in its standard errors, that ends the search too, if what all parameters together still
+/// promise is less than
 /// [`VALLEY`]: real poles that nearly coincide make a long flat valley, along which nothing else changes.
 const MODES_ARRIVED: f64 = 1e-2;
 /// Half a standard error, squared.
@@ -75,15 +79,16 @@ const VALLEY: f64 = 0.25;
 /// # Model
 /// `y(k) = sum_j Re(rho_j exp(s_j k T)) + c + n(k)`, n white; real poles faster than [`DecayOptions::slowest_decay`].
 /// # Method
-/// Start by shift invariance of the Hankel matrix. Then Levenberg-Marquardt on the poles alone, amplitudes solved for (variable projection, Kaufman's
-/// Jacobian), on a triangle of a few dozen rows that has the same norms and gradients as all samples: sums of exponentials by doubling, one
-/// product of the record with short exponentials per step.
+/// Start by shift invariance of the Hankel matrix. Then Levenberg-Marquardt on the poles alone, amplitudes solved for
+/// (variable projection, Kaufman's Jacobian), on a triangle of a few dozen rows that has the same norms and gradients
+/// as all samples: sums of exponentials by doubling, one product of the record with short exponentials per step.
 /// # Shapes
 /// `values`: N samples from the first one after the release on; at least `3 rows` of them.
 /// # Units
 /// Volts, seconds, rad/s.
 /// # Accuracy
-/// The Cramer-Rao bound of free amplitudes, unbiased, in white noise; under coloured noise its errors are too small: see
+/// The Cramer-Rao bound of free amplitudes, unbiased, in white noise; under coloured noise its errors are too small:
+/// see
 /// [`super::super::fit_ringdowns`]. The triangle squares the condition: residuals below `1e-7` of the signal, and modes closer than a thousandth of
 /// their width, are lost in rounding. `N modes` operations per step (docs/results/timings.md).
 /// # Errors
@@ -207,7 +212,8 @@ struct Poles {
 }
 
 impl Poles {
-    /// Steps: relative change of a mode's decay, change of its frequency, relative change of what a real pole has above the slowest.
+    /// Steps: relative change of a mode's decay, change of its frequency, relative change of what a real pole has above
+    /// the slowest.
     fn moved(&self, step: &[f64]) -> Self {
         let modes = self.modes.iter().zip(step.chunks(2)).map(|(s, d)| c64::new(s.re * d[0].exp(), s.im + d[1]));
         let above = |(d, x): (&f64, &f64)| self.slowest + (d - self.slowest) * x.clamp(-3.0, 3.0).exp();
@@ -226,7 +232,8 @@ impl Poles {
     }
 }
 
-/// Modes from the Hankel matrix behind the real poles; real poles from a fifth per sample down, each half of the one before.
+/// Modes from the Hankel matrix behind the real poles; real poles from a fifth per sample down, each half of the one
+/// before.
 fn first_poles(values: &[f64], head: usize, options: &DecayOptions, record: &Record) -> Result<Poles, ModelError> {
     let skipped = &values[head.min(values.len() / 8)..];
     let slowest = options.slowest_decay;

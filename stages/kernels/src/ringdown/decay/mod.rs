@@ -1,6 +1,7 @@
 //! One free decay in white noise, in well under a millisecond.
 //!
-//! The joint fit of [`super::fit_ringdowns`] weighs coloured noise and many events; a single record or a mean in white noise needs neither.
+//! The joint fit of [`super::fit_ringdowns`] weighs coloured noise and many events; a single record or a mean in white
+//! noise needs neither.
 
 mod fit;
 mod projection;

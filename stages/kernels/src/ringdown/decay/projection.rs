@@ -43,11 +43,13 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// QR of modes (real and imaginary part of `exp(s k)`), real poles (`exp(-d k)`), 1, then `k` times modes and poles, then the record.
+    /// QR of modes (real and imaginary part of `exp(s k)`), real poles (`exp(-d k)`), 1, then `k` times modes and
+    /// poles, then the record.
     ///
     /// # Method
-    /// Rows of the head as they are, on top of the Cholesky factor of all later ones, where only modes are left: its entries are power sums, but
-    /// for products with the record, which go block by block. Source: G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
+    /// Rows of the head as they are, on top of the Cholesky factor of all later ones, where only modes are left: its
+    /// entries are power sums, but for products with the record, which go block by block. Source: G. H. Golub and V.
+    /// Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
     /// # Shapes
     /// Triangle: `2 (2 modes + poles) + 2` square.
     pub fn project(&self, modes: &[c64], decays: &[f64]) -> Projected {
@@ -166,8 +168,8 @@ impl Projected {
         (self.basis..=last).map(|i| self.triangle[(i, last)]).collect()
     }
 
-    /// Change of the fit with each pole (per mode Re and Im of s, then each decay), all rows: those of the basis, then those below it, which
-    /// are Kaufman's Jacobian (BIT 15 (1975) 49).
+    /// Change of the fit with each pole (per mode Re and Im of s, then each decay), all rows: those of the basis, then
+    /// those below it, which are Kaufman's Jacobian (BIT 15 (1975) 49).
     pub fn changes(&self, weights: &[f64], modes: usize) -> Mat<f64> {
         let (basis, rows) = (self.basis, self.triangle.nrows());
         let at = |i: usize, column: usize| self.triangle[(i, basis + column)];

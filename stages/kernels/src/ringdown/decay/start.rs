@@ -5,13 +5,15 @@ use faer::{Mat, c64};
 
 use crate::model::ModelError;
 
-/// Poles `z` of a decaying record by shift invariance of the `order` strongest directions of its Hankel matrix, rows' means removed.
+/// Poles `z` of a decaying record by shift invariance of the `order` strongest directions of its Hankel matrix, rows'
+/// means removed.
 ///
 /// # Method
-/// Gram matrix of the rows from `rows` products and running differences; its dominant space by orthogonal iteration, which the gap between
-/// signal and noise makes short.
+/// Gram matrix of the rows from `rows` products and running differences; its dominant space by orthogonal iteration,
+/// which the gap between signal and noise makes short.
 /// # Source
-/// S. Y. Kung, Proc. 12th Asilomar Conf. (1978) 705; orthogonal iteration: G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., 8.2.4.
+/// S. Y. Kung, Proc. 12th Asilomar Conf. (1978) 705; orthogonal iteration: G. H. Golub and C. F. Van Loan, Matrix
+/// Computations, 4th ed., 8.2.4.
 pub(super) fn hankel_poles(values: &[f64], rows: usize, order: usize) -> Result<Vec<c64>, ModelError> {
     let space = dominant_space(&centred_gram(values, rows), order);
     let upper = space.as_ref().get(..rows - 1, ..);
@@ -50,7 +52,8 @@ const SETTLED: f64 = 1e-6;
 /// Orthonormal columns near the strongest `order` directions.
 fn dominant_space(gram: &Mat<f64>, order: usize) -> Mat<f64> {
     let rows = gram.nrows();
-    // any start that is not orthogonal to the space will do: cosines of rising frequency, and a ramp that breaks their symmetry
+    // any start that is not orthogonal to the space will do: cosines of rising frequency, and a ramp that breaks their
+    // symmetry
     let mut space = Mat::from_fn(rows, order.min(rows), |i, j| {
         let x = (i as f64 + 0.5) / rows as f64;
         (std::f64::consts::PI * j as f64 * x).cos() + 0.1 * x

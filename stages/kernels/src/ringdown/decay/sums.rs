@@ -5,8 +5,8 @@ use faer::c64;
 /// `sum_{k = first}^{first + count - 1} k^m w^k` for m = 0, 1, 2.
 ///
 /// # Method
-/// Binary expansion of `count`: a sum of `2n` terms is one of `n` plus the same shifted by `n`. `log2(count)` steps, and no difference of large
-/// numbers, unlike the closed form near `w = 1`.
+/// Binary expansion of `count`: a sum of `2n` terms is one of `n` plus the same shifted by `n`. `log2(count)` steps,
+/// and no difference of large numbers, unlike the closed form near `w = 1`.
 pub(super) fn power_sums(w: c64, first: usize, count: usize) -> [c64; 3] {
     let mut total = [c64::new(0.0, 0.0); 3];
     let mut counted = 0usize;

@@ -73,7 +73,8 @@ fn the_papers_window_is_good_to_two_per_cent_at_resonances() {
 fn differences_lose_only_what_still_rings_at_the_end() {
     let got = differenced();
     assert_eq!(got.vanishing, 0);
-    // mode 1 decays by exp(-pi f (N - T0) / (f_s Q)) = 0.6 % until the end of the window; measured 6.7e-3, 3.8e-3, 2.1e-3, 2.6e-3
+    // mode 1 decays by exp(-pi f (N - T0) / (f_s Q)) = 0.6 % until the end of the window; measured 6.7e-3, 3.8e-3,
+    // 2.1e-3, 2.6e-3
     for (f, limit) in RESONANCES_HZ.iter().zip([0.008, 0.005, 0.003, 0.004]) {
         let (relative, _) = errors(&got.frequency_hz, &got.transfer, 0.98 * f, 1.02 * f);
         assert!(relative < limit, "{f} {relative:e}");

@@ -40,8 +40,8 @@ pub struct ThermalFitSettings {
     pub highest_hz: f64,
     /// Probability that a spectrum without lines loses a bin to the search for lines; 0 for no search.
     pub line_false_alarm: f64,
-    /// 1/f noise: `Some` with or without it, `None` where the likelihood gains more than chance does once in a hundred times (never over less than a tenth of
-    /// an octave, where it cannot be distinguished from white noise).
+    /// 1/f noise: `Some` with or without it, `None` where the likelihood gains more than chance does once in a hundred
+    /// times (never over less than a tenth of an octave, where it cannot be distinguished from white noise).
     pub flicker: Option<bool>,
 }
 
@@ -67,7 +67,8 @@ pub struct FoundLine {
     pub p_value: f64,
 }
 
-/// A fitted thermal spectrum. Density: `variance (2/pi) (f0^3/Q) / ((f0^2 - f^2)^2 + (f f0/Q)^2) + white + flicker / f`.
+/// A fitted thermal spectrum. Density: `variance (2/pi) (f0^3/Q) / ((f0^2 - f^2)^2 + (f f0/Q)^2) + white + flicker /
+/// f`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalFit {
     /// Undamped natural frequency, Hz.
@@ -109,15 +110,17 @@ impl ThermalFit {
 /// Fits a thermal spectrum.
 ///
 /// # Model
-/// Each value is gamma distributed with the number of averages as shape about the expected periodogram: a harmonic oscillator driven by white
-/// force noise, white and 1/f noise, seen through the window, so that a resonance narrower than a bin is fitted as well.
+/// Each value is gamma distributed with the number of averages as shape about the expected periodogram: a harmonic
+/// oscillator driven by white force noise, white and 1/f noise, seen through the window, so that a resonance narrower
+/// than a bin is fitted as well.
 ///
 /// # Method
-/// Maximum of Whittle's likelihood by Fisher scoring with analytic slopes, on the logarithms of the parameters, from up to three
-/// places that stand out of a running median. A bin is a line if chance makes such a value with probability `line_false_alarm` over the number of
-/// bins; it goes with the bins that the window spreads it to, and the fit is repeated until the set of lines stays. Among the
-/// starts the one with the smallest deviance wins, each line counted at the threshold, so that a line is never the resonance
-/// unless nothing else is. 1/f noise stays if it gains more than 5.41 (chi-square of one degree at its bound, 1 %).
+/// Maximum of Whittle's likelihood by Fisher scoring with analytic slopes, on the logarithms of the parameters, from up
+/// to three places that stand out of a running median. A bin is a line if chance makes such a value with probability
+/// `line_false_alarm` over the number of bins; it goes with the bins that the window spreads it to, and the fit is
+/// repeated until the set of lines stays. Among the starts the one with the smallest deviance wins, each line counted
+/// at the threshold, so that a line is never the resonance unless nothing else is. 1/f noise stays if it gains more
+/// than 5.41 (chi-square of one degree at its bound, 1 %).
 ///
 /// # Shapes
 /// Any number of bins above 24.
@@ -126,20 +129,23 @@ impl ThermalFit {
 /// Hz and the density's own.
 ///
 /// # Accuracy
-/// The Cramer-Rao bound in the limit of many bins; for peaks of 200 signal-to-noise and 32 averages the errors hold within 10 %. Biased by some
-/// per cent of a standard error where the resonance is narrower than a bin. Folding at half the sample rate is not modelled.
+/// The Cramer-Rao bound in the limit of many bins; for peaks of 200 signal-to-noise and 32 averages the errors hold
+/// within 10 %. Biased by some per cent of a standard error where the resonance is narrower than a bin. Folding at half
+/// the sample rate is not modelled.
 ///
 /// # Errors
 /// Too few bins, frequencies not equally spaced, values not positive, no peak in the range, no convergence.
 ///
 /// # Source
-/// P. Whittle, Ark. Mat. 2 (1953) 423; A. M. Sykulski et al., Biometrika 106 (2019) 251; H. White, Econometrica 50 (1982) 1 (sandwich).
+/// P. Whittle, Ark. Mat. 2 (1953) 423; A. M. Sykulski et al., Biometrika 106 (2019) 251; H. White, Econometrica 50
+/// (1982) 1 (sandwich).
 pub fn thermal_fit(data: AveragedDensity<'_>, settings: ThermalFitSettings) -> Result<ThermalFit, SpectrumError> {
     check(data)?;
     if let Some(through) = data.through {
         return Ok(fit_through(data, settings, through)?.0);
     }
-    // the window that fits better gives the misfits; their correlation, 0 or 4/9, names the window: broad resonances look alike through both
+    // the window that fits better gives the misfits; their correlation, 0 or 4/9, names the window: broad resonances
+    // look alike through both
     let plain = fit_through(data, settings, SeenThrough::Rectangular);
     let hann = fit_through(data, settings, SeenThrough::Hann);
     match (plain, hann) {

@@ -96,7 +96,8 @@ fn a_resonance_of_two_bins_seen_through_hann_segments_is_unbiased() {
     let n = seeds as f64;
     let (bias, rms, std) = (sum / n, (square / n).sqrt(), (stated / n).sqrt());
     println!("Q: bias {bias:.3}, rms {rms:.3}, stated {std:.3}");
-    // without the window's width Q would come out near 13; rms over 60 seeds has 9 %, four of them and the segments' finite number
+    // without the window's width Q would come out near 13; rms over 60 seeds has 9 %, four of them and the segments'
+    // finite number
     assert!(bias.abs() < 4.0 * rms / n.sqrt() && (0.65..1.4).contains(&(rms / std)));
     // variance one: 160000 samples hold some 500 independent values, 60 seeds, 2.5 %
     assert!((variance - 1.0).abs() < 0.03, "{variance}");
@@ -175,7 +176,8 @@ fn flicker_is_taken_only_where_it_is() {
             taken[case] += usize::from(found.flicker.value > 0.0);
         }
     }
-    // a half-per-cent to one-per-cent level: at most 4 of 100 in 4 sigma; 300/f is 0.6 of the floor at its lower end: always seen
+    // a half-per-cent to one-per-cent level: at most 4 of 100 in 4 sigma; 300/f is 0.6 of the floor at its lower end:
+    // always seen
     assert!(taken[0] <= 5 && taken[1] == 100, "{taken:?}");
 }
 

@@ -51,13 +51,14 @@ pub struct Release {
     pub thermal: f64,
 }
 
-/// Signals of releases under effects, each with the modes' relative change of frequency, less that without any: what the causes add to the closed
-/// form, V.
+/// Signals of releases under effects, each with the modes' relative change of frequency, less that without any: what
+/// the causes add to the closed form, V.
 ///
 /// # Method
-/// Modes by their exact rotation under the load's mean over each quarter of a sample; forces of causes as kicks at its ends (Strang splitting, error
-/// of second order of the effect alone); optics as maps; poles exact for signals on cubics; changed frequencies in closed form. Both runs make the same errors, and the
-/// difference keeps those of the effect. Where nothing drives the lever any more and all is linear, one map takes it from sample to sample.
+/// Modes by their exact rotation under the load's mean over each quarter of a sample; forces of causes as kicks at its
+/// ends (Strang splitting, error of second order of the effect alone); optics as maps; poles exact for signals on
+/// cubics; changed frequencies in closed form. Both runs make the same errors, and the difference keeps those of the
+/// effect. Where nothing drives the lever any more and all is linear, one map takes it from sample to sample.
 /// # Source
 /// G. Strang, SIAM J. Numer. Anal. 5 (1968) 506.
 pub fn differences<'a>(
@@ -184,7 +185,8 @@ mod tests {
         let stepped = run(&lever, &Effects::default(), &release, Pace::FINE);
         let own = EventParameters { amplitude: 0.8, onset_s: -release.lead_s, offset: 0.0, slope: 0.0 };
         let exact = signal(&lever.release(), &own, release.interval_s, release.samples - release.before);
-        // lags follow cubics through values and rates: (w h)^4 / 384 of the fastest mode at a quarter and a half of a sample
+        // lags follow cubics through values and rates: (w h)^4 / 384 of the fastest mode at a quarter and a half of a
+        // sample
         assert!(
             apart(&stepped[release.before..], &exact) < 2e-6 * 0.8,
             "{}",

@@ -11,7 +11,8 @@ const LANES: usize = 8;
 /// Some samples further: modes turn each for itself, lags follow modes and the lags before them.
 pub(super) struct Ringing {
     rotations: Vec<[f64; 4]>,
-    /// What each real and imaginary part of a decaying load turns in turn, and what of it reaches each mode's position and velocity.
+    /// What each real and imaginary part of a decaying load turns in turn, and what of it reaches each mode's position
+    /// and velocity.
     loads: Vec<[f64; 4]>,
     driven: Vec<[Vec<f64>; 2]>,
     /// Of each lag after [`LANES`] samples: weights of the whole state.
@@ -26,7 +27,8 @@ impl Ringing {
     /// From where lever and readout stand, by turns of which a sample has `steps`.
     ///
     /// # Method
-    /// The map of one sample, column by column: each part of the state on its own through the very steps that it replaces.
+    /// The map of one sample, column by column: each part of the state on its own through the very steps that it
+    /// replaces.
     pub fn new(run: &Run<'_>, chain: &mut Chain, turn: &Turn, steps: usize) -> Self {
         let (modes, lags) = (run.position.len(), chain.lags());
         let first_load = 2 * modes + lags;

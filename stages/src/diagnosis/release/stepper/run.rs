@@ -9,7 +9,8 @@ use afmid_kernels::effects::{Effects, Motion};
 
 /// Halvings of a step within which a jump of the load is located: to a ten-thousandth of a sample.
 const HALVINGS: usize = 13;
-/// Error of the mean load over a step, of the load, beyond which it is halved: difference quotients divide it by a thousandth.
+/// Error of the mean load over a step, of the load, beyond which it is halved: difference quotients divide it by a
+/// thousandth.
 const EVEN: f64 = 1e-9;
 /// Half samples up to which a load may come and go, and the stride by which later ends are looked for.
 const SHORT: usize = 128;
@@ -30,7 +31,8 @@ fn rotation(omega: f64, quality_factor: f64, h: f64) -> [f64; 4] {
 pub(super) struct Run<'a> {
     effects: &'a Effects,
     shares: Vec<f64>,
-    /// Shares of the tip's displacement: a uniform beam's, inversely as the square of the frequency; no detector shows them.
+    /// Shares of the tip's displacement: a uniform beam's, inversely as the square of the frequency; no detector shows
+    /// them.
     tip: Vec<f64>,
     omega: Vec<f64>,
     quality: Vec<f64>,
@@ -49,7 +51,8 @@ pub(super) struct Run<'a> {
     load_now: f64,
 }
 
-/// One step of everything that is linear: each mode round its equilibrium, and of each decaying load its factor and its mean.
+/// One step of everything that is linear: each mode round its equilibrium, and of each decaying load its factor and its
+/// mean.
 pub(super) struct Turn {
     modes: Vec<[f64; 4]>,
     loads: Vec<[c64; 2]>,
@@ -116,8 +119,8 @@ impl<'a> Run<'a> {
         -self.amplitude * self.effects.remaining_load.iter().map(|load| load(t)).sum::<f64>()
     }
 
-    /// The causes' forces here, half a step of `h` on from the last kick: at the velocity to which the forces before would take it, so that one
-    /// question serves the half kicks on both sides and the error stays of second order.
+    /// The causes' forces here, half a step of `h` on from the last kick: at the velocity to which the forces before
+    /// would take it, so that one question serves the half kicks on both sides and the error stays of second order.
     fn feel(&mut self, h: f64) {
         let own = self.own;
         let foreseen = self.foreseen.iter_mut().zip(&self.velocity).zip(&self.acceleration);
@@ -141,7 +144,8 @@ impl<'a> Run<'a> {
         self.velocity.iter_mut().zip(&self.acceleration).for_each(|(v, a)| *v += 0.5 * h * a);
     }
 
-    /// Mean of the load from one time to another, from its values there and in the middle: Simpson's rule, halved where it jumps or bends.
+    /// Mean of the load from one time to another, from its values there and in the middle: Simpson's rule, halved where
+    /// it jumps or bends.
     fn mean_load(&self, from: (f64, f64), middle: (f64, f64), to: (f64, f64), halvings: usize) -> f64 {
         let at = |t: f64| (t, self.load(t));
         let (left, right) = (at(0.5 * (from.0 + middle.0)), at(0.5 * (middle.0 + to.0)));
@@ -195,7 +199,8 @@ impl<'a> Run<'a> {
         let s: f64 = self.shares.iter().map(|g| -self.amplitude * g).sum();
         self.effects.seen(s - self.effects.feedthrough * self.amplitude)
     }
-    /// How many of `count` samples from now on still need steps; from then on nothing drives the lever and all is linear.
+    /// How many of `count` samples from now on still need steps; from then on nothing drives the lever and all is
+    /// linear.
     pub fn driven(&self, count: usize, interval_s: f64) -> usize {
         if self.effects.bend_the_motion() || !self.effects.optics.is_empty() {
             return count;
@@ -205,7 +210,8 @@ impl<'a> Run<'a> {
         }
         let threshold = GONE * self.amplitude.abs();
         let acts = |half: usize| self.load(self.time_s + 0.5 * half as f64 * interval_s).abs() > threshold;
-        // looked for from the end, at samples and between them: a load that ends acts no more. Late ones by strides: what is short is early
+        // looked for from the end, at samples and between them: a load that ends acts no more. Late ones by strides:
+        // what is short is early
         let late = (SHORT..2 * count).rev().step_by(STRIDE).find(|&half| acts(half));
         let last = match late {
             Some(found) => (found..(found + STRIDE).min(2 * count)).rev().find(|&half| acts(half)),
