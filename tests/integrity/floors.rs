@@ -53,7 +53,8 @@ const CRATES: [Crate; 5] = [
         name: "afmid-kernels",
         src: "stages/kernels/src",
         floors: &[
-            &["fixture", "linear_algebra", "statistics", "effects"],
+            &["fixture", "linear_algebra", "signal", "statistics", "effects"],
+            &["optimise"],
             &["events", "calibration", "force", "model", "simulate"],
             &["spectra", "modes", "ringdown", "subspace", "vector_fitting"],
             &["contact", "pem"],
