@@ -66,9 +66,9 @@ pub struct Windows {
 /// # Method
 /// 1. Windows at the aligned positions.
 /// 2. The onset of their average, whose noise is the root of their number smaller: the first sustained departure beyond
-///   4 standard deviations, for 4 samples; all windows move by it as one, in whole samples.
+///    4 standard deviations, for 4 samples; all windows move by it as one, in whole samples.
 /// 3. Lines before and after (its second half) give the jump of the average; each event's own is its share of it, by
-///   the amplitude of the correlation.
+///    the amplitude of the correlation.
 /// 4. Each event is regressed on the average of the others and 1, after the onset, for the quality.
 ///
 /// `loaded_before`: a snap-off is free after the onset, a snap-to-contact before: there the offset is read.

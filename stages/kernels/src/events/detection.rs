@@ -91,10 +91,10 @@ const RISE_BLOCKS: usize = 8;
 /// # Method
 /// Spikes of one or two blocks are bridged. Then:
 /// 1. Steps `b[k+1] - b[k-1]`, less the local slope, that exceed `significance` times their median absolute deviation
-///   in this record; of a ringing only the first.
+///    in this record; of a ringing only the first.
 /// 2. At each of them lines fitted before and after give the jump of level. It must exceed `significance` times its own
-///   scale over the record (so hum and drift raise the bar by what they do), the jump that the change of slope could
-///   feign, and 0.7 times the ringing (a released oscillator rings with at most 0.71 rms of its step).
+///    scale over the record (so hum and drift raise the bar by what they do), the jump that the change of slope could
+///    feign, and 0.7 times the ringing (a released oscillator rings with at most 0.71 rms of its step).
 /// 3. Up is a snap-off; down, and followed by a rising slope, a snap-to-contact.
 ///
 /// All thresholds are relative to the record: nothing is tuned to volts.
