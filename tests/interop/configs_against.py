@@ -158,6 +158,7 @@ def compare(old, new):
 
 def main():
     old, new, folder, *names = sys.argv[1:]
+    old, new = (Path(program).resolve() for program in (old, new))
     folders = [Path(folder).resolve() / side for side in ("old", "new")]
     for one in folders:
         (one / "configs").mkdir(parents=True, exist_ok=True)
