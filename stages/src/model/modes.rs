@@ -102,7 +102,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "mode
 impl Stage for Modes {
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 5,
+        version: 6,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],

@@ -37,6 +37,8 @@ impl Root {
                 quality_factor_std: unknown,
             };
         }
+        // ln(-x - 0i) lies at -pi: a sum with zero has no negative zero
+        let z = c64::new(z.re, z.im + 0.0);
         let s = z.ln() / sample_time_s;
         let magnitude = s.norm();
         let ds: Vec<c64> = slopes.iter().map(|dz| dz / z / sample_time_s).collect();

@@ -92,6 +92,13 @@ fn poles_are_mapped_and_classified() {
 }
 
 #[test]
+fn a_negative_real_root_has_its_principal_logarithm_whatever_the_sign_of_zero() {
+    let [above, below] = [0.0, -0.0].map(|im| Root::without_errors(c64::new(-0.4, im), 2e-7).s);
+    assert_eq!((below.re, below.im), (above.re, above.im));
+    assert!((above.im * 2e-7 - std::f64::consts::PI).abs() < 1e-15);
+}
+
+#[test]
 fn doubtful_pairs_are_no_modes() {
     // a hundred times the errors: the pair's amplitude no longer stands out
     let vague = Mat::from_fn(11, 11, |i, j| 1e8 * covariance()[(i, j)]);
