@@ -6,16 +6,12 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use common::{ROOT, number};
+use common::{ROOT, number, path_with, python_bin};
 use serde_json::Value;
 
 /// afmid with `bin` of the working folder and the Python of `make test-deps` first on the PATH.
 fn afmid(here: &Path, arguments: &[&str]) -> Output {
-    let bin = Path::new(ROOT).join(".tools/bin");
-    assert!(bin.join("python3").exists(), "{} has no python3: run `make test-deps`", bin.display());
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let first = [here.join("bin"), bin];
-    let path = std::env::join_paths(first.into_iter().chain(std::env::split_paths(&path))).expect("a PATH");
+    let path = path_with(&[here.join("bin"), python_bin()]);
     let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
     command.current_dir(here).args(arguments).env("PATH", path).env("PYTHONDONTWRITEBYTECODE", "1");
     command.env("AFMID_TRUST", here.join("trust"));

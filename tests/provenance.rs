@@ -8,7 +8,7 @@ use std::process::Output;
 use std::time::{Duration, SystemTime};
 
 use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
-use common::{ROOT, afmid, command, config, files, simulated};
+use common::{afmid, command, config, files, python_bin, simulated};
 use serde_json::Value;
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
@@ -464,8 +464,7 @@ fn a_crate_is_one_for_its_own_tools_and_the_same_each_time() {
 
 /// `runcrate report` reads the crate and finds the run in it.
 fn report(folder: &Path) {
-    let runcrate = Path::new(ROOT).join(".tools/bin/runcrate");
-    assert!(runcrate.exists(), "{} is missing: run `make test-deps`", runcrate.display());
+    let runcrate = python_bin().join("runcrate");
     let output = std::process::Command::new(runcrate).arg("report").arg(folder).output().expect("runcrate starts");
     let (text, said) = (stdout(&output), stderr(&output));
     assert!(output.status.success(), "{text}\n{said}");

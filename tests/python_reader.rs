@@ -5,7 +5,7 @@ mod common;
 use std::path::Path;
 use std::process::Command;
 
-use common::{ROOT, afmid, config, files, simulated};
+use common::{ROOT, afmid, config, files, python_bin, simulated};
 
 #[test]
 fn the_python_reader_reads_what_afmid_shows_and_the_notebooks_run() {
@@ -14,8 +14,7 @@ fn the_python_reader_reads_what_afmid_shows_and_the_notebooks_run() {
     let archive = simulated(here, "archive", 8, 3);
     let chosen = files(&archive.folder);
     afmid(here, &["run", &config("free-lever.toml"), "--set", &chosen, "-o", "a.h5", "--cache", "cache"]);
-    let python = Path::new(ROOT).join(".tools/bin/python");
-    assert!(python.exists(), "{} is missing: run `make test-deps`", python.display());
+    let python = python_bin().join("python");
     let package = Path::new(ROOT).join("python/afmid");
     let output = Command::new(python)
         .args(["-m", "pytest", "-q"])

@@ -5,7 +5,7 @@ mod common;
 use std::path::Path;
 use std::process::Command;
 
-use common::{ROOT, afmid, config, files, simulated};
+use common::{ROOT, afmid, config, files, python_bin, simulated};
 
 #[test]
 fn h5py_xarray_and_nxcheck_read_a_result() {
@@ -13,8 +13,7 @@ fn h5py_xarray_and_nxcheck_read_a_result() {
     let here = scratch.path();
     let archive = simulated(here, "archive", 8, 3);
     afmid(here, &["run", &config("paper.toml"), "--set", &files(&archive.folder), "-o", "p.h5", "--cache", "cache"]);
-    let python = Path::new(ROOT).join(".tools/bin/python");
-    assert!(python.exists(), "{} is missing: run `make test-deps`", python.display());
+    let python = python_bin().join("python");
     let script = Path::new(ROOT).join("tests/store_readers.py");
     let output = Command::new(python).arg(script).arg(here.join("p.h5")).output().expect("python starts");
     let text = String::from_utf8_lossy(&output.stdout);

@@ -1,9 +1,11 @@
 //! The tutorials' commands run as they stand there, in the order of `docs/tutorials/README.md`.
 
+mod common;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+use common::{ROOT, path_with, python_bin};
 
 /// The files that the tutorials' first page refers to, in its order.
 fn pages() -> Vec<PathBuf> {
@@ -43,13 +45,7 @@ fn every_command_of_the_tutorials_runs() {
     copy(&Path::new(ROOT).join("configs"), &here.join("configs"));
     let program = Path::new(env!("CARGO_BIN_EXE_afmid")).parent().expect("a folder");
     // the python3 of `make test-deps` comes first
-    let python = Path::new(ROOT).join(".tools/bin");
-    let path = std::env::join_paths(
-        [program.to_owned(), python]
-            .into_iter()
-            .chain(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())),
-    );
-    let path = path.expect("a PATH");
+    let path = path_with(&[program.to_owned(), python_bin()]);
     let mut count = 0;
     for page in pages() {
         for line in commands(&std::fs::read_to_string(&page).expect("a tutorial")) {

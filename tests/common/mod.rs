@@ -4,6 +4,7 @@
 
 pub mod sets;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -30,6 +31,20 @@ pub struct Truth {
     pub contact_stiffness_n_per_m: f64,
     pub snap_offs: u64,
     pub snap_ins: u64,
+}
+
+/// The folder of the Python that `make test-deps` installs, with h5py and the other readers.
+pub fn python_bin() -> PathBuf {
+    let tools = Path::new(ROOT).join(".tools");
+    // `make deps` installs a Python too, but none of them: the file is written when all are there
+    assert!(tools.join("readers").exists(), "{} has no readers of results: run `make test-deps`", tools.display());
+    tools.join("bin")
+}
+
+/// The search path of programs, with these folders first.
+pub fn path_with(first: &[PathBuf]) -> OsString {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::join_paths(first.iter().cloned().chain(std::env::split_paths(&path))).expect("a PATH")
 }
 
 /// The program with arguments, in a folder.

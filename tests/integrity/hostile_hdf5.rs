@@ -7,7 +7,7 @@ use std::process::Command;
 
 use hdf5::{File, Group};
 
-use super::common::{ROOT, afmid, command};
+use super::common::{afmid, command, python_bin};
 use super::hostile::{every_command, sealed, unsealed};
 
 /// A file with a small measurement in `/x`, and what else `more` puts there.
@@ -135,7 +135,7 @@ for native in (True, False):
 fn samples_in_other_files_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
-    let python = Path::new(ROOT).join(".tools/bin/python3");
+    let python = python_bin().join("python3");
     let made = Command::new(python).current_dir(here).args(["-c", ELSEWHERE]).status().expect("python3 starts");
     assert!(made.success());
     let mut names: Vec<String> = fs::read_dir(here)
@@ -193,7 +193,7 @@ fn sealed_results_lead_to_no_other_file() {
     let whole = fs::read(here.join("whole.h5")).expect("a result");
     for way in ["virtual", "external", "link"] {
         fs::write(here.join("led.h5"), unsealed(whole.clone())).expect("written");
-        let python = Path::new(ROOT).join(".tools/bin/python3");
+        let python = python_bin().join("python3");
         let made = Command::new(python).current_dir(here).args(["-c", LED_ELSEWHERE, way, "led.h5"]).status();
         assert!(made.expect("python3 starts").success());
         let bytes = fs::read(here.join("led.h5")).expect("written");

@@ -9,7 +9,7 @@ use afmid_pipeline::graph::load;
 use afmid_pipeline::runner::{Change, Decision, Explanation, Surroundings, explain};
 use serde_json::Value;
 
-use super::common::{ROOT, afmid};
+use super::common::{afmid, path_with, python_bin};
 use super::small::{CONFIG, cached, folder, run};
 
 /// What a run on a processor, or of a build, with this arithmetic would do.
@@ -97,10 +97,7 @@ fn every_argument_and_variable_of_a_plugin_is_in_the_key_and_explain_says_what_i
     fs::write(here.join("arg.py"), ECHO).expect("a script");
     fs::write(here.join("data.txt"), "one").expect("a file");
     let afmid = |arguments: &[&str]| -> Value {
-        let bin = Path::new(ROOT).join(".tools/bin");
-        assert!(bin.join("python3").exists(), "{} has no python3: run `make test-deps`", bin.display());
-        let path = std::env::var_os("PATH").unwrap_or_default();
-        let path = std::env::join_paths([bin].into_iter().chain(std::env::split_paths(&path))).expect("a PATH");
+        let path = path_with(&[python_bin()]);
         let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
         command.current_dir(here).args(arguments).env("PATH", path).env("PYTHONDONTWRITEBYTECODE", "1");
         command.env("AFMID_CACHE", here.join("cache")).env("AFMID_TRUST", here.join("trust"));

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use serde_json::json;
 
-use super::super::common::ROOT;
+use super::super::common::python_bin;
 use super::{CONFIG, Project, all};
 
 #[test]
@@ -99,7 +99,7 @@ fn on_a_terminal_a_question_lists_what_would_run_and_only_yes_is_yes() {
     let project = Project::new("");
     let asked = |answer: &str, arguments: &[&str]| {
         let afmid = project.command(arguments);
-        let mut terminal = Command::new(Path::new(ROOT).join(".tools/bin/python3"));
+        let mut terminal = Command::new(python_bin().join("python3"));
         terminal.current_dir(project.folder()).args(["-c", TERMINAL, answer]).arg(afmid.get_program()).args(arguments);
         terminal.envs(afmid.get_envs().filter_map(|(name, value)| Some((name, value?))));
         terminal.output().expect("python3 starts")

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::super::common::ROOT;
+use super::super::common::python_bin;
 use super::{CONFIG, Project, all};
 
 #[test]
@@ -188,7 +188,7 @@ fn a_plugin_writes_to_its_own_folder_alone_and_what_is_not_enforced_is_in_the_re
         assert!(output.status.success(), "{}", all(&output));
         let read =
             "import h5py, sys; r = h5py.File('a.h5')['entry/run']; print('\\n'.join(t.decode() for t in r['log'][()]))";
-        let python = Path::new(ROOT).join(".tools/bin/python3");
+        let python = python_bin().join("python3");
         let read =
             Command::new(python).args(["-c", read]).current_dir(project.folder()).output().expect("python starts");
         String::from_utf8(read.stdout).expect("text")

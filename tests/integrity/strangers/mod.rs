@@ -11,7 +11,7 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-use super::common::ROOT;
+use super::common::{path_with, python_bin};
 
 /// What a plugin of the tests is: Python without any package.
 const HEAD: &str = r#"import json, os, subprocess, sys, time
@@ -107,10 +107,7 @@ impl Project {
 
     /// The program in the folder, with places of its own for cache, consent and temporary files.
     pub fn command(&self, arguments: &[&str]) -> Command {
-        let bin = Path::new(ROOT).join(".tools/bin");
-        assert!(bin.join("python3").exists(), "{} has no python3: run `make test-deps`", bin.display());
-        let path = std::env::var_os("PATH").unwrap_or_default();
-        let path = std::env::join_paths([bin].into_iter().chain(std::env::split_paths(&path))).expect("a PATH");
+        let path = path_with(&[python_bin()]);
         let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));
         command.current_dir(self.folder()).args(arguments).env("PATH", path).env("PYTHONDONTWRITEBYTECODE", "1");
         command.env("AFMID_TRUST", self.trust()).env("AFMID_CACHE", self.scratch.path().join("cache"));
