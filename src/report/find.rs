@@ -1,5 +1,6 @@
 //! Finding artifacts by what they are: shapes, variables and the stages that they came from.
 
+use afmid_kernels::events::EventKind;
 use afmid_pipeline::{Array, Attribute, Axis, RunResult, Shaped, StageRecord};
 use serde_json::Value;
 
@@ -30,15 +31,6 @@ pub(crate) fn all<T: Shaped>(run: &RunResult) -> impl Iterator<Item = Found<'_, 
     })
 }
 
-/// The kind of event that a stage's data came from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum EventKind {
-    /// The lever is free afterwards; also where nothing says otherwise.
-    SnapOff,
-    /// The lever is coupled to the surface afterwards.
-    SnapIn,
-}
-
 /// The kind of event at the head of a stage's inputs: the nearest stage upstream whose parameter `kind` names one.
 pub(crate) fn event_kind(run: &RunResult, stage: &StageRecord) -> EventKind {
     let mut seen: Vec<&str> = Vec::new();
@@ -62,21 +54,13 @@ pub(crate) fn event_kind(run: &RunResult, stage: &StageRecord) -> EventKind {
 }
 
 fn named_kind(stage: &StageRecord) -> Option<EventKind> {
-    kind_from(stage.params.get("kind").and_then(Value::as_str)?)
-}
-
-fn kind_from(name: &str) -> Option<EventKind> {
-    match name {
-        "snap-off" => Some(EventKind::SnapOff),
-        "snap-in" | "snap-to-contact" => Some(EventKind::SnapIn),
-        _ => None,
-    }
+    EventKind::from_name(stage.params.get("kind").and_then(Value::as_str)?)
 }
 
 impl Found<'_, Array> {
     /// The kind of event that the array says it came from, or that its stage's inputs did.
     pub fn event_kind(&self, run: &RunResult) -> EventKind {
-        let said = self.value.attributes.get("kind").and_then(Attribute::as_str).and_then(kind_from);
+        let said = self.value.attributes.get("kind").and_then(Attribute::as_str).and_then(EventKind::from_name);
         said.unwrap_or_else(|| event_kind(run, self.stage))
     }
 }

@@ -1,5 +1,6 @@
 //! The built-in stages of afmid, by domain: each a thin shell around a pure kernel.
 
+mod artifacts;
 pub mod calibration;
 pub mod causes;
 pub mod diagnosis;

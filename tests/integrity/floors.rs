@@ -55,7 +55,8 @@ const CRATES: [Crate; 5] = [
         floors: &[
             &["fixture", "linear_algebra", "signal", "statistics", "effects"],
             &["optimise"],
-            &["events", "calibration", "force", "model", "simulate"],
+            &["events"],
+            &["calibration", "force", "model", "simulate"],
             &["spectra", "modes", "ringdown", "subspace", "vector_fitting"],
             &["contact", "pem"],
             &["grey", "stabilisation", "validation"],
@@ -65,6 +66,7 @@ const CRATES: [Crate; 5] = [
         name: "afmid-stages",
         src: "stages/src",
         floors: &[
+            &["artifacts"],
             &["io", "causes"],
             &["events", "simulate"],
             &["ensemble", "calibration"],

@@ -5,8 +5,9 @@ use afmid_pipeline::{Array, Axis as Coordinates, Document, RunResult, Table};
 use super::force_curve::is_ensemble;
 use super::sections::Drawn;
 use crate::report::figure::{Axis, Band, Colour, Figure, Line, Mark, Marker, Panel, Points, Row, Stroke};
-use crate::report::find::{EventKind, Found, all, event_kind, frequency_axis, real_over, time_axis, unit_of};
+use crate::report::find::{Found, all, event_kind, frequency_axis, real_over, time_axis, unit_of};
 use crate::report::generic::document_view;
+use afmid_kernels::events::EventKind;
 
 /// Aligned events on top of each other, and the list of what was seen.
 pub(crate) fn alignment(run: &RunResult) -> Drawn {

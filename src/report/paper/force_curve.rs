@@ -3,7 +3,8 @@
 use afmid_pipeline::{Array, RunResult};
 
 use crate::report::figure::{Axis, Colour, Figure, Mark, Panel, Row, Stroke};
-use crate::report::find::{EventKind, Found, all, real_over, time_axis, unit_of};
+use crate::report::find::{Found, all, real_over, time_axis, unit_of};
+use afmid_kernels::events::EventKind;
 
 /// Fig. 2 with the panels that the run has data for.
 pub(crate) fn figure(run: &RunResult) -> Option<Figure> {

@@ -7,8 +7,9 @@ use serde_json::Value;
 use super::bode::{Bode, BodeCurve, Smoothness, bode_figure};
 use super::response::model_curve;
 use crate::report::figure::{Colour, Figure, Stroke};
-use crate::report::find::{EventKind, Found, all, depends_on, event_kind, frequency_axis, real_over};
+use crate::report::find::{Found, all, depends_on, event_kind, frequency_axis, real_over};
 use crate::report::number::rounded;
+use afmid_kernels::events::EventKind;
 
 /// What an estimate is, from the stage that made it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

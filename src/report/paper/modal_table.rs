@@ -3,9 +3,10 @@
 use afmid_pipeline::{Document, RunResult};
 use serde_json::Value;
 
-use crate::report::find::{EventKind, Found, all, event_kind};
+use crate::report::find::{Found, all, event_kind};
 use crate::report::number::{UNKNOWN, number, quantity, with_error};
 use crate::report::view::{Head, TableView};
+use afmid_kernels::events::EventKind;
 
 /// One table for each stage whose summary lists modes, the free lever's first.
 pub(crate) fn tables(run: &RunResult) -> Vec<TableView> {

@@ -3,8 +3,9 @@
 use afmid_pipeline::{RunResult, Table};
 
 use crate::report::figure::{Axis, Colour, Ellipse, Figure, Mark, Marker, Panel, Points, Row};
-use crate::report::find::{EventKind, all, event_kind};
+use crate::report::find::{all, event_kind};
 use crate::report::number::{quantity, with_error};
+use afmid_kernels::events::EventKind;
 
 /// Poles or zeros of one model; of a complex pair the upper one.
 #[derive(Debug, Clone, Default)]

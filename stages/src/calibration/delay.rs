@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use crate::artifacts::{Average, DataSet};
 use afmid_kernels::calibration::{OnsetRule, onset_delay};
 
 /// What the averaged snap-off says about the delay, and what it cannot say.
@@ -65,15 +66,15 @@ impl Stage for Delay {
     };
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
-        let average = inputs.get(&AVERAGE)?;
+        let average = Average::new(inputs.get(&AVERAGE)?);
         let rule = OnsetRule {
             threshold: self.threshold,
             sustained_samples: self.sustained_samples,
             skip_s: self.skip_s,
             detector_pole_hz: self.detector_poles_hz.clone(),
         };
-        let time = &average.axis("time")?.values;
-        let found = onset_delay(time, average.real("mean")?, average.real("standard_error")?, &rule)
+        let (time, all) = (&average.time()?.values, DataSet::All);
+        let found = onset_delay(time, average.mean(all)?, average.standard_error(all)?, &rule)
             .map_err(StageError::from_error)?;
         let poles_known = !self.detector_poles_hz.is_empty();
         let summary = json!({

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use afmid_pipeline::{Record, StageError};
 
+use crate::artifacts::{deflection, piezo};
 use afmid_kernels::calibration::{Blocks, FreeRule, FreeStretches, free_stretches};
 use afmid_kernels::signal::Welch;
 
@@ -15,8 +16,7 @@ const SEGMENTS_AT_ONCE: usize = 64;
 
 /// The block statistics of a record, with its piezo channel where it has one.
 pub(crate) fn read_blocks(record: &Record, block_samples: usize) -> Result<Blocks, StageError> {
-    let deflection = record.channel("deflection")?;
-    let piezo = record.channels.iter().find(|channel| channel.role == "piezo");
+    let (deflection, piezo) = (deflection(record)?, piezo(record));
     if let Some(piezo) = piezo.filter(|piezo| piezo.samples != deflection.samples) {
         return Err(StageError::new(format!(
             "`piezo` has {} samples, `deflection` {}: wanted as many",
@@ -41,7 +41,7 @@ pub(crate) fn read_free(record: &Record, blocks: &Blocks, rule: FreeRule) -> Res
 
 /// Feeds the free stretches of a record to a collector of segments.
 pub(crate) fn push_free(record: &Record, stretches: &[Range<usize>], welch: &mut Welch) -> Result<(), StageError> {
-    let deflection = record.channel("deflection")?;
+    let deflection = deflection(record)?;
     let segment = welch.segment_samples();
     for stretch in stretches {
         // parts overlap by half a segment, so that the segments are those of the whole stretch

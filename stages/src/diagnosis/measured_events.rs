@@ -2,22 +2,14 @@
 
 use std::ops::Range;
 
-use afmid_pipeline::{Array, Recording, StageError, Values};
+use afmid_pipeline::{Recording, StageError};
 
 use super::release::{Cut, EventWindow};
+use crate::artifacts::deflection;
 use afmid_kernels::effects::Instant;
 
 /// Room on either side of a window, within which its onset may move.
 const MARGIN: usize = 64;
-
-/// Record and onset (samples) of each event.
-pub(super) fn onsets(ensemble: &Array, rate: f64) -> Result<Vec<(usize, f64)>, StageError> {
-    let Values::Integer(records) = &ensemble.variable("record")?.values else {
-        return Err(StageError::new("variable `record`: wanted whole numbers"));
-    };
-    let onsets = ensemble.real("onset")?;
-    Ok(records.iter().zip(onsets).map(|(r, t)| (usize::try_from(*r).unwrap_or(usize::MAX), t * rate)).collect())
-}
 
 /// Whether a window keeps its release in its first half.
 pub(super) fn check_cut(window_samples: usize, before_samples: usize) -> Result<(), StageError> {
@@ -42,7 +34,7 @@ pub(super) fn cut_out(
         StageError::new(format!("an event is of record {number}, and there are {records}"))
             .help("wire the records that the events were found in")
     })?;
-    let channel = record.channel("deflection")?;
+    let channel = deflection(record)?;
     let first = onset.floor() - (MARGIN + cut.before) as f64;
     let length = cut.samples + 2 * MARGIN;
     // an onset that is no number leaves as well

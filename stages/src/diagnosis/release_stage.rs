@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::measured_events::{check_cut, cut_out, onsets};
+use super::measured_events::{check_cut, cut_out};
 use super::records::{
     Begun, CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, abstentions,
     summarise, without_droop,
@@ -19,6 +19,7 @@ use super::release::{
 use super::release_model::lever_model;
 use super::release_story::{residual_array, tile_table};
 use super::verdict::Verdict;
+use crate::artifacts::{Ensemble, deflection, piezo};
 use crate::causes::{added, catalogue, find};
 use crate::model::ModeNumber;
 use crate::simulate::LEVER_MODEL;
@@ -146,10 +147,10 @@ impl Stage for ReleaseDiagnose {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let (recording, ensemble) = (inputs.get(&RECORDS)?, inputs.get(&ENSEMBLE)?);
-        let rate = ensemble.number("sample_rate_hz")?;
+        let (recording, ensemble) = (inputs.get(&RECORDS)?, Ensemble::new(inputs.get(&ENSEMBLE)?));
+        let rate = ensemble.sample_rate_hz()?;
         let cut = Cut { before: self.before_samples, samples: self.window_samples, interval_s: 1.0 / rate };
-        let onsets = onsets(ensemble, rate)?;
+        let onsets = ensemble.places()?;
         let mut windows = self.windows(recording, &onsets, &cut)?;
         let summaries = self.record_summaries(recording, &onsets, rate)?;
         let (summaries, free): (Vec<RecordSummary>, Vec<Vec<f64>>) = summaries.into_iter().unzip();
@@ -300,10 +301,10 @@ impl ReleaseDiagnose {
         rate: f64,
         most: usize,
     ) -> Result<(RecordSummary, Vec<f64>), StageError> {
-        let channel = record.channel("deflection")?;
+        let channel = deflection(record)?;
         let deflection = channel.read(0, channel.samples)?;
-        let piezo: Option<Vec<f64>> = match record.channel("piezo") {
-            Ok(piezo) if piezo.samples == channel.samples => {
+        let piezo: Option<Vec<f64>> = match piezo(record) {
+            Some(piezo) if piezo.samples == channel.samples => {
                 Some(piezo.read(0, piezo.samples)?.into_iter().map(|v| v * self.piezo_m_per_unit).collect())
             }
             _ => None,

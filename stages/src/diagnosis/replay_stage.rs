@@ -7,9 +7,10 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::measured_events::{check_cut, cut_out, onsets};
+use super::measured_events::{check_cut, cut_out};
 use super::release::{Cut, EventWindow};
 use super::replay::{ReplayedEvent, Replayer};
+use crate::artifacts::{Ensemble, deflection, piezo};
 use crate::simulate::{LeverModel, MODEL};
 use afmid_kernels::effects::Instant;
 
@@ -82,16 +83,16 @@ impl Stage for ReleaseReplay {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let (recording, ensemble) = (inputs.get(&RECORDS)?, inputs.get(&ENSEMBLE)?);
+        let (recording, ensemble) = (inputs.get(&RECORDS)?, Ensemble::new(inputs.get(&ENSEMBLE)?));
         let model = LeverModel::read(inputs.get(&MODEL)?)?;
-        let rate = ensemble.number("sample_rate_hz")?;
+        let rate = ensemble.sample_rate_hz()?;
         if (rate / model.sample_rate_hz - 1.0).abs() > 1e-9 {
             let problem = format!("the events have {rate} samples per second, the model {}", model.sample_rate_hz);
             return Err(StageError::new(problem).help("diagnose records of the same rate"));
         }
         let cut = Cut { before: self.before_samples, samples: self.window_samples, interval_s: 1.0 / rate };
         let (plain, extended) = (Replayer::baseline(&model, cut), Replayer::extended(&model, cut)?);
-        let onsets = onsets(ensemble, rate)?;
+        let onsets = ensemble.places()?;
         cx.expect(onsets.len());
         let replayed: Vec<Option<Pair>> = onsets
             .par_iter()
@@ -153,13 +154,12 @@ impl ReleaseReplay {
         cut: &Cut,
     ) -> Result<Option<(EventWindow, Vec<f64>)>, StageError> {
         let Some((window, range)) = cut_out(recording, number, onset, cut)? else { return Ok(None) };
-        let piezo =
-            match recording.records.get(number).map(|record| (record.channel("piezo"), record.channel("deflection"))) {
-                Some((Ok(piezo), Ok(deflection))) if piezo.samples == deflection.samples => {
-                    piezo.read(range.start, range.len())?
-                }
-                _ => Vec::new(),
-            };
+        let piezo = match recording.records.get(number).map(|record| (piezo(record), deflection(record))) {
+            Some((Some(piezo), Ok(deflection))) if piezo.samples == deflection.samples => {
+                piezo.read(range.start, range.len())?
+            }
+            _ => Vec::new(),
+        };
         Ok(Some((window, piezo.into_iter().map(|v| v * self.piezo_m_per_unit).collect())))
     }
 }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::system::{Part, Recorded, SystemDiagnosis, SystemOptions, diagnose_system};
 use super::system_story::{error_array, error_table};
+use crate::artifacts::{DataSet, Pair};
 
 /// Says what a linear oscillator gets wrong in a measured input and output: names the causes, extends the model,
 /// measures the gain.
@@ -125,26 +126,24 @@ impl Stage for SystemDiagnose {
     }
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
-        let pair = inputs.get(&PAIR)?;
-        let rate = pair.number("sample_rate_hz")?;
-        let (input, output) = (pair.real("force")?, pair.real("response")?);
+        let pair = Pair::new(inputs.get(&PAIR)?);
+        let (rate, input, output) = (pair.sample_rate_hz()?, pair.force(DataSet::All)?, pair.response(DataSet::All)?);
         if input.len() != output.len() {
             let inputs = input.len() / output.len().max(1);
             return Err(StageError::new(format!("{inputs} inputs, wanted one"))
                 .help("choose one column as input; an oscillator under several inputs is beyond this stage"));
         }
-        let stretch = &pair.axis("time_identification")?.values;
-        let first =
-            stretch.first().zip(pair.axis("time")?.values.first()).map_or(0.0, |(a, b)| ((a - b) * rate).round());
+        let stretch = pair.own_time(DataSet::Identification)?;
+        let first = stretch.first().zip(pair.time()?.first()).map_or(0.0, |(a, b)| ((a - b) * rate).round());
         let training = (first as usize, first as usize + stretch.len());
-        let unit = |name: &str| pair.variable(name).map(|variable| variable.unit.clone());
-        let options = self.options(training, unit("response")?, unit("force")?);
+        let [force_unit, response_unit] = pair.units()?.map(str::to_owned);
+        let options = self.options(training, response_unit, force_unit);
         let record = Recorded { input, output, interval_s: 1.0 / rate };
         let found = diagnose_system(&record, &options).map_err(StageError::from_error)?;
         Ok(Ports::new()
             .with(&SUMMARY, Document::new(&found.diagnosis)?)
             .with(&LADDER, ladder(&found))
-            .with(&SIMULATION, simulation(&found, stretch.clone(), &options.output_unit))
+            .with(&SIMULATION, simulation(&found, stretch.to_vec(), &options.output_unit))
             .with(&ERRORS, error_array(&found.story, &options.output_unit))
             .with(&JUDGED, error_table(&found.story, &options.output_unit)))
     }

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::rows::{all, check_rows};
 use super::{Moments, Scatter, Split, moments, scatter, split_halves};
+use crate::artifacts::{AveragedSet, DataSet, Ensemble};
 
 /// Averages aligned events: all of them, and two halves drawn at random.
 ///
@@ -60,10 +61,9 @@ impl Stage for Average {
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let ensemble = inputs.get(&ENSEMBLE)?;
-        let (rows, unit) = signal_rows(ensemble)?;
-        let onset = onset_sample(ensemble)?;
-        let rate = ensemble.number("sample_rate_hz")?;
+        let ensemble = Ensemble::new(inputs.get(&ENSEMBLE)?);
+        let (rows, unit) = (checked_rows(&ensemble)?, ensemble.unit()?);
+        let (onset, rate) = (ensemble.onset_sample()?, ensemble.sample_rate_hz()?);
         let whole = Averaged::new(rows, &all(&rows), onset)?;
         let split = match split_halves(rows.rows(), cx.seed()) {
             Ok(split) if self.split => Some(split),
@@ -79,29 +79,17 @@ impl Stage for Average {
         if lag > LAG_LIMIT_SAMPLES {
             cx.warn(format!("the events are aligned to {lag:.2} samples rms: their mean blurs high modes"));
         }
-        let mut average = whole.add(
-            Array::over(vec![ensemble.axis("time")?.clone(), ensemble.axis("event")?.clone()]),
-            "",
-            "of all events",
-            unit,
-        );
+        let axes = vec![ensemble.time()?.clone(), ensemble.event()?.clone()];
+        let mut average = whole.of(DataSet::All, unit).add(Array::over(axes));
         if let Some(split) = &split {
-            let halves = [("_identification", &split.identification), ("_verification", &split.verification)];
-            for (suffix, chosen) in halves {
-                average = Averaged::new(rows, chosen, onset)?.add(
-                    average,
-                    suffix,
-                    &format!("of {} events", chosen.len()),
-                    unit,
-                );
+            let halves =
+                [(DataSet::Identification, &split.identification), (DataSet::Verification, &split.verification)];
+            for (set, chosen) in halves {
+                average = Averaged::new(rows, chosen, onset)?.of(set, unit).add(average);
             }
         }
         average = per_event(average, &whole, split.as_ref(), rate, unit);
-        for name in ["sample_rate_hz", "onset_sample", "kind"] {
-            if let Some(value) = ensemble.attributes.get(name) {
-                average.attributes.insert(name.to_owned(), value.clone());
-            }
-        }
+        ensemble.describe(&mut average);
         let summary = Document::new(&json!({
             "events": rows.rows(),
             "identification": split.as_ref().map(|s| &s.identification),
@@ -134,21 +122,11 @@ impl Stage for Average {
     }
 }
 
-/// The signal of an ensemble as checked rows, and its unit.
-pub(super) fn signal_rows(ensemble: &Array) -> Result<(RowView<'_>, &str), StageError> {
-    let rows = ensemble.rows("signal")?;
+/// The events of an ensemble, checked, wherever they lie.
+pub(super) fn checked_rows<'a>(ensemble: &Ensemble<'a>) -> Result<RowView<'a>, StageError> {
+    let rows = ensemble.rows()?;
     check_rows(&rows).map_err(StageError::from_error)?;
-    Ok((rows, &ensemble.variable("signal")?.unit))
-}
-
-/// The sample of the onset, as events are aligned to it.
-pub(crate) fn onset_sample(array: &Array) -> Result<usize, StageError> {
-    let onset = array.number("onset_sample")?;
-    if onset >= 0.0 && onset.fract() == 0.0 {
-        Ok(onset as usize)
-    } else {
-        Err(StageError::new(format!("attribute `onset_sample` is {onset}, wanted a whole number, 0 or more")))
-    }
+    Ok(rows)
 }
 
 struct Averaged {
@@ -163,35 +141,16 @@ impl Averaged {
         Ok(Self { moments, scatter })
     }
 
-    fn add(&self, to: Array, suffix: &str, whose: &str, unit: &str) -> Array {
-        let square = format!("{unit}^2");
-        let name = |base: &str| format!("{base}{suffix}");
-        let over = &["time"];
-        let count = vec![self.moments.count as i64; self.moments.mean.len()];
-        to.with(&name("mean"), unit, &format!("mean {whose}"), over, self.moments.mean.clone())
-            .with(
-                &name("standard_error"),
-                unit,
-                &format!("standard error of the mean {whose}"),
-                over,
-                self.scatter.standard_error(),
-            )
-            .with(
-                &name("noise_variance"),
-                &square,
-                &format!("noise variance of one event {whose}"),
-                over,
-                self.scatter.noise_variance.clone(),
-            )
-            .with(
-                &name("variance"),
-                &square,
-                &format!("variance between events, scatter included, {whose}"),
-                over,
-                self.moments.variance.clone(),
-            )
-            .with(&name("count"), "1", &format!("events averaged, {whose}"), over, count)
-            .attribute(&name("count"), self.moments.count)
+    fn of<'a>(&self, set: DataSet, unit: &'a str) -> AveragedSet<'a> {
+        AveragedSet {
+            set,
+            mean: self.moments.mean.clone(),
+            standard_error: self.scatter.standard_error(),
+            noise_variance: Some(self.scatter.noise_variance.clone()),
+            variance: Some(self.moments.variance.clone()),
+            count: self.moments.count,
+            unit,
+        }
     }
 }
 

@@ -6,8 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::average::{onset_sample, signal_rows};
+use super::average::checked_rows;
 use super::{DriftSettings, EnsembleError, ShapeDrift, SubEnsemble, shape_drift};
+use crate::artifacts::Ensemble;
 
 /// Asks whether the shape of the events changes slowly over the archive.
 ///
@@ -61,10 +62,10 @@ impl Stage for Drift {
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let ensemble = inputs.get(&ENSEMBLE)?;
-        let (rows, _) = signal_rows(ensemble)?;
+        let ensemble = Ensemble::new(inputs.get(&ENSEMBLE)?);
+        let rows = checked_rows(&ensemble)?;
         let settings = DriftSettings { groups: self.groups, permutations: self.permutations, seed: cx.seed() };
-        let found = match shape_drift(rows, onset_sample(ensemble)?, settings) {
+        let found = match shape_drift(rows, ensemble.onset_sample()?, settings) {
             Ok(found) => found,
             // a small archive is no reason to lose the rest of the pipeline: nothing is known of drift, and that is
             // said

@@ -4,7 +4,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use afmid_pipeline::{Array, Axis};
+use afmid_kernels::events::EventKind;
+use afmid_pipeline::Array;
+
+use crate::artifacts::{DataSet, NewEnsemble, NewPair, PairSet};
 
 /// Sample rate of the examples.
 pub(crate) const SAMPLE_RATE_HZ: f64 = 5e6;
@@ -40,15 +43,32 @@ pub(crate) fn ensemble() -> Array {
         let (amplitude, offset) = (1.0 + 0.1 * gauss(), 4e-3 * gauss());
         values.extend(release(samples, T0, LOAD_V).iter().map(|y| amplitude * y + offset + 1e-3 * gauss()));
     }
-    let time = (0..samples).map(|k| (k as f64 - T0 as f64) / SAMPLE_RATE_HZ).collect();
-    Array::over(vec![
-        Axis::new("event", "1", "event", (0..count).map(|k| k as f64).collect()),
-        Axis::new("time", "s", "time after the onset", time),
-    ])
-    .with("signal", "V", "deflection signal", &["event", "time"], values)
-    .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
-    .attribute("onset_sample", T0)
-    .attribute("kind", "snap-off")
+    ensemble_of(values, count, samples)
+}
+
+/// Events one after the other as an ensemble, in volts.
+pub(crate) fn ensemble_of(signal: Vec<f64>, events: usize, samples: usize) -> Array {
+    let (sample_rate_hz, onset_sample) = (SAMPLE_RATE_HZ, T0);
+    let (kind, unit) = (Some(EventKind::SnapOff), "V");
+    NewEnsemble { signal: signal.into(), events, samples, sample_rate_hz, onset_sample, kind, unit }.array()
+}
+
+/// A pair of the sets given: the force held until the release, and these responses.
+pub(crate) fn pair_of(response: &[f64], standard_error: Option<f64>, sets: &[DataSet]) -> Array {
+    let samples = response.len();
+    let (t0_sample, kind) = (T0, EventKind::SnapOff.name());
+    sets.iter().fold(NewPair { sample_rate_hz: SAMPLE_RATE_HZ, t0_sample, kind }.samples(samples), |pair, &set| {
+        PairSet {
+            set,
+            dims: &["time"],
+            response: response.to_vec(),
+            force: (0..samples).map(|k| if k < T0 { LOAD_V } else { 0.0 }).collect(),
+            standard_error: standard_error.map(|error| vec![error; samples]),
+            newtons_per_volt: None,
+            labels: PairSet::LEVER,
+        }
+        .add(pair)
+    })
 }
 
 /// Runs all examples of a list of stages on one context each.

@@ -19,7 +19,6 @@ mod shape_drift;
 mod split;
 
 pub use average::Average;
-pub(crate) use average::onset_sample;
 pub use drift::Drift;
 pub use error::EnsembleError;
 pub use moments::{Moments, moments};

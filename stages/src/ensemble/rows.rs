@@ -4,6 +4,7 @@ use afmid_pipeline::StageError;
 use afmid_pipeline::rows::{RowSource, RowView, in_blocks};
 
 use super::EnsembleError;
+use crate::artifacts::Ensemble;
 
 /// Aligned events in memory, row-major `[event, time]`; every value is finite.
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +26,11 @@ impl<'a> Rows<'a> {
             return Err(EnsembleError::NotFinite { event: at / samples, sample: at % samples });
         }
         Ok(Self { values, samples })
+    }
+
+    /// The events of an ensemble. Errors: as [`Rows::new`]; there are none.
+    pub(crate) fn of(ensemble: &Ensemble<'a>) -> Result<Self, StageError> {
+        Self::new(ensemble.signal()?, ensemble.samples()?).map_err(StageError::from_error)
     }
 
     /// Number of events.

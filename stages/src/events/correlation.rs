@@ -12,6 +12,7 @@ use super::extraction::{ExtractionSettings, extract};
 use super::listing::{Listed, ensemble_array, events_table, summary};
 use super::segments::{Searched, Segments, Stretch};
 use super::window::{WindowSettings, Windows, cut_windows, quality_outliers};
+use crate::artifacts::{NewEnsemble, deflection};
 use afmid_kernels::events::{Aligned, AveragingSettings, EventKind, Misfit, correlation_average};
 
 /// Finds snap-off or snap-to-contact events in records and aligns them by iterative correlation averaging.
@@ -138,19 +139,24 @@ impl Stage for Correlation {
         let searched = records
             .par_iter()
             .map(|record| {
-                let searched =
-                    extract(record.channel("deflection")?, &extraction).and_then(|found| segments.put(found));
+                let searched = extract(deflection(record)?, &extraction).and_then(|found| segments.put(found));
                 cx.tick();
                 searched.map_err(|error| if error.place.is_none() { error.at(&record.path) } else { error })
             })
             .collect::<Result<Vec<Searched>, StageError>>()?;
         let (listed, signal) = self.align(records, searched, &segments.finish(), stretch, cx)?;
         let unit = records.first().map_or("V", |record| record.channels.first().map_or("V", |channel| &channel.unit));
+        let ensemble = NewEnsemble {
+            signal,
+            events: listed.kept(),
+            samples: self.window_samples,
+            sample_rate_hz: rate,
+            onset_sample: self.pre_samples(),
+            kind: Some(self.kind),
+            unit,
+        };
         Ok(Ports::new()
-            .with(
-                &ENSEMBLE,
-                ensemble_array(&listed, (signal, self.window_samples), rate, self.pre_samples(), self.kind, unit),
-            )
+            .with(&ENSEMBLE, ensemble_array(&listed, ensemble))
             .with(&EVENTS, events_table(&listed, records, rate, unit))
             .with(&SUMMARY, summary(&listed, records, rate, self.kind)?))
     }

@@ -1,10 +1,11 @@
 //! Events as artifacts: ensemble, table, summary.
 
-use afmid_pipeline::{Array, Axis, Document, Record, StageError, Table, Values};
+use afmid_pipeline::{Array, Document, Record, StageError, Table};
 use serde::Serialize;
 
 use super::extraction::Refused;
 use super::window::EventWindow;
+use crate::artifacts::{NewEnsemble, with_places};
 use afmid_kernels::events::EventKind;
 
 /// An event of the ensemble with its record.
@@ -28,6 +29,11 @@ pub(super) struct Listed {
 }
 
 impl Listed {
+    /// Events of the ensemble.
+    pub(super) fn kept(&self) -> usize {
+        self.kept.len()
+    }
+
     /// Adds an event of the ensemble; `place` is its record, its segment's start and its saturated samples.
     pub(super) fn keep(&mut self, place: (usize, usize, usize), event: EventWindow) {
         let (record, start, saturated) = place;
@@ -42,44 +48,16 @@ impl Listed {
     }
 }
 
-/// Aligned events over event and time, `signal` with so many samples each; time 0 is the onset.
-pub(super) fn ensemble_array(
-    listed: &Listed,
-    signal: (Values, usize),
-    rate: f64,
-    onset_sample: usize,
-    kind: EventKind,
-    unit: &str,
-) -> Array {
-    let kept = &listed.kept;
-    let (signal, samples) = signal;
-    let time = (0..samples).map(|k| (k as f64 - onset_sample as f64) / rate).collect();
-    let each = |value: &dyn Fn(&Kept) -> f64| -> Vec<f64> { kept.iter().map(value).collect() };
-    Array::over(vec![
-        Axis::new("event", "1", "event", (0..kept.len()).map(|k| k as f64).collect()),
-        Axis::new("time", "s", "time after the onset", time),
-    ])
-    .with("signal", unit, "deflection signal", &["event", "time"], signal)
-    .with(
-        "record",
-        "1",
-        "number of the record",
-        &["event"],
-        kept.iter().map(|kept| kept.record as i64).collect::<Vec<_>>(),
-    )
-    .with("onset", "s", "time of the onset in its record", &["event"], each(&|kept| kept.position / rate))
-    .with("amplitude", unit, "jump of level at the onset", &["event"], each(&|kept| kept.event.amplitude))
-    .with("offset", unit, "level without force at the onset", &["event"], each(&|kept| kept.event.offset))
-    .with(
-        "noise",
-        unit,
-        "standard deviation of the noise before the onset",
-        &["event"],
-        each(&|kept| kept.event.noise_std),
-    )
-    .attribute("sample_rate_hz", rate)
-    .attribute("onset_sample", onset_sample)
-    .attribute("kind", kind_name(kind))
+/// The ensemble, with where each event is from; time 0 is the onset.
+pub(super) fn ensemble_array(listed: &Listed, ensemble: NewEnsemble<'_>) -> Array {
+    let (unit, rate) = (ensemble.unit.to_owned(), ensemble.sample_rate_hz);
+    let places: Vec<(usize, f64)> = listed.kept.iter().map(|kept| (kept.record, kept.position)).collect();
+    let each = |value: fn(&EventWindow) -> f64| listed.kept.iter().map(|kept| value(&kept.event)).collect::<Vec<f64>>();
+    let over = &["event"];
+    with_places(ensemble.array(), &places, rate)
+        .with("amplitude", &unit, "jump of level at the onset", over, each(|event| event.amplitude))
+        .with("offset", &unit, "level without force at the onset", over, each(|event| event.offset))
+        .with("noise", &unit, "standard deviation of the noise before the onset", over, each(|event| event.noise_std))
 }
 
 /// One row per event that was seen and per record without any, by record and time.
@@ -191,7 +169,7 @@ pub(super) fn summary(listed: &Listed, records: &[Record], rate: f64, kind: Even
     let name = |record: usize| records.get(record).map_or(String::new(), |record| record.name.clone());
     Document::new(&Summary {
         events: Events {
-            kind: kind_name(kind),
+            kind: kind.name(),
             records: records.len(),
             found: listed.kept.len(),
             kept: listed
@@ -214,11 +192,4 @@ pub(super) fn summary(listed: &Listed, records: &[Record], rate: f64, kind: Even
             amplitude_std: Some(variance.sqrt()).filter(|value| value.is_finite()),
         },
     })
-}
-
-fn kind_name(kind: EventKind) -> &'static str {
-    match kind {
-        EventKind::SnapOff => "snap-off",
-        EventKind::SnapIn => "snap-in",
-    }
 }

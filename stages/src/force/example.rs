@@ -3,7 +3,9 @@
 use afmid_pipeline::{Array, Axis, Example, Ports, StageError};
 
 use super::extrapolation::{AVERAGE, PAIR, SUMMARY};
+use crate::artifacts::{AveragedSet, DataSet, empty_average};
 use crate::ensemble::example::{LOAD_V, SAMPLE_RATE_HZ, T0, release};
+use afmid_kernels::events::EventKind;
 
 pub(super) fn examples() -> Vec<Example> {
     vec![
@@ -53,11 +55,15 @@ fn number(outputs: &Ports, path: &[&str]) -> Result<f64, String> {
 fn average() -> Array {
     let samples = 4096;
     let time = (0..samples).map(|k| (k as f64 - T0 as f64) / SAMPLE_RATE_HZ).collect();
-    Array::over(vec![Axis::new("time", "s", "time after the onset", time)])
-        .with("mean", "V", "mean", &["time"], release(samples, T0, LOAD_V))
-        .with("standard_error", "V", "standard error of the mean", &["time"], vec![1e-4; samples])
-        .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
-        .attribute("onset_sample", T0 + 1)
-        .attribute("kind", "snap-off")
-        .attribute("count", 24usize)
+    let axes = vec![Axis::new("time", "s", "time after the onset", time)];
+    AveragedSet {
+        set: DataSet::All,
+        mean: release(samples, T0, LOAD_V),
+        standard_error: vec![1e-4; samples],
+        noise_variance: None,
+        variance: None,
+        count: 24,
+        unit: "V",
+    }
+    .add(empty_average(axes, SAMPLE_RATE_HZ, T0 + 1, EventKind::SnapOff))
 }

@@ -1,11 +1,13 @@
 //! The stage `force.extrapolation`.
 
-use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use afmid_kernels::force::{Event, ExtrapolationSettings, Lines, Onset, OnsetSettings, ZeroLine, extrapolate, pair};
+use crate::artifacts::{Average, DataSet, NewPair, PairSet, with_counts};
+use afmid_kernels::events::EventKind;
+use afmid_kernels::force::{ExtrapolationSettings, Lines, Onset, OnsetSettings, ZeroLine, extrapolate, pair};
 
 /// Derives the force that acted from the averaged event: input and response of the identification.
 ///
@@ -90,13 +92,11 @@ impl Stage for Extrapolation {
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let average = inputs.get(&AVERAGE)?;
+        let average = Average::new(inputs.get(&AVERAGE)?);
         let scale = self.newtons_per_volt(inputs.find(&CALIBRATION)?)?;
-        let rate = average.number("sample_rate_hz")?;
-        let onset = crate::ensemble::onset_sample(average)?;
-        let event = event_kind(average)?;
+        let (rate, onset, event) = (average.sample_rate_hz()?, average.onset_sample()?, average.kind()?);
         let settings = self.settings(event, onset, rate);
-        let (mean, error) = (average.real("mean")?, average.real("standard_error")?);
+        let (mean, error) = (average.mean(DataSet::All)?, average.standard_error(DataSet::All)?);
         let causal = extrapolate(mean, error, settings, None);
         let lines = match self.given_onset(onset, rate) {
             None => causal.map_err(StageError::from_error)?,
@@ -121,31 +121,32 @@ impl Stage for Extrapolation {
         if t0 >= mean.len() {
             return Err(StageError::new(format!("t0 is sample {t0} of a window of {}", mean.len())));
         }
-        let time = (0..mean.len()).map(|k| (k as f64 - t0 as f64) / rate).collect();
-        let mut result = Array::over(vec![Axis::new("time", "s", "time since t0", time)]);
-        let mut halves = Vec::new();
-        for suffix in ["", "_identification", "_verification"] {
-            let Ok(mean) = average.real(&format!("mean{suffix}")) else { continue };
-            let error = average.real(&format!("standard_error{suffix}"))?;
-            let own = match suffix {
-                "" => lines,
+        let mut result = NewPair { sample_rate_hz: rate, t0_sample: t0, kind: event.name() }.samples(mean.len());
+        let (mut sets, mut counts) = (Vec::new(), Vec::new());
+        for set in DataSet::ALL.into_iter().filter(|set| average.has(*set)) {
+            let (mean, error) = (average.mean(set)?, average.standard_error(set)?);
+            let own = match set {
+                DataSet::All => lines,
                 _ => extrapolate(mean, error, settings, Some(lines.onset)).map_err(StageError::from_error)?,
             };
-            result = add_pair(result, suffix, mean, error, &own, event, scale.map(|scale| scale.per_volt));
-            halves.push((suffix, own));
-            if let Some(count) = average.attributes.get(&format!("count{suffix}")) {
-                result.attributes.insert(format!("count{suffix}"), count.clone());
-            }
+            let found = pair(mean, &own, event);
+            let own_set = PairSet {
+                set,
+                dims: &["time"],
+                response: found.response,
+                force: found.force,
+                standard_error: Some(error.to_vec()),
+                newtons_per_volt: scale.map(|scale| scale.per_volt),
+                labels: PairSet::LEVER,
+            };
+            result = own_set.add(result);
+            sets.push((set, own));
+            counts.extend(average.count(set).map(|count| (set, count.clone())));
         }
-        let ambiguity = lines.onset.ambiguity() / rate;
-        result = result
-            .attribute("sample_rate_hz", rate)
-            .attribute("t0_sample", t0)
-            .attribute("t0_ambiguity_s", ambiguity)
-            .attribute("kind", if event == Event::SnapOff { "snap-off" } else { "snap-in" })
+        let result = with_counts(result, &counts, lines.onset.ambiguity() / rate)
             .attribute("load_v", lines.load)
             .attribute("load_std_v", lines.load_std);
-        let summary = summary(&halves, event, onset, rate, scale)?;
+        let summary = summary(&sets, event, onset, rate, scale)?;
         Ok(Ports::new().with(&PAIR, result).with(&SUMMARY, summary))
     }
 
@@ -155,7 +156,7 @@ impl Stage for Extrapolation {
 }
 
 impl Extrapolation {
-    fn settings(&self, event: Event, near: usize, rate: f64) -> ExtrapolationSettings {
+    fn settings(&self, event: EventKind, near: usize, rate: f64) -> ExtrapolationSettings {
         let samples = |seconds: f64| (seconds * rate).ceil() as usize;
         ExtrapolationSettings {
             event,
@@ -208,54 +209,24 @@ fn calibrated(calibration: Option<&Document>, name: &str) -> Option<(f64, f64)> 
     found.as_f64().map(|value| (value, 0.0)).or_else(|| Some((part("value")?, part("std").unwrap_or(0.0))))
 }
 
-fn event_kind(average: &Array) -> Result<Event, StageError> {
-    match average.attributes.get("kind").and_then(|kind| kind.as_str()) {
-        Some("snap-off") => Ok(Event::SnapOff),
-        Some("snap-in") => Ok(Event::SnapIn),
-        other => Err(StageError::new(format!("attribute `kind` is {other:?}, wanted `snap-off` or `snap-in`"))),
-    }
-}
-
-fn add_pair(
-    to: Array,
-    suffix: &str,
-    mean: &[f64],
-    error: &[f64],
-    lines: &Lines,
-    event: Event,
-    newtons_per_volt: Option<f64>,
-) -> Array {
-    let pair = pair(mean, lines, event);
-    let newtons: Option<Vec<f64>> = newtons_per_volt.map(|scale| pair.force.iter().map(|u| scale * u).collect());
-    let over = &["time"];
-    let to = to
-        .with(&format!("response{suffix}"), "V", "deflection above the zero-force line", over, pair.response)
-        .with(&format!("force{suffix}"), "V", "force, as the static deflection that it causes", over, pair.force)
-        .with(&format!("standard_error{suffix}"), "V", "standard error of the response", over, error.to_vec());
-    match newtons {
-        Some(newtons) => to.with(&format!("force_newton{suffix}"), "N", "force on the tip", over, newtons),
-        None => to,
-    }
-}
-
 fn summary(
-    halves: &[(&str, Lines)],
-    event: Event,
+    sets: &[(DataSet, Lines)],
+    event: EventKind,
     onset: usize,
     rate: f64,
     scale: Option<Newtons>,
 ) -> Result<Document, StageError> {
-    let Some((_, whole)) = halves.first() else { return Err(StageError::new("there is no average")) };
+    let Some((_, whole)) = sets.first() else { return Err(StageError::new("there is no average")) };
     let with_std = |value: f64, std: f64, unit: &str| json!({ "value": value, "std": std, "unit": unit });
-    let half = |suffix: &str| {
-        halves.iter().find(|h| h.0 == suffix).map_or(Value::Null, |h| with_std(h.1.load, h.1.load_std, "V"))
+    let half = |half: DataSet| {
+        sets.iter().find(|h| h.0 == half).map_or(Value::Null, |h| with_std(h.1.load, h.1.load_std, "V"))
     };
-    let zero = if event == Event::SnapOff { whole.after } else { whole.before };
+    let zero = if event == EventKind::SnapOff { whole.after } else { whole.before };
     Document::new(&json!({
-        "kind": if event == Event::SnapOff { "snap-off" } else { "snap-in" },
+        "kind": event.name(),
         "load": with_std(whole.load, whole.load_std, "V"),
-        "load_identification": half("_identification"),
-        "load_verification": half("_verification"),
+        "load_identification": half(DataSet::Identification),
+        "load_verification": half(DataSet::Verification),
         "force": scale.map(|scale| {
             let force = scale.per_volt * whole.load;
             with_std(force, (scale.per_volt * whole.load_std).hypot(force * scale.relative_std), "N")

@@ -9,8 +9,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::extension::Extension;
-use crate::ensemble::{Rows, onset_sample};
+use crate::artifacts::{DataSet, Ensemble, Pair};
+use crate::ensemble::Rows;
 use crate::simulate::{LEVER_MODEL, LeverModel};
+use afmid_kernels::events::EventKind;
 use afmid_kernels::force::{
     ForcePrior, IdentifiedModel, Reconstruction as Kernel, ReconstructionSettings, Rise, Weighting, band_inflation,
     correlation_inflation, fit_line, reconstruct, rise,
@@ -125,7 +127,8 @@ impl Stage for Reconstruction {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let (ensemble, pair) = (inputs.get(&ENSEMBLE)?, inputs.find(&PAIR)?);
+        let ensemble = Ensemble::new(inputs.get(&ENSEMBLE)?);
+        let pair = inputs.find(&PAIR)?.map(Pair::new);
         let extension = match inputs.find(&EXTENSION)? {
             Some(document) => Some(Extension::new(&LeverModel::read(document)?)?),
             None => None,
@@ -140,20 +143,18 @@ impl Stage for Reconstruction {
             }
         };
         extension.iter().flat_map(|extension| &extension.remaining).for_each(|left| cx.warn(left.clone()));
-        let samples = ensemble.axis("time")?.values.len();
-        let rows = Rows::new(ensemble.real("signal")?, samples).map_err(StageError::from_error)?;
-        let rate = ensemble.number("sample_rate_hz")?;
+        let (samples, rows, rate) = (ensemble.samples()?, Rows::of(&ensemble)?, ensemble.sample_rate_hz()?);
         let identified = identified(model, rate)?;
         let event = match pair {
-            Some(pair) => pair.number("t0_sample")? as usize,
-            None => onset_sample(ensemble)?,
+            Some(pair) => pair.t0_sample()? as usize,
+            None => ensemble.onset_sample()?,
         };
         let chosen = self.chosen(rows.count())?;
-        let mut settings = self.settings(model, pair, extension.is_some(), event, samples, rate)?;
+        let mut settings = self.settings(model, pair.as_ref(), extension.is_some(), event, samples, rate)?;
         if let (Some(extension), NoiseSource::Model) = (&extension, self.noise) {
             settings.noise_variance = Some(extension.model.innovation_variance);
         }
-        let free = self.free_stretch(ensemble, event, samples, rate)?;
+        let free = self.free_stretch(&ensemble, event, samples, rate)?;
         cx.expect(chosen.len());
         let found: Vec<Reconstructed> = chosen
             .par_iter()
@@ -164,7 +165,7 @@ impl Stage for Reconstruction {
             })
             .collect::<Result<_, StageError>>()?;
         warn(&found, cx);
-        let newtons = pair.and_then(newtons_per_volt);
+        let newtons = pair.as_ref().and_then(Pair::newtons_per_volt);
         Ok(Ports::new()
             .with(&FORCE, force_array(&found, event, samples, rate, newtons))
             .with(&EVENTS, table(&found, rate))
@@ -199,7 +200,7 @@ impl Reconstruction {
     fn settings(
         &self,
         model: &StateSpace,
-        pair: Option<&Array>,
+        pair: Option<&Pair<'_>>,
         extended: bool,
         event: usize,
         samples: usize,
@@ -217,7 +218,10 @@ impl Reconstruction {
                         "`noise = \"model\"` wants the pair that the model was fitted to, for its number of events",
                     )
                 })?;
-                Some(model.innovation_variance * pair.number("count")?)
+                let count = pair.count(DataSet::All).ok_or_else(|| {
+                    StageError::new("the pair does not state how many events it is from, as its attribute `count`")
+                })?;
+                Some(model.innovation_variance * count)
             }
         };
         let prior = self.prior;
@@ -227,15 +231,15 @@ impl Reconstruction {
     /// Where no force acts.
     fn free_stretch(
         &self,
-        ensemble: &Array,
+        ensemble: &Ensemble<'_>,
         event: usize,
         samples: usize,
         rate: f64,
     ) -> Result<std::ops::Range<usize>, StageError> {
         const SHORTEST: usize = 64;
         let guard = (self.guard_s * rate).ceil() as usize;
-        let stretch = match ensemble.attributes.get("kind").and_then(|kind| kind.as_str()) {
-            Some("snap-in") => 0..event.saturating_sub(guard),
+        let stretch = match ensemble.kind() {
+            Some(EventKind::SnapIn) => 0..event.saturating_sub(guard),
             _ => (event + guard).min(samples)..samples,
         };
         if stretch.len() < SHORTEST {
@@ -306,11 +310,6 @@ pub(super) fn identified(model: &StateSpace, rate: f64) -> Result<IdentifiedMode
     }
     let d = model.d.values.first().copied().unwrap_or(0.0);
     Ok(IdentifiedModel { a: &model.a.values, b: &model.b.values, c: &model.c.values, d, k: &model.k.values })
-}
-
-fn newtons_per_volt(pair: &Array) -> Option<f64> {
-    let (volts, newtons) = (pair.real("force").ok()?, pair.real("force_newton").ok()?);
-    volts.iter().zip(newtons).find(|(v, _)| **v != 0.0).map(|(v, n)| n / v)
 }
 
 fn warn(found: &[Reconstructed], cx: &Context) {

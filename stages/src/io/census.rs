@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::code_census::{CensusSettings, ChannelCensus, Found};
 use super::memory::{memory_channel, memory_record};
+use crate::artifacts::DEFLECTION;
 
 /// Counts what is wrong with stored samples: missing ones, sentinels, saturation; and what is noise.
 ///
@@ -162,7 +163,7 @@ impl Census {
             row.found.saturated_low + row.found.saturated_high
         });
         let smooth =
-            |row: &&Row| row.channel == "deflection" && row.found.bandwidth_hz < self.min_bandwidth_share * row.rate;
+            |row: &&Row| row.channel == DEFLECTION && row.found.bandwidth_hz < self.min_bandwidth_share * row.rate;
         if let Some(first) = rows.iter().find(smooth) {
             warnings.push(format!(
                 "the noise of {} channels is smooth, in {} it reaches {:.0} Hz at {} samples per second: low-pass filtered, it may not carry a ringdown",
@@ -211,7 +212,7 @@ fn summary(rows: &[Row], records: usize) -> Result<Document, StageError> {
     let sum = |value: fn(&Found) -> usize| rows.iter().map(|row| value(&row.found)).sum();
     let saturated = |found: &Found| found.saturated_low + found.saturated_high;
     let mut noise: Vec<f64> =
-        rows.iter().filter(|row| row.channel == "deflection").map(|row| row.found.noise_std).collect();
+        rows.iter().filter(|row| row.channel == DEFLECTION).map(|row| row.found.noise_std).collect();
     let mut names: Vec<String> =
         rows.iter().filter(|row| saturated(&row.found) > 0).map(|row| row.record.clone()).collect();
     names.dedup();

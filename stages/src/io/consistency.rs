@@ -2,6 +2,8 @@
 
 use afmid_pipeline::{Record, StageError};
 
+use crate::artifacts::{deflection, piezo};
+
 /// What records have in common.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Consistency {
@@ -28,7 +30,7 @@ pub struct Consistency {
 /// No record; a rate or unit that differs, with both files; an empty record; channels of different lengths.
 pub fn check_consistency(records: &[Record]) -> Result<Consistency, StageError> {
     let first = records.first().ok_or_else(|| StageError::new("there is no record"))?;
-    let deflection = first.channel("deflection")?;
+    let known = deflection(first)?;
     let (mut samples, mut shortest, mut longest) = (0, first, first);
     for record in records {
         if (record.sample_rate_hz / first.sample_rate_hz - 1.0).abs() > 1e-6 {
@@ -43,11 +45,11 @@ pub fn check_consistency(records: &[Record]) -> Result<Consistency, StageError> 
                 return Err(differs(first, record, &what, &same.unit, &channel.unit));
             }
         }
-        let length = record.channel("deflection")?.samples;
-        shortest = if length < shortest.channel("deflection")?.samples { record } else { shortest };
-        longest = if length > longest.channel("deflection")?.samples { record } else { longest };
+        let length = deflection(record)?.samples;
+        shortest = if length < deflection(shortest)?.samples { record } else { shortest };
+        longest = if length > deflection(longest)?.samples { record } else { longest };
     }
-    let lengths = [shortest.channel("deflection")?.samples, longest.channel("deflection")?.samples];
+    let lengths = [deflection(shortest)?.samples, deflection(longest)?.samples];
     let mut remarks = Vec::new();
     if lengths[0] != lengths[1] {
         remarks.push(format!(
@@ -55,25 +57,25 @@ pub fn check_consistency(records: &[Record]) -> Result<Consistency, StageError> 
             lengths[0], shortest.name, lengths[1], longest.name
         ));
     }
-    if let Some(other) = records.iter().find(|record| {
-        record.channel("deflection").is_ok_and(|channel| channel.scale_factor != deflection.scale_factor)
-    }) {
+    if let Some(other) =
+        records.iter().find(|record| deflection(record).is_ok_and(|channel| channel.scale_factor != known.scale_factor))
+    {
         remarks.push(format!(
             "the scale factor changes within the archive: {} {} per code in {}, {} in {}",
-            deflection.scale_factor,
-            deflection.unit,
+            known.scale_factor,
+            known.unit,
             first.name,
-            other.channel("deflection")?.scale_factor,
+            deflection(other)?.scale_factor,
             other.name
         ));
     }
-    let without = records.iter().filter(|record| record.channel("piezo").is_err()).count();
+    let without = records.iter().filter(|record| piezo(record).is_none()).count();
     if without > 0 && without < records.len() {
         remarks.push(format!("{without} of {} records have no piezo channel", records.len()));
     }
     Ok(Consistency {
         sample_rate_hz: first.sample_rate_hz,
-        unit: deflection.unit.clone(),
+        unit: known.unit.clone(),
         samples,
         shortest_samples: lengths[0],
         longest_samples: lengths[1],
@@ -82,7 +84,7 @@ pub fn check_consistency(records: &[Record]) -> Result<Consistency, StageError> 
 }
 
 fn checked_length(record: &Record) -> Result<usize, StageError> {
-    let length = record.channel("deflection")?.samples;
+    let length = deflection(record)?.samples;
     if length == 0 {
         return Err(StageError::new("the record holds no sample")
             .at(&record.path)

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::memory::{memory_channel, memory_record};
 use super::stretch_extremes::StretchExtremes;
+use crate::artifacts::{DEFLECTION, deflection};
 
 /// The entire force curve of one record, as the least and largest value of short stretches.
 ///
@@ -63,13 +64,13 @@ impl Stage for Overview {
         let record = records.get(self.record).ok_or_else(|| {
             StageError::new(format!("`record` is {}, there are {} records", self.record, records.len()))
         })?;
-        let deflection = record.channel("deflection")?;
+        let deflection = deflection(record)?;
         let stretch = deflection.samples.div_ceil(self.stretches).max(1);
         let count = deflection.samples.div_ceil(stretch);
         let middle = |k: usize| (k as f64 + 0.5) * stretch as f64 / record.sample_rate_hz;
         let mut overview =
             Array::over(vec![Axis::new("time", "s", "time in the record", (0..count).map(middle).collect())]);
-        let others = record.channels.iter().filter(|channel| channel.role != "deflection");
+        let others = record.channels.iter().filter(|channel| channel.role != DEFLECTION);
         for channel in std::iter::once(deflection).chain(others) {
             if channel.samples != deflection.samples {
                 let (found, wanted) = (channel.samples, deflection.samples);
@@ -77,7 +78,7 @@ impl Stage for Overview {
                     .at(&record.path));
             }
             let extremes = extremes(channel, stretch)?;
-            let prefix = if channel.role == "deflection" { String::new() } else { format!("{}_", channel.role) };
+            let prefix = if channel.role == DEFLECTION { String::new() } else { format!("{}_", channel.role) };
             overview = overview
                 .with(
                     &format!("{prefix}minimum"),

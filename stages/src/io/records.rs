@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::consistency::{Consistency, check_consistency};
 use super::file_patterns::{Match, matching_files};
 use super::shared_data::moved;
+use crate::artifacts::{DEFLECTION, PIEZO, piezo};
 
 /// Opens records of any format by pattern.
 ///
@@ -183,9 +184,9 @@ impl Records {
     }
 
     fn open(&self, path: &Path, cx: &Context) -> Result<Opened, StageError> {
-        let mut wanted = vec![Wanted { role: "deflection", location: &self.channel, required: true }];
+        let mut wanted = vec![Wanted { role: DEFLECTION, location: &self.channel, required: true }];
         if !self.piezo_channel.is_empty() {
-            wanted.push(Wanted { role: "piezo", location: &self.piezo_channel, required: false });
+            wanted.push(Wanted { role: PIEZO, location: &self.piezo_channel, required: false });
         }
         open_records(cx.files(), path, &wanted, &self.how())
     }
@@ -290,7 +291,7 @@ impl Summary {
             duration_s: consistency.samples as f64 / consistency.sample_rate_hz,
             shortest_samples: consistency.shortest_samples,
             longest_samples: consistency.longest_samples,
-            with_piezo: records.iter().filter(|record| record.channel("piezo").is_ok()).count(),
+            with_piezo: records.iter().filter(|record| piezo(record).is_some()).count(),
             bytes,
             first: name(records.first()),
             last: name(records.last()),

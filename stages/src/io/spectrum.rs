@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::{InputFiles, read_number_attribute, read_series};
-use afmid_pipeline::{Array, Axis, Caching, Context, Example, Faults, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Caching, Context, Example, Faults, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::file_patterns::matching_files;
 use super::shared_data::moved;
+use crate::artifacts::NewDensity;
 
 /// Opens a power spectral density that another program has averaged and stored.
 ///
@@ -153,14 +154,8 @@ impl Spectrum {
 
 /// A density as `spectrum.thermal` takes it.
 fn density_array(frequency_hz: Vec<f64>, density: Vec<f64>, averages: f64, unit: &str) -> Array {
-    let square = format!("{unit}^2/Hz");
-    let error: Vec<f64> = density.iter().map(|p| p / averages.sqrt()).collect();
-    let over = &["frequency_hz"];
-    Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", frequency_hz)])
-        .with("density", &square, "one-sided power spectral density", over, density)
-        .with("standard_error", &square, "its standard error", over, error)
-        .attribute("averages", averages)
-        .attribute("signal_unit", unit)
+    let standard_error: Vec<f64> = density.iter().map(|p| p / averages.sqrt()).collect();
+    NewDensity { frequency_hz, density, standard_error, averages, signal_unit: unit, error_if: "" }.array()
 }
 
 fn check_spectrum(f: &[f64], p: &[f64]) -> Result<(), StageError> {

@@ -9,9 +9,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::modes::innovations;
 use super::pem::{MODEL, PAIR};
-use crate::ensemble::{Rows, moments, onset_sample, scatter};
+use crate::artifacts::{DataSet, Ensemble, Pair, innovations};
+use crate::ensemble::{Rows, moments, scatter};
 use afmid_kernels::model::{InnovationsModel, ModelError, transmission_zeros};
 use afmid_kernels::modes::LEVEL;
 use afmid_kernels::pem::{Experiment, PemOptions, refit};
@@ -95,17 +95,16 @@ impl Stage for BootstrapIntervals {
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let (ensemble, pair, artifact) = (inputs.get(&ENSEMBLE)?, inputs.get(&PAIR)?, inputs.get(&MODEL)?);
-        let samples = ensemble.axis("time")?.values.len();
-        let rows = Rows::new(ensemble.real("signal")?, samples).map_err(StageError::from_error)?;
-        let force = pair.real("force")?;
+        let (ensemble, pair) = (Ensemble::new(inputs.get(&ENSEMBLE)?), Pair::new(inputs.get(&PAIR)?));
+        let artifact = inputs.get(&MODEL)?;
+        let (samples, rows, force) = (ensemble.samples()?, Rows::of(&ensemble)?, pair.force(DataSet::All)?);
         if force.len() != samples {
             let problem = format!("the pair's force has {} values, the events {samples} samples", force.len());
             return Err(StageError::new(problem).help("wire the force that was derived from the same events"));
         }
         let all = rows.all();
         let mean = moments(rows, &all).map_err(StageError::from_error)?.mean;
-        let amplitude = scatter(rows, &all, &mean, onset_sample(ensemble)?).map_err(StageError::from_error)?.amplitude;
+        let amplitude = scatter(rows, &all, &mean, ensemble.onset_sample()?).map_err(StageError::from_error)?.amplitude;
         let events: Vec<&[f64]> = all.iter().map(|&i| rows.row(i)).collect();
         let (model, _) = innovations(artifact)?;
         let frequencies = self.frequencies(1.0 / model.sample_time_s);

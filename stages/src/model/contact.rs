@@ -1,20 +1,17 @@
 //! The stage `model.contact`.
 
 mod output;
-mod reading;
 #[cfg(test)]
 mod tests;
 
-use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table,
-};
-use faer::c64;
+use afmid_pipeline::{Array, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
+use faer::{Mat, c64};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::output::{contact_table, share_table, summary};
-use self::reading::ringing;
 use super::ringdown::POLES;
+use crate::artifacts::{mode_table, modes, ringing, ringing_array};
 use crate::calibration::StiffnessSummary;
 use afmid_kernels::contact::{
     FreeLever, JointContact, JointOptions, LOADED_BEAM_SHARES, LawChoice, Ringing, coupled_poles, joint_contact,
@@ -232,20 +229,15 @@ impl ContactFit {
                 .help("wire the summary of `calibration.stiffness`, or give the number"));
             }
         };
-        let (f, f_std) = (free.real("frequency_hz")?, free.real("frequency_std_hz")?);
-        let (q, q_std) = (free.real("quality_factor")?, free.real("quality_factor_std")?);
-        if f.len() != self.tip_shares.len() {
+        let modes = modes(free)?;
+        if modes.len() != self.tip_shares.len() {
             return Err(StageError::new(format!(
                 "the free lever has {} modes, `tip_shares` {} numbers",
-                f.len(),
+                modes.len(),
                 self.tip_shares.len()
             ))
             .help("give one share for each mode"));
         }
-        let estimate = |value: &[f64], std: &[f64], i: usize| Estimate { value: value[i], std: std[i] };
-        let modes = (0..f.len())
-            .map(|i| ModeEstimate { frequency_hz: estimate(f, f_std, i), quality_factor: estimate(q, q_std, i) })
-            .collect();
         // shares with an error are the joint estimate's to count
         FreeLever::new(stiffness, modes, self.tip_shares.clone(), 0.0).map_err(StageError::from_error)
     }
@@ -253,25 +245,16 @@ impl ContactFit {
 
 /// A lever of two modes, and its exact poles on a contact of 60 N/m and 8e-6 N s/m.
 fn example_inputs() -> Result<Ports, StageError> {
-    let (f, q) = ([46.3e3, 247.4e3], [40.8, 193.2]);
-    let free = Table::new()
-        .with("frequency_hz", "Hz", "resonance frequency", f.to_vec())
-        .with("frequency_std_hz", "Hz", "its standard error", vec![0.1, 1.0])
-        .with("quality_factor", "1", "quality factor", q.to_vec())
-        .with("quality_factor_std", "1", "its standard error", vec![0.01, 0.1]);
+    let estimate = |value: f64, std: f64| Estimate { value, std };
+    let free = mode_table(&[
+        ModeEstimate { frequency_hz: estimate(46.3e3, 0.1), quality_factor: estimate(40.8, 0.01) },
+        ModeEstimate { frequency_hz: estimate(247.4e3, 1.0), quality_factor: estimate(193.2, 0.1) },
+    ]);
     let stage = ContactFit { stiffness_n_per_m: Some(3.8), tip_shares: vec![0.97, 0.03], ..ContactFit::default() };
     let lever = stage.lever(&free, None)?;
     let start = [c64::new(-3e4, 9.3e5), c64::new(-1e5, 2e6)];
     let poles = coupled_poles(&lever, [60.0, 8e-6], &start).ok_or_else(|| StageError::new("no coupled poles"))?;
-    let axis = |name: &str| Axis::new(name, "1", "parts of the poles", vec![0.0, 1.0, 2.0, 3.0]);
-    let array = Array::over(vec![axis("parameter"), axis("other")])
-        .with("pole", "rad/s", "poles", &["parameter"], poles.iter().flat_map(|p| [p.re, p.im]).collect::<Vec<f64>>())
-        .with(
-            "covariance",
-            "rad^2/s^2",
-            "their covariance",
-            &["parameter", "other"],
-            (0..16).map(|i| if i % 5 == 0 { 1e4 } else { 0.0 }).collect::<Vec<f64>>(),
-        );
+    let covariance = Mat::from_fn(4, 4, |i, j| if i == j { 1e4 } else { 0.0 });
+    let array = ringing_array(&Ringing { poles, residues: None, covariance, real_poles: 0 });
     Ok(Ports::new().with(&FREE, free).with(&POLES, array))
 }

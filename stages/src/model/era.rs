@@ -5,9 +5,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::order::largest_gap;
-use super::pem::{DataSet, PAIR};
+use super::pem::PAIR;
 use super::realised::{MODEL, Realised, SUMMARY};
-use super::series::PairSeries;
+use crate::artifacts::{DataSet, Pair, PairSeries};
 use afmid_kernels::subspace::Era;
 
 /// Estimates a state-space model from the free decay at the end of a record: eigensystem realization.
@@ -67,7 +67,7 @@ impl Stage for EraEstimate {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let series = PairSeries::new(inputs.get(&PAIR)?, self.set, 0)?;
+        let series = Pair::new(inputs.get(&PAIR)?).series(self.set, 0)?;
         let decay = free_decay(&series, self.skip_s);
         let era = Era::new(&decay, self.block_rows).map_err(|error| {
             StageError::from_error(error)

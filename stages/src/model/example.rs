@@ -1,11 +1,14 @@
 //! Examples of the stages: known truth, as inputs.
 
-use afmid_pipeline::{Array, Axis, Context, Document, Example, Port, Ports, Stage, StageError, StateSpace, Table};
+use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Stage, StageError, StateSpace, Table};
 
 use super::order::Order;
-use super::pem::{self, DataSet, Pem};
+use super::pem::{self, Pem};
 use super::{bootstrap, modes, stabilisation, vector_fitting, zeros};
-use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, release};
+use crate::artifacts::{DataSet, innovations};
+use crate::ensemble::example::{
+    FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, ensemble_of, pair_of, release,
+};
 use crate::spectrum::{Etfe, Window};
 use afmid_kernels::signal::Taper;
 
@@ -53,18 +56,12 @@ const LATE: f64 = 1.0 / 3.0;
 /// The pair with an event that is [`LATE`].
 fn shifted(pair: &Array) -> Result<Array, StageError> {
     let samples = pair.axis("time")?.values.len();
-    let time = pair.axis("time")?.values.clone();
     let late = |k: usize| (k as f64 - T0 as f64 - LATE).max(0.0) / SAMPLE_RATE_HZ;
     let (w0, a) = (std::f64::consts::TAU * FREQUENCY_HZ, std::f64::consts::PI * FREQUENCY_HZ / QUALITY_FACTOR);
     let w = (w0 * w0 - a * a).sqrt();
     let ringing = |t: f64| LOAD_V * (-a * t).exp() * ((w * t).cos() + a / w * (w * t).sin());
     let response: Vec<f64> = (0..samples).map(|k| ringing(late(k))).collect();
-    Ok(Array::over(vec![Axis::new("time", "s", "time since t0", time)])
-        .with("response", "V", "response", &["time"], response)
-        .with("force", "V", "force", &["time"], pair.real("force")?.to_vec())
-        .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
-        .attribute("t0_sample", T0)
-        .attribute("kind", "snap-off"))
+    Ok(pair_of(&response, None, &[DataSet::All]))
 }
 
 pub(super) fn subspace() -> Vec<Example> {
@@ -142,14 +139,7 @@ pub(super) fn bootstrap() -> Vec<Example> {
                 |event: usize, k: usize| 1e-3 * ((k * k + 7 * event * k) as f64 * (0.37 + 0.11 * event as f64)).sin();
             let signal: Vec<f64> =
                 (0..12 * samples).map(|i| clean[i % samples] + wiggle(i / samples, i % samples)).collect();
-            let time = pair.axis("time")?.values.clone();
-            let ensemble = Array::over(vec![
-                Axis::new("event", "1", "event", (0..12).map(f64::from).collect()),
-                Axis::new("time", "s", "time since t0", time),
-            ])
-            .with("signal", "V", "signal", &["event", "time"], signal)
-            .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
-            .attribute("onset_sample", T0);
+            let ensemble = ensemble_of(signal, 12, samples);
             Ok(Ports::new().with(&bootstrap::ENSEMBLE, ensemble).with(&pem::PAIR, pair).with(&pem::MODEL, model()?))
         },
         expect: |outputs| {
@@ -169,7 +159,7 @@ pub(super) fn bootstrap() -> Vec<Example> {
 /// Whether the model's first pair is the example's resonance.
 fn the_resonance(outputs: &Ports, frequency_tolerance: f64, quality_tolerance: f64) -> Result<String, String> {
     let model = outputs.get(&pem::MODEL).map_err(|error| error.to_string())?;
-    let (model, _) = modes::innovations(model).map_err(|error| error.to_string())?;
+    let (model, _) = innovations(model).map_err(|error| error.to_string())?;
     let Some(z) = model.sections.first().and_then(|section| section.poles().first().copied()) else {
         return Err("no pole".to_owned());
     };
@@ -229,22 +219,7 @@ pub(super) fn zeros() -> Vec<Example> {
 
 /// The release of one resonance, noise-free, as a pair with both halves.
 fn pair() -> Array {
-    let samples = 2048;
-    let time = (0..samples).map(|k| (k as f64 - T0 as f64) / SAMPLE_RATE_HZ).collect();
-    let force: Vec<f64> = (0..samples).map(|k| if k < T0 { LOAD_V } else { 0.0 }).collect();
-    let response = release(samples, T0, LOAD_V);
-    let mut pair = Array::over(vec![Axis::new("time", "s", "time since t0", time)])
-        .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
-        .attribute("t0_sample", T0)
-        .attribute("kind", "snap-off");
-    for set in [DataSet::All, DataSet::Identification, DataSet::Verification] {
-        let name = |what: &str| format!("{what}{}", set.suffix());
-        pair = pair
-            .with(&name("response"), "V", "response", &["time"], response.clone())
-            .with(&name("force"), "V", "force", &["time"], force.clone())
-            .with(&name("standard_error"), "V", "standard error of the response", &["time"], vec![1e-4; samples]);
-    }
-    pair
+    pair_of(&release(2048, T0, LOAD_V), Some(1e-4), &DataSet::ALL)
 }
 
 fn model() -> Result<StateSpace, StageError> {

@@ -15,10 +15,9 @@ use serde_json::{Value, json};
 
 pub use self::known::{GreyNumber, GreyNumberKind};
 use self::tables::{mode_table, named, parameter_table, static_gain, with_interval};
-use super::modes::innovations;
 use super::order::simulated_percent;
-use super::pem::{DataSet, MODEL, PAIR, RESIDUALS, SUMMARY, ending, state_space};
-use super::series::PairSeries;
+use super::pem::{MODEL, PAIR, RESIDUALS, SUMMARY, ending};
+use crate::artifacts::{DataSet, Pair, PairSeries, innovations, state_nuisances, state_space, state_t0_ambiguity};
 use afmid_kernels::grey::{Before, Grey, GreyHold, GreyOptions, GreyQuantity, GreyStart, InputBetween, fit_grey};
 use afmid_kernels::pem::{Experiment, Identified, ResidualColour};
 use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, whiteness};
@@ -145,23 +144,19 @@ impl Stage for GreyEstimate {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let pair = inputs.get(&PAIR)?;
-        let rate = pair.number("sample_rate_hz")?;
-        let first = self.first_sample(pair, rate)?;
-        let series = PairSeries::new(pair, self.set, first)?;
+        let pair = Pair::new(inputs.get(&PAIR)?);
+        let (rate, first) = (pair.sample_rate_hz()?, pair.first_sample(self.before_s)?);
+        let series = pair.series(self.set, first)?;
         let options = self.options(inputs.find(&START)?)?;
         let experiment = Experiment { input: &series.input, output: &series.output };
         let fit = fit_grey(&[experiment], 1.0 / rate, &options).map_err(StageError::from_error)?;
         self.warn(&fit, series.output.len(), cx);
         let identified = identified(&fit, &series)?;
         let mut model = state_space(&identified, self.set, first)?;
-        model.attributes.insert("offset_fitted".to_owned(), self.offset.into());
-        model.attributes.insert("drift_fitted".to_owned(), self.drift.into());
+        state_nuisances(&mut model, Nuisances { offset: self.offset, slope: self.drift });
+        state_t0_ambiguity(&mut model, pair.t0_ambiguity_s());
         model.attributes.insert("delay_s".to_owned(), fit.model.delay_s.into());
         model.attributes.insert("dead_samples".to_owned(), fit.discrete.dead_samples.into());
-        if let Some(ambiguity) = pair.attributes.get("t0_ambiguity_s") {
-            model.attributes.insert("t0_ambiguity_s".to_owned(), ambiguity.clone());
-        }
         let summary = self.summary(&fit, &identified, &series, first)?;
         let residual = fit.experiments.first().map_or_else(Vec::new, |own| own.residual.clone());
         let prediction = series.output.iter().zip(&residual).map(|(y, e)| y - e).collect::<Vec<f64>>();
@@ -233,12 +228,6 @@ impl GreyEstimate {
             max_iterations: self.max_iterations,
             colour: if self.coloured { ResidualColour::Spectrum } else { ResidualColour::White },
         })
-    }
-
-    fn first_sample(&self, pair: &Array, rate: f64) -> Result<usize, StageError> {
-        let Some(before) = self.before_s else { return Ok(0) };
-        let first = pair.number("t0_sample")? - (before * rate).ceil();
-        Ok(first.clamp(0.0, pair.axis("time")?.values.len() as f64) as usize)
     }
 
     fn warn(&self, fit: &Grey, samples: usize, cx: &Context) {

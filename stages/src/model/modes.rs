@@ -2,8 +2,7 @@
 
 use afmid_kernels::spectra::Intersample;
 use afmid_pipeline::{
-    Array, Attribute, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError,
-    StateSpace, Table,
+    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
 };
 use faer::Mat;
 use num_complex::Complex64;
@@ -11,14 +10,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::pem::{DataSet, MODEL};
-use super::series::PairSeries;
-use afmid_kernels::model::{InnovationsModel, InputGains};
-use afmid_kernels::modes::{
-    Interval, LEVEL, ModeCriteria, Pole, PoleKind, ResponsePoint, Root, at_rest, poles, response,
-    share_error_from_onset, zeros,
+use super::pem::MODEL;
+use crate::artifacts::{
+    DataSet, Pair, first_sample, further_inputs, innovations, mode_table, nuisances, root_table, t0_ambiguity_s,
 };
-use afmid_kernels::validation::{Nuisances, noise_ceiling_percent, simulate_held_out};
+use afmid_kernels::model::InnovationsModel;
+use afmid_kernels::modes::{
+    Interval, LEVEL, ModeCriteria, Pole, PoleKind, ResponsePoint, at_rest, poles, response, share_error_from_onset,
+    zeros,
+};
+use afmid_kernels::ringdown::{Estimate, ModeEstimate};
+use afmid_kernels::validation::{noise_ceiling_percent, simulate_held_out};
 
 /// Extracts modes, poles and zeros from a model, each with its standard error, and judges the model on held-out events.
 ///
@@ -156,7 +158,7 @@ impl Stage for Modes {
             "reference": self.compared(&modes),
         }))?;
         Ok(Ports::new()
-            .with(&MODES, mode_table(&modes))
+            .with(&MODES, modes_with_shares(&modes))
             .with(&ROOTS, root_table(&found, &zeros))
             .with(&RESPONSE, response_array(&points, artifact, self.intersample))
             .with(&SUMMARY, summary))
@@ -228,52 +230,12 @@ impl Modes {
 /// Width of the interval in which t0 may lie, as `force.extrapolation` states it; at least a sample, since t0 lies on
 /// the grid and the event does not. None for a pair that says nothing of it.
 fn onset_ambiguity(model: &StateSpace) -> Option<f64> {
-    let stated = model.attributes.get("t0_ambiguity_s").and_then(Attribute::as_f64)?;
-    Some(stated.max(model.sample_time_s))
+    Some(t0_ambiguity_s(model)?.max(model.sample_time_s))
 }
 
 /// A difference in standard errors; unknown where there is no error.
 fn in_errors(difference: f64, std: f64) -> Option<f64> {
     Some(difference / std).filter(|ratio| ratio.is_finite())
-}
-
-/// Column `input` of B.
-fn input_column(artifact: &StateSpace, input: usize) -> Vec<f64> {
-    artifact.b.values.iter().skip(input).step_by(artifact.b.columns.max(1)).copied().collect()
-}
-
-/// Gains of the inputs beyond the first.
-pub(super) fn further_inputs(artifact: &StateSpace) -> Vec<InputGains> {
-    let gains = |input: usize| {
-        let b = input_column(artifact, input);
-        let pairs = b.chunks(2).map(|b| [b[0], b.get(1).copied().unwrap_or(0.0)]).collect();
-        InputGains { b: pairs, feedthrough: artifact.d.values.get(input).copied().unwrap_or(0.0) }
-    };
-    (1..artifact.b.columns).map(gains).collect()
-}
-
-/// Model, from the first input, and covariance of an artifact that a stage of this domain made.
-pub(super) fn innovations(artifact: &StateSpace) -> Result<(InnovationsModel, Mat<f64>), StageError> {
-    let n = artifact.order();
-    let a = Mat::from_fn(n, n, |i, j| artifact.a.at(i, j));
-    let feedthrough = artifact.d.values.first().copied().unwrap_or(0.0);
-    let model = InnovationsModel::from_matrices(
-        &a,
-        &input_column(artifact, 0),
-        &artifact.k.values,
-        feedthrough,
-        artifact.sample_time_s,
-    )
-    .map_err(StageError::from_error)?;
-    let count = n + artifact.b.columns * (n + 1);
-    if (artifact.covariance.rows, artifact.covariance.columns) != (count, count) {
-        return Err(StageError::new(format!(
-            "the model's covariance is {} x {}, wanted {count} x {count}: all a, then all b and d of each input",
-            artifact.covariance.rows, artifact.covariance.columns
-        )));
-    }
-    let count = 2 * n + 1;
-    Ok((model, Mat::from_fn(count, count, |i, j| artifact.covariance.at(i, j))))
 }
 
 /// FIT % of the half-split model; unknown where a part is missing.
@@ -286,27 +248,26 @@ struct Fits {
 
 fn held_out(half: &StateSpace, pair: &Array) -> Result<Fits, StageError> {
     let (model, _) = innovations(half)?;
-    let rate = pair.number("sample_rate_hz")?;
+    let pair = Pair::new(pair);
+    let rate = pair.sample_rate_hz()?;
     if (rate * model.sample_time_s - 1.0).abs() > 1e-9 {
         return Err(StageError::new(format!(
             "the pair's sample rate is {rate} Hz, the model's {} Hz",
             1.0 / model.sample_time_s
         )));
     }
-    let first = half.attributes.get("first_sample").and_then(Attribute::as_f64).unwrap_or(0.0) as usize;
-    let further = further_inputs(half);
-    // what the model was fitted with is fitted again; models of before this was stored had both
-    let fitted = |name: &str| half.attributes.get(name) != Some(&Attribute::Flag(false));
-    let nuisances = Nuisances { offset: fitted("offset_fitted"), slope: fitted("drift_fitted") };
+    let (first, further) = (first_sample(half), further_inputs(half));
+    // what the model was fitted with is fitted again
+    let nuisances = nuisances(half);
     let simulated = |set: DataSet| -> Result<f64, StageError> {
-        let series = PairSeries::new(pair, set, first)?;
+        let series = pair.series(set, first)?;
         let simulation = simulate_held_out(&model, &further, &series.input, &series.output, nuisances);
         Ok(simulation.map_err(StageError::from_error)?.fit_percent)
     };
     let held_out = DataSet::Verification;
-    let ceiling = match pair.real(&format!("standard_error{}", held_out.suffix())) {
+    let ceiling = match pair.standard_error(held_out) {
         Ok(error) => {
-            let series = PairSeries::new(pair, held_out, first)?;
+            let series = pair.series(held_out, first)?;
             let error = error.get(first..).unwrap_or(&[]);
             Some(noise_ceiling_percent(&series.output, error).map_err(StageError::from_error)?)
         }
@@ -331,46 +292,17 @@ fn mode_document(mode: &Pole) -> Value {
     })
 }
 
-fn mode_table(modes: &[&Pole]) -> Table {
+fn modes_with_shares(modes: &[&Pole]) -> Table {
     let column = |value: fn(&Pole) -> f64| modes.iter().map(|mode| value(mode)).collect::<Vec<f64>>();
-    Table::new()
-        .with("frequency_hz", "Hz", "resonance frequency", column(|m| m.root.frequency_hz))
-        .with("frequency_std_hz", "Hz", "its standard error", column(|m| m.root.frequency_std_hz))
-        .with("quality_factor", "1", "quality factor", column(|m| m.root.quality_factor))
-        .with("quality_factor_std", "1", "its standard error", column(|m| m.root.quality_factor_std))
+    let estimate = |mode: &&Pole| ModeEstimate {
+        frequency_hz: Estimate { value: mode.root.frequency_hz, std: mode.root.frequency_std_hz },
+        quality_factor: Estimate { value: mode.root.quality_factor, std: mode.root.quality_factor_std },
+    };
+    let estimates: Vec<ModeEstimate> = modes.iter().map(estimate).collect();
+    mode_table(&estimates)
         .with("static_share", "1", "part of the static gain", column(|m| m.static_share))
         .with("static_share_std", "1", "its standard error", column(|m| m.static_share_std))
         .with("significance", "1", "ringing amplitude over its standard error", column(|m| m.significance))
-}
-
-fn root_table(poles: &[Pole], zeros: &[Root]) -> Table {
-    let roots: Vec<Root> = poles.iter().map(|pole| pole.root).chain(zeros.iter().copied()).collect();
-    let column = |value: &dyn Fn(&Root) -> f64| roots.iter().map(value).collect::<Vec<f64>>();
-    let frequency = |r: &Root| Interval::normal(r.frequency_hz, r.frequency_std_hz);
-    let quality = |r: &Root| Interval::normal(r.quality_factor, r.quality_factor_std);
-    let zero_kind = |root: &Root| if root.is_complex() { "pair" } else { "real" };
-    let kinds = poles.iter().map(|_| "pole").chain(zeros.iter().map(|_| "zero"));
-    let classes = poles.iter().map(|pole| pole.kind.name()).chain(zeros.iter().map(zero_kind));
-    Table::new()
-        .with("kind", "", "pole or zero", kinds.map(str::to_owned).collect::<Vec<String>>())
-        .with(
-            "class",
-            "",
-            "what a pole belongs to; whether a zero is one of a pair",
-            classes.map(str::to_owned).collect::<Vec<String>>(),
-        )
-        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", column(&|r| r.frequency_hz))
-        .with("frequency_std_hz", "Hz", "its standard error", column(&|r| r.frequency_std_hz))
-        .with("quality_factor", "1", "magnitude of s over minus twice its real part", column(&|r| r.quality_factor))
-        .with("quality_factor_std", "1", "its standard error", column(&|r| r.quality_factor_std))
-        .with("frequency_low_hz", "Hz", "lower end of its 95 % interval", column(&|r| frequency(r).low))
-        .with("frequency_high_hz", "Hz", "upper end", column(&|r| frequency(r).high))
-        .with("quality_factor_low", "1", "lower end of its 95 % interval", column(&|r| quality(r).low))
-        .with("quality_factor_high", "1", "upper end", column(&|r| quality(r).high))
-        .with("z_re", "1", "real part in the z plane", column(&|r| r.z.re))
-        .with("z_im", "1", "imaginary part in the z plane, upper one of a pair", column(&|r| r.z.im))
-        .with("s_re", "rad/s", "real part in the s plane", column(&|r| r.s.re))
-        .with("s_im", "rad/s", "imaginary part in the s plane", column(&|r| r.s.im))
 }
 
 /// From the response to a held input to that of the continuous system: `i w T / (1 - exp(-i w T))`.

@@ -1,17 +1,15 @@
 //! The stage `model.pem`.
 
 use afmid_pipeline::{
-    Array, Attribute, Axis, Caching, Context, Document, Example, Faults, Matrix, Port, Ports, Spec, Stage, StageError,
-    StateSpace,
+    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::ensemble::LEAST_EVENTS;
-
 use super::order::{Order, OrderChoice, choose_order, simulated_percent};
-use super::series::PairSeries;
+use crate::artifacts::{DataSet, Pair, PairSeries, state_nuisances, state_space, state_t0_ambiguity};
+use crate::ensemble::LEAST_EVENTS;
 use afmid_kernels::pem::{Ending, Experiment, Focus, Identified, NoiseModel, PemOptions, identify};
 use afmid_kernels::validation::{Nuisances, TestResult, fit_percent, input_dependence, whiteness};
 
@@ -79,29 +77,6 @@ pub struct Pem {
     pub test_lags: usize,
 }
 
-/// Which events a model is fitted to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum DataSet {
-    /// All events.
-    All,
-    /// The identification half.
-    Identification,
-    /// The verification half.
-    Verification,
-}
-
-impl DataSet {
-    /// What its variables' names end in.
-    pub const fn suffix(self) -> &'static str {
-        match self {
-            Self::All => "",
-            Self::Identification => "_identification",
-            Self::Verification => "_verification",
-        }
-    }
-}
-
 impl Default for Pem {
     fn default() -> Self {
         Self {
@@ -148,11 +123,10 @@ impl Stage for Pem {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let pair = inputs.get(&PAIR)?;
-        self.require_set(pair)?;
-        let rate = pair.number("sample_rate_hz")?;
-        let first = self.first_sample(pair, rate)?;
-        let PairSeries { input, output, time, unit, .. } = PairSeries::new(pair, self.set, first)?;
+        let pair = Pair::new(inputs.get(&PAIR)?);
+        self.require_set(&pair)?;
+        let (rate, first) = (pair.sample_rate_hz()?, pair.first_sample(self.before_s)?);
+        let PairSeries { input, output, time, unit, .. } = pair.series(self.set, first)?;
         let experiment = Experiment { input: &input, output: &output };
         let choice = match self.order {
             Order::Fixed(_) => None,
@@ -177,12 +151,8 @@ impl Stage for Pem {
         }
         let summary = self.summary(&fit, choice.as_ref(), &input, &output, first)?;
         let mut model = state_space(&fit, self.set, first)?;
-        model.attributes.insert("offset_fitted".to_owned(), self.offset.into());
-        model.attributes.insert("drift_fitted".to_owned(), self.drift.into());
-        // what the model cannot know: `model.modes` counts it in the shares
-        if let Some(ambiguity) = pair.attributes.get("t0_ambiguity_s") {
-            model.attributes.insert("t0_ambiguity_s".to_owned(), ambiguity.clone());
-        }
+        state_nuisances(&mut model, Nuisances { offset: self.offset, slope: self.drift });
+        state_t0_ambiguity(&mut model, pair.t0_ambiguity_s());
         let residual = fit.residuals.into_iter().next().unwrap_or_default();
         let prediction = output.iter().zip(&residual).map(|(y, e)| y - e).collect::<Vec<f64>>();
         let residuals = Array::over(vec![Axis::new("time", "s", "time since t0", time)])
@@ -214,25 +184,18 @@ impl Pem {
     }
 
     /// Errors: a half is asked for, and the pair has none.
-    fn require_set(&self, pair: &Array) -> Result<(), StageError> {
-        let suffix = self.set.suffix();
-        if suffix.is_empty() || pair.variable(&format!("force{suffix}")).is_ok() {
+    fn require_set(&self, pair: &Pair<'_>) -> Result<(), StageError> {
+        if self.set == DataSet::All || pair.has(self.set) {
             return Ok(());
         }
-        let half = suffix.trim_start_matches('_');
-        let events = match pair.attributes.get("count").and_then(Attribute::as_f64) {
+        let half = self.set.name();
+        let events = match pair.count(DataSet::All) {
             Some(count) => format!(", made from {count} events"),
             None => String::new(),
         };
         Err(StageError::new(format!("`set` is \"{half}\", but the pair has no halves{events}")).help(format!(
             "set `split = true` in the stage `ensemble.average`; it splits {LEAST_EVENTS} events or more. With fewer, fit all of them: `set = \"all\"`"
         )))
-    }
-
-    fn first_sample(&self, pair: &Array, rate: f64) -> Result<usize, StageError> {
-        let Some(before) = self.before_s else { return Ok(0) };
-        let first = pair.number("t0_sample")? - (before * rate).ceil();
-        Ok(first.clamp(0.0, pair.axis("time")?.values.len() as f64) as usize)
     }
 
     fn summary(
@@ -287,54 +250,6 @@ pub(super) fn ending(ending: Ending) -> &'static str {
         Ending::Stalled => "stalled",
         Ending::IterationLimit => "iteration-limit",
     }
-}
-
-/// The artifact: matrices in the sections' observer form, parameters a, then b and d of each input, with their
-/// covariance.
-pub(super) fn state_space(fit: &Identified, set: DataSet, first: usize) -> Result<StateSpace, StageError> {
-    let model = &fit.model;
-    let n = model.order();
-    let (a, b, c, k) = model.matrices();
-    let mut columns = vec![(b, model.feedthrough)];
-    for gains in &fit.further_inputs {
-        let (_, b, ..) = model.from_input(gains).map_err(StageError::from_error)?.matrices();
-        columns.push((b, gains.feedthrough));
-    }
-    let inputs = columns.len();
-    let mut names: Vec<String> = (1..=n).map(|i| format!("a{i}")).collect();
-    let mut parameters = model.parameters();
-    parameters.truncate(n);
-    for (input, (b, d)) in columns.iter().enumerate() {
-        let mark = if input == 0 { String::new() } else { format!("_{}", input + 1) };
-        names.extend((1..=n).map(|i| format!("b{i}{mark}")).chain([format!("d{mark}")]));
-        parameters.extend(b.iter().copied().chain([*d]));
-    }
-    let count = parameters.len();
-    let square = |matrix: &faer::Mat<f64>, n: usize| {
-        Matrix::new(n, n, (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).map(|(i, j)| matrix[(i, j)]).collect())
-    };
-    let mut artifact = StateSpace {
-        a: square(&a, n)?,
-        b: Matrix::new(n, inputs, (0..n).flat_map(|i| columns.iter().map(move |(b, _)| b[i])).collect())?,
-        c: Matrix::row(c),
-        d: Matrix::row(columns.iter().map(|(_, d)| *d).collect()),
-        k: Matrix::column(k),
-        x0: fit.initial_states.first().cloned().unwrap_or_default(),
-        sample_time_s: model.sample_time_s,
-        innovation_variance: fit.innovation_variance,
-        parameter_names: names,
-        parameters,
-        covariance: square(&fit.covariance, count)?,
-        ..StateSpace::default()
-    };
-    let set = set.suffix().trim_start_matches('_');
-    let mut tell = |name: &str, value: afmid_pipeline::Attribute| artifact.attributes.insert(name.to_owned(), value);
-    tell("set", if set.is_empty() { "all" } else { set }.into());
-    tell("first_sample", first.into());
-    tell("converged", fit.verdict.converged.into());
-    tell("offset_v", fit.offsets.first().copied().unwrap_or(0.0).into());
-    tell("drift_v_per_s", fit.slopes.first().copied().unwrap_or(0.0).into());
-    Ok(artifact)
 }
 
 #[cfg(test)]

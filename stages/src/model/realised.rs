@@ -5,8 +5,7 @@ use faer::c64;
 use serde_json::{Value, json};
 
 use super::order::{OrderChoice, simulated_percent};
-use super::pem::{DataSet, state_space};
-use super::series::PairSeries;
+use crate::artifacts::{DataSet, PairSeries, state_nuisances, state_space};
 use afmid_kernels::pem::{Experiment, Identified, PemOptions, with_poles};
 use afmid_kernels::validation::Nuisances;
 
@@ -42,13 +41,15 @@ impl Realised<'_> {
         let experiment = Experiment { input: &series.input, output: &series.output };
         let fit = with_poles(&[experiment], 1.0 / series.rate, poles, &options).map_err(StageError::from_error)?;
         let mut model = state_space(&fit, self.set, self.first)?;
-        model.attributes.insert("offset_fitted".to_owned(), self.offset.into());
-        model.attributes.insert("drift_fitted".to_owned(), self.drift.into());
+        state_nuisances(&mut model, self.nuisances());
         Ok(Ports::new().with(&MODEL, model).with(&SUMMARY, self.summary(&fit, unstable, series)?))
     }
 
+    fn nuisances(&self) -> Nuisances {
+        Nuisances { offset: self.offset, slope: self.drift }
+    }
+
     fn summary(&self, fit: &Identified, unstable: usize, series: &PairSeries) -> Result<Document, StageError> {
-        let nuisances = Nuisances { offset: self.offset, slope: self.drift };
         Document::new(&json!({
             "order": fit.model.order(),
             "order_choice": self.choice.map_or(Value::Null, OrderChoice::document),
@@ -57,7 +58,7 @@ impl Realised<'_> {
             "samples": series.output.len(),
             "first_sample": self.first,
             "reflected_poles": unstable,
-            "simulation_fit_percent": simulated_percent(fit, &series.input, &series.output, nuisances),
+            "simulation_fit_percent": simulated_percent(fit, &series.input, &series.output, self.nuisances()),
             "residual_std": { "value": fit.innovation_variance.sqrt(), "unit": series.unit },
             "singular_values": self.singular_values,
         }))

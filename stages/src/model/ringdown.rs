@@ -22,6 +22,7 @@ pub use self::mode_number::ModeNumber;
 use self::stretches::windows as free_windows;
 use self::summary::summary;
 use self::tables::{event_table, mode_table, poles, spectrum};
+use crate::artifacts::Ensemble;
 use crate::calibration::FreeSettings;
 use afmid_kernels::ringdown::{
     ModeCount, ModeEstimate, NoiseSource, Quantity, Ringdown, RingdownOptions, fit_counted_ringdowns, fit_ringdowns,
@@ -177,11 +178,9 @@ impl Stage for RingdownFit {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let ensemble = inputs.get(&ENSEMBLE)?;
-        let rate = ensemble.number("sample_rate_hz")?;
-        let signal = ensemble.real("signal")?;
-        let samples = ensemble.axis("time")?.values.len();
-        let first = crate::ensemble::onset_sample(ensemble)? + self.skip_samples;
+        let ensemble = Ensemble::new(inputs.get(&ENSEMBLE)?);
+        let (rate, signal, samples) = (ensemble.sample_rate_hz()?, ensemble.signal()?, ensemble.samples()?);
+        let first = ensemble.onset_sample()? + self.skip_samples;
         if first >= samples {
             return Err(StageError::new(format!(
                 "the window ends {samples} samples after its start, the fit would begin at {first}"

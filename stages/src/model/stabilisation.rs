@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::era::free_decay;
-use super::pem::{DataSet, PAIR};
-use super::series::PairSeries;
+use super::pem::PAIR;
+use crate::artifacts::{DataSet, Pair, PairSeries};
 use afmid_kernels::model::ModelError;
 use afmid_kernels::pem::Experiment;
 use afmid_kernels::stabilisation::{OrderedPole, PhysicalMode, Stabilisation, StabilisationCriteria, stabilisation};
@@ -135,7 +135,7 @@ impl Stage for StabilisationDiagram {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let series = PairSeries::new(inputs.get(&PAIR)?, self.set, 0)?;
+        let series = Pair::new(inputs.get(&PAIR)?).series(self.set, 0)?;
         let candidates = self.candidates(&series).map_err(|error| {
             StageError::from_error(error)
                 .help("fewer `block_rows`, or a record that goes on longer after the force's last change")

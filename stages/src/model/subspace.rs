@@ -1,13 +1,13 @@
 //! The stage `model.subspace`.
 
-use afmid_pipeline::{Array, Caching, Context, Example, Faults, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Caching, Context, Example, Faults, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::order::{Order, choose_order};
-use super::pem::{DataSet, PAIR};
+use super::pem::PAIR;
 use super::realised::{MODEL, Realised, SUMMARY};
-use super::series::PairSeries;
+use crate::artifacts::{DataSet, Pair, PairSeries};
 use afmid_kernels::pem::{Experiment, NoiseModel, PemOptions};
 use afmid_kernels::subspace::{InstrumentalSubspace, Subspace, Weight};
 
@@ -93,8 +93,7 @@ impl Stage for SubspaceEstimate {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let pair: &Array = inputs.get(&PAIR)?;
-        let series = PairSeries::new(pair, self.set, 0)?;
+        let series = Pair::new(inputs.get(&PAIR)?).series(self.set, 0)?;
         let choice = match self.order {
             Order::Fixed(_) => None,
             Order::Auto => Some(self.choose(&series)?),

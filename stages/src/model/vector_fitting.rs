@@ -2,15 +2,15 @@
 
 use afmid_kernels::spectra::Intersample;
 use afmid_pipeline::{
-    Array, Attribute, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace,
+    Array, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace,
 };
 use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::pem::{DataSet, state_space};
 use super::realised::MODEL;
+use crate::artifacts::{DataSet, Transfer, state_space};
 use crate::spectrum::TransientChoice;
 use afmid_kernels::pem::{Ending, Identified, Verdict};
 use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFit, VectorFitting, vector_fitting};
@@ -119,11 +119,10 @@ impl Stage for VectorFittingEstimate {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let array = inputs.get(&TRANSFER)?;
-        let rate = array.number("sample_rate_hz")?;
-        let frequency_hz = &array.axis("frequency_hz")?.values;
-        let (transfer, variance) = self.sequences(array, frequency_hz, rate)?;
-        let settings = self.settings(array, frequency_hz)?;
+        let given = Transfer::new(inputs.get(&TRANSFER)?)?;
+        let (frequency_hz, rate) = (given.frequency_hz, given.sample_rate_hz);
+        let (transfer, variance) = self.sequences(&given);
+        let settings = self.settings(&given)?;
         let weighted = self.weight == ResponseWeight::Variance;
         let response = MeasuredResponse { frequency_hz, transfer: &transfer, variance: Some(&variance) };
         let fit = vector_fitting(response, 1.0 / rate, &settings).map_err(|error| {
@@ -156,19 +155,11 @@ impl Stage for VectorFittingEstimate {
 
 impl VectorFittingEstimate {
     /// Transfer function from sequence to sequence, and its variance; undefined outside the band.
-    fn sequences(&self, array: &Array, frequency_hz: &[f64], rate: f64) -> Result<(Vec<c64>, Vec<f64>), StageError> {
-        let (given, variance) = (array.complex("transfer")?, array.real("variance")?);
-        let bins = frequency_hz.len();
-        if given.len() != bins || variance.len() != bins {
-            return Err(StageError::new(format!(
-                "the response has {} values, its variance {}, wanted {bins} as on the axis `frequency_hz`",
-                given.len(),
-                variance.len()
-            )));
-        }
+    fn sequences(&self, given: &Transfer<'_>) -> (Vec<c64>, Vec<f64>) {
+        let (frequency_hz, rate) = (given.frequency_hz, given.sample_rate_hz);
         let high = self.max_frequency_hz.unwrap_or(f64::INFINITY);
         // of differences a drift is a constant: it sits in the bin at zero alone, and nowhere else
-        let differenced = array.attributes.get("differenced") == Some(&Attribute::Flag(true));
+        let differenced = given.differenced();
         let used = |f: f64| (self.min_frequency_hz..=high).contains(&f) && !(differenced && f == 0.0);
         let held = |f: f64| {
             let turn = std::f64::consts::TAU * f / rate;
@@ -180,29 +171,29 @@ impl VectorFittingEstimate {
         let nothing = c64::new(f64::NAN, f64::NAN);
         let transfer = frequency_hz
             .iter()
-            .zip(given)
+            .zip(given.transfer)
             .map(|(&f, g)| if used(f) { c64::new(g.re, g.im) * held(f) } else { nothing })
             .collect();
         let own = |(&f, &v): (&f64, &f64)| match self.weight {
             ResponseWeight::Variance => v * held(f).norm_sqr(),
             ResponseWeight::Uniform => 0.0,
         };
-        Ok((transfer, frequency_hz.iter().zip(variance).map(own).collect()))
+        (transfer, frequency_hz.iter().zip(given.variance).map(own).collect())
     }
 
-    fn settings(&self, array: &Array, frequency_hz: &[f64]) -> Result<VectorFitting, StageError> {
-        let smoothed = array.variable("half_width_bins").is_ok();
-        let differenced = array.attributes.get("differenced") == Some(&Attribute::Flag(true));
+    fn settings(&self, given: &Transfer<'_>) -> Result<VectorFitting, StageError> {
+        let smoothed = given.half_width_bins();
+        let differenced = given.differenced();
         let wanted = match self.transient {
             TransientChoice::On => true,
             TransientChoice::Off => false,
-            TransientChoice::Auto => differenced && !smoothed,
+            TransientChoice::Auto => differenced && smoothed.is_none(),
         };
-        let width = match frequency_hz {
+        let width = match given.frequency_hz {
             [first, second, ..] => second - first,
             _ => f64::NAN,
         };
-        let delay = if wanted { Some(array.number("event_turns_per_bin")? / width) } else { None };
+        let delay = if wanted { Some(given.event_turns_per_bin()? / width) } else { None };
         // two estimates share data as far as both reach
         let reach = |values: &[f64]| values.iter().filter(|h| h.is_finite()).fold(0.0_f64, |most, h| most.max(*h));
         Ok(VectorFitting {
@@ -212,7 +203,7 @@ impl VectorFittingEstimate {
             refine: self.refine,
             stable: self.stable,
             transient_delay_s: delay,
-            correlated_bins: if smoothed { 2 * reach(array.real("half_width_bins")?) as usize } else { 0 },
+            correlated_bins: smoothed.map_or(0, |bins| 2 * reach(bins) as usize),
         })
     }
 

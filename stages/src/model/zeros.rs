@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use crate::artifacts::{RootRow, roots};
 use afmid_kernels::validation::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
 
 /// Compares the zeros of the surface-coupled lever with the free lever's, and reports how far the contact moves the
@@ -58,15 +59,15 @@ impl Stage for Zeros {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let (free, coupled) = (inputs.get(&FREE)?, inputs.get(&COUPLED)?);
-        let free_modes = self.roots(free, "pole", "mechanical")?;
+        let free_modes = self.sharp(free, |root| root.is_mode)?;
         let (Some(lowest), Some(highest)) = (free_modes.first(), free_modes.last()) else {
             return Err(StageError::new("the free lever's table holds no mode, wanted at least one"));
         };
         let band = lowest.value_hz..highest.value_hz;
-        let mut free_zeros = self.roots(free, "zero", "pair")?;
+        let mut free_zeros = self.sharp(free, |root| root.is_zero_pair)?;
         free_zeros.retain(|zero| band.contains(&zero.value_hz));
-        let pairs = compare_zeros(&free_zeros, &self.roots(coupled, "zero", "pair")?);
-        let shifts = pole_shifts(&free_modes, &self.roots(coupled, "pole", "mechanical")?);
+        let pairs = compare_zeros(&free_zeros, &self.sharp(coupled, |root| root.is_zero_pair)?);
+        let shifts = pole_shifts(&free_modes, &self.sharp(coupled, |root| root.is_mode)?);
         for pair in pairs.iter().filter(|pair| pair.combined_errors().abs() > 4.0) {
             cx.warn(format!(
                 "the zero at {:.0} Hz moves by {:.1} combined standard errors on contact",
@@ -87,15 +88,16 @@ impl Stage for Zeros {
 }
 
 impl Zeros {
-    /// Rows of one kind and class that are sharp and well known, ascending.
-    fn roots(&self, table: &Table, kind: &str, class: &str) -> Result<Vec<Frequency>, StageError> {
-        let (kinds, classes) = (table.text("kind")?, table.text("class")?);
-        let (f, std, q) = (table.real("frequency_hz")?, table.real("frequency_std_hz")?, table.real("quality_factor")?);
-        let mut found: Vec<Frequency> = (0..table.rows())
-            .filter(|&i| kinds[i] == kind && classes[i] == class)
-            .filter(|&i| q[i].abs() >= self.min_quality_factor && std[i] <= self.max_frequency_error * f[i])
-            .map(|i| Frequency { value_hz: f[i], std_hz: std[i] })
-            .collect();
+    /// Rows that are sharp and well known, ascending.
+    fn sharp(&self, table: &Table, chosen: fn(&RootRow) -> bool) -> Result<Vec<Frequency>, StageError> {
+        let rows = roots(table)?;
+        let sharp = |row: &&RootRow| {
+            row.quality_factor.abs() >= self.min_quality_factor
+                && row.frequency_std_hz <= self.max_frequency_error * row.frequency_hz
+        };
+        let wanted = rows.iter().filter(|row| chosen(row)).filter(sharp);
+        let mut found: Vec<Frequency> =
+            wanted.map(|row| Frequency { value_hz: row.frequency_hz, std_hz: row.frequency_std_hz }).collect();
         found.sort_by(|x, y| x.value_hz.total_cmp(&y.value_hz));
         Ok(found)
     }

@@ -1,13 +1,12 @@
 //! The stage `spectrum.etfe`.
 
-use afmid_pipeline::{
-    Array, Attribute, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError,
-};
+use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::window::PAIR;
+use crate::artifacts::{DataSet, NewTransfer, Pair};
 use afmid_kernels::spectra::{EndTreatment, EtfeSettings, Intersample, etfe};
 
 /// Empirical transfer function estimate: the ratio of the transforms of response and force.
@@ -68,9 +67,8 @@ impl Stage for Etfe {
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let pair = inputs.get(&PAIR)?;
-        let rate = pair.number("sample_rate_hz")?;
-        let differenced = pair.attributes.get("differenced") == Some(&Attribute::Flag(true));
+        let pair = Pair::new(inputs.get(&PAIR)?);
+        let (rate, differenced) = (pair.sample_rate_hz()?, pair.differenced());
         if self.bandwidth_hz > 0.5 * rate {
             cx.warn(format!("bandwidth_hz {} lies above half the sample rate, {}", self.bandwidth_hz, 0.5 * rate));
         }
@@ -82,7 +80,8 @@ impl Stage for Etfe {
             intersample: self.intersample,
             normalise: self.normalise,
         };
-        let found = etfe(pair.real("force")?, pair.real("response")?, pair.real("standard_error")?, settings)
+        let all = DataSet::All;
+        let found = etfe(pair.force(all)?, pair.response(all)?, pair.standard_error(all)?, settings)
             .map_err(StageError::from_error)?;
         let defined = found.variance.iter().filter(|v| v.is_finite()).count();
         let summary = Document::new(&json!({
@@ -90,22 +89,23 @@ impl Stage for Etfe {
             "defined": defined,
             "vanishing": found.vanishing,
             "bandwidth_hz": self.bandwidth_hz,
-            "bin_width_hz": rate / pair.axis("time")?.values.len() as f64,
+            "bin_width_hz": rate / pair.samples()? as f64,
             "static_gain": found.static_gain,
             "normalised": self.normalise,
         }))?;
-        let turns = pair.number("t0_sample")? / pair.axis("time")?.values.len() as f64;
-        let over = &["frequency_hz"];
-        let mut result = Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", found.frequency_hz)])
-            .with("transfer", "1", "transfer function", over, found.transfer)
-            .with("variance", "1", "expected squared error", over, found.variance)
-            .attribute("sample_rate_hz", rate)
-            .attribute("static_gain", found.static_gain)
-            .attribute("differenced", differenced)
-            .attribute("event_turns_per_bin", turns);
-        if let Some(kind) = pair.attributes.get("kind") {
-            result.attributes.insert("kind".to_owned(), kind.clone());
+        let mut result = NewTransfer {
+            frequency_hz: found.frequency_hz,
+            transfer: found.transfer,
+            variance: found.variance,
+            variance_from: "expected squared error",
+            further_axes: Vec::new(),
+            sample_rate_hz: rate,
+            static_gain: found.static_gain,
+            differenced,
+            event_turns_per_bin: pair.event_turns_per_bin()?,
         }
+        .array();
+        pair.describe_kind(&mut result);
         Ok(Ports::new().with(&ETFE, result).with(&SUMMARY, summary))
     }
 

@@ -3,14 +3,15 @@
 use std::f64::consts::TAU;
 
 use afmid_pipeline::stage::NoProgress;
-use afmid_pipeline::{Array, Axis, Context, Example, Ports, Stage, StageError};
+use afmid_pipeline::{Array, Context, Example, Ports, Stage, StageError};
 use rustfft::num_complex::Complex64;
 
 use super::etfe::{ETFE, Etfe};
 use super::periodogram::PERIODOGRAM;
 use super::smoothing::SMOOTHED;
 use super::window::{PAIR, WINDOWED, Window};
-use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, release};
+use crate::artifacts::DataSet;
+use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, pair_of, release};
 use afmid_kernels::signal::Taper;
 
 const SAMPLES: usize = 4096;
@@ -127,13 +128,5 @@ fn worst_error(etfe: Result<&Array, StageError>) -> Result<f64, StageError> {
 
 /// A release and its force, free of noise.
 fn pair() -> Array {
-    let time = (0..SAMPLES).map(|k| (k as f64 - T0 as f64) / SAMPLE_RATE_HZ).collect();
-    let force: Vec<f64> = (0..SAMPLES).map(|k| if k < T0 { LOAD_V } else { 0.0 }).collect();
-    Array::over(vec![Axis::new("time", "s", "time since t0", time)])
-        .with("response", "V", "response", &["time"], release(SAMPLES, T0, LOAD_V))
-        .with("force", "V", "force", &["time"], force)
-        .with("standard_error", "V", "standard error", &["time"], vec![1e-4; SAMPLES])
-        .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
-        .attribute("t0_sample", T0)
-        .attribute("kind", "snap-off")
+    pair_of(&release(SAMPLES, T0, LOAD_V), Some(1e-4), &[DataSet::All])
 }

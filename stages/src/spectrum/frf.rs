@@ -1,12 +1,13 @@
 //! The stage `spectrum.frf`.
 
-use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use rustfft::num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::ensemble::{Rows, moments, onset_sample, scatter};
+use crate::artifacts::{DataSet, Ensemble, NewTransfer, Pair};
+use crate::ensemble::{Rows, moments, scatter};
 use afmid_kernels::spectra::{
     EnsembleResponse, EnsembleResponseSettings, bin_frequencies, difference, ensemble_response,
 };
@@ -73,18 +74,16 @@ impl Stage for Frf {
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let (ensemble, pair) = (inputs.get(&ENSEMBLE)?, inputs.get(&PAIR)?);
-        let samples = ensemble.axis("time")?.values.len();
-        let rows = Rows::new(ensemble.real("signal")?, samples).map_err(StageError::from_error)?;
-        let force = pair.real("force")?;
+        let (ensemble, pair) = (Ensemble::new(inputs.get(&ENSEMBLE)?), Pair::new(inputs.get(&PAIR)?));
+        let (samples, rows, force) = (ensemble.samples()?, Rows::of(&ensemble)?, pair.force(DataSet::All)?);
         if force.len() != samples {
             let problem = format!("the pair has {} samples, the events {samples}", force.len());
             return Err(StageError::new(problem).help("wire the force that was derived from the same events"));
         }
-        let rate = ensemble.number("sample_rate_hz")?;
+        let rate = ensemble.sample_rate_hz()?;
         let all = rows.all();
         let mean = moments(rows, &all).map_err(StageError::from_error)?.mean;
-        let amplitude = scatter(rows, &all, &mean, onset_sample(ensemble)?).map_err(StageError::from_error)?.amplitude;
+        let amplitude = scatter(rows, &all, &mean, ensemble.onset_sample()?).map_err(StageError::from_error)?.amplitude;
         let step = difference(force);
         let forces: Vec<Vec<f64>> = amplitude.iter().map(|a| step.iter().map(|u| a * u).collect()).collect();
         let responses: Vec<Vec<f64>> = all.iter().map(|&i| difference(rows.row(i))).collect();
@@ -118,11 +117,8 @@ impl Stage for Frf {
             "distorted_bins_by_chance": expected,
             "distorted_hz": distorted.iter().take(50).map(|&k| frequency[k]).collect::<Vec<f64>>(),
         }))?;
-        let turns = pair.number("t0_sample")? / samples as f64;
-        let mut array = frf_array(frequency, found, band, ensemble, rate)?.attribute("event_turns_per_bin", turns);
-        if let Some(kind) = ensemble.attributes.get("kind") {
-            array.attributes.insert("kind".to_owned(), kind.clone());
-        }
+        let mut array = frf_array(frequency, found, band, &ensemble, pair.t0_sample()? / samples as f64)?;
+        ensemble.describe_kind(&mut array);
         Ok(Ports::new().with(&FRF, array).with(&SUMMARY, summary))
     }
 
@@ -142,10 +138,10 @@ fn frf_array(
     frequency: Vec<f64>,
     found: EnsembleResponse,
     band: usize,
-    ensemble: &Array,
-    rate: f64,
+    ensemble: &Ensemble<'_>,
+    event_turns_per_bin: f64,
 ) -> Result<Array, StageError> {
-    let bins = frequency.len();
+    let (bins, rate) = (frequency.len(), ensemble.sample_rate_hz()?);
     let held = |k: usize| {
         let turn = std::f64::consts::TAU * frequency[k] / rate;
         if k == 0 {
@@ -161,10 +157,19 @@ fn frf_array(
     let variance: Vec<f64> = (0..bins).map(|k| found.variance[k] * held(k).norm_sqr()).collect();
     let lag: Vec<f64> = found.lag.iter().map(|l| l / rate).collect();
     let over = &["frequency_hz"];
-    let event = ensemble.axis("event")?.clone();
-    Ok(Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", frequency), event])
-        .with("transfer", "1", "transfer function", over, transfer)
-        .with("variance", "1", "expected squared error, from the scatter between events", over, cut(&variance))
+    let response = NewTransfer {
+        frequency_hz: frequency,
+        transfer,
+        variance: cut(&variance),
+        variance_from: "expected squared error, from the scatter between events",
+        further_axes: vec![ensemble.event()?.clone()],
+        sample_rate_hz: rate,
+        static_gain: 1.0,
+        differenced: true,
+        event_turns_per_bin,
+    };
+    Ok(response
+        .array()
         .with("coherence", "1", "ordinary coherence", over, cut(&found.coherence))
         .with("scatter", "V^2", "scatter between events about the linear response", over, cut(&found.scatter))
         .with("noise", "V^2", "part of the scatter that is noise", over, cut(&found.noise))
@@ -177,8 +182,5 @@ fn frf_array(
             over,
             cut(&found.distortion_p),
         )
-        .with("lag", "s", "how much later than the mean", &["event"], lag)
-        .attribute("sample_rate_hz", rate)
-        .attribute("static_gain", 1.0)
-        .attribute("differenced", true))
+        .with("lag", "s", "how much later than the mean", &["event"], lag))
 }

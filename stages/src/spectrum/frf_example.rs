@@ -1,15 +1,18 @@
 //! The example of `spectrum.frf`.
 
-use afmid_pipeline::{Array, Axis, Example, Ports};
+use afmid_pipeline::{Example, Ports};
 
 use super::frf::{ENSEMBLE, FRF, PAIR};
-use crate::ensemble::example::{FREQUENCY_HZ, LOAD_V, QUALITY_FACTOR, SAMPLE_RATE_HZ, T0, ensemble};
+use crate::artifacts::DataSet;
+use crate::ensemble::example::{FREQUENCY_HZ, QUALITY_FACTOR, ensemble, pair_of};
 
 pub(super) fn examples() -> Vec<Example> {
     vec![Example {
         title: "One resonance from twelve releases, in noise of a millivolt",
         params: "bandwidth_hz = 400e3",
-        inputs: || Ok(Ports::new().with(&ENSEMBLE, ensemble()).with(&PAIR, pair())),
+        inputs: || {
+            Ok(Ports::new().with(&ENSEMBLE, ensemble()).with(&PAIR, pair_of(&[0.0; 4096], None, &[DataSet::All])))
+        },
         expect: |outputs| {
             let array = outputs.get(&FRF).map_err(|error| error.to_string())?;
             let f = &array.axis("frequency_hz").map_err(|error| error.to_string())?.values;
@@ -29,16 +32,4 @@ pub(super) fn examples() -> Vec<Example> {
             }
         },
     }]
-}
-
-/// The force's shape, as the extrapolation of the mean gives it.
-fn pair() -> Array {
-    let samples = 4096;
-    let time = (0..samples).map(|k| (k as f64 - T0 as f64) / SAMPLE_RATE_HZ).collect();
-    let force: Vec<f64> = (0..samples).map(|k| if k < T0 { LOAD_V } else { 0.0 }).collect();
-    Array::over(vec![Axis::new("time", "s", "time since t0", time)])
-        .with("response", "V", "response", &["time"], vec![0.0; samples])
-        .with("force", "V", "force", &["time"], force)
-        .attribute("sample_rate_hz", SAMPLE_RATE_HZ)
-        .attribute("t0_sample", T0)
 }

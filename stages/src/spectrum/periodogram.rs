@@ -1,10 +1,11 @@
 //! The stage `spectrum.periodogram`.
 
-use afmid_pipeline::{Array, Attribute, Axis, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Axis, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::window::PAIR;
+use crate::artifacts::{DataSet, Pair};
 use afmid_kernels::spectra::{bin_frequencies, power_spectrum};
 
 /// Periodograms of force and response: their power spectral densities, as a first look.
@@ -38,20 +39,19 @@ impl Stage for Periodogram {
     };
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
-        let pair = inputs.get(&PAIR)?;
-        if pair.attributes.get("differenced") == Some(&Attribute::Flag(true)) {
+        let pair = Pair::new(inputs.get(&PAIR)?);
+        if pair.differenced() {
             return Err(StageError::new("the pair holds differences, which are no signals")
                 .help("wire a window without `differenced`, or the pair of `force.extrapolation`"));
         }
-        let rate = pair.number("sample_rate_hz")?;
-        let samples = pair.axis("time")?.values.len();
-        let power = pair.number("noise_gain").unwrap_or(1.0) * samples as f64;
-        let density = |name: &str| -> Result<Vec<f64>, StageError> {
-            Ok(power_spectrum(pair.real(name)?, power, rate).map_err(StageError::from_error)?.density)
+        let (rate, samples, all) = (pair.sample_rate_hz()?, pair.samples()?, DataSet::All);
+        let power = pair.noise_gain() * samples as f64;
+        let density = |values: &[f64]| -> Result<Vec<f64>, StageError> {
+            Ok(power_spectrum(values, power, rate).map_err(StageError::from_error)?.density)
         };
-        let (response, force) = (density("response")?, density("force")?);
+        let (response, force) = (density(pair.response(all)?)?, density(pair.force(all)?)?);
         // white noise of this variance, windowed: sum w^2 divides out
-        let noise = 2.0 * pair.real("standard_error")?.iter().map(|s| s * s).sum::<f64>() / (rate * power);
+        let noise = 2.0 * pair.standard_error(all)?.iter().map(|s| s * s).sum::<f64>() / (rate * power);
         let over = &["frequency_hz"];
         let bins = bin_frequencies(samples, rate);
         let noise = vec![noise; bins.len()];

@@ -1,10 +1,11 @@
 //! The stage `spectrum.smoothing`.
 
-use afmid_pipeline::{Array, Attribute, Axis, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::etfe::ETFE;
+use crate::artifacts::Transfer;
 use afmid_kernels::spectra::{
     Bins, PolynomialSettings, RationalSettings, SuppressedLine, local_polynomial, local_rational,
 };
@@ -125,16 +126,16 @@ impl Stage for Smoothing {
     };
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
-        let etfe = inputs.get(&ETFE)?;
-        let frequency_hz = &etfe.axis("frequency_hz")?.values;
-        let bins = Bins { frequency_hz, transfer: etfe.complex("transfer")?, variance: etfe.real("variance")? };
+        let etfe = Transfer::new(inputs.get(&ETFE)?)?;
+        let Transfer { frequency_hz, transfer, variance, .. } = etfe;
+        let bins = Bins { frequency_hz, transfer, variance };
         let lines: Vec<SuppressedLine> = self
             .lines
             .iter()
             .map(|l| SuppressedLine { frequency_hz: l.frequency_hz, half_width_hz: l.half_width_hz })
             .collect();
         let smoothed = match self.method {
-            SmoothingMethod::LocalRational => local_rational(bins, self.rational(etfe)?, &lines),
+            SmoothingMethod::LocalRational => local_rational(bins, self.rational(&etfe)?, &lines),
             SmoothingMethod::LocalPolynomial => {
                 let adapt_sigma = (self.adapt_sigma > 0.0).then_some(self.adapt_sigma);
                 let half_width_bins = self.half_width_bins;
@@ -142,13 +143,13 @@ impl Stage for Smoothing {
             }
         }
         .map_err(StageError::from_error)?;
-        let over = &["frequency_hz"];
-        let mut result = Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", frequency_hz.clone())])
-            .with("transfer", "1", "smoothed transfer function", over, smoothed.transfer)
-            .with("variance", "1", "expected squared error", over, smoothed.variance)
-            .with("half_width_bins", "1", "bins on either side that the value comes from", over, smoothed.half_width)
-            .with("misfit", "1", "residual per degree of freedom over the variance given", over, smoothed.misfit);
-        result.attributes = etfe.attributes.clone();
+        let result = etfe.smoothed(smoothed.transfer, smoothed.variance, smoothed.half_width).with(
+            "misfit",
+            "1",
+            "residual per degree of freedom over the variance given",
+            &["frequency_hz"],
+            smoothed.misfit,
+        );
         Ok(Ports::new().with(&SMOOTHED, result))
     }
 
@@ -158,13 +159,13 @@ impl Stage for Smoothing {
 }
 
 impl Smoothing {
-    fn rational(&self, etfe: &Array) -> Result<RationalSettings, StageError> {
+    fn rational(&self, etfe: &Transfer<'_>) -> Result<RationalSettings, StageError> {
         let wanted = match self.transient {
             TransientChoice::On => true,
             TransientChoice::Off => false,
-            TransientChoice::Auto => etfe.attributes.get("differenced") == Some(&Attribute::Flag(true)),
+            TransientChoice::Auto => etfe.differenced(),
         };
-        let transient = if wanted { Some((self.transient_order, etfe.number("event_turns_per_bin")?)) } else { None };
+        let transient = if wanted { Some((self.transient_order, etfe.event_turns_per_bin()?)) } else { None };
         Ok(RationalSettings {
             numerator_order: self.numerator_order,
             denominator_order: self.denominator_order,

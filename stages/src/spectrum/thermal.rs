@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use crate::artifacts::Density;
 use crate::io::DENSITY;
 use afmid_kernels::spectra::{AveragedDensity, Fitted, SeenThrough, ThermalFit, ThermalFitSettings, thermal_fit};
 
@@ -123,10 +124,10 @@ impl Stage for Thermal {
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let array = inputs.get(&DENSITY)?;
-        let (f, p) = self.band(&array.axis("frequency_hz")?.values, array.real("density")?)?;
-        let through = self.through(array)?;
-        let data = AveragedDensity { frequency_hz: f, density: p, averages: array.number("averages")?, through };
+        let density = Density::new(inputs.get(&DENSITY)?)?;
+        let (f, p) = self.band(density.frequency_hz, density.density)?;
+        let through = self.through(&density)?;
+        let data = AveragedDensity { frequency_hz: f, density: p, averages: density.averages, through };
         let settings = ThermalFitSettings {
             lowest_hz: self.lowest_hz,
             highest_hz: self.highest_hz.unwrap_or(f64::INFINITY),
@@ -139,12 +140,10 @@ impl Stage for Thermal {
         };
         let fit = thermal_fit(data, settings).map_err(StageError::from_error)?;
         self.warn(&fit, f, data.averages, cx);
-        let unit = &array.variable("density")?.unit;
-        let signal = array.attributes.get("signal_unit").and_then(|unit| unit.as_str()).unwrap_or("V").to_owned();
         Ok(Ports::new()
-            .with(&FIT, fit_array(f, p, &fit, unit))
+            .with(&FIT, fit_array(f, p, &fit, density.unit))
             .with(&LINES, lines_table(&fit))
-            .with(&SUMMARY, Document::new(&summary(&fit, &signal, self.line_false_alarm))?))
+            .with(&SUMMARY, Document::new(&summary(&fit, density.signal_unit(), self.line_false_alarm))?))
     }
 
     fn examples() -> Vec<Example> {
@@ -167,12 +166,12 @@ impl Thermal {
         }
     }
 
-    fn through(&self, array: &Array) -> Result<Option<SeenThrough>, StageError> {
+    fn through(&self, density: &Density<'_>) -> Result<Option<SeenThrough>, StageError> {
         Ok(match self.window {
             SpectrumWindow::Hann => Some(SeenThrough::Hann),
             SpectrumWindow::Rectangular => Some(SeenThrough::Rectangular),
             SpectrumWindow::None => Some(SeenThrough::Nothing),
-            SpectrumWindow::Auto => match array.attributes.get("window").and_then(|window| window.as_str()) {
+            SpectrumWindow::Auto => match density.window() {
                 None => None,
                 Some("hann") => Some(SeenThrough::Hann),
                 Some("rectangular") => Some(SeenThrough::Rectangular),

@@ -1,13 +1,14 @@
 //! The stage `spectrum.welch`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError,
+    Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use crate::artifacts::NewDensity;
 use crate::calibration::FreeSettings;
 use crate::calibration::reading::{common_rate, push_free, read_blocks, read_free};
 use crate::io::DENSITY;
@@ -109,21 +110,24 @@ impl Stage for Welch {
             "mean_square_v2": average.density.iter().sum::<f64>() * bin_hz,
         }))?;
         let frequency = (0..average.density.len()).map(|k| k as f64 * bin_hz).collect();
-        let over = &["frequency_hz"];
-        let density = Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", frequency)])
-            .with("density", "V^2/Hz", "one-sided power spectral density", over, average.density)
-            .with("standard_error", "V^2/Hz", "its standard error if stationary", over, average.standard_error)
+        let density = NewDensity {
+            frequency_hz: frequency,
+            density: average.density,
+            standard_error: average.standard_error,
+            averages: average.averages,
+            signal_unit: "V",
+            error_if: " if stationary",
+        };
+        let density = density
+            .through("hann")
             .with(
                 "record_error",
                 "V^2/Hz",
                 "its standard error from the scatter of records",
-                over,
+                &["frequency_hz"],
                 average.record_error,
             )
-            .attribute("averages", average.averages)
             .attribute("segments", average.segments)
-            .attribute("window", "hann")
-            .attribute("signal_unit", "V")
             .attribute("equivalent_noise_bandwidth_hz", 1.5 * bin_hz)
             .attribute("sample_rate_hz", rate);
         Ok(Ports::new().with(&DENSITY, density).with(&SUMMARY, summary))

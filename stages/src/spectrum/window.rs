@@ -1,9 +1,10 @@
 //! The stage `spectrum.window`.
 
-use afmid_pipeline::{Array, Caching, Context, Example, Port, Ports, Spec, Stage, StageError, Values};
+use afmid_pipeline::{Array, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::artifacts::Pair;
 use afmid_kernels::spectra::{Taper, difference, taper, taper_gains};
 
 /// Multiplies force and response by a window in time.
@@ -55,15 +56,15 @@ impl Stage for Window {
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let pair = inputs.get(&PAIR)?;
-        if pair.attributes.contains_key("window_kind") {
+        let pair = Pair::new(inputs.get(&PAIR)?);
+        if pair.windowed() {
             return Err(
                 StageError::new("the pair has been windowed already").help("wire the pair of `force.extrapolation`")
             );
         }
-        let samples = pair.axis("time")?.values.len();
+        let samples = pair.samples()?;
         let window = taper(self.kind, self.alpha, samples).map_err(StageError::from_error)?;
-        let t0 = pair.number("t0_sample")?;
+        let t0 = pair.t0_sample()?;
         if let Some(&weight) = window.get(t0 as usize)
             && weight < 1.0
         {
@@ -71,22 +72,16 @@ impl Stage for Window {
                 "the event (sample {t0}) lies under the taper, where the window is {weight:.3}: take a longer stretch before it or a smaller alpha"
             ));
         }
-        let mut result = pair.clone();
-        for variable in &mut result.variables {
-            let Values::Real(values) = &mut variable.values else { continue };
-            if self.differenced && !variable.name.starts_with("standard_error") {
+        let gains = taper_gains(&window);
+        let gains = [gains.coherent, gains.noise, gains.equivalent_bins];
+        let differences = |name: &str| self.differenced && !name.starts_with("standard_error");
+        let result = pair.windowed_by(self.kind.name(), self.differenced, gains, |name, values| {
+            if differences(name) {
                 *values = difference(values);
             }
             values.iter_mut().zip(&window).for_each(|(v, w)| *v *= w);
-        }
-        let gains = taper_gains(&window);
-        let result = result
-            .with("window", "1", "window", &["time"], window)
-            .attribute("window_kind", self.kind.name())
-            .attribute("differenced", self.differenced)
-            .attribute("coherent_gain", gains.coherent)
-            .attribute("noise_gain", gains.noise)
-            .attribute("equivalent_bins", gains.equivalent_bins);
+        });
+        let result = result.with("window", "1", "window", &["time"], window);
         Ok(Ports::new().with(&WINDOWED, result))
     }
 

@@ -1,21 +1,9 @@
 //! Candidate events of one record, from its block means.
 
-use serde::{Deserialize, Serialize};
-
 use super::despike::despike;
+use super::kind::EventKind;
 use super::level_change::{LevelChange, jump_and_slope, level_change};
 use crate::statistics::median_and_scale;
-
-/// What happened to the tip.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum EventKind {
-    /// The contact ruptures: an upward jump from the loaded ramp to the free level.
-    SnapOff,
-    /// The tip jumps to the surface: a downward jump from the free level, then the contact ramp.
-    #[serde(alias = "snap-to-contact")]
-    SnapIn,
-}
 
 /// How sensitive the detection is. Lengths in blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,20 +1,12 @@
 //! Both lines, the moment between them, and the input and response that follow.
 
 use super::line::correlation_inflation;
+use crate::events::EventKind;
 use crate::force::error::ForceError;
 use crate::force::line::{Line, Weighting, fit_line};
 use crate::force::onset::{Onset, OnsetSettings, find_onset};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// What happened at the event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Event {
-    /// The tip leaves the surface: loaded before, free after.
-    SnapOff,
-    /// The tip jumps to the surface: free before, a step and the piezo's ramp after.
-    SnapIn,
-}
 
 /// Shape of the line without force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -30,7 +22,7 @@ pub enum ZeroLine {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExtrapolationSettings {
     /// Kind of event.
-    pub event: Event,
+    pub event: EventKind,
     /// Shape of the zero-force line.
     pub zero_line: ZeroLine,
     /// Samples left out between the line before and the expected event.
@@ -118,7 +110,7 @@ pub fn extrapolate(
         return Err(ForceError::TooShort { samples, stretch: "after", wanted: LINE_SAMPLES });
     }
     let linear = settings.zero_line == ZeroLine::Linear;
-    let snap_off = settings.event == Event::SnapOff;
+    let snap_off = settings.event == EventKind::SnapOff;
     let before = fit_line(mean, 0, end, Weighting::Uniform, linear || snap_off);
     let after = fit_line(mean, near, mean.len(), Weighting::Hann, linear || !snap_off);
 
@@ -155,13 +147,13 @@ pub fn extrapolate(
 ///
 /// # Units
 /// Those of the mean: the quasi-static gain from force to response is one.
-pub fn pair(mean: &[f64], lines: &Lines, event: Event) -> Pair {
+pub fn pair(mean: &[f64], lines: &Lines, event: EventKind) -> Pair {
     let (zero, loaded) = match event {
-        Event::SnapOff => (lines.after, lines.before),
-        Event::SnapIn => (lines.before, lines.after),
+        EventKind::SnapOff => (lines.after, lines.before),
+        EventKind::SnapIn => (lines.before, lines.after),
     };
     let t0 = lines.onset.latest;
-    let acts = |k: usize| (k < t0) == (event == Event::SnapOff);
+    let acts = |k: usize| (k < t0) == (event == EventKind::SnapOff);
     let at = |k: usize| k as f64;
     Pair {
         force: (0..mean.len()).map(|k| if acts(k) { loaded.at(at(k)) - zero.at(at(k)) } else { 0.0 }).collect(),
@@ -177,7 +169,7 @@ mod tests {
     const SAMPLES: usize = 8192;
     const T0: usize = 1024;
 
-    fn settings(event: Event) -> ExtrapolationSettings {
+    fn settings(event: EventKind) -> ExtrapolationSettings {
         ExtrapolationSettings {
             event,
             zero_line: ZeroLine::Linear,
@@ -203,7 +195,7 @@ mod tests {
         let se = vec![2.5e-4; SAMPLES];
         let mut scaled = Vec::new();
         for seed in 0..20 {
-            let got = extrapolate(&rupture(2.5e-4, seed), &se, settings(Event::SnapOff), None).unwrap();
+            let got = extrapolate(&rupture(2.5e-4, seed), &se, settings(EventKind::SnapOff), None).unwrap();
             // the ramp goes on between the truth and the found moment, 4.2e-6 per sample
             let truth = -0.9 - 4.2e-6 * (got.onset.latest as f64 - T0 as f64);
             scaled.push((got.load - truth) / got.load_std);
@@ -217,11 +209,11 @@ mod tests {
     #[test]
     fn without_noise_pair_and_truth_coincide() {
         let mean = rupture(0.0, 0);
-        let got = extrapolate(&mean, &vec![0.0; SAMPLES], settings(Event::SnapOff), None).unwrap();
+        let got = extrapolate(&mean, &vec![0.0; SAMPLES], settings(EventKind::SnapOff), None).unwrap();
         assert_eq!(got.onset.latest, T0);
         // what ringing leaves in the Hann-weighted line, see its test
         assert!((got.load + 0.9).abs() < 3e-6, "{}", got.load);
-        let pair = pair(&mean, &got, Event::SnapOff);
+        let pair = pair(&mean, &got, EventKind::SnapOff);
         assert_eq!(pair.force[T0], 0.0);
         for k in 0..T0 {
             // the same, over a line continued by 1024 samples
@@ -241,12 +233,12 @@ mod tests {
             })
             .collect();
         let se = vec![1e-9; SAMPLES];
-        let got = extrapolate(&mean, &se, settings(Event::SnapIn), None).unwrap();
+        let got = extrapolate(&mean, &se, settings(EventKind::SnapIn), None).unwrap();
         assert!(got.onset.latest >= T0 && got.onset.latest <= T0 + 1);
         // the ramp meets the lever's lag of 2 samples: not modelled here, and the extrapolation to the edge
         assert!((got.load + 0.04).abs() < 1e-5, "{}", got.load);
         assert!((got.load_slope - 4.2e-6).abs() < 1e-9);
-        let pair = pair(&mean, &got, Event::SnapIn);
+        let pair = pair(&mean, &got, EventKind::SnapIn);
         assert!(pair.force[T0 - 1] == 0.0 && (pair.force[T0 + 1000] + 0.04 - 4.2e-3).abs() < 2e-5);
     }
 
@@ -254,14 +246,14 @@ mod tests {
     fn what_cannot_be_extrapolated_is_refused() {
         let se = vec![1e-3; SAMPLES];
         let quiet = white_noise(SAMPLES, 1e-3, 1);
-        assert!(extrapolate(&quiet, &se, settings(Event::SnapOff), None).is_err());
+        assert!(extrapolate(&quiet, &se, settings(EventKind::SnapOff), None).is_err());
         let short = ExtrapolationSettings {
-            onset: OnsetSettings { near: 40, ..settings(Event::SnapOff).onset },
-            ..settings(Event::SnapOff)
+            onset: OnsetSettings { near: 40, ..settings(EventKind::SnapOff).onset },
+            ..settings(EventKind::SnapOff)
         };
         assert!(matches!(extrapolate(&quiet, &se, short, None), Err(ForceError::TooShort { stretch: "before", .. })));
         assert!(matches!(
-            extrapolate(&quiet[..1030], &se[..1030], settings(Event::SnapOff), None),
+            extrapolate(&quiet[..1030], &se[..1030], settings(EventKind::SnapOff), None),
             Err(ForceError::TooShort { stretch: "after", .. })
         ));
     }

@@ -11,7 +11,7 @@ mod onset;
 mod reconstruct;
 
 pub use error::ForceError;
-pub use extrapolate::{Event, ExtrapolationSettings, Lines, Pair, ZeroLine, extrapolate, pair};
+pub use extrapolate::{ExtrapolationSettings, Lines, Pair, ZeroLine, extrapolate, pair};
 pub use line::{Line, Weighting, correlation_inflation, fit_line};
 pub use onset::{Onset, OnsetSettings, find_onset};
 pub use reconstruct::{

@@ -1,11 +1,11 @@
 //! The plan of an archive: surfaces, pull-off forces, start phases, wander of the baseline.
 
 use super::error::{SimulateError, require};
-use super::motion::EventKind;
 use super::phases::{PhaseProblem, RecordPlan, Target};
 use super::readout_noise::Drift;
 use super::recorder::{Microscope, Place, RecordedEvent, Scatter, SimulatedRecord, archive_stream, counted};
 use crate::effects::Effects;
+use crate::events::EventKind;
 
 /// Size and contents of an archive.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,13 +108,11 @@ impl Archive {
 
     /// Checks that the simulated events are as many as asked for.
     pub fn verify(&self, records: &[Vec<RecordedEvent>]) -> Result<(), SimulateError> {
-        for (kind, name, wanted) in [
-            (EventKind::SnapIn, "snap-in", self.layout.target.snap_ins),
-            (EventKind::SnapOff, "snap-off", self.layout.target.snap_offs),
-        ] {
+        let target = &self.layout.target;
+        for (kind, wanted) in [(EventKind::SnapIn, target.snap_ins), (EventKind::SnapOff, target.snap_offs)] {
             let found = counted(records.iter().map(Vec::as_slice), kind);
             if let Some(wanted) = wanted.filter(|wanted| *wanted != found) {
-                return Err(SimulateError::Count { kind: name, found, wanted });
+                return Err(SimulateError::Count { kind: kind.name(), found, wanted });
             }
         }
         Ok(())

@@ -56,6 +56,7 @@ mod square;
 mod tests;
 mod truth;
 
+pub use crate::events::EventKind;
 pub use adc::Adc;
 pub use afm_system::{AfmSystem, BOLTZMANN_J_PER_K};
 pub use archive::{Archive, ArchiveLayout};
@@ -65,7 +66,7 @@ pub use discretisation::{LinearSystem, Step};
 pub use error::SimulateError;
 pub use hidden_motion::simulate_hidden;
 pub use lever::{ModalLever, Mode};
-pub use motion::{ContactEvent, Drive, EventKind, Motion, Sampling, simulate_motion};
+pub use motion::{ContactEvent, Drive, Motion, Sampling, simulate_motion};
 pub use noise_free::Cut;
 pub use phases::{PhaseProblem, RecordPlan, Target};
 pub use ramp::TriangleRamp;

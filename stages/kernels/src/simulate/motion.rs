@@ -6,18 +6,10 @@ use super::discretisation::LinearSystem;
 use super::lever::ModalLever;
 use super::propagator::Propagator;
 use super::ramp::TriangleRamp;
+use crate::events::EventKind;
 use crate::linear_algebra::dot;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-
-/// Which way the contact changed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum EventKind {
-    /// The tip was caught.
-    SnapIn,
-    /// The tip was let go.
-    SnapOff,
-}
 
 /// One change of regime.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,9 +2,10 @@
 
 use super::afm_system::AfmSystem;
 use super::hidden_motion::simulate_hidden;
-use super::motion::{Drive, EventKind, Sampling};
+use super::motion::{Drive, Sampling};
 use super::recorder::{Microscope, Place};
 use crate::effects::Effects;
+use crate::events::EventKind;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -2,8 +2,9 @@
 
 use super::contact::Contact;
 use super::error::SimulateError;
-use super::motion::{Drive, EventKind};
+use super::motion::Drive;
 use super::ramp::TriangleRamp;
+use crate::events::EventKind;
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -176,11 +177,11 @@ fn out_of_reach(options: &[Vec<Attainable>], target: Target) -> SimulateError {
     let records = options.len();
     match target {
         Target { snap_ins: Some(wanted), .. } if wanted < records * ins.0 || wanted > records * ins.1 => {
-            SimulateError::Totals { kind: "snap-in", wanted, records, fewest: ins.0, most: ins.1 }
+            SimulateError::Totals { kind: EventKind::SnapIn.name(), wanted, records, fewest: ins.0, most: ins.1 }
         }
         Target { snap_offs, .. } => {
             let wanted = snap_offs.unwrap_or(0);
-            SimulateError::Totals { kind: "snap-off", wanted, records, fewest: offs.0, most: offs.1 }
+            SimulateError::Totals { kind: EventKind::SnapOff.name(), wanted, records, fewest: offs.0, most: offs.1 }
         }
     }
 }

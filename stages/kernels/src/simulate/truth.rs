@@ -1,8 +1,8 @@
 //! The truth of an archive, as a JSON document beside its folder.
 
 use super::archive::Archive;
-use super::motion::EventKind;
 use super::recorder::{RecordedEvent, counted};
+use crate::events::EventKind;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -67,10 +67,7 @@ pub struct EventTruth {
 impl EventTruth {
     fn new(recorded: &RecordedEvent) -> Self {
         Self {
-            kind: match recorded.event.kind {
-                EventKind::SnapIn => "snap-in",
-                EventKind::SnapOff => "snap-off",
-            },
+            kind: recorded.event.kind.name(),
             time_s: recorded.event.time_s,
             sample: recorded.sample,
             force_n: recorded.event.force_n,

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use super::stage::Columns;
 use super::stretch::{Stretch, Trend, halves};
 use super::table::ColumnTable;
+use crate::artifacts::{DataSet, NewPair, PairSet};
 
 /// Inputs and output as the file has them, NaN where missing.
 pub(super) struct Series {
@@ -72,34 +73,32 @@ impl Series {
         let inputs: Vec<Vec<f64>> = self.inputs.iter().zip(&trends).map(|(u, trend)| trend.removed(u)).collect();
         let output = level.removed(&self.output);
         let whole = Stretch { first: 0, end: output.len() };
-        let sets = [("", whole), ("_identification", self.identification), ("_verification", self.verification)];
-        let mut axes: Vec<Axis> = sets.iter().map(|(suffix, stretch)| self.axis(suffix, *stretch)).collect();
+        let sets = DataSet::ALL.into_iter().zip([whole, self.identification, self.verification]);
+        let mut axes: Vec<Axis> = sets.clone().map(|(set, stretch)| self.axis(set, stretch)).collect();
         if inputs.len() > 1 {
             let numbers = (1..=inputs.len()).map(|i| i as f64).collect();
             axes.push(Axis::new("input", "1", "number of the input", numbers));
         }
-        let mut pair = Array::over(axes);
-        for (suffix, stretch) in sets {
-            let time = format!("time{suffix}");
-            let over: &[&str] = if inputs.len() > 1 { &["input", &time] } else { &[&time] };
-            let force: Vec<f64> = inputs.iter().flat_map(|input| stretch.of(input).to_vec()).collect();
-            let response = stretch.of(&output).to_vec();
-            pair = pair.with(&format!("response{suffix}"), &wanted.output_unit, "output", &[&time], response).with(
-                &format!("force{suffix}"),
-                &wanted.input_unit,
-                "input",
-                over,
-                force,
-            );
+        let mut pair = NewPair { sample_rate_hz: self.rate, t0_sample: 0, kind: "columns" }.over(axes);
+        for (set, stretch) in sets {
+            let time = set.of("time");
+            let of_set = PairSet {
+                set,
+                dims: if inputs.len() > 1 { &["input", &time] } else { &[&time] },
+                response: stretch.of(&output).to_vec(),
+                force: inputs.iter().flat_map(|input| stretch.of(input).to_vec()).collect(),
+                standard_error: None,
+                newtons_per_volt: None,
+                labels: [("output", &wanted.output_unit), ("input", &wanted.input_unit)],
+            };
+            pair = of_set.add(pair);
         }
-        let pair =
-            pair.attribute("sample_rate_hz", self.rate).attribute("t0_sample", 0_usize).attribute("kind", "columns");
         Ok((pair, self.summary(wanted, &trends, level)?))
     }
 
-    fn axis(&self, suffix: &str, stretch: Stretch) -> Axis {
+    fn axis(&self, set: DataSet, stretch: Stretch) -> Axis {
         let time = (stretch.first..stretch.end).map(|k| k as f64 / self.rate).collect();
-        Axis::new(&format!("time{suffix}"), "s", "time since the first sample", time)
+        Axis::new(&set.of("time"), "s", "time since the first sample", time)
     }
 
     /// Missing outputs of a stretch.

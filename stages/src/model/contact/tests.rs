@@ -3,8 +3,8 @@
 use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Context, Ports, Stage};
 
-use super::reading::ringing;
 use super::{CONTACT, ContactFit, FREE, FREE_POLES, SHARES, SUMMARY};
+use crate::artifacts::ringing;
 use crate::model::ringdown::{POLES, RingdownFit};
 
 fn context() -> Context<'static> {

@@ -4,6 +4,7 @@ use afmid_pipeline::Table;
 use faer::Mat;
 use serde_json::{Value, json};
 
+use crate::artifacts;
 use afmid_kernels::grey::{Grey, GreyHold, GreyQuantity};
 use afmid_kernels::modes::Interval;
 use afmid_kernels::ringdown::Estimate;
@@ -17,11 +18,7 @@ pub(super) fn mode_table(fit: &Grey) -> Table {
     let share = |n: usize| shares.get(n).copied().unwrap_or(Estimate { value: f64::NAN, std: f64::NAN });
     let gain = |n: usize| gains.get(n).copied().unwrap_or(Estimate { value: f64::NAN, std: f64::NAN });
     let significance = |n: usize| if gain(n).std > 0.0 { gain(n).value.abs() / gain(n).std } else { f64::NAN };
-    Table::new()
-        .with("frequency_hz", "Hz", "resonance frequency", column(&|n| modes[n].frequency_hz.value))
-        .with("frequency_std_hz", "Hz", "its standard error", column(&|n| modes[n].frequency_hz.std))
-        .with("quality_factor", "1", "quality factor", column(&|n| modes[n].quality_factor.value))
-        .with("quality_factor_std", "1", "its standard error", column(&|n| modes[n].quality_factor.std))
+    artifacts::mode_table(&modes)
         .with("static_share", "1", "part of the static gain", column(&|n| share(n).value))
         .with("static_share_std", "1", "its standard error", column(&|n| share(n).std))
         .with("significance", "1", "gain over its standard error", column(&significance))

@@ -3,6 +3,7 @@
 use afmid_pipeline::{Record, Recording, StageError};
 use rayon::prelude::*;
 
+use crate::artifacts::deflection;
 use crate::calibration::FreeSettings;
 use crate::calibration::reading::{common_rate, read_blocks, read_free};
 
@@ -50,7 +51,7 @@ fn of_record(
         .iter()
         .flat_map(|stretch| (0..stretch.len() / samples.max(1)).map(|i| stretch.start + i * samples))
         .collect();
-    let deflection = record.channel("deflection")?;
+    let deflection = deflection(record)?;
     let count = most.min(starts.len());
     let mut windows = Vec::new();
     for i in 0..count {

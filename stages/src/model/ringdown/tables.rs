@@ -1,14 +1,13 @@
 //! What the stage hands on.
 
 use afmid_pipeline::{Array, Axis, Table};
-use faer::c64;
 
 use super::ErrorSource;
+use crate::artifacts;
 use afmid_kernels::contact::Ringing;
 use afmid_kernels::ringdown::{EventParameters, ModeEstimate, Ringdown};
 
 pub(super) fn mode_table(fit: &Ringdown, modes: &[ModeEstimate]) -> Table {
-    let column = |value: fn(&ModeEstimate) -> f64| modes.iter().map(value).collect::<Vec<f64>>();
     let scatter = fit.sandwich.as_ref().map(|covariance| fit.modes_with(covariance));
     let other = |value: fn(&ModeEstimate) -> f64| match &scatter {
         Some(scatter) => scatter.iter().map(value).collect::<Vec<f64>>(),
@@ -18,11 +17,7 @@ pub(super) fn mode_table(fit: &Ringdown, modes: &[ModeEstimate]) -> Table {
     let thermal = (0..modes.len())
         .map(|i| fit.noise.thermal.get(i).map_or(f64::NAN, |mode| mode.variance.max(0.0).sqrt()))
         .collect::<Vec<f64>>();
-    let table = Table::new()
-        .with("frequency_hz", "Hz", "resonance frequency", column(|m| m.frequency_hz.value))
-        .with("frequency_std_hz", "Hz", "its standard error", column(|m| m.frequency_hz.std))
-        .with("quality_factor", "1", "quality factor", column(|m| m.quality_factor.value))
-        .with("quality_factor_std", "1", "its standard error", column(|m| m.quality_factor.std))
+    let table = artifacts::mode_table(modes)
         .with("frequency_scatter_hz", "Hz", "standard error from the events' scatter", other(|m| m.frequency_hz.std))
         .with("quality_factor_scatter", "1", "standard error from the events' scatter", other(|m| m.quality_factor.std))
         .with(
@@ -41,37 +36,13 @@ pub(super) fn mode_table(fit: &Ringdown, modes: &[ModeEstimate]) -> Table {
         .with("quality_factor_high", "1", "upper end of it", end(|i| i[1].1))
 }
 
+/// Poles and residues with the covariance that this source of errors gives.
 pub(super) fn poles(fit: &Ringdown, source: ErrorSource) -> Array {
     let covariance = match (source, &fit.sandwich) {
         (ErrorSource::Events, Some(sandwich)) => sandwich,
         _ => &fit.covariance,
     };
-    let ringing = Ringing::of(fit, covariance);
-    let residues = ringing.residues.clone().unwrap_or_default();
-    let count = 2 * ringing.poles.len();
-    let axis = |name: &str| {
-        Axis::new(name, "1", "real and imaginary part of each pole in turn", (0..count).map(|i| i as f64).collect())
-    };
-    // four numbers a mode: a pole's two parts at 0, a residue's at 2
-    let place = |i: usize, what: usize| 4 * (i / 2) + what + i % 2;
-    let block = |row: usize, column: usize| -> Vec<f64> {
-        (0..count * count).map(|i| ringing.covariance[(place(i / count, row), place(i % count, column))]).collect()
-    };
-    let parts = |values: &[c64]| values.iter().flat_map(|v| [v.re, v.im]).collect::<Vec<f64>>();
-    let both = &["parameter", "other"];
-    Array::over(vec![axis("parameter"), axis("other")])
-        .with("pole", "rad/s", "poles of the modes, the upper ones of pairs", &["parameter"], parts(&ringing.poles))
-        .with("covariance", "rad^2/s^2", "their covariance", both, block(0, 0))
-        .with(
-            "residue",
-            "V",
-            "their residues in an event of amplitude 1 at its onset",
-            &["parameter"],
-            parts(&residues),
-        )
-        .with("residue_covariance", "V^2", "covariance of the residues; 0 for the reference's", both, block(2, 2))
-        .with("cross_covariance", "V rad/s", "covariance of poles (first axis) and residues", both, block(0, 2))
-        .attribute("real_poles", ringing.real_poles)
+    artifacts::ringing_array(&Ringing::of(fit, covariance))
 }
 
 pub(super) fn event_table(fit: &Ringdown) -> Table {

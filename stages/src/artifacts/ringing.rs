@@ -1,12 +1,12 @@
-//! Ringings from the artifacts of `model.ringdown`.
+//! `ringdown-poles`: poles and residues of a ringing with their covariance.
 
-use afmid_pipeline::{Array, StageError};
+use afmid_pipeline::{Array, Axis, StageError};
 use faer::{Mat, c64};
 
 use afmid_kernels::contact::Ringing;
 
 /// The poles of an array up to an angular frequency (rad/s), with their residues where it has them.
-pub(super) fn ringing(array: &Array, most: f64) -> Result<Ringing, StageError> {
+pub(crate) fn ringing(array: &Array, most: f64) -> Result<Ringing, StageError> {
     let poles = parts(array, "pole")?;
     let covariance = square(array, "covariance", poles.len())?;
     let kept: Vec<usize> = (0..poles.len()).filter(|&j| poles[j].norm() <= most).collect();
@@ -39,6 +39,32 @@ pub(super) fn ringing(array: &Array, most: f64) -> Result<Ringing, StageError> {
     });
     let residues = Some(kept.iter().map(|&j| residues[j]).collect());
     Ok(Ringing { poles, residues, covariance, real_poles: found as usize })
+}
+
+/// Poles as real and imaginary parts in turn, with their residues where it has them, and the covariance of all.
+pub(crate) fn ringing_array(ringing: &Ringing) -> Array {
+    let count = 2 * ringing.poles.len();
+    let numbers = if ringing.residues.is_some() { 4 } else { 2 };
+    let axis = |name: &str| {
+        Axis::new(name, "1", "real and imaginary part of each pole in turn", (0..count).map(|i| i as f64).collect())
+    };
+    // two or four numbers a mode: a pole's two parts at 0, a residue's at 2
+    let place = |i: usize, what: usize| numbers * (i / 2) + what + i % 2;
+    let block = |row: usize, column: usize| -> Vec<f64> {
+        (0..count * count).map(|i| ringing.covariance[(place(i / count, row), place(i % count, column))]).collect()
+    };
+    let parts = |values: &[c64]| values.iter().flat_map(|v| [v.re, v.im]).collect::<Vec<f64>>();
+    let both = &["parameter", "other"];
+    let poles = Array::over(vec![axis("parameter"), axis("other")])
+        .with("pole", "rad/s", "poles of the modes, the upper ones of pairs", &["parameter"], parts(&ringing.poles))
+        .with("covariance", "rad^2/s^2", "their covariance", both, block(0, 0));
+    let Some(residues) = &ringing.residues else { return poles };
+    let what = "their residues in an event of amplitude 1 at its onset";
+    poles
+        .with("residue", "V", what, &["parameter"], parts(residues))
+        .with("residue_covariance", "V^2", "covariance of the residues; 0 for the reference's", both, block(2, 2))
+        .with("cross_covariance", "V rad/s", "covariance of poles (first axis) and residues", both, block(0, 2))
+        .attribute("real_poles", ringing.real_poles)
 }
 
 fn parts(array: &Array, name: &str) -> Result<Vec<c64>, StageError> {

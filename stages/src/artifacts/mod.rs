@@ -1,0 +1,50 @@
+//! What the artifacts on the ports contain: a file for each tag declares names, units and axes once, reads an artifact
+//! as plain numbers for a kernel, and makes one of what a kernel returns.
+
+mod average;
+mod channels;
+mod data_set;
+mod density;
+mod ensemble;
+mod model;
+mod modes;
+mod pair;
+mod ringing;
+mod roots;
+mod transfer;
+
+pub(crate) use average::{Average, AveragedSet, empty_average};
+pub(crate) use channels::{DEFLECTION, PIEZO, deflection, piezo};
+pub use data_set::DataSet;
+pub(crate) use density::{Density, NewDensity};
+pub(crate) use ensemble::{Ensemble, NewEnsemble, with_places};
+pub(crate) use model::{
+    first_sample, further_inputs, innovations, nuisances, state_nuisances, state_space, state_t0_ambiguity,
+    t0_ambiguity_s,
+};
+pub(crate) use modes::{mode_table, modes};
+pub(crate) use pair::{NewPair, Pair, PairSeries, PairSet, with_counts};
+pub(crate) use ringing::{ringing, ringing_array};
+pub(crate) use roots::{RootRow, root_table, roots};
+pub(crate) use transfer::{NewTransfer, Transfer};
+
+use afmid_kernels::events::EventKind;
+use afmid_pipeline::{Array, Attribute};
+
+/// Samples per second.
+pub(crate) const SAMPLE_RATE_HZ: &str = "sample_rate_hz";
+const KIND: &str = "kind";
+
+/// The event that an array is about; none where it states none or another.
+fn event_kind(array: &Array) -> Option<EventKind> {
+    array.attributes.get(KIND).and_then(Attribute::as_str).and_then(EventKind::from_name)
+}
+
+/// Copies attributes that are there.
+fn copy_attributes(from: &Array, to: &mut Array, names: &[&str]) {
+    for name in names {
+        if let Some(value) = from.attributes.get(*name) {
+            to.attributes.insert((*name).to_owned(), value.clone());
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! `modes`: frequencies and quality factors with their standard errors.
+
+use afmid_kernels::ringdown::{Estimate, ModeEstimate};
+use afmid_pipeline::{StageError, Table};
+
+const FREQUENCY_HZ: &str = "frequency_hz";
+const FREQUENCY_STD_HZ: &str = "frequency_std_hz";
+const QUALITY_FACTOR: &str = "quality_factor";
+const QUALITY_FACTOR_STD: &str = "quality_factor_std";
+
+/// The modes of a table. Errors: a column that is missing.
+pub(crate) fn modes(table: &Table) -> Result<Vec<ModeEstimate>, StageError> {
+    let frequency = estimates(table, FREQUENCY_HZ, FREQUENCY_STD_HZ)?;
+    let quality = estimates(table, QUALITY_FACTOR, QUALITY_FACTOR_STD)?;
+    let mode = |(frequency_hz, quality_factor)| ModeEstimate { frequency_hz, quality_factor };
+    Ok(frequency.into_iter().zip(quality).map(mode).collect())
+}
+
+/// A table of modes by row; what else is known of them is added to it.
+pub(crate) fn mode_table(modes: &[ModeEstimate]) -> Table {
+    let column = |value: fn(&ModeEstimate) -> f64| modes.iter().map(value).collect::<Vec<f64>>();
+    Table::new()
+        .with(FREQUENCY_HZ, "Hz", "resonance frequency", column(|m| m.frequency_hz.value))
+        .with(FREQUENCY_STD_HZ, "Hz", "its standard error", column(|m| m.frequency_hz.std))
+        .with(QUALITY_FACTOR, "1", "quality factor", column(|m| m.quality_factor.value))
+        .with(QUALITY_FACTOR_STD, "1", "its standard error", column(|m| m.quality_factor.std))
+}
+
+fn estimates(table: &Table, value: &str, std: &str) -> Result<Vec<Estimate>, StageError> {
+    let (values, stds) = (table.real(value)?, table.real(std)?);
+    Ok(values.iter().zip(stds).map(|(&value, &std)| Estimate { value, std }).collect())
+}
