@@ -14,12 +14,12 @@ use afmid_kernels::pem::{Experiment, PemOptions, refit};
 use afmid_kernels::ringdown::{DecayOptions, Estimate, ModeEstimate, RingdownOptions, fit_decay, fit_ringdowns};
 use afmid_kernels::signal::{Detrend, Welch};
 use afmid_kernels::spectra::{
-    AveragedDensity, Bins, EndTreatment, EnsembleResponseSettings, EtfeSettings, Intersample, RationalSettings,
-    SeenThrough, ThermalFitSettings, TransferEstimate, difference, ensemble_response, etfe, local_rational,
-    thermal_fit,
+    AveragedDensity, Bins, EndTreatment, EnsembleResponseSettings, EtfeSettings, Intersample, Presence,
+    RationalSettings, SeenThrough, ThermalFitSettings, TransferEstimate, difference, ensemble_response, etfe,
+    local_rational, thermal_fit,
 };
 use afmid_kernels::stabilisation::{StabilisationCriteria, stabilisation};
-use afmid_kernels::subspace::{Era, InstrumentalSubspace, Subspace, Weight};
+use afmid_kernels::subspace::{Subspace, Weight};
 use afmid_kernels::validation::{BootstrapSettings, bootstrap};
 use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFitting, vector_fitting};
 use criterion::{BenchmarkId, Criterion, SamplingMode};
@@ -93,14 +93,14 @@ fn starts(criterion: &mut Criterion) {
     for (name, weight) in [("N4SID", Weight::N4sid), ("MOESP", Weight::Moesp), ("CVA", Weight::Cva)] {
         group.bench_function(name, |bench| {
             bench.iter(|| {
-                InstrumentalSubspace::new(black_box(&u), &y, 60, weight).and_then(|s| s.poles(11)).expect("poles")
+                Subspace::with_instruments(black_box(&u), &y, 60, weight).and_then(|s| s.poles(11)).expect("poles")
             })
         });
     }
     let free = ringing(MEAN_NOISE_V, 1);
     for rows in [60, 300] {
         group.bench_function(BenchmarkId::new("era, rows", rows), |bench| {
-            bench.iter(|| Era::new(black_box(&free), rows).and_then(|era| era.poles(11)).expect("poles"))
+            bench.iter(|| Subspace::of_decay(black_box(&free), rows).and_then(|era| era.poles(11)).expect("poles"))
         });
     }
     let poles = Subspace::new(&u, &y, 60).and_then(|s| s.poles(11)).expect("poles");
@@ -136,7 +136,7 @@ fn grey(criterion: &mut Criterion) {
 /// Poles of orders 2 to 30, and what stays among them.
 fn stable_poles(criterion: &mut Criterion) {
     let y = ringing(MEAN_NOISE_V, 1);
-    let era = Era::new(&y, 300).expect("a Hankel matrix");
+    let era = Subspace::of_decay(&y, 300).expect("a Hankel matrix");
     let criteria = StabilisationCriteria::default();
     criterion.bench_function("stabilisation, orders 2 to 30, 300 rows", |bench| {
         bench.iter(|| {
@@ -201,7 +201,10 @@ fn resampling(criterion: &mut Criterion) {
         Ok(fit.modes().iter().map(|mode| mode.frequency_hz.value).collect())
     };
     criterion.bench_function("bootstrap of fit_decay, 24 events, 200 replicates", |bench| {
-        bench.iter(|| bootstrap(events.len(), &BootstrapSettings::default(), black_box(statistic)).expect("intervals"))
+        bench.iter(|| {
+            bootstrap(events.len(), &BootstrapSettings::default(), black_box(statistic), &afmid_kernels::Unwatched)
+                .expect("intervals")
+        })
     });
 }
 
@@ -240,7 +243,8 @@ fn spectra(criterion: &mut Criterion) {
     let found = welch.average().expect("segments");
     let frequency_hz: Vec<f64> = (2..found.density.len()).map(|k| k as f64 * found.bin_hz).collect();
     let density = &found.density[2..];
-    let settings = ThermalFitSettings { lowest_hz: 20e3, highest_hz: 100e3, line_false_alarm: 1e-3, flicker: None };
+    let settings =
+        ThermalFitSettings { lowest_hz: 20e3, highest_hz: 100e3, line_false_alarm: 1e-3, flicker: Presence::Auto };
     group.bench_function("Whittle fit, 4095 bins", |bench| {
         bench.iter(|| {
             let data = AveragedDensity {

@@ -33,7 +33,7 @@ from typing import Any, Callable
 
 import numpy as np
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "Array", "Axis", "Channel", "Column", "Context", "Record", "Refused", "StateSpace", "Table", "Variable",
     "array_of", "boolean", "choice", "integer", "number", "port", "serve", "stage", "text",

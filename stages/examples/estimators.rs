@@ -5,7 +5,7 @@ use afmid_kernels::modes::Root;
 use afmid_kernels::pem::{Experiment, PemOptions, identify};
 use afmid_kernels::ringdown::{NoiseSource, RingdownOptions, fit_ringdowns};
 use afmid_kernels::stabilisation::{StabilisationCriteria, stabilisation};
-use afmid_kernels::subspace::{Era, Subspace};
+use afmid_kernels::subspace::Subspace;
 use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFitting, vector_fitting};
 use num_complex::Complex64;
 
@@ -53,14 +53,14 @@ fn subspace() -> Result<(), ModelError> {
 
 fn free_decay() -> Result<(), ModelError> {
     let (_, y) = data();
-    let z = Era::new(&y[200..], 60)?.poles(2)?[0];
+    let z = Subspace::of_decay(&y[200..], 60)?.poles(2)?[0];
     println!("era: {:.1} Hz", Root::without_errors(z, INTERVAL_S).frequency_hz);
     Ok(())
 }
 
 fn stable_poles() -> Result<(), ModelError> {
     let (_, y) = data();
-    let era = Era::new(&y[200..], 60)?;
+    let era = Subspace::of_decay(&y[200..], 60)?;
     let orders = (2..=12).map(|order| Ok((order, era.poles(order)?))).collect::<Result<Vec<_>, ModelError>>()?;
     let found = stabilisation(&orders, INTERVAL_S, &StabilisationCriteria::default())?;
     println!("stabilisation: {:?} at order {:?}", found.modes.first().map(|mode| mode.frequency_hz), found.order);

@@ -12,6 +12,7 @@ pub mod io;
 pub mod model;
 pub mod simulate;
 pub mod spectrum;
+mod watched;
 
 use afmid_pipeline::stage::DoubleName;
 use afmid_pipeline::{Entry, Registry};

@@ -53,7 +53,7 @@ const CRATES: [Crate; 5] = [
         name: "afmid-kernels",
         src: "stages/kernels/src",
         floors: &[
-            &["fixture", "linear_algebra", "signal", "statistics", "effects"],
+            &["fixture", "linear_algebra", "signal", "statistics", "effects", "monitor"],
             &["optimise"],
             &["events"],
             &["calibration", "force", "model", "simulate"],
@@ -66,7 +66,7 @@ const CRATES: [Crate; 5] = [
         name: "afmid-stages",
         src: "stages/src",
         floors: &[
-            &["artifacts"],
+            &["artifacts", "watched"],
             &["io", "causes"],
             &["events", "simulate"],
             &["ensemble", "calibration"],

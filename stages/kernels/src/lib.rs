@@ -14,8 +14,10 @@
 //! | [`simulate`] | a lever, a contact, a detector | records with their truth |
 //!
 //! From the ground up, each using only those before it:
-//! [`linear_algebra`], [`signal`], [`statistics`], [`effects`] - [`optimise`] - [`events`], [`calibration`], [`force`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`],
-//! [`subspace`], [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`].
+//! [`linear_algebra`], [`signal`], [`statistics`], [`effects`], [`Monitor`] - [`optimise`] - [`events`] -
+//! [`calibration`], [`force`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`], [`subspace`],
+//! [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`]. Kernels that fit many times
+//! take a [`Monitor`]: [`ringdown::fit_counted_ringdowns`], [`validation::choose_order`], [`validation::bootstrap`].
 //!
 //! ```
 //! use afmid_kernels::statistics::{chi_square_tail, median_and_scale};
@@ -36,6 +38,7 @@ pub mod grey;
 pub mod linear_algebra;
 pub mod model;
 pub mod modes;
+mod monitor;
 pub mod optimise;
 pub mod pem;
 pub mod ringdown;
@@ -49,6 +52,7 @@ pub mod validation;
 pub mod vector_fitting;
 
 pub use faer::{Mat, c64};
+pub use monitor::{Monitor, Unwatched};
 
 #[cfg(test)]
 mod fixture;

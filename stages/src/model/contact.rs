@@ -58,22 +58,10 @@ pub struct ContactFit {
     pub tip_share_error: Option<f64>,
     /// The contact's law: `spring-damper`, `second-order`, or `auto`, which takes the second where it lowers chi square
     /// by more than 9.
-    pub law: Law,
+    pub law: LawChoice,
     /// Coupled poles above this frequency in Hz are left out. Absent: all count.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_frequency_hz: Option<f64>,
-}
-
-/// The contact's force by frequency.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Law {
-    /// `k_c + eta s`.
-    SpringDamper,
-    /// `k_c + eta s + mu s^2`.
-    SecondOrder,
-    /// What the data ask for.
-    Auto,
 }
 
 impl Default for ContactFit {
@@ -83,7 +71,7 @@ impl Default for ContactFit {
             stiffness_error: 0.0,
             tip_shares: LOADED_BEAM_SHARES.to_vec(),
             tip_share_error: None,
-            law: Law::Auto,
+            law: LawChoice::Auto,
             max_frequency_hz: None,
         }
     }
@@ -207,12 +195,7 @@ fn warn(contact: &JointContact, cx: &Context) {
 
 impl ContactFit {
     fn options(&self) -> JointOptions {
-        let law = match self.law {
-            Law::SpringDamper => LawChoice::SpringDamper,
-            Law::SecondOrder => LawChoice::SecondOrder,
-            Law::Auto => LawChoice::Auto,
-        };
-        JointOptions { law, share_error: self.tip_share_error }
+        JointOptions { law: self.law, share_error: self.tip_share_error }
     }
 
     fn lever(&self, free: &Table, wired: Option<&Document>) -> Result<FreeLever, StageError> {

@@ -4,11 +4,11 @@ use afmid_pipeline::{Caching, Context, Example, Faults, Ports, Spec, Stage, Stag
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::order::largest_gap;
 use super::pem::PAIR;
 use super::realised::{MODEL, Realised, SUMMARY};
 use crate::artifacts::{DataSet, Pair, PairSeries};
-use afmid_kernels::subspace::Era;
+use afmid_kernels::subspace::Subspace;
+use afmid_kernels::validation::largest_gap;
 
 /// Estimates a state-space model from the free decay at the end of a record: eigensystem realization.
 ///
@@ -69,7 +69,7 @@ impl Stage for EraEstimate {
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let series = Pair::new(inputs.get(&PAIR)?).series(self.set, 0)?;
         let decay = free_decay(&series, self.skip_s);
-        let era = Era::new(&decay, self.block_rows).map_err(|error| {
+        let era = Subspace::of_decay(&decay, self.block_rows).map_err(|error| {
             StageError::from_error(error)
                 .help("fewer `block_rows`, or a record that goes on longer after the force's last change")
         })?;

@@ -3,6 +3,7 @@
 
 mod bootstrap;
 mod contact;
+mod count;
 mod era;
 mod example;
 mod grey;
@@ -20,14 +21,15 @@ mod zeros;
 pub use crate::artifacts::DataSet;
 pub use bootstrap::BootstrapIntervals;
 pub use contact::ContactFit;
+pub use count::Count;
 pub use era::EraEstimate;
 pub use grey::{GreyEstimate, GreyNumber, GreyNumberKind};
 pub use modes::Modes;
-pub use order::{Order, OrderCandidate, OrderChoice, choose_order};
+pub use order::Order;
 pub use pem::Pem;
 pub use ringdown::{ErrorSource, JointNoise, KnownNumber, KnownQuantity, ModeNumber, RingdownFit};
 pub use stabilisation::{PoleMethod, StabilisationDiagram};
-pub use subspace::{SubspaceEstimate, WeightKind};
+pub use subspace::SubspaceEstimate;
 pub use system_poles::system_poles;
 pub use vector_fitting::{ResponseWeight, VectorFittingEstimate};
 pub use zeros::Zeros;

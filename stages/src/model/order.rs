@@ -1,241 +1,24 @@
 //! The order of a model: given, or found from the data.
 
-use std::borrow::Cow;
-
-use rayon::prelude::*;
-use schemars::{JsonSchema, Schema, SchemaGenerator};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use afmid_kernels::pem::Identified;
+use afmid_kernels::validation::{Nuisances, OrderChoice, simulate_held_out};
 use serde_json::{Value, json};
 
-use afmid_kernels::model::ModelError;
-use afmid_kernels::pem::{Experiment, Identified, NoiseModel, PemOptions, identify};
-use afmid_kernels::subspace::Subspace;
-use afmid_kernels::validation::{Nuisances, simulate_held_out};
+use super::count::Count;
 
 /// The order of a model: a number, or `"auto"`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
-    /// Given.
-    Fixed(usize),
-    /// Found from the data.
-    Auto,
-}
+pub type Order = Count<40>;
 
-impl Order {
-    /// The given order; `most` where it is to be found.
-    pub(super) fn largest(self, most: usize) -> usize {
-        if let Self::Fixed(order) = self { order } else { most }
-    }
-}
-
-impl Serialize for Order {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Fixed(order) => serializer.serialize_u64(*order as u64),
-            Self::Auto => serializer.serialize_str("auto"),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for Order {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(untagged, expecting = "wanted an order: a whole number, or \"auto\"")]
-        enum Written {
-            Number(usize),
-            Word(Word),
-        }
-        #[derive(Deserialize)]
-        #[serde(rename_all = "kebab-case")]
-        enum Word {
-            Auto,
-        }
-        Ok(match Written::deserialize(deserializer)? {
-            Written::Number(order) => Self::Fixed(order),
-            Written::Word(Word::Auto) => Self::Auto,
-        })
-    }
-}
-
-impl JsonSchema for Order {
-    fn schema_name() -> Cow<'static, str> {
-        "Order".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        schemars::json_schema!({
-            "description": "The order of a model: a number, or `\"auto\"`.",
-            "anyOf": [{ "type": "integer", "minimum": 1, "maximum": 40 }, { "const": "auto" }],
-        })
-    }
-}
-
-/// What an order's model made of the data.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OrderCandidate {
-    /// The order.
-    pub order: usize,
-    /// `N ln(mean square of e) + k ln N` of the whole training record; NaN where no model could be had.
-    pub bic: f64,
-    /// FIT % of the simulation of the record's last third, by a model of its first two thirds; NaN where this cannot be
-    /// judged.
-    pub held_out_percent: f64,
-}
-
-/// The order found, and what was seen.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OrderChoice {
-    /// The order.
-    pub order: usize,
-    /// The order at the largest gap between consecutive singular values (by ratio), for comparison.
-    pub gap: usize,
-    /// All orders that were tried.
-    pub candidates: Vec<OrderCandidate>,
-}
-
-/// Iterations for each candidate: enough to rank orders.
-const ITERATIONS: usize = 12;
-/// Parts of the last third whose errors say how sure its fit is.
-const BLOCKS: usize = 10;
-
-/// Chooses an order of 1 to `most` from training data alone.
-///
-/// # Model
-/// That of [`identify`] with `options`, its order replaced.
-/// # Method
-/// Each order is fitted to the first two thirds and simulated over the last: the smallest order whose squared error is
-/// within one standard error (over ten blocks) of the least. Where the last third has no input of its own (a release),
-/// the least Bayesian information criterion instead.
-/// # Accuracy
-/// The true order or one of the next two in most of 20 records with output noise of standard deviation 0.05 (test); no
-/// more than the data need, not the truth.
-/// # Errors
-/// No order can be fitted.
-/// # Source
-/// L. Ljung, System Identification (1999), section 16.4; G. Schwarz, Ann. Stat. 6 (1978) 461.
-pub fn choose_order(
-    experiment: Experiment<'_>,
-    sample_time_s: f64,
-    most: usize,
-    options: &PemOptions,
-) -> Result<OrderChoice, ModelError> {
-    let parts = Parts::of(experiment);
-    let candidates: Vec<(OrderCandidate, Vec<f64>)> = (1..=most)
-        .into_par_iter()
-        .map(|order| candidate(experiment, parts.as_ref(), sample_time_s, order, options))
-        .collect();
-    let rows = options.block_rows.min(experiment.output.len() / 3);
-    let gap = Subspace::new(experiment.input, experiment.output, rows)
-        .map(|subspace| largest_gap(subspace.singular_values(), most))
-        .unwrap_or(0);
-    let held_out = smallest_within_error(&candidates);
-    let by_bic = candidates.iter().map(|(c, _)| c).filter(|c| !c.bic.is_nan()).min_by(|x, y| x.bic.total_cmp(&y.bic));
-    let order = held_out
-        .or(by_bic.map(|c| c.order))
-        .ok_or(ModelError::Degenerate("no order could be fitted: the record may be too short for `block_rows`"))?;
-    Ok(OrderChoice { order, gap, candidates: candidates.into_iter().map(|(candidate, _)| candidate).collect() })
-}
-
-/// First two thirds and the rest, inputs one after the other.
-struct Parts {
-    first: (Vec<f64>, Vec<f64>),
-    rest: (Vec<f64>, Vec<f64>),
-}
-
-impl Parts {
-    /// `None` where the rest has no input of its own, or lacks outputs.
-    fn of(experiment: Experiment<'_>) -> Option<Self> {
-        let samples = experiment.output.len();
-        let cut = 2 * samples / 3;
-        let part = |from: usize, to: usize| {
-            let inputs = experiment.input.chunks_exact(samples).flat_map(|u| u[from..to].to_vec()).collect();
-            (inputs, experiment.output[from..to].to_vec())
-        };
-        let parts = Self { first: part(0, cut), rest: part(cut, samples) };
-        let moves = parts.rest.0.windows(2).any(|pair| pair[0] != pair[1]);
-        let complete = experiment.output.iter().all(|y| y.is_finite());
-        (moves && complete).then_some(parts)
-    }
-}
-
-/// A candidate and the squared errors of its simulation by block, over the rest's own variation.
-fn candidate(
-    experiment: Experiment<'_>,
-    parts: Option<&Parts>,
-    sample_time_s: f64,
-    order: usize,
-    options: &PemOptions,
-) -> (OrderCandidate, Vec<f64>) {
-    let options = PemOptions {
-        order,
-        block_rows: options.block_rows.max(order + 1),
-        max_iterations: ITERATIONS.min(options.max_iterations),
-        ..options.clone()
-    };
-    let bic = identify(&[experiment], sample_time_s, &options).map_or(f64::NAN, |fit| bic(&fit, options.noise));
-    let judged = parts.and_then(|parts| {
-        let rows = options.block_rows.min(parts.first.1.len() / 5).max(order + 1);
-        let options = PemOptions { block_rows: rows, ..options };
-        let first = Experiment { input: &parts.first.0, output: &parts.first.1 };
-        let fit = identify(&[first], sample_time_s, &options).ok()?;
-        let nuisances = Nuisances { offset: options.offset, slope: options.slope };
-        let simulation =
-            simulate_held_out(&fit.model, &fit.further_inputs, &parts.rest.0, &parts.rest.1, nuisances).ok()?;
-        let errors: Vec<f64> = simulation.response.iter().zip(&parts.rest.1).map(|(x, y)| (x - y).powi(2)).collect();
-        let size = errors.len().div_ceil(BLOCKS).max(1);
-        Some((simulation.fit_percent, errors.chunks(size).map(|block| block.iter().sum()).collect()))
-    });
-    let (held_out_percent, blocks) = judged.unwrap_or((f64::NAN, Vec::new()));
-    (OrderCandidate { order, bic, held_out_percent }, blocks)
-}
-
-fn bic(fit: &Identified, noise: NoiseModel) -> f64 {
-    let present: Vec<f64> = fit.residuals.iter().flatten().copied().filter(|e| e.is_finite()).collect();
-    let (n, order) = (present.len() as f64, fit.model.order());
-    let noise = match noise {
-        NoiseModel::White | NoiseModel::Coloured => 0,
-        NoiseModel::Thermal => order.div_ceil(2),
-        NoiseModel::Free => order,
-    };
-    let count = fit.covariance.nrows() + noise;
-    let mean = present.iter().map(|e| e * e).sum::<f64>() / n;
-    n * mean.max(f64::MIN_POSITIVE).ln() + count as f64 * n.ln()
-}
-
-/// The smallest order that is no worse than the best by more than one standard error of their difference.
-fn smallest_within_error(candidates: &[(OrderCandidate, Vec<f64>)]) -> Option<usize> {
-    let total = |blocks: &[f64]| blocks.iter().sum::<f64>();
-    let judged = || candidates.iter().filter(|(_, blocks)| !blocks.is_empty());
-    let (_, best) = judged().min_by(|(_, x), (_, y)| total(x).total_cmp(&total(y)))?;
-    let within = |blocks: &[f64]| {
-        let differences: Vec<f64> = blocks.iter().zip(best).map(|(x, y)| x - y).collect();
-        let count = differences.len() as f64;
-        let mean = differences.iter().sum::<f64>() / count;
-        let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        mean <= (spread / count).sqrt()
-    };
-    judged().find(|(_, blocks)| within(blocks)).map(|(candidate, _)| candidate.order)
-}
-
-/// Where the ratio of consecutive singular values is largest, 1 to `most`.
-pub(super) fn largest_gap(singular_values: &[f64], most: usize) -> usize {
-    let floor = 1e-15 * singular_values.first().copied().unwrap_or(0.0);
-    let ratio = |n: usize| singular_values[n - 1] / singular_values[n].max(floor).max(f64::MIN_POSITIVE);
-    (1..singular_values.len().min(most + 1)).max_by(|&x, &y| ratio(x).total_cmp(&ratio(y))).unwrap_or(0)
-}
-
-impl OrderChoice {
-    /// For a stage's summary; unknown numbers are null.
-    pub(super) fn document(&self) -> Value {
-        let known = |value: f64| value.is_finite().then_some(value);
-        json!({
-            "chosen": self.order,
-            "singular_value_gap": self.gap,
-            "candidates": self.candidates.iter().map(|c| json!({
-                "order": c.order, "bic": known(c.bic), "held_out_percent": known(c.held_out_percent),
-            })).collect::<Vec<Value>>(),
-        })
-    }
+/// A choice for a stage's summary; unknown numbers are null.
+pub(super) fn choice_document(choice: &OrderChoice) -> Value {
+    let known = |value: f64| value.is_finite().then_some(value);
+    json!({
+        "chosen": choice.order,
+        "singular_value_gap": choice.gap,
+        "candidates": choice.candidates.iter().map(|c| json!({
+            "order": c.order, "bic": known(c.bic), "held_out_percent": known(c.held_out_percent),
+        })).collect::<Vec<Value>>(),
+    })
 }
 
 /// FIT % of a fit's simulation of the data that it is from; `None` where there is none.
@@ -247,8 +30,6 @@ pub(super) fn simulated_percent(fit: &Identified, input: &[f64], output: &[f64],
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::white_noise;
-    use afmid_kernels::model::{InnovationsModel, Section};
 
     #[test]
     fn orders_are_numbers_or_auto() {
@@ -261,40 +42,5 @@ mod tests {
                 .is_err()
         };
         assert!(refused(Order::Fixed(41), 20) && refused(Order::Auto, 0) && !refused(Order::Auto, 40));
-    }
-
-    #[test]
-    fn the_order_of_two_resonances_is_found() {
-        let section = |a: [f64; 2], b: [f64; 2]| Section { order: 2, a, b, k: [0.0; 2] };
-        let truth = InnovationsModel {
-            sections: vec![section([-1.7, 0.9], [0.3, 0.1]), section([-0.5, 0.85], [0.4, -0.2])],
-            feedthrough: 0.1,
-            sample_time_s: 1.0,
-        };
-        let options = PemOptions { block_rows: 15, noise: NoiseModel::White, slope: false, ..PemOptions::default() };
-        let found: Vec<usize> = (0..20)
-            .map(|seed| {
-                let (u, e) = (white_noise(450, 1.0, seed), white_noise(450, 0.05, 1000 + seed));
-                let y = truth.simulate(&u, &[0.0; 4]).unwrap();
-                let y: Vec<f64> = y.iter().zip(&e).map(|(y, e)| y + e).collect();
-                choose_order(Experiment { input: &u, output: &y }, 1.0, 7, &options).unwrap().order
-            })
-            .collect();
-        // never too low: an order less leaves a resonance out; a one-standard-error rule errs upwards in one of six
-        assert!(found.iter().all(|order| *order >= 4), "{found:?}");
-        assert!(found.iter().filter(|order| **order == 4).count() >= 12, "{found:?}");
-    }
-
-    #[test]
-    fn a_release_is_judged_by_information_alone() {
-        let u: Vec<f64> = (0..600).map(|k| if k < 100 { 1.0 } else { 0.0 }).collect();
-        let section = Section { order: 2, a: [-1.9, 0.97], b: [0.05, 0.02], k: [0.0; 2] };
-        let truth = InnovationsModel { sections: vec![section], feedthrough: 0.0, sample_time_s: 1.0 };
-        let e = white_noise(600, 0.01, 5);
-        let y: Vec<f64> = truth.simulate(&u, &[1.0, -0.97]).unwrap().iter().zip(&e).map(|(y, e)| y + e).collect();
-        let options = PemOptions { block_rows: 20, noise: NoiseModel::White, ..PemOptions::default() };
-        let choice = choose_order(Experiment { input: &u, output: &y }, 1.0, 6, &options).unwrap();
-        assert_eq!((choice.order, choice.gap), (2, 2));
-        assert!(choice.candidates.iter().all(|c| c.held_out_percent.is_nan() && c.bic.is_finite()));
     }
 }

@@ -7,11 +7,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::order::{Order, OrderChoice, choose_order, simulated_percent};
+use super::order::{Order, choice_document, simulated_percent};
 use crate::artifacts::{DataSet, Pair, PairSeries, state_nuisances, state_space, state_t0_ambiguity};
 use crate::ensemble::LEAST_EVENTS;
+use crate::watched::Watched;
 use afmid_kernels::pem::{Ending, Experiment, Focus, Identified, NoiseModel, PemOptions, identify};
-use afmid_kernels::validation::{Nuisances, TestResult, fit_percent, input_dependence, whiteness};
+use afmid_kernels::validation::{
+    Nuisances, OrderChoice, TestResult, choose_order, fit_percent, input_dependence, whiteness,
+};
 
 /// Identifies a state-space model in innovations form from force and response.
 ///
@@ -130,7 +133,10 @@ impl Stage for Pem {
         let experiment = Experiment { input: &input, output: &output };
         let choice = match self.order {
             Order::Fixed(_) => None,
-            Order::Auto => Some(choose_order(experiment, 1.0 / rate, self.max_order, &self.options(self.max_order))),
+            Order::Auto => {
+                let options = self.options(self.max_order);
+                Some(choose_order(experiment, 1.0 / rate, self.max_order, &options, &Watched(cx)))
+            }
         };
         let choice = choice.transpose().map_err(StageError::from_error)?;
         let order = choice.as_ref().map_or(self.order.largest(0), |choice| choice.order);
@@ -222,7 +228,7 @@ impl Pem {
         let samples = output.len() as f64;
         Document::new(&json!({
             "order": order,
-            "order_choice": choice.map(OrderChoice::document),
+            "order_choice": choice.map(choice_document),
             "set": self.set,
             "samples": output.len(),
             "first_sample": first,

@@ -4,10 +4,10 @@ use afmid_pipeline::{Context, Document, Port, Ports, StageError, StateSpace};
 use faer::c64;
 use serde_json::{Value, json};
 
-use super::order::{OrderChoice, simulated_percent};
+use super::order::{choice_document, simulated_percent};
 use crate::artifacts::{DataSet, PairSeries, state_nuisances, state_space};
 use afmid_kernels::pem::{Experiment, Identified, PemOptions, with_poles};
-use afmid_kernels::validation::Nuisances;
+use afmid_kernels::validation::{Nuisances, OrderChoice};
 
 pub(super) const MODEL: Port<StateSpace> =
     Port::new("model", "model", "the model, with the covariance of its parameters");
@@ -52,7 +52,7 @@ impl Realised<'_> {
     fn summary(&self, fit: &Identified, unstable: usize, series: &PairSeries) -> Result<Document, StageError> {
         Document::new(&json!({
             "order": fit.model.order(),
-            "order_choice": self.choice.map_or(Value::Null, OrderChoice::document),
+            "order_choice": self.choice.map_or(Value::Null, choice_document),
             "singular_value_gap": self.gap,
             "set": self.set,
             "samples": series.output.len(),

@@ -2,7 +2,6 @@
 
 mod gaps;
 mod known;
-mod mode_number;
 mod stretches;
 mod summary;
 mod tables;
@@ -18,12 +17,13 @@ use serde::{Deserialize, Serialize};
 use self::gaps::{gaps, total};
 use self::known::named;
 pub use self::known::{KnownNumber, KnownQuantity};
-pub use self::mode_number::ModeNumber;
 use self::stretches::windows as free_windows;
 use self::summary::summary;
 use self::tables::{event_table, mode_table, poles, spectrum};
+use super::count::Count;
 use crate::artifacts::Ensemble;
 use crate::calibration::FreeSettings;
+use crate::watched::Watched;
 use afmid_kernels::ringdown::{
     ModeCount, ModeEstimate, NoiseSource, Quantity, Ringdown, RingdownOptions, fit_counted_ringdowns, fit_ringdowns,
 };
@@ -115,6 +115,9 @@ pub enum ErrorSource {
     Events,
 }
 
+/// How many modes are fitted: a number, or `"auto"`.
+pub type ModeNumber = Count<20>;
+
 impl Default for RingdownFit {
     fn default() -> Self {
         Self {
@@ -196,7 +199,7 @@ impl Stage for RingdownFit {
         let borrowed: Vec<&[f64]> = free.iter().map(Vec::as_slice).collect();
         let missing = total(&gaps);
         let options = RingdownOptions { missing: gaps, ..self.options(cx.seed())? };
-        let (fit, seen) = self.fitted(&events, &borrowed, 1.0 / rate, &options)?;
+        let (fit, seen) = self.fitted(&events, &borrowed, 1.0 / rate, &options, cx)?;
         self.warn(&fit, &seen, cx);
         let modes = self.estimates(&fit, cx)?;
         Ok(Ports::new()
@@ -294,10 +297,11 @@ impl RingdownFit {
         free: &[&[f64]],
         interval_s: f64,
         options: &RingdownOptions,
+        cx: &Context,
     ) -> Result<(Ringdown, Vec<ModeCount>), StageError> {
         match self.modes {
             ModeNumber::Fixed(_) => fit_ringdowns(events, free, interval_s, options).map(|fit| (fit, Vec::new())),
-            ModeNumber::Auto => fit_counted_ringdowns(events, free, interval_s, self.max_modes, options)
+            ModeNumber::Auto => fit_counted_ringdowns(events, free, interval_s, self.max_modes, options, &Watched(cx))
                 .map(|counted| (counted.fit, counted.seen)),
         }
         .map_err(StageError::from_error)

@@ -12,7 +12,7 @@ use crate::artifacts::{DataSet, Pair, PairSeries};
 use afmid_kernels::model::ModelError;
 use afmid_kernels::pem::Experiment;
 use afmid_kernels::stabilisation::{OrderedPole, PhysicalMode, Stabilisation, StabilisationCriteria, stabilisation};
-use afmid_kernels::subspace::{Era, InstrumentalSubspace, Subspace, Weight};
+use afmid_kernels::subspace::{Subspace, Weight};
 
 /// Shows which poles stay where they are as the order grows, and names the modes and the order.
 ///
@@ -176,28 +176,16 @@ impl StabilisationDiagram {
     /// Poles of each order, from one decomposition.
     fn candidates(&self, series: &PairSeries) -> Result<Vec<(usize, Vec<c64>)>, ModelError> {
         let (u, y, rows) = (&series.input, &series.output, self.block_rows);
-        let poles: PolesAt = match self.method {
-            PoleMethod::Era => {
-                let era = Era::new(&free_decay(series, 0.0), rows)?;
-                Box::new(move |order| era.poles(order))
-            }
-            PoleMethod::Release => {
-                let subspace = Subspace::new(u, y, rows)?;
-                Box::new(move |order| subspace.poles(order))
-            }
-            PoleMethod::N4sid => instrumental(u, y, rows, Weight::N4sid)?,
-            PoleMethod::Moesp => instrumental(u, y, rows, Weight::Moesp)?,
-            PoleMethod::Cva => instrumental(u, y, rows, Weight::Cva)?,
-        };
-        (self.from_order..=self.to_order).step_by(self.step).map(|order| Ok((order, poles(order)?))).collect()
+        let subspace = match self.method {
+            PoleMethod::Era => Subspace::of_decay(&free_decay(series, 0.0), rows),
+            PoleMethod::Release => Subspace::new(u, y, rows),
+            PoleMethod::N4sid => Subspace::with_instruments(u, y, rows, Weight::N4sid),
+            PoleMethod::Moesp => Subspace::with_instruments(u, y, rows, Weight::Moesp),
+            PoleMethod::Cva => Subspace::with_instruments(u, y, rows, Weight::Cva),
+        }?;
+        let orders = (self.from_order..=self.to_order).step_by(self.step);
+        orders.map(|order| Ok((order, subspace.poles(order)?))).collect()
     }
-}
-
-type PolesAt = Box<dyn Fn(usize) -> Result<Vec<c64>, ModelError>>;
-
-fn instrumental(u: &[f64], y: &[f64], rows: usize, weight: Weight) -> Result<PolesAt, ModelError> {
-    let subspace = InstrumentalSubspace::new(u, y, rows, weight)?;
-    Ok(Box::new(move |order| subspace.poles(order)))
 }
 
 fn mode_document(mode: &PhysicalMode) -> Value {

@@ -4,12 +4,14 @@ use afmid_pipeline::{Caching, Context, Example, Faults, Ports, Spec, Stage, Stag
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::order::{Order, choose_order};
+use super::order::Order;
 use super::pem::PAIR;
 use super::realised::{MODEL, Realised, SUMMARY};
 use crate::artifacts::{DataSet, Pair, PairSeries};
+use crate::watched::Watched;
 use afmid_kernels::pem::{Experiment, NoiseModel, PemOptions};
-use afmid_kernels::subspace::{InstrumentalSubspace, Subspace, Weight};
+use afmid_kernels::subspace::{Subspace, Weight};
+use afmid_kernels::validation::{OrderChoice, choose_order};
 
 /// Estimates a state-space model from the column space of Hankel matrices, without iteration.
 ///
@@ -37,7 +39,7 @@ pub struct SubspaceEstimate {
     pub set: DataSet,
     /// Weight: `n4sid`, `moesp`, `cva`, or `release` (no instruments, for inputs that do not excite). Why: as the
     /// events here are.
-    pub weight: WeightKind,
+    pub weight: Weight,
     /// Rows of each Hankel matrix, more than the order and at most 1000. Why: a period of the slowest mode or more; few
     /// blur close poles, many take noise along.
     pub block_rows: usize,
@@ -47,27 +49,13 @@ pub struct SubspaceEstimate {
     pub drift: bool,
 }
 
-/// How the future is weighted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum WeightKind {
-    /// Oblique projection.
-    N4sid,
-    /// Orthogonal projection.
-    Moesp,
-    /// Canonical variates.
-    Cva,
-    /// Without instruments.
-    Release,
-}
-
 impl Default for SubspaceEstimate {
     fn default() -> Self {
         Self {
             order: Order::Fixed(11),
             max_order: 16,
             set: DataSet::All,
-            weight: WeightKind::Release,
+            weight: Weight::Release,
             block_rows: 60,
             offset: true,
             drift: true,
@@ -96,28 +84,18 @@ impl Stage for SubspaceEstimate {
         let series = Pair::new(inputs.get(&PAIR)?).series(self.set, 0)?;
         let choice = match self.order {
             Order::Fixed(_) => None,
-            Order::Auto => Some(self.choose(&series)?),
+            Order::Auto => Some(self.choose(&series, cx)?),
         };
         let order = choice.as_ref().map_or(self.order.largest(0), |choice| choice.order);
         let (u, y, rows) = (&series.input, &series.output, self.block_rows);
-        let instrumental = |weight| {
-            let estimate = InstrumentalSubspace::new(u, y, rows, weight)?;
-            Ok((estimate.poles(order)?, estimate.singular_values().to_vec()))
-        };
-        let (poles, singular_values) = match self.weight {
-            WeightKind::N4sid => instrumental(Weight::N4sid),
-            WeightKind::Moesp => instrumental(Weight::Moesp),
-            WeightKind::Cva => instrumental(Weight::Cva),
-            WeightKind::Release => Subspace::new(u, y, rows)
-                .and_then(|estimate| Ok((estimate.poles(order)?, estimate.singular_values().to_vec()))),
-        }
-        .map_err(StageError::from_error)?;
+        let estimate = Subspace::with_instruments(u, y, rows, self.weight).map_err(StageError::from_error)?;
+        let poles = estimate.poles(order).map_err(StageError::from_error)?;
         let realised = Realised {
             set: self.set,
             first: 0,
             offset: self.offset,
             drift: self.drift,
-            singular_values: &singular_values,
+            singular_values: estimate.singular_values(),
             choice: choice.as_ref(),
             gap: choice.as_ref().map(|choice| choice.gap),
         };
@@ -130,7 +108,7 @@ impl Stage for SubspaceEstimate {
 }
 
 impl SubspaceEstimate {
-    fn choose(&self, series: &PairSeries) -> Result<super::OrderChoice, StageError> {
+    fn choose(&self, series: &PairSeries, cx: &Context) -> Result<OrderChoice, StageError> {
         let options = PemOptions {
             block_rows: self.block_rows,
             noise: NoiseModel::White,
@@ -139,6 +117,7 @@ impl SubspaceEstimate {
             ..PemOptions::default()
         };
         let experiment = Experiment { input: &series.input, output: &series.output };
-        choose_order(experiment, 1.0 / series.rate, self.max_order, &options).map_err(StageError::from_error)
+        choose_order(experiment, 1.0 / series.rate, self.max_order, &options, &Watched(cx))
+            .map_err(StageError::from_error)
     }
 }

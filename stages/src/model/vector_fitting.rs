@@ -1,6 +1,6 @@
 //! The stage `model.vector_fitting`.
 
-use afmid_kernels::spectra::Intersample;
+use afmid_kernels::spectra::{Intersample, Presence};
 use afmid_pipeline::{
     Array, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace,
 };
@@ -11,7 +11,6 @@ use serde_json::json;
 
 use super::realised::MODEL;
 use crate::artifacts::{DataSet, Transfer, state_space};
-use crate::spectrum::TransientChoice;
 use afmid_kernels::pem::{Ending, Identified, Verdict};
 use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFit, VectorFitting, vector_fitting};
 
@@ -55,7 +54,7 @@ pub struct VectorFittingEstimate {
     pub intersample: Intersample,
     /// What the ends of the window add: `auto` (fitted for a response from differences that is not smoothed), `on` or
     /// `off`.
-    pub transient: TransientChoice,
+    pub transient: Presence,
     /// Relocations of the poles at most. Why: ten are usual.
     #[schemars(range(min = 1, max = 1000))]
     pub iterations: usize,
@@ -85,7 +84,7 @@ impl Default for VectorFittingEstimate {
             max_frequency_hz: None,
             weight: ResponseWeight::Variance,
             intersample: Intersample::Held,
-            transient: TransientChoice::Auto,
+            transient: Presence::Auto,
             iterations: kernel.iterations,
             refine: kernel.refine,
             stable: kernel.stable,
@@ -184,11 +183,7 @@ impl VectorFittingEstimate {
     fn settings(&self, given: &Transfer<'_>) -> Result<VectorFitting, StageError> {
         let smoothed = given.half_width_bins();
         let differenced = given.differenced();
-        let wanted = match self.transient {
-            TransientChoice::On => true,
-            TransientChoice::Off => false,
-            TransientChoice::Auto => differenced && smoothed.is_none(),
-        };
+        let wanted = self.transient.given().unwrap_or(differenced && smoothed.is_none());
         let width = match given.frequency_hz {
             [first, second, ..] => second - first,
             _ => f64::NAN,

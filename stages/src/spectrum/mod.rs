@@ -16,8 +16,8 @@ mod chain_tests;
 pub use etfe::Etfe;
 pub use frf::Frf;
 pub use periodogram::Periodogram;
-pub use smoothing::{LineParams, Smoothing, SmoothingMethod, TransientChoice};
-pub use thermal::{Presence, SpectrumWindow, Thermal};
+pub use smoothing::{LineParams, Smoothing, SmoothingMethod};
+pub use thermal::{SpectrumWindow, Thermal};
 pub use welch::Welch;
 pub use window::Window;
 

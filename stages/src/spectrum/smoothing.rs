@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::etfe::ETFE;
 use crate::artifacts::Transfer;
 use afmid_kernels::spectra::{
-    Bins, PolynomialSettings, RationalSettings, SuppressedLine, local_polynomial, local_rational,
+    Bins, PolynomialSettings, Presence, RationalSettings, SuppressedLine, local_polynomial, local_rational,
 };
 
 /// Smooths a transfer function by local models of real and imaginary parts.
@@ -46,7 +46,7 @@ pub struct Smoothing {
     pub denominator_order: usize,
     /// Transient in the rational: `auto` (for differences), `on` or `off`. Why: tapered series have their own errors,
     /// which it does not describe.
-    pub transient: TransientChoice,
+    pub transient: Presence,
     /// Order of the transient.
     #[schemars(range(min = 0, max = 6))]
     pub transient_order: usize,
@@ -82,18 +82,6 @@ pub enum SmoothingMethod {
     LocalPolynomial,
 }
 
-/// Whether the local rational has a transient.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum TransientChoice {
-    /// Where the estimate comes from differences.
-    Auto,
-    /// Always.
-    On,
-    /// Never.
-    Off,
-}
-
 impl Default for Smoothing {
     fn default() -> Self {
         Self {
@@ -101,7 +89,7 @@ impl Default for Smoothing {
             half_width_bins: 10,
             numerator_order: 2,
             denominator_order: 2,
-            transient: TransientChoice::Auto,
+            transient: Presence::Auto,
             transient_order: 1,
             degree: 2,
             adapt_sigma: 2.0,
@@ -160,11 +148,7 @@ impl Stage for Smoothing {
 
 impl Smoothing {
     fn rational(&self, etfe: &Transfer<'_>) -> Result<RationalSettings, StageError> {
-        let wanted = match self.transient {
-            TransientChoice::On => true,
-            TransientChoice::Off => false,
-            TransientChoice::Auto => etfe.differenced(),
-        };
+        let wanted = self.transient.given().unwrap_or(etfe.differenced());
         let transient = if wanted { Some((self.transient_order, etfe.event_turns_per_bin()?)) } else { None };
         Ok(RationalSettings {
             numerator_order: self.numerator_order,

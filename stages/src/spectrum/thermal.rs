@@ -9,7 +9,9 @@ use serde_json::{Value, json};
 
 use crate::artifacts::Density;
 use crate::io::DENSITY;
-use afmid_kernels::spectra::{AveragedDensity, Fitted, SeenThrough, ThermalFit, ThermalFitSettings, thermal_fit};
+use afmid_kernels::spectra::{
+    AveragedDensity, Fitted, Presence, SeenThrough, ThermalFit, ThermalFitSettings, thermal_fit,
+};
 
 /// Fits a thermal spectrum: resonance, quality factor, level, white and 1/f noise.
 ///
@@ -71,18 +73,6 @@ pub enum SpectrumWindow {
     None,
 }
 
-/// Whether a term is in the model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Presence {
-    /// Where the data ask for it.
-    Auto,
-    /// Always.
-    On,
-    /// Never.
-    Off,
-}
-
 impl Default for Thermal {
     fn default() -> Self {
         Self {
@@ -132,11 +122,7 @@ impl Stage for Thermal {
             lowest_hz: self.lowest_hz,
             highest_hz: self.highest_hz.unwrap_or(f64::INFINITY),
             line_false_alarm: self.line_false_alarm,
-            flicker: match self.flicker {
-                Presence::Auto => None,
-                Presence::On => Some(true),
-                Presence::Off => Some(false),
-            },
+            flicker: self.flicker,
         };
         let fit = thermal_fit(data, settings).map_err(StageError::from_error)?;
         self.warn(&fit, f, data.averages, cx);

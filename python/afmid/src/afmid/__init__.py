@@ -16,7 +16,7 @@ from .response import frequency_response
 from .result import Result, open
 from .stage import Source, Stage
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "AfmidError",
     "Damaged",

@@ -3,9 +3,9 @@
 use super::*;
 use crate::fixture::{Lever as ClosedForm, white_noise};
 use crate::signal::{AveragedPeriodogram, Detrend, Welch};
+use crate::simulate::paper::paper_microscope;
 use crate::simulate::{
-    Adc, Contact, Detector, LinearSystem, Microscope, ModalLever, Mode, PhaseProblem, PiezoMonitor, Place,
-    ReadoutNoise, Scatter, SimulatedRecord, Square, Target, TriangleRamp, archive_stream,
+    LinearSystem, Microscope, PhaseProblem, Place, Scatter, SimulatedRecord, Square, Target, archive_stream,
 };
 use crate::spectra::{AveragedDensity, PeakSearch, SeenThrough, ThermalFit, thermal_peak};
 
@@ -14,33 +14,7 @@ const TEMPERATURE_K: f64 = 295.0;
 const FACTOR: f64 = 0.8979 * 0.8979 / 0.9713;
 
 fn microscope() -> Microscope {
-    let closed = ClosedForm::paper();
-    let tip_shares = [0.9713, 0.0247, 0.0032, 0.0008];
-    let modes = (0..4)
-        .map(|i| Mode {
-            frequency_hz: closed.frequency_hz[i],
-            quality_factor: closed.quality_factor[i],
-            tip_share: tip_shares[i],
-            detector_share: closed.static_share[i],
-        })
-        .collect();
-    Microscope {
-        lever: ModalLever { stiffness_n_per_m: 3.8, modes },
-        contact: Contact {
-            stiffness_n_per_m: 60.0,
-            damping_n_s_per_m: 8e-6,
-            snap_in_gap_m: 4e-9,
-            adhesion_n: 330e-9,
-            adhesion_scatter: 0.06,
-        },
-        detector: Detector { sensitivity_v_per_m: 1e7, pole_hz: closed.detector_pole_hz, delay_s: 0.0 },
-        noise: ReadoutNoise { white_v: 1.2e-3, pink_v: 0.3e-3, drift_v: 4e-3 },
-        adc: Adc { bits: 12, lsb_v: 0.977e-3 },
-        monitor: PiezoMonitor { m_per_v: 25e-9, lsb_v: 4.88e-3, white_v: 5e-4 },
-        ramp: TriangleRamp { frequency_hz: 5.58, range_m: 200e-9, phase: 0.0 },
-        temperature_k: TEMPERATURE_K,
-        sample_rate_hz: 5e6,
-    }
+    paper_microscope(TEMPERATURE_K)
 }
 
 fn archive(records: usize, seed: u64) -> Vec<SimulatedRecord> {

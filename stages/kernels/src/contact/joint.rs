@@ -1,5 +1,8 @@
 //! Contact, tip shares and contact resonances from both ringings together.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::estimate::contact_stiffness;
 use super::joint_model::JointModel;
 use super::joint_result::{JointContact, ResidueTest, Solved};
@@ -12,11 +15,12 @@ use crate::model::ModelError;
 use crate::statistics::chi_square_tail;
 
 /// How the contact's force depends on frequency.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum LawChoice {
-    /// A spring and a damper.
+    /// A spring and a damper: `k_c + eta s`.
     SpringDamper,
-    /// With a term of second order.
+    /// With a term of second order: `k_c + eta s + mu s^2`.
     SecondOrder,
     /// The second where it lowers chi square by more than nine: three standard errors of its term.
     Auto,

@@ -11,7 +11,7 @@ use super::search::{search, tried};
 use crate::model::ModelError;
 use crate::ringdown::Knowledge;
 use crate::ringdown::internals::pole_of;
-use crate::subspace::{InstrumentalSubspace, Subspace, Weight};
+use crate::subspace::{Subspace, Weight};
 
 /// Decays per sample of the fastest real pole on the grid; each further pole has half of the one before.
 const DECAYS: [f64; 5] = [2.0, 0.7, 0.2, 0.05, 0.01];
@@ -169,7 +169,7 @@ fn subspace(options: &GreyOptions, u: &[f64], y: &[f64]) -> Result<Vec<Vec<[f64;
     let rows = options.block_rows;
     let plain = Subspace::new(u, y, rows)?;
     let instrumental =
-        InstrumentalSubspace::new(u, y, rows.min(y.len() / (4 + 2 * (u.len() / y.len()))), Weight::Moesp);
+        Subspace::with_instruments(u, y, rows.min(y.len() / (4 + 2 * (u.len() / y.len()))), Weight::Moesp);
     let mut sets = Vec::new();
     for order in [least, least + 2, least + 4] {
         // an order that is too high, or whose eigenvalues fail, is no start; others are

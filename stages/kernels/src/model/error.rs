@@ -69,6 +69,9 @@ pub enum ModelError {
     /// The result is not a finite model.
     #[error("the fit has no finite result: {0}")]
     Degenerate(&'static str),
+    /// Whoever watches did not want the result any more.
+    #[error("cancelled")]
+    Cancelled,
 }
 
 /// Checks that a series is finite. Errors: [`ModelError::NotFinite`].

@@ -13,6 +13,7 @@ use super::options::{NoiseSource, RingdownOptions};
 use super::records::Records;
 use super::search::Point;
 use crate::model::ModelError;
+use crate::monitor::Monitor;
 
 /// What a number of modes made of the events.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,7 +71,7 @@ const BEYOND_RINGING: usize = 4;
 /// four events on.
 /// # Errors
 /// Those of [`fit_ringdowns`] with one mode; `most` of 0; given start values or knowledge of single modes, which have
-/// no meaning yet.
+/// no meaning yet; cancelled by the monitor.
 /// # Source
 /// G. Schwarz, Ann. Stat. 6 (1978) 461; M. Stone, J. R. Stat. Soc. B 36 (1974) 111.
 pub fn fit_counted_ringdowns(
@@ -79,13 +80,22 @@ pub fn fit_counted_ringdowns(
     interval_s: f64,
     most: usize,
     options: &RingdownOptions,
+    monitor: &dyn Monitor,
 ) -> Result<CountedRingdown, ModelError> {
     check(most, options)?;
     let all = Data { events, free, interval_s };
     let ladder = ladder(&all, most, BEYOND, options, ARRIVED)?;
     let sufficient = all.fitted(&ladder.steps[ladder.best], options, ARRIVED)?;
     let judged = RingdownOptions { noise: NoiseSource::Known(sufficient.noise.clone()), ..options.clone() };
-    let tries: Vec<Try> = ladder.steps.iter().map(|start| Try::of(&all, start, &judged)).collect();
+    monitor.expect(ladder.steps.len());
+    let mut tries = Vec::new();
+    for start in &ladder.steps {
+        if monitor.is_cancelled() {
+            return Err(ModelError::Cancelled);
+        }
+        tries.push(Try::of(&all, start, &judged));
+        monitor.tick();
+    }
     let mut seen = Vec::new();
     let mut chosen: Option<usize> = None;
     for (i, this) in tries.iter().enumerate() {

@@ -2,6 +2,7 @@
 
 use super::tests::INTERVAL_S;
 use super::{CountedRingdown, NoiseSource, RingdownOptions, fit_counted_ringdowns};
+use crate::Unwatched;
 use crate::fixture::{Lever, white_noise};
 use crate::model::ModelError;
 
@@ -28,7 +29,7 @@ fn counted(modes: usize, events: usize, seed: u64, noise: NoiseSource) -> Counte
         .collect();
     let borrowed: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
     let options = RingdownOptions { noise, ..RingdownOptions::default() };
-    fit_counted_ringdowns(&borrowed, &[], INTERVAL_S, 7, &options).unwrap()
+    fit_counted_ringdowns(&borrowed, &[], INTERVAL_S, 7, &options, &Unwatched).unwrap()
 }
 
 /// How many of some seeds give the right number, and the mean square of the modes' errors over their standard errors.
@@ -92,6 +93,6 @@ fn what_was_seen_is_reported() {
 #[test]
 fn none_is_refused() {
     let y = white_noise(400, 1.0, 1);
-    let found = fit_counted_ringdowns(&[&y], &[], INTERVAL_S, 0, &RingdownOptions::default());
+    let found = fit_counted_ringdowns(&[&y], &[], INTERVAL_S, 0, &RingdownOptions::default(), &Unwatched);
     assert!(matches!(found, Err(ModelError::Parameter { .. })));
 }

@@ -1,6 +1,7 @@
 //! Start values: exponentials of a free decay from its Hankel matrix.
 
-use crate::linear_algebra::{eigenvalues, least_squares, product, solve};
+use super::decay::centred_gram;
+use crate::linear_algebra::{dot, eigenvalues, least_squares, product, solve};
 use faer::{Mat, c64};
 
 use super::modal_form::Exponential;
@@ -20,32 +21,10 @@ pub(super) fn decay_poles(values: &[f64], rows: usize, order: usize) -> Result<V
     if values.len() < 3 * rows {
         return Err(ModelError::TooShort { found: values.len(), wanted: 3 * rows });
     }
-    let space = dominant_space(&centred_gram(values, rows), order)?;
+    let space = dominant_space(&centred_gram(values, rows, dot), order)?;
     let upper = space.as_ref().get(..rows - 1, ..).to_owned();
     let lower = space.as_ref().get(1.., ..).to_owned();
     Ok(eigenvalues(&least_squares(&upper, &lower, f64::EPSILON)?)?)
-}
-
-/// `H H^T` with each row's mean removed.
-fn centred_gram(values: &[f64], rows: usize) -> Mat<f64> {
-    let windows = values.len() - rows + 1;
-    let mut sums = vec![values[..windows].iter().sum::<f64>()];
-    for i in 1..rows {
-        sums.push(sums[i - 1] + values[windows + i - 1] - values[i - 1]);
-    }
-    let mut gram = Mat::zeros(rows, rows);
-    for lag in 0..rows {
-        let mut sum: f64 = values[..windows].iter().zip(&values[lag..]).map(|(a, b)| a * b).sum();
-        for i in 0..rows - lag {
-            let centred = sum - sums[i] * sums[i + lag] / windows as f64;
-            gram[(i, i + lag)] = centred;
-            gram[(i + lag, i)] = centred;
-            if i + lag + 1 < rows {
-                sum += values[windows + i] * values[windows + i + lag] - values[i] * values[i + lag];
-            }
-        }
-    }
-    gram
 }
 
 /// Orthonormal columns that span the strongest `order` directions of a symmetric matrix.

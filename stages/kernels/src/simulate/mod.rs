@@ -45,6 +45,8 @@ mod lever;
 mod motion;
 mod noise_free;
 mod optics;
+#[cfg(test)]
+pub(crate) mod paper;
 mod phases;
 mod propagator;
 mod ramp;

@@ -189,18 +189,13 @@ fn out_of_reach(options: &[Vec<Attainable>], target: Target) -> SimulateError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulate::paper::{PAPER_CONTACT, PAPER_RAMP};
     use rand::SeedableRng;
 
     fn problem() -> PhaseProblem {
         PhaseProblem {
-            ramp: TriangleRamp { frequency_hz: 5.58, range_m: 200e-9, phase: 0.0 },
-            contact: Contact {
-                stiffness_n_per_m: 60.0,
-                damping_n_s_per_m: 8e-6,
-                snap_in_gap_m: 4e-9,
-                adhesion_n: 330e-9,
-                adhesion_scatter: 0.06,
-            },
+            ramp: PAPER_RAMP,
+            contact: PAPER_CONTACT,
             stiffness_n_per_m: 3.8,
             duration_s: 0.6,
             margin_s: 0.004,

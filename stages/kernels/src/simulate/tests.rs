@@ -1,39 +1,10 @@
 //! The simulator against closed forms and its own invariants.
 
+use super::paper::paper_microscope;
 use super::*;
 use crate::fixture::Lever as ClosedForm;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-
-fn paper(temperature_k: f64) -> Microscope {
-    let closed = ClosedForm::paper();
-    let tip_shares = [0.9713, 0.0247, 0.0032, 0.0008];
-    let modes = (0..4)
-        .map(|i| Mode {
-            frequency_hz: closed.frequency_hz[i],
-            quality_factor: closed.quality_factor[i],
-            tip_share: tip_shares[i],
-            detector_share: closed.static_share[i],
-        })
-        .collect();
-    Microscope {
-        lever: ModalLever { stiffness_n_per_m: 3.8, modes },
-        contact: Contact {
-            stiffness_n_per_m: 60.0,
-            damping_n_s_per_m: 8e-6,
-            snap_in_gap_m: 4e-9,
-            adhesion_n: 330e-9,
-            adhesion_scatter: 0.06,
-        },
-        detector: Detector { sensitivity_v_per_m: 1e7, pole_hz: closed.detector_pole_hz, delay_s: 0.0 },
-        noise: ReadoutNoise { white_v: 1.2e-3, pink_v: 0.3e-3, drift_v: 4e-3 },
-        adc: Adc { bits: 12, lsb_v: 0.977e-3 },
-        monitor: PiezoMonitor { m_per_v: 25e-9, lsb_v: 4.88e-3, white_v: 5e-4 },
-        ramp: TriangleRamp { frequency_hz: 5.58, range_m: 200e-9, phase: 0.0 },
-        temperature_k,
-        sample_rate_hz: 5e6,
-    }
-}
 
 /// Motion from `start_s` on, with the surface at -22 nm and one pull-off force.
 fn motion(microscope: &Microscope, sampling: Sampling, pull_off_n: f64, seed: u64) -> Motion {
@@ -51,7 +22,7 @@ fn pull_off_s(microscope: &Microscope) -> f64 {
 
 #[test]
 fn snap_off_rings_down_as_the_closed_form_does() {
-    let microscope = paper(0.0);
+    let microscope = paper_microscope(0.0);
     let interval_s = 2e-7;
     let start_s = pull_off_s(&microscope) - 2e-3;
     let result = motion(&microscope, Sampling { start_s, interval_s, samples: 40_000 }, 330e-9, 1);
@@ -74,7 +45,7 @@ fn snap_off_rings_down_as_the_closed_form_does() {
 
 #[test]
 fn contact_deflects_by_the_series_of_both_springs() {
-    let mut microscope = paper(0.0);
+    let mut microscope = paper_microscope(0.0);
     // 1 pm per second: at rest
     microscope.ramp = TriangleRamp { frequency_hz: 2.5e-6, range_m: 200e-9, phase: 0.4 };
     let result = motion(&microscope, Sampling { start_s: 0.0, interval_s: 2e-7, samples: 2000 }, 330e-9, 1);
@@ -88,7 +59,7 @@ fn contact_deflects_by_the_series_of_both_springs() {
 
 #[test]
 fn halving_the_step_changes_nothing() {
-    let microscope = paper(0.0);
+    let microscope = paper_microscope(0.0);
     let start_s = microscope.ramp.passes_s(0, -18e-9) - 1e-4;
     let coarse = motion(&microscope, Sampling { start_s, interval_s: 2e-7, samples: 5000 }, 330e-9, 1);
     let fine = motion(&microscope, Sampling { start_s, interval_s: 1e-7, samples: 10_000 }, 330e-9, 1);
@@ -103,7 +74,7 @@ fn halving_the_step_changes_nothing() {
 
 #[test]
 fn kink_of_the_ramp_is_met_within_a_sample() {
-    let microscope = paper(0.0);
+    let microscope = paper_microscope(0.0);
     let kink = microscope.ramp.end_s(0);
     let at = |offset: f64| {
         let sampling = Sampling { start_s: kink - 300.5e-7 + offset, interval_s: 2e-7, samples: 4000 };
@@ -118,7 +89,7 @@ fn kink_of_the_ramp_is_met_within_a_sample() {
 
 #[test]
 fn thermal_motion_obeys_equipartition_free_and_attached() {
-    let microscope = paper(295.0);
+    let microscope = paper_microscope(295.0);
     let thermal = BOLTZMANN_J_PER_K * 295.0;
     let system = AfmSystem::new(&microscope.lever, &microscope.contact, &microscope.detector, 295.0);
     let free = system.free.stationary_covariance(2e-7);
@@ -141,7 +112,7 @@ fn thermal_motion_obeys_equipartition_free_and_attached() {
 
 #[test]
 fn simulated_free_flight_has_the_thermal_variance() {
-    let mut microscope = paper(295.0);
+    let mut microscope = paper_microscope(295.0);
     microscope.detector.pole_hz.clear();
     microscope.ramp = TriangleRamp { frequency_hz: 1e-6, range_m: 200e-9, phase: 0.0 };
     let expected: f64 = microscope
@@ -169,7 +140,7 @@ fn place(record: usize, records: usize, samples: usize) -> Place {
 
 #[test]
 fn a_record_holds_what_its_plan_says() {
-    let microscope = paper(295.0);
+    let microscope = paper_microscope(295.0);
     let scatter = Scatter { surface_m: -22e-9, surface_std_m: 3e-9 };
     let samples = 900_000;
     let place = place(3, 12, samples);
@@ -214,7 +185,7 @@ fn a_record_holds_what_its_plan_says() {
 
 #[test]
 fn delay_moves_the_deflection_and_not_the_piezo() {
-    let mut microscope = paper(0.0);
+    let mut microscope = paper_microscope(0.0);
     let plan = RecordPlan { surface_m: -22e-9, pull_off_n: vec![330e-9] };
     let phase = microscope.ramp.frequency_hz * (pull_off_s(&microscope) - 1e-3);
     microscope.noise = ReadoutNoise { white_v: 0.0, pink_v: 0.0, drift_v: 0.0 };
@@ -231,14 +202,14 @@ fn delay_moves_the_deflection_and_not_the_piezo() {
 
 #[test]
 fn impossible_parameters_are_refused_with_a_reason() {
-    let mut microscope = paper(295.0);
+    let mut microscope = paper_microscope(295.0);
     assert!(microscope.check().is_ok());
     microscope.lever.modes[0].tip_share = 0.9;
     assert!(microscope.check().unwrap_err().to_string().contains("sum must be 1"));
-    let mut microscope = paper(295.0);
+    let mut microscope = paper_microscope(295.0);
     microscope.contact.adhesion_n = 250e-9;
     assert!(microscope.check().unwrap_err().to_string().contains("tears the contact"));
-    let mut microscope = paper(295.0);
+    let mut microscope = paper_microscope(295.0);
     microscope.sample_rate_hz = 1e6;
     assert!(microscope.check().unwrap_err().to_string().contains("twice the highest"));
 }

@@ -1,6 +1,7 @@
 //! The thermal peak of one mode, cut out of a spectrum with others.
 
 use super::error::SpectrumError;
+use super::presence::Presence;
 use super::thermal_fit::{AveragedDensity, ThermalFit, ThermalFitSettings, thermal_fit};
 
 /// Where a peak is sought and how much of the spectrum round it is fitted.
@@ -39,7 +40,10 @@ pub fn thermal_peak(spectrum: AveragedDensity<'_>, search: PeakSearch) -> Result
     let to = f.partition_point(|f| *f <= near_hz * band).min(last);
     let from = f.partition_point(|f| *f < near_hz / band).clamp(EDGE.min(to), to);
     let cut = AveragedDensity { frequency_hz: &f[from..to], density: &spectrum.density[from..to], ..spectrum };
-    thermal_fit(cut, ThermalFitSettings { lowest_hz, highest_hz, line_false_alarm: LINE_FALSE_ALARM, flicker: None })
+    thermal_fit(
+        cut,
+        ThermalFitSettings { lowest_hz, highest_hz, line_false_alarm: LINE_FALSE_ALARM, flicker: Presence::Auto },
+    )
 }
 
 fn strongest(spectrum: AveragedDensity<'_>, search: PeakSearch) -> Option<f64> {

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 use super::*;
 use crate::fixture::{Lever, white_noise};
 use crate::pem::Experiment;
-use crate::subspace::{Era, Subspace};
+use crate::subspace::Subspace;
 
 const SAMPLES: usize = 8192;
 const T0: usize = 1024;
@@ -25,7 +25,7 @@ fn diagram(modes: usize, seed: u64, era: bool) -> Stabilisation {
     let y: Vec<f64> = lever(modes).release(SAMPLES, T0 as f64, -0.8).iter().zip(noise).map(|(y, e)| y + e).collect();
     let u: Vec<f64> = (0..SAMPLES).map(|k| if k < T0 { -0.8 } else { 0.0 }).collect();
     let candidates: Vec<(usize, Vec<c64>)> = if era {
-        let era = Era::new(&y[T0..], 300).unwrap();
+        let era = Subspace::of_decay(&y[T0..], 300).unwrap();
         (2..=40).map(|order| (order, era.poles(order).unwrap())).collect()
     } else {
         let subspace = Subspace::new(&u, &y, 300).unwrap();

@@ -1,57 +1,42 @@
 //! Subspace identification with past inputs and outputs as instruments: N4SID, MOESP and CVA weights.
 
-use crate::linear_algebra::{Qr, Svd, eigenvalues, least_squares, product};
-use faer::{Mat, c64};
+use crate::linear_algebra::{Qr, Svd, product};
+use faer::Mat;
 
+use super::past_future::{Subspace, input_basis};
+use super::weight::Weight;
 use crate::model::{ModelError, finite};
-use crate::subspace::past_future::input_basis;
-
-/// How the future, predicted from the past, is weighted before its singular values are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Weight {
-    /// Not at all: the oblique projection.
-    N4sid,
-    /// The future input's directions removed on the right.
-    Moesp,
-    /// Also scaled by the future output's covariance: canonical variates, least variance for white inputs.
-    Cva,
-}
-
-/// The observability matrix's column space, estimated from what the past says about the future.
-///
-/// # Model
-/// Innovations form, one output: `x(t+1) = A x + B u + K e`, `y = C x + D u + e`; an offset of y is allowed. The noise
-/// may be coloured.
-/// # Method
-/// QR of `[1; U_f]`, past `[U_p; Y_p]`, `Y_f`; singular value decomposition of the part of `Y_f` that the past
-/// explains, weighted; A by shift invariance, in the least-squares sense.
-/// # Shapes
-/// u, y: N samples, several inputs one after the other; singular values: `block_rows`.
-/// # Units
-/// Poles in the z plane; each signal is scaled to its peak first.
-/// # Accuracy
-/// Consistent as N and the block rows grow, if the input excites 2 `block_rows` rows: start values, some per cent from
-/// the likelihood's maximum. The weights differ in the metric alone in which the order is cut off: with noise below the
-/// weakest state, or a white input, N4SID and MOESP agree to a per cent, and CVA gains 4 to 10 % where the noise is
-/// coloured; a coloured input sets N4SID behind MOESP (60 seeds, test). Singular values always differ.
-/// # Errors
-/// Lengths, values that are not finite, fewer than `(4 + 2 inputs) block_rows` samples, no convergence of a
-/// decomposition.
-/// # Source
-/// P. Van Overschee and B. De Moor, Subspace Identification for Linear Systems (1996), chapter 4; L. Ljung (1999),
-/// section 10.6.
-#[derive(Debug, Clone)]
-pub struct InstrumentalSubspace {
-    left: Mat<f64>,
-    singular_values: Vec<f64>,
-}
 
 /// Directions below this share of the strongest are not excited: a thousand roundings of QR.
 const TOLERANCE: f64 = 1e-12;
 
-impl InstrumentalSubspace {
-    /// Estimates with `block_rows` rows of past and as many of future (at least 2).
-    pub fn new(u: &[f64], y: &[f64], block_rows: usize, weight: Weight) -> Result<Self, ModelError> {
+impl Subspace {
+    /// The observability matrix's column space, estimated from what the past says about the future.
+    ///
+    /// # Model
+    /// Innovations form, one output: `x(t+1) = A x + B u + K e`, `y = C x + D u + e`; an offset of y is allowed. The noise
+    /// may be coloured.
+    /// # Method
+    /// QR of `[1; U_f]`, past `[U_p; Y_p]`, `Y_f`; singular value decomposition of the part of `Y_f` that the past
+    /// explains, weighted; A by shift invariance, in the least-squares sense.
+    /// # Shapes
+    /// u, y: N samples, several inputs one after the other; singular values: `block_rows`.
+    /// # Units
+    /// Poles in the z plane; each signal is scaled to its peak first.
+    /// # Accuracy
+    /// Consistent as N and the block rows grow, if the input excites 2 `block_rows` rows: start values, some per cent from
+    /// the likelihood's maximum. The weights differ in the metric alone in which the order is cut off: with noise below the
+    /// weakest state, or a white input, N4SID and MOESP agree to a per cent, and CVA gains 4 to 10 % where the noise is
+    /// coloured; a coloured input sets N4SID behind MOESP (60 seeds, test). Singular values always differ.
+    /// # Errors
+    /// Lengths, values that are not finite, fewer than `(4 + 2 inputs) block_rows` samples, no convergence of a
+    /// decomposition.
+    /// # Source
+    /// P. Van Overschee and B. De Moor, Subspace Identification for Linear Systems (1996), chapter 4; L. Ljung (1999),
+    /// section 10.6.
+    ///
+    /// `block_rows` rows of past and as many of future, at least 2.
+    pub fn with_instruments(u: &[f64], y: &[f64], block_rows: usize, weight: Weight) -> Result<Self, ModelError> {
         let (samples, s) = (y.len(), block_rows);
         let inputs = u.len() / samples.max(1);
         if inputs == 0 || u.len() != inputs * samples {
@@ -76,34 +61,13 @@ impl InstrumentalSubspace {
         let (w, f) = (future..future + past, all - s..all);
         let explained = Explained::new(&block(w.clone(), w.clone()), &block(w.clone(), f.clone()))?;
         let (left, singular_values) = match weight {
+            Weight::Release => return Self::new(u, y, block_rows),
             Weight::Moesp => decomposed(&explained.projected)?,
             Weight::N4sid => decomposed(&product(block(0..w.end, w).as_ref(), explained.coefficients.as_ref()))?,
             Weight::Cva => canonical(&explained.projected, &block(future..all, f))?,
         };
         Ok(Self { left, singular_values })
     }
-
-    /// Singular values, descending (CVA: canonical correlations): their fall shows the order.
-    pub fn singular_values(&self) -> &[f64] {
-        &self.singular_values
-    }
-
-    /// Poles of the model of order `order`, 1 to block rows - 1; they need not be stable.
-    pub fn poles(&self, order: usize) -> Result<Vec<c64>, ModelError> {
-        shift_invariant_poles(&self.left, order)
-    }
-}
-
-/// Poles from the first `order` columns of a basis of the observability matrix. Errors: order 0, or no fewer columns or
-/// rows than that.
-pub(super) fn shift_invariant_poles(basis: &Mat<f64>, order: usize) -> Result<Vec<c64>, ModelError> {
-    let rows = basis.nrows();
-    if order == 0 || order >= rows || order > basis.ncols() {
-        return Err(ModelError::Parameter { name: "order", found: order as f64, wanted: "1 to block rows - 1" });
-    }
-    let upper = basis.as_ref().get(..rows - 1, ..order).to_owned();
-    let lower = basis.as_ref().get(1.., ..order).to_owned();
-    Ok(eigenvalues(&least_squares(&upper, &lower, f64::EPSILON)?)?)
 }
 
 /// Future input directions, past, future output: windows x columns.

@@ -2,9 +2,9 @@
 //!
 //! | of | kernel | instruments |
 //! |---|---|---|
-//! | input and output, white output noise | [`Subspace`] (MOESP) | none |
-//! | input and output, any noise | [`InstrumentalSubspace`] (N4SID, MOESP, CVA) | the past |
-//! | a free decay | [`Era`] | none |
+//! | input and output, white output noise | [`Subspace::new`] (MOESP) | none |
+//! | input and output, any noise | [`Subspace::with_instruments`] (N4SID, MOESP, CVA) | the past |
+//! | a free decay | [`Subspace::of_decay`] | none |
 //!
 //! # Cost
 //! For N samples and s block rows: O(N s) to form the products, O(s^3) to decompose them; O(N s^2) where the products
@@ -12,7 +12,7 @@
 //!
 //! ```
 //! use afmid_kernels::modes::Root;
-//! use afmid_kernels::subspace::{Era, Subspace};
+//! use afmid_kernels::subspace::Subspace;
 //! // a resonance at 50 kHz with Q = 40, sampled at 1 MS/s; the input ends, the output rings, with noise
 //! let (w, a) = (std::f64::consts::TAU * 50e3 * 1e-6, std::f64::consts::PI * 50e3 / 40.0 * 1e-6);
 //! let (a1, a2) = (-2.0 * (-a).exp() * w.cos(), (-2.0 * a).exp());
@@ -23,7 +23,7 @@
 //! }
 //! y.iter_mut().enumerate().for_each(|(k, y)| *y += 1e-4 * ((k * k) as f64).sin());
 //! let driven = Subspace::new(&u, &y, 60)?.poles(2)?[0];
-//! let decay = Era::new(&y[200..], 60)?.poles(2)?[0];
+//! let decay = Subspace::of_decay(&y[200..], 60)?.poles(2)?[0];
 //! for z in [driven, decay] {
 //!     let pole = Root::without_errors(z, 1e-6);
 //!     // start values: a tenth of a per cent
@@ -36,9 +36,9 @@ mod instrumental;
 mod past_future;
 #[cfg(test)]
 mod start_tests;
+mod weight;
 #[cfg(test)]
 mod weight_tests;
 
-pub use era::Era;
-pub use instrumental::{InstrumentalSubspace, Weight};
 pub use past_future::Subspace;
+pub use weight::Weight;

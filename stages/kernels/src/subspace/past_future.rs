@@ -30,8 +30,8 @@ use crate::model::{ModelError, finite};
 /// M. Verhaegen and P. Dewilde, Int. J. Control 56 (1992) 1187; L. Ljung, System Identification (1999), section 10.6.
 #[derive(Debug, Clone)]
 pub struct Subspace {
-    left: Mat<f64>,
-    singular_values: Vec<f64>,
+    pub(super) left: Mat<f64>,
+    pub(super) singular_values: Vec<f64>,
 }
 
 /// Energy of an input direction, as a share of the strongest, below which it counts as not excited: well above a Gram
@@ -81,7 +81,7 @@ impl Subspace {
         Ok(Self { left: svd.u, singular_values: svd.s })
     }
 
-    /// Singular values, descending: their fall shows the order.
+    /// Singular values, descending (CVA: canonical correlations): their fall shows the order.
     pub fn singular_values(&self) -> &[f64] {
         &self.singular_values
     }
@@ -93,14 +93,20 @@ impl Subspace {
 
     /// Poles of the model of order `order` (1 to [`Subspace::max_order`]); they need not be stable.
     pub fn poles(&self, order: usize) -> Result<Vec<c64>, ModelError> {
-        if order == 0 || order > self.max_order() {
-            return Err(ModelError::Parameter { name: "order", found: order as f64, wanted: "1 to block rows - 1" });
-        }
-        let rows = self.left.nrows();
-        let upper = self.left.as_ref().get(..rows - 1, ..order).to_owned();
-        let lower = self.left.as_ref().get(1.., ..order).to_owned();
-        Ok(eigenvalues(&least_squares(&upper, &lower, f64::EPSILON)?)?)
+        shift_invariant_poles(&self.left, order)
     }
+}
+
+/// Poles from the first `order` columns of a basis of the observability matrix. Errors: order 0, or no fewer columns or
+/// rows than that.
+pub(super) fn shift_invariant_poles(basis: &Mat<f64>, order: usize) -> Result<Vec<c64>, ModelError> {
+    let rows = basis.nrows();
+    if order == 0 || order >= rows || order > basis.ncols() {
+        return Err(ModelError::Parameter { name: "order", found: order as f64, wanted: "1 to block rows - 1" });
+    }
+    let upper = basis.as_ref().get(..rows - 1, ..order).to_owned();
+    let lower = basis.as_ref().get(1.., ..order).to_owned();
+    Ok(eigenvalues(&least_squares(&upper, &lower, f64::EPSILON)?)?)
 }
 
 /// Columns that span the rows of `[1; U_f]`, from the eigenvectors of their Gram matrix: windows x rank.

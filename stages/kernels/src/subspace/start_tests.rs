@@ -3,8 +3,7 @@
 use faer::c64;
 use rayon::prelude::*;
 
-use super::era::Era;
-use super::instrumental::{InstrumentalSubspace, Weight};
+use super::weight::Weight;
 use crate::fixture::{Lever, white_noise};
 use crate::model::{InnovationsModel, InputGains, Section};
 use crate::pem::{Experiment, Focus, NoiseModel, PemOptions, identify, with_poles};
@@ -67,7 +66,7 @@ fn every_weight_finds_noise_free_poles_with_one_input_and_with_two() {
         let y = driven(&u, further, 0.0, 3);
         let input = [&u, further].concat();
         for weight in [Weight::N4sid, Weight::Moesp, Weight::Cva] {
-            let estimate = InstrumentalSubspace::new(&input, &y, 15, weight).unwrap();
+            let estimate = Subspace::with_instruments(&input, &y, 15, weight).unwrap();
             let s = estimate.singular_values();
             // five states; the rest is rounding, for CVA over the floor of 1e-6
             assert!(s[4] > 1e-6 * s[0] && s[5] < 1e-8 * s[0], "{weight:?} {:?}", &s[..7]);
@@ -87,7 +86,7 @@ fn coloured_noise_biases_no_weight_and_the_likelihood_is_at_the_bound() {
         .map(|&seed| {
             let u = white_noise(2000, 1.0, 100 + seed);
             let y = driven(&u, &[], 0.5, 200 + seed);
-            let of = |weight| distance(&InstrumentalSubspace::new(&u, &y, 20, weight).unwrap().poles(5).unwrap());
+            let of = |weight| distance(&Subspace::with_instruments(&u, &y, 20, weight).unwrap().poles(5).unwrap());
             let options = PemOptions {
                 order: 5,
                 block_rows: 20,
@@ -185,7 +184,7 @@ fn simulation_focus_is_the_better_simulation_and_prediction_focus_the_better_pre
 fn era_finds_the_levers_poles_in_its_free_decay() {
     let lever = Lever::paper();
     let y = lever.release(4096, -0.7, -0.8);
-    let era = Era::new(&y, 60).unwrap();
+    let era = Subspace::of_decay(&y, 60).unwrap();
     let found = era.poles(11).unwrap();
     for pole in &lever.poles()[..8] {
         let z = (pole / lever.sample_rate_hz).exp();
@@ -193,7 +192,7 @@ fn era_finds_the_levers_poles_in_its_free_decay() {
         // rounding over the fourth mode's share of the Hankel matrix, 1e-4
         assert!(nearest < 1e-8, "{z}: {nearest}");
     }
-    assert!(Era::new(&y, 1).is_err() && Era::new(&y[..100], 60).is_err() && era.poles(60).is_err());
+    assert!(Subspace::of_decay(&y, 1).is_err() && Subspace::of_decay(&y[..100], 60).is_err() && era.poles(60).is_err());
 }
 
 #[test]
@@ -204,7 +203,7 @@ fn the_methods_agree_on_a_noisy_decay() {
         let noise = white_noise(4096, 1e-3, 600 + seed);
         let y: Vec<f64> = lever.release(4096, -0.7, -0.8).iter().zip(&noise).map(|(y, e)| y + e).collect();
         let none = vec![0.0; y.len()];
-        let era = Era::new(&y, 300).unwrap().poles(8).unwrap();
+        let era = Subspace::of_decay(&y, 300).unwrap().poles(8).unwrap();
         let moesp = Subspace::new(&none, &y, 300).unwrap().poles(8).unwrap();
         for found in [era, moesp] {
             let nearest = found.iter().map(|w| (w - z).norm()).fold(f64::MAX, f64::min);
@@ -212,7 +211,7 @@ fn the_methods_agree_on_a_noisy_decay() {
             assert!(nearest < 2e-5, "{seed}: {nearest}");
         }
         let options = PemOptions { order: 8, ..PemOptions::default() };
-        let poles = Era::new(&y, 300).unwrap().poles(8).unwrap();
+        let poles = Subspace::of_decay(&y, 300).unwrap().poles(8).unwrap();
         let fit = with_poles(&[Experiment { input: &none, output: &y }], 2e-7, &poles, &options).unwrap();
         // what is left is the noise, and the three detector poles that order 8 leaves out
         assert!(fit.innovation_variance.sqrt() < 1.3e-3, "{}", fit.innovation_variance.sqrt());

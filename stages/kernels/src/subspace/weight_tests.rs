@@ -4,7 +4,8 @@ use crate::linear_algebra::{Svd, least_squares, product};
 use faer::{Mat, c64};
 use rayon::prelude::*;
 
-use super::instrumental::{InstrumentalSubspace, Weight, shift_invariant_poles};
+use super::past_future::{Subspace, shift_invariant_poles};
+use super::weight::Weight;
 use crate::fixture::white_noise;
 use crate::model::{InnovationsModel, Section};
 
@@ -64,6 +65,7 @@ fn by_definition(u: &[f64], y: &[f64], s: usize, weight: Weight) -> (Vec<f64>, V
     let (weighted, back) = match weight {
         Weight::N4sid => (product(past.as_ref(), l.as_ref()), None),
         Weight::Moesp => (product(past_only.as_ref(), l.as_ref()), None),
+        Weight::Release => unreachable!("without instruments"),
         Weight::Cva => {
             let root = Svd::new(&future_only).unwrap();
             let power = |p: i32| {
@@ -88,7 +90,7 @@ fn farthest(found: &[c64], wanted: &[c64]) -> f64 {
 fn every_weight_is_what_its_definition_says() {
     let (u, y) = record(400, 0.8, 0.5, 3);
     for weight in WEIGHTS {
-        let estimate = InstrumentalSubspace::new(&u, &y, 8, weight).unwrap();
+        let estimate = Subspace::with_instruments(&u, &y, 8, weight).unwrap();
         let (singular_values, poles) = by_definition(&u, &y, 8, weight);
         for (fast, slow) in estimate.singular_values().iter().zip(&singular_values) {
             // rounding over the conditioning of a coloured input's 8 rows, 1e3
@@ -103,7 +105,7 @@ fn every_weight_is_what_its_definition_says() {
         }
     }
     // canonical correlations
-    let estimate = InstrumentalSubspace::new(&u, &y, 8, Weight::Cva).unwrap();
+    let estimate = Subspace::with_instruments(&u, &y, 8, Weight::Cva).unwrap();
     assert!(estimate.singular_values().iter().all(|s| (0.0..=1.0 + 1e-12).contains(s)));
 }
 
@@ -117,7 +119,7 @@ fn the_weights_agree_for_white_inputs_and_part_for_coloured_ones() {
             .map(|&seed| {
                 let (u, y) = record(800, colour, 0.5, seed);
                 let error = |weight| {
-                    let estimate = InstrumentalSubspace::new(&u, &y, rows, weight).unwrap();
+                    let estimate = Subspace::with_instruments(&u, &y, rows, weight).unwrap();
                     farthest(&estimate.poles(4).unwrap(), &true_poles)
                 };
                 WEIGHTS.into_iter().map(error).collect()

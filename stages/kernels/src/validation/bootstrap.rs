@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::model::ModelError;
 use crate::modes::Interval;
+use crate::monitor::Monitor;
 
 /// How events are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +61,7 @@ pub fn bootstrap(
     events: usize,
     settings: &BootstrapSettings,
     statistic: impl Fn(&[usize]) -> Result<Vec<f64>, ModelError> + Sync,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<Bootstrapped>, ModelError> {
     let range = |name, found: usize, ok: bool, wanted| {
         if ok { Ok(()) } else { Err(ModelError::Parameter { name, found: found as f64, wanted }) }
@@ -70,10 +72,18 @@ pub fn bootstrap(
     range("block_events", block, (1..=events / 2).contains(&block), "1 to half of the events")?;
     let all: Vec<usize> = (0..events).collect();
     let values = statistic(&all)?;
+    monitor.expect(settings.replicates);
     let found: Vec<Option<Vec<f64>>> = (0..settings.replicates)
         .into_par_iter()
-        .map(|replicate| statistic(&drawn(events, settings, replicate)).ok().filter(|x| x.len() == values.len()))
-        .collect();
+        .map(|replicate| {
+            if monitor.is_cancelled() {
+                return Err(ModelError::Cancelled);
+            }
+            let found = statistic(&drawn(events, settings, replicate)).ok().filter(|x| x.len() == values.len());
+            monitor.tick();
+            Ok(found)
+        })
+        .collect::<Result<_, ModelError>>()?;
     let done: Vec<&Vec<f64>> = found.iter().flatten().collect();
     if 2 * done.len() < settings.replicates {
         return Err(ModelError::Degenerate("more than half of the bootstrap replicates have no fit"));
@@ -119,6 +129,7 @@ fn concluded(value: f64, mut found: Vec<f64>, done: usize, widened: f64) -> Boot
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Unwatched;
     use crate::fixture::white_noise;
 
     fn mean(x: &[f64]) -> impl Fn(&[usize]) -> Result<Vec<f64>, ModelError> + Sync + '_ {
@@ -130,7 +141,8 @@ mod tests {
         let mut covered = 0;
         for seed in 0..200 {
             let x = white_noise(16, 1.0, seed);
-            let found = bootstrap(16, &BootstrapSettings { seed, ..Default::default() }, mean(&x)).unwrap()[0];
+            let found =
+                bootstrap(16, &BootstrapSettings { seed, ..Default::default() }, mean(&x), &Unwatched).unwrap()[0];
             covered += usize::from(found.interval.covers(0.0));
             let m = x.iter().sum::<f64>() / 16.0;
             let textbook = (x.iter().map(|x| (x - m).powi(2)).sum::<f64>() / 15.0 / 16.0).sqrt();
@@ -148,7 +160,7 @@ mod tests {
         let x: Vec<f64> = white_noise(60, 1.0, 3).iter().flat_map(|x| [*x, *x]).collect();
         let std = |block_events| {
             let settings = BootstrapSettings { block_events, replicates: 1000, seed: 1 };
-            bootstrap(120, &settings, mean(&x)).unwrap()[0].std
+            bootstrap(120, &settings, mean(&x), &Unwatched).unwrap()[0].std
         };
         // sqrt(2), nearly reached with blocks of ten; 3 % for 1000 replicates, ends of blocks lose a twentieth
         assert!((std(10) / std(1) - 1.41).abs() < 0.2, "{}", std(10) / std(1));
@@ -159,12 +171,12 @@ mod tests {
         let x = white_noise(12, 1.0, 5);
         let usual = BootstrapSettings::default();
         let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let run = |threads| pool(threads).install(|| bootstrap(12, &usual, mean(&x)).unwrap());
+        let run = |threads| pool(threads).install(|| bootstrap(12, &usual, mean(&x), &Unwatched).unwrap());
         assert_eq!(run(1), run(3));
-        assert!(bootstrap(3, &usual, mean(&x)).is_err());
-        assert!(bootstrap(12, &BootstrapSettings { replicates: 5, ..usual }, mean(&x)).is_err());
-        assert!(bootstrap(12, &BootstrapSettings { block_events: 7, ..usual }, mean(&x)).is_err());
+        assert!(bootstrap(3, &usual, mean(&x), &Unwatched).is_err());
+        assert!(bootstrap(12, &BootstrapSettings { replicates: 5, ..usual }, mean(&x), &Unwatched).is_err());
+        assert!(bootstrap(12, &BootstrapSettings { block_events: 7, ..usual }, mean(&x), &Unwatched).is_err());
         let failing = |_: &[usize]| Err(ModelError::ConstantOutput);
-        assert!(bootstrap(12, &usual, failing).is_err());
+        assert!(bootstrap(12, &usual, failing, &Unwatched).is_err());
     }
 }

@@ -5,7 +5,7 @@ use super::*;
 use crate::fixture::{Lever, white_noise};
 use crate::modes::Root;
 use crate::spectra::{EndTreatment, EtfeSettings, Intersample, difference, etfe};
-use crate::subspace::{Era, Subspace};
+use crate::subspace::Subspace;
 
 const SAMPLES: usize = 4096;
 const T0: usize = 500;
@@ -113,7 +113,7 @@ fn noise_biases_no_refined_fit_and_the_stated_errors_hold() {
             assert!((fit.misfit - 1.0).abs() < 0.09, "{seed}: {}", fit.misfit);
             let plain = fitted(&y, NOISE_V, &VectorFitting { refine: false, ..settings() });
             let subspace = Subspace::new(&load(), &y, 60).unwrap().poles(11).unwrap();
-            let era = Era::new(&y[T0..], 300).unwrap().poles(11).unwrap();
+            let era = Subspace::of_decay(&y[T0..], 300).unwrap().poles(11).unwrap();
             let (value, std) = with_errors(&fit).into_iter().unzip();
             [value, std, nearest(&poles_of(&plain)), nearest(&subspace), nearest(&era)]
         })

@@ -5,8 +5,9 @@ use afmid_pipeline::{Array, Artifact, Axis, Context, Ports, Stage, StateSpace};
 
 use crate::fixture::{Lever, white_noise};
 use crate::model::{Modes, ResponseWeight, VectorFittingEstimate};
-use crate::spectrum::{Etfe, Smoothing, TransientChoice, Window};
+use crate::spectrum::{Etfe, Smoothing, Window};
 use afmid_kernels::signal::Taper;
+use afmid_kernels::spectra::Presence;
 
 const SAMPLES: usize = 4096;
 const T0: usize = 500;
@@ -97,7 +98,7 @@ fn stated_errors_hold_for_raw_and_for_smoothed_estimates() {
 fn tapered_and_equally_weighted_estimates_are_taken_too() {
     let fit = VectorFittingEstimate {
         weight: ResponseWeight::Uniform,
-        transient: TransientChoice::Off,
+        transient: Presence::Off,
         ..VectorFittingEstimate::default()
     };
     let model = run(&fit, "transfer", etfe(1, 1.3e-4, false, 1.2e6));

@@ -15,7 +15,7 @@ use crate::model::ModelError;
 /// S. Y. Kung, Proc. 12th Asilomar Conf. (1978) 705; orthogonal iteration: G. H. Golub and C. F. Van Loan, Matrix
 /// Computations, 4th ed., 8.2.4.
 pub(super) fn hankel_poles(values: &[f64], rows: usize, order: usize) -> Result<Vec<c64>, ModelError> {
-    let space = dominant_space(&centred_gram(values, rows), order);
+    let space = dominant_space(&centred_gram(values, rows, dot_in_lanes), order);
     let upper = space.as_ref().get(..rows - 1, ..);
     let lower = space.as_ref().get(1.., ..);
     // columns are orthonormal: the normal equations are as well conditioned as the problem
@@ -23,7 +23,7 @@ pub(super) fn hankel_poles(values: &[f64], rows: usize, order: usize) -> Result<
 }
 
 /// `H H^T` with each row's mean removed; row i of H begins at sample i.
-fn centred_gram(values: &[f64], rows: usize) -> Mat<f64> {
+pub(in crate::ringdown) fn centred_gram(values: &[f64], rows: usize, dot: fn(&[f64], &[f64]) -> f64) -> Mat<f64> {
     let windows = values.len() - rows + 1;
     let mut sums = vec![values[..windows].iter().sum::<f64>()];
     for i in 1..rows {
@@ -31,7 +31,7 @@ fn centred_gram(values: &[f64], rows: usize) -> Mat<f64> {
     }
     let mut gram = Mat::zeros(rows, rows);
     for lag in 0..rows {
-        let mut sum = dot_in_lanes(&values[..windows], &values[lag..lag + windows]);
+        let mut sum = dot(&values[..windows], &values[lag..lag + windows]);
         for i in 0..rows - lag {
             let centred = sum - sums[i] * sums[i + lag] / windows as f64;
             gram[(i, i + lag)] = centred;

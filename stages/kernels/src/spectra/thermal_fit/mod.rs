@@ -10,6 +10,7 @@ mod tests;
 use std::f64::consts::PI;
 
 use super::error::{finite, positive};
+use super::presence::Presence;
 use super::seen_oscillator::SeenThrough;
 use crate::spectra::error::SpectrumError;
 use crate::statistics::gamma_tail;
@@ -42,7 +43,7 @@ pub struct ThermalFitSettings {
     pub line_false_alarm: f64,
     /// 1/f noise: `Some` with or without it, `None` where the likelihood gains more than chance does once in a hundred
     /// times (never over less than a tenth of an octave, where it cannot be distinguished from white noise).
-    pub flicker: Option<bool>,
+    pub flicker: Presence,
 }
 
 /// An estimate with two standard errors.
@@ -222,7 +223,7 @@ fn fit_through(
     // over less than a tenth of an octave 1/f noise and white noise are one
     let first = data.frequency_hz[0].max(likelihood.bin_hz);
     let narrow = data.frequency_hz[data.frequency_hz.len() - 1] < 1.07 * first;
-    let (settled, gain) = match settings.flicker.or(narrow.then_some(false)) {
+    let (settled, gain) = match settings.flicker.given().or(narrow.then_some(false)) {
         Some(flicker) => (best(flicker)?, f64::NAN),
         None => {
             let plain = best(false)?;

@@ -23,7 +23,7 @@ fn spectrum(truth: [f64; 5], bins: usize, through: SeenThrough, seed: u64) -> (V
 }
 
 const SETTINGS: ThermalFitSettings =
-    ThermalFitSettings { lowest_hz: 600.0, highest_hz: 2400.0, line_false_alarm: 0.01, flicker: Some(false) };
+    ThermalFitSettings { lowest_hz: 600.0, highest_hz: 2400.0, line_false_alarm: 0.01, flicker: Presence::Off };
 
 fn fit(f: &[f64], p: &[f64], through: SeenThrough) -> ThermalFit {
     let data = AveragedDensity { frequency_hz: f, density: p, averages: AVERAGES, through: Some(through) };
@@ -165,7 +165,7 @@ fn lines_are_set_aside_and_false_alarms_are_as_rare_as_stated() {
 #[test]
 fn flicker_is_taken_only_where_it_is() {
     let level = std::f64::consts::FRAC_PI_2 * 14.0 * 200.0;
-    let auto = ThermalFitSettings { flicker: None, ..SETTINGS };
+    let auto = ThermalFitSettings { flicker: Presence::Auto, ..SETTINGS };
     let mut taken = [0, 0];
     for seed in 0..100 {
         for (case, flicker) in [0.0, 300.0].into_iter().enumerate() {

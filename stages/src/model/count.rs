@@ -1,39 +1,39 @@
-//! The parameter `modes`: a number, or `auto`.
+//! A parameter that is a number, or `auto`.
 
 use std::borrow::Cow;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How many modes are fitted.
+/// A number from 1 to `MOST`, or `"auto"`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ModeNumber {
+pub enum Count<const MOST: u64> {
     /// So many.
     Fixed(usize),
     /// Found from the data.
     Auto,
 }
 
-impl ModeNumber {
+impl<const MOST: u64> Count<MOST> {
     /// The given number; `most` where it is to be found.
     pub(super) fn largest(self, most: usize) -> usize {
-        if let Self::Fixed(modes) = self { modes } else { most }
+        if let Self::Fixed(number) = self { number } else { most }
     }
 }
 
-impl Serialize for ModeNumber {
+impl<const MOST: u64> Serialize for Count<MOST> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            Self::Fixed(modes) => serializer.serialize_u64(*modes as u64),
+            Self::Fixed(number) => serializer.serialize_u64(*number as u64),
             Self::Auto => serializer.serialize_str("auto"),
         }
     }
 }
 
-impl<'de> Deserialize<'de> for ModeNumber {
+impl<'de, const MOST: u64> Deserialize<'de> for Count<MOST> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]
-        #[serde(untagged, expecting = "wanted a number of modes, or \"auto\"")]
+        #[serde(untagged, expecting = "wanted a whole number, or \"auto\"")]
         enum Written {
             Number(usize),
             Word(Word),
@@ -44,21 +44,21 @@ impl<'de> Deserialize<'de> for ModeNumber {
             Auto,
         }
         Ok(match Written::deserialize(deserializer)? {
-            Written::Number(modes) => Self::Fixed(modes),
+            Written::Number(number) => Self::Fixed(number),
             Written::Word(Word::Auto) => Self::Auto,
         })
     }
 }
 
-impl JsonSchema for ModeNumber {
+impl<const MOST: u64> JsonSchema for Count<MOST> {
     fn schema_name() -> Cow<'static, str> {
-        "ModeNumber".into()
+        format!("CountTo{MOST}").into()
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         schemars::json_schema!({
-            "description": "How many modes are fitted: a number, or `\"auto\"`.",
-            "anyOf": [{ "type": "integer", "minimum": 1, "maximum": 20 }, { "const": "auto" }],
+            "description": "A number, or `\"auto\"`.",
+            "anyOf": [{ "type": "integer", "minimum": 1, "maximum": MOST }, { "const": "auto" }],
         })
     }
 }
