@@ -1,4 +1,4 @@
-//! The built-in stages of afmid, by domain: each a thin shell around a pure kernel.
+//! The built-in stages of afmid, by domain: parameters, ports, calls of kernels.
 
 mod artifacts;
 pub mod calibration;

@@ -1,9 +1,9 @@
-//! Which events an estimate is made from.
+//! Which events: all, or one half.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Which events a model is fitted to.
+/// Which events: all, or one half.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DataSet {
@@ -17,7 +17,7 @@ pub enum DataSet {
 
 impl DataSet {
     /// All events, then the halves.
-    pub const ALL: [Self; 3] = [Self::All, Self::Identification, Self::Verification];
+    pub const EACH: [Self; 3] = [Self::All, Self::Identification, Self::Verification];
 
     /// As configs and attributes name it.
     pub const fn name(self) -> &'static str {

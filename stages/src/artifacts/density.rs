@@ -1,4 +1,4 @@
-//! `thermal-density`: an averaged power spectral density.
+//! `power-density`: an averaged power spectral density.
 
 use afmid_pipeline::{Array, Attribute, Axis, StageError};
 

@@ -1,5 +1,17 @@
-//! What the artifacts on the ports contain: a file for each tag declares names, units and axes once, reads an artifact
-//! as plain numbers for a kernel, and makes one of what a kernel returns.
+//! What artifacts contain that several stages read: a file for each declares names, units and axes once, reads an
+//! artifact as plain numbers for a kernel, and makes one of what a kernel returns.
+//!
+//! | port tag | read by | made by |
+//! |---|---|---|
+//! | `records` | [`deflection`], [`piezo`] | |
+//! | `ensemble` | [`Ensemble`]; in memory [`Rows::of`](crate::ensemble::Rows), else `rows()` in blocks | [`NewEnsemble`] |
+//! | `average` | [`Average`] | [`AveragedSet`] |
+//! | `pair` | [`Pair`] | [`NewPair`], [`PairSet`] |
+//! | `transfer` | [`Transfer`] | [`NewTransfer`] |
+//! | `power-density` | [`Density`] | [`NewDensity`] |
+//! | `model` | [`innovations`], [`further_inputs`] | [`state_space`] |
+//! | `modes`, `roots` | [`modes()`], [`roots()`] | [`mode_table`], [`root_table`] |
+//! | `ringdown-poles` | [`ringing()`] | [`ringing_array`] |
 
 mod average;
 mod channels;

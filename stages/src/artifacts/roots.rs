@@ -1,6 +1,6 @@
 //! `roots`: poles and zeros, by row.
 
-use afmid_kernels::modes::{Interval, Pole, PoleKind, Root};
+use afmid_kernels::modes::{Interval, Pole, PoleClass, Root};
 use afmid_pipeline::{StageError, Table};
 
 const POLE: &str = "pole";
@@ -25,7 +25,7 @@ pub(crate) fn roots(table: &Table) -> Result<Vec<RootRow>, StageError> {
     let (kinds, classes) = (table.text("kind")?, table.text("class")?);
     let (f, std, q) = (table.real("frequency_hz")?, table.real("frequency_std_hz")?, table.real("quality_factor")?);
     let row = |i: usize| RootRow {
-        is_mode: kinds[i] == POLE && classes[i] == PoleKind::Mechanical.name(),
+        is_mode: kinds[i] == POLE && classes[i] == PoleClass::Mechanical.name(),
         is_zero_pair: kinds[i] == ZERO && classes[i] == PAIR,
         frequency_hz: f[i],
         frequency_std_hz: std[i],

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::artifacts::{Average, DataSet, NewPair, PairSet, with_counts};
 use afmid_kernels::events::EventKind;
-use afmid_kernels::force::{ExtrapolationSettings, Lines, Onset, OnsetSettings, ZeroLine, extrapolate, pair};
+use afmid_kernels::force::{ExtrapolationSettings, Lines, T0, T0Settings, ZeroLine, extrapolate, pair};
 
 /// Derives the force that acted from the averaged event: input and response of the identification.
 ///
@@ -123,7 +123,7 @@ impl Stage for Extrapolation {
         }
         let mut result = NewPair { sample_rate_hz: rate, t0_sample: t0, kind: event.name() }.samples(mean.len());
         let (mut sets, mut counts) = (Vec::new(), Vec::new());
-        for set in DataSet::ALL.into_iter().filter(|set| average.has(*set)) {
+        for set in DataSet::EACH.into_iter().filter(|set| average.has(*set)) {
             let (mean, error) = (average.mean(set)?, average.standard_error(set)?);
             let own = match set {
                 DataSet::All => lines,
@@ -162,7 +162,7 @@ impl Extrapolation {
             event,
             zero_line: self.zero_line,
             guard: samples(self.guard_s),
-            onset: OnsetSettings {
+            onset: T0Settings {
                 near,
                 reach: samples(self.reach_s),
                 departure_sigma: self.departure_sigma,
@@ -171,9 +171,9 @@ impl Extrapolation {
         }
     }
 
-    fn given_onset(&self, near: usize, rate: f64) -> Option<Onset> {
+    fn given_onset(&self, near: usize, rate: f64) -> Option<T0> {
         let sample = (near as f64 + (self.t0_s? * rate).round()).max(0.0);
-        Some(Onset { latest: sample as usize, earliest: sample })
+        Some(T0 { latest: sample as usize, earliest: sample })
     }
 
     /// Stiffness over sensitivity, from the parameters or the calibration.

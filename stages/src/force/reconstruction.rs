@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::extension::Extension;
-use crate::artifacts::{DataSet, Ensemble, Pair};
+use crate::artifacts::{DataSet, Ensemble, Pair, SAMPLE_RATE_HZ};
 use crate::ensemble::Rows;
 use crate::simulate::{LEVER_MODEL, LeverModel};
 use afmid_kernels::events::EventKind;
@@ -341,7 +341,7 @@ fn force_array(found: &[Reconstructed], event: usize, samples: usize, rate: f64,
     let axes =
         vec![Axis::new("event", "1", "number of the event", numbers), Axis::new("time", "s", "time since t0", time)];
     let innovations: Vec<f64> = found.iter().flat_map(|r| r.found.innovations.iter().copied()).collect();
-    let mut array = Array::over(axes).attribute("sample_rate_hz", rate).attribute("t0_sample", event);
+    let mut array = Array::over(axes).attribute(SAMPLE_RATE_HZ, rate).attribute("t0_sample", event);
     if let Some(scale) = newtons {
         array.attributes.insert("newtons_per_volt".to_owned(), scale.into());
     }

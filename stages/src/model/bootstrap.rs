@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::pem::{MODEL, PAIR};
-use crate::artifacts::{DataSet, Ensemble, Pair, innovations};
+use crate::artifacts::{DataSet, Ensemble, Pair, SAMPLE_RATE_HZ, innovations};
 use crate::ensemble::{Rows, moments, scatter};
 use crate::watched::Watched;
 use afmid_kernels::model::InnovationsModel;
@@ -174,7 +174,7 @@ impl BootstrapIntervals {
             .with("phase", "rad", "phase of the transfer function", over, phase(|p| p.value))
             .with("phase_low", "rad", "lower end of its 95 % interval", over, phase(|p| p.interval.low))
             .with("phase_high", "rad", "upper end", over, phase(|p| p.interval.high))
-            .attribute("sample_rate_hz", 1.0 / artifact.sample_time_s)
+            .attribute(SAMPLE_RATE_HZ, 1.0 / artifact.sample_time_s)
     }
 }
 

@@ -219,7 +219,7 @@ pub(super) fn zeros() -> Vec<Example> {
 
 /// The release of one resonance, noise-free, as a pair with both halves.
 fn pair() -> Array {
-    pair_of(&release(2048, T0, LOAD_V), Some(1e-4), &DataSet::ALL)
+    pair_of(&release(2048, T0, LOAD_V), Some(1e-4), &DataSet::EACH)
 }
 
 fn model() -> Result<StateSpace, StageError> {

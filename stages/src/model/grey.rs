@@ -17,7 +17,9 @@ pub use self::known::{GreyNumber, GreyNumberKind};
 use self::tables::{mode_table, named, parameter_table, static_gain, with_interval};
 use super::order::simulated_percent;
 use super::pem::{MODEL, PAIR, RESIDUALS, SUMMARY, ending};
-use crate::artifacts::{DataSet, Pair, PairSeries, innovations, state_nuisances, state_space, state_t0_ambiguity};
+use crate::artifacts::{
+    DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, innovations, state_nuisances, state_space, state_t0_ambiguity,
+};
 use afmid_kernels::grey::{Before, Grey, GreyHold, GreyOptions, GreyQuantity, GreyStart, InputBetween, fit_grey};
 use afmid_kernels::pem::{Experiment, Identified, ResidualColour};
 use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, whiteness};
@@ -163,7 +165,7 @@ impl Stage for GreyEstimate {
         let residuals = Array::over(vec![Axis::new("time", "s", "time since t0", series.time.clone())])
             .with("residual", &series.unit, "response less simulation", &["time"], residual)
             .with("prediction", &series.unit, "response simulated from the force", &["time"], prediction)
-            .attribute("sample_rate_hz", rate);
+            .attribute(SAMPLE_RATE_HZ, rate);
         Ok(Ports::new()
             .with(&MODEL, model)
             .with(&RESIDUALS, residuals)

@@ -12,11 +12,12 @@ use serde_json::{Value, json};
 
 use super::pem::MODEL;
 use crate::artifacts::{
-    DataSet, Pair, first_sample, further_inputs, innovations, mode_table, nuisances, root_table, t0_ambiguity_s,
+    DataSet, Pair, SAMPLE_RATE_HZ, first_sample, further_inputs, innovations, mode_table, nuisances, root_table,
+    t0_ambiguity_s,
 };
 use afmid_kernels::model::InnovationsModel;
 use afmid_kernels::modes::{
-    Interval, LEVEL, ModeCriteria, Pole, PoleKind, ResponsePoint, at_rest, poles, response, share_error_from_onset,
+    Interval, LEVEL, ModeCriteria, Pole, PoleClass, ResponsePoint, at_rest, poles, response, share_error_from_onset,
     zeros,
 };
 use afmid_kernels::ringdown::{Estimate, ModeEstimate};
@@ -135,7 +136,7 @@ impl Stage for Modes {
             pole.static_share_std = pole.static_share_std.hypot(from_onset);
         }
         let zeros = zeros(&model, &covariance).map_err(StageError::from_error)?;
-        let modes: Vec<&Pole> = found.iter().filter(|pole| pole.kind == PoleKind::Mechanical).collect();
+        let modes: Vec<&Pole> = found.iter().filter(|pole| pole.kind == PoleClass::Mechanical).collect();
         if modes.is_empty() {
             cx.warn("no pole passes as a mode: lower min_significance or min_quality_factor, or raise the order");
         }
@@ -354,7 +355,7 @@ fn response_array(points: &[ResponsePoint], model: &StateSpace, intersample: Int
             over,
             points.iter().map(ResponsePoint::phase_std_rad).collect::<Vec<_>>(),
         )
-        .attribute("sample_rate_hz", 1.0 / model.sample_time_s)
+        .attribute(SAMPLE_RATE_HZ, 1.0 / model.sample_time_s)
         .attribute("order", model.order())
 }
 

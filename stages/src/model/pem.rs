@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::order::{Order, choice_document, simulated_percent};
-use crate::artifacts::{DataSet, Pair, PairSeries, state_nuisances, state_space, state_t0_ambiguity};
+use crate::artifacts::{DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, state_nuisances, state_space, state_t0_ambiguity};
 use crate::ensemble::LEAST_EVENTS;
 use crate::watched::Watched;
 use afmid_kernels::pem::{Ending, Experiment, Focus, Identified, NoiseModel, PemOptions, identify};
@@ -21,7 +21,7 @@ use afmid_kernels::validation::{
 /// Model: Eq. 8, x(t+Ts) = A x + B u + K e, y = C x + D u + e + offset + drift; the initial state is estimated along.
 /// Method: minimum of the squared one-step prediction errors by Levenberg-Marquardt with analytic sensitivities; all
 /// that enters linearly is eliminated exactly. Poles and predictor are stable by construction: sections of second order
-/// in reflection coefficients. Starts from a subspace estimate at every order up to the wanted one.
+/// in reflection coefficients. Starts from subspace estimates of the wanted order and of up to six less.
 /// Shapes: `residual`, `prediction` over time; A order x order; covariance of the 2 order + 1 parameters of A, B and D.
 /// Several inputs (`force` over `input` and time) give B and D as many columns.
 /// Units: volts to volts where the force is given as static deflection.
@@ -111,7 +111,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Pem {
     const SPEC: Spec = Spec {
         name: "model.pem",
-        version: 7,
+        version: 8,
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],
@@ -155,7 +155,7 @@ impl Stage for Pem {
                 fit.verdict.at_limit
             ));
         }
-        let summary = self.summary(&fit, choice.as_ref(), &input, &output, first)?;
+        let summary = self.summary(&fit, choice.as_ref(), (&input, &output, &unit), first)?;
         let mut model = state_space(&fit, self.set, first)?;
         state_nuisances(&mut model, Nuisances { offset: self.offset, slope: self.drift });
         state_t0_ambiguity(&mut model, pair.t0_ambiguity_s());
@@ -164,7 +164,7 @@ impl Stage for Pem {
         let residuals = Array::over(vec![Axis::new("time", "s", "time since t0", time)])
             .with("residual", &unit, "one-step prediction error", &["time"], residual)
             .with("prediction", &unit, "response predicted one sample ahead", &["time"], prediction)
-            .attribute("sample_rate_hz", rate);
+            .attribute(SAMPLE_RATE_HZ, rate);
         Ok(Ports::new().with(&MODEL, model).with(&RESIDUALS, residuals).with(&SUMMARY, summary))
     }
 
@@ -208,8 +208,7 @@ impl Pem {
         &self,
         fit: &Identified,
         choice: Option<&OrderChoice>,
-        input: &[f64],
-        output: &[f64],
+        (input, output, unit): (&[f64], &[f64], &str),
         first: usize,
     ) -> Result<Document, StageError> {
         let residual = fit.residuals.first().map_or(&[][..], Vec::as_slice);
@@ -237,7 +236,7 @@ impl Pem {
             "iterations": verdict.iterations,
             "gradient_standard_errors": verdict.gradient * samples.sqrt(),
             "coordinates_at_limit": verdict.at_limit,
-            "innovation_std": { "value": fit.innovation_variance.sqrt(), "unit": "V" },
+            "innovation_std": { "value": fit.innovation_variance.sqrt(), "unit": unit },
             "prediction_fit_percent": fit_percent(output, &predicted).ok(),
             "simulation_fit_percent": simulated_percent(fit, all_inputs, output, nuisances),
             "offset_v": fit.offsets.first(),

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::window::PAIR;
-use crate::artifacts::{DataSet, Pair};
+use crate::artifacts::{DataSet, Pair, SAMPLE_RATE_HZ};
 use afmid_kernels::spectra::{bin_frequencies, power_spectrum};
 
 /// Periodograms of force and response: their power spectral densities, as a first look.
@@ -59,7 +59,7 @@ impl Stage for Periodogram {
             .with("response", "V^2/Hz", "power spectral density of the response", over, response)
             .with("force", "V^2/Hz", "power spectral density of the force", over, force)
             .with("noise", "V^2/Hz", "density of the response's standard error", over, noise)
-            .attribute("sample_rate_hz", rate);
+            .attribute(SAMPLE_RATE_HZ, rate);
         Ok(Ports::new().with(&PERIODOGRAM, result))
     }
 

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::artifacts::NewDensity;
+use crate::artifacts::{NewDensity, SAMPLE_RATE_HZ};
 use crate::calibration::FreeSettings;
 use crate::calibration::reading::{common_rate, push_free, read_blocks, read_free};
 use crate::io::DENSITY;
@@ -129,7 +129,7 @@ impl Stage for Welch {
             )
             .attribute("segments", average.segments)
             .attribute("equivalent_noise_bandwidth_hz", 1.5 * bin_hz)
-            .attribute("sample_rate_hz", rate);
+            .attribute(SAMPLE_RATE_HZ, rate);
         Ok(Ports::new().with(&DENSITY, density).with(&SUMMARY, summary))
     }
 

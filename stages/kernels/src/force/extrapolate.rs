@@ -4,7 +4,7 @@ use super::line::correlation_inflation;
 use crate::events::EventKind;
 use crate::force::error::ForceError;
 use crate::force::line::{Line, Weighting, fit_line};
-use crate::force::onset::{Onset, OnsetSettings, find_onset};
+use crate::force::t0::{T0, T0Settings, find_t0};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +28,7 @@ pub struct ExtrapolationSettings {
     /// Samples left out between the line before and the expected event.
     pub guard: usize,
     /// Search for the moment; its `near` is the expected event.
-    pub onset: OnsetSettings,
+    pub onset: T0Settings,
 }
 
 /// Lines before and after, and the load between them.
@@ -39,7 +39,7 @@ pub struct Lines {
     /// Line after the event, ringing weighted away.
     pub after: Line,
     /// The moment.
-    pub onset: Onset,
+    pub onset: T0,
     /// Static deflection under the force at `t0`: negative where the tip is pulled to the surface.
     pub load: f64,
     /// Its standard error, from the noise of the mean and its correlation; adhesion scatter is no part of it.
@@ -71,7 +71,7 @@ const LINE_SAMPLES: usize = 32;
 /// # Method
 /// Uniform line before, up to `guard` samples ahead of the expected event; Hann-weighted line after, from the expected
 /// event to the end, which suppresses ringing (46 kHz, Q = 40) to a millionth without a model of it. With `t0` given
-/// (sub-ensembles), it is used; otherwise [`find_onset`] looks for it.
+/// (sub-ensembles), it is used; otherwise [`find_t0`] looks for it.
 ///
 /// # Shapes
 /// `mean` and `standard_error` `[time]`.
@@ -92,7 +92,7 @@ pub fn extrapolate(
     mean: &[f64],
     standard_error: &[f64],
     settings: ExtrapolationSettings,
-    t0: Option<Onset>,
+    t0: Option<T0>,
 ) -> Result<Lines, ForceError> {
     if mean.len() != standard_error.len() {
         return Err(ForceError::Lengths { mean: mean.len(), standard_error: standard_error.len() });
@@ -120,7 +120,7 @@ pub fn extrapolate(
     let step = after.at(near as f64) - before.at(near as f64);
     let onset = match t0 {
         Some(onset) => onset,
-        None => find_onset(&departure, step, rms_before, settings.onset)?,
+        None => find_t0(&departure, step, rms_before, settings.onset)?,
     };
     let at = onset.latest as f64;
     let jump = after.at(at) - before.at(at);
@@ -174,7 +174,7 @@ mod tests {
             event,
             zero_line: ZeroLine::Linear,
             guard: 30,
-            onset: OnsetSettings { near: T0 + 2, reach: 30, departure_sigma: 4.0, sure_share: 0.1 },
+            onset: T0Settings { near: T0 + 2, reach: 30, departure_sigma: 4.0, sure_share: 0.1 },
         }
     }
 
@@ -248,7 +248,7 @@ mod tests {
         let quiet = white_noise(SAMPLES, 1e-3, 1);
         assert!(extrapolate(&quiet, &se, settings(EventKind::SnapOff), None).is_err());
         let short = ExtrapolationSettings {
-            onset: OnsetSettings { near: 40, ..settings(EventKind::SnapOff).onset },
+            onset: T0Settings { near: 40, ..settings(EventKind::SnapOff).onset },
             ..settings(EventKind::SnapOff)
         };
         assert!(matches!(extrapolate(&quiet, &se, short, None), Err(ForceError::TooShort { stretch: "before", .. })));

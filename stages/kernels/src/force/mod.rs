@@ -7,13 +7,13 @@
 mod error;
 mod extrapolate;
 mod line;
-mod onset;
 mod reconstruct;
+mod t0;
 
 pub use error::ForceError;
 pub use extrapolate::{ExtrapolationSettings, Lines, Pair, ZeroLine, extrapolate, pair};
 pub use line::{Line, Weighting, correlation_inflation, fit_line};
-pub use onset::{Onset, OnsetSettings, find_onset};
 pub use reconstruct::{
     ForcePrior, IdentifiedModel, Reconstruction, ReconstructionSettings, Rise, band_inflation, reconstruct, rise,
 };
+pub use t0::{T0, T0Settings, find_t0};

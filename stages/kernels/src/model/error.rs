@@ -69,7 +69,7 @@ pub enum ModelError {
     /// The result is not a finite model.
     #[error("the fit has no finite result: {0}")]
     Degenerate(&'static str),
-    /// Whoever watches did not want the result any more.
+    /// The monitor said so.
     #[error("cancelled")]
     Cancelled,
 }

@@ -14,7 +14,7 @@ mod tests;
 
 pub use interval::{Interval, LEVEL};
 pub use map::Root;
-pub use poles::{ModeCriteria, Pole, PoleKind, poles, zeros};
+pub use poles::{ModeCriteria, Pole, PoleClass, poles, zeros};
 pub use response::{ResponsePoint, response};
 pub use rest::{AtRest, at_rest};
 pub use shift::share_error_from_onset;

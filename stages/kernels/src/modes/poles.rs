@@ -7,7 +7,7 @@ use crate::model::{InnovationsModel, ModelError, Section, transmission_zeros};
 
 /// What a pole belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PoleKind {
+pub enum PoleClass {
     /// A resonance of the lever.
     Mechanical,
     /// Detector, electronics, slow wander: strongly damped, or real.
@@ -20,7 +20,7 @@ pub enum PoleKind {
     Delay,
 }
 
-impl PoleKind {
+impl PoleClass {
     /// Its name in tables.
     pub const fn name(self) -> &'static str {
         match self {
@@ -39,7 +39,7 @@ pub struct Pole {
     /// Frequency and damping.
     pub root: Root,
     /// What it belongs to.
-    pub kind: PoleKind,
+    pub kind: PoleClass,
     /// Its section's part of the static gain `G(1)`; a section of two real poles counts as a whole, at each.
     pub static_share: f64,
     /// Standard error of the static share, for a t0 that is known; see
@@ -181,20 +181,20 @@ fn significance(amplitude: c64, slopes: &[c64], covariance: &Mat<f64>) -> f64 {
     if square.is_finite() && square > 0.0 { square.sqrt() } else { 0.0 }
 }
 
-fn classify(root: &Root, significance: f64, criteria: &ModeCriteria) -> PoleKind {
+fn classify(root: &Root, significance: f64, criteria: &ModeCriteria) -> PoleClass {
     if root.z.norm_sqr() == 0.0 {
-        return PoleKind::Delay;
+        return PoleClass::Delay;
     }
     if !root.is_complex() {
-        return if root.z.re < 0.0 { PoleKind::Nyquist } else { PoleKind::Detector };
+        return if root.z.re < 0.0 { PoleClass::Nyquist } else { PoleClass::Detector };
     }
     if root.quality_factor < criteria.min_quality_factor {
-        return PoleKind::Detector;
+        return PoleClass::Detector;
     }
     let established = significance >= criteria.min_significance
         && root.quality_factor_std <= criteria.max_quality_factor_error * root.quality_factor
         && root.frequency_hz <= criteria.max_frequency_hz;
-    if established { PoleKind::Mechanical } else { PoleKind::Doubtful }
+    if established { PoleClass::Mechanical } else { PoleClass::Doubtful }
 }
 
 /// All transmission zeros, ascending in frequency, with standard errors; of a pair only the upper one.

@@ -75,8 +75,8 @@ fn standard_errors_agree_with_differences() {
 fn poles_are_mapped_and_classified() {
     let criteria = ModeCriteria { min_significance: 0.0, ..ModeCriteria::default() };
     let found = poles(&model(), &covariance(), &criteria).unwrap();
-    let kinds: Vec<PoleKind> = found.iter().map(|pole| pole.kind).collect();
-    assert_eq!(kinds, [PoleKind::Mechanical, PoleKind::Detector, PoleKind::Detector, PoleKind::Nyquist]);
+    let kinds: Vec<PoleClass> = found.iter().map(|pole| pole.kind).collect();
+    assert_eq!(kinds, [PoleClass::Mechanical, PoleClass::Detector, PoleClass::Detector, PoleClass::Nyquist]);
     // z = 0.5 and 0.2
     for (pole, z) in found[1..3].iter().zip([0.5_f64, 0.2]) {
         assert!((pole.root.frequency_hz / (-z.ln() / 2e-7 / std::f64::consts::TAU) - 1.0).abs() < 1e-12);
@@ -103,7 +103,7 @@ fn doubtful_pairs_are_no_modes() {
     // a hundred times the errors: the pair's amplitude no longer stands out
     let vague = Mat::from_fn(11, 11, |i, j| 1e8 * covariance()[(i, j)]);
     let found = poles(&model(), &vague, &ModeCriteria::default()).unwrap();
-    assert_eq!(found[0].kind, PoleKind::Doubtful);
+    assert_eq!(found[0].kind, PoleClass::Doubtful);
     assert!(poles(&model(), &Mat::zeros(3, 3), &ModeCriteria::default()).is_err());
     assert!(zeros(&model(), &Mat::zeros(3, 3)).is_err() && response(&model(), &Mat::zeros(3, 3), &[1e3]).is_err());
 }

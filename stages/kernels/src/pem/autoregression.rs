@@ -3,9 +3,9 @@
 use crate::linear_algebra::eigenvalues;
 use faer::{Mat, c64};
 
-use super::gradient::{Noise, Point, residual};
-use super::optimiser::{Limits, minimise};
+use super::jacobian::{Noise, Point, residual};
 use super::predictor::Problem;
+use super::search::{Limits, minimise};
 use super::state::State;
 use super::whitening::Whitened;
 use crate::model::{ModelError, coordinates, sections};
@@ -93,7 +93,7 @@ fn levinson(covariance: &[f64], samples: usize) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::fixture::white_noise;
-    use crate::pem::columns::Shelf;
+    use crate::pem::columns::BufferPool;
 
     #[test]
     fn an_autoregression_is_found_with_its_order() {
@@ -112,7 +112,7 @@ mod tests {
                 slope: false,
                 missing: Vec::new(),
                 priors: 0,
-                shelf: Shelf::default(),
+                shelf: BufferPool::default(),
             };
             let found = levinson(&autocovariance(&problem, &y, 12), 4000);
             // standard error sqrt((1 - 0.8^2) / 4000) = 0.0095: four of them; BIC errs upwards in one of hundreds

@@ -24,14 +24,14 @@ pub(crate) struct Columns {
     /// Where each begins.
     starts: Vec<usize>,
     rows: usize,
-    shelf: Shelf,
+    shelf: BufferPool,
 }
 
 impl Columns {
     /// With any contents, to be overwritten: but for those of several records, which are zeros.
     ///
     /// `records`: how many lie one after the other in the rows.
-    pub fn new(rows: usize, parts: &[Part], records: usize, shelf: &Shelf) -> Self {
+    pub fn new(rows: usize, parts: &[Part], records: usize, shelf: &BufferPool) -> Self {
         let (mut starts, mut end, overlapping) = (Vec::new(), 0, records == 1);
         for part in parts {
             match *part {
@@ -207,9 +207,9 @@ const LARGEST: usize = 1 << 19;
 /// Storage of columns that are no longer used, kept for the next ones: an iteration makes and drops as many as it has
 /// steps, and the system clears the pages that it hands out. Clones share it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Shelf(Arc<Mutex<Vec<Vec<f64>>>>);
+pub(crate) struct BufferPool(Arc<Mutex<Vec<Vec<f64>>>>);
 
-impl Shelf {
+impl BufferPool {
     /// So many numbers, any.
     fn take(&self, count: usize) -> Vec<f64> {
         let found = self.0.lock().ok().and_then(|mut shelf| {
@@ -249,7 +249,7 @@ mod tests {
     fn columns_of_a_section_are_a_row_apart_whether_they_overlap_or_not() {
         let (rows, sections) = (300, [[-1.2, 0.5], [-0.9, 0.0]]);
         let signal = |k: usize| (k * 7919 % 13) as f64 - 6.0;
-        let shelf = Shelf::default();
+        let shelf = BufferPool::default();
         for delay in [0, 1] {
             let columns = |records: usize| {
                 let mut columns = Columns::new(rows, &[Part::Sections(3), Part::Single(1)], records, &shelf);

@@ -4,7 +4,7 @@ use faer::Mat;
 
 use super::columns::Columns;
 use super::covariance::{ResidualColour, covariance};
-use super::gradient::Noise;
+use super::jacobian::Noise;
 use super::options::{Identified, NoiseModel, PemOptions, Verdict};
 use super::predictor::Problem;
 use super::projection::{Present, present};

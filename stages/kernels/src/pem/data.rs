@@ -1,6 +1,6 @@
 //! Records made ready: checked, with priors, without gaps.
 
-use super::columns::Shelf;
+use super::columns::BufferPool;
 use super::options::{Experiment, NoiseModel, PemOptions};
 use super::predictor::Problem;
 use crate::model::{ModelError, finite};
@@ -115,6 +115,6 @@ pub(super) fn checked<'a>(
         slope: options.slope,
         missing,
         priors: 0,
-        shelf: Shelf::default(),
+        shelf: BufferPool::default(),
     })
 }

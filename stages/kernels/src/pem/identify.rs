@@ -2,15 +2,15 @@
 
 use faer::c64;
 
+use super::alternating::{simulation, thermal_or_free};
 use super::autoregression::whitened;
 use super::conclusion::conclude;
 use super::data::{checked, complete, prior_records};
-use super::gradient::{Noise, Point};
-use super::optimiser::{Limits, minimise};
+use super::jacobian::{Noise, Point};
 use super::options::{Experiment, Focus, Identified, NoiseModel, PemOptions};
+use super::search::{Limits, minimise};
 use super::starts::{candidates, instrumental, lowest, predictors, ranked, refined};
 use super::state::State;
-use super::turns::{simulation, thermal_or_free};
 use crate::model::{ModelError, coordinates};
 use crate::subspace::Subspace;
 
@@ -22,7 +22,8 @@ use crate::subspace::Subspace;
 /// # Method
 /// Parallel sections of second order in reflection coefficients (stable by construction, A as well as A - K C, and
 /// without redundancy); b, D, x0, offset and slope eliminated by variable projection; Levenberg-Marquardt with analytic
-/// sensitivities on the rest, from several starts: subspace estimates with and without instruments. The linear part by
+/// sensitivities on the rest, from several starts: subspace estimates, with instruments too where more than three are
+/// asked for. The linear part by
 /// inner products of the columns where these keep enough digits, which is checked, by rotations elsewhere. Cost per
 /// iteration: about `N (3 n)^2` operations, twice as many by rotations.
 /// # Shapes
@@ -56,7 +57,8 @@ pub fn identify(
     let subspace = Subspace::new(&input, output, options.block_rows)?;
     let limits = Limits { iterations: options.max_iterations, gradient: options.gradient_tolerance };
     let mut poles = candidates(&subspace, options.order)?;
-    if options.starts > PemOptions::default().starts {
+    let many = options.starts > PemOptions::default().starts;
+    if many {
         poles.extend(instrumental(&input, output, options.order, options.block_rows));
     }
     let starts = ranked(short, &poles, options.starts)?;

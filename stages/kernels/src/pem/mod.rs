@@ -5,9 +5,11 @@
 //! sections of order two ([`InnovationsModel`](crate::model::InnovationsModel)). Per experiment: x0, an offset and a
 //! slope of y.
 //! # Method
-//! Start by subspace identification ([`crate::subspace`]), then damped Gauss-Newton steps on the one-step prediction
-//! errors, with x0, offset, slope, B and D eliminated in every step (variable projection). [`identify`] minimises;
-//! [`refit`] starts from a model; [`with_poles`] keeps the poles.
+//! Starts from subspace estimates ([`crate::subspace`]; `starts`), then Levenberg-Marquardt steps on the one-step
+//! prediction errors (`search`, by [`crate::optimise::descend`]) with analytic derivatives (`jacobian`) and a secant
+//! estimate of the curvature that they leave out (`secant`); x0, offset, slope, B and D are eliminated in every step
+//! (variable projection, `projection`). [`identify`] minimises; [`refit`] starts from a model; [`with_poles`] keeps the
+//! poles.
 //! # Shapes
 //! u and y: N samples per experiment, several inputs one after the other; covariance: (2n + 1) x (2n + 1) and n + 1
 //! more for each further input.
@@ -37,28 +39,28 @@
 //! # Ok::<(), afmid_kernels::model::ModelError>(())
 //! ```
 
+mod alternating;
 mod autoregression;
 mod columns;
 mod conclusion;
 mod covariance;
 mod data;
-mod gradient;
 mod identify;
+mod jacobian;
 mod linearised;
 mod noise;
-mod optimiser;
 mod options;
 mod predictor;
 mod products;
 mod projection;
 mod rotation;
+mod search;
 mod secant;
 mod starts;
 mod state;
 mod tangent;
 #[cfg(test)]
 mod tests;
-mod turns;
 mod whitening;
 
 pub use crate::optimise::Ending;

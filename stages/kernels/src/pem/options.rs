@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::covariance::ResidualColour;
 use crate::model::{InnovationsModel, InputGains, ModelError};
-use crate::modes::{ModeCriteria, Pole, PoleKind, poles};
+use crate::modes::{ModeCriteria, Pole, PoleClass, poles};
 use crate::optimise::Ending;
 
 /// One record of input and output, equally sampled.
@@ -148,7 +148,7 @@ impl Identified {
     /// The resonances among the poles, by the default criteria. Errors: as [`poles`].
     pub fn modes(&self) -> Result<Vec<Pole>, ModelError> {
         let mut found = self.poles(&ModeCriteria::default())?;
-        found.retain(|pole| pole.kind == PoleKind::Mechanical);
+        found.retain(|pole| pole.kind == PoleClass::Mechanical);
         Ok(found)
     }
 }

@@ -3,7 +3,7 @@
 //! `e = H^-1 (y - sum_i b_i/a_i u - D u - x0 response - offset)`, `H^-1 = prod_i a_i / c_i`: with a and c fixed, e is
 //! linear in all the rest, and the filtered regressors are the columns of a least-squares problem.
 
-use super::columns::{Columns, Part, Place, SIDE_BY_SIDE, Shelf};
+use super::columns::{BufferPool, Columns, Part, Place, SIDE_BY_SIDE};
 use super::whitening::{IMPULSE, INPUT, LANES, ONE, OUTPUT, RAMP, Signals, Whitened};
 use crate::model::Coefficients;
 
@@ -21,7 +21,7 @@ pub(crate) struct Problem<'a> {
     /// How many of the last experiments are a prior's: they begin at rest and have no offset or slope.
     pub priors: usize,
     /// Storage of columns, used again and again.
-    pub shelf: Shelf,
+    pub shelf: BufferPool,
 }
 
 /// Share of the output's changes that a shortened problem sees, and its least samples for each linear parameter.

@@ -8,7 +8,7 @@
 use crate::linear_algebra::Symmetric;
 use faer::Mat;
 
-use super::gradient::residual;
+use super::jacobian::residual;
 use super::projection::{Sensitivities, Solution};
 use crate::linear_algebra::{cross_of, gram_of};
 

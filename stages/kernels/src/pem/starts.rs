@@ -1,15 +1,15 @@
 //! Where the iteration begins: several sets of poles, the most promising refined first.
 //!
-//! Strong modes come from the subspace estimate of every order up to the wanted one; what is missing is filled with
+//! Strong modes come from the subspace estimate of every order from six below the wanted one on; what is missing is filled with
 //! real poles spread over the fast part of the unit interval, where detectors lie. A weak mode needs the high orders,
 //! detector poles the low ones.
 
 use crate::linear_algebra::{eigenvalues, least_squares};
 use faer::{Mat, c64};
 
-use super::gradient::{Noise, Point};
-use super::optimiser::{Limits, minimise};
+use super::jacobian::{Noise, Point};
 use super::predictor::Problem;
+use super::search::{Limits, minimise};
 use super::state::State;
 use crate::model::{ModelError, coordinates, roots, section_order};
 use crate::subspace::{Subspace, Weight};

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::columns::Columns;
-use super::gradient::{Point, coefficient_jacobian, residual, to_coordinates};
-use super::optimiser::DAMPING;
+use super::jacobian::{Point, coefficient_jacobian, residual, to_coordinates};
 use super::predictor::Problem;
 use super::projection::{Projection, Sensitivities};
+use super::search::DAMPING;
 use super::secant::Secant;
 use super::whitening::Whitened;
 use crate::model::ModelError;

@@ -4,14 +4,14 @@ use crate::linear_algebra::eigenvalues;
 use faer::Mat;
 use rayon::prelude::*;
 
-use super::columns::Shelf;
-use super::gradient::{Noise, Point, coefficient_jacobian, residual};
+use super::columns::BufferPool;
+use super::jacobian::{Noise, Point, coefficient_jacobian, residual};
 use super::predictor::Problem;
 use super::whitening::Whitened;
 use super::*;
 use crate::fixture::{Lever, white_noise};
 use crate::model::{ModelError, coordinates, section_order, sections};
-use crate::modes::{ModeCriteria, Pole, PoleKind, poles, zeros};
+use crate::modes::{ModeCriteria, Pole, PoleClass, poles, zeros};
 
 const N: usize = 8192;
 const TS: f64 = 2e-7;
@@ -59,7 +59,7 @@ fn fit(output: &[f64], options: &PemOptions) -> Result<Identified, ModelError> {
 
 fn modes(fit: &Identified) -> Vec<Pole> {
     let mut found = poles(&fit.model, &fit.covariance, &ModeCriteria::default()).unwrap();
-    found.retain(|pole| pole.kind == PoleKind::Mechanical);
+    found.retain(|pole| pole.kind == PoleClass::Mechanical);
     found
 }
 
@@ -171,7 +171,7 @@ fn sensitivities_agree_with_differences() {
         slope: true,
         missing: Vec::new(),
         priors: 0,
-        shelf: Shelf::default(),
+        shelf: BufferPool::default(),
     };
     let z = |re, im| faer::c64::new(re, im);
     let a = coordinates(&[z(0.99, 0.06), z(0.99, -0.06), z(0.9, 0.3), z(0.9, -0.3), z(0.4, 0.0)]);
@@ -185,7 +185,7 @@ fn sensitivities_agree_with_differences() {
         let errors = |point: &Point| -> Vec<f64> { residual(&regressors(point).slices(), &theta) };
         let regressors = regressors(&point);
         let mut jacobian = coefficient_jacobian(&problem, &point, &regressors, &theta, &errors(&point));
-        super::gradient::to_coordinates(&mut jacobian, &point);
+        super::jacobian::to_coordinates(&mut jacobian, &point);
         for j in 0..point.len() {
             let h = 1e-6;
             let moved = |sign: f64| {
@@ -286,7 +286,7 @@ fn a_release_is_cut_where_it_has_died_away_and_noise_is_not() {
         slope: true,
         missing: Vec::new(),
         priors: 0,
-        shelf: Shelf::default(),
+        shelf: BufferPool::default(),
     };
     let (u, y, noise) = (force(), averaged(1), white_noise(N, 1.0, 1));
     let whole = problem(&u, &y);

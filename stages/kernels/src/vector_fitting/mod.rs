@@ -110,10 +110,10 @@ pub struct VectorFit {
 /// # Accuracy
 /// Rounding without noise. With noise: the maximum of the likelihood for the variance given. Over 40 seeds of the
 /// paper's lever (the mean of 84 events, 4096 samples) rms errors of f and Q are 0.2 to 0.4 of those of
-/// [`Subspace`](crate::subspace::Subspace) with 60 rows and 0.6 to 0.8 of those of [`Subspace::of_decay`](crate::subspace::Era) with
-/// 300; any bias is below what 40 seeds show, 0.63 of a standard error, and the squares of the errors are 0.7 to 1.3 of
-/// the stated ones (tests). The covariance is that of the last linearised least squares, scaled by the misfit; for a
-/// smoothed response also by the residual's correlation.
+/// [`Subspace::new`](crate::subspace::Subspace::new) with 60 rows and 0.6 to 0.8 of those of
+/// [`Subspace::of_decay`](crate::subspace::Subspace::of_decay) with 300; any bias is below what 40 seeds show, 0.63 of a
+/// standard error, and the squares of the errors are 0.7 to 1.3 of the stated ones (tests). The covariance is that of
+/// the last linearised least squares, scaled by the misfit; for a smoothed response also by the residual's correlation.
 /// # Errors
 /// Lengths, settings out of range, too few points, no finite fit. No convergence is no error: see the fit.
 /// # Source

@@ -73,7 +73,7 @@ impl Series {
         let inputs: Vec<Vec<f64>> = self.inputs.iter().zip(&trends).map(|(u, trend)| trend.removed(u)).collect();
         let output = level.removed(&self.output);
         let whole = Stretch { first: 0, end: output.len() };
-        let sets = DataSet::ALL.into_iter().zip([whole, self.identification, self.verification]);
+        let sets = DataSet::EACH.into_iter().zip([whole, self.identification, self.verification]);
         let mut axes: Vec<Axis> = sets.clone().map(|(set, stretch)| self.axis(set, stretch)).collect();
         if inputs.len() > 1 {
             let numbers = (1..=inputs.len()).map(|i| i as f64).collect();

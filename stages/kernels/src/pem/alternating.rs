@@ -3,11 +3,11 @@
 use faer::c64;
 
 use super::conclusion::Jacobian;
-use super::gradient::{Noise, Point};
+use super::jacobian::{Noise, Point};
 use super::noise::{Seen, gain, intensities};
-use super::optimiser::{Limits, minimise};
 use super::options::NoiseModel;
 use super::predictor::Problem;
+use super::search::{Limits, minimise};
 use super::starts::{lowest, refined};
 use super::state::State;
 use super::tangent::{Tangent, Transform, periodogram, remaining};

@@ -6,7 +6,7 @@
 
 use faer::c64;
 
-use super::gradient::{Noise, Point};
+use super::jacobian::{Noise, Point};
 use super::linearised::{Linearised, Quadratic, unscaled};
 use super::predictor::Problem;
 use super::secant::{Secant, Taken};

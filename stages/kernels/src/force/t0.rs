@@ -4,7 +4,7 @@ use crate::force::error::ForceError;
 
 /// How the onset is looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OnsetSettings {
+pub struct T0Settings {
     /// Where the event is expected.
     pub near: usize,
     /// How far the onset may lie from there, in samples.
@@ -17,14 +17,14 @@ pub struct OnsetSettings {
 
 /// The onset, as far as the data tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Onset {
+pub struct T0 {
     /// Last sample that still lies on the line: the latest `t0` for which the response is causal.
     pub latest: usize,
     /// Where power laws of order two to four, through the samples that follow, reach zero at the earliest.
     pub earliest: f64,
 }
 
-impl Onset {
+impl T0 {
     /// Width of the interval of `t0` that the data allow, in samples.
     pub fn ambiguity(&self) -> f64 {
         (self.latest as f64 - self.earliest).max(0.0)
@@ -59,7 +59,7 @@ impl Onset {
 ///
 /// # Source
 /// Stark et al. 2005: "adjusted to the largest possible value compatible with a causal transfer function".
-pub fn find_onset(departure: &[f64], load: f64, noise_std: f64, settings: OnsetSettings) -> Result<Onset, ForceError> {
+pub fn find_t0(departure: &[f64], load: f64, noise_std: f64, settings: T0Settings) -> Result<T0, ForceError> {
     let from = settings.near.saturating_sub(settings.reach);
     let to = (settings.near + settings.reach + 1).min(departure.len());
     let sure = settings.sure_share * load.abs();
@@ -84,7 +84,7 @@ pub fn find_onset(departure: &[f64], load: f64, noise_std: f64, settings: OnsetS
             earliest = earliest.min(zero);
         }
     }
-    Ok(Onset { latest, earliest })
+    Ok(T0 { latest, earliest })
 }
 
 /// Where the least-squares line through the points vanishes, if it rises.
@@ -101,8 +101,8 @@ mod tests {
     use super::*;
     use crate::fixture::{Lever, white_noise};
 
-    fn settings(near: usize) -> OnsetSettings {
-        OnsetSettings { near, reach: 40, departure_sigma: 4.0, sure_share: 0.1 }
+    fn settings(near: usize) -> T0Settings {
+        T0Settings { near, reach: 40, departure_sigma: 4.0, sure_share: 0.1 }
     }
 
     #[test]
@@ -111,7 +111,7 @@ mod tests {
             let noise = white_noise(1200, 2.5e-4, seed);
             let departure: Vec<f64> =
                 Lever::paper().release(1200, t0, -0.9).iter().zip(noise).map(|(y, e)| y + 0.9 + e).collect();
-            let onset = find_onset(&departure, 0.9, 2.5e-4, settings(505)).unwrap();
+            let onset = find_t0(&departure, 0.9, 2.5e-4, settings(505)).unwrap();
             // half a sample for the power laws, which are an extrapolation
             assert!(onset.earliest - 0.5 <= t0 && t0 <= onset.latest as f64 + 1.0, "{t0} {onset:?}");
             assert!(onset.ambiguity() < 5.0, "{onset:?}");
@@ -121,14 +121,14 @@ mod tests {
     #[test]
     fn without_noise_the_latest_moment_is_the_true_one() {
         let departure: Vec<f64> = Lever::paper().release(1200, 500.0, -0.9).iter().map(|y| y + 0.9).collect();
-        let onset = find_onset(&departure, 0.9, 0.0, settings(505)).unwrap();
+        let onset = find_t0(&departure, 0.9, 0.0, settings(505)).unwrap();
         assert_eq!(onset.latest, 500);
     }
 
     #[test]
     fn a_quiet_signal_has_no_onset() {
         let noise = white_noise(1200, 2.5e-4, 1);
-        assert!(matches!(find_onset(&noise, 0.9, 2.5e-4, settings(500)), Err(ForceError::NoDeparture { .. })));
-        assert!(matches!(find_onset(&[], 0.9, 2.5e-4, settings(500)), Err(ForceError::NoDeparture { .. })));
+        assert!(matches!(find_t0(&noise, 0.9, 2.5e-4, settings(500)), Err(ForceError::NoDeparture { .. })));
+        assert!(matches!(find_t0(&[], 0.9, 2.5e-4, settings(500)), Err(ForceError::NoDeparture { .. })));
     }
 }
