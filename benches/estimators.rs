@@ -122,7 +122,7 @@ fn grey(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("grey form, four modes, 8192 samples");
     group.sampling_mode(SamplingMode::Flat);
     for (name, start) in [("subspace start", GreyStart::Subspace), ("modes given", GreyStart::Modes(near))] {
-        let options = GreyOptions { before: Before::Settled, start, ..GreyOptions::default() };
+        let options = GreyOptions { history: Before::Settled, start, ..GreyOptions::default() };
         group.bench_function(name, |bench| {
             bench.iter(|| {
                 let experiment = Experiment { input: black_box(&u), output: &y };

@@ -145,13 +145,20 @@ struct Typed<S>(PhantomData<fn() -> S>);
 
 impl<S: Stage> Maker for Typed<S> {
     fn parse(&self, params: toml::Table) -> Result<Box<dyn DynStage>, ParamError> {
-        serde_path_to_error::deserialize::<_, S>(params)
+        if S::HAS_KERNEL_OPTIONS {
+            known_names::<S>(&params)?;
+        }
+        deserialised::<S>(params.clone())
+            .map_err(|error| if S::HAS_KERNEL_OPTIONS { located::<S>(params, error) } else { error })
             .map(|stage| Box::new(stage) as Box<dyn DynStage>)
-            .map_err(|error| ParamError { path: error.path().to_string(), message: error.inner().message().to_owned() })
     }
 
     fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
-        S::json_schema(generator)
+        let mut schema = S::json_schema(generator);
+        if S::HAS_KERNEL_OPTIONS {
+            schema.insert("additionalProperties".to_owned(), false.into());
+        }
+        schema
     }
 
     fn examples(&self) -> Vec<Example> {
@@ -161,4 +168,34 @@ impl<S: Stage> Maker for Typed<S> {
     fn manual(&self) -> String {
         format!("`afmid stages {}` lists the parameters", S::SPEC.name)
     }
+}
+
+fn deserialised<S: Stage>(params: toml::Table) -> Result<S, ParamError> {
+    serde_path_to_error::deserialize::<_, S>(params)
+        .map_err(|error| ParamError { path: error.path().to_string(), message: error.inner().message().to_owned() })
+}
+
+/// Errors, in serde's words: a name that neither the stage nor the kernel's options have.
+fn known_names<S: Stage>(params: &toml::Table) -> Result<(), ParamError> {
+    let schema = S::json_schema(&mut SchemaGenerator::default());
+    let properties = schema.get("properties").and_then(Value::as_object);
+    let is_known = |name: &str| properties.is_some_and(|properties| properties.contains_key(name));
+    let Some(unknown) = params.keys().find(|name| !is_known(name)) else { return Ok(()) };
+    let names: Vec<String> = properties.into_iter().flatten().map(|(name, _)| format!("`{name}`")).collect();
+    let message = format!("unknown field `{unknown}`, expected one of {}", names.join(", "));
+    Err(ParamError { path: unknown.clone(), message })
+}
+
+/// The error with its parameter's name, which serde loses where structs are flattened: that of the first parameter that
+/// is refused alone too.
+fn located<S: Stage>(params: toml::Table, error: ParamError) -> ParamError {
+    if !matches!(error.path.as_str(), "" | ".") {
+        return error;
+    }
+    let alone = |(name, value): (String, toml::Value)| {
+        let wrong = deserialised::<S>(toml::Table::from_iter([(name.clone(), value)])).err()?;
+        let inside = matches!(wrong.path.as_str(), "" | ".");
+        Some(ParamError { path: if inside { name } else { wrong.path }, message: wrong.message })
+    };
+    params.into_iter().find_map(alone).unwrap_or(error)
 }

@@ -52,6 +52,10 @@ pub trait Stage: Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'stat
     /// Name, version, ports.
     const SPEC: Spec;
 
+    /// Whether options of a kernel are part of the parameters (`#[serde(flatten)]`, without `deny_unknown_fields`,
+    /// which serde does not combine): then names that neither has are found by the schema.
+    const HAS_KERNEL_OPTIONS: bool = false;
+
     /// Checks what relates parameters to one another, before any data is opened. The range of a single parameter is
     /// stated on its field (`#[schemars(range(min = 1, max = 40))]`) and checked before, of all parameters at once.
     /// Each fault says what was found and what was wanted; the runner adds the place.

@@ -37,7 +37,7 @@ use afmid_kernels::events::{Aligned, AveragingSettings, EventKind, Misfit, corre
 /// # Source
 /// Stark et al. 2005, section Data processing; Woody, Med. Biol. Eng. 5 (1967) 539.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct Correlation {
     /// `snap-off` (the contact ruptures) or `snap-in` (also `snap-to-contact`).
     pub kind: EventKind,
@@ -58,23 +58,9 @@ pub struct Correlation {
     /// step in thirty records of a million samples.
     #[schemars(range(min = 5.0, max = 1000.0))]
     pub significance: f64,
-    /// Samples after the onset that are compared in the alignment (and a quarter of it before). Why: the steepest
-    /// slopes, and too short for resonances that differ between events to slip in phase.
-    #[schemars(range(min = 16, max = 65_536))]
-    pub correlation_samples: usize,
-    /// How far the alignment may move an event from its detected onset, in samples. Why: less than half a period
-    /// of the slowest mode.
-    #[schemars(range(min = 1, max = 1024))]
-    pub max_shift_samples: usize,
-    /// Iterations of the averaging at most. Why: four are usual.
-    #[schemars(range(min = 1, max = 1000))]
-    pub max_iterations: usize,
-    /// The averaging ends when no event moves by more, in samples. Why: below the noise of any shift.
-    #[schemars(range(min = 1e-9, max = 1.0))]
-    pub tolerance_samples: f64,
-    /// Events that correlate less with the average of the others are rejected. Why: ordinary ones reach 0.99.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub min_correlation: f64,
+    /// How events are aligned.
+    #[serde(flatten)]
+    pub averaging: AveragingSettings,
     /// Events are rejected whose residual against the others is this many times the median one (and 6 robust deviations
     /// above it).
     #[schemars(range(min = 1.0, max = 1e9))]
@@ -92,11 +78,7 @@ impl Default for Correlation {
             block_samples: 16,
             level_samples: 1024,
             significance: 8.0,
-            correlation_samples: 256,
-            max_shift_samples: 32,
-            max_iterations: 20,
-            tolerance_samples: 1e-3,
-            min_correlation: 0.8,
+            averaging: AveragingSettings::default(),
             max_residual_ratio: 3.0,
             keep_saturated: false,
         }
@@ -113,6 +95,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many events
 const MAX_ONSET_SAMPLES: usize = 16;
 
 impl Stage for Correlation {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.correlation",
         version: 4,
@@ -134,7 +117,7 @@ impl Stage for Correlation {
         let rate = common_rate(records)?;
         cx.expect(records.len());
         let extraction = self.extraction();
-        let stretch = Stretch::new(&self.averaging(), extraction.before, extraction.after);
+        let stretch = Stretch::new(&self.averaging, extraction.before, extraction.after);
         let segments = Segments::new(cx.row_writer(extraction.before + extraction.after), stretch);
         let searched = records
             .par_iter()
@@ -171,16 +154,6 @@ impl Correlation {
         (self.window_samples as f64 * self.pre_share).round() as usize
     }
 
-    fn averaging(&self) -> AveragingSettings {
-        AveragingSettings {
-            correlation_samples: self.correlation_samples,
-            max_shift_samples: self.max_shift_samples,
-            max_iterations: self.max_iterations,
-            tolerance_samples: self.tolerance_samples,
-            min_correlation: self.min_correlation,
-        }
-    }
-
     fn window(&self) -> WindowSettings {
         WindowSettings {
             window_samples: self.window_samples,
@@ -191,7 +164,7 @@ impl Correlation {
     }
 
     fn extraction(&self) -> ExtractionSettings {
-        let (window, averaging) = (self.window().margins(self.max_shift_samples), self.averaging().margins());
+        let (window, averaging) = (self.window().margins(self.averaging.max_shift_samples), self.averaging.margins());
         ExtractionSettings {
             kind: self.kind,
             block_samples: self.block_samples,
@@ -226,12 +199,12 @@ impl Correlation {
         if stretches.is_empty() {
             return Err(nothing_found(&listed, records));
         }
-        let averaging = correlation_average(&stretches, stretch.onset, &self.averaging());
+        let averaging = correlation_average(&stretches, stretch.onset, &self.averaging);
         drop(stretches);
-        if averaging.last_change_samples > self.tolerance_samples {
+        if averaging.last_change_samples > self.averaging.tolerance_samples {
             cx.warn(format!(
                 "the alignment still moved events by {:.4} samples after {} iterations, wanted {}: raise max_iterations",
-                averaging.last_change_samples, averaging.iterations, self.tolerance_samples
+                averaging.last_change_samples, averaging.iterations, self.averaging.tolerance_samples
             ));
         }
         let mut kept: Vec<(usize, Aligned)> = Vec::new();
@@ -281,10 +254,10 @@ impl Correlation {
     fn misfit_reason(&self, misfit: &Misfit) -> String {
         match misfit {
             Misfit::Correlation(value) => {
-                format!("unlike the others: correlation {value:.3}, wanted at least {}", self.min_correlation)
+                format!("unlike the others: correlation {value:.3}, wanted at least {}", self.averaging.min_correlation)
             }
             Misfit::BeyondLimit => {
-                format!("its onset does not fit the others' within {} samples", self.max_shift_samples)
+                format!("its onset does not fit the others' within {} samples", self.averaging.max_shift_samples)
             }
             Misfit::Incomparable => "cannot be compared with the others: constant, or upside down".to_owned(),
         }

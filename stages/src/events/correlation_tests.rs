@@ -191,8 +191,20 @@ fn parameters_out_of_range_are_named() {
         (Correlation { block_samples: 0, ..default() }, "block_samples"),
         (Correlation { level_samples: 100, ..default() }, "level_samples"),
         (Correlation { significance: 1.0, ..default() }, "significance"),
-        (Correlation { max_iterations: 0, ..default() }, "max_iterations"),
-        (Correlation { min_correlation: 1.5, ..default() }, "min_correlation"),
+        (
+            Correlation {
+                averaging: AveragingSettings { max_iterations: 0, ..AveragingSettings::default() },
+                ..default()
+            },
+            "max_iterations",
+        ),
+        (
+            Correlation {
+                averaging: AveragingSettings { min_correlation: 1.5, ..AveragingSettings::default() },
+                ..default()
+            },
+            "min_correlation",
+        ),
     ] {
         assert!(afmid_pipeline::stage::check(&stage).unwrap_err().to_string().contains(named), "{named}");
     }
@@ -234,8 +246,11 @@ fn ripple(k: u32) -> f64 {
 #[test]
 fn the_alignment_has_the_same_bits_from_what_it_looks_at_as_from_whole_segments() {
     let lever = crate::fixture::Lever::paper();
-    let stage = Correlation { max_shift_samples: 8, ..Correlation::default() };
-    let (averaging, extraction) = (stage.averaging(), stage.extraction());
+    let stage = Correlation {
+        averaging: AveragingSettings { max_shift_samples: 8, ..AveragingSettings::default() },
+        ..Correlation::default()
+    };
+    let (averaging, extraction) = (stage.averaging, stage.extraction());
     let count = extraction.before + extraction.after;
     let stretch = Stretch::new(&averaging, extraction.before, extraction.after);
     // some at the largest shift, some beyond it, one of noise alone

@@ -35,15 +35,11 @@ use afmid_kernels::validation::{BootstrapSettings, Bootstrapped, Drawing, Interv
 /// Source: B. Efron and R. Tibshirani, An Introduction to the Bootstrap, 1993; H. Kuensch, Ann. Statist. 17 (1989)
 /// 1217.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct BootstrapIntervals {
-    /// Replicates. Why: a fit each: ends of the intervals to a tenth of their length.
-    #[schemars(range(min = 20, max = 100_000))]
-    pub replicates: usize,
-    /// Consecutive events drawn together, 1 to half of the events. Why: more where neighbours are alike, as when the
-    /// lever drifts.
-    #[schemars(range(min = 1))]
-    pub block_events: usize,
+    /// How events are drawn.
+    #[serde(flatten)]
+    pub drawing: BootstrapSettings,
     /// Estimate a constant offset of the response.
     pub offset: bool,
     /// Estimate a linear drift of the response. Why: averaged records wander.
@@ -61,10 +57,8 @@ pub struct BootstrapIntervals {
 
 impl Default for BootstrapIntervals {
     fn default() -> Self {
-        let kernel = BootstrapSettings::default();
         Self {
-            replicates: kernel.replicates,
-            block_events: kernel.block_events,
+            drawing: BootstrapSettings::default(),
             offset: true,
             drift: true,
             response_points: 200,
@@ -82,6 +76,7 @@ pub(super) const RESPONSE: Port<Array> =
 pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "gain and delay with their intervals");
 
 impl Stage for BootstrapIntervals {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.bootstrap",
         version: 3,
@@ -116,8 +111,7 @@ impl Stage for BootstrapIntervals {
             offset: self.offset,
             drift: self.drift,
         };
-        let settings =
-            BootstrapSettings { replicates: self.replicates, block_events: self.block_events, seed: cx.seed() };
+        let settings = BootstrapSettings { seed: cx.seed(), ..self.drawing };
         let found = drawing.intervals(&settings, &Watched(cx)).map_err(StageError::from_error)?;
         let unknown = found.roots.iter().filter(|root| root.frequency.std.is_nan()).count();
         if unknown > 0 {
@@ -125,7 +119,7 @@ impl Stage for BootstrapIntervals {
         }
         let summary = Document::new(&json!({
             "events": events.len(),
-            "replicates": self.replicates,
+            "replicates": self.drawing.replicates,
             "level": LEVEL,
             "gain": document(&found.gain, 0.0),
             "delay_s": document(&found.delay_s, self.hold_delay_s(&model)),

@@ -20,7 +20,7 @@ use super::pem::{MODEL, PAIR, RESIDUALS, SUMMARY, ending};
 use crate::artifacts::{
     DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, innovations, state_nuisances, state_space, state_t0_ambiguity,
 };
-use afmid_kernels::grey::{Before, Grey, GreyHold, GreyOptions, GreyQuantity, GreyStart, InputBetween, fit_grey};
+use afmid_kernels::grey::{Grey, GreyHold, GreyOptions, GreyQuantity, GreyStart, fit_grey};
 use afmid_kernels::pem::{Experiment, Identified, ResidualColour};
 use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, whiteness};
 
@@ -45,29 +45,13 @@ use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, white
 /// Source: L. Ljung, System Identification, 1999, chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003)
 /// R1; E. I. Jury, Theory and Application of the z-Transform Method, 1964.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct GreyEstimate {
-    /// Oscillating modes. Why: the paper's.
-    #[schemars(range(min = 1, max = 40))]
-    pub modes: usize,
-    /// Real poles of detector and electronics. Why: further ones and the delay take each other's place.
-    #[schemars(range(min = 0, max = 8))]
-    pub real_poles: usize,
-    /// Estimate a delay, or take what is `known` of it. Why: without it is none.
-    pub delay: bool,
-    /// Estimate what passes without any mode. Why: modes beyond the fitted ones act like that.
-    pub feedthrough: bool,
+    /// How it is fitted.
+    #[serde(flatten)]
+    pub fit: GreyOptions,
     /// Which events: `all`, or one half (`identification`, `verification`).
     pub set: DataSet,
-    /// What the force does between its samples: `held` until the next, or `linear`. Why: exact for a step at a sample.
-    pub between: InputBetween,
-    /// Before the first sample the system was `settled` under its first force, at `rest` without any, or `anything` (an
-    /// initial state is estimated). Why: settled says more where it is true, as before a release.
-    pub history: Before,
-    /// Estimate a constant offset of the response.
-    pub offset: bool,
-    /// Estimate a linear drift of the response. Why: averaged records wander.
-    pub drift: bool,
     /// Seconds before t0 that are used. Absent: all of them.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub before_s: Option<f64>,
@@ -77,15 +61,6 @@ pub struct GreyEstimate {
     /// Modes to start from, `[frequency in Hz, quality factor]` each, as many as `modes`. None: from the port `start`
     /// or from subspace estimates.
     pub start_modes: Vec<[f64; 2]>,
-    /// Rows of the Hankel matrix of the start, six more than twice the modes and the real poles, at least.
-    #[schemars(range(min = 2, max = 1000))]
-    pub block_rows: usize,
-    /// Starts that are refined.
-    #[schemars(range(min = 1, max = 100))]
-    pub starts: usize,
-    /// Most steps of a search. Why: ten are usual.
-    #[schemars(range(min = 1, max = 10_000))]
-    pub max_iterations: usize,
     /// Standard errors for `white` residuals or by the residual's own spectrum. Why: by the spectrum.
     pub coloured: bool,
 }
@@ -93,21 +68,11 @@ pub struct GreyEstimate {
 impl Default for GreyEstimate {
     fn default() -> Self {
         Self {
-            modes: 4,
-            real_poles: 1,
-            delay: true,
-            feedthrough: true,
+            fit: GreyOptions::default(),
             set: DataSet::All,
-            between: InputBetween::Held,
-            history: Before::Anything,
-            offset: true,
-            drift: true,
             before_s: None,
             known: Vec::new(),
             start_modes: Vec::new(),
-            block_rows: 60,
-            starts: 3,
-            max_iterations: 60,
             coloured: true,
         }
     }
@@ -119,6 +84,7 @@ const PARAMETERS: Port<Table> =
     Port::new("parameters", "grey-parameters", "all numbers of the grey form, with their errors");
 
 impl Stage for GreyEstimate {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.grey",
         version: 4,
@@ -131,9 +97,9 @@ impl Stage for GreyEstimate {
     };
 
     fn check(&self, faults: &mut Faults) {
-        let (rows, least) = (self.block_rows, 2 * self.modes + self.real_poles + 6);
+        let (rows, least) = (self.fit.block_rows, 2 * self.fit.modes + self.fit.real_poles + 6);
         faults.require(rows >= least, || format!("`block_rows` is {rows}, wanted {least} to 1000"));
-        let (found, modes) = (self.start_modes.len(), self.modes);
+        let (found, modes) = (self.start_modes.len(), self.fit.modes);
         faults.require(found == 0 || found == modes, || {
             format!("`start_modes` has {found}, wanted {modes} as `modes` says, or none")
         });
@@ -155,7 +121,7 @@ impl Stage for GreyEstimate {
         self.warn(&fit, series.output.len(), cx);
         let identified = identified(&fit, &series)?;
         let mut model = state_space(&identified, self.set, first)?;
-        state_nuisances(&mut model, Nuisances { offset: self.offset, slope: self.drift });
+        state_nuisances(&mut model, Nuisances { offset: self.fit.offset, slope: self.fit.drift });
         state_t0_ambiguity(&mut model, pair.t0_ambiguity_s());
         model.attributes.insert("delay_s".to_owned(), fit.model.delay_s.into());
         model.attributes.insert("dead_samples".to_owned(), fit.discrete.dead_samples.into());
@@ -189,11 +155,11 @@ impl GreyEstimate {
             }
             let there = match entry.quantity {
                 GreyQuantity::Frequency(n) | GreyQuantity::QualityFactor(n) | GreyQuantity::Gain { mode: n, .. } => {
-                    n < self.modes
+                    n < self.fit.modes
                 }
-                GreyQuantity::RealPole(k) => k < self.real_poles,
-                GreyQuantity::Delay => self.delay,
-                GreyQuantity::Feedthrough(_) => self.feedthrough,
+                GreyQuantity::RealPole(k) => k < self.fit.real_poles,
+                GreyQuantity::Delay => self.fit.delay,
+                GreyQuantity::Feedthrough(_) => self.fit.feedthrough,
             };
             if !there {
                 return Err(StageError::new(format!("`known` names the {name}, which is not fitted")));
@@ -215,20 +181,10 @@ impl GreyEstimate {
             None => GreyStart::Subspace,
         };
         Ok(GreyOptions {
-            modes: self.modes,
-            real_poles: self.real_poles,
-            delay: self.delay,
-            feedthrough: self.feedthrough,
-            offset: self.offset,
-            slope: self.drift,
-            before: self.history,
-            between: self.between,
             known: self.known.iter().map(GreyNumber::known).collect::<Result<_, _>>()?,
             start,
-            block_rows: self.block_rows,
-            starts: self.starts,
-            max_iterations: self.max_iterations,
             colour: if self.coloured { ResidualColour::Spectrum } else { ResidualColour::White },
+            ..self.fit.clone()
         })
     }
 
@@ -270,7 +226,7 @@ impl GreyEstimate {
         let measured: Vec<f64> = present.iter().map(|&k| series.output[k]).collect();
         let simulated: Vec<f64> = present.iter().map(|&k| series.output[k] - residual[k]).collect();
         let left: Vec<f64> = present.iter().map(|&k| residual[k]).collect();
-        let nuisances = Nuisances { offset: self.offset, slope: self.drift };
+        let nuisances = Nuisances { offset: self.fit.offset, slope: self.fit.drift };
         let shares = fit.static_shares(0);
         let modes: Vec<Value> = fit
             .modes()

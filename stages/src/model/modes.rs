@@ -44,21 +44,11 @@ use afmid_kernels::validation::{noise_ceiling_percent, simulate_held_out};
 /// Errors: a model that is not one of `model.pem`, or without covariance; a pair of another sample rate.
 /// Source: Stark et al. 2005, Table I and Fig. 5; L. Ljung, System Identification, 1999, section 9.4.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct Modes {
-    /// Least quality factor of a mode. Why: detector poles are real or strongly damped.
-    #[schemars(extend("exclusiveMinimum" = 0.5))]
-    pub min_quality_factor: f64,
-    /// Highest frequency of a mode in Hz.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub max_frequency_hz: Option<f64>,
-    /// Least amplitude of a mode's ringing over its standard error. Why: the best of thousands of noise frequencies
-    /// reaches 5.
-    #[schemars(range(min = 0.0))]
-    pub min_significance: f64,
-    /// Largest relative standard error of a mode's quality factor. Why: a line that does not decay is no mode.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub max_quality_factor_error: f64,
+    /// What counts as a mode.
+    #[serde(flatten)]
+    pub criteria: ModeCriteria,
     /// Points of the frequency response, logarithmic from `response_from_hz` to half the sample rate.
     #[schemars(range(min = 2, max = 100_000))]
     pub response_points: usize,
@@ -78,12 +68,8 @@ pub struct Modes {
 
 impl Default for Modes {
     fn default() -> Self {
-        let criteria = ModeCriteria::default();
         Self {
-            min_quality_factor: criteria.min_quality_factor,
-            max_frequency_hz: None,
-            min_significance: criteria.min_significance,
-            max_quality_factor_error: criteria.max_quality_factor_error,
+            criteria: ModeCriteria::default(),
             response_points: 2000,
             response_from_hz: 1000.0,
             intersample: Intersample::Held,
@@ -103,6 +89,7 @@ const RESPONSE: Port<Array> = Port::new("response", "model-response", "frequency
 pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "modes and fits");
 
 impl Stage for Modes {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.modes",
         version: 6,
@@ -129,7 +116,7 @@ impl Stage for Modes {
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let artifact = inputs.get(&MODEL)?;
         let (model, covariance) = innovations(artifact)?;
-        let mut found = poles(&model, &covariance, &self.criteria()).map_err(StageError::from_error)?;
+        let mut found = poles(&model, &covariance, &self.criteria).map_err(StageError::from_error)?;
         let ambiguity_s = onset_ambiguity(artifact);
         for pole in found.iter_mut().filter(|pole| pole.root.is_complex()) {
             let from_onset = share_error_from_onset(pole.amplitude, pole.root.s, ambiguity_s.unwrap_or(0.0));
@@ -171,15 +158,6 @@ impl Stage for Modes {
 }
 
 impl Modes {
-    fn criteria(&self) -> ModeCriteria {
-        ModeCriteria {
-            min_quality_factor: self.min_quality_factor,
-            max_frequency_hz: self.max_frequency_hz.unwrap_or(f64::INFINITY),
-            min_significance: self.min_significance,
-            max_quality_factor_error: self.max_quality_factor_error,
-        }
-    }
-
     /// Gain and delay with their intervals.
     fn at_rest(&self, model: &InnovationsModel, covariance: &Mat<f64>) -> Result<Value, StageError> {
         let rest = at_rest(model, covariance).map_err(StageError::from_error)?;

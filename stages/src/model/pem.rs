@@ -11,7 +11,7 @@ use super::order::{Order, choice_document, simulated_percent};
 use crate::artifacts::{DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, state_nuisances, state_space, state_t0_ambiguity};
 use crate::ensemble::LEAST_EVENTS;
 use crate::watched::Watched;
-use afmid_kernels::pem::{Ending, Experiment, Focus, Identified, NoiseModel, PemOptions, identify};
+use afmid_kernels::pem::{Ending, Experiment, Identified, PemOptions, identify};
 use afmid_kernels::validation::{
     Nuisances, OrderChoice, TestResult, choose_order, fit_percent, input_dependence, whiteness,
 };
@@ -32,7 +32,7 @@ use afmid_kernels::validation::{
 /// leaves them out. No convergence is a warning.
 /// Source: Stark et al. 2005, Eq. 8; L. Ljung, System Identification, 1999, chapters 7 and 10.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct Pem {
     /// Number of states, 1 to 40, or `auto`: the smallest up to `max_order` whose simulation of the last third of the
     /// data, fitted on the rest, is within a standard error of the best; after a release the least BIC. Why: as in the
@@ -43,34 +43,9 @@ pub struct Pem {
     pub max_order: usize,
     /// Which events: `all`, or one half (`identification`, `verification`).
     pub set: DataSet,
-    /// Rows of the Hankel matrix that the start comes from, more than `order`. Why: half as many blur close poles.
-    #[schemars(range(min = 2, max = 1000))]
-    pub block_rows: usize,
-    /// Most iterations in each stretch of the search. Why: ten to thirty are usual.
-    #[schemars(range(min = 1, max = 10_000))]
-    pub max_iterations: usize,
-    /// Parametrisation of the Kalman gain: `thermal` (white output noise and a white force on every section, one
-    /// intensity each), `free` (all its elements), `white` (none: output error) or `coloured` (none; the errors are
-    /// whitened by an autoregressive filter of their own, for noise that does not pass through the model's poles). Why:
-    /// a free gain also fits the dips that the fit itself leaves at resonances.
-    pub noise: NoiseModel,
-    /// Which errors are made small: `prediction` (one sample ahead) or `simulation` (output error, started from the
-    /// best of the subspace estimates and the prediction model; K is zero). Why: the most efficient where the noise
-    /// model holds.
-    pub focus: Focus,
-    /// Starts that are refined. Why: more than three also take subspace estimates with instruments, which records of
-    /// rich input need (8).
-    #[schemars(range(min = 1, max = 100))]
-    pub starts: usize,
-    /// Prior variance of the response outside the excited band: as if white noise of this share of each input's energy
-    /// had been put in and nothing had come out. Why: records that excite a narrow band need one to say anything
-    /// beyond it: the share of noise in the output, over the samples.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub prior: f64,
-    /// Estimate a constant offset of the response.
-    pub offset: bool,
-    /// Estimate a linear drift of the response. Why: averaged records wander.
-    pub drift: bool,
+    /// How it is fitted.
+    #[serde(flatten)]
+    pub fit: PemOptions,
     /// Seconds before t0 that are used. Absent: all of them. After a snap-in a few periods suffice: before it the lever
     /// is another system.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -86,14 +61,7 @@ impl Default for Pem {
             order: Order::Fixed(11),
             max_order: 16,
             set: DataSet::All,
-            block_rows: 60,
-            max_iterations: 60,
-            noise: NoiseModel::Thermal,
-            focus: Focus::Prediction,
-            starts: 3,
-            prior: 0.0,
-            offset: true,
-            drift: true,
+            fit: PemOptions::default(),
             before_s: None,
             test_lags: 25,
         }
@@ -109,6 +77,7 @@ pub(super) const SUMMARY: Port<Document> =
     Port::new("summary", "summary", "convergence, fits of the data that it was fitted to, residual tests");
 
 impl Stage for Pem {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.pem",
         version: 8,
@@ -121,7 +90,7 @@ impl Stage for Pem {
     };
 
     fn check(&self, faults: &mut Faults) {
-        let (rows, least) = (self.block_rows, self.order.largest(self.max_order) + 1);
+        let (rows, least) = (self.fit.block_rows, self.order.largest(self.max_order) + 1);
         faults.require(rows >= least, || format!("`block_rows` is {rows}, wanted {least} to 1000"));
     }
 
@@ -157,7 +126,7 @@ impl Stage for Pem {
         }
         let summary = self.summary(&fit, choice.as_ref(), (&input, &output, &unit), first)?;
         let mut model = state_space(&fit, self.set, first)?;
-        state_nuisances(&mut model, Nuisances { offset: self.offset, slope: self.drift });
+        state_nuisances(&mut model, Nuisances { offset: self.fit.offset, slope: self.fit.drift });
         state_t0_ambiguity(&mut model, pair.t0_ambiguity_s());
         let residual = fit.residuals.into_iter().next().unwrap_or_default();
         let prediction = output.iter().zip(&residual).map(|(y, e)| y - e).collect::<Vec<f64>>();
@@ -175,18 +144,7 @@ impl Stage for Pem {
 
 impl Pem {
     fn options(&self, order: usize) -> PemOptions {
-        PemOptions {
-            order,
-            block_rows: self.block_rows,
-            max_iterations: self.max_iterations,
-            offset: self.offset,
-            slope: self.drift,
-            noise: self.noise,
-            focus: self.focus,
-            starts: self.starts,
-            prior: self.prior,
-            ..PemOptions::default()
-        }
+        PemOptions { order, ..self.fit.clone() }
     }
 
     /// Errors: a half is asked for, and the pair has none.
@@ -216,7 +174,7 @@ impl Pem {
         let order = fit.model.order();
         let lags = self.test_lags + order;
         let (all_inputs, input) = (input, input.get(..output.len()).unwrap_or(input));
-        let nuisances = Nuisances { offset: self.offset, slope: self.drift };
+        let nuisances = Nuisances { offset: self.fit.offset, slope: self.fit.drift };
         let test = |result: Result<TestResult, afmid_kernels::model::ModelError>| {
             result.map_or(
                 json!(null),

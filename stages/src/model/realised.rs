@@ -37,7 +37,7 @@ impl Realised<'_> {
             ));
         }
         let options =
-            PemOptions { block_rows: poles.len() + 1, offset: self.offset, slope: self.drift, ..PemOptions::default() };
+            PemOptions { block_rows: poles.len() + 1, offset: self.offset, drift: self.drift, ..PemOptions::default() };
         let experiment = Experiment { input: &series.input, output: &series.output };
         let fit = with_poles(&[experiment], 1.0 / series.rate, poles, &options).map_err(StageError::from_error)?;
         let mut model = state_space(&fit, self.set, self.first)?;

@@ -49,7 +49,7 @@ use afmid_kernels::ringdown::{
 /// Source: S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7; D. A. Harville, J. Am. Stat.
 /// Assoc. 72 (1977) 320.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct RingdownFit {
     /// Oscillating modes, 1 to 20, or `auto`: as many up to `max_modes` as lower the chi square of held-out events by
     /// two standard errors each, below 4 events as the least BIC wants. Why: the paper's.
@@ -57,9 +57,9 @@ pub struct RingdownFit {
     /// Largest number that `auto` tries. Why: each takes a fit, and three from 4 events on.
     #[schemars(range(min = 1, max = 20))]
     pub max_modes: usize,
-    /// Real poles of the detector. Why: the paper's; they matter in the first samples only.
-    #[schemars(range(min = 0, max = 8))]
-    pub real_poles: usize,
+    /// How it is fitted.
+    #[serde(flatten)]
+    pub fit: RingdownOptions,
     /// Samples after the onset that are left out. Why: some where the onset is not sharp.
     #[schemars(range(min = 0, max = 100_000))]
     pub skip_samples: usize,
@@ -67,15 +67,6 @@ pub struct RingdownFit {
     pub noise: JointNoise,
     /// Where standard errors come from: `noise` (the noise model) or `events` (the scatter of 8 events or more).
     pub error_source: ErrorSource,
-    /// Estimate a linear drift of each event beside its offset.
-    pub drift: bool,
-    /// Draws of a bootstrap over events for 95 % intervals. 400 know an interval's ends to a tenth of its
-    /// width.
-    #[schemars(range(max = 100_000))]
-    pub bootstrap_draws: usize,
-    /// Rows of the Hankel matrix of the start, more than its order. Why: a period of the slowest mode.
-    #[schemars(range(min = 2, max = 400))]
-    pub block_rows: usize,
     /// Samples after the onset that the start is made from, 0 (all) or 8 per mode, real pole and two more to 10
     /// million. Why: some decay times where the ringing fills a small part of the window, as on contact.
     #[schemars(range(min = 0, max = 10_000_000))]
@@ -123,13 +114,10 @@ impl Default for RingdownFit {
         Self {
             modes: ModeNumber::Fixed(4),
             max_modes: 8,
-            real_poles: 3,
+            fit: RingdownOptions::default(),
             skip_samples: 0,
             noise: JointNoise::Estimated,
             error_source: ErrorSource::Noise,
-            drift: true,
-            bootstrap_draws: 0,
-            block_rows: 100,
             start_samples: 0,
             missing: Vec::new(),
             range_v: None,
@@ -157,6 +145,7 @@ const DISAGREEMENT: f64 = 1.6;
 const EXCESS: f64 = 1.1;
 
 impl Stage for RingdownFit {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.ringdown",
         version: 4,
@@ -170,9 +159,9 @@ impl Stage for RingdownFit {
 
     fn check(&self, faults: &mut Faults) {
         let modes = self.modes.largest(self.max_modes);
-        let (rows, least) = (self.block_rows, 2 * modes + self.real_poles.max(1) + 2);
+        let (rows, least) = (self.fit.block_rows, 2 * modes + self.fit.real_poles.max(1) + 2);
         faults.require(rows >= least, || format!("`block_rows` is {rows}, wanted {least} to 400"));
-        let (samples, least) = (self.start_samples, 8 * (modes + self.real_poles + 2));
+        let (samples, least) = (self.start_samples, 8 * (modes + self.fit.real_poles + 2));
         faults.require(samples == 0 || samples >= least, || {
             format!("`start_samples` is {samples}, wanted 0 or {least} to 10000000")
         });
@@ -256,7 +245,7 @@ impl RingdownFit {
                 )
                 .help("give the number of modes"));
             }
-            let known = entry.known(modes, self.real_poles)?;
+            let known = entry.known(modes, self.fit.real_poles)?;
             if seen.contains(&known.quantity) {
                 return Err(StageError::new(format!("`known` has two entries for {}", named(known.quantity))));
             }
@@ -269,18 +258,14 @@ impl RingdownFit {
         let modes = self.modes.largest(self.max_modes);
         Ok(RingdownOptions {
             modes,
-            real_poles: self.real_poles,
-            block_rows: self.block_rows,
-            slope: self.drift,
-            bootstrap_draws: self.bootstrap_draws,
             bootstrap_seed: seed,
             start_samples: (self.start_samples > 0).then_some(self.start_samples),
             noise: match self.noise {
                 JointNoise::Estimated => NoiseSource::Estimated,
                 JointNoise::White => NoiseSource::White,
             },
-            known: self.known.iter().map(|entry| entry.known(modes, self.real_poles)).collect::<Result<_, _>>()?,
-            ..RingdownOptions::default()
+            known: self.known.iter().map(|entry| entry.known(modes, self.fit.real_poles)).collect::<Result<_, _>>()?,
+            ..self.fit.clone()
         })
     }
 

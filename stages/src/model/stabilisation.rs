@@ -33,7 +33,7 @@ use afmid_kernels::subspace::{Subspace, Weight};
 /// Source: H. Van der Auweraer and B. Peeters, Smart Struct. Syst. 1 (2004) 1; B. Peeters and G. De Roeck, J. Dyn.
 /// Syst. Meas. Control 123 (2001) 659.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct StabilisationDiagram {
     /// Where the poles come from: `era` (the free decay), `release` (subspace without instruments), `n4sid`, `moesp` or
     /// `cva` (inputs that excite). Why: as the events here decay freely.
@@ -52,24 +52,12 @@ pub struct StabilisationDiagram {
     /// Rows of the Hankel matrix, more than the highest order. Why: as in `model.era`.
     #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
-    /// Largest relative change of a stable pole's frequency from one order to the next. Why: as is usual.
-    #[schemars(range(max = 0.5), extend("exclusiveMinimum" = 0.0))]
-    pub frequency: f64,
-    /// Largest relative change of a stable pole's damping. Why: as is usual; a mode's damping may spread twice as much.
-    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
-    pub damping: f64,
-    /// Least quality factor of a mode. Why: as in `model.modes`.
-    #[schemars(extend("exclusiveMinimum" = 0.5))]
-    pub min_quality_factor: f64,
-    /// Least number of orders at which a mode is stable.
-    #[schemars(range(min = 1))]
-    pub min_count: usize,
     /// Least amplitude of a mode's ringing over its standard error. Why: as in `model.modes`.
     #[schemars(range(min = 0.0))]
     pub min_significance: f64,
-    /// Least share of the orders from a mode's first on at which it is stable.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub min_share: f64,
+    /// What counts as stable, and as a mode.
+    #[serde(flatten)]
+    pub criteria: StabilisationCriteria,
 }
 
 /// Where the poles come from.
@@ -90,7 +78,6 @@ pub enum PoleMethod {
 
 impl Default for StabilisationDiagram {
     fn default() -> Self {
-        let criteria = StabilisationCriteria::default();
         Self {
             method: PoleMethod::Era,
             from_order: 2,
@@ -98,12 +85,8 @@ impl Default for StabilisationDiagram {
             step: 1,
             set: DataSet::All,
             block_rows: 300,
-            frequency: criteria.frequency,
-            damping: criteria.damping,
-            min_quality_factor: criteria.min_quality_factor,
-            min_count: criteria.min_count,
             min_significance: 6.0,
-            min_share: criteria.min_share,
+            criteria: StabilisationCriteria::default(),
         }
     }
 }
@@ -114,6 +97,7 @@ pub(super) const MODES: Port<Table> = Port::new("modes", "stable-modes", "physic
 pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many modes, and the proposed order");
 
 impl Stage for StabilisationDiagram {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.stabilisation",
         version: 4,
@@ -141,7 +125,7 @@ impl Stage for StabilisationDiagram {
                 .help("fewer `block_rows`, or a record that goes on longer after the force's last change")
         })?;
         let (experiment, interval_s) = (Experiment { input: &series.input, output: &series.output }, 1.0 / series.rate);
-        let found = stabilisation(&candidates, interval_s, &self.criteria())
+        let found = stabilisation(&candidates, interval_s, &self.criteria)
             .and_then(|found| found.established(experiment, interval_s, self.min_significance))
             .map_err(StageError::from_error)?;
         if found.modes.is_empty() {
@@ -163,16 +147,6 @@ impl Stage for StabilisationDiagram {
 }
 
 impl StabilisationDiagram {
-    fn criteria(&self) -> StabilisationCriteria {
-        StabilisationCriteria {
-            frequency: self.frequency,
-            damping: self.damping,
-            min_quality_factor: self.min_quality_factor,
-            min_count: self.min_count,
-            min_share: self.min_share,
-        }
-    }
-
     /// Poles of each order, from one decomposition.
     fn candidates(&self, series: &PairSeries) -> Result<Vec<(usize, Vec<c64>)>, ModelError> {
         let (u, y, rows) = (&series.input, &series.output, self.block_rows);

@@ -113,7 +113,7 @@ impl SubspaceEstimate {
             block_rows: self.block_rows,
             noise: NoiseModel::White,
             offset: self.offset,
-            slope: self.drift,
+            drift: self.drift,
             ..PemOptions::default()
         };
         let experiment = Experiment { input: &series.input, output: &series.output };

@@ -35,14 +35,11 @@ use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFit, VectorFitting, 
 /// event was.
 /// Source: B. Gustavsen, IEEE Trans. Power Delivery 21 (2006) 1587; B. Gustavsen and A. Semlyen, ibid. 14 (1999) 1052.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct VectorFittingEstimate {
-    /// Number of poles. Why: as in the paper: four modes and three detector poles.
-    #[schemars(range(min = 1, max = 40))]
-    pub order: usize,
-    /// Oscillating pairs among the starting poles, at most half the order; the rest starts real. Absent: as many as
-    /// fit. A fit that ends with another number warns: pairs and real poles may turn into each other.
-    pub modes: Option<usize>,
+    /// How it is fitted.
+    #[serde(flatten)]
+    pub fit: VectorFitting,
     /// Lowest frequency that is used, in Hz.
     #[schemars(range(min = 0.0))]
     pub min_frequency_hz: f64,
@@ -55,13 +52,6 @@ pub struct VectorFittingEstimate {
     /// What the ends of the window add: `auto` (fitted for a response from differences that is not smoothed), `on` or
     /// `off`.
     pub transient: Presence,
-    /// Relocations of the poles at most. Why: ten are usual.
-    #[schemars(range(min = 1, max = 1000))]
-    pub iterations: usize,
-    /// End with Gauss-Newton on the weighted error. Why: without, errors are up to a seventh larger.
-    pub refine: bool,
-    /// Reflect poles from outside the unit circle into it. Why: an unstable pole says that the order is too high.
-    pub stable: bool,
 }
 
 /// How bins count.
@@ -76,18 +66,13 @@ pub enum ResponseWeight {
 
 impl Default for VectorFittingEstimate {
     fn default() -> Self {
-        let kernel = VectorFitting::default();
         Self {
-            order: kernel.order,
-            modes: None,
+            fit: VectorFitting::default(),
             min_frequency_hz: 0.0,
             max_frequency_hz: None,
             weight: ResponseWeight::Variance,
             intersample: Intersample::Held,
             transient: Presence::Auto,
-            iterations: kernel.iterations,
-            refine: kernel.refine,
-            stable: kernel.stable,
         }
     }
 }
@@ -97,6 +82,7 @@ pub(super) const TRANSFER: Port<Array> =
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "order, pairs, fit of the response, convergence");
 
 impl Stage for VectorFittingEstimate {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.vector_fitting",
         version: 2,
@@ -109,7 +95,7 @@ impl Stage for VectorFittingEstimate {
     };
 
     fn check(&self, faults: &mut Faults) {
-        let (modes, most) = (self.modes.unwrap_or(0), self.order / 2);
+        let (modes, most) = (self.fit.modes.unwrap_or(0), self.fit.order / 2);
         faults.require(modes <= most, || format!("`modes` is {modes}, wanted at most half the order, {most}"));
         let (low, high) = (self.min_frequency_hz, self.max_frequency_hz.unwrap_or(f64::MAX));
         faults.require(high > low && high.is_finite(), || {
@@ -130,9 +116,9 @@ impl Stage for VectorFittingEstimate {
         let pairs = fit.model.sections.iter().flat_map(|s| s.poles()).filter(|z| z.im > 0.0).count();
         self.warn(&fit, pairs, cx);
         let summary = Document::new(&json!({
-            "order": self.order,
+            "order": self.fit.order,
             "pairs": pairs,
-            "real_poles": self.order - 2 * pairs,
+            "real_poles": self.fit.order - 2 * pairs,
             "bins": fit.points,
             "weight": if weighted { "variance" } else { "uniform" },
             "transient": settings.transient_delay_s.is_some(),
@@ -192,18 +178,14 @@ impl VectorFittingEstimate {
         // two estimates share data as far as both reach
         let reach = |values: &[f64]| values.iter().filter(|h| h.is_finite()).fold(0.0_f64, |most, h| most.max(*h));
         Ok(VectorFitting {
-            order: self.order,
-            pairs: self.modes,
-            iterations: self.iterations,
-            refine: self.refine,
-            stable: self.stable,
             transient_delay_s: delay,
             correlated_bins: smoothed.map_or(0, |bins| 2 * reach(bins) as usize),
+            ..self.fit.clone()
         })
     }
 
     fn warn(&self, fit: &VectorFit, pairs: usize, cx: &Context) {
-        if !fit.converged && self.refine {
+        if !fit.converged && self.fit.refine {
             cx.warn(format!(
                 "the poles did not settle in {} steps: the gradient is {:.1e} of the residual; another order may do",
                 fit.iterations, fit.gradient
@@ -212,11 +194,14 @@ impl VectorFittingEstimate {
         if fit.unstable > 0 {
             cx.warn(format!(
                 "{} of {} poles lie outside the unit circle; a lower order may do, or `stable = true`",
-                fit.unstable, self.order
+                fit.unstable, self.fit.order
             ));
         }
-        if let Some(modes) = self.modes.filter(|modes| *modes != pairs) {
-            cx.warn(format!("{modes} oscillating pairs were wanted, the response has {pairs} at order {}", self.order));
+        if let Some(modes) = self.fit.modes.filter(|modes| *modes != pairs) {
+            cx.warn(format!(
+                "{modes} oscillating pairs were wanted, the response has {pairs} at order {}",
+                self.fit.order
+            ));
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Iterative correlation averaging: events and their average are aligned with each other until nothing moves.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::cross_correlation::CrossCorrelator;
 use super::fractional_shift::{REACH, fractional_shift};
@@ -8,18 +10,38 @@ use super::shift_refinement::refine_shift;
 use crate::statistics::median;
 
 /// How events are aligned.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct AveragingSettings {
-    /// Samples after the onset that are compared; a quarter of it before.
+    /// Samples after the onset that are compared in the alignment (and a quarter of it before). Why: the steepest
+    /// slopes, and too short for resonances that differ between events to slip in phase.
+    #[schemars(range(min = 16, max = 65_536))]
     pub correlation_samples: usize,
-    /// How far an event may lie from its detected onset.
+    /// How far the alignment may move an event from its detected onset, in samples. Why: less than half a period
+    /// of the slowest mode.
+    #[schemars(range(min = 1, max = 1024))]
     pub max_shift_samples: usize,
-    /// Iterations at most.
+    /// Iterations of the averaging at most. Why: four are usual.
+    #[schemars(range(min = 1, max = 1000))]
     pub max_iterations: usize,
-    /// Done when no event moves by more.
+    /// The averaging ends when no event moves by more, in samples. Why: below the noise of any shift.
+    #[schemars(range(min = 1e-9, max = 1.0))]
     pub tolerance_samples: f64,
-    /// Events that correlate less with the average of the others are left out.
+    /// Events that correlate less with the average of the others are rejected. Why: ordinary ones reach 0.99.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_correlation: f64,
+}
+
+impl Default for AveragingSettings {
+    fn default() -> Self {
+        Self {
+            correlation_samples: 256,
+            max_shift_samples: 32,
+            max_iterations: 20,
+            tolerance_samples: 1e-3,
+            min_correlation: 0.8,
+        }
+    }
 }
 
 impl AveragingSettings {

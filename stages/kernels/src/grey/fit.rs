@@ -96,7 +96,7 @@ fn settled(options: &GreyOptions) -> GreyOptions {
 /// Leaves out the samples that hold what was put in before the record.
 fn mask(problem: &mut Problem<'_>, options: &GreyOptions, delay: Option<f64>) {
     let samples = match delay {
-        Some(delay) if options.before == Before::Anything => delay.ceil() as usize,
+        Some(delay) if options.history == Before::Anything => delay.ceil() as usize,
         _ => 0,
     };
     problem.series.iter_mut().for_each(|s| s.masked = samples.min(s.output.len() / 2));
@@ -136,13 +136,13 @@ fn checked<'a>(
         modes: options.modes,
         poles: options.real_poles,
         inputs,
-        initial: options.before == Before::Anything,
+        initial: options.history == Before::Anything,
         slopes: true,
     };
     let mut problem = Problem {
         series: Vec::new(),
         layout,
-        linear: Linear { feedthrough: options.feedthrough, offset: options.offset, slope: options.slope },
+        linear: Linear { feedthrough: options.feedthrough, offset: options.offset, slope: options.drift },
         between: options.between,
         rules,
     };
@@ -178,7 +178,7 @@ fn series<'a>(
     let inputs: Vec<&[f64]> = input.chunks_exact(output.len().max(1)).collect();
     let levels = inputs
         .iter()
-        .map(|u| if options.before == Before::Rest { 0.0 } else { u.first().copied().unwrap_or(0.0) })
+        .map(|u| if options.history == Before::Rest { 0.0 } else { u.first().copied().unwrap_or(0.0) })
         .collect();
     let series = Series { inputs, output, levels, masked: 0 };
     let wanted = 2 * own + 2 * START_MASK;

@@ -88,35 +88,45 @@ pub enum GreyStart {
 }
 
 /// What is fitted.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct GreyOptions {
-    /// Modes, at least 1; default 4, the paper's.
+    /// Oscillating modes. Why: the paper's.
+    #[schemars(range(min = 1, max = 40))]
     pub modes: usize,
-    /// Real poles, default 1: further ones and the delay are hard to tell apart.
+    /// Real poles of detector and electronics. Why: further ones and the delay take each other's place.
+    #[schemars(range(min = 0, max = 8))]
     pub real_poles: usize,
-    /// Estimate the delay; default true. Otherwise it is what is known of it, or none.
+    /// Estimate a delay, or take what is `known` of it. Why: without it is none.
     pub delay: bool,
-    /// Estimate a feedthrough `d0` per input; default true.
+    /// Estimate what passes without any mode. Why: modes beyond the fitted ones act like that.
     pub feedthrough: bool,
-    /// Estimate an offset per experiment; default true.
-    pub offset: bool,
-    /// Estimate a linear drift per experiment; default false.
-    pub slope: bool,
-    /// Before the first sample; default anything.
-    pub before: Before,
-    /// The input between samples; default held.
+    /// What the force does between its samples: `held` until the next, or `linear`. Why: exact for a step at a sample.
     pub between: InputBetween,
+    /// Before the first sample the system was `settled` under its first force, at `rest` without any, or `anything` (an
+    /// initial state is estimated). Why: settled says more where it is true, as before a release.
+    pub history: Before,
+    /// Estimate a constant offset of the response.
+    pub offset: bool,
+    /// Estimate a linear drift of the response. Why: averaged records wander.
+    pub drift: bool,
+    /// Rows of the Hankel matrix of the start, six more than twice the modes and the real poles, at least.
+    #[schemars(range(min = 2, max = 1000))]
+    pub block_rows: usize,
+    /// Starts that are refined.
+    #[schemars(range(min = 1, max = 100))]
+    pub starts: usize,
+    /// Most steps of a search. Why: ten are usual.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub max_iterations: usize,
     /// What is known beforehand; default nothing.
+    #[serde(skip)]
     pub known: Vec<GreyKnown>,
     /// Where the search begins; default at a subspace estimate.
+    #[serde(skip)]
     pub start: GreyStart,
-    /// Rows of the subspace estimate's Hankel matrix; default 60.
-    pub block_rows: usize,
-    /// Starts that are refined, at least 1; default 3.
-    pub starts: usize,
-    /// Most steps of a search, at least 1; default 60.
-    pub max_iterations: usize,
     /// Whether standard errors follow the residual's own spectrum; default so.
+    #[serde(skip)]
     pub colour: ResidualColour,
 }
 
@@ -128,8 +138,8 @@ impl Default for GreyOptions {
             delay: true,
             feedthrough: true,
             offset: true,
-            slope: false,
-            before: Before::Anything,
+            drift: true,
+            history: Before::Anything,
             between: InputBetween::Held,
             known: Vec::new(),
             start: GreyStart::Subspace,

@@ -111,7 +111,7 @@ fn binary(samples: usize, hold: usize, seed: u64) -> Vec<f64> {
 }
 
 fn options() -> GreyOptions {
-    GreyOptions { modes: 2, real_poles: 1, block_rows: 40, before: Before::Settled, ..GreyOptions::default() }
+    GreyOptions { modes: 2, real_poles: 1, block_rows: 40, history: Before::Settled, ..GreyOptions::default() }
 }
 
 fn found(fit: &Grey) -> Vec<(f64, f64)> {
@@ -131,7 +131,7 @@ fn noise_free_data_are_recovered_to_rounding() {
         let u = if between == InputBetween::Held { binary(1500, 16, 3) } else { white_noise(1500, 1.0, 3) };
         let y: Vec<f64> = truth.response(&u, between).iter().map(|y| y + 0.3).collect();
         for before in [Before::Settled, Before::Anything] {
-            let options = GreyOptions { between, before, delay: truth.delay > 0.0, ..options() };
+            let options = GreyOptions { between, history: before, delay: truth.delay > 0.0, ..options() };
             let fit = fit_grey(&[Experiment { input: &u, output: &y }], T, &options).unwrap();
             let values: Vec<f64> = truth.values();
             let off = found(&fit)
@@ -207,7 +207,7 @@ fn monte_carlo(before: Before, colour: ResidualColour, seeds: u64) -> (Vec<[f64;
     let (truth, std, samples) = (Truth::two(), 0.02, 2048);
     let u = binary(samples, 16, 11);
     let clean = truth.response(&u, InputBetween::Held);
-    let options = GreyOptions { before, colour, ..options() };
+    let options = GreyOptions { history: before, colour, ..options() };
     let results: Vec<Vec<(f64, f64)>> = (1..=seeds)
         .into_par_iter()
         .map(|seed| {
@@ -330,7 +330,7 @@ fn missing_samples_several_experiments_and_inputs() {
     let borrowed: Vec<Experiment<'_>> =
         experiments.iter().map(|(input, output)| Experiment { input, output }).collect();
     for before in [Before::Settled, Before::Anything] {
-        let fit = fit_grey(&borrowed, T, &GreyOptions { before, ..options() }).unwrap();
+        let fit = fit_grey(&borrowed, T, &GreyOptions { history: before, ..options() }).unwrap();
         assert!(fit.verdict.converged, "{:?}", fit.verdict);
         let mut truth: Vec<f64> = one.values();
         truth.extend([-0.4, 0.5, 0.3]);

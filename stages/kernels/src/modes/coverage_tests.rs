@@ -42,7 +42,7 @@ fn intervals_of_zeros_gain_delay_and_response_cover_95_per_cent() {
     let wanted: Vec<f64> = intervals(&truth(), &faer::Mat::zeros(5, 5)).iter().map(|(value, _)| *value).collect();
     let seeds: Vec<u64> = (1..=300).collect();
     let options =
-        PemOptions { order: 2, block_rows: 12, noise: NoiseModel::White, slope: false, ..PemOptions::default() };
+        PemOptions { order: 2, block_rows: 12, noise: NoiseModel::White, drift: false, ..PemOptions::default() };
     let covered: Vec<Vec<bool>> = seeds
         .par_iter()
         .map(|&seed| {

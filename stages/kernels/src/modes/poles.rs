@@ -1,6 +1,8 @@
 //! Poles, modes and zeros of an identified model, each with its standard error.
 
 use faer::{Mat, c64};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::map::{Root, bilinear, deviation};
 use crate::model::{InnovationsModel, ModelError, Section, transmission_zeros};
@@ -53,26 +55,27 @@ pub struct Pole {
 }
 
 /// What counts as a resonance.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct ModeCriteria {
-    /// Least quality factor; default 5: detector poles are real or strongly damped.
+    /// Least quality factor of a mode. Why: detector poles are real or strongly damped.
+    #[schemars(extend("exclusiveMinimum" = 0.5))]
     pub min_quality_factor: f64,
-    /// Highest frequency in hertz; default infinite: the Nyquist frequency.
-    pub max_frequency_hz: f64,
-    /// Least significance; default 6: the best of thousands of noise frequencies reaches 5.
+    /// Highest frequency of a mode in Hz.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub max_frequency_hz: Option<f64>,
+    /// Least amplitude of a mode's ringing over its standard error. Why: the best of thousands of noise frequencies
+    /// reaches 5.
+    #[schemars(range(min = 0.0))]
     pub min_significance: f64,
-    /// Largest relative standard error of Q; default 0.5: a line without decay is no mode.
+    /// Largest relative standard error of a mode's quality factor. Why: a line that does not decay is no mode.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_quality_factor_error: f64,
 }
 
 impl Default for ModeCriteria {
     fn default() -> Self {
-        Self {
-            min_quality_factor: 5.0,
-            max_frequency_hz: f64::INFINITY,
-            min_significance: 6.0,
-            max_quality_factor_error: 0.5,
-        }
+        Self { min_quality_factor: 5.0, max_frequency_hz: None, min_significance: 6.0, max_quality_factor_error: 0.5 }
     }
 }
 
@@ -193,7 +196,7 @@ fn classify(root: &Root, significance: f64, criteria: &ModeCriteria) -> PoleClas
     }
     let established = significance >= criteria.min_significance
         && root.quality_factor_std <= criteria.max_quality_factor_error * root.quality_factor
-        && root.frequency_hz <= criteria.max_frequency_hz;
+        && criteria.max_frequency_hz.is_none_or(|most| root.frequency_hz <= most);
     if established { PoleClass::Mechanical } else { PoleClass::Doubtful }
 }
 

@@ -112,7 +112,7 @@ pub(super) fn checked<'a>(
         inputs,
         order: options.order,
         offset: options.offset,
-        slope: options.slope,
+        slope: options.drift,
         missing,
         priors: 0,
         shelf: BufferPool::default(),

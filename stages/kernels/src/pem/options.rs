@@ -20,32 +20,46 @@ pub struct Experiment<'a> {
 }
 
 /// What is estimated, and how far the iteration goes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct PemOptions {
-    /// Order n of the model, at least 1; default 11 (the paper: four modes, three detector poles).
+    /// Order n of the model, at least 1.
+    #[serde(skip)]
     pub order: usize,
-    /// Rows of the Hankel matrix of the start, more than the order; default 60.
+    /// Rows of the Hankel matrix that the start comes from, more than `order`. Why: half as many blur close poles.
+    #[schemars(range(min = 2, max = 1000))]
     pub block_rows: usize,
-    /// Most iterations, at least 1; default 60 (20 are usual).
+    /// Most iterations in each stretch of the search. Why: ten to thirty are usual.
+    #[schemars(range(min = 1, max = 10_000))]
     pub max_iterations: usize,
-    /// Estimate a constant offset of y per experiment; default true.
-    pub offset: bool,
-    /// Estimate a linear drift of y per experiment; default true: averaged records wander.
-    pub slope: bool,
-    /// How the Kalman gain is parametrised; default thermal.
+    /// Parametrisation of the Kalman gain: `thermal` (white output noise and a white force on every section, one
+    /// intensity each), `free` (all its elements), `white` (none: output error) or `coloured` (none; the errors are
+    /// whitened by an autoregressive filter of their own, for noise that does not pass through the model's poles). Why:
+    /// a free gain also fits the dips that the fit itself leaves at resonances.
     pub noise: NoiseModel,
-    /// Which errors are made small; default prediction.
+    /// Which errors are made small: `prediction` (one sample ahead) or `simulation` (output error, started from the
+    /// best of the subspace estimates and the prediction model; K is zero). Why: the most efficient where the noise
+    /// model holds.
     pub focus: Focus,
-    /// Starts that are refined, at least 1; default 3. Measured records of rich input need more: 8.
+    /// Starts that are refined. Why: more than three also take subspace estimates with instruments, which records of
+    /// rich input need (8).
+    #[schemars(range(min = 1, max = 100))]
     pub starts: usize,
-    /// Prior against responses that the data do not ask for, 0 or more: as if white noise of this share of each input's
-    /// energy had been put in and nothing had come out. Default 0: none. It biases every estimate; the covariance does
-    /// not count that.
+    /// Prior variance of the response outside the excited band: as if white noise of this share of each input's energy
+    /// had been put in and nothing had come out. Why: records that excite a narrow band need one to say anything
+    /// beyond it: the share of noise in the output, over the samples.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub prior: f64,
-    /// Share of the residual in the tangent space that counts as zero gradient; default 1e-4: a hundredth of a standard
-    /// error at 8192 samples.
+    /// Estimate a constant offset of the response.
+    pub offset: bool,
+    /// Estimate a linear drift of the response. Why: averaged records wander.
+    pub drift: bool,
+    /// Share of the residual in the tangent space that counts as zero gradient: a hundredth of a standard error at 8192
+    /// samples.
+    #[serde(skip)]
     pub gradient_tolerance: f64,
-    /// How the covariance treats the residual; default its own spectrum.
+    /// How the covariance treats the residual.
+    #[serde(skip)]
     pub colour: ResidualColour,
 }
 
@@ -56,7 +70,7 @@ impl Default for PemOptions {
             block_rows: 60,
             max_iterations: 60,
             offset: true,
-            slope: true,
+            drift: true,
             noise: NoiseModel::Thermal,
             focus: Focus::Prediction,
             starts: 3,

@@ -24,7 +24,7 @@ pub(super) fn freedom(exponentials: &[Exponential], options: &RingdownOptions) -
         }));
         first += count;
     }
-    let own = if options.slope { vec![0, 1, 2, 3] } else { vec![0, 1, 2] };
+    let own = if options.drift { vec![0, 1, 2, 3] } else { vec![0, 1, 2] };
     let mut freedom =
         Freedom { limits: vec![None; first], resonance: vec![false; exponentials.len()], shared, priors, own };
     options.known.iter().for_each(|known| tell(&mut freedom, exponentials, known));

@@ -70,7 +70,7 @@ pub(super) fn shares(
     events
         .iter()
         .map(|event| {
-            let line = if options.start_samples.is_some() && options.slope {
+            let line = if options.start_samples.is_some() && options.drift {
                 line_of_second_half(event)
             } else {
                 Line { offset: event[tail..].iter().sum::<f64>() / (samples - tail) as f64, slope: 0.0 }

@@ -6,6 +6,8 @@ mod established;
 mod tests;
 
 use faer::c64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use self::cluster::clustered;
 use crate::model::ModelError;
@@ -13,19 +15,23 @@ use crate::model::ModelError;
 pub use self::cluster::PhysicalMode;
 
 /// When a pole counts as stable, and stable poles as a mode.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct StabilisationCriteria {
-    /// Largest relative change of the frequency from the next lower order, above 0; also the half width of a cluster.
-    /// Default 0.01.
+    /// Largest relative change of a stable pole's frequency from one order to the next. Why: as is usual.
+    #[schemars(range(max = 0.5), extend("exclusiveMinimum" = 0.0))]
     pub frequency: f64,
-    /// Largest relative change of the damping, above 0; also the largest relative spread of a mode's damping. Default
-    /// 0.05.
+    /// Largest relative change of a stable pole's damping. Why: as is usual; a mode's damping may spread twice as much.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub damping: f64,
-    /// Least quality factor of a mode, above 0.5; default 5, as for `model.modes`.
+    /// Least quality factor of a mode. Why: as in `model.modes`.
+    #[schemars(extend("exclusiveMinimum" = 0.5))]
     pub min_quality_factor: f64,
-    /// Least number of orders at which a mode's pole is stable, at least 1; default 4.
+    /// Least number of orders at which a mode is stable.
+    #[schemars(range(min = 1))]
     pub min_count: usize,
-    /// Least share of the orders from a mode's first on at which its pole is stable, 0 to 1; default 0.5.
+    /// Least share of the orders from a mode's first on at which it is stable.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_share: f64,
 }
 

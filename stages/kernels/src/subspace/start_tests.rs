@@ -91,7 +91,7 @@ fn coloured_noise_biases_no_weight_and_the_likelihood_is_at_the_bound() {
                 order: 5,
                 block_rows: 20,
                 noise: NoiseModel::Free,
-                slope: false,
+                drift: false,
                 starts: 8,
                 ..PemOptions::default()
             };
@@ -165,7 +165,7 @@ fn simulation_focus_is_the_better_simulation_and_prediction_focus_the_better_pre
             focus,
             starts: 8,
             offset: false,
-            slope: false,
+            drift: false,
             ..PemOptions::default()
         };
         identify(&[Experiment { input: &u, output: &y }], 1.0, &options).unwrap()

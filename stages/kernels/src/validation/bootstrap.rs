@@ -3,20 +3,26 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::model::ModelError;
 use crate::modes::Interval;
 use crate::monitor::Monitor;
 
 /// How events are drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct BootstrapSettings {
-    /// Replicates, 20 to 100 000; default 200: ends of a 95 % interval to a tenth of its length.
+    /// Replicates. Why: a fit each: ends of the intervals to a tenth of their length.
+    #[schemars(range(min = 20, max = 100_000))]
     pub replicates: usize,
-    /// Events that are drawn together, at least 1, at most half of them; default 1. More where neighbouring events are
-    /// alike.
+    /// Consecutive events drawn together, 1 to half of the events. Why: more where neighbours are alike, as when the
+    /// lever drifts.
+    #[schemars(range(min = 1))]
     pub block_events: usize,
-    /// Seed of the drawing; default 0.
+    /// Seed of the drawing.
+    #[serde(skip)]
     pub seed: u64,
 }
 

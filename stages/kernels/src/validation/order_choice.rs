@@ -125,7 +125,7 @@ fn candidate(
         let options = PemOptions { block_rows: rows, ..options };
         let first = Experiment { input: &parts.first.0, output: &parts.first.1 };
         let fit = identify(&[first], sample_time_s, &options).ok()?;
-        let nuisances = Nuisances { offset: options.offset, slope: options.slope };
+        let nuisances = Nuisances { offset: options.offset, slope: options.drift };
         let simulation =
             simulate_held_out(&fit.model, &fit.further_inputs, &parts.rest.0, &parts.rest.1, nuisances).ok()?;
         let errors: Vec<f64> = simulation.response.iter().zip(&parts.rest.1).map(|(x, y)| (x - y).powi(2)).collect();
@@ -186,7 +186,7 @@ mod tests {
             feedthrough: 0.1,
             sample_time_s: 1.0,
         };
-        let options = PemOptions { block_rows: 15, noise: NoiseModel::White, slope: false, ..PemOptions::default() };
+        let options = PemOptions { block_rows: 15, noise: NoiseModel::White, drift: false, ..PemOptions::default() };
         let found: Vec<usize> = (0..20)
             .map(|seed| {
                 let (u, e) = (white_noise(450, 1.0, seed), white_noise(450, 0.05, 1000 + seed));

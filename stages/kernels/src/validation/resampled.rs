@@ -98,7 +98,7 @@ impl Drawing<'_> {
         let options = PemOptions {
             block_rows: from.order() + 1,
             offset: self.offset,
-            slope: self.drift,
+            drift: self.drift,
             // a thirtieth of a standard error at 8192 samples: small beside what the drawing scatters by
             gradient_tolerance: 3e-4,
             ..PemOptions::default()

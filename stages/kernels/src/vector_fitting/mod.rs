@@ -9,6 +9,8 @@ mod start;
 mod tests;
 
 use faer::{Mat, c64};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use self::linear::{Points, residues};
 use crate::model::{InnovationsModel, InputGains, ModelError};
@@ -26,24 +28,28 @@ pub struct MeasuredResponse<'a> {
 }
 
 /// What is fitted, and how far.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct VectorFitting {
-    /// Number of poles n, at least 1; default 11 (the paper: four modes, three detector poles).
+    /// Number of poles. Why: as in the paper: four modes and three detector poles.
+    #[schemars(range(min = 1, max = 40))]
     pub order: usize,
-    /// Pairs among the starting poles, at most order / 2; the rest starts real. Default: none, as many pairs as fit.
-    pub pairs: Option<usize>,
-    /// Relocations of the poles at most, at least 1; default 30: ten are usual.
+    /// Oscillating pairs among the starting poles, at most half the order; the rest starts real. Absent: as many as
+    /// fit. A fit that ends with another number warns: pairs and real poles may turn into each other.
+    pub modes: Option<usize>,
+    /// Relocations of the poles at most. Why: ten are usual.
+    #[schemars(range(min = 1, max = 1000))]
     pub iterations: usize,
-    /// Ends with Gauss-Newton on the weighted error itself; default true. Without, sigma weights the noise: rms errors
-    /// of a noisy event's Q grow by up to a seventh (test).
+    /// End with Gauss-Newton on the weighted error. Why: without, errors are up to a seventh larger.
     pub refine: bool,
-    /// Reflects poles from outside the unit circle into it; default false: an unstable pole says that the order is too
-    /// high, and may.
+    /// Reflect poles from outside the unit circle into it. Why: an unstable pole says that the order is too high.
     pub stable: bool,
     /// Fits what the ends of the window add, for an input that is a pulse this many seconds after the first sample;
     /// default none.
+    #[serde(skip)]
     pub transient_delay_s: Option<f64>,
     /// Bins over which neighbouring errors are correlated (a smoothed response); default 0.
+    #[serde(skip)]
     pub correlated_bins: usize,
 }
 
@@ -51,7 +57,7 @@ impl Default for VectorFitting {
     fn default() -> Self {
         Self {
             order: 11,
-            pairs: None,
+            modes: None,
             iterations: 30,
             refine: true,
             stable: false,
@@ -146,8 +152,8 @@ fn checked(response: MeasuredResponse<'_>, sample_time_s: f64, settings: &Vector
     range("sample_time_s", sample_time_s, sample_time_s > 0.0 && sample_time_s.is_finite(), "positive")?;
     range("order", n as f64, n >= 1, "at least 1")?;
     range("iterations", settings.iterations as f64, settings.iterations >= 1, "at least 1")?;
-    let pairs = settings.pairs.unwrap_or(0);
-    range("pairs", pairs as f64, 2 * pairs <= n, "at most half the order")?;
+    let pairs = settings.modes.unwrap_or(0);
+    range("modes", pairs as f64, 2 * pairs <= n, "at most half the order")?;
     if let Some(delay) = settings.transient_delay_s {
         range("transient_delay_s", delay, delay.is_finite(), "finite")?;
     }

@@ -14,7 +14,7 @@ const REAL: (f64, f64) = (0.1, 0.8);
 
 /// Three sets: angles spread linearly and logarithmically over the band, and at the most prominent peaks.
 pub(super) fn starting_poles(points: &Points, settings: &VectorFitting) -> Vec<Poles> {
-    let pairs = settings.pairs.unwrap_or(settings.order / 2);
+    let pairs = settings.modes.unwrap_or(settings.order / 2);
     let reals = settings.order - 2 * pairs;
     let angles = points.z.iter().map(|z| z.arg().abs());
     let high = angles.clone().fold(0.0, f64::max) * 0.999;

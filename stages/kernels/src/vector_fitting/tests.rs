@@ -204,7 +204,7 @@ fn unusable_responses_are_refused() {
     for wrong in [
         VectorFitting { order: 0, ..small.clone() },
         VectorFitting { order: 25, ..small.clone() },
-        VectorFitting { pairs: Some(2), ..small.clone() },
+        VectorFitting { modes: Some(2), ..small.clone() },
         VectorFitting { iterations: 0, ..small.clone() },
         VectorFitting { transient_delay_s: Some(f64::NAN), ..small.clone() },
     ] {

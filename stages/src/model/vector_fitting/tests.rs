@@ -8,6 +8,7 @@ use crate::model::{Modes, ResponseWeight, VectorFittingEstimate};
 use crate::spectrum::{Etfe, Smoothing, Window};
 use afmid_kernels::signal::Taper;
 use afmid_kernels::spectra::Presence;
+use afmid_kernels::vector_fitting::VectorFitting;
 
 const SAMPLES: usize = 4096;
 const T0: usize = 500;
@@ -111,13 +112,14 @@ fn tapered_and_equally_weighted_estimates_are_taken_too() {
 #[test]
 fn parameters_out_of_range_are_refused() {
     let usual = VectorFittingEstimate::default;
+    let of = |fit: VectorFitting| VectorFittingEstimate { fit, ..usual() };
     for wrong in [
-        VectorFittingEstimate { order: 0, ..usual() },
-        VectorFittingEstimate { order: 41, ..usual() },
-        VectorFittingEstimate { modes: Some(6), ..usual() },
+        of(VectorFitting { order: 0, ..VectorFitting::default() }),
+        of(VectorFitting { order: 41, ..VectorFitting::default() }),
+        of(VectorFitting { modes: Some(6), ..VectorFitting::default() }),
         VectorFittingEstimate { min_frequency_hz: -1.0, ..usual() },
         VectorFittingEstimate { max_frequency_hz: Some(0.0), ..usual() },
-        VectorFittingEstimate { iterations: 0, ..usual() },
+        of(VectorFitting { iterations: 0, ..VectorFitting::default() }),
     ] {
         assert!(afmid_pipeline::stage::check(&wrong).is_err(), "{wrong:?}");
     }
