@@ -145,12 +145,13 @@ struct Typed<S>(PhantomData<fn() -> S>);
 
 impl<S: Stage> Maker for Typed<S> {
     fn parse(&self, params: toml::Table) -> Result<Box<dyn DynStage>, ParamError> {
-        if S::HAS_KERNEL_OPTIONS {
+        let stage = if S::HAS_KERNEL_OPTIONS {
             known_names::<S>(&params)?;
-        }
-        deserialised::<S>(params.clone())
-            .map_err(|error| if S::HAS_KERNEL_OPTIONS { located::<S>(params, error) } else { error })
-            .map(|stage| Box::new(stage) as Box<dyn DynStage>)
+            deserialised::<S>(params.clone()).map_err(|error| located::<S>(params, error))
+        } else {
+            deserialised::<S>(params)
+        };
+        stage.map(|stage| Box::new(stage) as Box<dyn DynStage>)
     }
 
     fn schema(&self, generator: &mut SchemaGenerator) -> Schema {

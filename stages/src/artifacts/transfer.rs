@@ -49,9 +49,10 @@ impl<'a> Transfer<'a> {
         self.array.number(EVENT_TURNS_PER_BIN)
     }
 
-    /// Bins on either side that a value comes from, if it was smoothed. Errors: they cannot be read.
-    pub fn half_width_bins(&self) -> Option<&'a [f64]> {
-        self.array.real(HALF_WIDTH_BINS).ok()
+    /// Bins on either side that a value comes from, if it was smoothed. Errors: they are no real numbers.
+    pub fn half_width_bins(&self) -> Result<Option<&'a [f64]>, StageError> {
+        let smoothed = self.array.variable(HALF_WIDTH_BINS).is_ok();
+        smoothed.then(|| self.array.real(HALF_WIDTH_BINS)).transpose()
     }
 
     /// A smoothed response of the same kind: transfer function, variance, bins on either side.

@@ -167,7 +167,7 @@ impl VectorFittingEstimate {
     }
 
     fn settings(&self, given: &Transfer<'_>) -> Result<VectorFitting, StageError> {
-        let smoothed = given.half_width_bins();
+        let smoothed = given.half_width_bins()?;
         let differenced = given.differenced();
         let wanted = self.transient.given().unwrap_or(differenced && smoothed.is_none());
         let width = match given.frequency_hz {
