@@ -243,8 +243,12 @@ fn spectra(criterion: &mut Criterion) {
     let found = welch.average().expect("segments");
     let frequency_hz: Vec<f64> = (2..found.density.len()).map(|k| k as f64 * found.bin_hz).collect();
     let density = &found.density[2..];
-    let settings =
-        ThermalFitSettings { lowest_hz: 20e3, highest_hz: 100e3, line_false_alarm: 1e-3, flicker: Presence::Auto };
+    let settings = ThermalFitSettings {
+        lowest_hz: 20e3,
+        highest_hz: Some(100e3),
+        line_false_alarm: 1e-3,
+        flicker: Presence::Auto,
+    };
     group.bench_function("Whittle fit, 4095 bins", |bench| {
         bench.iter(|| {
             let data = AveragedDensity {

@@ -6,8 +6,7 @@
 use std::process::ExitCode;
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Entry, Example, Faults, Port, Ports, Spec, Stage, StageError, schemars,
-    serde,
+    Array, Axis, Context, Document, Entry, Example, Faults, Port, Ports, Spec, Stage, StageError, schemars, serde,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,9 +58,8 @@ impl Stage for Envelope {
         summary: "Decay time of a ringdown from its envelope",
         inputs: &[AVERAGE.spec()],
         outputs: &[ENVELOPE.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "logarithmic decrement",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {

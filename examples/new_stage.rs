@@ -5,7 +5,7 @@
 use std::process::ExitCode;
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Entry, Example, Port, Ports, Spec, Stage, StageError, schemars, serde,
+    Array, Axis, Context, Document, Entry, Example, Port, Ports, Spec, Stage, StageError, schemars, serde,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -51,9 +51,8 @@ impl Stage for NewStage {
         summary: "Root mean square of the end of an averaged event",
         inputs: &[AVERAGE.spec()],
         outputs: &[SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "definition",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {

@@ -29,7 +29,8 @@ pub mod store;
 pub use {schemars, serde, serde_json, toml};
 
 pub use artifact::{
-    Array, Artifact, Attribute, Axis, Column, Document, Matrix, Shape, Shaped, StateSpace, Table, Values, Variable,
+    Array, Artifact, Attribute, Axis, Column, Document, Matrix, Shape, Shaped, StateSpace, Table, TableOf, Values,
+    Variable,
 };
 pub use config::{Config, Problem};
 pub use error::StageError;

@@ -1,6 +1,6 @@
 //! The machinery of an exam with a stand-in for the diagnosis: it says one thing, whatever the recordings hold.
 
-use afmid_pipeline::{Caching, Document, Entry, Example, Port, Recording, Spec, StageError};
+use afmid_pipeline::{Document, Entry, Example, Port, Recording, Spec, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -32,9 +32,8 @@ impl Stage for StandIn {
         summary: "answers without looking",
         inputs: &[RECORDS.spec()],
         outputs: &[ANSWER.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {

@@ -124,7 +124,7 @@ fn estimates(seed: u64) -> Result<Vec<JointContact>, ModelError> {
     let poles = [free.poles_only(), coupled.poles_only()];
     let (plain, second) = (LawChoice::Auto, LawChoice::SecondOrder);
     let joint = |lever, free, coupled, law, share_error| {
-        joint_contact(lever, free, coupled, &JointOptions { law, share_error })
+        joint_contact(lever, free, coupled, &JointOptions { law, tip_share_error: share_error })
     };
     Ok(vec![
         joint(&given, &poles[0], &poles[1], plain, Some(0.0))?,

@@ -16,7 +16,7 @@ pub use document::Document;
 pub use row_writer::RowWriter;
 pub use standard_error::std_name;
 pub use state_space::{Matrix, StateSpace};
-pub use table::{Column, ColumnValues, Table};
+pub use table::{Column, ColumnValues, Table, TableOf};
 
 use crate::error::StageError;
 use crate::recording::Recording;

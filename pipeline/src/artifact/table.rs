@@ -70,6 +70,12 @@ impl From<Vec<i64>> for ColumnValues {
     }
 }
 
+impl From<Vec<usize>> for ColumnValues {
+    fn from(values: Vec<usize>) -> Self {
+        Self::Integer(values.into_iter().map(|value| value as i64).collect())
+    }
+}
+
 impl From<Vec<bool>> for ColumnValues {
     fn from(values: Vec<bool>) -> Self {
         Self::Flag(values)
@@ -82,10 +88,59 @@ impl From<Vec<String>> for ColumnValues {
     }
 }
 
+impl From<Vec<&str>> for ColumnValues {
+    fn from(values: Vec<&str>) -> Self {
+        Self::Text(values.into_iter().map(str::to_owned).collect())
+    }
+}
+
+/// A table that has a row for each of some items: add columns with [`TableOf::with`], then take the [`TableOf::table`].
+#[derive(Debug)]
+pub struct TableOf<'a, T> {
+    items: &'a [T],
+    table: Table,
+}
+
+impl<'a, T> TableOf<'a, T> {
+    /// Adds a column.
+    #[must_use]
+    pub fn with<V>(self, name: &str, unit: &str, long_name: &str, of: impl Fn(&'a T) -> V) -> Self
+    where
+        Vec<V>: Into<ColumnValues>,
+    {
+        let values: Vec<V> = self.items.iter().map(of).collect();
+        Self { table: self.table.with(name, unit, long_name, values), ..self }
+    }
+
+    /// Adds a column of values and one of their standard errors.
+    #[must_use]
+    pub fn with_std<E>(self, names: [&str; 2], unit: &str, long_name: &str, of: impl Fn(&'a T) -> E) -> Self
+    where
+        E: Into<(f64, f64)>,
+    {
+        self.with(names[0], unit, long_name, |item| of(item).into().0).with(
+            names[1],
+            unit,
+            "its standard error",
+            |item| of(item).into().1,
+        )
+    }
+
+    /// The table.
+    pub fn table(self) -> Table {
+        self.table
+    }
+}
+
 impl Table {
     /// An empty table: add columns with [`Table::with`].
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// An empty table of a row for each item.
+    pub fn of<T>(items: &[T]) -> TableOf<'_, T> {
+        TableOf { items, table: Self::new() }
     }
 
     /// Adds a column.

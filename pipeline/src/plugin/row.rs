@@ -17,7 +17,7 @@ use crate::config::{Config, StageDecl};
 use crate::error::StageError;
 use crate::outcome::{PortSpec, Ports};
 use crate::recording::InputFiles;
-use crate::stage::{Caching, Context, DynStage, Entry, Example, Maker, ParamError, Spec};
+use crate::stage::{Context, DynStage, Entry, Example, Maker, ParamError, Spec};
 
 /// What to do about a plugin that nobody has agreed to.
 pub(super) const CONSENT: &str = "`afmid trust CONFIG` lists what it would run, and remembers that you agree; \
@@ -89,9 +89,8 @@ impl NotDescribed {
             summary: "a plugin that has not described itself",
             inputs: ports(wired),
             outputs: ports(taken),
-            caching: Caching::Stored,
-            seeded: false,
             source: "",
+            ..Spec::STORED
         };
         let own = Self { spec: Box::leak(Box::new(spec)), name: name.to_owned() };
         Entry::made_by(own.spec, Box::leak(Box::new(own)))

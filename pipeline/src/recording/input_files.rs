@@ -180,6 +180,16 @@ impl InputFiles {
 }
 
 impl HashedFile {
+    /// Where it lies.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The state in which it was hashed.
+    pub(super) fn state(&self) -> FileState {
+        self.state
+    }
+
     /// Bytes.
     pub(crate) fn size(&self) -> u64 {
         self.state.size()

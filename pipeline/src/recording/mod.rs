@@ -14,6 +14,7 @@ mod opened_files;
 mod series;
 mod source;
 mod stretches;
+mod whole;
 mod write;
 
 #[cfg(test)]
@@ -37,7 +38,8 @@ pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native,
 pub use afmid_formats::{Contents, FormatError, FoundChannel, Raw, RawBinary, Source, formats, most_inflated};
 pub use contents::open_contents;
 pub use how::{How, Reading};
-pub use open::{Opened, open_records, recognised};
+pub use open::{Opened, agreed_rate, open_records, recognised};
+pub use whole::WholeFile;
 
 use crate::error::StageError;
 

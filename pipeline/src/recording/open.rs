@@ -48,7 +48,7 @@ pub fn open_records(files: &InputFiles, path: &Path, wanted: &[Wanted], how: &Ho
         _ => (None, format_of(files, path, &how.reading)?),
     };
     if let Some(record) = native {
-        agreed_rate(Some(record.sample_rate_hz), how, "the file").map_err(|error| error.at(path))?;
+        agreed_rate(Some(record.sample_rate_hz), how.sample_rate_hz, "the file").map_err(|error| error.at(path))?;
         for wanted in wanted {
             if let Ok(channel) = record.channel(wanted.role) {
                 agreed_unit(&channel.unit, how, wanted).map_err(|error| error.at(path))?;
@@ -88,7 +88,7 @@ impl File<'_> {
         }
         let mut rate = None;
         for (_, channel) in &found {
-            let own = agreed_rate(channel.sample_rate_hz, how, &channel.location)?;
+            let own = agreed_rate(channel.sample_rate_hz, how.sample_rate_hz, &channel.location)?;
             if let Some((first, other)) = rate.filter(|(_, rate)| differ(*rate, own)) {
                 return Err(StageError::new(format!(
                     "{} has {own} samples per second, {first} has {other}: one record wants one rate",
@@ -175,9 +175,9 @@ fn differ(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() > SAME_RATE
 }
 
-/// The rate that is stated or given. Errors: neither, or both and they differ.
-fn agreed_rate(stated: Option<f64>, how: &How, what: &str) -> Result<f64, StageError> {
-    match (stated, how.sample_rate_hz) {
+/// The rate that the part of a file called `what` states, or that is given. Errors: neither, or both and they differ.
+pub fn agreed_rate(stated: Option<f64>, given: Option<f64>, what: &str) -> Result<f64, StageError> {
+    match (stated, given) {
         (Some(stated), Some(given)) if differ(stated, given) => {
             Err(StageError::new(format!("`sample_rate_hz` is given as {given}, {what} states {stated}"))
                 .help("leave `sample_rate_hz` out: it is for files that state no rate"))

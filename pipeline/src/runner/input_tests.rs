@@ -105,9 +105,8 @@ impl Stage for Read {
         summary: "reads",
         inputs: &[],
         outputs: &[OUT.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "",
+        ..Spec::STORED
     };
 
     fn sources(&self, base: &Path, _files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {

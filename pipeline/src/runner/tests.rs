@@ -12,7 +12,7 @@ use crate::cache::Cache;
 use crate::error::StageError;
 use crate::graph::{Plan, load};
 use crate::outcome::{Port, Ports, RunResult};
-use crate::stage::{Caching, Context, Entry, Example, Registry, Spec, Stage};
+use crate::stage::{Context, Entry, Example, Registry, Spec, Stage};
 use crate::store::{compare, write_result};
 
 const OUT: Port<Array> = Port::new("out", "series", "a series");
@@ -40,9 +40,8 @@ impl Stage for Count {
         summary: "counts",
         inputs: &[],
         outputs: &[OUT.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "",
+        ..Spec::STORED
     };
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -49,6 +49,11 @@ impl<'a> Context<'a> {
         }
     }
 
+    /// A context for a stage that is run by itself, in the working directory.
+    pub fn alone(seed: u64) -> Self {
+        Self::new(Path::new("."), seed, &NoProgress)
+    }
+
     /// The same with another place for rows that are too many for memory; the runner's is the cache's folder.
     #[must_use]
     pub fn with_scratch(self, scratch: Scratch) -> Self {

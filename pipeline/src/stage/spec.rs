@@ -32,6 +32,20 @@ pub struct Spec {
     pub source: &'static str,
 }
 
+impl Spec {
+    /// What most stages have in common: results are cached, nothing is drawn. The rest is for each to say.
+    pub const STORED: Self = Self {
+        name: "",
+        version: 1,
+        summary: "",
+        inputs: &[],
+        outputs: &[],
+        caching: Caching::Stored,
+        seeded: false,
+        source: "",
+    };
+}
+
 /// Whether a stage's result may be taken from the cache.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Caching {

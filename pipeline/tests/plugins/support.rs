@@ -9,8 +9,8 @@ use afmid_pipeline::recording::{
 };
 use afmid_pipeline::runner::{Options, Quiet, RunError, run};
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Entry, Example, Matrix, Plan, Port, Ports, Problem, Recording, Registry,
-    RunResult, Spec, Stage, StageError, StateSpace, Table, graph,
+    Array, Axis, Context, Document, Entry, Example, Matrix, Plan, Port, Ports, Problem, Recording, Registry, RunResult,
+    Spec, Stage, StageError, StateSpace, Table, graph,
 };
 use num_complex::Complex64;
 use schemars::JsonSchema;
@@ -91,9 +91,8 @@ impl Stage for All {
         summary: "one artifact of each shape",
         inputs: &[],
         outputs: &[ARRAY.spec(), TABLE.spec(), MODEL.spec(), DOCUMENT.spec(), RECORDING.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "",
+        ..Spec::STORED
     };
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -3,7 +3,7 @@
 use afmid_kernels::events::EventKind;
 use afmid_pipeline::{Array, Attribute, Axis, StageError};
 
-use super::ensemble::{ONSET_SAMPLE, onset_sample};
+use super::ensemble::{Ensemble, ONSET_SAMPLE};
 use super::{DataSet, KIND, SAMPLE_RATE_HZ, event_kind};
 
 const MEAN: &str = "mean";
@@ -22,19 +22,9 @@ impl<'a> Average<'a> {
         Self { array }
     }
 
-    /// Samples per second. Errors: not stated.
-    pub fn sample_rate_hz(&self) -> Result<f64, StageError> {
-        self.array.number(SAMPLE_RATE_HZ)
-    }
-
-    /// Time after the onset.
-    pub fn time(&self) -> Result<&'a Axis, StageError> {
-        self.array.axis("time")
-    }
-
-    /// The sample that the events were aligned to. Errors: none is stated, or it is no sample.
-    pub fn onset_sample(&self) -> Result<usize, StageError> {
-        onset_sample(self.array)
+    /// Rate, time and onset, which stand in it as in the ensemble that was averaged.
+    pub fn events(&self) -> Ensemble<'a> {
+        Ensemble::new(self.array)
     }
 
     /// What was averaged. Errors: neither snap-off nor snap-in.

@@ -60,7 +60,11 @@ impl<'a> Ensemble<'a> {
 
     /// The sample that the events are aligned to. Errors: none is stated, or it is no sample.
     pub fn onset_sample(&self) -> Result<usize, StageError> {
-        onset_sample(self.array)
+        let onset = self.array.number(ONSET_SAMPLE)?;
+        if onset >= 0.0 && onset.fract() == 0.0 {
+            return Ok(onset as usize);
+        }
+        Err(StageError::new(format!("attribute `{ONSET_SAMPLE}` is {onset}, wanted a whole number, 0 or more")))
     }
 
     /// What the events are.
@@ -86,15 +90,6 @@ impl<'a> Ensemble<'a> {
     /// States of `array` the kind of its events.
     pub fn describe_kind(&self, array: &mut Array) {
         copy_attributes(self.array, array, &[KIND]);
-    }
-}
-
-pub(super) fn onset_sample(array: &Array) -> Result<usize, StageError> {
-    let onset = array.number(ONSET_SAMPLE)?;
-    if onset >= 0.0 && onset.fract() == 0.0 {
-        Ok(onset as usize)
-    } else {
-        Err(StageError::new(format!("attribute `{ONSET_SAMPLE}` is {onset}, wanted a whole number, 0 or more")))
     }
 }
 

@@ -18,12 +18,10 @@ pub(crate) fn modes(table: &Table) -> Result<Vec<ModeEstimate>, StageError> {
 
 /// A table of modes by row; what else is known of them is added to it.
 pub(crate) fn mode_table(modes: &[ModeEstimate]) -> Table {
-    let column = |value: fn(&ModeEstimate) -> f64| modes.iter().map(value).collect::<Vec<f64>>();
-    Table::new()
-        .with(FREQUENCY_HZ, "Hz", "resonance frequency", column(|m| m.frequency_hz.value))
-        .with(FREQUENCY_STD_HZ, "Hz", "its standard error", column(|m| m.frequency_hz.std))
-        .with(QUALITY_FACTOR, "1", "quality factor", column(|m| m.quality_factor.value))
-        .with(QUALITY_FACTOR_STD, "1", "its standard error", column(|m| m.quality_factor.std))
+    Table::of(modes)
+        .with_std([FREQUENCY_HZ, FREQUENCY_STD_HZ], "Hz", "resonance frequency", |m| m.frequency_hz)
+        .with_std([QUALITY_FACTOR, QUALITY_FACTOR_STD], "1", "quality factor", |m| m.quality_factor)
+        .table()
 }
 
 fn estimates(table: &Table, value: &str, std: &str) -> Result<Vec<Estimate>, StageError> {

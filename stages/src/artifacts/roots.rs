@@ -37,30 +37,34 @@ pub(crate) fn roots(table: &Table) -> Result<Vec<RootRow>, StageError> {
 /// Poles, then zeros.
 pub(crate) fn root_table(poles: &[Pole], zeros: &[Root]) -> Table {
     let roots: Vec<Root> = poles.iter().map(|pole| pole.root).chain(zeros.iter().copied()).collect();
-    let column = |value: &dyn Fn(&Root) -> f64| roots.iter().map(value).collect::<Vec<f64>>();
     let frequency = |r: &Root| Interval::normal(r.frequency_hz, r.frequency_std_hz);
     let quality = |r: &Root| Interval::normal(r.quality_factor, r.quality_factor_std);
     let zero_kind = |root: &Root| if root.is_complex() { PAIR } else { "real" };
     let kinds = poles.iter().map(|_| POLE).chain(zeros.iter().map(|_| ZERO));
     let classes = poles.iter().map(|pole| pole.kind.name()).chain(zeros.iter().map(zero_kind));
-    Table::new()
-        .with("kind", "", "pole or zero", kinds.map(str::to_owned).collect::<Vec<String>>())
-        .with(
-            "class",
-            "",
-            "what a pole belongs to; whether a zero is one of a pair",
-            classes.map(str::to_owned).collect::<Vec<String>>(),
-        )
-        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", column(&|r| r.frequency_hz))
-        .with("frequency_std_hz", "Hz", "its standard error", column(&|r| r.frequency_std_hz))
-        .with("quality_factor", "1", "magnitude of s over minus twice its real part", column(&|r| r.quality_factor))
-        .with("quality_factor_std", "1", "its standard error", column(&|r| r.quality_factor_std))
-        .with("frequency_low_hz", "Hz", "lower end of its 95 % interval", column(&|r| frequency(r).low))
-        .with("frequency_high_hz", "Hz", "upper end", column(&|r| frequency(r).high))
-        .with("quality_factor_low", "1", "lower end of its 95 % interval", column(&|r| quality(r).low))
-        .with("quality_factor_high", "1", "upper end", column(&|r| quality(r).high))
-        .with("z_re", "1", "real part in the z plane", column(&|r| r.z.re))
-        .with("z_im", "1", "imaginary part in the z plane, upper one of a pair", column(&|r| r.z.im))
-        .with("s_re", "rad/s", "real part in the s plane", column(&|r| r.s.re))
-        .with("s_im", "rad/s", "imaginary part in the s plane", column(&|r| r.s.im))
+    let class = "what a pole belongs to; whether a zero is one of a pair";
+    let mut table = Table::new().with("kind", "", "pole or zero", kinds.collect::<Vec<&str>>()).with(
+        "class",
+        "",
+        class,
+        classes.collect::<Vec<&str>>(),
+    );
+    let numbers = Table::of(&roots)
+        .with_std(["frequency_hz", "frequency_std_hz"], "Hz", "magnitude of s over 2 pi", |r| {
+            (r.frequency_hz, r.frequency_std_hz)
+        })
+        .with_std(["quality_factor", "quality_factor_std"], "1", "magnitude of s over minus twice its real part", |r| {
+            (r.quality_factor, r.quality_factor_std)
+        })
+        .with("frequency_low_hz", "Hz", "lower end of its 95 % interval", |r| frequency(r).low)
+        .with("frequency_high_hz", "Hz", "upper end", |r| frequency(r).high)
+        .with("quality_factor_low", "1", "lower end of its 95 % interval", |r| quality(r).low)
+        .with("quality_factor_high", "1", "upper end", |r| quality(r).high)
+        .with("z_re", "1", "real part in the z plane", |r| r.z.re)
+        .with("z_im", "1", "imaginary part in the z plane, upper one of a pair", |r| r.z.im)
+        .with("s_re", "rad/s", "real part in the s plane", |r| r.s.re)
+        .with("s_im", "rad/s", "imaginary part in the s plane", |r| r.s.im)
+        .table();
+    table.columns.extend(numbers.columns);
+    table
 }

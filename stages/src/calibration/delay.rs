@@ -1,6 +1,6 @@
 //! The stage `calibration.delay`.
 
-use afmid_pipeline::{Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Axis, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -60,9 +60,8 @@ impl Stage for Delay {
         summary: "bounds on the rupture's time plus the delay, which the response cannot tell apart",
         inputs: &[AVERAGE.spec()],
         outputs: &[SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
@@ -73,7 +72,7 @@ impl Stage for Delay {
             skip_s: self.skip_s,
             detector_pole_hz: self.detector_poles_hz.clone(),
         };
-        let (time, all) = (&average.time()?.values, DataSet::All);
+        let (time, all) = (&average.events().time()?.values, DataSet::All);
         let found = onset_delay(time, average.mean(all)?, average.standard_error(all)?, &rule)
             .map_err(StageError::from_error)?;
         let poles_known = !self.detector_poles_hz.is_empty();

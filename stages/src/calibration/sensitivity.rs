@@ -1,7 +1,7 @@
 //! The stage `calibration.sensitivity`.
 
 use afmid_pipeline::{
-    Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
+    Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -105,9 +105,8 @@ impl Stage for SlopeSensitivity {
         summary: "optical lever sensitivity from the contact slope, corrected for a soft contact",
         inputs: &[RECORDS.spec()],
         outputs: &[SLOPES.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "H.-J. Butt, B. Cappella and M. Kappl, Surf. Sci. Rep. 59 (2005) 1",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -198,20 +197,13 @@ impl SlopeSensitivity {
 fn table(per_record: &[Vec<SlopeStretch>], records: &[Record]) -> Table {
     let rows: Vec<(&Record, &SlopeStretch)> =
         records.iter().zip(per_record).flat_map(|(record, all)| all.iter().map(move |one| (record, one))).collect();
-    let real = |value: &dyn Fn(&SlopeStretch) -> f64| -> Vec<f64> { rows.iter().map(|(_, s)| value(s)).collect() };
-    let whole =
-        |value: &dyn Fn(&SlopeStretch) -> usize| -> Vec<i64> { rows.iter().map(|(_, s)| value(s) as i64).collect() };
-    Table::new()
-        .with(
-            "record",
-            "",
-            "file name of the record",
-            rows.iter().map(|(r, _)| r.name.clone()).collect::<Vec<String>>(),
-        )
-        .with("start", "1", "first sample of the stretch", whole(&|s| s.start_sample))
-        .with("end", "1", "one past its last sample", whole(&|s| s.end_sample))
-        .with("approach", "", "towards the sample", rows.iter().map(|(_, s)| s.approach).collect::<Vec<bool>>())
-        .with("slope", "V/V", "deflection against piezo", real(&|s| s.slope_v_per_v))
-        .with("travel", "V", "travel of the piezo monitor", real(&|s| s.travel_v))
-        .with("residual", "V", "root mean square distance from the line", real(&|s| s.residual_v))
+    Table::of(&rows)
+        .with("record", "", "file name of the record", |(record, _)| record.name.clone())
+        .with("start", "1", "first sample of the stretch", |(_, s)| s.start_sample)
+        .with("end", "1", "one past its last sample", |(_, s)| s.end_sample)
+        .with("approach", "", "towards the sample", |(_, s)| s.approach)
+        .with("slope", "V/V", "deflection against piezo", |(_, s)| s.slope_v_per_v)
+        .with("travel", "V", "travel of the piezo monitor", |(_, s)| s.travel_v)
+        .with("residual", "V", "root mean square distance from the line", |(_, s)| s.residual_v)
+        .table()
 }

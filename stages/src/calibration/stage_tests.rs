@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::{InputFiles, Wanted, open_native};
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Context, Document, Entry, Port, Ports, Recording, Stage};
 
 use super::sensitivity::{SensitivitySummary, SlopeSensitivity};
@@ -18,8 +17,7 @@ fn run_example(entry: &Entry) {
     for example in entry.examples() {
         let stage = entry.parse(afmid_pipeline::toml::from_str(example.params).unwrap()).unwrap();
         assert!(stage.faults().is_empty(), "{:?}", stage.faults());
-        let cx = Context::new(Path::new("."), 1, &NoProgress);
-        let outputs = stage.run(&(example.inputs)().unwrap(), &cx).unwrap();
+        let outputs = stage.run(&(example.inputs)().unwrap(), &Context::alone(1)).unwrap();
         println!("{}: {}", entry.spec.name, (example.expect)(&outputs).unwrap());
     }
 }
@@ -48,7 +46,7 @@ fn lever_a() -> Ports {
 #[test]
 fn lever_a_has_its_published_sensitivity_and_spring_constant() {
     let records = lever_a();
-    let cx = Context::new(Path::new("."), 1, &NoProgress);
+    let cx = Context::alone(1);
     let slope = SlopeSensitivity { contact_stiffness_n_per_m: Some(60.0), ..SlopeSensitivity::default() };
     let outputs = slope.run(&records, &cx).unwrap();
     let document = outputs.get(&SUMMARY).unwrap().clone();
@@ -82,8 +80,7 @@ fn lever_a_does_not_change_over_its_archive() {
         println!("stand-in: 1 test on free records instead of lever-a");
         return run_example(&Entry::of::<Thermal>());
     }
-    let cx = Context::new(Path::new("."), 1, &NoProgress);
-    let outputs = Thermal::default().run(&records, &cx).unwrap();
+    let outputs = Thermal::default().run(&records, &Context::alone(1)).unwrap();
     let summary = &outputs.get(&SUMMARY).unwrap().0;
     assert_eq!(summary["changed"], serde_json::json!([]), "{summary:#}");
     assert_eq!(summary["without_peak"], serde_json::json!([]));

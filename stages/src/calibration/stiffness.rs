@@ -1,7 +1,7 @@
 //! The stage `calibration.stiffness`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError,
+    Array, Axis, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -149,9 +149,8 @@ impl Stage for ThermalStiffness {
         summary: "spring constant from the thermal peak of mode 1 in the free stretches",
         inputs: &[RECORDS.spec(), SENSITIVITY.spec()],
         outputs: &[SPECTRUM.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "H.-J. Butt and M. Jaschke, Nanotechnology 6 (1995) 1; P. Whittle, Ark. Mat. 2 (1953) 423",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {

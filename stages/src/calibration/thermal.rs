@@ -1,8 +1,7 @@
 //! The stage `calibration.thermal`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError,
-    Table,
+    Array, Axis, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -66,9 +65,8 @@ impl Stage for Thermal {
         summary: "thermal spectra per record, and tests for a change of the system over the archive",
         inputs: &[RECORDS.spec()],
         outputs: &[SPECTRA.spec(), PEAKS.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Setup",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {

@@ -1,7 +1,7 @@
 //! The stage `diagnosis.release`.
 
 use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
+    Array, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -126,9 +126,9 @@ impl Stage for ReleaseDiagnose {
         summary: "names what a linear lever and detector get wrong in snap-off events",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
         outputs: &[SUMMARY.spec(), RESIDUALS.spec(), TILES.spec(), MODEL.spec()],
-        caching: Caching::Stored,
         seeded: true,
         source: "C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {

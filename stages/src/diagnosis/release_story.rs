@@ -3,7 +3,7 @@
 use afmid_pipeline::{Array, Axis, Table};
 
 use super::records::PositionCourse;
-use super::release::{Cut, EventStory, LevelStory, Story, Tile};
+use super::release::{Cut, EventStory, LevelStory, Story};
 
 /// Residuals, spectra and numbers of single events.
 pub(super) fn residual_array(story: &Story, cut: &Cut, course: &[PositionCourse]) -> Array {
@@ -75,21 +75,20 @@ pub(super) fn residual_array(story: &Story, cut: &Cut, course: &[PositionCourse]
 
 /// Energy of the residual common to all events over time and frequency, before and after.
 pub(super) fn tile_table(story: &Story) -> Table {
-    let of = |which: usize, pick: fn(&Tile) -> f64| story.tiles.iter().map(|t| pick(&t[which])).collect::<Vec<f64>>();
-    Table::new()
-        .with("from_s", "s", "begin, after the release", of(0, |tile| tile.from_s))
-        .with("to_s", "s", "end", of(0, |tile| tile.to_s))
-        .with("low_hz", "Hz", "lowest frequency", of(0, |tile| tile.low_hz))
-        .with("high_hz", "Hz", "highest frequency", of(0, |tile| tile.high_hz))
-        .with("excess_before", "1", "energy over the noise's, linear model", of(0, |tile| tile.excess))
-        .with("excess_after", "1", "energy over the noise's, extended model", of(1, |tile| tile.excess))
-        .with("p_before", "1", "probability of so much in noise, linear model", of(0, |tile| tile.p_value))
-        .with("p_after", "1", "probability of so much in noise, extended model", of(1, |tile| tile.p_value))
+    Table::of(&story.tiles)
+        .with("from_s", "s", "begin, after the release", |[tile, _]| tile.from_s)
+        .with("to_s", "s", "end", |[tile, _]| tile.to_s)
+        .with("low_hz", "Hz", "lowest frequency", |[tile, _]| tile.low_hz)
+        .with("high_hz", "Hz", "highest frequency", |[tile, _]| tile.high_hz)
+        .with("excess_before", "1", "energy over the noise's, linear model", |[tile, _]| tile.excess)
+        .with("excess_after", "1", "energy over the noise's, extended model", |[_, tile]| tile.excess)
+        .with("p_before", "1", "probability of so much in noise, linear model", |[tile, _]| tile.p_value)
+        .with("p_after", "1", "probability of so much in noise, extended model", |[_, tile]| tile.p_value)
+        .table()
 }
 
 #[cfg(test)]
 mod tests {
-    use afmid_pipeline::stage::NoProgress;
     use afmid_pipeline::{Array, Context, Port, Stage, Table};
 
     use crate::diagnosis::ReleaseDiagnose;
@@ -106,8 +105,7 @@ mod tests {
             window_samples: 4000,
             ..ReleaseDiagnose::default()
         };
-        let context = Context::new(std::path::Path::new("."), 7, &NoProgress);
-        let ports = stage.run(&(example.inputs)().expect("inputs"), &context).expect("a diagnosis");
+        let ports = stage.run(&(example.inputs)().expect("inputs"), &Context::alone(7)).expect("a diagnosis");
         let array = ports.get(&RESIDUALS).expect("residuals");
         let of = |name: &str| array.real(name).expect("a variable");
         let levels = &array.axis("level").expect("levels").values;

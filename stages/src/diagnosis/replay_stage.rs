@@ -1,7 +1,7 @@
 //! The stage `diagnosis.replay`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
+    Array, Axis, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -69,9 +69,8 @@ impl Stage for ReleaseReplay {
         summary: "simulates measured snap-offs again, before and after the extension, and shows what is left",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec(), MODEL.spec()],
         outputs: &[SUMMARY.spec(), RESIDUALS.spec(), EVENTS.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "C. F. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -264,13 +263,12 @@ impl Pair {
 
 fn table(pairs: &[Pair], cut: &Cut) -> Table {
     let rows: Vec<EventRow> = pairs.iter().map(|pair| pair.row(cut)).collect();
-    let whole = |of: fn(&EventRow) -> usize| rows.iter().map(|row| of(row) as i64).collect::<Vec<i64>>();
-    let real = |of: fn(&EventRow) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
-    Table::new()
-        .with("event", "1", "number of the event", whole(|row| row.event))
-        .with("record", "1", "number of its record", whole(|row| row.record))
-        .with("amplitude_v", "V", "static deflection before the release", real(|row| row.amplitude_v))
-        .with("onset_s", "s", "time of the release in its record", real(|row| row.onset_s))
-        .with("rms_before_v", "V", "what the lever alone leaves", real(|row| row.rms_before_v))
-        .with("rms_after_v", "V", "what the extended model leaves", real(|row| row.rms_after_v))
+    Table::of(&rows)
+        .with("event", "1", "number of the event", |row| row.event)
+        .with("record", "1", "number of its record", |row| row.record)
+        .with("amplitude_v", "V", "static deflection before the release", |row| row.amplitude_v)
+        .with("onset_s", "s", "time of the release in its record", |row| row.onset_s)
+        .with("rms_before_v", "V", "what the lever alone leaves", |row| row.rms_before_v)
+        .with("rms_after_v", "V", "what the extended model leaves", |row| row.rms_after_v)
+        .table()
 }

@@ -1,8 +1,6 @@
 //! The stage `diagnosis.system`.
 
-use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table,
-};
+use afmid_pipeline::{Array, Axis, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -107,9 +105,8 @@ impl Stage for SystemDiagnose {
         summary: "names what a linear oscillator gets wrong in a measured input and output",
         inputs: &[PAIR.spec()],
         outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -178,16 +175,15 @@ impl SystemDiagnose {
 fn ladder(found: &SystemDiagnosis) -> Table {
     let rungs = &found.diagnosis.ladder;
     let unit = &found.diagnosis.ladder.first().map_or(String::new(), |rung| rung.unit.clone());
-    let column = |value: fn(&super::Rung) -> Option<f64>| {
-        rungs.iter().map(|r| value(r).unwrap_or(f64::NAN)).collect::<Vec<f64>>()
-    };
-    Table::new()
-        .with("added", "1", "what was added", rungs.iter().map(|rung| rung.added.clone()).collect::<Vec<String>>())
-        .with("parameters", "1", "parameters so far", rungs.iter().map(|r| r.parameters as f64).collect::<Vec<f64>>())
-        .with("rms", unit, "free-run error of the identification stretch", column(|rung| rung.rms))
-        .with("held_out_rms", unit, "free-run error of what was held out", column(|rung| rung.held_out_rms))
-        .with("log_likelihood_gain", "1", "over the model before", column(|rung| rung.log_likelihood_gain))
-        .with("bic", "1", "Bayesian information criterion", column(|rung| rung.bic))
+    let known = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    Table::of(rungs)
+        .with("added", "1", "what was added", |rung| rung.added.clone())
+        .with("parameters", "1", "parameters so far", |rung| rung.parameters as f64)
+        .with("rms", unit, "free-run error of the identification stretch", |rung| known(rung.rms))
+        .with("held_out_rms", unit, "free-run error of what was held out", |rung| known(rung.held_out_rms))
+        .with("log_likelihood_gain", "1", "over the model before", |rung| known(rung.log_likelihood_gain))
+        .with("bic", "1", "Bayesian information criterion", |rung| known(rung.bic))
+        .table()
 }
 
 fn simulation(found: &SystemDiagnosis, time: Vec<f64>, unit: &str) -> Array {

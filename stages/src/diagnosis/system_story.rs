@@ -28,12 +28,13 @@ pub(super) fn error_array(story: &SystemStory, unit: &str) -> Array {
 
 /// Errors over time, part by part.
 pub(super) fn error_table(story: &SystemStory, unit: &str) -> Table {
-    let rows = || story.times.iter().flat_map(|(part, bins)| bins.iter().map(move |bin| (part, bin)));
-    let of = |pick: fn(&Binned) -> f64| rows().map(|(_, bin)| pick(bin)).collect::<Vec<f64>>();
-    Table::new()
-        .with("part", "", "part of the record", rows().map(|(part, _)| part.clone()).collect::<Vec<String>>())
-        .with("time_s", "s", "time since the first sample of the record", of(|bin| bin.at))
-        .with("output", unit, "rms of the output", of(|bin| bin.output))
-        .with("before", unit, "rms error of the linear oscillator", of(|bin| bin.before))
-        .with("after", unit, "rms error of the extended model", of(|bin| bin.after))
+    let rows: Vec<(&String, &Binned)> =
+        story.times.iter().flat_map(|(part, bins)| bins.iter().map(move |bin| (part, bin))).collect();
+    Table::of(&rows)
+        .with("part", "", "part of the record", |(part, _)| (*part).clone())
+        .with("time_s", "s", "time since the first sample of the record", |(_, bin)| bin.at)
+        .with("output", unit, "rms of the output", |(_, bin)| bin.output)
+        .with("before", unit, "rms error of the linear oscillator", |(_, bin)| bin.before)
+        .with("after", unit, "rms error of the extended model", |(_, bin)| bin.after)
+        .table()
 }

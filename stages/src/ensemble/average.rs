@@ -1,7 +1,7 @@
 //! The stage `ensemble.average`.
 
 use afmid_pipeline::rows::{RowSource, RowView};
-use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -55,9 +55,9 @@ impl Stage for Average {
         summary: "averages aligned events, all of them and two random halves, and tells noise from scatter",
         inputs: &[ENSEMBLE.spec()],
         outputs: &[AVERAGE.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
         seeded: true,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

@@ -1,7 +1,7 @@
 //! The stage `ensemble.drift`.
 
 use afmid_pipeline::rows::RowSource;
-use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
+use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -24,14 +24,11 @@ use crate::artifacts::Ensemble;
 /// unknown.
 /// Source: Stark et al. 2005, section Data processing; Phipson and Smyth, Stat. Appl. Genet. Mol. Biol. 9 (2010) 39.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct Drift {
-    /// Sub-ensembles of either kind. Why: some twenty events each in an archive like the paper's.
-    #[schemars(range(min = 2, max = 1000))]
-    pub groups: usize,
-    /// Random orders. Why: a p-value of one per cent then has a standard error of a third of itself.
-    #[schemars(range(min = 99, max = 100_000))]
-    pub permutations: usize,
+    /// How drift is looked for.
+    #[serde(flatten)]
+    pub settings: DriftSettings,
     /// A smaller p-value is a warning.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub alarm_p_value: f64,
@@ -39,7 +36,7 @@ pub struct Drift {
 
 impl Default for Drift {
     fn default() -> Self {
-        Self { groups: 4, permutations: 999, alarm_p_value: 0.01 }
+        Self { settings: DriftSettings::default(), alarm_p_value: 0.01 }
     }
 }
 
@@ -50,21 +47,22 @@ const SUMMARY: Port<Document> =
     Port::new("summary", "summary", "p-value of no drift, and the range of the correlations");
 
 impl Stage for Drift {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "ensemble.drift",
         version: 2,
         summary: "compares ordered with random sub-ensembles: does the shape change over the archive?",
         inputs: &[ENSEMBLE.spec()],
         outputs: &[GROUPS.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
         seeded: true,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let ensemble = Ensemble::new(inputs.get(&ENSEMBLE)?);
         let rows = checked_rows(&ensemble)?;
-        let settings = DriftSettings { groups: self.groups, permutations: self.permutations, seed: cx.seed() };
+        let settings = DriftSettings { seed: cx.seed(), ..self.settings };
         let found = match shape_drift(rows, ensemble.onset_sample()?, settings) {
             Ok(found) => found,
             // a small archive is no reason to lose the rest of the pipeline: nothing is known of drift, and that is
@@ -83,7 +81,7 @@ impl Stage for Drift {
                 found.p_value, found.z_score
             ));
         }
-        let summary = summary(&found, rows.rows(), self.permutations)?;
+        let summary = summary(&found, rows.rows(), self.settings.permutations)?;
         Ok(Ports::new().with(&GROUPS, table(&found.groups)).with(&SUMMARY, summary))
     }
 
@@ -105,17 +103,13 @@ impl Stage for Drift {
 }
 
 fn table(groups: &[SubEnsemble]) -> Table {
-    let order = |g: &SubEnsemble| if g.ordered { "ordered" } else { "random" }.to_owned();
-    Table::new()
-        .with("order", "", "how its events were chosen", groups.iter().map(order).collect::<Vec<String>>())
-        .with("group", "1", "number of the group", groups.iter().map(|g| g.group as i64).collect::<Vec<_>>())
-        .with("events", "1", "events in it", groups.iter().map(|g| g.count as i64).collect::<Vec<_>>())
-        .with(
-            "correlation",
-            "1",
-            "correlation of its mean with the mean of all other events",
-            groups.iter().map(|g| g.correlation).collect::<Vec<_>>(),
-        )
+    let correlation = "correlation of its mean with the mean of all other events";
+    Table::of(groups)
+        .with("order", "", "how its events were chosen", |g| if g.ordered { "ordered" } else { "random" })
+        .with("group", "1", "number of the group", |g| g.group)
+        .with("events", "1", "events in it", |g| g.count)
+        .with("correlation", "1", correlation, |g| g.correlation)
+        .table()
 }
 
 fn summary(found: &ShapeDrift, events: usize, permutations: usize) -> Result<Document, StageError> {

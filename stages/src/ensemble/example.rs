@@ -74,7 +74,6 @@ pub(crate) fn pair_of(response: &[f64], standard_error: Option<f64>, sets: &[Dat
 /// Runs all examples of a list of stages on one context each.
 #[cfg(test)]
 pub(crate) fn run_examples(stages: &[afmid_pipeline::Entry]) {
-    use afmid_pipeline::stage::NoProgress;
     for entry in stages {
         let examples = entry.examples();
         assert!(!examples.is_empty(), "{}: no example", entry.spec.name);
@@ -82,7 +81,7 @@ pub(crate) fn run_examples(stages: &[afmid_pipeline::Entry]) {
             let params = afmid_pipeline::toml::from_str(example.params).unwrap();
             let stage = entry.parse(params).unwrap();
             assert!(stage.faults().is_empty(), "{:?}", stage.faults());
-            let cx = afmid_pipeline::Context::new(std::path::Path::new("."), 7, &NoProgress);
+            let cx = afmid_pipeline::Context::alone(7);
             let outputs = stage.run(&(example.inputs)().unwrap(), &cx).unwrap();
             for (name, artifact) in outputs.iter() {
                 artifact.validate().unwrap_or_else(|error| panic!("{}.{name}: {error}", entry.spec.name));

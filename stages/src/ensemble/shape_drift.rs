@@ -6,6 +6,8 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::gram::gram;
 use super::rows::all;
@@ -13,14 +15,25 @@ use super::scatter::Remainders;
 use super::{EnsembleError, moments};
 
 /// How drift is looked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct DriftSettings {
-    /// Sub-ensembles of either kind.
+    /// Sub-ensembles of either kind. Why: some twenty events each in an archive like the paper's.
+    #[schemars(range(min = 2, max = 1000))]
     pub groups: usize,
-    /// Random orders that the ordered one is compared with.
+    /// Random orders that the ordered one is compared with. Why: a p-value of one per cent then has a standard error of
+    /// a third of itself.
+    #[schemars(range(min = 99, max = 100_000))]
     pub permutations: usize,
     /// Seed of the random orders.
+    #[serde(skip)]
     pub seed: u64,
+}
+
+impl Default for DriftSettings {
+    fn default() -> Self {
+        Self { groups: 4, permutations: 999, seed: 0 }
+    }
 }
 
 /// One sub-ensemble.

@@ -1,12 +1,9 @@
 //! Ensembles that are too large for memory: the same bits, and no more of them read at once than a block.
-
-use std::path::Path;
 use std::sync::Mutex;
 
 use afmid_pipeline::artifact::RowWriter;
 use afmid_pipeline::outcome::difference;
 use afmid_pipeline::rows::{RowSource, Scratch};
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Artifact, Context, Ports, Stage, StageError, Values};
 
 use super::*;
@@ -27,14 +24,17 @@ fn outputs(stage: &impl Stage, ensemble: Array, threads: usize) -> Ports {
     let mut ports = Ports::new();
     ports.insert("ensemble", Artifact::Array(std::sync::Arc::new(ensemble)));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| stage.run(&ports, &Context::new(Path::new("."), 7, &NoProgress))).unwrap()
+    pool.install(|| stage.run(&ports, &Context::alone(7))).unwrap()
 }
 
 #[test]
 fn averages_and_drift_have_the_same_bits_from_memory_and_from_a_file() {
     let (memory, file) = (ensemble(usize::MAX), ensemble(0));
     assert!(matches!((&memory.variables[0].values, &file.variables[0].values), (Values::Real(_), Values::Stored(_))));
-    let (average, drift) = (Average::default(), Drift { groups: 3, ..Drift::default() });
+    let (average, drift) = (
+        Average::default(),
+        Drift { settings: DriftSettings { groups: 3, ..DriftSettings::default() }, ..Drift::default() },
+    );
     for threads in [1, 4] {
         assert_eq!(difference(&outputs(&average, memory.clone(), 1), &outputs(&average, file.clone(), threads)), None);
         assert_eq!(difference(&outputs(&drift, memory.clone(), 1), &outputs(&drift, file.clone(), threads)), None);
@@ -57,7 +57,7 @@ fn values_that_are_not_finite_are_found_in_a_file() {
     array.variables[0].values = writer.finish();
     let mut ports = Ports::new();
     ports.insert("ensemble", Artifact::Array(std::sync::Arc::new(array)));
-    let error = Average::default().run(&ports, &Context::new(Path::new("."), 7, &NoProgress)).unwrap_err();
+    let error = Average::default().run(&ports, &Context::alone(7)).unwrap_err();
     assert_eq!(error.to_string(), "event 5, sample 77 is not a finite number");
 }
 

@@ -1,8 +1,7 @@
 //! Archives of an independent simulator, with their truth; force curves of our own where they are missing.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Artifact, Context, Ports, Stage, Table};
 
 use super::Correlation;
@@ -30,7 +29,7 @@ fn shared(name: &str) -> Option<Archive> {
         .map(|record| record.as_array()?.iter().map(event).collect())
         .collect::<Option<_>>()?;
     let stage = Records { files: vec![folder.display().to_string()], ..Records::default() };
-    let records = stage.run(&Ports::new(), &Context::new(Path::new("."), 1, &NoProgress)).unwrap();
+    let records = stage.run(&Ports::new(), &Context::alone(1)).unwrap();
     Some(Archive { records, truth })
 }
 
@@ -62,7 +61,7 @@ fn stand_in(count: usize) -> Archive {
 
 fn table(archive: &Archive, kind: EventKind) -> Table {
     let stage = Correlation { kind, ..Correlation::default() };
-    let outputs = stage.run(&archive.records, &Context::new(Path::new("."), 1, &NoProgress)).unwrap();
+    let outputs = stage.run(&archive.records, &Context::alone(1)).unwrap();
     let Some(Artifact::Table(table)) = outputs.artifact("events") else { panic!("no table") };
     Table::clone(table)
 }

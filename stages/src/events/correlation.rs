@@ -1,8 +1,7 @@
 //! The stage `events.correlation`.
 
 use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
-    Values,
+    Array, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError, Table, Values,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -102,9 +101,8 @@ impl Stage for Correlation {
         summary: "finds snap-off or snap-to-contact events and aligns them by iterative correlation averaging",
         inputs: &[RECORDS.spec()],
         outputs: &[ENSEMBLE.spec(), EVENTS.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing; Woody, Med. Biol. Eng. 5 (1967) 539",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {

@@ -1,8 +1,6 @@
-use std::path::Path;
 use std::sync::Arc;
 
 use afmid_pipeline::recording::Raw;
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Artifact, Values};
 
 use super::*;
@@ -33,7 +31,7 @@ fn run(stage: &Correlation, records: Vec<Record>) -> Result<Outcome, StageError>
 
 fn run_on(stage: &Correlation, ports: &Ports) -> Result<Outcome, StageError> {
     afmid_pipeline::stage::check(stage)?;
-    let context = Context::new(Path::new("."), 1, &NoProgress);
+    let context = Context::alone(1);
     let outputs = stage.run(ports, &context)?;
     let (ensemble, table) = (outputs.get(&ENSEMBLE)?.clone(), outputs.get(&EVENTS)?.clone());
     ensemble.validate()?;
@@ -71,8 +69,7 @@ fn the_example_runs_and_reaches_its_truth() {
     for example in Correlation::examples() {
         let stage: Correlation = afmid_pipeline::toml::from_str(example.params).unwrap();
         let inputs = (example.inputs)().unwrap();
-        let context = Context::new(Path::new("."), 1, &NoProgress);
-        println!("{}", (example.expect)(&stage.run(&inputs, &context).unwrap()).unwrap());
+        println!("{}", (example.expect)(&stage.run(&inputs, &Context::alone(1)).unwrap()).unwrap());
         let outcome = run_on(&stage, &inputs).unwrap();
         assert!(outcome.warnings.is_empty());
         assert_eq!(outcome.summary["events"]["found"], 3);
@@ -222,7 +219,7 @@ fn windows_in_a_file_are_those_in_memory_bit_for_bit_on_any_number_of_threads() 
     ports.insert("records", Artifact::Recording(Arc::new(Recording { records })));
     let outputs = |limit_bytes: usize, threads: usize| {
         let scratch = afmid_pipeline::rows::Scratch::default().with_limit_bytes(limit_bytes);
-        let context = Context::new(Path::new("."), 1, &NoProgress).with_scratch(scratch);
+        let context = Context::alone(1).with_scratch(scratch);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| Correlation::default().run(&ports, &context)).unwrap()
     };

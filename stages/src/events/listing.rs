@@ -65,21 +65,19 @@ pub(super) fn events_table(listed: &Listed, records: &[Record], rate: f64, unit:
     let mut rows: Vec<Row> = (0..).zip(&listed.kept).map(|(number, kept)| Row::kept(kept, number, rate)).collect();
     rows.extend(listed.refused.iter().map(|(record, refused)| Row::refused(*record, refused, rate)));
     rows.sort_by(|a, b| a.record.cmp(&b.record).then(a.index.cmp(&b.index)));
-    let text = |value: &dyn Fn(&Row) -> String| -> Vec<String> { rows.iter().map(value).collect() };
-    let whole = |value: &dyn Fn(&Row) -> i64| -> Vec<i64> { rows.iter().map(value).collect() };
-    let real = |value: &dyn Fn(&Row) -> f64| -> Vec<f64> { rows.iter().map(value).collect() };
     let name = |row: &Row| records.get(row.record).map_or(String::new(), |record| record.name.clone());
-    Table::new()
-        .with("record", "", "file name of the record", text(&name))
-        .with("event", "1", "place in the ensemble; -1 if it is not in it", whole(&|row| row.event))
-        .with("index", "1", "sample of the onset; -1 if none was seen", whole(&|row| row.index))
-        .with("shift", "1", "what the onset lies after that sample, in samples", real(&|row| row.shift))
-        .with("time_s", "s", "time of the onset in the record", real(&|row| row.time_s))
-        .with("amplitude", unit, "jump of level at the onset", real(&|row| row.amplitude))
-        .with("correlation", "1", "correlation with the average of the others", real(&|row| row.correlation))
-        .with("quality", "1", "residual against the others over the noise; 1 is ideal", real(&|row| row.quality))
-        .with("saturated", "1", "samples at the end of the range", whole(&|row| row.saturated))
-        .with("rejected", "", "why it is not in the ensemble; empty if it is", text(&|row| row.reason.clone()))
+    Table::of(&rows)
+        .with("record", "", "file name of the record", name)
+        .with("event", "1", "place in the ensemble; -1 if it is not in it", |row| row.event)
+        .with("index", "1", "sample of the onset; -1 if none was seen", |row| row.index)
+        .with("shift", "1", "what the onset lies after that sample, in samples", |row| row.shift)
+        .with("time_s", "s", "time of the onset in the record", |row| row.time_s)
+        .with("amplitude", unit, "jump of level at the onset", |row| row.amplitude)
+        .with("correlation", "1", "correlation with the average of the others", |row| row.correlation)
+        .with("quality", "1", "residual against the others over the noise; 1 is ideal", |row| row.quality)
+        .with("saturated", "1", "samples at the end of the range", |row| row.saturated)
+        .with("rejected", "", "why it is not in the ensemble; empty if it is", |row| row.reason.clone())
+        .table()
 }
 
 struct Row {

@@ -1,6 +1,6 @@
 //! The stage `force.extrapolation`.
 
-use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -86,15 +86,15 @@ impl Stage for Extrapolation {
         summary: "derives force input and response from the lines before and after the averaged event",
         inputs: &[AVERAGE.spec(), CALIBRATION.spec()],
         outputs: &[PAIR.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Data processing, Fig. 2(d)",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let average = Average::new(inputs.get(&AVERAGE)?);
         let scale = self.newtons_per_volt(inputs.find(&CALIBRATION)?)?;
-        let (rate, onset, event) = (average.sample_rate_hz()?, average.onset_sample()?, average.kind()?);
+        let (rate, onset, event) =
+            (average.events().sample_rate_hz()?, average.events().onset_sample()?, average.kind()?);
         let settings = self.settings(event, onset, rate);
         let (mean, error) = (average.mean(DataSet::All)?, average.standard_error(DataSet::All)?);
         let causal = extrapolate(mean, error, settings, None);

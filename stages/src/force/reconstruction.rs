@@ -1,7 +1,7 @@
 //! The stage `force.reconstruction`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
+    Array, Axis, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -117,9 +117,8 @@ impl Stage for Reconstruction {
         summary: "turns single events into tip force against time with an error band",
         inputs: &[ENSEMBLE.spec(), MODEL.spec(), PAIR.spec(), EXTENSION.spec()],
         outputs: &[FORCE.spec(), EVENTS.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "P. Park, T. Kailath, IEEE Trans. Autom. Control 40 (1995) 727; Stark et al. 2005, Conclusion",
+        ..Spec::STORED
     };
 
     fn depends_on(&self) -> Vec<String> {
@@ -362,30 +361,22 @@ fn force_array(found: &[Reconstructed], event: usize, samples: usize, rate: f64,
 }
 
 fn table(found: &[Reconstructed], rate: f64) -> Table {
-    let real = |of: &dyn Fn(&Reconstructed) -> f64| found.iter().map(of).collect::<Vec<f64>>();
     let risen = |of: fn(&Rise) -> f64| move |r: &Reconstructed| r.rise.as_ref().map_or(f64::NAN, of);
-    Table::new()
-        .with("event", "1", "number of the event", found.iter().map(|r| r.number as i64).collect::<Vec<i64>>())
-        .with("before_v", "V", "force before the transition", real(&risen(|r| r.before)))
-        .with("after_v", "V", "force after the transition", real(&risen(|r| r.after)))
-        .with("rise_time_s", "s", "from 10 to 90 % of the change", real(&|r| risen(|r| r.samples)(r) / rate))
-        .with("noise_v", "V", "innovation's standard deviation", real(&|r| r.found.noise_variance.sqrt()))
-        .with(
-            "walk_before_v",
-            "V",
-            "standard deviation of the force's step per sample, up to the transition",
-            real(&|r| r.found.walk_std[0]),
-        )
-        .with("walk_after_v", "V", "the same after it", real(&|r| r.found.walk_std[1]))
-        .with("jump_v", "V", "standard deviation of a step in the transition", real(&|r| r.found.jump_std))
-        .with("band_inflation", "1", "factor that the free stretch asks for", real(&|r| r.inflation))
-        .with("log_likelihood", "1", "log-likelihood", real(&|r| r.found.log_likelihood))
-        .with(
-            "innovation_colour",
-            "1",
-            "lag-one correlation of the innovations in standard errors",
-            real(&|r| r.colour),
-        )
+    let walk = "standard deviation of the force's step per sample, up to the transition";
+    let colour = "lag-one correlation of the innovations in standard errors";
+    Table::of(found)
+        .with("event", "1", "number of the event", |r| r.number)
+        .with("before_v", "V", "force before the transition", risen(|r| r.before))
+        .with("after_v", "V", "force after the transition", risen(|r| r.after))
+        .with("rise_time_s", "s", "from 10 to 90 % of the change", |r| risen(|r| r.samples)(r) / rate)
+        .with("noise_v", "V", "innovation's standard deviation", |r| r.found.noise_variance.sqrt())
+        .with("walk_before_v", "V", walk, |r| r.found.walk_std[0])
+        .with("walk_after_v", "V", "the same after it", |r| r.found.walk_std[1])
+        .with("jump_v", "V", "standard deviation of a step in the transition", |r| r.found.jump_std)
+        .with("band_inflation", "1", "factor that the free stretch asks for", |r| r.inflation)
+        .with("log_likelihood", "1", "log-likelihood", |r| r.found.log_likelihood)
+        .with("innovation_colour", "1", colour, |r| r.colour)
+        .table()
 }
 
 /// Mean and standard deviation over events; null where there are too few.
@@ -394,8 +385,7 @@ fn spread(values: impl Iterator<Item = f64>, unit: &str) -> Value {
     let n = known.len() as f64;
     let mean = known.iter().sum::<f64>() / n;
     let square = known.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let finite = |value: f64| value.is_finite().then_some(value);
-    json!({ "mean": finite(mean), "std": finite(square.sqrt()), "events": known.len(), "unit": unit })
+    json!({ "mean": mean, "std": square.sqrt(), "events": known.len(), "unit": unit })
 }
 
 fn summary(found: &[Reconstructed], rate: f64, model: &StateSpace) -> Value {

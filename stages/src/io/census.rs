@@ -2,8 +2,8 @@
 
 use afmid_pipeline::recording::Raw;
 use afmid_pipeline::{
-    Artifact, Caching, Channel, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage,
-    StageError, Table,
+    Artifact, Channel, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError,
+    Table,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -59,9 +59,8 @@ impl Stage for Census {
         summary: "counts missing, sentinel and saturated samples, and measures the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[TABLE.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "von Neumann, Ann. Math. Stat. 12 (1941) 367",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -178,21 +177,20 @@ impl Census {
 }
 
 fn table(rows: &[Row]) -> Table {
-    let whole = |value: fn(&Found) -> usize| -> Vec<i64> { rows.iter().map(|row| value(&row.found) as i64).collect() };
-    let real = |value: fn(&Found) -> f64| -> Vec<f64> { rows.iter().map(|row| value(&row.found)).collect() };
-    Table::new()
-        .with("record", "", "file name of the record", rows.iter().map(|row| row.record.clone()).collect::<Vec<_>>())
-        .with("channel", "", "role of the channel", rows.iter().map(|row| row.channel.clone()).collect::<Vec<_>>())
-        .with("samples", "1", "samples", whole(|found| found.samples))
-        .with("not_finite", "1", "NaN and infinities", whole(|found| found.not_finite))
-        .with("fill", "1", "samples with the file's fill code", whole(|found| found.fill))
-        .with("sentinels", "1", "samples with a sentinel code", whole(|found| found.sentinels))
-        .with("saturated_low", "1", "samples piled up at the lower end", whole(|found| found.saturated_low))
-        .with("saturated_high", "1", "samples piled up at the upper end", whole(|found| found.saturated_high))
-        .with("least", "V", "smallest valid value", real(|found| found.least))
-        .with("largest", "V", "largest valid value", real(|found| found.largest))
-        .with("noise", "V", "robust standard deviation of the noise", real(|found| found.noise_std))
-        .with("bandwidth", "Hz", "bandwidth of the noise", real(|found| found.bandwidth_hz))
+    Table::of(rows)
+        .with("record", "", "file name of the record", |row| row.record.clone())
+        .with("channel", "", "role of the channel", |row| row.channel.clone())
+        .with("samples", "1", "samples", |row| row.found.samples)
+        .with("not_finite", "1", "NaN and infinities", |row| row.found.not_finite)
+        .with("fill", "1", "samples with the file's fill code", |row| row.found.fill)
+        .with("sentinels", "1", "samples with a sentinel code", |row| row.found.sentinels)
+        .with("saturated_low", "1", "samples piled up at the lower end", |row| row.found.saturated_low)
+        .with("saturated_high", "1", "samples piled up at the upper end", |row| row.found.saturated_high)
+        .with("least", "V", "smallest valid value", |row| row.found.least)
+        .with("largest", "V", "largest valid value", |row| row.found.largest)
+        .with("noise", "V", "robust standard deviation of the noise", |row| row.found.noise_std)
+        .with("bandwidth", "Hz", "bandwidth of the noise", |row| row.found.bandwidth_hz)
+        .table()
 }
 
 #[derive(Serialize)]
@@ -254,16 +252,12 @@ fn expect_example(outputs: &Ports) -> Result<String, String> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use afmid_pipeline::stage::NoProgress;
-
     use super::*;
 
     #[test]
     fn the_example_runs_and_warns_of_both() {
         for example in Census::examples() {
-            let context = Context::new(Path::new("."), 1, &NoProgress);
+            let context = Context::alone(1);
             let outputs = Census::default().run(&(example.inputs)().unwrap(), &context).unwrap();
             println!("{}", (example.expect)(&outputs).unwrap());
             let warnings = context.into_warnings();

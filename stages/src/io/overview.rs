@@ -2,7 +2,7 @@
 
 use afmid_pipeline::recording::Raw;
 use afmid_pipeline::{
-    Array, Artifact, Axis, Caching, Channel, Context, Example, Port, Ports, Recording, Spec, Stage, StageError,
+    Array, Artifact, Axis, Channel, Context, Example, Port, Ports, Recording, Spec, Stage, StageError,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,9 +54,8 @@ impl Stage for Overview {
         summary: "shows the entire force curve of one record",
         inputs: &[RECORDS.spec()],
         outputs: &[OVERVIEW.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Fig. 2(a)",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
@@ -155,16 +154,13 @@ fn expect_example(outputs: &Ports) -> Result<String, String> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use afmid_pipeline::stage::NoProgress;
 
     use super::*;
 
     fn run(stage: &Overview, records: Vec<afmid_pipeline::Record>) -> Result<Ports, StageError> {
         let mut ports = Ports::new();
         ports.insert("records", Artifact::Recording(std::sync::Arc::new(Recording { records })));
-        stage.run(&ports, &Context::new(Path::new("."), 1, &NoProgress))
+        stage.run(&ports, &Context::alone(1))
     }
 
     #[test]

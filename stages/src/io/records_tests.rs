@@ -58,8 +58,7 @@ fn the_example_runs_and_reaches_its_truth() {
         let stage: Records = afmid_pipeline::toml::from_str(example.params).unwrap();
         afmid_pipeline::stage::check(&stage).unwrap();
         let inputs = (example.inputs)().unwrap();
-        let context = Context::new(Path::new("."), 1, &NoProgress);
-        println!("{}", (example.expect)(&stage.run(&inputs, &context).unwrap()).unwrap());
+        println!("{}", (example.expect)(&stage.run(&inputs, &Context::alone(1)).unwrap()).unwrap());
     }
 }
 

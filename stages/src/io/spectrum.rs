@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::{InputFiles, read_number_attribute, read_series};
-use afmid_pipeline::{Array, Caching, Context, Example, Faults, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Context, Example, Faults, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -83,9 +83,8 @@ impl Stage for Spectrum {
         summary: "opens a stored power spectral density",
         inputs: &[],
         outputs: &[DENSITY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {

@@ -1,8 +1,8 @@
 //! The stage `model.bootstrap`.
 
-use afmid_kernels::spectra::Intersample;
+use afmid_kernels::spectra::{Intersample, response_frequencies};
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
+    Array, Axis, Context, Document, Example, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,6 @@ use super::pem::{MODEL, PAIR};
 use crate::artifacts::{DataSet, Ensemble, Pair, SAMPLE_RATE_HZ, innovations};
 use crate::ensemble::{Rows, moments, scatter};
 use crate::watched::Watched;
-use afmid_kernels::model::InnovationsModel;
 use afmid_kernels::modes::LEVEL;
 use afmid_kernels::validation::{BootstrapSettings, Bootstrapped, Drawing, Intervals, RootInterval};
 
@@ -83,9 +82,9 @@ impl Stage for BootstrapIntervals {
         summary: "intervals on poles, zeros, gain, delay and frequency response by resampling events",
         inputs: &[ENSEMBLE.spec(), PAIR.spec(), MODEL.spec()],
         outputs: &[ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
         seeded: true,
         source: "B. Efron and R. Tibshirani, An Introduction to the Bootstrap, 1993",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -101,7 +100,7 @@ impl Stage for BootstrapIntervals {
         let amplitude = scatter(rows, &all, &mean, ensemble.onset_sample()?).map_err(StageError::from_error)?.amplitude;
         let events: Vec<&[f64]> = all.iter().map(|&i| rows.row(i)).collect();
         let (model, _) = innovations(artifact)?;
-        let frequencies = self.frequencies(1.0 / model.sample_time_s);
+        let frequencies = response_frequencies(self.response_from_hz, model.sample_time_s, self.response_points);
         let drawing = Drawing {
             events: &events,
             amplitude: &amplitude,
@@ -122,7 +121,7 @@ impl Stage for BootstrapIntervals {
             "replicates": self.drawing.replicates,
             "level": LEVEL,
             "gain": document(&found.gain, 0.0),
-            "delay_s": document(&found.delay_s, self.hold_delay_s(&model)),
+            "delay_s": document(&found.delay_s, self.intersample.delay_s(model.sample_time_s)),
         }))?;
         Ok(Ports::new()
             .with(&ROOTS, root_table(&found.roots))
@@ -136,30 +135,16 @@ impl Stage for BootstrapIntervals {
 }
 
 impl BootstrapIntervals {
-    fn frequencies(&self, rate: f64) -> Vec<f64> {
-        let (low, high) = (self.response_from_hz.min(0.25 * rate).ln(), (0.5 * rate).ln());
-        let last = (self.response_points - 1) as f64;
-        (0..self.response_points).map(|i| (low + (high - low) * i as f64 / last).exp()).collect()
-    }
-
-    fn hold_delay_s(&self, model: &InnovationsModel) -> f64 {
-        if self.intersample == Intersample::Held { 0.5 * model.sample_time_s } else { 0.0 }
-    }
-
     fn response(&self, found: &Intervals, frequencies: &[f64], artifact: &StateSpace) -> Array {
         let over = &["frequency_hz"];
-        // lag and droop of a held force, x = pi f Ts
-        let held = |f: f64| {
-            let x = std::f64::consts::PI * f * artifact.sample_time_s;
-            if self.intersample == Intersample::Held && x > 0.0 { (x / x.sin(), x) } else { (1.0, 0.0) }
-        };
+        let held = |f: f64| self.intersample.correction(f, artifact.sample_time_s);
         let magnitude = |value: fn(&Bootstrapped) -> f64| {
             let rows = frequencies.iter().zip(&found.response);
-            rows.map(|(&f, (m, _))| value(m).exp() * held(f).0).collect::<Vec<f64>>()
+            rows.map(|(&f, (m, _))| value(m).exp() * held(f).norm()).collect::<Vec<f64>>()
         };
         let phase = |value: fn(&Bootstrapped) -> f64| {
             let rows = frequencies.iter().zip(&found.response);
-            rows.map(|(&f, (_, p))| value(p) + held(f).1).collect::<Vec<f64>>()
+            rows.map(|(&f, (_, p))| value(p) + held(f).arg()).collect::<Vec<f64>>()
         };
         Array::over(vec![Axis::new("frequency_hz", "Hz", "frequency", frequencies.to_vec())])
             .with("magnitude", "1", "magnitude of the transfer function", over, magnitude(|m| m.value))
@@ -183,16 +168,17 @@ fn document(found: &Bootstrapped, less: f64) -> Value {
 }
 
 fn root_table(roots: &[RootInterval]) -> Table {
-    let column = |value: fn(&RootInterval) -> f64| roots.iter().map(value).collect::<Vec<f64>>();
-    let kind = |root: &RootInterval| if root.pole { "pole" } else { "zero" }.to_owned();
-    Table::new()
-        .with("kind", "", "pole or zero", roots.iter().map(kind).collect::<Vec<String>>())
-        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", column(|r| r.frequency.value))
-        .with("frequency_std_hz", "Hz", "standard deviation of the replicates", column(|r| r.frequency.std))
-        .with("frequency_low_hz", "Hz", "lower end of its 95 % interval", column(|r| r.frequency.interval.low))
-        .with("frequency_high_hz", "Hz", "upper end", column(|r| r.frequency.interval.high))
-        .with("quality_factor", "1", "magnitude of s over minus twice its real part", column(|r| r.quality.value))
-        .with("quality_factor_std", "1", "standard deviation of the replicates", column(|r| r.quality.std))
-        .with("quality_factor_low", "1", "lower end of its 95 % interval", column(|r| r.quality.interval.low))
-        .with("quality_factor_high", "1", "upper end", column(|r| r.quality.interval.high))
+    let std = "standard deviation of the replicates";
+    let quality = "magnitude of s over minus twice its real part";
+    Table::of(roots)
+        .with("kind", "", "pole or zero", |r| if r.pole { "pole" } else { "zero" })
+        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", |r| r.frequency.value)
+        .with("frequency_std_hz", "Hz", std, |r| r.frequency.std)
+        .with("frequency_low_hz", "Hz", "lower end of its 95 % interval", |r| r.frequency.interval.low)
+        .with("frequency_high_hz", "Hz", "upper end", |r| r.frequency.interval.high)
+        .with("quality_factor", "1", quality, |r| r.quality.value)
+        .with("quality_factor_std", "1", std, |r| r.quality.std)
+        .with("quality_factor_low", "1", "lower end of its 95 % interval", |r| r.quality.interval.low)
+        .with("quality_factor_high", "1", "upper end", |r| r.quality.interval.high)
+        .table()
 }

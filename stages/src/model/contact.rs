@@ -4,7 +4,7 @@ mod output;
 #[cfg(test)]
 mod tests;
 
-use afmid_pipeline::{Array, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
+use afmid_pipeline::{Array, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
 use faer::{Mat, c64};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ use super::ringdown::POLES;
 use crate::artifacts::{mode_table, modes, ringing, ringing_array};
 use crate::calibration::StiffnessSummary;
 use afmid_kernels::contact::{
-    FreeLever, JointContact, JointOptions, LOADED_BEAM_SHARES, LawChoice, Ringing, coupled_poles, joint_contact,
+    FreeLever, JointContact, JointOptions, LOADED_BEAM_SHARES, Ringing, coupled_poles, joint_contact,
 };
 use afmid_kernels::ringdown::{Estimate, ModeEstimate};
 
@@ -40,7 +40,7 @@ use afmid_kernels::ringdown::{Estimate, ModeEstimate};
 /// Source: U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281; A. C. Aitken, Proc. R. Soc. Edinb. 55
 /// (1936) 42.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct ContactFit {
     /// Static stiffness of the lever at its tip in N/m, where `stiffness` is not wired.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -52,13 +52,9 @@ pub struct ContactFit {
     /// static. Their sum is kept, each is a start. Why: a beam loaded at its end.
     #[schemars(inner(range(min = 1e-12, max = 1.0)))]
     pub tip_shares: Vec<f64>,
-    /// Relative standard error of each share but the first, which makes up for the others; 0 takes them as they are.
-    /// Absent: the data alone say them; wanted where there are fewer coupled poles than shares.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub tip_share_error: Option<f64>,
-    /// The contact's law: `spring-damper`, `second-order`, or `auto`, which takes the second where it lowers chi square
-    /// by more than 9.
-    pub law: LawChoice,
+    /// What is known of shares and law beforehand.
+    #[serde(flatten)]
+    pub options: JointOptions,
     /// Coupled poles above this frequency in Hz are left out. Absent: all count.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub max_frequency_hz: Option<f64>,
@@ -70,8 +66,7 @@ impl Default for ContactFit {
             stiffness_n_per_m: None,
             stiffness_error: 0.0,
             tip_shares: LOADED_BEAM_SHARES.to_vec(),
-            tip_share_error: None,
-            law: LawChoice::Auto,
+            options: JointOptions::default(),
             max_frequency_hz: None,
         }
     }
@@ -94,15 +89,15 @@ const SUMMARY: Port<Document> =
 const DISAGREEMENT: f64 = 0.01;
 
 impl Stage for ContactFit {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.contact",
         version: 2,
         summary: "contact stiffness, damping and resonances, sharing zeros and detector with the free lever",
         inputs: &[FREE.spec(), FREE_POLES.spec(), POLES.spec(), STIFFNESS.spec()],
         outputs: &[CONTACT.spec(), SHARES.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "U. Rabe, K. Janser, W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -120,7 +115,7 @@ impl Stage for ContactFit {
         };
         let most = self.max_frequency_hz.map_or(f64::INFINITY, |f| std::f64::consts::TAU * f);
         let coupled = ringing(inputs.get(&POLES)?, most)?;
-        let contact = joint_contact(&lever, &free, &coupled, &self.options()).map_err(|error| {
+        let contact = joint_contact(&lever, &free, &coupled, &self.options).map_err(|error| {
             StageError::from_error(error).help(
                 "look at the coupled modes: leave wrong ones out with `max_frequency_hz` or fit fewer `modes`; with fewer poles than shares give \
                  `tip_share_error`",
@@ -194,10 +189,6 @@ fn warn(contact: &JointContact, cx: &Context) {
 }
 
 impl ContactFit {
-    fn options(&self) -> JointOptions {
-        JointOptions { law: self.law, share_error: self.tip_share_error }
-    }
-
     fn lever(&self, free: &Table, wired: Option<&Document>) -> Result<FreeLever, StageError> {
         let stiffness = match (wired, self.stiffness_n_per_m) {
             (Some(document), _) => {

@@ -1,6 +1,6 @@
 //! The stage `model.era`.
 
-use afmid_pipeline::{Caching, Context, Example, Faults, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Context, Example, Faults, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -56,9 +56,8 @@ impl Stage for EraEstimate {
         summary: "estimates a state-space model from a free decay: eigensystem realization",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "J. Juang and R. Pappa, J. Guidance 8 (1985) 620",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {

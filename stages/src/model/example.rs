@@ -96,7 +96,7 @@ pub(super) fn vector_fitting() -> Vec<Example> {
 
 /// Transfer function of the release, by the estimate over its differences.
 fn response() -> Result<Array, StageError> {
-    let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
+    let cx = Context::alone(0);
     let window = Window { kind: Taper::Rectangular, differenced: true, ..Window::default() };
     let windowed = window.run(&named("pair", pair()), &cx)?;
     let windowed = windowed.get(&Port::<Array>::new(Window::SPEC.outputs[0].name, "", ""))?.clone();
@@ -224,8 +224,7 @@ fn pair() -> Array {
 
 fn model() -> Result<StateSpace, StageError> {
     let stage = Pem { order: Order::Fixed(2), ..Pem::default() };
-    let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
-    let outputs = stage.run(&Ports::new().with(&pem::PAIR, pair()), &cx)?;
+    let outputs = stage.run(&Ports::new().with(&pem::PAIR, pair()), &Context::alone(0))?;
     Ok(outputs.get(&pem::MODEL)?.clone())
 }
 

@@ -1,20 +1,19 @@
 //! The stage `model.grey`.
 
-mod known;
 mod tables;
 #[cfg(test)]
 mod tests;
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
+    Array, Axis, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
 };
 use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-pub use self::known::{GreyNumber, GreyNumberKind};
 use self::tables::{mode_table, named, parameter_table, static_gain, with_interval};
+use super::known::KnownNumber;
 use super::order::simulated_percent;
 use super::pem::{MODEL, PAIR, RESIDUALS, SUMMARY, ending};
 use crate::artifacts::{
@@ -57,7 +56,7 @@ pub struct GreyEstimate {
     pub before_s: Option<f64>,
     /// What is known beforehand, such as `{ quantity = "delay_s", fixed = 1e-6 }`, `{ quantity = "gain", mode = 2,
     /// between = [0.0, 0.2] }` or `{ quantity = "corner_hz", real_pole = 1, about = [1.3e6, 1e5] }`.
-    pub known: Vec<GreyNumber>,
+    pub known: Vec<KnownNumber>,
     /// Modes to start from, `[frequency in Hz, quality factor]` each, as many as `modes`. None: from the port `start`
     /// or from subspace estimates.
     pub start_modes: Vec<[f64; 2]>,
@@ -91,9 +90,8 @@ impl Stage for GreyEstimate {
         summary: "fits modes, real poles, delay and feedthrough: the grey modal form",
         inputs: &[PAIR.spec(), START.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec(), MODES.spec(), PARAMETERS.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "L. Ljung, System Identification, 1999; G. Golub and V. Pereyra, Inverse Problems 19 (2003) R1",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -147,7 +145,7 @@ impl Stage for GreyEstimate {
 
 impl GreyEstimate {
     fn check_known(&self) -> Result<(), StageError> {
-        let known = self.known.iter().map(GreyNumber::known).collect::<Result<Vec<_>, _>>()?;
+        let known = self.known.iter().map(KnownNumber::of_grey).collect::<Result<Vec<_>, _>>()?;
         for (i, entry) in known.iter().enumerate() {
             let name = named(entry.quantity).0;
             if known[..i].iter().any(|other| other.quantity == entry.quantity) {
@@ -181,7 +179,7 @@ impl GreyEstimate {
             None => GreyStart::Subspace,
         };
         Ok(GreyOptions {
-            known: self.known.iter().map(GreyNumber::known).collect::<Result<_, _>>()?,
+            known: self.known.iter().map(KnownNumber::of_grey).collect::<Result<_, _>>()?,
             start,
             colour: if self.coloured { ResidualColour::Spectrum } else { ResidualColour::White },
             ..self.fit.clone()

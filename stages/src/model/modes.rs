@@ -1,8 +1,8 @@
 //! The stage `model.modes`.
 
-use afmid_kernels::spectra::Intersample;
+use afmid_kernels::spectra::{Intersample, response_frequencies};
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
+    Array, Axis, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
 };
 use faer::Mat;
 use num_complex::Complex64;
@@ -96,9 +96,8 @@ impl Stage for Modes {
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Table I and Fig. 5",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -132,8 +131,12 @@ impl Stage for Modes {
             (Some(half), Some(pair)) => held_out(half, pair)?,
             _ => Fits::default(),
         };
-        let points = response(&model, &covariance, &self.frequencies(1.0 / model.sample_time_s))
-            .map_err(StageError::from_error)?;
+        let points = response(
+            &model,
+            &covariance,
+            &response_frequencies(self.response_from_hz, model.sample_time_s, self.response_points),
+        )
+        .map_err(StageError::from_error)?;
         let summary = Document::new(&json!({
             "modes": modes.iter().map(|mode| mode_document(mode)).collect::<Vec<Value>>(),
             "fit_percent": {
@@ -161,7 +164,7 @@ impl Modes {
     /// Gain and delay with their intervals.
     fn at_rest(&self, model: &InnovationsModel, covariance: &Mat<f64>) -> Result<Value, StageError> {
         let rest = at_rest(model, covariance).map_err(StageError::from_error)?;
-        let hold_s = if self.intersample == Intersample::Held { 0.5 * model.sample_time_s } else { 0.0 };
+        let hold_s = self.intersample.delay_s(model.sample_time_s);
         let with_interval = |value: f64, std: f64| {
             let Interval { low, high } = Interval::normal(value, std);
             json!({ "value": value, "std": std, "low": low, "high": high })
@@ -171,12 +174,6 @@ impl Modes {
             "delay_s": with_interval(rest.delay_s - hold_s, rest.delay_std_s),
             "level": LEVEL,
         }))
-    }
-
-    fn frequencies(&self, rate: f64) -> Vec<f64> {
-        let (low, high) = (self.response_from_hz.min(0.25 * rate).ln(), (0.5 * rate).ln());
-        let last = (self.response_points - 1) as f64;
-        (0..self.response_points).map(|i| (low + (high - low) * i as f64 / last).exp()).collect()
     }
 
     /// Each reference value beside the nearest mode.
@@ -284,20 +281,9 @@ fn modes_with_shares(modes: &[&Pole]) -> Table {
         .with("significance", "1", "ringing amplitude over its standard error", column(|m| m.significance))
 }
 
-/// From the response to a held input to that of the continuous system: `i w T / (1 - exp(-i w T))`.
-fn hold_correction(frequency_hz: f64, sample_time_s: f64, intersample: Intersample) -> Complex64 {
-    let angle = std::f64::consts::TAU * frequency_hz * sample_time_s;
-    match intersample {
-        Intersample::Held if angle > 0.0 => {
-            Complex64::new(0.0, angle) / (Complex64::new(1.0, 0.0) - Complex64::cis(-angle))
-        }
-        _ => Complex64::new(1.0, 0.0),
-    }
-}
-
 fn response_array(points: &[ResponsePoint], model: &StateSpace, intersample: Intersample) -> Array {
     let over = &["frequency_hz"];
-    let factor = |point: &ResponsePoint| hold_correction(point.frequency_hz, model.sample_time_s, intersample);
+    let factor = |point: &ResponsePoint| intersample.correction(point.frequency_hz, model.sample_time_s);
     let interval = |p: &ResponsePoint| {
         let scale = factor(p).norm();
         Interval::positive(p.value.norm() * scale, p.magnitude_std() * scale)
@@ -335,17 +321,6 @@ fn response_array(points: &[ResponsePoint], model: &StateSpace, intersample: Int
         )
         .attribute(SAMPLE_RATE_HZ, 1.0 / model.sample_time_s)
         .attribute("order", model.order())
-}
-
-#[cfg(test)]
-#[test]
-fn the_hold_correction_advances_by_half_a_sample_and_undoes_the_droop() {
-    let (rate, f) = (5e6, 1.05e6);
-    let found = hold_correction(f, 1.0 / rate, Intersample::Held);
-    let x = std::f64::consts::PI * f / rate;
-    // exact: exp(i x) x / sin(x); rounding of a few operations
-    assert!((found - Complex64::from_polar(x / x.sin(), x)).norm() < 1e-14);
-    assert_eq!(hold_correction(f, 1.0 / rate, Intersample::Sampled), Complex64::new(1.0, 0.0));
 }
 
 #[cfg(test)]

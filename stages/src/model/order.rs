@@ -11,12 +11,11 @@ pub type Order = Count<40>;
 
 /// A choice for a stage's summary; unknown numbers are null.
 pub(super) fn choice_document(choice: &OrderChoice) -> Value {
-    let known = |value: f64| value.is_finite().then_some(value);
     json!({
         "chosen": choice.order,
         "singular_value_gap": choice.gap,
         "candidates": choice.candidates.iter().map(|c| json!({
-            "order": c.order, "bic": known(c.bic), "held_out_percent": known(c.held_out_percent),
+            "order": c.order, "bic": c.bic, "held_out_percent": c.held_out_percent,
         })).collect::<Vec<Value>>(),
     })
 }

@@ -1,7 +1,7 @@
 //! The stage `model.pem`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace,
+    Array, Axis, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -84,9 +84,8 @@ impl Stage for Pem {
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Eq. 8; L. Ljung, System Identification, 1999",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -223,9 +222,8 @@ fn a_half_that_the_pair_does_not_have_is_refused_with_what_to_do() {
         .with("force", "V", "force", &["time"], vec![0.0; 64])
         .attribute("sample_rate_hz", 5e6)
         .attribute("count", 3.0);
-    let cx = Context::new(std::path::Path::new("."), 0, &afmid_pipeline::stage::NoProgress);
     let stage = Pem { set: DataSet::Identification, ..Pem::default() };
-    let error = stage.run(&Ports::new().with(&PAIR, pair), &cx).unwrap_err();
+    let error = stage.run(&Ports::new().with(&PAIR, pair), &Context::alone(0)).unwrap_err();
     assert_eq!(error.problem, "`set` is \"identification\", but the pair has no halves, made from 3 events");
     let help = error.help.unwrap_or_default();
     assert!(help.contains("split = true") && help.contains("ensemble.average") && help.contains("4 events"), "{help}");

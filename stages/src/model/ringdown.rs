@@ -1,7 +1,6 @@
 //! The stage `model.ringdown`.
 
 mod gaps;
-mod known;
 mod stretches;
 mod summary;
 mod tables;
@@ -9,18 +8,18 @@ mod tables;
 mod tests;
 
 use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
+    Array, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::gaps::{gaps, total};
-use self::known::named;
-pub use self::known::{KnownNumber, KnownQuantity};
 use self::stretches::windows as free_windows;
 use self::summary::summary;
+use self::tables::named;
 use self::tables::{event_table, mode_table, poles, spectrum};
 use super::count::Count;
+use super::known::KnownNumber;
 use crate::artifacts::Ensemble;
 use crate::calibration::FreeSettings;
 use crate::watched::Watched;
@@ -152,9 +151,9 @@ impl Stage for RingdownFit {
         summary: "fits the modes of all events jointly, at the limit of their noise",
         inputs: &[ENSEMBLE.spec(), FREE.spec()],
         outputs: &[MODES.spec(), EVENTS.spec(), SPECTRUM.spec(), POLES.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
         seeded: true,
         source: "S. M. Kay, Fundamentals of Statistical Signal Processing I, 1993, chapter 7",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -245,7 +244,7 @@ impl RingdownFit {
                 )
                 .help("give the number of modes"));
             }
-            let known = entry.known(modes, self.fit.real_poles)?;
+            let known = entry.of_ringdown(modes, self.fit.real_poles)?;
             if seen.contains(&known.quantity) {
                 return Err(StageError::new(format!("`known` has two entries for {}", named(known.quantity))));
             }
@@ -264,7 +263,11 @@ impl RingdownFit {
                 JointNoise::Estimated => NoiseSource::Estimated,
                 JointNoise::White => NoiseSource::White,
             },
-            known: self.known.iter().map(|entry| entry.known(modes, self.fit.real_poles)).collect::<Result<_, _>>()?,
+            known: self
+                .known
+                .iter()
+                .map(|entry| entry.of_ringdown(modes, self.fit.real_poles))
+                .collect::<Result<_, _>>()?,
             ..self.fit.clone()
         })
     }

@@ -1,6 +1,6 @@
 //! The stage `model.stabilisation`.
 
-use afmid_pipeline::{Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
+use afmid_pipeline::{Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
 use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -104,9 +104,8 @@ impl Stage for StabilisationDiagram {
         summary: "shows which poles stay as the order grows, and names the modes and the order",
         inputs: &[PAIR.spec()],
         outputs: &[POLES.spec(), MODES.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "H. Van der Auweraer and B. Peeters, Smart Struct. Syst. 1 (2004) 1",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -175,18 +174,15 @@ fn mode_document(mode: &PhysicalMode) -> Value {
 }
 
 fn pole_table(found: &Stabilisation) -> Table {
-    let column = |value: fn(&OrderedPole) -> f64| found.poles.iter().map(value).collect::<Vec<f64>>();
-    let flag = |value: fn(&OrderedPole) -> bool| found.poles.iter().map(value).collect::<Vec<bool>>();
-    let orders: Vec<i64> = found.poles.iter().map(|pole| pole.order as i64).collect();
-    let modes: Vec<i64> = found.poles.iter().map(|pole| pole.mode.map_or(0, |mode| mode as i64 + 1)).collect();
-    let mut table = Table::new()
-        .with("order", "1", "order of the model", orders)
-        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", column(|p| p.frequency_hz))
-        .with("damping", "1", "one over twice the quality factor", column(|p| p.damping))
-        .with("quality_factor", "1", "quality factor", column(OrderedPole::quality_factor))
-        .with("frequency_stable", "", "the next lower order has it here", flag(|p| p.frequency_stable))
-        .with("damping_stable", "", "and with this damping", flag(|p| p.damping_stable))
-        .with("mode", "1", "number of the physical mode; 0: none", modes);
+    let mut table = Table::of(&found.poles)
+        .with("order", "1", "order of the model", |p| p.order)
+        .with("frequency_hz", "Hz", "magnitude of s over 2 pi", |p| p.frequency_hz)
+        .with("damping", "1", "one over twice the quality factor", |p| p.damping)
+        .with("quality_factor", "1", "quality factor", OrderedPole::quality_factor)
+        .with("frequency_stable", "", "the next lower order has it here", |p| p.frequency_stable)
+        .with("damping_stable", "", "and with this damping", |p| p.damping_stable)
+        .with("mode", "1", "number of the physical mode; 0: none", |p| p.mode.map_or(0, |mode| mode + 1))
+        .table();
     if let Some(order) = found.order {
         table = table.attribute("proposed_order", order);
     }
@@ -194,14 +190,13 @@ fn pole_table(found: &Stabilisation) -> Table {
 }
 
 fn mode_table(modes: &[PhysicalMode]) -> Table {
-    let column = |value: fn(&PhysicalMode) -> f64| modes.iter().map(value).collect::<Vec<f64>>();
-    let whole = |value: fn(&PhysicalMode) -> usize| modes.iter().map(|m| value(m) as i64).collect::<Vec<i64>>();
-    Table::new()
-        .with("frequency_hz", "Hz", "median frequency over the orders", column(|m| m.frequency_hz))
-        .with("frequency_spread_hz", "Hz", "spread between orders", column(|m| m.frequency_spread_hz))
-        .with("quality_factor", "1", "median quality factor", column(PhysicalMode::quality_factor))
-        .with("quality_factor_spread", "1", "spread between orders", column(PhysicalMode::quality_factor_spread))
-        .with("orders", "1", "orders at which it is stable", whole(|m| m.count))
-        .with("first_order", "1", "the lowest of them", whole(|m| m.first_order))
-        .with("significance", "1", "ringing amplitude over its standard error", column(|m| m.significance))
+    Table::of(modes)
+        .with("frequency_hz", "Hz", "median frequency over the orders", |m| m.frequency_hz)
+        .with("frequency_spread_hz", "Hz", "spread between orders", |m| m.frequency_spread_hz)
+        .with("quality_factor", "1", "median quality factor", PhysicalMode::quality_factor)
+        .with("quality_factor_spread", "1", "spread between orders", PhysicalMode::quality_factor_spread)
+        .with("orders", "1", "orders at which it is stable", |m| m.count)
+        .with("first_order", "1", "the lowest of them", |m| m.first_order)
+        .with("significance", "1", "ringing amplitude over its standard error", |m| m.significance)
+        .table()
 }

@@ -1,6 +1,6 @@
 //! The stage `model.subspace`.
 
-use afmid_pipeline::{Caching, Context, Example, Faults, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Context, Example, Faults, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -70,9 +70,8 @@ impl Stage for SubspaceEstimate {
         summary: "estimates a state-space model by subspace methods: N4SID, MOESP, CVA weights",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Van Overschee and De Moor 1996; Verhaegen and Dewilde, Int. J. Control 56 (1992) 1187",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {

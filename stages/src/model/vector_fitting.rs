@@ -1,9 +1,7 @@
 //! The stage `model.vector_fitting`.
 
 use afmid_kernels::spectra::{Intersample, Presence};
-use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace,
-};
+use afmid_pipeline::{Array, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace};
 use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -89,9 +87,8 @@ impl Stage for VectorFittingEstimate {
         summary: "fits a rational transfer function to a frequency response: relaxed vector fitting in z",
         inputs: &[TRANSFER.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "B. Gustavsen, IEEE Trans. Power Delivery 21 (2006) 1587",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
@@ -146,21 +143,15 @@ impl VectorFittingEstimate {
         // of differences a drift is a constant: it sits in the bin at zero alone, and nowhere else
         let differenced = given.differenced();
         let used = |f: f64| (self.min_frequency_hz..=high).contains(&f) && !(differenced && f == 0.0);
-        let held = |f: f64| {
-            let turn = std::f64::consts::TAU * f / rate;
-            match self.intersample {
-                Intersample::Held if turn > 0.0 => (1.0 - c64::cis(-turn)) / c64::new(0.0, turn),
-                _ => c64::new(1.0, 0.0),
-            }
-        };
+        let held = |f: f64| self.intersample.correction(f, 1.0 / rate);
         let nothing = c64::new(f64::NAN, f64::NAN);
         let transfer = frequency_hz
             .iter()
             .zip(given.transfer)
-            .map(|(&f, g)| if used(f) { c64::new(g.re, g.im) * held(f) } else { nothing })
+            .map(|(&f, g)| if used(f) { c64::new(g.re, g.im) / held(f) } else { nothing })
             .collect();
         let own = |(&f, &v): (&f64, &f64)| match self.weight {
-            ResponseWeight::Variance => v * held(f).norm_sqr(),
+            ResponseWeight::Variance => v / held(f).norm_sqr(),
             ResponseWeight::Uniform => 0.0,
         };
         (transfer, frequency_hz.iter().zip(given.variance).map(own).collect())

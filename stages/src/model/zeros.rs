@@ -1,6 +1,6 @@
 //! The stage `model.zeros`.
 
-use afmid_pipeline::{Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
+use afmid_pipeline::{Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -52,9 +52,8 @@ impl Stage for Zeros {
         summary: "compares the zeros of the surface-coupled lever with the free lever's",
         inputs: &[FREE.spec(), COUPLED.spec()],
         outputs: &[ZEROS.spec(), SHIFTS.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Fig. 4",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -124,24 +123,24 @@ fn shift_document(shift: &PoleShift) -> Value {
     })
 }
 
+/// A number that may be missing.
+fn or_unknown(found: Option<Frequency>) -> (f64, f64) {
+    found.map_or((f64::NAN, f64::NAN), |zero| (zero.value_hz, zero.std_hz))
+}
+
 fn zero_table(pairs: &[ZeroPair]) -> Table {
-    let column = |value: &dyn Fn(&ZeroPair) -> f64| pairs.iter().map(value).collect::<Vec<f64>>();
-    Table::new()
-        .with("free_hz", "Hz", "zero of the free lever", column(&|p| p.free.value_hz))
-        .with("free_std_hz", "Hz", "its standard error", column(&|p| p.free.std_hz))
-        .with("coupled_hz", "Hz", "zero of the coupled lever", column(&|p| p.coupled.map_or(f64::NAN, |c| c.value_hz)))
-        .with("coupled_std_hz", "Hz", "its standard error", column(&|p| p.coupled.map_or(f64::NAN, |c| c.std_hz)))
-        .with("relative_difference", "1", "coupled over free, minus one", column(&ZeroPair::relative_difference))
-        .with("combined_errors", "1", "difference in combined standard errors", column(&ZeroPair::combined_errors))
+    Table::of(pairs)
+        .with_std(["free_hz", "free_std_hz"], "Hz", "zero of the free lever", |p| (p.free.value_hz, p.free.std_hz))
+        .with_std(["coupled_hz", "coupled_std_hz"], "Hz", "zero of the coupled lever", |p| or_unknown(p.coupled))
+        .with("relative_difference", "1", "coupled over free, minus one", ZeroPair::relative_difference)
+        .with("combined_errors", "1", "difference in combined standard errors", ZeroPair::combined_errors)
+        .table()
 }
 
 fn shift_table(shifts: &[PoleShift]) -> Table {
-    let column = |value: &dyn Fn(&PoleShift) -> f64| shifts.iter().map(value).collect::<Vec<f64>>();
-    Table::new()
-        .with("free_hz", "Hz", "mode of the free lever", column(&|s| s.free.value_hz))
-        .with("free_std_hz", "Hz", "its standard error", column(&|s| s.free.std_hz))
-        .with("coupled_hz", "Hz", "where the contact moves it", column(&|s| s.coupled.map_or(f64::NAN, |c| c.value_hz)))
-        .with("coupled_std_hz", "Hz", "its standard error", column(&|s| s.coupled.map_or(f64::NAN, |c| c.std_hz)))
-        .with("shift_hz", "Hz", "coupled minus free", column(&|s| s.shift_hz().0))
-        .with("shift_std_hz", "Hz", "its standard error", column(&|s| s.shift_hz().1))
+    Table::of(shifts)
+        .with_std(["free_hz", "free_std_hz"], "Hz", "mode of the free lever", |s| (s.free.value_hz, s.free.std_hz))
+        .with_std(["coupled_hz", "coupled_std_hz"], "Hz", "where the contact moves it", |s| or_unknown(s.coupled))
+        .with_std(["shift_hz", "shift_std_hz"], "Hz", "coupled minus free", PoleShift::shift_hz)
+        .table()
 }

@@ -1,5 +1,6 @@
 //! What is hidden in the motion against closed forms and amplitude-frequency laws.
 
+use super::Afm;
 use crate::fixture::Lever as ClosedForm;
 use afmid_kernels::effects::{Effects, ExtraMode, LinearSection};
 use afmid_kernels::simulate::*;
@@ -14,47 +15,31 @@ const VOLTS_PER_M: f64 = 1e7;
 const RATE_HZ: f64 = 5e6;
 const START: usize = 2000;
 
-/// The paper's lever as the simulator has it, or parts of it.
-struct Rig {
-    lever: ModalLever,
-    contact: Contact,
-    detector: Detector,
-    temperature_k: f64,
-}
-
-fn rig(closed: &ClosedForm) -> Rig {
-    let tip_shares = [0.9713, 0.0247, 0.0032, 0.0008];
-    let modes = (0..4)
-        .map(|i| Mode {
-            frequency_hz: closed.frequency_hz[i],
-            quality_factor: closed.quality_factor[i],
-            tip_share: tip_shares[i],
-            detector_share: closed.static_share[i],
-        })
-        .collect();
-    let contact = Contact {
-        stiffness_n_per_m: 60.0,
-        damping_n_s_per_m: 8e-6,
-        snap_in_gap_m: 4e-9,
-        adhesion_n: LOAD_N,
-        adhesion_scatter: 0.06,
-    };
-    let pole_hz = closed.detector_pole_hz.clone();
-    let detector = Detector { sensitivity_v_per_m: VOLTS_PER_M, pole_hz, delay_s: 0.0 };
-    Rig { lever: ModalLever { stiffness_n_per_m: 3.8, modes }, contact, detector, temperature_k: 0.0 }
+/// The paper's microscope with this lever, without thermal motion or delay.
+fn rig(closed: &ClosedForm) -> Microscope {
+    let mut rig = Afm::default().microscope();
+    for (i, mode) in rig.lever.modes.iter_mut().enumerate() {
+        (mode.frequency_hz, mode.quality_factor) = (closed.frequency_hz[i], closed.quality_factor[i]);
+        mode.detector_share = closed.static_share[i];
+    }
+    rig.contact.adhesion_n = LOAD_N;
+    rig.detector =
+        Detector { sensitivity_v_per_m: VOLTS_PER_M, pole_hz: closed.detector_pole_hz.clone(), delay_s: 0.0 };
+    rig.temperature_k = 0.0;
+    rig
 }
 
 /// A retract so slow (2 nm/s) that the base stands still, from `START` samples before the release on.
-fn run(rig: &Rig, effects: &Effects, samples: usize, rate_hz: f64) -> Motion {
+fn run(rig: &Microscope, effects: &Effects, samples: usize, rate_hz: f64) -> Motion {
     run_at(5e-3, START as f64, rig, effects, samples, rate_hz)
 }
 
 /// A retract at the paper's 2.2 um/s: where forces move the release by nanometres.
-fn run_moving(rig: &Rig, effects: &Effects, samples: usize, rate_hz: f64) -> Motion {
+fn run_moving(rig: &Microscope, effects: &Effects, samples: usize, rate_hz: f64) -> Motion {
     run_at(5.58, 8000.0, rig, effects, samples, rate_hz)
 }
 
-fn run_at(ramp_hz: f64, lead: f64, rig: &Rig, effects: &Effects, samples: usize, rate_hz: f64) -> Motion {
+fn run_at(ramp_hz: f64, lead: f64, rig: &Microscope, effects: &Effects, samples: usize, rate_hz: f64) -> Motion {
     let ramp = TriangleRamp { frequency_hz: ramp_hz, range_m: 200e-9, phase: 0.0 };
     let pull_off = [LOAD_N];
     let drive = Drive { ramp, surface_m: -22e-9, pull_off_n: &pull_off };
@@ -92,7 +77,7 @@ fn tail(share: f64, tau_s: f64) -> Effects {
 
 #[test]
 fn nothing_hidden_gives_the_same_bits() {
-    let rig = Rig { temperature_k: 295.0, ..rig(&ClosedForm::paper()) };
+    let rig = Microscope { temperature_k: 295.0, ..rig(&ClosedForm::paper()) };
     let ramp = TriangleRamp { frequency_hz: 25.0, range_m: 200e-9, phase: 0.0 };
     let pull_off = [LOAD_N];
     let drive = Drive { ramp, surface_m: -22e-9, pull_off_n: &pull_off };

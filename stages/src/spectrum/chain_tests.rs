@@ -1,6 +1,5 @@
 //! From aligned events to a smoothed transfer function, on the paper's lever in noise.
 
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Axis, Context, Ports, Stage};
 use rustfft::num_complex::Complex64;
 
@@ -40,11 +39,10 @@ fn ensemble(seed: u64) -> Array {
 
 /// Runs a stage on what is wired to it, under the names that its ports have.
 fn run<S: Stage>(stage: &S, port: &str, input: &Array) -> Array {
-    let cx = Context::new(std::path::Path::new("."), 3, &NoProgress);
     let mut inputs = Ports::new();
     inputs.insert(port, afmid_pipeline::Artifact::Array(std::sync::Arc::new(input.clone())));
     afmid_pipeline::stage::check(stage).unwrap();
-    let outputs = stage.run(&inputs, &cx).unwrap();
+    let outputs = stage.run(&inputs, &Context::alone(3)).unwrap();
     match outputs.artifact(S::SPEC.outputs[0].name) {
         Some(afmid_pipeline::Artifact::Array(array)) => array.as_ref().clone(),
         other => panic!("{other:?}"),

@@ -1,6 +1,6 @@
 //! The stage `spectrum.etfe`.
 
-use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -61,9 +61,8 @@ impl Stage for Etfe {
         summary: "estimates the transfer function as the ratio of the transforms of response and force",
         inputs: &[PAIR.spec()],
         outputs: &[ETFE.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Eqs. 5 to 7",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

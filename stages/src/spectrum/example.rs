@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Context, Example, Ports, Stage, StageError};
 use rustfft::num_complex::Complex64;
 
@@ -103,14 +102,12 @@ fn peak_kept(outputs: &Ports, limit: f64) -> Result<String, String> {
 
 fn smoothing_inputs() -> Result<Ports, StageError> {
     let windowed = prepared(Taper::Rectangular, true)?;
-    let cx = Context::new(std::path::Path::new("."), 0, &NoProgress);
-    Etfe { bandwidth_hz: 400e3, ..Etfe::default() }.run(&Ports::new().with(&PAIR, windowed), &cx)
+    Etfe { bandwidth_hz: 400e3, ..Etfe::default() }.run(&Ports::new().with(&PAIR, windowed), &Context::alone(0))
 }
 
 fn prepared(kind: Taper, differenced: bool) -> Result<Array, StageError> {
-    let cx = Context::new(std::path::Path::new("."), 0, &NoProgress);
     let window = Window { kind, differenced, ..Window::default() };
-    Ok(window.run(&Ports::new().with(&PAIR, pair()), &cx)?.get(&WINDOWED)?.clone())
+    Ok(window.run(&Ports::new().with(&PAIR, pair()), &Context::alone(0))?.get(&WINDOWED)?.clone())
 }
 
 /// The transfer function of the examples.

@@ -1,6 +1,6 @@
 //! The stage `spectrum.frf`.
 
-use afmid_pipeline::{Array, Caching, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Spec, Stage, StageError};
 use rustfft::num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -68,9 +68,8 @@ impl Stage for Frf {
         summary: "estimates the frequency response from all events, with noise and distortion levels",
         inputs: &[ENSEMBLE.spec(), PAIR.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "R. Pintelon, J. Schoukens, System Identification, 2012, ch. 2 and 4",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

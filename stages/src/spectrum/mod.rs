@@ -16,7 +16,7 @@ mod chain_tests;
 pub use etfe::Etfe;
 pub use frf::Frf;
 pub use periodogram::Periodogram;
-pub use smoothing::{LineParams, Smoothing, SmoothingMethod};
+pub use smoothing::{Smoothing, SmoothingMethod};
 pub use thermal::{SpectrumWindow, Thermal};
 pub use welch::Welch;
 pub use window::Window;

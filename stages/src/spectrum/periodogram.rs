@@ -1,6 +1,6 @@
 //! The stage `spectrum.periodogram`.
 
-use afmid_pipeline::{Array, Axis, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Axis, Context, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -33,9 +33,8 @@ impl Stage for Periodogram {
         summary: "computes power spectral densities of force and response",
         inputs: &[PAIR.spec()],
         outputs: &[PERIODOGRAM.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Results and discussion",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {

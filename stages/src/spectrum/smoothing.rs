@@ -1,6 +1,6 @@
 //! The stage `spectrum.smoothing`.
 
-use afmid_pipeline::{Array, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Context, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -57,19 +57,7 @@ pub struct Smoothing {
     #[schemars(range(min = 0.0, max = 100.0))]
     pub adapt_sigma: f64,
     /// Lines that do not belong to the transfer function. None: the second harmonic of the first mode is the usual one.
-    pub lines: Vec<LineParams>,
-}
-
-/// A line to be left out.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LineParams {
-    /// Centre in Hz.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub frequency_hz: f64,
-    /// Half of the width that is left out, in Hz.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub half_width_hz: f64,
+    pub lines: Vec<SuppressedLine>,
 }
 
 /// Local models.
@@ -108,26 +96,24 @@ impl Stage for Smoothing {
         summary: "smooths a transfer function by local rationals or polynomials of real and imaginary parts",
         inputs: &[ETFE.spec()],
         outputs: &[SMOOTHED.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005; McKelvey and Guerin, IFAC SYSID 2012",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
         let etfe = Transfer::new(inputs.get(&ETFE)?)?;
         let Transfer { frequency_hz, transfer, variance, .. } = etfe;
         let bins = Bins { frequency_hz, transfer, variance };
-        let lines: Vec<SuppressedLine> = self
-            .lines
-            .iter()
-            .map(|l| SuppressedLine { frequency_hz: l.frequency_hz, half_width_hz: l.half_width_hz })
-            .collect();
         let smoothed = match self.method {
-            SmoothingMethod::LocalRational => local_rational(bins, self.rational(&etfe)?, &lines),
+            SmoothingMethod::LocalRational => local_rational(bins, self.rational(&etfe)?, &self.lines),
             SmoothingMethod::LocalPolynomial => {
                 let adapt_sigma = (self.adapt_sigma > 0.0).then_some(self.adapt_sigma);
                 let half_width_bins = self.half_width_bins;
-                local_polynomial(bins, PolynomialSettings { degree: self.degree, half_width_bins, adapt_sigma }, &lines)
+                local_polynomial(
+                    bins,
+                    PolynomialSettings { degree: self.degree, half_width_bins, adapt_sigma },
+                    &self.lines,
+                )
             }
         }
         .map_err(StageError::from_error)?;

@@ -1,7 +1,7 @@
 //! The stage `spectrum.thermal`.
 
 use afmid_pipeline::{
-    Array, Axis, Caching, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table, Values,
+    Array, Axis, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table, Values,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,9 +9,7 @@ use serde_json::{Value, json};
 
 use crate::artifacts::Density;
 use crate::io::DENSITY;
-use afmid_kernels::spectra::{
-    AveragedDensity, Fitted, Presence, SeenThrough, ThermalFit, ThermalFitSettings, thermal_fit,
-};
+use afmid_kernels::spectra::{AveragedDensity, Fitted, SeenThrough, ThermalFit, ThermalFitSettings, thermal_fit};
 
 /// Fits a thermal spectrum: resonance, quality factor, level, white and 1/f noise.
 ///
@@ -36,14 +34,11 @@ use afmid_kernels::spectra::{
 /// P. Whittle, Ark. Mat. 2 (1953) 423; A. M. Sykulski et al., Biometrika 106 (2019) 251; H. White, Econometrica 50
 /// (1982) 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct Thermal {
-    /// The resonance lies above this, in Hz.
-    #[schemars(range(min = 0.0))]
-    pub lowest_hz: f64,
-    /// The resonance lies below this, in Hz. Absent: the last bin.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub highest_hz: Option<f64>,
+    /// How the spectrum is fitted.
+    #[serde(flatten)]
+    pub fit: ThermalFitSettings,
     /// Only bins between these two frequencies are fitted, in Hz. Absent: all but the first three and the last three of
     /// a spectrum that begins at zero.
     #[schemars(inner(range(min = 0.0)))]
@@ -51,12 +46,6 @@ pub struct Thermal {
     /// The window of the spectra: `auto` (from the input, or else from the correlation of neighbouring bins), `hann`,
     /// `rectangular`, or `none` for a density that no window has widened.
     pub window: SpectrumWindow,
-    /// 1/f noise: `auto` (kept where the likelihood gains more than chance does once in a hundred spectra), `on` or
-    /// `off`.
-    pub flicker: Presence,
-    /// Probability that a spectrum without lines loses any bin to the search for lines, 0 (no search) to 0.5.
-    #[schemars(range(min = 0.0, max = 0.5))]
-    pub line_false_alarm: f64,
 }
 
 /// The window of stored spectra.
@@ -75,14 +64,7 @@ pub enum SpectrumWindow {
 
 impl Default for Thermal {
     fn default() -> Self {
-        Self {
-            lowest_hz: 0.0,
-            highest_hz: None,
-            fitted_hz: None,
-            window: SpectrumWindow::Auto,
-            flicker: Presence::Auto,
-            line_false_alarm: 0.01,
-        }
+        Self { fit: ThermalFitSettings::default(), fitted_hz: None, window: SpectrumWindow::Auto }
     }
 }
 
@@ -91,20 +73,20 @@ const LINES: Port<Table> = Port::new("lines", "spectral-lines", "lines that were
 pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "the fitted numbers with standard errors");
 
 impl Stage for Thermal {
+    const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "spectrum.thermal",
         version: 1,
         summary: "fits resonance, quality factor and noise levels to a thermal spectrum",
         inputs: &[DENSITY.spec()],
         outputs: &[FIT.spec(), LINES.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "P. Whittle, Ark. Mat. 2 (1953) 423; A. M. Sykulski et al., Biometrika 106 (2019) 251",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
-        if let Some(highest) = self.highest_hz {
-            let lowest = self.lowest_hz;
+        if let Some(highest) = self.fit.highest_hz {
+            let lowest = self.fit.lowest_hz;
             faults
                 .require(lowest < highest, || format!("`lowest_hz` is {lowest}, wanted below `highest_hz`, {highest}"));
         }
@@ -118,18 +100,12 @@ impl Stage for Thermal {
         let (f, p) = self.band(density.frequency_hz, density.density)?;
         let through = self.through(&density)?;
         let data = AveragedDensity { frequency_hz: f, density: p, averages: density.averages, through };
-        let settings = ThermalFitSettings {
-            lowest_hz: self.lowest_hz,
-            highest_hz: self.highest_hz.unwrap_or(f64::INFINITY),
-            line_false_alarm: self.line_false_alarm,
-            flicker: self.flicker,
-        };
-        let fit = thermal_fit(data, settings).map_err(StageError::from_error)?;
+        let fit = thermal_fit(data, self.fit).map_err(StageError::from_error)?;
         self.warn(&fit, f, data.averages, cx);
         Ok(Ports::new()
             .with(&FIT, fit_array(f, p, &fit, density.unit))
             .with(&LINES, lines_table(&fit))
-            .with(&SUMMARY, Document::new(&summary(&fit, density.signal_unit(), self.line_false_alarm))?))
+            .with(&SUMMARY, Document::new(&summary(&fit, density.signal_unit(), self.fit.line_false_alarm))?))
     }
 
     fn examples() -> Vec<Example> {
@@ -199,8 +175,7 @@ fn window_name(through: SeenThrough) -> &'static str {
 }
 
 fn estimate(fitted: Fitted, unit: &str) -> Value {
-    let known = |value: f64| value.is_finite().then_some(value);
-    json!({ "value": fitted.value, "std": known(fitted.std), "robust_std": known(fitted.robust_std), "unit": unit })
+    json!({ "value": fitted.value, "std": fitted.std, "robust_std": fitted.robust_std, "unit": unit })
 }
 
 fn summary(fit: &ThermalFit, signal: &str, false_alarm: f64) -> Value {
@@ -215,7 +190,7 @@ fn summary(fit: &ThermalFit, signal: &str, false_alarm: f64) -> Value {
         },
         "white": estimate(fit.white, &density),
         "flicker_at_1_hz": estimate(fit.flicker, &square),
-        "flicker_log_likelihood_gain": (fit.flicker_gain.is_finite()).then_some(0.5 * fit.flicker_gain),
+        "flicker_log_likelihood_gain": 0.5 * fit.flicker_gain,
         "lines": fit.lines.len(),
         "line_false_alarm": false_alarm,
         "window": window_name(fit.through),
@@ -235,9 +210,9 @@ fn fit_array(f: &[f64], p: &[f64], fit: &ThermalFit, unit: &str) -> Array {
 }
 
 fn lines_table(fit: &ThermalFit) -> Table {
-    let column = |of: fn(&afmid_kernels::spectra::FoundLine) -> f64| fit.lines.iter().map(of).collect::<Vec<f64>>();
-    Table::new()
-        .with("frequency_hz", "Hz", "highest bin of the line", column(|l| l.frequency_hz))
-        .with("ratio", "1", "density over the fitted one", column(|l| l.ratio))
-        .with("p_value", "1", "chance of such a bin without a line", column(|l| l.p_value))
+    Table::of(&fit.lines)
+        .with("frequency_hz", "Hz", "highest bin of the line", |l| l.frequency_hz)
+        .with("ratio", "1", "density over the fitted one", |l| l.ratio)
+        .with("p_value", "1", "chance of such a bin without a line", |l| l.p_value)
+        .table()
 }

@@ -1,8 +1,6 @@
 //! The stage `spectrum.welch`.
 
-use afmid_pipeline::{
-    Caching, Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError,
-};
+use afmid_pipeline::{Context, Document, Example, Faults, Port, Ports, Record, Recording, Spec, Stage, StageError};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -61,9 +59,8 @@ impl Stage for Welch {
         summary: "averages periodograms of free stretches into a density with its uncertainty",
         inputs: &[RECORDS.spec()],
         outputs: &[DENSITY.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {

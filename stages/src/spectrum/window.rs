@@ -1,6 +1,6 @@
 //! The stage `spectrum.window`.
 
-use afmid_pipeline::{Array, Caching, Context, Example, Port, Ports, Spec, Stage, StageError};
+use afmid_pipeline::{Array, Context, Example, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -50,9 +50,8 @@ impl Stage for Window {
         summary: "multiplies force and response by a Tukey, Hann or rectangular window",
         inputs: &[PAIR.spec()],
         outputs: &[WINDOWED.spec()],
-        caching: Caching::Stored,
-        seeded: false,
         source: "Stark et al., Rev. Sci. Instrum. 2005, Eq. 9; Harris, Proc. IEEE 66 (1978) 51",
+        ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {

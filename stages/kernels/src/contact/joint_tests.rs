@@ -15,7 +15,7 @@ use crate::simulate::LinearSystem;
 
 /// Shares that are not the simulator's.
 const WRONG_SHARES: [f64; 4] = [0.9664, 0.03, 0.0026, 0.001];
-const UNKNOWN: JointOptions = JointOptions { law: LawChoice::Auto, share_error: None };
+const UNKNOWN: JointOptions = JointOptions { law: LawChoice::Auto, tip_share_error: None };
 
 /// `weights (s - A)^-1 input` by Gaussian elimination.
 fn transfer(system: &LinearSystem, input: &[f64], weights: &[f64], s: c64) -> c64 {
@@ -153,7 +153,7 @@ fn standard_errors_hold_with_and_without_residues() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let full = [drawn(&exact[0], &mut rng), drawn(&exact[1], &mut rng)];
         let bare = [full[0].poles_only(), full[1].poles_only()];
-        let options = JointOptions { law: LawChoice::SpringDamper, share_error: None };
+        let options = JointOptions { law: LawChoice::SpringDamper, tip_share_error: None };
         let found = [joint(&bare, &options).unwrap(), joint(&full, &options).unwrap()];
         for (way, contact) in found.iter().enumerate() {
             let shares = contact.tip_shares.iter().zip(LOADED_BEAM_SHARES).map(|(s, t)| (s.value - t) / s.std);
@@ -212,7 +212,7 @@ fn a_force_that_comes_late_is_found_by_the_law_and_by_nothing_else() {
     let covariance = Mat::from_fn(8, 8, |i, j| if i == j { (1e-3 * poles[i / 2].re).powi(2) } else { 0.0 });
     let coupled = Ringing { poles, residues: None, covariance, real_poles: 0 };
     let free = Ringing::of_modes(&lever);
-    let options = |law| JointOptions { law, share_error: Some(0.0) };
+    let options = |law| JointOptions { law, tip_share_error: Some(0.0) };
     let plain = joint_contact(&lever, &free, &coupled, &options(LawChoice::SpringDamper)).unwrap();
     assert!(plain.p_value < 1e-6, "{plain:?}");
     let found = joint_contact(&lever, &free, &coupled, &options(LawChoice::Auto)).unwrap();
@@ -225,7 +225,7 @@ fn a_force_that_comes_late_is_found_by_the_law_and_by_nothing_else() {
     assert!((found.damping_n_s_per_m.value / apparent - 1.0).abs() < 0.01, "{found:?}");
     assert!(found.law_gain.unwrap() > 9.0);
     // shares cannot make up for it
-    let unknown = JointOptions { law: LawChoice::SpringDamper, share_error: None };
+    let unknown = JointOptions { law: LawChoice::SpringDamper, tip_share_error: None };
     assert!(joint_contact(&lever, &free, &coupled, &unknown).unwrap().p_value < 1e-6);
 }
 
@@ -268,7 +268,7 @@ fn given_shares_count_as_they_are_known() {
             &exact_lever(shares),
             &both[0],
             &both[1],
-            &JointOptions { law: LawChoice::SpringDamper, share_error },
+            &JointOptions { law: LawChoice::SpringDamper, tip_share_error: share_error },
         )
         .unwrap()
     };
@@ -282,7 +282,7 @@ fn given_shares_count_as_they_are_known() {
     // a relative error of k is the same relative error of the contact
     let mut lever = exact_lever(LOADED_BEAM_SHARES);
     lever.stiffness_n_per_m.std = 0.05 * lever.stiffness_n_per_m.value;
-    let options = JointOptions { law: LawChoice::SpringDamper, share_error: Some(0.0) };
+    let options = JointOptions { law: LawChoice::SpringDamper, tip_share_error: Some(0.0) };
     let found = joint_contact(&lever, &both[0], &both[1], &options).unwrap();
     assert!((found.budget.stiffness / (0.05 * found.stiffness_n_per_m.value) - 1.0).abs() < 1e-12);
     assert!(found.stiffness_n_per_m.std > found.budget.stiffness && found.correlation > 0.9, "{found:?}");
@@ -300,7 +300,7 @@ fn too_few_poles_and_broken_ringings_are_refused() {
     let refused = |free: &Ringing, coupled: &Ringing, options| joint(&[free.clone(), coupled.clone()], options).err();
     // four numbers for a contact and three shares; with what is known of these it works
     assert!(matches!(refused(&free, &two, &UNKNOWN), Some(ModelError::Degenerate(_))));
-    assert_eq!(refused(&free, &two, &JointOptions { share_error: Some(0.3), ..UNKNOWN }), None);
+    assert_eq!(refused(&free, &two, &JointOptions { tip_share_error: Some(0.3), ..UNKNOWN }), None);
     assert!(matches!(refused(&two, &all, &UNKNOWN), Some(ModelError::Parameter { .. })));
     let wide = Ringing { covariance: Mat::zeros(4, 4), ..all.clone() };
     assert!(matches!(refused(&free, &wide, &UNKNOWN), Some(ModelError::Parameter { .. })));

@@ -169,7 +169,7 @@ fn simulated_snap_ins_give_the_contact_within_its_errors() {
         sum += ((found.stiffness_n_per_m.value - TRUTH[0]) / found.stiffness_n_per_m.std).powi(2);
         // the same with tip shares that are not the lever's to start from
         let lever = exact_lever([0.9664, 0.03, 0.0026, 0.001]);
-        let options = JointOptions { law: LawChoice::Auto, share_error: None };
+        let options = JointOptions { law: LawChoice::Auto, tip_share_error: None };
         let found = joint_contact(&lever, &Ringing::of_modes(&lever), &Ringing::of(&fit, &fit.covariance), &options);
         let found = found.unwrap();
         assert!(found.stiffness_n_per_m.std < 0.4 && found.p_value > 1e-4, "{found:?}");

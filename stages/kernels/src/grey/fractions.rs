@@ -3,6 +3,10 @@
 use faer::c64;
 
 use super::point::Point;
+use crate::model::held_apart;
+
+/// Real poles closer than this share of themselves are held apart.
+const APART: f64 = 1e-4;
 
 /// A residue and its slopes by the point's values (but the delay).
 #[derive(Debug, Clone)]
@@ -28,7 +32,7 @@ pub(super) struct Fractions {
 
 impl Fractions {
     pub fn of(point: &Point) -> Self {
-        let (upper, decays) = (point.upper(), point.separated());
+        let (upper, decays) = (point.upper(), held_apart(&point.poles, APART));
         let upper_slopes: Vec<[c64; 2]> = point
             .modes
             .iter()

@@ -49,17 +49,11 @@ impl GreyKnown {
             GreyQuantity::QualityFactor(_) => 0.5,
             _ => 0.0,
         };
-        let (fine, found) = match self.knowledge {
-            Knowledge::Free => (true, 0.0),
-            Knowledge::Fixed(value) => (value > floor && value.is_finite(), value),
-            Knowledge::Between(least, most) => (least > floor && least < most && most.is_finite(), least),
-            Knowledge::About(value, std) => (value > floor && value.is_finite() && std > 0.0 && std.is_finite(), value),
-        };
-        if fine {
+        if self.knowledge.is_possible(floor) {
             return Ok(());
         }
         let wanted = "finite, frequencies above 0, a quality factor above 0.5, a delay of 0 or more, ascending bounds, a standard deviation above 0";
-        Err(ModelError::Parameter { name: "known", found, wanted })
+        Err(ModelError::Parameter { name: "known", found: self.knowledge.value(), wanted })
     }
 }
 

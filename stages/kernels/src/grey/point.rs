@@ -15,9 +15,6 @@ pub(super) struct Point {
     pub delay: f64,
 }
 
-/// Real poles closer than this share of themselves are held apart: residues of coinciding ones grow without bound.
-const APART: f64 = 1e-4;
-
 impl Point {
     /// Per mode ln w, ln Q; ln p; delay.
     pub fn values(&self) -> Vec<f64> {
@@ -47,18 +44,5 @@ impl Point {
     /// Upper poles of the modes, per sample.
     pub fn upper(&self) -> Vec<c64> {
         self.modes.iter().map(|[w, q]| pole_of(*w, *q)).collect()
-    }
-
-    /// Decays of the real poles, no two alike.
-    pub fn separated(&self) -> Vec<f64> {
-        let mut poles: Vec<f64> = Vec::with_capacity(self.poles.len());
-        for &pole in &self.poles {
-            let mut own = pole;
-            while poles.iter().any(|p| (p - own).abs() < APART * own) {
-                own *= 1.0 + 2.0 * APART;
-            }
-            poles.push(own);
-        }
-        poles
     }
 }

@@ -10,6 +10,7 @@ pub use error::ModelError;
 pub(crate) use error::finite;
 pub(crate) use innovations::kalman_gains;
 pub use innovations::{InnovationsModel, InputGains, Section};
+pub use parametrisation::held_apart;
 pub(crate) use parametrisation::{
     Coefficients, LIMIT, coordinates, roots, section_order, sections, sections_of_roots, slopes,
 };

@@ -100,6 +100,19 @@ pub(crate) fn roots(coefficients: Coefficients, order: usize) -> Vec<c64> {
     vec![c64::new(large, 0.0), c64::new(small, 0.0)]
 }
 
+/// Decays of real poles, held apart by a share of themselves: residues of coinciding ones grow without bound.
+pub fn held_apart(decays: &[f64], share: f64) -> Vec<f64> {
+    let mut apart: Vec<f64> = Vec::with_capacity(decays.len());
+    for &decay in decays {
+        let mut own = decay;
+        while apart.iter().any(|other| (other - own).abs() < share * own) {
+            own *= 1.0 + 2.0 * share;
+        }
+        apart.push(own);
+    }
+    apart
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

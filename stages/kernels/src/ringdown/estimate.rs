@@ -15,6 +15,12 @@ pub struct Estimate {
     pub std: f64,
 }
 
+impl From<Estimate> for (f64, f64) {
+    fn from(estimate: Estimate) -> Self {
+        (estimate.value, estimate.std)
+    }
+}
+
 /// One mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModeEstimate {

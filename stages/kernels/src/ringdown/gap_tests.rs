@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::compressed::whiten;
+use super::knowledge_tests::numbers;
 use super::noise::RingdownNoise;
 use super::tests::{INTERVAL_S, coloured, dense_factor, noise};
 use super::whitener::Whitener;
@@ -50,11 +51,6 @@ fn fitted(events: &[Vec<f64>], missing: &[Vec<Range<usize>>], noise: NoiseSource
     let borrowed: Vec<&[f64]> = events.iter().map(Vec::as_slice).collect();
     let options = RingdownOptions { noise, missing: missing.to_vec(), ..RingdownOptions::default() };
     fit_ringdowns(&borrowed, &[], INTERVAL_S, &options).unwrap()
-}
-
-/// Frequencies and quality factors in turn: values and standard errors.
-fn numbers(fit: &Ringdown) -> Vec<(f64, f64)> {
-    fit.modes().iter().flat_map(|m| [m.frequency_hz, m.quality_factor]).map(|e| (e.value, e.std)).collect()
 }
 
 fn truth() -> Vec<f64> {

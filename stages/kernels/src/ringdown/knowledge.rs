@@ -69,9 +69,16 @@ impl Knowledge {
         }
     }
 
-    fn is_possible(self, quantity: Quantity) -> bool {
-        // an oscillation has Q above 1/2
-        let floor = if matches!(quantity, Quantity::QualityFactor(_)) { 0.5 } else { 0.0 };
+    /// The number that it is about.
+    pub(crate) fn value(self) -> f64 {
+        match self {
+            Self::Free => f64::NAN,
+            Self::Fixed(value) | Self::Between(value, _) | Self::About(value, _) => value,
+        }
+    }
+
+    /// Whether it says something of a number above `floor`.
+    pub(crate) fn is_possible(self, floor: f64) -> bool {
         match self {
             Self::Free => true,
             Self::Fixed(value) => value > floor && value.is_finite(),
@@ -81,20 +88,26 @@ impl Knowledge {
     }
 }
 
+impl Known {
+    /// Errors: a number that cannot be.
+    pub fn check(&self) -> Result<(), ModelError> {
+        // an oscillation has Q above 1/2
+        let floor = if matches!(self.quantity, Quantity::QualityFactor(_)) { 0.5 } else { 0.0 };
+        if self.knowledge.is_possible(floor) {
+            return Ok(());
+        }
+        let wanted = "finite, above 0 (a quality factor above 0.5), ascending bounds, a standard deviation above 0";
+        Err(ModelError::Parameter { name: "known", found: self.knowledge.value(), wanted })
+    }
+}
+
 /// Errors: numbers that cannot be, two entries for one quantity.
 pub(super) fn check(known: &[Known]) -> Result<(), ModelError> {
     for (i, entry) in known.iter().enumerate() {
         if known[..i].iter().any(|other| other.quantity == entry.quantity) {
             return Err(ModelError::Parameter { name: "known", found: i as f64, wanted: "one entry per quantity" });
         }
-        if !entry.knowledge.is_possible(entry.quantity) {
-            let found = match entry.knowledge {
-                Knowledge::Free => f64::NAN,
-                Knowledge::Fixed(value) | Knowledge::Between(value, _) | Knowledge::About(value, _) => value,
-            };
-            let wanted = "finite, above 0 (a quality factor above 0.5), ascending bounds, a standard deviation above 0";
-            return Err(ModelError::Parameter { name: "known", found, wanted });
-        }
+        entry.check()?;
     }
     Ok(())
 }

@@ -26,7 +26,7 @@ fn fitted(seed: u64, known: Vec<Known>) -> Ringdown {
 }
 
 /// Frequencies and quality factors in turn: values and standard errors.
-fn numbers(fit: &Ringdown) -> Vec<(f64, f64)> {
+pub(super) fn numbers(fit: &Ringdown) -> Vec<(f64, f64)> {
     fit.modes().iter().flat_map(|m| [m.frequency_hz, m.quality_factor]).map(|e| (e.value, e.std)).collect()
 }
 

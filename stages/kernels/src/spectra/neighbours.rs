@@ -1,16 +1,21 @@
 //! Which bins a local model is fitted to.
 
 use rustfft::num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::error::positive;
 use crate::spectra::error::SpectrumError;
 
 /// A line that does not belong to the transfer function: its bins are filled in from their neighbours.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct SuppressedLine {
-    /// Centre.
+    /// Centre in Hz.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub frequency_hz: f64,
-    /// Half of the width that is left out.
+    /// Half of the width that is left out, in Hz.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub half_width_hz: f64,
 }
 

@@ -1,11 +1,10 @@
 //! The empirical transfer function estimate.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 use rustfft::num_complex::Complex64;
 
+use super::Intersample;
 use super::error::{finite, positive};
 use crate::spectra::error::SpectrumError;
 use crate::spectra::fourier::{bin_frequencies, transform};
@@ -18,17 +17,6 @@ pub enum EndTreatment {
     /// First differences of both, from [`difference`]: the step has become a pulse, and the jump from the end of the
     /// window to its start is never seen.
     Differenced,
-}
-
-/// What the input does between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Intersample {
-    /// It is held until the next sample, as a force that is released at a sample is. The ratio of the transforms then
-    /// lags by half a sample and droops by `sin(x) / x`, `x = pi f / f_s`; both are taken out.
-    Held,
-    /// Nothing is corrected: the transfer function from sequence to sequence.
-    Sampled,
 }
 
 /// Settings of the estimate.
@@ -131,10 +119,7 @@ pub fn etfe(
         }
         let step = 1.0 - Complex64::from_polar(1.0, -TAU * k as f64 / n as f64);
         let coloured = if differenced { phi * (step.norm_sqr() + 2.0 / n as f64) } else { phi };
-        let between = match settings.intersample {
-            Intersample::Held if k > 0 => Complex64::new(0.0, TAU * k as f64 / n as f64) / step,
-            _ => Complex64::new(1.0, 0.0),
-        };
+        let between = settings.intersample.correction(k as f64, 1.0 / n as f64);
         result.transfer.push(y[k] / u[k] * between / gain); // Eq. 7
         result.variance.push(coloured / power * between.norm_sqr() / (gain * gain)); // Eq. 10
     }

@@ -42,7 +42,12 @@ pub fn thermal_peak(spectrum: AveragedDensity<'_>, search: PeakSearch) -> Result
     let cut = AveragedDensity { frequency_hz: &f[from..to], density: &spectrum.density[from..to], ..spectrum };
     thermal_fit(
         cut,
-        ThermalFitSettings { lowest_hz, highest_hz, line_false_alarm: LINE_FALSE_ALARM, flicker: Presence::Auto },
+        ThermalFitSettings {
+            lowest_hz,
+            highest_hz: Some(highest_hz),
+            line_false_alarm: LINE_FALSE_ALARM,
+            flicker: Presence::Auto,
+        },
     )
 }
 

@@ -2,6 +2,7 @@
 
 use faer::c64;
 
+use afmid_kernels::model::held_apart;
 use afmid_kernels::ringdown::Exponential;
 
 /// One mode of the baseline.
@@ -27,7 +28,7 @@ pub struct Lever {
     pub poles: Vec<f64>,
 }
 
-/// Poles closer than this share of themselves are held apart: residues of coinciding ones grow without bound.
+/// Poles closer than this share of themselves are held apart.
 const APART: f64 = 1e-5;
 
 impl Lever {
@@ -59,7 +60,7 @@ impl Lever {
 
     /// What is left after the release of a unit load that pulled the signal to -1: `y(t) = sum Re(rho exp(s t))`.
     pub fn release(&self) -> Vec<Exponential> {
-        let poles = self.separated();
+        let poles = held_apart(&self.poles, APART);
         let mut out = Vec::with_capacity(self.modes.len() + poles.len());
         for mode in &self.modes {
             let s = mode.pole();
@@ -99,18 +100,6 @@ impl Lever {
     pub fn scaled(&self, change: f64) -> Self {
         let modes = self.modes.iter().map(|m| LeverMode { omega: m.omega * (1.0 + change), ..*m }).collect();
         Self { modes, poles: self.poles.clone() }
-    }
-
-    fn separated(&self) -> Vec<f64> {
-        let mut poles: Vec<f64> = Vec::with_capacity(self.poles.len());
-        for &pole in &self.poles {
-            let mut own = pole;
-            while poles.iter().any(|p| (p - own).abs() < APART * own) {
-                own *= 1.0 + 2.0 * APART;
-            }
-            poles.push(own);
-        }
-        poles
     }
 }
 

@@ -1,18 +1,18 @@
-//! Which column is meant.
+//! Which channel is meant.
 
 use afmid_pipeline::StageError;
+use afmid_pipeline::recording::{Contents, FoundChannel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::table::{ColumnTable, NamedColumn};
-
-/// A column: its number from 1, or its name in the header (of a MATLAB matrix `x`: `x:1`, `x:2`).
+/// A channel: its number from 1 as `afmid inspect` lists them, or its name in the file (`force`, `/data/force`,
+/// `x[2]`). A time axis that gives the sample rate is no channel.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "wanted a column: its number, from 1, or its name")]
+#[serde(untagged, expecting = "wanted a channel: its number, from 1, or its name")]
 pub enum Column {
     /// From 1.
     Number(usize),
-    /// In the header.
+    /// In the file.
     Name(String),
 }
 
@@ -29,56 +29,54 @@ impl Column {
     /// Errors: a number 0, an empty name.
     pub(super) fn check(&self, parameter: &str) -> Result<(), StageError> {
         match self {
-            Self::Number(0) => Err(StageError::new(format!("`{parameter}` is 0; columns are numbered from 1"))),
+            Self::Number(0) => Err(StageError::new(format!("`{parameter}` is 0; channels are numbered from 1"))),
             Self::Name(name) if name.is_empty() => {
-                Err(StageError::new(format!("`{parameter}` is empty, wanted a column's number or name")))
+                Err(StageError::new(format!("`{parameter}` is empty, wanted a channel's number or name")))
             }
             _ => Ok(()),
         }
     }
 
-    /// This column of a table. Errors: there is none, two have the name, or it holds text.
-    pub(super) fn of<'a>(&self, table: &'a ColumnTable) -> Result<&'a NamedColumn, StageError> {
-        let found = match self {
-            Self::Number(number) => number.checked_sub(1).and_then(|index| table.columns.get(index)),
-            Self::Name(name) => {
-                let mut same = table.columns.iter().filter(|column| column.name == *name);
-                let first = same.next();
-                if same.next().is_some() {
-                    return Err(StageError::new(format!("two columns have the name {self}; wanted one"))
-                        .help("name the column by its number"));
-                }
-                first
-            }
+    /// This channel of a file, if it has it. Errors: two have the name.
+    pub(super) fn find<'a>(&self, contents: &'a Contents) -> Result<Option<&'a FoundChannel>, StageError> {
+        let name = match self {
+            Self::Number(number) => return Ok(number.checked_sub(1).and_then(|index| contents.channels.get(index))),
+            Self::Name(name) => name,
         };
-        let column =
-            found.ok_or_else(|| StageError::new(format!("there is no column {self}; there is: {}", listing(table))))?;
-        match &column.text {
-            Some(text) => Err(StageError::new(format!(
-                "column {self} holds `{}` in line {}, wanted numbers",
-                text.found, text.line
-            ))
-            .help("`NaN`, `NA`, `null` and empty entries count as missing")),
-            None => Ok(column),
+        let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
+        let located = contents.channels.iter().find(|channel| bare(&channel.location) == bare(name));
+        if located.is_some() {
+            return Ok(located);
         }
+        let mut titled = contents.channels.iter().filter(|channel| channel.long_name == *name);
+        match (titled.next(), titled.next()) {
+            (Some(one), Some(other)) => {
+                let problem = format!("{} and {} are both titled {self}; wanted one", one.location, other.location);
+                Err(StageError::new(problem).help("name the channel by its number or location"))
+            }
+            (found, _) => Ok(found),
+        }
+    }
+
+    /// The same where it has to be there. Errors: there is none, or two have the name.
+    pub(super) fn of<'a>(&self, contents: &'a Contents) -> Result<&'a FoundChannel, StageError> {
+        self.find(contents)?.ok_or_else(|| {
+            let error = StageError::new(format!("there is no channel {self}; there is: {}", listing(contents)));
+            match contents.remarks.is_empty() {
+                true => error,
+                false => error.help(contents.remarks.join("; ")),
+            }
+        })
     }
 }
 
-/// The columns by number and name, the first forty.
-fn listing(table: &ColumnTable) -> String {
+/// The channels by number and location, the first forty.
+fn listing(contents: &Contents) -> String {
     const MOST: usize = 40;
-    let mut names: Vec<String> = table
-        .columns
-        .iter()
-        .enumerate()
-        .take(MOST)
-        .map(|(i, c)| if c.name.is_empty() { format!("{}", i + 1) } else { format!("{} `{}`", i + 1, c.name) })
-        .collect();
-    if table.columns.len() > MOST {
-        names.push(format!("{} more", table.columns.len() - MOST));
+    let numbered = contents.channels.iter().enumerate().take(MOST);
+    let mut names: Vec<String> = numbered.map(|(i, channel)| format!("{} `{}`", i + 1, channel.location)).collect();
+    if contents.channels.len() > MOST {
+        names.push(format!("{} more", contents.channels.len() - MOST));
     }
-    if !table.others.is_empty() {
-        names.push(format!("not readable as columns: {}", table.others.join(", ")));
-    }
-    names.join(", ")
+    if names.is_empty() { "none at all".to_owned() } else { names.join(", ") }
 }

@@ -1,65 +1,76 @@
 //! From a table's columns to inputs, output and their stretches.
 
+use afmid_pipeline::recording::{FoundChannel, WholeFile, agreed_rate};
 use afmid_pipeline::{Array, Axis, Document, StageError};
 use serde_json::{Value, json};
 
+use super::selection::Column;
 use super::stage::Columns;
 use super::stretch::{Stretch, Trend, halves};
-use super::table::ColumnTable;
 use crate::artifacts::{DataSet, NewPair, PairSet};
 
-/// Inputs and output as the file has them, NaN where missing.
+/// Inputs and output in their units, NaN where missing.
 pub(super) struct Series {
     inputs: Vec<Vec<f64>>,
     output: Vec<f64>,
+    input_unit: String,
+    output_unit: String,
     rate: f64,
     identification: Stretch,
     verification: Stretch,
 }
 
-/// Largest departure of a time column from equal spacing, in intervals.
+/// Largest departure of a channel of times from equal spacing, in intervals.
 const UNEQUAL: f64 = 0.01;
 
 impl Series {
-    /// Picks the columns. Errors: see the stage.
-    pub fn new(wanted: &Columns, table: &ColumnTable) -> Result<Self, StageError> {
-        let values = |column: &super::Column| -> Result<Vec<f64>, StageError> {
-            let mut values = column.of(table)?.values.clone();
-            values.iter_mut().filter(|value| wanted.missing.contains(value)).for_each(|value| *value = f64::NAN);
-            Ok(values)
+    /// Reads the channels. Errors: see the stage.
+    pub fn new(wanted: &Columns, file: &WholeFile) -> Result<Self, StageError> {
+        let channels = Channels::find(wanted, file)?;
+        let rate = channels.rate(wanted, file)?;
+        let values = |channel: &FoundChannel, scale: f64| -> Result<Vec<f64>, StageError> {
+            let value = |value: f64| if wanted.missing.contains(&value) { f64::NAN } else { value * scale };
+            Ok(file.read(channel)?.into_iter().map(value).collect())
         };
-        let inputs: Vec<Vec<f64>> = wanted.inputs.iter().map(values).collect::<Result<_, _>>()?;
-        let output = values(&wanted.output)?;
+        let inputs: Vec<Vec<f64>> =
+            channels.inputs.iter().map(|channel| values(channel, wanted.input_scale)).collect::<Result<_, _>>()?;
+        let output = values(channels.output, wanted.output_scale)?;
         let samples = output.len();
-        for (column, input) in wanted.inputs.iter().zip(&inputs) {
+        for (channel, input) in channels.inputs.iter().zip(&inputs) {
+            let name = &channel.location;
             if input.len() != samples {
                 return Err(StageError::new(format!(
-                    "input column {column} has {} samples, the output {samples}; wanted as many",
-                    input.len()
+                    "input {name} has {} samples, the output {} has {samples}; wanted as many",
+                    input.len(),
+                    channels.output.location
                 )));
             }
             if let Some(k) = input.iter().position(|value| !value.is_finite()) {
                 return Err(StageError::new(format!(
-                    "input column {column} misses sample {k}: the response to an unknown input is unknown"
+                    "input {name} misses sample {k}: the response to an unknown input is unknown"
                 ))
                 .help("choose stretches without gaps in the input and cut the file to them"));
             }
         }
         if output.iter().all(|value| !value.is_finite()) {
-            return Err(StageError::new(format!("output column {} has no value at all", wanted.output)));
+            return Err(StageError::new(format!("output {} has no value at all", channels.output.location)));
         }
         let (first, second) = halves(samples);
-        let stretch = |given: Option<[usize; 2]>, default: Stretch, name: &str| match given {
-            None => Ok(default),
-            Some([first, end]) if end <= samples => Ok(Stretch { first, end }),
-            Some([first, end]) => {
-                Err(StageError::new(format!("`{name}` is [{first}, {end}], the record has {samples} samples")))
+        let stretch = |given: Option<[usize; 2]>, default: Stretch, name: &str| {
+            let stretch = given.map_or(default, |[first, end]| Stretch { first, end });
+            if stretch.end > samples {
+                let Stretch { first, end } = stretch;
+                let problem = format!("`{name}` is [{first}, {end}], the record has {samples} samples");
+                return Err(StageError::new(problem));
             }
+            channels.uninterrupted(stretch, name)
         };
         Ok(Self {
             identification: stretch(wanted.identification, first, "identification")?,
             verification: stretch(wanted.verification, second, "verification")?,
-            rate: rate(wanted, table)?,
+            input_unit: unit(&channels.inputs, wanted.input_unit.as_deref(), wanted.input_scale, "input")?,
+            output_unit: unit(&[channels.output], wanted.output_unit.as_deref(), wanted.output_scale, "output")?,
+            rate,
             inputs,
             output,
         })
@@ -89,7 +100,7 @@ impl Series {
                 force: inputs.iter().flat_map(|input| stretch.of(input).to_vec()).collect(),
                 standard_error: None,
                 newtons_per_volt: None,
-                labels: [("output", &wanted.output_unit), ("input", &wanted.input_unit)],
+                labels: [("output", &self.output_unit), ("input", &self.input_unit)],
             };
             pair = of_set.add(pair);
         }
@@ -125,8 +136,8 @@ impl Series {
             "verification": part(self.verification),
             "removed": {
                 "what": wanted.remove,
-                "inputs": trends.iter().map(|trend| taken(trend, &wanted.input_unit)).collect::<Vec<Value>>(),
-                "output": taken(&level, &wanted.output_unit),
+                "inputs": trends.iter().map(|trend| taken(trend, &self.input_unit)).collect::<Vec<Value>>(),
+                "output": taken(&level, &self.output_unit),
             },
         }))
     }
@@ -152,21 +163,77 @@ impl Series {
     }
 }
 
-fn rate(wanted: &Columns, table: &ColumnTable) -> Result<f64, StageError> {
-    if let Some(rate) = wanted.sample_rate_hz {
-        return Ok(rate);
+/// The channels that are meant.
+struct Channels<'a> {
+    inputs: Vec<&'a FoundChannel>,
+    output: &'a FoundChannel,
+}
+
+impl<'a> Channels<'a> {
+    fn find(wanted: &Columns, file: &'a WholeFile) -> Result<Self, StageError> {
+        let contents = file.contents();
+        let inputs = wanted.inputs.iter().map(|column| column.of(contents)).collect::<Result<_, _>>()?;
+        Ok(Self { inputs, output: wanted.output.of(contents)? })
     }
-    if let Some(column) = &wanted.time {
-        return equal_spacing(&column.of(table)?.values).ok_or_else(|| {
-            StageError::new(format!(
-                "the times in column {column} are not equally spaced, ascending and complete to 1 %"
+
+    /// The one rate that all state, or that the user gives. Errors: none, or several.
+    fn rate(&self, wanted: &Columns, file: &WholeFile) -> Result<f64, StageError> {
+        let stated = self.inputs.iter().chain([&self.output]).map(|channel| (channel, channel.sample_rate_hz));
+        let stated: Vec<(&&FoundChannel, f64)> =
+            stated.filter_map(|(channel, rate)| rate.map(|rate| (channel, rate))).collect();
+        let first = stated.first().map(|(_, rate)| *rate);
+        for (channel, rate) in &stated {
+            agreed_rate(Some(*rate), first, &channel.location)?;
+        }
+        if let (None, None, Some(column)) = (first, wanted.sample_rate_hz, &wanted.time) {
+            return spaced_equally(column, file);
+        }
+        agreed_rate(first, wanted.sample_rate_hz, &self.output.location).map_err(|error| match first {
+            Some(_) => error,
+            None => error.help("give `sample_rate_hz` (1 for cycles per sample) or the channel `time`"),
+        })
+    }
+
+    /// A stretch, if no channel was interrupted within it.
+    fn uninterrupted(&self, stretch: Stretch, name: &str) -> Result<Stretch, StageError> {
+        let within = |channel: &&FoundChannel| {
+            channel.gaps.iter().copied().find(|gap| *gap > stretch.first && *gap < stretch.end)
+        };
+        match self.inputs.iter().chain([&self.output]).find_map(within) {
+            None => Ok(stretch),
+            Some(gap) => Err(StageError::new(format!(
+                "the recording was interrupted before sample {gap}, within `{name}` from {} to {}",
+                stretch.first, stretch.end
             ))
-            .help("resample the record, or give `sample_rate_hz` if the column is only a coarse clock")
-        });
+            .help("give `identification` and `verification` on one side of it each")),
+        }
     }
-    table.interval_s.map(|interval| 1.0 / interval).ok_or_else(|| {
-        StageError::new("the sample rate is not known: the file does not state it")
-            .help("give `sample_rate_hz` (1 for cycles per sample) or the column `time`")
+}
+
+/// The unit of channels, with what the user says of it. Errors: they state several; the user states another; they are
+/// scaled to nobody knows what.
+fn unit(channels: &[&FoundChannel], given: Option<&str>, scale: f64, what: &str) -> Result<String, StageError> {
+    let scaled = scale != 1.0;
+    match (given, channels.first().map_or("", |channel| &channel.unit)) {
+        (Some(given), _) if scaled => Ok(given.to_owned()),
+        (None, _) if scaled => Err(StageError::new(format!("`{what}_scale` is {scale} and `{what}_unit` is missing"))
+            .help(format!("say what the scaled values are in: {what}_unit = \"N\""))),
+        (given, stated) => match channels.iter().find(|channel| given.unwrap_or(stated) != channel.unit) {
+            Some(other) if !other.unit.is_empty() => {
+                let wanted = given.unwrap_or(stated);
+                Err(StageError::new(format!("{} is in {}, wanted {wanted}", other.location, other.unit))
+                    .help(format!("leave `{what}_unit` out, or convert with `{what}_scale`")))
+            }
+            _ => Ok(Some(given.unwrap_or(stated)).filter(|unit| !unit.is_empty()).unwrap_or("1").to_owned()),
+        },
+    }
+}
+
+/// The rate of a channel of times. Errors: there is none; they are not equally spaced.
+fn spaced_equally(column: &Column, file: &WholeFile) -> Result<f64, StageError> {
+    equal_spacing(&file.read(column.of(file.contents())?)?).ok_or_else(|| {
+        StageError::new(format!("the times in channel {column} are not equally spaced, ascending and complete to 1 %"))
+            .help("resample the record, or give `sample_rate_hz` if they are only a coarse clock")
     })
 }
 

@@ -2,25 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::{
-    Array, Caching, Context, Document, Example, Faults, InputFiles, Port, Ports, Spec, Stage, StageError,
-};
+use afmid_pipeline::recording::{RawBinary, Reading, WholeFile};
+use afmid_pipeline::{Array, Context, Document, Example, Faults, InputFiles, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::selection::Column;
 use super::series::Series;
 use super::stretch::Removal;
-use super::table::read_columns;
-use super::text::Separator;
 use crate::io::shared_data::moved;
 
-/// Reads measured input and output from the columns of a file, and splits them into a stretch to fit and one to judge
+/// Reads measured input and output from the channels of a file, and splits them into a stretch to fit and one to judge
 /// on.
 ///
 /// # Model
-/// Equally sampled inputs u and one output y, in columns of a CSV, DAT, LVM or other text file, or variables of a
-/// MATLAB file (version 5 to 7).
+/// Equally sampled inputs u and one output y, channels of a file of any format that `io.records` opens: columns of a
+/// table, variables of a MATLAB file, datasets, channels of an oscilloscope or recorder (docs/archives.md).
 /// # Method
 /// Two stretches of time, identification and verification. Mean or line are taken off with the constants of the
 /// identification stretch alone, also from the other, which so stays unseen. Missing samples (empty, NaN, the given
@@ -29,33 +26,36 @@ use crate::io::shared_data::moved;
 /// `response`, `force` over `time`, the whole record; the same with `_identification` and `_verification` over axes of
 /// their own, which may differ in length. With several inputs `force` is over (`input`, time).
 /// # Units
-/// Those given; no conversion.
+/// Those of the file, times `input_scale` and `output_scale`.
 /// # Accuracy
 /// Numbers as in the file; 64-bit integers beyond 2^53 are rounded.
 /// # Errors
-/// A file that is no table or damaged, MATLAB 7.3; a column that is not there or holds text; no sample rate, a time
-/// column that is not equally spaced; stretches beyond the record; missing inputs; an output that is missing
+/// A file of no format or damaged; a channel that is not there; no sample rate, two that differ, times that are not
+/// equally spaced; stretches beyond the record or across an interruption; missing inputs; an output that is missing
 /// altogether.
 /// # Source
-/// L. Ljung, System Identification, 1999, sections 14.1 and 16.5; MathWorks, MAT-File Format, Level 5.
+/// L. Ljung, System Identification, 1999, sections 14.1 and 16.5; docs/archives.md for the formats.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Columns {
-    /// The file, relative to the config file; `.mat` is MATLAB, anything else text. A path that begins with
-    /// `../../shared/data/` begins at the variable `AFMID_DATA` where that is set. Required.
+    /// The file, relative to the config file. A path that begins with `../../shared/data/` begins at the variable
+    /// `AFMID_DATA` where that is set. Required.
     pub file: String,
-    /// Columns of the inputs, each a number from 1 or a name, at least one. Default: the first column.
+    /// Channels of the inputs, at least one. Default: the first.
     pub inputs: Vec<Column>,
-    /// Column of the output. Default: the second.
+    /// Channel of the output. Default: the second.
     pub output: Column,
-    /// Sample rate in Hz. Absent: from `time`, or an LVM header. Where it is not known, 1 makes frequencies cycles per
-    /// sample.
+    /// The file's format, as for `io.records`.
+    pub format: String,
+    /// What is in a file without a header, as for `io.records`.
+    pub raw: Option<RawBinary>,
+    /// Sample rate in Hz, of a file that states none. Absent: the file's, or from `time`. Where it is not known, 1
+    /// makes frequencies cycles per sample.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sample_rate_hz: Option<f64>,
-    /// Column of the time in seconds, for the sample rate; equally spaced to 1 %.
+    /// Channel of the time in seconds, for the sample rate; equally spaced to 1 %. For files whose time axis is not
+    /// titled as one.
     pub time: Option<Column>,
-    /// What separates columns of a text file: `auto`, `comma`, `semicolon`, `tab`, `whitespace`.
-    pub separator: Separator,
     /// Stretch to fit, as first sample (from 0) and one past the last. Absent: the first half.
     pub identification: Option<[usize; 2]>,
     /// Stretch to judge on. Absent: the second half.
@@ -65,10 +65,16 @@ pub struct Columns {
     pub remove: Removal,
     /// Values that stand for no value, such as -9999.
     pub missing: Vec<f64>,
-    /// Unit of the inputs.
-    pub input_unit: String,
-    /// Unit of the output.
-    pub output_unit: String,
+    /// Factor of the inputs: a sensitivity. The unit is then `input_unit`.
+    #[schemars(extend("not" = { "const": 0.0 }))]
+    pub input_scale: f64,
+    /// Factor of the output. The unit is then `output_unit`.
+    #[schemars(extend("not" = { "const": 0.0 }))]
+    pub output_scale: f64,
+    /// Unit of the inputs, where the file states none or they are scaled. Absent: 1.
+    pub input_unit: Option<String>,
+    /// Unit of the output, likewise.
+    pub output_unit: Option<String>,
 }
 
 impl Default for Columns {
@@ -77,15 +83,18 @@ impl Default for Columns {
             file: String::new(),
             inputs: vec![Column::Number(1)],
             output: Column::Number(2),
+            format: "auto".to_owned(),
+            raw: None,
             sample_rate_hz: None,
             time: None,
-            separator: Separator::Auto,
             identification: None,
             verification: None,
             remove: Removal::Mean,
             missing: Vec::new(),
-            input_unit: "1".to_owned(),
-            output_unit: "1".to_owned(),
+            input_scale: 1.0,
+            output_scale: 1.0,
+            input_unit: None,
+            output_unit: None,
         }
     }
 }
@@ -98,23 +107,27 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Columns {
     const SPEC: Spec = Spec {
         name: "io.columns",
-        version: 1,
-        summary: "reads measured input and output from columns of text or MATLAB files",
+        version: 2,
+        summary: "reads measured input and output from the channels of a file of any format",
         inputs: &[],
         outputs: &[PAIR.spec(), SUMMARY.spec()],
-        caching: Caching::Stored,
-        seeded: false,
-        source: "L. Ljung, System Identification, 1999; MathWorks, MAT-File Format, Level 5",
+        source: "L. Ljung, System Identification, 1999, sections 14.1 and 16.5",
+        ..Spec::STORED
     };
 
     fn check(&self, faults: &mut Faults) {
         faults.require(!self.file.is_empty(), || {
             "`file` is empty, wanted a file such as \"data/flutter.dat\"".to_owned()
         });
-        faults.require(!self.inputs.is_empty(), || "`inputs` is empty, wanted at least one column".to_owned());
+        faults.require(!self.inputs.is_empty(), || "`inputs` is empty, wanted at least one channel".to_owned());
         self.inputs.iter().for_each(|column| faults.take(column.check("inputs")));
         faults.take(self.output.check("output"));
         self.time.iter().for_each(|column| faults.take(column.check("time")));
+        faults.take(Reading::of(&self.format, self.raw.clone()).check());
+        for (name, scale) in [("input_scale", self.input_scale), ("output_scale", self.output_scale)] {
+            faults
+                .require(scale != 0.0 && scale.is_finite(), || format!("`{name}` is {scale}, wanted any other number"));
+        }
         for (name, stretch) in [("identification", self.identification), ("verification", self.verification)] {
             if let Some([first, end]) = stretch {
                 faults.require(first < end, || {
@@ -138,12 +151,8 @@ impl Stage for Columns {
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let path = self.path(cx.base());
-        let place = |error: String| StageError::new(format!("{}: {error}", path.display()));
-        let bytes = cx.files().read(&path)?;
-        let table = read_columns(&self.file, &bytes, self.separator).map_err(|error| place(error.to_string()))?;
-        drop(bytes);
-        let series = Series::new(self, &table)?;
-        drop(table);
+        let file = WholeFile::open(cx.files(), &path, &Reading::of(&self.format, self.raw.clone()))?;
+        let series = Series::new(self, &file).map_err(|error| error.at(&path))?;
         let (pair, summary) = series.split(self)?;
         series.warnings().into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new().with(&PAIR, pair).with(&SUMMARY, summary))

@@ -1,173 +1,13 @@
-//! Tables as people write them, real files of other programs, damage, and the split.
+//! The channels of files of several formats, and the split.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
 use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Context, InputFiles, Ports, Stage};
 
 use super::stage::{PAIR, SUMMARY};
 use super::*;
-
-fn text(content: &str) -> ColumnTable {
-    read_text(content.as_bytes(), Separator::Auto).unwrap()
-}
-
-fn values(table: &ColumnTable) -> Vec<Vec<f64>> {
-    table.columns.iter().map(|column| column.values.clone()).collect()
-}
-
-#[test]
-fn every_usual_way_to_write_columns_gives_the_same_numbers() {
-    let wanted = vec![vec![0.5, 1.5], vec![-2e-3, 3.0]];
-    for written in [
-        "0.5 -2e-3\n1.5 3\n",
-        "  0.5\t -2.0000e-03\t\r\n  1.5\t3\r\n",
-        "# made by hand\nu, y\n0.5, -2e-3\n\n1.5, 3\n",
-        "u;y\n0,5;-2e-3\n1,5;3\n",
-        "0,5 -2e-3\n1,5 3\n",
-        "\u{feff}\"u\",\"y\"\n\"0.5\",\"-0.002\"\n\"1.5\",\"3\"",
-        "force (N)\tresponse (V)\n0.5\t-2e-3\n1.5\t3\n",
-    ] {
-        assert_eq!(values(&text(written)), wanted, "{written:?}");
-    }
-    let named = text("force (N)\tresponse (V)\n0.5\t-2e-3\n");
-    assert_eq!(named.columns[1].name, "response (V)");
-}
-
-#[test]
-fn missing_entries_are_nan_and_text_is_named_only_where_it_is_wanted() {
-    let table = text("t,u,y,remark\n0,1,,ok\n1,NaN,5,\n2,3,6,lost\n");
-    assert!(table.columns[2].values[0].is_nan() && table.columns[1].values[1].is_nan());
-    assert!(Column::Name("y".to_owned()).of(&table).is_ok());
-    let error = Column::Number(4).of(&table).unwrap_err().to_string();
-    assert!(error.contains("`ok` in line 2"), "{error}");
-    let error = Column::Name("z".to_owned()).of(&table).unwrap_err().to_string();
-    assert!(error.contains("1 `t`, 2 `u`, 3 `y`, 4 `remark`"), "{error}");
-    assert_eq!(read_text(b"a b\nc d\n", Separator::Auto).unwrap_err(), ColumnError::NoNumbers);
-    let broken = read_text(b"1 2\n3 4\nu y\n5 6\n", Separator::Auto).unwrap_err();
-    assert!(matches!(broken, ColumnError::TextAmongNumbers { line: 3, rows: 2, .. }), "{broken}");
-}
-
-/// A folder of shared data, or `None` with a counted line.
-fn shared(folder: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("AFMID_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    let path = root.join(folder);
-    if path.is_dir() {
-        return Some(path);
-    }
-    println!("stand-in: {folder} is not there, written here instead");
-    None
-}
-
-const LVM: &str = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\nX_Columns\tNo\n***End_of_Header***\t\n\t\nChannels\t2\n\
-    Samples\t2\t2\t\nDelta_X\t3,906250E-5\t3,906250E-5\t\n***End_of_Header***\t\t\t\nX_Value\tExcitation\tResponse\tComment\n\
-    \t0,914018\t1,204792\n\t0,537321\t1,208403\n";
-
-#[test]
-fn labview_headers_give_names_and_the_sample_interval() {
-    let stand_in = text(LVM);
-    let mut tables = vec![stand_in];
-    if let Some(folder) = shared("loaders/lvm") {
-        tables.push(read_text(&std::fs::read(folder.join("short.lvm")).unwrap(), Separator::Auto).unwrap());
-        for (name, columns, interval) in [
-            ("multi_time_column.lvm", 5, 1.953125e-5),
-            ("no_decimal_separator.lvm", 7, 0.00025),
-            ("with_empty_fields.lvm", 9, 0.001),
-        ] {
-            let table = read_text(&std::fs::read(folder.join(name)).unwrap(), Separator::Auto).unwrap();
-            assert_eq!((table.columns.len(), table.interval_s), (columns, Some(interval)), "{name}");
-        }
-        let remarks = read_text(&std::fs::read(folder.join("with_comments.lvm")).unwrap(), Separator::Auto).unwrap();
-        assert!(Column::Name("Comment".to_owned()).of(&remarks).is_err());
-        assert_eq!(Column::Number(2).of(&remarks).unwrap().values[1], 1.522167);
-    }
-    for table in &tables {
-        assert_eq!(table.interval_s, Some(3.90625e-5));
-        assert!(table.columns[2].name.starts_with("Response"));
-        assert_eq!(&table.columns[1].values[..2], &[0.914018, 0.537321]);
-    }
-    assert_eq!(
-        read_text(LVM.split("***").next().unwrap().as_bytes(), Separator::Auto),
-        Err(ColumnError::EndlessHeader)
-    );
-}
-
-/// A MATLAB file of one 3 x 2 matrix `x` of doubles and a row vector `v` of int16, in either byte order.
-fn mat(big: bool) -> Vec<u8> {
-    let word = |value: u32| if big { value.to_be_bytes() } else { value.to_le_bytes() };
-    let mut file = vec![b' '; 124];
-    file.extend(if big { [1, 0] } else { [0, 1] });
-    file.extend(if big { *b"MI" } else { *b"IM" });
-    let element = |kind: u32, data: &[u8]| {
-        let mut bytes = [word(kind), word(data.len() as u32)].concat();
-        bytes.extend(data);
-        bytes.resize(bytes.len().next_multiple_of(8), 0);
-        bytes
-    };
-    let mut variable = |class: u32, name: &str, sizes: [u32; 2], kind: u32, data: Vec<u8>| {
-        let flags = element(6, &[word(class), word(0)].concat());
-        let sizes = element(5, &sizes.map(word).concat());
-        let body = [flags, sizes, element(1, name.as_bytes()), element(kind, &data)].concat();
-        file.extend(element(14, &body));
-    };
-    let doubles = [1.0_f64, 2.0, 3.0, 10.0, 20.0, 30.0];
-    let bytes = |value: &f64| if big { value.to_be_bytes() } else { value.to_le_bytes() };
-    variable(6, "x", [3, 2], 9, doubles.iter().flat_map(bytes).collect());
-    let shorts = |value: i16| if big { value.to_be_bytes() } else { value.to_le_bytes() };
-    variable(10, "v", [1, 3], 3, [-5_i16, 6, 7].into_iter().flat_map(shorts).collect());
-    file
-}
-
-#[test]
-fn matlab_matrices_are_columns_in_either_byte_order() {
-    for big in [false, true] {
-        let table = read_mat(&mat(big)).unwrap();
-        let names: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
-        assert_eq!(names, ["x:1", "x:2", "v"]);
-        assert_eq!(values(&table), [[1.0, 2.0, 3.0], [10.0, 20.0, 30.0], [-5.0, 6.0, 7.0]]);
-    }
-}
-
-#[test]
-fn a_matlab_file_cut_anywhere_or_with_any_byte_changed_is_an_error_or_a_table() {
-    let whole = mat(false);
-    for cut in 0..whole.len() {
-        let _ = read_mat(&whole[..cut]);
-        let mut spoilt = whole.clone();
-        spoilt[cut] ^= 0xff;
-        let _ = read_mat(&spoilt);
-    }
-    assert!(matches!(read_mat(&whole[..200]), Err(ColumnError::Damaged { .. })));
-    assert_eq!(read_mat(b"\x89HDF\r\n\x1a\n").unwrap_err(), ColumnError::Hdf5);
-    assert_eq!(read_mat(b"short").unwrap_err(), ColumnError::NotMat5);
-}
-
-#[test]
-fn real_matlab_files_are_read_or_refused_with_a_reason() {
-    let Some(folder) = shared("loaders/mat") else { return };
-    for entry in std::fs::read_dir(&folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        let read = read_mat(&std::fs::read(&path).unwrap());
-        println!(
-            "{name}: {}",
-            read.as_ref().map_or_else(ToString::to_string, |t| format!("{} columns", t.columns.len()))
-        );
-        match name.as_str() {
-            "little_endian.mat" | "big_endian.mat" | "testmulti_7.4_GLNX86.mat" => assert!(read.is_ok(), "{name}"),
-            "testhdf5_7.4_GLNX86.mat" => assert_eq!(read.unwrap_err(), ColumnError::Hdf5),
-            "testdouble_4.2c_SOL2.mat" | "testvec_4_GLNX86.mat" => assert_eq!(read.unwrap_err(), ColumnError::NotMat5),
-            "corrupted_zlib_data.mat" | "malformed1.mat" => {
-                assert!(
-                    matches!(read, Err(ColumnError::Damaged { .. } | ColumnError::NoMatrix(_))),
-                    "{name}: {read:?}"
-                );
-            }
-            _ => assert!(matches!(read, Err(ColumnError::NoMatrix(_))), "{name}: {read:?}"),
-        }
-    }
-}
 
 fn run(stage: &Columns, folder: &Path) -> Result<(Ports, Vec<String>), afmid_pipeline::StageError> {
     let cx = Context::new(folder, 1, &NoProgress);
@@ -216,6 +56,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
             file: "a.csv".to_owned(),
             inputs: vec![Column::Name("t".to_owned())],
             output: Column::Number(3),
+            missing: vec![-1.0],
             sample_rate_hz: Some(1.0),
             ..Columns::default()
         };
@@ -225,7 +66,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     let error = |stage: &Columns| run(stage, folder.path()).map(|_| ()).unwrap_err().to_string();
     assert!(run(&stage(|_| {}), folder.path()).is_ok());
     assert!(error(&stage(|s| s.inputs = vec![Column::Number(2)])).contains("misses sample 1"));
-    assert!(error(&stage(|s| s.sample_rate_hz = None)).contains("sample rate is not known"));
+    assert!(error(&stage(|s| s.sample_rate_hz = None)).contains("no sample rate"));
     let unequal = |s: &mut Columns| {
         s.sample_rate_hz = None;
         s.time = Some(Column::Number(1));
@@ -242,4 +83,71 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         assert!(afmid_pipeline::stage::check(&wrong).is_err());
     }
     assert!(stage(|s| s.file = "b.csv".to_owned()).sources(folder.path(), &InputFiles::new()).is_err());
+}
+
+const LVM: &str = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\nX_Columns\tNo\n***End_of_Header***\t\n\t\n\
+    Channels\t2\nSamples\t4\t4\t\nY_Unit_Label\tN\tV\nDelta_X\t2,5E-2\t2,5E-2\t\n***End_of_Header***\t\t\t\n\
+    X_Value\tforce\tresponse\tComment\n\t1\t2\n\t2\t4\n\t3\t9\n\t5\t7\n";
+
+/// Writes the same force (N) and response (V) at 40 Hz in several formats.
+fn write_each(folder: &Path) -> Vec<&'static str> {
+    let (force, response) = ([1.0, 2.0, 3.0, 5.0], [2.0, 4.0, 9.0, 7.0]);
+    std::fs::write(folder.join("a.lvm"), LVM).unwrap();
+    let rows: String = (0..4).map(|k| format!("{};{};{}\n", k as f64 * 0.025, force[k], response[k])).collect();
+    std::fs::write(folder.join("a.csv"), format!("time (s);force (N);response (V)\n{rows}")).unwrap();
+    let channel = |location: &str, unit: &str, values: &[f64]| NativeChannel {
+        location: location.to_owned(),
+        unit: unit.to_owned(),
+        long_name: location.to_owned(),
+        scale_factor: 0.5,
+        add_offset: 0.0,
+        codes: Codes::Int16(values.iter().map(|value| (2.0 * value) as i16).collect()),
+    };
+    let record = NativeRecord {
+        sample_rate_hz: 40.0,
+        started_at: "2026-11-26T00:00:00Z".to_owned(),
+        channels: vec![channel("/force", "N", &force), channel("/response", "V", &response)],
+    };
+    write_native(&folder.join("a.h5"), &record, RecordStorage::Raw).unwrap();
+    vec!["a.lvm", "a.csv", "a.h5"]
+}
+
+#[test]
+fn any_format_gives_the_same_pair_with_rate_and_units() {
+    let folder = tempfile::tempdir().unwrap();
+    for file in write_each(folder.path()) {
+        for inputs in [Column::Number(1), Column::Name("force".to_owned())] {
+            let stage = Columns {
+                file: file.to_owned(),
+                inputs: vec![inputs],
+                output: Column::Name("response".to_owned()),
+                remove: Removal::None,
+                ..Columns::default()
+            };
+            let (ports, warnings) = run(&stage, folder.path()).unwrap_or_else(|error| panic!("{file}: {error}"));
+            let pair = ports.get(&PAIR).unwrap();
+            assert_eq!(pair.real("force").unwrap(), [1.0, 2.0, 3.0, 5.0], "{file}");
+            assert_eq!(pair.real("response").unwrap(), [2.0, 4.0, 9.0, 7.0], "{file}");
+            assert!((pair.number("sample_rate_hz").unwrap() - 40.0).abs() < 1e-9, "{file}");
+            assert!(warnings.is_empty(), "{warnings:?}");
+        }
+    }
+}
+
+#[test]
+fn scales_want_their_unit_and_units_that_differ_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_each(folder.path());
+    let stage = |change: fn(&mut Columns)| {
+        let mut stage = Columns { file: "a.csv".to_owned(), remove: Removal::None, ..Columns::default() };
+        change(&mut stage);
+        run(&stage, folder.path()).map(|(ports, _)| ports.get(&PAIR).unwrap().clone())
+    };
+    let scaled = stage(|s| (s.output_scale, s.output_unit) = (-2.0, Some("m".to_owned()))).unwrap();
+    assert_eq!(scaled.real("response").unwrap(), [-4.0, -8.0, -18.0, -14.0]);
+    let error = |change| stage(change).map(|_| ()).unwrap_err().to_string();
+    assert!(error(|s| s.input_scale = 3.0).contains("`input_unit` is missing"));
+    assert!(error(|s| s.input_unit = Some("V".to_owned())).contains("is in N, wanted V"));
+    assert!(error(|s| s.sample_rate_hz = Some(41.0)).contains("states 40"));
+    assert!(error(|s| s.inputs = vec![Column::Name("time".to_owned())]).contains("1 `force`, 2 `response`"));
 }

@@ -3,102 +3,77 @@
 use afmid_pipeline::{Document, StageError, Table};
 use serde_json::{Value, json};
 
-use afmid_kernels::contact::{ContactResonance, FreeLever, JointContact};
+use afmid_kernels::contact::{FreeLever, JointContact};
 
 pub(super) fn contact_table(contact: &JointContact) -> Table {
-    let column = |value: fn(&ContactResonance) -> f64| contact.resonances.iter().map(value).collect::<Vec<f64>>();
-    Table::new()
-        .with("frequency_hz", "Hz", "coupled resonance as measured", column(|r| r.measured.frequency_hz.value))
-        .with("frequency_std_hz", "Hz", "its standard error", column(|r| r.measured.frequency_hz.std))
-        .with("quality_factor", "1", "its quality factor", column(|r| r.measured.quality_factor.value))
-        .with("quality_factor_std", "1", "its standard error", column(|r| r.measured.quality_factor.std))
-        .with(
-            "fitted_hz",
-            "Hz",
-            "contact resonance from everything together",
-            column(|r| r.estimated.frequency_hz.value),
-        )
-        .with("fitted_std_hz", "Hz", "its standard error", column(|r| r.estimated.frequency_hz.std))
-        .with("fitted_quality_factor", "1", "its quality factor", column(|r| r.estimated.quality_factor.value))
-        .with("fitted_quality_factor_std", "1", "its standard error", column(|r| r.estimated.quality_factor.std))
-        .with(
-            "stiffness",
-            "N/m",
-            "contact stiffness from this pole alone, as of a spring and damper, shares as estimated",
-            column(|r| r.alone.stiffness_n_per_m.value),
-        )
-        .with("stiffness_std", "N/m", "its standard error", column(|r| r.alone.stiffness_n_per_m.std))
-        .with("damping", "N s/m", "contact damping from this pole alone", column(|r| r.alone.damping_n_s_per_m.value))
-        .with("damping_std", "N s/m", "its standard error", column(|r| r.alone.damping_n_s_per_m.std))
-        .with(
-            "stiffness_weight",
-            "1",
-            "what pole and residue count in the stiffness",
-            column(|r| r.alone.stiffness_weight),
-        )
-        .with("damping_weight", "1", "what they count in the damping", column(|r| r.alone.damping_weight))
+    let fitted = "contact resonance from everything together";
+    let stiffness = "contact stiffness from this pole alone, as of a spring and damper, shares as estimated";
+    let weight = "what pole and residue count in the stiffness";
+    Table::of(&contact.resonances)
+        .with_std(["frequency_hz", "frequency_std_hz"], "Hz", "coupled resonance as measured", |r| {
+            r.measured.frequency_hz
+        })
+        .with_std(["quality_factor", "quality_factor_std"], "1", "its quality factor", |r| r.measured.quality_factor)
+        .with_std(["fitted_hz", "fitted_std_hz"], "Hz", fitted, |r| r.estimated.frequency_hz)
+        .with_std(["fitted_quality_factor", "fitted_quality_factor_std"], "1", "its quality factor", |r| {
+            r.estimated.quality_factor
+        })
+        .with_std(["stiffness", "stiffness_std"], "N/m", stiffness, |r| r.alone.stiffness_n_per_m)
+        .with_std(["damping", "damping_std"], "N s/m", "contact damping from this pole alone", |r| {
+            r.alone.damping_n_s_per_m
+        })
+        .with("stiffness_weight", "1", weight, |r| r.alone.stiffness_weight)
+        .with("damping_weight", "1", "what they count in the damping", |r| r.alone.damping_weight)
+        .table()
 }
 
 pub(super) fn share_table(contact: &JointContact, lever: &FreeLever, given: &[f64]) -> Table {
-    let shares = &contact.tip_shares;
+    let share = "what it has of the tip's static compliance";
+    let frequencies: Vec<f64> = lever.modes().iter().map(|mode| mode.frequency_hz.value).collect();
     Table::new()
-        .with(
-            "frequency_hz",
-            "Hz",
-            "free mode",
-            lever.modes().iter().map(|m| m.frequency_hz.value).collect::<Vec<f64>>(),
-        )
-        .with(
-            "tip_share",
-            "1",
-            "what it has of the tip's static compliance",
-            shares.iter().map(|s| s.value).collect::<Vec<f64>>(),
-        )
+        .with("frequency_hz", "Hz", "free mode", frequencies)
+        .with("tip_share", "1", share, contact.tip_shares.iter().map(|s| s.value).collect::<Vec<f64>>())
         .with(
             "tip_share_std",
             "1",
             "its standard error; 0 if given",
-            shares.iter().map(|s| s.std).collect::<Vec<f64>>(),
+            contact.tip_shares.iter().map(|s| s.std).collect::<Vec<f64>>(),
         )
         .with("given", "1", "the share as given", given.to_vec())
 }
 
-/// JSON has no NaN: unknown is null.
-fn known(value: f64) -> Value {
-    if value.is_finite() { json!(value) } else { Value::Null }
-}
-
+/// The contact as JSON, where NaN, which is unknown, becomes null.
 pub(super) fn summary(contact: &JointContact, lever: &FreeLever) -> Result<Document, StageError> {
     let resonances = contact.resonances.iter().map(|r| {
         json!({
-            "frequency_hz": known(r.estimated.frequency_hz.value),
-            "frequency_std_hz": known(r.estimated.frequency_hz.std),
-            "quality_factor": known(r.estimated.quality_factor.value),
-            "quality_factor_std": known(r.estimated.quality_factor.std),
-            "stiffness_weight": known(r.alone.stiffness_weight),
-            "damping_weight": known(r.alone.damping_weight),
+            "frequency_hz": r.estimated.frequency_hz.value,
+            "frequency_std_hz": r.estimated.frequency_hz.std,
+            "quality_factor": r.estimated.quality_factor.value,
+            "quality_factor_std": r.estimated.quality_factor.std,
+            "stiffness_weight": r.alone.stiffness_weight,
+            "damping_weight": r.alone.damping_weight,
         })
     });
-    let shares = contact.tip_shares.iter().map(|s| json!({ "tip_share": s.value, "tip_share_std": known(s.std) }));
+    let shares = contact.tip_shares.iter().map(|s| json!({ "tip_share": s.value, "tip_share_std": s.std }));
     Document::new(&json!({
         "contact_stiffness_n_per_m": contact.stiffness_n_per_m.value,
-        "contact_stiffness_std_n_per_m": known(contact.stiffness_n_per_m.std),
+        "contact_stiffness_std_n_per_m": contact.stiffness_n_per_m.std,
         "contact_damping_n_s_per_m": contact.damping_n_s_per_m.value,
-        "contact_damping_std_n_s_per_m": known(contact.damping_n_s_per_m.std),
+        "contact_damping_std_n_s_per_m": contact.damping_n_s_per_m.std,
         "contact_inertia_kg": contact.inertia_kg.map(|e| e.value),
         "contact_inertia_std_kg": contact.inertia_kg.map(|e| e.std),
         "law": if contact.inertia_kg.is_some() { "second-order" } else { "spring-damper" },
         "law_gain": contact.law_gain,
-        "correlation": known(contact.correlation),
+        "correlation": contact.correlation,
         "lever_stiffness_n_per_m": lever.stiffness().value,
         "chi_square": contact.chi_square,
         "freedom": contact.freedom,
-        "p_value": known(contact.p_value),
+        "p_value": contact.p_value,
         "residues": contact.residues.map(|test| json!({
             "used": test.used,
             "chi_square": test.chi_square,
             "freedom": test.freedom,
-            "p_value": known(test.p_value),
+            "p_value": test.p_value,
         })),
         "stiffness_std_by_origin_n_per_m": {
             "coupled_ringing": contact.budget.coupled,

@@ -1,22 +1,18 @@
 //! The stage: what its ports carry, and what it says where they do not fit.
 
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Context, Ports, Stage};
 
 use super::{CONTACT, ContactFit, FREE, FREE_POLES, SHARES, SUMMARY};
 use crate::artifacts::ringing;
 use crate::model::ringdown::{POLES, RingdownFit};
-
-fn context() -> Context<'static> {
-    Context::new(std::path::Path::new("."), 1, &NoProgress)
-}
+use afmid_kernels::contact::JointOptions;
 
 /// Poles and residues as the joint fit's stage hands them on.
 fn handed_on() -> Array {
     let example = &RingdownFit::examples()[0];
     let fit: RingdownFit = afmid_pipeline::toml::from_str(example.params).unwrap();
     let inputs = (example.inputs)().unwrap();
-    fit.run(&inputs, &context()).unwrap().get(&POLES).unwrap().clone()
+    fit.run(&inputs, &Context::alone(1)).unwrap().get(&POLES).unwrap().clone()
 }
 
 #[test]
@@ -49,6 +45,10 @@ fn arrays_of_the_wrong_size_are_refused() {
     }
 }
 
+fn with_error(stage: ContactFit, error: f64) -> ContactFit {
+    ContactFit { options: JointOptions { tip_share_error: Some(error), ..stage.options }, ..stage }
+}
+
 fn example() -> (ContactFit, Ports) {
     let example = &ContactFit::examples()[0];
     (afmid_pipeline::toml::from_str(example.params).unwrap(), (example.inputs)().unwrap())
@@ -57,7 +57,7 @@ fn example() -> (ContactFit, Ports) {
 #[test]
 fn shares_resonances_and_errors_are_handed_on() {
     let (stage, inputs) = example();
-    let out = stage.run(&inputs, &context()).unwrap();
+    let out = stage.run(&inputs, &Context::alone(1)).unwrap();
     let shares = out.get(&SHARES).unwrap();
     assert!((shares.real("tip_share").unwrap()[1] - 0.03).abs() < 1e-6);
     assert!(shares.real("tip_share_std").unwrap()[1] > 0.0);
@@ -74,16 +74,16 @@ fn shares_resonances_and_errors_are_handed_on() {
 fn what_is_missing_is_said() {
     let (stage, inputs) = example();
     let without = ContactFit { stiffness_n_per_m: None, ..stage.clone() };
-    assert!(without.run(&inputs, &context()).unwrap_err().to_string().contains("no stiffness"));
+    assert!(without.run(&inputs, &Context::alone(1)).unwrap_err().to_string().contains("no stiffness"));
     let many = ContactFit { tip_shares: vec![0.5; 2].into_iter().chain([0.1]).collect(), ..stage.clone() };
-    assert!(many.run(&inputs, &context()).unwrap_err().to_string().contains("tip_shares"));
+    assert!(many.run(&inputs, &Context::alone(1)).unwrap_err().to_string().contains("tip_shares"));
     let few = ContactFit { max_frequency_hz: Some(200e3), ..stage.clone() };
-    assert!(few.run(&inputs, &context()).is_err());
-    let given = ContactFit { tip_share_error: Some(0.01), ..few };
-    assert!(given.run(&inputs, &context()).is_ok());
-    assert!(afmid_pipeline::stage::check(&ContactFit { tip_share_error: Some(-0.1), ..stage.clone() }).is_err());
+    assert!(few.run(&inputs, &Context::alone(1)).is_err());
+    let given = with_error(few, 0.01);
+    assert!(given.run(&inputs, &Context::alone(1)).is_ok());
+    assert!(afmid_pipeline::stage::check(&with_error(stage.clone(), -0.1)).is_err());
     // the free lever's table has two modes, this fit one
     let other = inputs.with(&FREE_POLES, handed_on());
-    assert!(stage.run(&other, &context()).unwrap_err().to_string().contains("free lever's poles"));
+    assert!(stage.run(&other, &Context::alone(1)).unwrap_err().to_string().contains("free lever's poles"));
     assert!(other.get(&FREE).is_ok());
 }

@@ -5,7 +5,7 @@ use faer::Mat;
 use serde_json::{Value, json};
 
 use crate::artifacts;
-use afmid_kernels::grey::{Grey, GreyHold, GreyQuantity};
+use afmid_kernels::grey::{Grey, GreyHold, GreyParameter, GreyQuantity};
 use afmid_kernels::modes::Interval;
 use afmid_kernels::ringdown::Estimate;
 
@@ -44,28 +44,22 @@ pub(super) fn named(quantity: GreyQuantity) -> (String, &'static str) {
 
 /// All parameters with errors and intervals.
 pub(super) fn parameter_table(fit: &Grey) -> Table {
-    let names =
-        |of: &dyn Fn(GreyQuantity) -> String| fit.parameters.iter().map(|p| of(p.quantity)).collect::<Vec<String>>();
-    let holds: Vec<String> = fit
-        .parameters
-        .iter()
-        .map(|p| match p.hold {
-            GreyHold::Free => "estimated",
-            GreyHold::Fixed => "given",
-            GreyHold::Bound => "on a bound",
-        })
-        .map(str::to_owned)
-        .collect();
-    let column = |of: &dyn Fn(Estimate) -> f64| fit.parameters.iter().map(|p| of(p.estimate)).collect::<Vec<f64>>();
-    let interval = |e: Estimate| Interval::normal(e.value, e.std);
-    Table::new()
-        .with("parameter", "", "which number of the grey form", names(&|q| named(q).0))
-        .with("unit", "", "its unit", names(&|q| named(q).1.to_owned()))
-        .with("value", "", "its value", column(&|e| e.value))
-        .with("std", "", "its standard error: 0 if given, unknown on a bound", column(&|e| e.std))
-        .with("low", "", "lower end of its 95 % interval", column(&|e| interval(e).low))
-        .with("high", "", "upper end", column(&|e| interval(e).high))
-        .with("hold", "", "estimated, given, or on a bound", holds)
+    let hold = |p: &GreyParameter| match p.hold {
+        GreyHold::Free => "estimated",
+        GreyHold::Fixed => "given",
+        GreyHold::Bound => "on a bound",
+    };
+    let interval = |p: &GreyParameter| Interval::normal(p.estimate.value, p.estimate.std);
+    let std = "its standard error: 0 if given, unknown on a bound";
+    Table::of(&fit.parameters)
+        .with("parameter", "", "which number of the grey form", |p| named(p.quantity).0)
+        .with("unit", "", "its unit", |p| named(p.quantity).1)
+        .with("value", "", "its value", |p| p.estimate.value)
+        .with("std", "", std, |p| p.estimate.std)
+        .with("low", "", "lower end of its 95 % interval", |p| interval(p).low)
+        .with("high", "", "upper end", |p| interval(p).high)
+        .with("hold", "", "estimated, given, or on a bound", hold)
+        .table()
 }
 
 /// Value, error and interval.

@@ -1,6 +1,5 @@
 //! The stage: its port in a chain with `model.modes`, knowledge, gaps and refusals through parameters.
 
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Axis, Context, Ports, Stage, StateSpace};
 use serde_json::Value;
 
@@ -39,7 +38,7 @@ const TWO: &str = "modes = 2\nfeedthrough = false\nhistory = \"settled\"\n";
 fn run(params: &str, inputs: &Ports) -> Result<(Ports, Vec<String>), String> {
     let stage: GreyEstimate = afmid_pipeline::toml::from_str(params).map_err(|error| error.to_string())?;
     afmid_pipeline::stage::check(&stage).map_err(|error| error.to_string())?;
-    let context = Context::new(std::path::Path::new("."), 1, &NoProgress);
+    let context = Context::alone(1);
     let outputs = stage.run(inputs, &context).map_err(|error| error.to_string())?;
     Ok((outputs, context.into_warnings()))
 }
@@ -67,8 +66,7 @@ fn a_release_gives_its_modes_its_delay_and_a_model_that_others_read() {
     let (simulated, fitted) = (&found["simulation_fit_percent"], &found["prediction_fit_percent"]);
     assert!((simulated.as_f64().unwrap() - fitted.as_f64().unwrap()).abs() < 0.01, "{found}");
     let model: &StateSpace = outputs.get(&MODEL).unwrap();
-    let context = Context::new(std::path::Path::new("."), 1, &NoProgress);
-    let modes = Modes::default().run(&Ports::new().with(&MODEL, model.clone()), &context).unwrap();
+    let modes = Modes::default().run(&Ports::new().with(&MODEL, model.clone()), &Context::alone(1)).unwrap();
     let (theirs, ours) = (modes.get(&MODES).unwrap(), outputs.get(&MODES).unwrap());
     for column in ["frequency_hz", "frequency_std_hz", "quality_factor", "quality_factor_std"] {
         let (a, b) = (theirs.real(column).unwrap(), ours.real(column).unwrap());

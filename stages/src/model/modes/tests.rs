@@ -5,7 +5,6 @@ use crate::fixture::{Lever, white_noise};
 #[test]
 fn static_shares_lie_within_errors_that_count_the_ambiguity_of_t0() {
     use crate::model::{Modes, Pem};
-    use afmid_pipeline::stage::NoProgress;
     use afmid_pipeline::{Array, Axis, Context, Port, Ports, Stage, StateSpace, Table};
     const MODEL: Port<StateSpace> = Port::new("model", "model", "");
     const MODES: Port<Table> = Port::new("modes", "modes", "");
@@ -13,7 +12,6 @@ fn static_shares_lie_within_errors_that_count_the_ambiguity_of_t0() {
     let (samples, true_t0, lever) = (4096, 500usize, Lever::paper());
     // mode n is pole 2n; a release from a load of one rings by -R / p
     let truth: Vec<f64> = lever.step_residues().iter().step_by(2).take(4).map(|(_, r)| -2.0 * r.re).collect();
-    let cx = || Context::new(std::path::Path::new("."), 0, &NoProgress);
     let shares = |seed: u64, late: usize, ambiguity: Option<f64>| -> (Vec<f64>, Vec<f64>) {
         let t0 = true_t0 + late;
         let noise = white_noise(samples, 2e-4, seed);
@@ -29,9 +27,9 @@ fn static_shares_lie_within_errors_that_count_the_ambiguity_of_t0() {
         if let Some(ambiguity) = ambiguity {
             pair = pair.attribute("t0_ambiguity_s", ambiguity);
         }
-        let fitted = Pem::default().run(&Ports::new().with(&PAIR, pair), &cx()).unwrap();
+        let fitted = Pem::default().run(&Ports::new().with(&PAIR, pair), &Context::alone(0)).unwrap();
         let model = fitted.get(&MODEL).unwrap().clone();
-        let found = Modes::default().run(&Ports::new().with(&MODEL, model), &cx()).unwrap();
+        let found = Modes::default().run(&Ports::new().with(&MODEL, model), &Context::alone(0)).unwrap();
         let modes = found.get(&MODES).unwrap();
         let column = |name: &str| modes.real(name).unwrap().to_vec();
         (column("static_share"), column("static_share_std"))

@@ -4,7 +4,7 @@ use afmid_pipeline::{Document, StageError};
 use serde_json::{Value, json};
 
 use super::ErrorSource;
-use super::known::named;
+use super::tables::named;
 use afmid_kernels::ringdown::{ModeCount, ModeEstimate, Ringdown};
 
 /// The summary; numbers that are unknown are null.
@@ -34,25 +34,21 @@ pub(super) fn summary(
     }))
 }
 
-fn known(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
-}
-
 fn mode(mode: &ModeEstimate) -> Value {
     json!({
         "frequency_hz": mode.frequency_hz.value,
-        "frequency_std_hz": known(mode.frequency_hz.std),
+        "frequency_std_hz": mode.frequency_hz.std,
         "quality_factor": mode.quality_factor.value,
-        "quality_factor_std": known(mode.quality_factor.std),
+        "quality_factor_std": mode.quality_factor.std,
     })
 }
 
 fn count(count: &ModeCount) -> Value {
     json!({
         "modes": count.modes,
-        "chi_square": known(count.chi_square),
-        "bic": known(count.bic),
-        "held_out_chi_square": known(count.held_out),
-        "worse_than_chosen_by_std": known(count.worse_by),
+        "chi_square": count.chi_square,
+        "bic": count.bic,
+        "held_out_chi_square": count.held_out,
+        "worse_than_chosen_by_std": count.worse_by,
     })
 }

@@ -5,7 +5,7 @@ use afmid_pipeline::{Array, Axis, Table};
 use super::ErrorSource;
 use crate::artifacts;
 use afmid_kernels::contact::Ringing;
-use afmid_kernels::ringdown::{EventParameters, ModeEstimate, Ringdown};
+use afmid_kernels::ringdown::{EventParameters, ModeEstimate, Quantity, Ringdown};
 
 pub(super) fn mode_table(fit: &Ringdown, modes: &[ModeEstimate]) -> Table {
     let scatter = fit.sandwich.as_ref().map(|covariance| fit.modes_with(covariance));
@@ -46,17 +46,15 @@ pub(super) fn poles(fit: &Ringdown, source: ErrorSource) -> Array {
 }
 
 pub(super) fn event_table(fit: &Ringdown) -> Table {
-    let column = |value: fn(&EventParameters) -> f64| fit.events.iter().map(value).collect::<Vec<f64>>();
-    let error = |value: fn(&EventParameters) -> f64| fit.event_std.iter().map(value).collect::<Vec<f64>>();
-    Table::new()
-        .with("amplitude", "1", "factor of the shared shape", column(|e| e.amplitude))
-        .with("amplitude_std", "1", "its standard error", error(|e| e.amplitude))
-        .with("onset_s", "s", "onset after the first sample used", column(|e| e.onset_s))
-        .with("onset_std_s", "s", "its standard error", error(|e| e.onset_s))
-        .with("offset", "V", "level that it decays to", column(|e| e.offset))
-        .with("offset_std", "V", "its standard error", error(|e| e.offset))
-        .with("slope", "V", "change of that level over half the window", column(|e| e.slope))
-        .with("slope_std", "V", "its standard error", error(|e| e.slope))
+    let events: Vec<(&EventParameters, &EventParameters)> = fit.events.iter().zip(&fit.event_std).collect();
+    Table::of(&events)
+        .with_std(["amplitude", "amplitude_std"], "1", "factor of the shared shape", |(e, s)| {
+            (e.amplitude, s.amplitude)
+        })
+        .with_std(["onset_s", "onset_std_s"], "s", "onset after the first sample used", |(e, s)| (e.onset_s, s.onset_s))
+        .with_std(["offset", "offset_std"], "V", "level that it decays to", |(e, s)| (e.offset, s.offset))
+        .with_std(["slope", "slope_std"], "V", "change of that level over half the window", |(e, s)| (e.slope, s.slope))
+        .table()
 }
 
 pub(super) fn spectrum(fit: &Ringdown) -> Array {
@@ -65,4 +63,13 @@ pub(super) fn spectrum(fit: &Ringdown) -> Array {
         .with("residual", "V^2/Hz", "mean Hann periodogram of the residuals", over, fit.residual_periodogram.clone())
         .with("expected", "V^2/Hz", "what the noise model expects of it", over, fit.expected_periodogram.clone())
         .attribute("events", fit.events.len())
+}
+
+/// The name of a quantity in messages.
+pub(super) fn named(quantity: Quantity) -> String {
+    match quantity {
+        Quantity::Frequency(mode) => format!("the frequency of mode {}", mode + 1),
+        Quantity::QualityFactor(mode) => format!("the quality factor of mode {}", mode + 1),
+        Quantity::RealPole(pole) => format!("real pole {}", pole + 1),
+    }
 }

@@ -1,7 +1,6 @@
 //! The stage: gaps, knowledge, free stretches and the number of modes through parameters and ports.
 
 use afmid_pipeline::recording::Raw;
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Axis, Context, Ports, Recording, Stage};
 use faer::c64;
 use serde_json::Value;
@@ -57,7 +56,7 @@ fn event(seed: u64) -> Vec<f64> {
 fn run(params: &str, inputs: &Ports) -> Result<(Value, Vec<String>), String> {
     let stage: RingdownFit = afmid_pipeline::toml::from_str(params).map_err(|error| error.to_string())?;
     afmid_pipeline::stage::check(&stage).map_err(|error| error.to_string())?;
-    let context = Context::new(std::path::Path::new("."), 1, &NoProgress);
+    let context = Context::alone(1);
     let outputs = stage.run(inputs, &context).map_err(|error| error.to_string())?;
     Ok((outputs.get(&SUMMARY).unwrap().0.clone(), context.into_warnings()))
 }
@@ -149,8 +148,8 @@ fn parameters_that_cannot_be_are_refused() {
     for (params, part) in [
         ("known = [{ mode = 5, quantity = \"frequency_hz\", fixed = 1e5 }]", "mode 5 of 4"),
         ("known = [{ mode = 1, quantity = \"frequency_hz\" }]", "one of `fixed`"),
-        ("known = [{ quantity = \"frequency_hz\", fixed = 1e5 }]", "either `mode` or `real_pole`"),
-        ("known = [{ real_pole = 1, quantity = \"quality_factor\", fixed = 1.0 }]", "of a real pole"),
+        ("known = [{ quantity = \"frequency_hz\", fixed = 1e5 }]", "wanted `mode` beside"),
+        ("known = [{ real_pole = 1, quantity = \"quality_factor\", fixed = 1.0 }]", "`real_pole` does not go with"),
         ("known = [{ mode = 1, quantity = \"quality_factor\", fixed = 0.3 }]", "above 0.5"),
         ("modes = \"auto\"\nknown = [{ mode = 1, quantity = \"quality_factor\", fixed = 9.0 }]", "auto"),
         ("missing = [[5, 5]]", "ascending"),

@@ -1,6 +1,5 @@
 //! The stage, on what the spectrum stages make, and read by `model.modes`.
 
-use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Artifact, Axis, Context, Ports, Stage, StateSpace};
 
 use crate::fixture::{Lever, white_noise};
@@ -31,11 +30,10 @@ fn pair(seed: u64, noise_v: f64) -> Array {
 
 /// Runs a stage on one input; its first output.
 fn run<S: Stage>(stage: &S, port: &str, input: Artifact) -> Artifact {
-    let cx = Context::new(std::path::Path::new("."), 3, &NoProgress);
     afmid_pipeline::stage::check(stage).unwrap();
     let mut inputs = Ports::new();
     inputs.insert(port, input);
-    stage.run(&inputs, &cx).unwrap().artifact(S::SPEC.outputs[0].name).unwrap().clone()
+    stage.run(&inputs, &Context::alone(3)).unwrap().artifact(S::SPEC.outputs[0].name).unwrap().clone()
 }
 
 fn etfe(seed: u64, noise_v: f64, differenced: bool, bandwidth_hz: f64) -> Artifact {

@@ -9,6 +9,9 @@ mod tests;
 
 use std::f64::consts::PI;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::error::{finite, positive};
 use super::presence::Presence;
 use super::seen_oscillator::SeenThrough;
@@ -33,17 +36,34 @@ pub struct AveragedDensity<'a> {
 }
 
 /// How the spectrum is fitted.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct ThermalFitSettings {
-    /// The resonance lies above this, Hz.
+    /// The resonance lies above this, in Hz.
+    #[schemars(range(min = 0.0))]
     pub lowest_hz: f64,
-    /// The resonance lies below this, Hz.
-    pub highest_hz: f64,
-    /// Probability that a spectrum without lines loses a bin to the search for lines; 0 for no search.
+    /// The resonance lies below this, in Hz. Absent: the last bin.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub highest_hz: Option<f64>,
+    /// Probability that a spectrum without lines loses any bin to the search for lines, 0 (no search) to 0.5.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub line_false_alarm: f64,
-    /// 1/f noise: `Some` with or without it, `None` where the likelihood gains more than chance does once in a hundred
-    /// times (never over less than a tenth of an octave, where it cannot be distinguished from white noise).
+    /// 1/f noise: `auto` (kept where the likelihood gains more than chance does once in a hundred spectra; never over
+    /// less than a tenth of an octave, where it cannot be distinguished from white noise), `on` or `off`.
     pub flicker: Presence,
+}
+
+impl Default for ThermalFitSettings {
+    fn default() -> Self {
+        Self { lowest_hz: 0.0, highest_hz: None, line_false_alarm: 0.01, flicker: Presence::Auto }
+    }
+}
+
+impl ThermalFitSettings {
+    /// The band that the resonance lies in, Hz.
+    fn band(&self) -> (f64, f64) {
+        (self.lowest_hz, self.highest_hz.unwrap_or(f64::INFINITY))
+    }
 }
 
 /// An estimate with two standard errors.
@@ -193,7 +213,7 @@ fn fit_through(
     let likelihood = Likelihood::new(data, through);
     let rule = LineRule::new(data.averages, data.density.len(), settings.line_false_alarm, through);
     let starts = candidates(data, settings)?;
-    let ThermalFitSettings { lowest_hz, highest_hz, .. } = settings;
+    let (lowest_hz, highest_hz) = settings.band();
     let best = |flicker: bool| -> Result<Settled, SpectrumError> {
         let mut explained: Vec<f64> = Vec::new();
         let (mut settled, mut failure) = (Vec::new(), SpectrumError::NoPeak { lowest_hz, highest_hz });

@@ -39,8 +39,8 @@ pub(super) fn candidates(
     let f = data.frequency_hz;
     let smooth = running_median(data.density, MEDIAN_BINS);
     let white = quantile(&smooth, 0.2);
-    let mut order: Vec<usize> =
-        (0..f.len()).filter(|&k| f[k] > settings.lowest_hz && f[k] < settings.highest_hz && f[k] > 0.0).collect();
+    let (lowest_hz, highest_hz) = settings.band();
+    let mut order: Vec<usize> = (0..f.len()).filter(|&k| f[k] > lowest_hz && f[k] < highest_hz && f[k] > 0.0).collect();
     order.sort_by(|&a, &b| (smooth[b] * f[b]).total_cmp(&(smooth[a] * f[a])));
     let mut found: Vec<(usize, usize, usize)> = Vec::new();
     for k in order {
@@ -50,7 +50,6 @@ pub(super) fn candidates(
             found.push((k, from.saturating_sub(MEDIAN_BINS), to + MEDIAN_BINS));
         }
     }
-    let (lowest_hz, highest_hz) = (settings.lowest_hz, settings.highest_hz);
     if found.is_empty() {
         return Err(SpectrumError::NoPeak { lowest_hz, highest_hz });
     }

@@ -23,7 +23,7 @@ fn spectrum(truth: [f64; 5], bins: usize, through: SeenThrough, seed: u64) -> (V
 }
 
 const SETTINGS: ThermalFitSettings =
-    ThermalFitSettings { lowest_hz: 600.0, highest_hz: 2400.0, line_false_alarm: 0.01, flicker: Presence::Off };
+    ThermalFitSettings { lowest_hz: 600.0, highest_hz: Some(2400.0), line_false_alarm: 0.01, flicker: Presence::Off };
 
 fn fit(f: &[f64], p: &[f64], through: SeenThrough) -> ThermalFit {
     let data = AveragedDensity { frequency_hz: f, density: p, averages: AVERAGES, through: Some(through) };
@@ -84,7 +84,7 @@ fn a_resonance_of_two_bins_seen_through_hann_segments_is_unbiased() {
             averages: n * n / (n + 2.0 * (n - 1.0) / 36.0),
             through: None,
         };
-        let settings = ThermalFitSettings { lowest_hz: 60.0, highest_hz: 200.0, ..SETTINGS };
+        let settings = ThermalFitSettings { lowest_hz: 60.0, highest_hz: Some(200.0), ..SETTINGS };
         let fit = thermal_fit(data, settings).unwrap();
         assert_eq!(fit.through, SeenThrough::Hann, "{}", fit.bin_correlation);
         let off = fit.quality_factor.value - quality;
@@ -186,7 +186,7 @@ fn what_cannot_be_fitted_is_refused() {
     let f: Vec<f64> = (0..100).map(f64::from).collect();
     let p = vec![1.0; 100];
     let data = AveragedDensity { frequency_hz: &f, density: &p, averages: 8.0, through: None };
-    let outside = ThermalFitSettings { lowest_hz: 200.0, highest_hz: 300.0, ..SETTINGS };
+    let outside = ThermalFitSettings { lowest_hz: 200.0, highest_hz: Some(300.0), ..SETTINGS };
     assert!(matches!(thermal_fit(data, outside), Err(SpectrumError::NoPeak { .. })));
     assert!(thermal_fit(AveragedDensity { density: &p[..20], frequency_hz: &f[..20], ..data }, SETTINGS).is_err());
     assert!(thermal_fit(AveragedDensity { averages: 0.0, ..data }, SETTINGS).is_err());
