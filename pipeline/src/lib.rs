@@ -35,6 +35,6 @@ pub use artifact::{
 pub use config::{Config, Problem};
 pub use error::StageError;
 pub use graph::{Node, Plan, Wire};
-pub use outcome::{Port, PortSpec, Ports, RunInfo, RunResult, SourceFile, StageRecord, StageResult};
+pub use outcome::{Port, PortSpec, Ports, RunInfo, RunResult, SourceFile, StageRecord, StageResult, Unfinished};
 pub use recording::{Channel, InputFiles, Record, Recording, Source};
 pub use stage::{Caching, Context, DynStage, Entry, Example, Faults, Registry, Spec, Stage};

@@ -128,7 +128,7 @@ impl Work<'_> {
             observer: &Silent,
         };
         let result = run_to_file(plan, &options, &path).map_err(|failed| match failed {
-            Failed::Stages(errors) => errors_text(&errors),
+            Failed::Stages { errors, .. } => errors_text(&errors),
             Failed::File(error) => error.to_string(),
         })?;
         // the key was made before the run: it is the run's only if both read the same files

@@ -4,6 +4,7 @@ use std::num::NonZeroU16;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::cache::Cache;
+use afmid_pipeline::error::StoreError;
 use afmid_pipeline::files::sweep_folders;
 use afmid_pipeline::graph::Stages;
 use afmid_pipeline::runner::{Failed, Options, RunError, run as run_plan, run_to_file};
@@ -46,7 +47,7 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     warn(&cache);
     interrupt::check()?;
     let result = result?.map_err(|failed| match failed {
-        Failed::Stages(errors) => stages_failed(&errors),
+        Failed::Stages { errors, kept } => stages_failed(&errors, kept),
         Failed::File(error) => Failure::failed(&error, error.help.clone()),
     })?;
     if args.json {
@@ -127,13 +128,24 @@ pub fn compute(plan: &Plan, how: &Computation) -> Result<RunResult, Failure> {
     written_folders(plan);
     let result = how.run(|options| run_plan(plan, options))?;
     interrupt::check()?;
-    result.map_err(|errors| stages_failed(&errors))
+    result.map_err(|errors| stages_failed(&errors, None))
 }
 
-fn stages_failed(errors: &[RunError]) -> Failure {
+/// What failed, and where the rest is.
+fn stages_failed(errors: &[RunError], kept: Option<Result<PathBuf, StoreError>>) -> Failure {
     let help = |error: &RunError| error.error.help.as_deref().map(help_line).unwrap_or_default();
     let one = |error: &RunError| format!("error: {}\n{}", message(&error.to_string()), help(error));
-    Failure::Failed(Message::Rendered(errors.iter().map(one).collect()))
+    let mut text: String = errors.iter().map(one).collect();
+    match kept {
+        Some(Ok(file)) => {
+            text.push_str(&format!("the stages that went through are in {0}: afmid show {0}\n", shown(&file)));
+        }
+        Some(Err(error)) => {
+            text.push_str(&format!("the stages that went through are not kept: {}\n", message(&error.to_string())))
+        }
+        None => {}
+    }
+    Failure::Failed(Message::Rendered(text))
 }
 
 /// How many stages were reused.

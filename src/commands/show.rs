@@ -30,6 +30,15 @@ pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
 /// The stage with this id. Errors, usage: there is none.
 pub fn find<'a>(file: &'a ResultFile, id: &str) -> Result<&'a StageSummary, Failure> {
     file.stage(id).ok_or_else(|| {
+        let without = file.run().info.unfinished.iter().find(|stage| stage.id == id);
+        if let Some(stage) = without {
+            let why = stage.reason.clone().unwrap_or_else(|| "something that it needs failed".to_owned());
+            let message = format!("{} is incomplete: `{id}` has no result, {why}", file.path().display());
+            return Failure::usage(
+                message,
+                Some(format!("`afmid show {}` lists the stages that have", file.path().display())),
+            );
+        }
         let ids: Vec<&str> = file.stages().iter().map(|stage| stage.record.id.as_str()).collect();
         let help = match nearest(id, ids.iter().copied()) {
             Some(nearest) => format!("did you mean `{nearest}`?"),

@@ -392,6 +392,7 @@ pub(crate) fn paper() -> RunResult {
             folder: "/home/somebody".to_owned(),
             config_file: "configs/free-lever.toml".to_owned(),
             logs: Vec::new(),
+            unfinished: Vec::new(),
             stages: timings,
         },
     }

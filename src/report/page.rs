@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use afmid_pipeline::files::marked;
-use afmid_pipeline::{Document, Recording, RunResult};
+use afmid_pipeline::{Document, Recording, RunResult, Unfinished};
 use minijinja::value::{Serde, Value as Text};
 use minijinja::{Environment, Output, State, escape_formatter};
 use serde::Serialize;
@@ -39,6 +39,8 @@ struct Page<'a> {
     program: &'a str,
     facts: Vec<Fact>,
     tiles: Vec<Tile>,
+    /// Stages without a result, by name and reason; empty for a run that went through.
+    unfinished: Vec<Fact>,
     warnings: Vec<(String, Vec<String>)>,
     sections: Vec<Section>,
     skipped: Vec<Section>,
@@ -75,6 +77,7 @@ pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportE
         program: &run.program,
         facts: facts(run),
         tiles: tiles(run),
+        unfinished: run.info.unfinished.iter().map(unfinished).collect(),
         warnings,
         sections: shown,
         skipped,
@@ -91,6 +94,11 @@ pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportE
     let page = environment.get_template("report.html")?.render(Serde(page))?;
     let marked = marked(|mark| format!("{}\n<!-- {mark} -->\n", page.trim_end()).into_bytes());
     Ok(marked.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or(page))
+}
+
+fn unfinished(stage: &Unfinished) -> Fact {
+    let reason = stage.reason.as_ref().map(|reason| format!("failed: {reason}"));
+    Fact::new(&stage.id, reason.unwrap_or_else(|| "was not run: something that it needs has no result".to_owned()))
 }
 
 /// Whether a file that begins with these bytes is a page of [`report`]: pages of earlier versions bear no mark.

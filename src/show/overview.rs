@@ -1,7 +1,7 @@
 //! What a result file holds.
 
-use afmid_pipeline::StageRecord;
 use afmid_pipeline::store::{PortSummary, ResultFile, StageSummary};
+use afmid_pipeline::{StageRecord, Unfinished};
 use serde_json::{Value, json};
 
 use super::grid::grid;
@@ -25,11 +25,24 @@ pub fn overview_text(file: &ResultFile) -> String {
         rows.push(vec![stage.record.id.clone(), stage.record.uses.clone(), ports.join(", ")]);
     }
     text.push_str(&grid(&rows));
+    text.push_str(&incomplete(&info.unfinished));
     let warnings: Vec<String> = file.stages().iter().flat_map(warnings).collect();
     if !warnings.is_empty() {
         text.push_str(&format!("\nwarnings\n{}", warnings.concat()));
     }
     text
+}
+
+/// Which stages of a run have no result, and why; empty for one that went through.
+pub fn incomplete(unfinished: &[Unfinished]) -> String {
+    let line = |stage: &Unfinished| match &stage.reason {
+        Some(reason) => format!("  {} ({}) failed: {}\n", stage.id, stage.uses, one_line(reason)),
+        None => format!("  {} ({}) was not run: something that it needs has no result\n", stage.id, stage.uses),
+    };
+    match unfinished {
+        [] => String::new(),
+        _ => format!("\nincomplete: the run failed\n{}", unfinished.iter().map(line).collect::<String>()),
+    }
 }
 
 fn warnings(stage: &StageSummary) -> Vec<String> {
@@ -46,6 +59,7 @@ fn warnings(stage: &StageSummary) -> Vec<String> {
 pub fn overview_json(file: &ResultFile) -> Value {
     let run = file.run();
     let artifact = |port: &PortSummary| json!({ "port": port.name, "shape": port.shape.name() });
+    let unfinished = |stage: &Unfinished| json!({ "id": stage.id, "uses": stage.uses, "reason": stage.reason });
     let stage = |stage: &StageSummary| {
         let record = &stage.record;
         json!({
@@ -62,6 +76,8 @@ pub fn overview_json(file: &ResultFile) -> Value {
         "program": run.program,
         "overrides": run.overrides,
         "stages": file.stages().iter().map(stage).collect::<Vec<_>>(),
+        "complete": run.info.unfinished.is_empty(),
+        "unfinished": run.info.unfinished.iter().map(unfinished).collect::<Vec<_>>(),
     })
 }
 

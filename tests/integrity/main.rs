@@ -8,6 +8,7 @@ mod cache_files;
 mod corpus;
 mod earlier_results;
 mod entrances;
+mod failed_runs;
 mod faults;
 mod floors;
 mod handles;

@@ -155,6 +155,7 @@ fn run(name: &str, stages: Vec<StageRecord>) -> RunResult {
             config_file: "seed.toml".to_owned(),
             stages: times,
             logs: vec![("records".to_owned(), "said on stderr\n".to_owned())],
+            unfinished: Vec::new(),
         },
     }
 }

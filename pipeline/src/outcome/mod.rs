@@ -6,4 +6,4 @@ mod run;
 
 pub use difference::difference;
 pub use port::{Port, PortSpec, Ports};
-pub use run::{RunInfo, RunResult, SourceFile, StageRecord, StageResult};
+pub use run::{RunInfo, RunResult, SourceFile, StageRecord, StageResult, Unfinished};

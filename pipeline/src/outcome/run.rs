@@ -66,6 +66,19 @@ pub struct RunInfo {
     pub stages: Vec<(String, f64, bool)>,
     /// Per stage id that ran a process which wrote to stderr: the end of that.
     pub logs: Vec<(String, String)>,
+    /// The stages without a result, in the plan's order; empty where the run went through.
+    pub unfinished: Vec<Unfinished>,
+}
+
+/// A stage of a run that has no result.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unfinished {
+    /// Its id in the config.
+    pub id: String,
+    /// Its name in the registry.
+    pub uses: String,
+    /// Why it failed; none if it was not run, since something that it needs has no result.
+    pub reason: Option<String>,
 }
 
 /// A finished run: what a result file holds.

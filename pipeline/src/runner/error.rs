@@ -1,5 +1,7 @@
 //! A run that failed: which stage, which port, why.
 
+use std::path::PathBuf;
+
 use crate::error::StageError;
 use crate::error::StoreError;
 
@@ -7,7 +9,12 @@ use crate::error::StoreError;
 #[derive(Debug)]
 pub enum Failed {
     /// Stages failed, in the plan's order.
-    Stages(Vec<RunError>),
+    Stages {
+        /// Which, and why.
+        errors: Vec<RunError>,
+        /// The file that the results of the others were written to, or why it could not be; none if there are none.
+        kept: Option<Result<PathBuf, StoreError>>,
+    },
     /// All stages went through, and the file cannot be written.
     File(StoreError),
 }

@@ -14,11 +14,11 @@ use crate::artifact::Artifact;
 use crate::cache::{Cache, Origin, arithmetic};
 use crate::error::{StageError, StoreError};
 use crate::graph::{Node, Plan};
-use crate::outcome::{Ports, RunInfo, RunResult, StageRecord, StageResult};
+use crate::outcome::{Ports, RunInfo, RunResult, StageRecord, StageResult, Unfinished};
 use crate::recording::{HashedFile, InputFiles};
 use crate::rows::Scratch;
 use crate::stage::{Caching, Context, Progress};
-use crate::store::{PendingResult, RunHead, StageIdentity};
+use crate::store::{PendingResult, RunHead, StageIdentity, Written, write_result, written};
 
 /// Who watches a run. Called from several threads.
 pub trait Observer: Send + Sync {
@@ -77,11 +77,13 @@ struct Finished {
 /// A result that cannot be kept is a note of the cache's ([`Cache::take_notes`]). Errors: all stages that failed, in
 /// the plan's order; independent stages are finished first.
 pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError>> {
-    perform(plan, options, None::<fn() -> _>).map(|(result, _)| result)
+    let Performed { result, errors, .. } = perform(plan, options, None::<fn() -> _>);
+    if errors.is_empty() { Ok(result) } else { Err(errors) }
 }
 
 /// As [`run`], and writes the result file, each stage as soon as those before it are written: whole or not at all, as
-/// [`crate::store::write_result`].
+/// [`crate::store::write_result`]. Where stages fail, the results of the others go to [`failed_place`], which says what
+/// is missing; `path` is not touched. A run that goes through removes that file.
 ///
 /// Errors: those of [`run`]; the file cannot be written.
 pub fn run_to_file(plan: &Plan, options: &Options<'_>, path: &Path) -> Result<RunResult, Failed> {
@@ -95,19 +97,44 @@ pub fn run_to_file(plan: &Plan, options: &Options<'_>, path: &Path) -> Result<Ru
             &RunHead { name, seed: plan.seed(), config, overrides, program, ids: &ids, needs: &needs },
         )
     };
-    let (result, file) = perform(plan, options, Some(begin)).map_err(Failed::Stages)?;
+    let Performed { result, errors, file } = perform(plan, options, Some(begin));
+    let failed = failed_place(path);
+    if !errors.is_empty() {
+        let write = || write_result(&failed, &result).map(|()| failed);
+        let kept = (!result.stages.is_empty()).then(write);
+        return Err(Failed::Stages { errors, kept });
+    }
     if let Some(file) = file {
         file.and_then(|file| file.finish(&result.info)).map_err(Failed::File)?;
+    }
+    if matches!(written(&failed), Ok(Written::AsWritten)) {
+        // one that stays says itself when it was made
+        let _ = std::fs::remove_file(&failed);
     }
     Ok(result)
 }
 
-/// A run, and its result file but for its end, if `begin` makes one.
+/// Where the results of a failed run go that was to be written to `path`: `a.failed.h5` for `a.h5`.
+pub fn failed_place(path: &Path) -> PathBuf {
+    path.with_extension("failed.h5")
+}
+
+/// A run that has ended.
+struct Performed {
+    /// What went through.
+    result: RunResult,
+    /// Stages that failed, in the plan's order.
+    errors: Vec<RunError>,
+    /// Its result file but for its end, if one was begun.
+    file: Pending,
+}
+
+/// Runs a plan, and writes its result file but for its end, if `begin` makes one.
 fn perform(
     plan: &Plan,
     options: &Options<'_>,
     begin: Option<impl FnOnce() -> Result<PendingResult, StoreError> + Send>,
-) -> Result<(RunResult, Pending), Vec<RunError>> {
+) -> Performed {
     let (started, clock) = (jiff::Timestamp::now(), Instant::now());
     let needs = needs(plan);
     let failed = |index: usize, error: StageError| {
@@ -128,8 +155,10 @@ fn perform(
     });
     // a panic there is a bug like any other: it goes on here
     let file = file.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-    let (mut stages, mut times, mut errors, mut logs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for outcome in outcomes {
+    let (mut stages, mut times, mut logs) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut errors, mut unfinished) = (Vec::new(), Vec::new());
+    for (node, outcome) in plan.nodes.iter().zip(outcomes) {
+        let without = |reason| Unfinished { id: node.id.clone(), uses: node.uses.clone(), reason };
         match outcome {
             Outcome::Done(finished) => {
                 times.push((finished.record.id.clone(), finished.seconds, finished.cached));
@@ -138,12 +167,12 @@ fn perform(
                 }
                 stages.push(finished.record);
             }
-            Outcome::Failed(error) => errors.push(error),
-            Outcome::Skipped => {}
+            Outcome::Failed(error) => {
+                unfinished.push(without(Some(error.error.to_string())));
+                errors.push(error);
+            }
+            Outcome::Skipped => unfinished.push(without(None)),
         }
-    }
-    if !errors.is_empty() {
-        return Err(errors);
     }
     let info = RunInfo {
         started_at: started.strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
@@ -154,6 +183,7 @@ fn perform(
         config_file: plan.config.file.clone(),
         stages: times,
         logs,
+        unfinished,
     };
     let result = RunResult {
         name: plan.name().to_owned(),
@@ -164,7 +194,7 @@ fn perform(
         stages,
         info,
     };
-    Ok((result, file))
+    Performed { result, errors, file }
 }
 
 /// The stages that each stage needs, by their places in the plan.

@@ -14,6 +14,6 @@ mod writing;
 
 pub use changes::{Change, changes};
 pub use error::{Failed, RunError};
-pub use execute::{Observer, Options, Quiet, run, run_to_file};
+pub use execute::{Observer, Options, Quiet, failed_place, run, run_to_file};
 pub use explain::{Decision, Explanation, Nearest, explain};
 pub use keys::{RunKey, Surroundings, run_key, stage_seed};

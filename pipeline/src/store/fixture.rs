@@ -195,6 +195,7 @@ pub(crate) fn run_result() -> RunResult {
             folder: "/home/somebody".to_owned(),
             config_file: "configs/free-lever.toml".to_owned(),
             logs: vec![("plug".to_owned(), "said on stderr\n".to_owned())],
+            unfinished: Vec::new(),
             stages: vec![("records".to_owned(), 0.5, false), ("events".to_owned(), 1.0, true)],
         },
     }

@@ -5,12 +5,14 @@ use hdf5::Group;
 use crate::error::{Result, StoreError};
 use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
-use crate::outcome::RunInfo;
+use crate::outcome::{RunInfo, Unfinished};
 
 const FOLDER: &str = "folder";
 const CONFIG_FILE: &str = "config_file";
 const LOG_STAGE: &str = "log_stage";
 const LOG: &str = "log";
+/// Ids, names and reasons of stages without a result.
+const UNFINISHED: [&str; 3] = ["unfinished_stage", "unfinished_uses", "unfinished_reason"];
 
 pub(super) fn write_run_info(parent: &Group, name: &str, info: &RunInfo) -> Result<()> {
     let group = write::nexus_group(parent, name, "NXcollection")?;
@@ -34,6 +36,19 @@ pub(super) fn write_run_info(parent: &Group, name: &str, info: &RunInfo) -> Resu
     let logged: Vec<&str> = info.logs.iter().map(|log| log.0.as_str()).collect();
     write::texts(&group, LOG_STAGE, &logged)?;
     write::texts(&group, LOG, &info.logs.iter().map(text).collect::<Vec<_>>())?;
+    if !info.unfinished.is_empty() {
+        write_unfinished(&group, &info.unfinished)?;
+    }
+    Ok(())
+}
+
+/// Files of runs that went through have none of these.
+fn write_unfinished(group: &Group, unfinished: &[Unfinished]) -> Result<()> {
+    let texts = |of: fn(&Unfinished) -> &str| unfinished.iter().map(of).collect::<Vec<&str>>();
+    write::texts(group, UNFINISHED[0], &texts(|stage| &stage.id))?;
+    write::texts(group, UNFINISHED[1], &texts(|stage| &stage.uses))?;
+    let reasons = unfinished.iter().map(|stage| stage.reason.as_deref().unwrap_or_default().replace('\0', "\u{fffd}"));
+    write::texts(group, UNFINISHED[2], &reasons.collect::<Vec<String>>())?;
     Ok(())
 }
 
@@ -49,6 +64,12 @@ pub(super) fn read_run_info(parent: &Node, name: &str) -> Result<RunInfo> {
     let optional = |name: &str| if group.link_exists(name) { read::text(&group, name) } else { Ok(String::new()) };
     let texts = |name: &str| if group.link_exists(name) { read::texts(&group, name) } else { Ok(Vec::new()) };
     let (logged, logs) = (texts(LOG_STAGE)?, texts(LOG)?);
+    let [ids, uses, reasons] = UNFINISHED.map(texts);
+    let unfinished = ids?.into_iter().zip(uses?).zip(reasons?).map(|((id, uses), reason)| {
+        let reason = Some(reason).filter(|reason| !reason.is_empty());
+        Unfinished { id, uses, reason }
+    });
+    let unfinished = unfinished.collect();
     Ok(RunInfo {
         folder: optional(FOLDER)?,
         config_file: optional(CONFIG_FILE)?,
@@ -58,5 +79,6 @@ pub(super) fn read_run_info(parent: &Node, name: &str) -> Result<RunInfo> {
         threads: read::number::<u64>(&group, "threads")? as usize,
         stages: names.into_iter().zip(seconds).zip(cached).map(|((id, time), hit)| (id, time, hit != 0)).collect(),
         logs: logged.into_iter().zip(logs).collect(),
+        unfinished,
     })
 }
