@@ -1,8 +1,9 @@
-//! Event extraction: snap-off and snap-to-contact.
+//! Event extraction: snap-off and snap-to-contact; free decays in [`decay`].
 
 mod block_means;
 mod correlation_averaging;
 mod cross_correlation;
+pub mod decay;
 mod despike;
 mod detection;
 mod fractional_shift;

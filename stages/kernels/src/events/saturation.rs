@@ -17,7 +17,7 @@ pub fn saturated_samples(values: &[f64]) -> usize {
     high + low
 }
 
-fn pile_up(values: impl Iterator<Item = f64> + Clone) -> usize {
+pub(super) fn pile_up(values: impl Iterator<Item = f64> + Clone) -> usize {
     let mut limit = f64::INFINITY;
     let mut counts = [0usize; 5];
     for (rank, count) in counts.iter_mut().enumerate() {

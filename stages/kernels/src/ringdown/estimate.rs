@@ -30,6 +30,14 @@ pub struct ModeEstimate {
     pub quality_factor: Estimate,
 }
 
+impl ModeEstimate {
+    /// `-Re s / abs(s)`, the share of critical damping: `1 / (2 Q)`, its error by the delta method.
+    pub fn damping_ratio(&self) -> Estimate {
+        let Estimate { value, std } = self.quality_factor;
+        Estimate { value: 0.5 / value, std: 0.5 * std / (value * value) }
+    }
+}
+
 /// How the search ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RingdownVerdict {

@@ -33,6 +33,11 @@ impl Gaps {
         Ok(Self { masks })
     }
 
+    /// Of one event with this mask.
+    pub fn of_mask(mask: &[bool]) -> Self {
+        Self { masks: vec![mask.to_vec()] }
+    }
+
     /// The mask of one event, empty if nothing is missing.
     pub fn mask(&self, event: usize) -> &[bool] {
         self.masks.get(event).map_or(&[], Vec::as_slice)

@@ -17,6 +17,7 @@
 
 mod absorbed;
 mod bootstrap;
+mod channels;
 mod choice;
 #[cfg(test)]
 mod choice_tests;
@@ -64,6 +65,10 @@ pub mod internals {
     pub use super::whittle::hann;
 }
 
+pub use channels::{
+    ChannelNoise, ChannelOptions, ChannelRingdown, ModeShape, ModesWanted, OrderTried, RankOne, RecordFit, ShapePoint,
+    fit_channels,
+};
 pub use choice::{CountedRingdown, HELD_OUT_EVENTS, ModeCount, fit_counted_ringdowns};
 pub use decay::{Decay, DecayOptions, fit_decay};
 pub use estimate::{Estimate, ModeEstimate, Ringdown, RingdownVerdict};

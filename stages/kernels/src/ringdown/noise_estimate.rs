@@ -12,7 +12,7 @@ use super::whittle::{expected_parts, hann, variances};
 use crate::signal::{autocorrelation, mean_periodogram};
 
 /// Thermal motion of every mode and a ladder of wander from the window's own frequency upwards, a decade apart.
-fn parts_of(exponentials: &[Exponential], white: f64, interval_s: f64, samples: usize) -> RingdownNoise {
+pub(super) fn parts_of(exponentials: &[Exponential], white: f64, interval_s: f64, samples: usize) -> RingdownNoise {
     let lowest = std::f64::consts::TAU / (samples as f64 * interval_s);
     let highest = 0.5 / interval_s;
     let wander = (0..12)

@@ -52,6 +52,17 @@ impl Whitener {
         if self.states() > 0 || !self.order.is_empty() { None } else { self.gains.first().map(|gain| gain.1) }
     }
 
+    /// Sum of the logarithms of the prediction errors' variances over a record: of the determinant of its noise's
+    /// covariance.
+    pub fn log_variance(&self, samples: usize) -> f64 {
+        let Some(last) = self.gains.len().checked_sub(1) else { return 0.0 };
+        let of = |gain: usize| -2.0 * self.gains[gain.min(last)].1.ln();
+        match self.order.is_empty() {
+            true => (0..samples).map(of).sum(),
+            false => self.order.iter().take(samples).flatten().map(|&gain| of(gain)).sum(),
+        }
+    }
+
     fn states(&self) -> usize {
         2 * self.rotations.len() + self.decays.len()
     }

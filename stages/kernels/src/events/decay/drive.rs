@@ -1,0 +1,65 @@
+//! Ends of a drive: in its own channel, or where a steady response begins to die.
+
+use super::envelope::Envelope;
+use crate::statistics::median;
+
+/// Share of the largest energy from which on a stretch is driven.
+const DRIVEN: f64 = 0.5;
+/// Least periods of a driven stretch.
+const LEAST_PERIODS: usize = 8;
+/// Share of the plateau's energy down to which its last samples still belong to it.
+const PLATEAU: f64 = 0.8;
+
+/// The sample after each stretch of a drive: the last one beyond a tenth of its largest swing before it rests for two
+/// periods.
+pub(super) fn ends_of_drive(drive: &[f64], period: usize) -> Vec<usize> {
+    let rest = median(&mut drive[drive.len() - drive.len() / 16 - 1..].to_vec());
+    let largest = drive.iter().fold(0.0_f64, |m, y| m.max((y - rest).abs()));
+    let mut ends = Vec::new();
+    let mut last = None;
+    for k in (0..drive.len()).filter(|&k| (drive[k] - rest).abs() > 0.1 * largest) {
+        if let Some(before) = last.filter(|before| k - before > 2 * period) {
+            ends.push(before + 1);
+        }
+        last = Some(k);
+    }
+    ends.extend(last.map(|k| k + 1).filter(|end| end + 2 * period < drive.len()));
+    ends
+}
+
+/// Samples where a steady response begins to die.
+///
+/// # Method
+/// Stretches of eight periods and more with half of the record's largest energy; of each the last sample with 80 % of
+/// its median energy over a period. Late by up to a period, never early: the decay is free there.
+pub(super) fn ends_of_response(envelope: &Envelope) -> Vec<usize> {
+    let (samples, period) = (envelope.samples(), envelope.period);
+    let energy: Vec<f64> =
+        (0..samples).map(|k| envelope.mean(k.saturating_sub(period / 2), k + period / 2 + 1)).collect();
+    let level = DRIVEN * plateau(&energy);
+    let mut ends = Vec::new();
+    let mut first = None;
+    for k in 0..=samples {
+        let driven = energy.get(k).is_some_and(|e| *e >= level);
+        match first {
+            None if driven => first = Some(k),
+            Some(begin) if !driven => {
+                first = None;
+                if k - begin >= LEAST_PERIODS * period && k < samples {
+                    let own = median(&mut energy[begin..k].to_vec());
+                    let last = (begin..k).rev().find(|&k| energy[k] >= PLATEAU * own).unwrap_or(k);
+                    ends.push((last + period / 2 + 1).min(samples));
+                }
+            }
+            _ => {}
+        }
+    }
+    ends
+}
+
+/// Median energy of the samples above half the largest: a single spike is no plateau.
+fn plateau(energy: &[f64]) -> f64 {
+    let most = energy.iter().copied().fold(0.0, f64::max);
+    let mut upper: Vec<f64> = energy.iter().copied().filter(|e| *e > DRIVEN * most).collect();
+    median(&mut upper)
+}

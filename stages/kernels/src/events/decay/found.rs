@@ -1,0 +1,147 @@
+//! What a search finds.
+
+use std::ops::Range;
+
+/// Why a decay ends where it does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DecayEnd {
+    /// The ringing of a period is smaller than the noise.
+    Noise,
+    /// The next event begins.
+    NextEvent,
+    /// The record ends first: it never drowns.
+    RecordEnd,
+}
+
+/// Slope of the logarithm of an oscillation's amplitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decline {
+    /// Decay rate, 1/s; negative: it grows.
+    pub rate_per_s: f64,
+    /// Its standard error, from the scatter round the straight line; infinite where there are too few periods.
+    pub std_per_s: f64,
+}
+
+/// What one channel shows of a decay.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelDecay {
+    /// Largest departure from the level within the decay, in the channel's unit, with its sign.
+    pub peak: f64,
+    /// Sample of the record where it is.
+    pub peak_sample: usize,
+    /// Clipped samples within the decay's range, as samples of the record: to be left out of a fit.
+    pub clipped: Vec<Range<usize>>,
+    /// Level of the quiet stretch before the event, in the channel's unit; none where there is none.
+    pub level_before: Option<f64>,
+    /// Standard deviation of the noise before the event; none where there is no quiet stretch.
+    pub noise_before: Option<f64>,
+    /// The same after the decay.
+    pub noise_after: Option<f64>,
+}
+
+/// A free decay.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeDecay {
+    /// First sample of the event: where the signal leaves what was before.
+    pub onset: usize,
+    /// First sample of the free, linear decay to the sample after its last.
+    pub range: Range<usize>,
+    /// Why it ends there.
+    pub end: DecayEnd,
+    /// Quiet samples before the event; none where the record or the decay before it begins too late.
+    pub quiet: Option<Range<usize>>,
+    /// Strongest frequency, Hz; to the width of a line, not a fit's.
+    pub frequency_hz: f64,
+    /// Decline of that frequency's amplitude.
+    pub decline: Decline,
+    /// Per channel, the drive's left out.
+    pub channels: Vec<ChannelDecay>,
+}
+
+/// An oscillation whose amplitude does not decay: frequency and amplitude are all that can be had from it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Steady {
+    /// Samples of it.
+    pub range: Range<usize>,
+    /// Its frequency, Hz.
+    pub frequency_hz: f64,
+    /// Amplitude per channel, in the channel's unit, the drive's left out.
+    pub amplitude: Vec<f64>,
+    /// Slope of its amplitude.
+    pub decline: Decline,
+    /// Whether it grows by more than its error allows.
+    pub growing: bool,
+}
+
+impl Steady {
+    /// What it means.
+    pub fn statement(&self) -> String {
+        let Decline { rate_per_s, std_per_s } = self.decline;
+        let shape = if self.growing { "grows" } else { "does not decay" };
+        format!(
+            "steady oscillation at {:.6} Hz: its amplitude {shape} (decay rate {rate_per_s:.3e} +- {std_per_s:.1e} \
+             1/s), so Q cannot be had from it",
+            self.frequency_hz
+        )
+    }
+}
+
+/// Why a start was not taken for a decay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DismissedReason {
+    /// Too few samples before it drowns or the next event begins: less than two periods.
+    TooShort,
+    /// Nothing there exceeds the noise.
+    NoRinging,
+}
+
+/// A start that was not taken for a decay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DismissedDecay {
+    /// Where.
+    pub onset: usize,
+    /// Why.
+    pub reason: DismissedReason,
+}
+
+/// What a record holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DecaySearch {
+    /// Decays in order of time.
+    pub decays: Vec<FreeDecay>,
+    /// Oscillations that do not decay.
+    pub steady: Vec<Steady>,
+    /// Starts that are neither.
+    pub dismissed: Vec<DismissedDecay>,
+    /// Standard deviation of each channel's noise, the drive's left out.
+    pub noise_std: Vec<f64>,
+    /// Largest energy over a period, in units of the noise's: 1 is noise.
+    pub largest_energy: f64,
+    /// Numbers of the channels that are searched: all but the drive's.
+    pub channels: Vec<usize>,
+}
+
+impl DecaySearch {
+    /// Why nothing was found, where that is so.
+    pub fn reason(&self) -> Option<String> {
+        if !self.decays.is_empty() {
+            return None;
+        }
+        if let Some(steady) = self.steady.first() {
+            return Some(steady.statement());
+        }
+        let largest = self.largest_energy.max(0.0).sqrt();
+        Some(match self.dismissed.first() {
+            Some(first) => format!(
+                "{} starts, none with a decay; the first, at sample {}, {}",
+                self.dismissed.len(),
+                first.onset,
+                match first.reason {
+                    DismissedReason::TooShort => "is followed by less than two periods above the noise",
+                    DismissedReason::NoRinging => "is followed by noise alone",
+                }
+            ),
+            None => format!("noise alone: no period's rms exceeds {largest:.1} times the noise's"),
+        })
+    }
+}

@@ -1,0 +1,42 @@
+//! Free decays in a record of one or several channels: where they begin, where they drown in the noise.
+//!
+//! [`find_decays`] returns stretches that a sum of decaying exponentials describes, ready for a fit; a steady
+//! oscillation is recognised as one and not taken for a decay.
+//!
+//! ```
+//! use afmid_kernels::events::decay::{DecaySearchOptions, find_decays};
+//!
+//! // 100 Hz, Q = 50, hit at 0.2 s, 5 kHz
+//! let y: Vec<f64> = (0..5000)
+//!     .map(|k| {
+//!         let (t, noise) = (k as f64 / 5e3 - 0.2, 1e-3 * ((k * k) as f64).sin());
+//!         if t < 0.0 { noise } else { (-6.3 * t).exp() * (628.3 * t).sin() + noise }
+//!     })
+//!     .collect();
+//! let found = find_decays(&[&y], 5e3, &DecaySearchOptions::default())?;
+//! assert_eq!(found.decays.len(), 1);
+//! assert!(found.decays[0].range.start.abs_diff(1000) < 20);
+//! # Ok::<(), afmid_kernels::events::decay::DecaySearchError>(())
+//! ```
+
+mod backward;
+mod clipping;
+mod drive;
+mod envelope;
+mod error;
+mod extent;
+mod found;
+mod noise_floor;
+mod onsets;
+mod options;
+mod search;
+#[cfg(test)]
+mod simulated;
+mod steadiness;
+#[cfg(test)]
+mod tests;
+
+pub use error::DecaySearchError;
+pub use found::{ChannelDecay, DecayEnd, DecaySearch, Decline, DismissedDecay, DismissedReason, FreeDecay, Steady};
+pub use options::{DecaySearchOptions, DecayTrigger};
+pub use search::find_decays;

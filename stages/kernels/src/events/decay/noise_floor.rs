@@ -1,0 +1,65 @@
+//! The noise of a channel, from its quietest stretches.
+
+use crate::signal::{RealTransform, hann};
+use crate::statistics::median;
+
+/// Share of a window's power within the two bins beside its strongest from which on it still rings.
+const RINGS: f64 = 0.5;
+/// Windows per record.
+const WINDOWS: usize = 64;
+/// Samples of a window at least: five bins of noise have a tenth of its power.
+const LEAST_WINDOW: usize = 128;
+
+/// Standard deviation of the noise of a channel without its drift.
+///
+/// # Method
+/// Mean squares of windows of a 64th of the record, eight periods at least. Windows within six of their own standard
+/// deviations of the least belong to the noise; their median is its variance. Where the quietest window still rings (a
+/// line holds half of its power) the variance is the median of its periodogram over ln 2: that of white noise beneath
+/// the lines. Floor: rounding of the codes, `1e-9` of the channel's rms.
+pub(super) fn noise_std(swing: &[f64], period: usize, step: f64) -> f64 {
+    let samples = swing.len();
+    let length = (samples / WINDOWS).max(8 * period).max(LEAST_WINDOW).min(samples);
+    let energy = |first: usize| swing[first..first + length].iter().map(|y| y * y).sum::<f64>() / length as f64;
+    let starts: Vec<usize> = (0..=samples - length).step_by((length / 2).max(1)).chain([samples - length]).collect();
+    let energies: Vec<f64> = starts.iter().map(|&first| energy(first)).collect();
+    let quietest = (0..starts.len()).min_by(|&a, &b| energies[a].total_cmp(&energies[b])).unwrap_or(0);
+    let limit = energies[quietest] * (1.0 + 6.0 * (2.0 / length as f64).sqrt());
+    let mut quiet: Vec<f64> = energies.iter().copied().filter(|e| *e <= limit).collect();
+    let mut variance = median(&mut quiet);
+    let (share, white) = spectrum(&swing[starts[quietest]..starts[quietest] + length]);
+    if share > RINGS {
+        variance = white;
+    }
+    let mean = swing.iter().map(|y| y * y).sum::<f64>() / samples as f64;
+    variance.max(step * step / 12.0).max(1e-18 * mean).max(f64::MIN_POSITIVE).sqrt()
+}
+
+/// Share of the power round the strongest bin, and the variance of white noise with the same median bin.
+fn spectrum(values: &[f64]) -> (f64, f64) {
+    let n = values.len();
+    let mean = values.iter().sum::<f64>() / n as f64;
+    let taper = hann(n, 0.5);
+    let mut power = RealTransform::new(n).power(values.iter().zip(&taper).map(|(y, w)| w * (y - mean)));
+    let total: f64 = power.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let peak = (0..power.len()).max_by(|&a, &b| power[a].total_cmp(&power[b])).unwrap_or(0);
+    let share = power[peak.saturating_sub(2)..(peak + 3).min(power.len())].iter().sum::<f64>() / total;
+    let gain = taper.iter().map(|w| w * w).sum::<f64>();
+    // the median of an exponential variable is ln 2 of its mean
+    (share, median(&mut power[1..]) / (std::f64::consts::LN_2 * gain))
+}
+
+/// Smallest step between values of a channel: one code of its converter; 0 where values are not codes.
+pub(super) fn code_step(values: &[f64]) -> f64 {
+    let mut sorted: Vec<f64> = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let range = sorted[sorted.len() - 1] - sorted[0];
+    sorted.dedup();
+    // as many values as samples: no codes
+    if sorted.len() * 4 > 3 * values.len() {
+        return 0.0;
+    }
+    let steps = sorted.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > 1e-9 * range);
+    let least = steps.fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
+}

@@ -1,0 +1,304 @@
+//! The search, from channels to decays.
+
+use std::ops::Range;
+
+use super::clipping::{clipped, touches};
+use super::drive::{ends_of_drive, ends_of_response};
+use super::envelope::{Envelope, Pitch, without_drift};
+use super::error::DecaySearchError;
+use super::extent::{Begin, begin, departure, end, quiet_before};
+use super::found::{ChannelDecay, DecayEnd, DecaySearch, Decline, DismissedDecay, DismissedReason, FreeDecay, Steady};
+use super::noise_floor::{code_step, noise_std};
+use super::onsets::onsets;
+use super::options::{DecaySearchOptions, DecayTrigger};
+use super::steadiness::oscillation;
+use crate::events::baseline;
+
+/// Least samples of a record.
+const LEAST_SAMPLES: usize = 64;
+/// Quiet periods before a rise that is an event for sure.
+const QUIET_PERIODS: usize = 4;
+/// Periods of a decay at least.
+const LEAST_PERIODS: usize = 2;
+/// Fall of the amplitude, nepers, that is a decay whatever its slope's error: two periods of a low Q have none.
+const CERTAIN_FALL: f64 = 1.5;
+/// Fall of the amplitude, nepers, below which an instrument's own gain may have drifted.
+const LEAST_FALL: f64 = 1e-3;
+
+/// Finds the free decays of one record.
+///
+/// # Model
+/// Quiet, an event (hit, release, pulse, end of a drive), free ringing of any number of modes that dies away in white or
+/// slowly wandering noise; the same again. Offset and drift slower than the ringing.
+/// # Method
+/// 1. The strongest oscillation sets the period. Each channel less its running mean over two periods, over its noise
+///    (quietest stretches), squared and added: the envelope.
+/// 2. Starts by [`DecayTrigger`]; refined to the first sustained departure from the quiet line before.
+/// 3. End: where the ringing of two periods is smaller than the noise, or the next start.
+/// 4. First free sample: the later samples foretell it backwards by a linear recurrence; contact and saturation do not
+///    obey it.
+/// 5. The decline of the strongest oscillation against its own error: what does not decline is [`Steady`].
+/// # Shapes
+/// `channels`: C slices of N samples of the same instants.
+/// # Units
+/// The channels' own; samples; Hz.
+/// # Accuracy
+/// First free sample: on or after the true one in all but one of a hundred decays, late by less than half a period;
+/// end: where amplitude and noise are equal, to three quarters of the decay time or two periods (docs/results/decay.md).
+/// Cost: some `100 N C` operations.
+/// # Errors
+/// No channel, unequal lengths, fewer than 64 samples, values that are not finite, options out of range.
+/// # Source
+/// R. V. Allen, Bull. Seismol. Soc. Am. 68 (1978) 1521 (energy before and after a pick); G. R. B. de Prony, J. Ec.
+/// Polytech. 1 (1795) 24 (linear recurrence of exponentials).
+pub fn find_decays(
+    channels: &[&[f64]],
+    sample_rate_hz: f64,
+    options: &DecaySearchOptions,
+) -> Result<DecaySearch, DecaySearchError> {
+    check(channels, sample_rate_hz, options)?;
+    let record = Record::of(channels, sample_rate_hz, options);
+    let starts = record.starts(options);
+    let mut found = DecaySearch {
+        decays: Vec::new(),
+        steady: Vec::new(),
+        dismissed: Vec::new(),
+        largest_energy: record.envelope.largest(0, record.envelope.samples()),
+        noise_std: record.noise_std.clone(),
+        channels: record.numbers.clone(),
+    };
+    let mut since = 0;
+    for (place, &onset) in starts.iter().enumerate() {
+        let next = starts.get(place + 1).copied().unwrap_or(record.envelope.samples());
+        since = record.judge(onset, since, next, options, &mut found);
+    }
+    while found.decays.len() > options.most {
+        let size = |d: &FreeDecay| d.channels.iter().zip(&record.noise_std).map(|(c, s)| (c.peak / s).powi(2)).sum();
+        let sizes: Vec<f64> = found.decays.iter().map(size).collect();
+        let least = (0..sizes.len()).min_by(|&a, &b| sizes[a].total_cmp(&sizes[b])).unwrap_or(0);
+        found.decays.remove(least);
+    }
+    Ok(found)
+}
+
+/// A record as the search sees it.
+struct Record<'a> {
+    /// Without the drive's.
+    channels: Vec<&'a [f64]>,
+    numbers: Vec<usize>,
+    drive: Option<&'a [f64]>,
+    /// Channels without their drift.
+    swings: Vec<Vec<f64>>,
+    noise_std: Vec<f64>,
+    clipped: Vec<Vec<Range<usize>>>,
+    envelope: Envelope,
+    /// Strongest oscillation, cycles per sample.
+    frequency: f64,
+    rate_hz: f64,
+    all: Vec<&'a [f64]>,
+}
+
+impl<'a> Record<'a> {
+    fn of(all: &[&'a [f64]], rate_hz: f64, options: &DecaySearchOptions) -> Self {
+        let drive = match options.trigger {
+            DecayTrigger::DriveEnd { channel } => channel,
+            _ => None,
+        };
+        let numbers: Vec<usize> = (0..all.len()).filter(|&c| Some(c) != drive).collect();
+        let channels: Vec<&[f64]> = numbers.iter().map(|&c| all[c]).collect();
+        let pitch = Pitch::of(&channels);
+        let period = ((1.0 / pitch.slowest).round() as usize).max(2);
+        let swings: Vec<Vec<f64>> = channels.iter().map(|y| without_drift(y, (2 * period) | 1)).collect();
+        let steps: Vec<f64> = channels.iter().map(|y| code_step(y)).collect();
+        let noise_std: Vec<f64> = swings.iter().zip(&steps).map(|(y, &step)| noise_std(y, period, step)).collect();
+        let envelope = Envelope::new(&swings, &noise_std, period);
+        let clipped = channels.iter().zip(&steps).map(|(y, &step)| clipped(y, step)).collect();
+        let drive = drive.map(|c| all[c]);
+        Self {
+            channels,
+            numbers,
+            drive,
+            swings,
+            noise_std,
+            clipped,
+            envelope,
+            frequency: pitch.strongest,
+            rate_hz,
+            all: all.to_vec(),
+        }
+    }
+
+    fn starts(&self, options: &DecaySearchOptions) -> Vec<usize> {
+        match (&options.trigger, self.drive) {
+            (DecayTrigger::DriveEnd { .. }, Some(drive)) => {
+                let ends = ends_of_drive(drive, self.envelope.period);
+                // a response that outlasts its drive's command: the later of the two
+                let response = ends_of_response(&self.envelope);
+                let later = |end: usize| response.iter().copied().find(|&k| k > end);
+                let next = |place: usize| ends.get(place + 1).copied().unwrap_or(usize::MAX);
+                ends.iter().enumerate().map(|(i, &end)| later(end).filter(|&k| k < next(i)).unwrap_or(end)).collect()
+            }
+            (DecayTrigger::DriveEnd { .. }, None) => ends_of_response(&self.envelope),
+            (DecayTrigger::LargestRise, _) => {
+                self.without_beats(onsets(&self.all, &self.envelope, self.rate_hz, options))
+            }
+            _ => onsets(&self.all, &self.envelope, self.rate_hz, options),
+        }
+    }
+
+    /// Leaves out rises that are no events: what follows them foretells what precedes them. From the last one back, so
+    /// that each is judged by all that rings after it.
+    fn without_beats(&self, mut starts: Vec<usize>) -> Vec<usize> {
+        let period = self.envelope.period;
+        let mut next = self.envelope.samples();
+        for place in (0..starts.len()).rev() {
+            let start = starts[place];
+            let before = start.saturating_sub(period / 4);
+            let quiet = start < QUIET_PERIODS * period
+                || self.envelope.mean(before - before.min(QUIET_PERIODS * period), before) < 2.0;
+            let (end, _) = end(&self.envelope, self.channels.len(), start, next);
+            if !quiet && self.begin(start, end).foretold {
+                starts.remove(place);
+            } else {
+                next = start;
+            }
+        }
+        starts
+    }
+
+    fn begin(&self, onset: usize, end: usize) -> Begin {
+        begin(&self.channels, &self.swings, &self.noise_std, &self.clipped, onset, end, self.envelope.period)
+    }
+
+    /// Takes the start for a decay, a steady oscillation or neither; where the next quiet stretch may begin.
+    fn judge(
+        &self,
+        start: usize,
+        since: usize,
+        next: usize,
+        options: &DecaySearchOptions,
+        found: &mut DecaySearch,
+    ) -> usize {
+        let period = self.envelope.period;
+        let given = !matches!(options.trigger, DecayTrigger::LargestRise);
+        let quiet = quiet_before(&self.envelope, since, start);
+        let onset = match &quiet {
+            Some(quiet) if !given => departure(&self.channels, &self.noise_std, start, quiet.start, period),
+            _ => start,
+        };
+        let (end, why) = end(&self.envelope, self.channels.len(), onset, next);
+        let driven = if given { None } else { self.driven_until(onset, end, options, found) };
+        let onset = driven.unwrap_or(onset);
+        let first = match options.trigger {
+            // the drive's end is the last forced sample
+            DecayTrigger::DriveEnd { .. } => onset,
+            _ if driven.is_some() => onset,
+            _ => self.begin(onset, end).free,
+        } + (options.skip_s * self.rate_hz).round() as usize;
+        if first + LEAST_PERIODS * period > end {
+            let reason = if end <= onset + period { DismissedReason::NoRinging } else { DismissedReason::TooShort };
+            found.dismissed.push(DismissedDecay { onset, reason });
+            return end;
+        }
+        let range = first..end;
+        let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
+        let frequency_hz = tone.frequency * self.rate_hz;
+        if self.is_steady(&tone.decline, &range, why, options) {
+            let Decline { rate_per_s, std_per_s } = tone.decline;
+            let growing = rate_per_s < -options.decline_significance * std_per_s;
+            let (decline, amplitude) = (tone.decline, tone.amplitude);
+            found.steady.push(Steady { range, frequency_hz, amplitude, decline, growing });
+            return end;
+        }
+        let channels = self.channels_of(&range, quiet.as_ref(), next);
+        found.decays.push(FreeDecay { onset, range, end: why, quiet, frequency_hz, decline: tone.decline, channels });
+        end
+    }
+
+    /// Where a drive ends that kept the response steady from `onset` on; that stretch goes to the steady ones.
+    fn driven_until(
+        &self,
+        onset: usize,
+        end: usize,
+        options: &DecaySearchOptions,
+        found: &mut DecaySearch,
+    ) -> Option<usize> {
+        let period = self.envelope.period;
+        let inside = |k: &usize| *k > onset + 8 * period && k + LEAST_PERIODS * period < end;
+        let last = ends_of_response(&self.envelope).into_iter().find(inside)?;
+        // the switch-on and the last period are not steady
+        let range = onset + period..last - period;
+        let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
+        if !tone.decline.std_per_s.is_finite() || !self.is_steady(&tone.decline, &range, DecayEnd::NextEvent, options) {
+            return None;
+        }
+        let (frequency_hz, amplitude, decline) = (tone.frequency * self.rate_hz, tone.amplitude, tone.decline);
+        found.steady.push(Steady { range, frequency_hz, amplitude, decline, growing: false });
+        Some(last)
+    }
+
+    /// Whether the decline is within its error, or an instrument's drift.
+    fn is_steady(&self, decline: &Decline, range: &Range<usize>, why: DecayEnd, options: &DecaySearchOptions) -> bool {
+        let energy = |first: usize| self.envelope.mean(first, first + LEAST_PERIODS * self.envelope.period) - 1.0;
+        let last = range.end.saturating_sub(LEAST_PERIODS * self.envelope.period).max(range.start);
+        let fall = 0.5 * (energy(range.start) / energy(last).max(1e-3)).max(f64::MIN_POSITIVE).ln();
+        if fall > CERTAIN_FALL {
+            return false;
+        }
+        let total = decline.rate_per_s * range.len() as f64 / self.rate_hz;
+        let short = !decline.std_per_s.is_finite();
+        // few periods that end in the noise have died; few that fill the record cannot be judged by a slope
+        if short {
+            return why != DecayEnd::Noise && fall < 0.5;
+        }
+        decline.rate_per_s < options.decline_significance * decline.std_per_s || total < LEAST_FALL
+    }
+
+    fn channels_of(&self, range: &Range<usize>, quiet: Option<&Range<usize>>, next: usize) -> Vec<ChannelDecay> {
+        let after = range.end + self.envelope.period..next.saturating_sub(self.envelope.period);
+        (0..self.channels.len())
+            .map(|c| {
+                let (y, swing) = (self.channels[c], &self.swings[c]);
+                let before = quiet.and_then(|quiet| baseline(y, quiet.clone()));
+                let behind = if after.len() >= 32 { baseline(y, after.clone()) } else { None };
+                let largest = |&a: &usize, &b: &usize| swing[a].abs().total_cmp(&swing[b].abs());
+                let peak_sample = range.clone().max_by(largest).unwrap_or(range.start);
+                let level = match (&before, &behind) {
+                    (_, Some(line)) => line.at(peak_sample as f64),
+                    (Some(line), None) => line.at(peak_sample as f64),
+                    (None, None) => y[peak_sample] - swing[peak_sample],
+                };
+                let gaps = self.clipped[c].iter().filter(|gap| touches(std::slice::from_ref(gap), range.clone()));
+                let cut = |gap: &Range<usize>| gap.start.max(range.start)..gap.end.min(range.end);
+                ChannelDecay {
+                    peak: y[peak_sample] - level,
+                    peak_sample,
+                    clipped: gaps.map(cut).collect(),
+                    level_before: before.map(|line| line.at(range.start as f64)),
+                    noise_before: before.map(|line| line.noise_std),
+                    noise_after: behind.map(|line| line.noise_std),
+                }
+            })
+            .collect()
+    }
+}
+
+fn check(channels: &[&[f64]], rate_hz: f64, options: &DecaySearchOptions) -> Result<(), DecaySearchError> {
+    let wanted = channels.first().ok_or(DecaySearchError::NoChannel)?.len();
+    for (channel, values) in channels.iter().enumerate() {
+        if values.len() != wanted {
+            return Err(DecaySearchError::Length { channel, found: values.len(), wanted });
+        }
+        if let Some(index) = values.iter().position(|y| !y.is_finite()) {
+            return Err(DecaySearchError::NotFinite { channel, index });
+        }
+    }
+    if wanted < LEAST_SAMPLES {
+        return Err(DecaySearchError::TooShort { found: wanted, wanted: LEAST_SAMPLES });
+    }
+    if !(rate_hz > 0.0 && rate_hz.is_finite()) {
+        let wanted = "above 0";
+        return Err(DecaySearchError::Parameter { name: "sample_rate_hz", found: rate_hz, wanted });
+    }
+    options.check(channels.len())
+}

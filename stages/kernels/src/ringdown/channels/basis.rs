@@ -1,0 +1,87 @@
+//! Poles, and the signals that they make.
+
+use faer::c64;
+
+/// Poles of all modes, 1/s.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Poles(pub Vec<c64>);
+
+impl Poles {
+    /// Numbers in the search's order: Re and Im of each, times `unit_s`.
+    pub fn values(&self, unit_s: f64) -> Vec<f64> {
+        self.0.iter().flat_map(|s| [s.re * unit_s, s.im * unit_s]).collect()
+    }
+
+    pub fn from_values(values: &[f64], unit_s: f64) -> Self {
+        Self(values.chunks_exact(2).map(|v| c64::new(v[0] / unit_s, v[1] / unit_s)).collect())
+    }
+
+    /// Whether all decay and oscillate, above the least quality factor and below half the sample rate.
+    pub fn valid(&self, interval_s: f64, least_quality_factor: f64) -> bool {
+        self.0.iter().all(|s| {
+            s.re < 0.0
+                && s.im > 0.0
+                && s.im * interval_s < std::f64::consts::PI
+                && s.norm() >= -2.0 * s.re * least_quality_factor
+        })
+    }
+}
+
+/// Amplitudes that each record has for itself: two per mode, an offset, a slope.
+pub(super) fn own_count(modes: usize, drift: bool) -> usize {
+    2 * modes + 1 + usize::from(drift)
+}
+
+/// Columns of a record's own amplitudes, then those of the poles' changes, two per mode each.
+///
+/// # Model
+/// `Re(rho exp(s t)) = Re(rho) Re(e) - Im(rho) Im(e)`: columns `Re(e), -Im(e)`, then 1 and a ramp from -1 to 1, then
+/// `t Re(e), -t Im(e)` with the time in units of `unit_s`.
+pub(super) fn columns(poles: &Poles, interval_s: f64, unit_s: f64, samples: usize, drift: bool) -> Vec<Vec<f64>> {
+    let modes = poles.0.len();
+    let own = own_count(modes, drift);
+    let mut all = vec![vec![0.0; samples]; own + 2 * modes];
+    for (j, pole) in poles.0.iter().enumerate() {
+        let step = (pole * interval_s).exp();
+        // below every rounding nothing is left to add, and denormal numbers are slow
+        let values: Vec<c64> = std::iter::successors(Some(c64::new(1.0, 0.0)), |z| Some(z * step))
+            .take(samples)
+            .take_while(|z| z.norm_sqr() > 1e-200)
+            .collect();
+        let mut put = |column: usize, value: &dyn Fn(f64, c64) -> f64| {
+            for (k, (target, z)) in all[column].iter_mut().zip(&values).enumerate() {
+                *target = value(k as f64 * interval_s / unit_s, *z);
+            }
+        };
+        put(2 * j, &|_, z| z.re);
+        put(2 * j + 1, &|_, z| -z.im);
+        put(own + 2 * j, &|t, z| t * z.re);
+        put(own + 2 * j + 1, &|t, z| -t * z.im);
+    }
+    all[2 * modes].fill(1.0);
+    if drift {
+        let centre = 0.5 * (samples.max(2) - 1) as f64;
+        all[2 * modes + 1].iter_mut().enumerate().for_each(|(k, v)| *v = (k as f64 - centre) / centre);
+    }
+    all
+}
+
+/// A record's model: its own amplitudes times their columns.
+pub(super) fn signal(poles: &Poles, own: &[f64], interval_s: f64, samples: usize, drift: bool) -> Vec<f64> {
+    let modes = poles.0.len();
+    let centre = 0.5 * (samples.max(2) - 1) as f64;
+    let slope = if drift { own[2 * modes + 1] } else { 0.0 };
+    let mut out: Vec<f64> = (0..samples).map(|k| own[2 * modes] + slope * (k as f64 - centre) / centre).collect();
+    for (j, pole) in poles.0.iter().enumerate() {
+        let step = (pole * interval_s).exp();
+        let mut z = c64::new(own[2 * j], own[2 * j + 1]);
+        for value in &mut out {
+            *value += z.re;
+            z *= step;
+            if z.norm_sqr() < 1e-200 {
+                break;
+            }
+        }
+    }
+    out
+}
