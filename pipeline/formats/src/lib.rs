@@ -5,14 +5,19 @@
 //! [`Source`] reads any stretch of these. Nothing here knows physics, HDF5 or the rest of afmid.
 
 mod archive;
+mod axes;
 mod budget;
 mod calendar;
 mod fail;
+mod fields;
 mod grid;
 pub mod igor;
 mod inflating;
+mod joined;
 pub mod jpk;
+pub mod keysight;
 mod lanes;
+pub mod lecroy;
 mod listing;
 pub mod matlab;
 pub mod nanoscope;
@@ -27,13 +32,16 @@ pub mod raw_binary;
 mod registry;
 mod regular;
 pub mod tdms;
+pub mod tektronix;
 mod text;
 pub mod text_table;
 pub mod uff;
+pub mod wav;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use axes::settle as settle_axes;
 pub use budget::most_inflated;
 pub use grid::numbers_in_file;
 pub use lanes::Lanes;
@@ -91,10 +99,32 @@ pub struct FoundChannel {
     pub fill_code: Option<f64>,
     /// Samples before which the recording was interrupted: a restart, a lost buffer. Ascending.
     pub gaps: Vec<usize>,
+    /// Whether it is an axis (times, frequencies, a counter) and no signal.
+    pub is_axis: bool,
     /// Type of the stored samples, for people: `int16`, `float64`.
     pub stored_as: &'static str,
     /// Where the samples come from.
     pub source: Arc<dyn Source>,
+}
+
+impl FoundChannel {
+    /// A channel that is described by nothing but its name: no unit, no rate, values as they are stored.
+    pub fn new(location: impl Into<String>, samples: usize, stored_as: &'static str, source: Arc<dyn Source>) -> Self {
+        Self {
+            location: location.into(),
+            samples,
+            unit: String::new(),
+            long_name: String::new(),
+            sample_rate_hz: None,
+            scale_factor: 1.0,
+            add_offset: 0.0,
+            fill_code: None,
+            gaps: Vec::new(),
+            is_axis: false,
+            stored_as,
+            source,
+        }
+    }
 }
 
 /// What a file holds.

@@ -16,6 +16,8 @@ pub(super) struct Column {
     pub(super) first_no_number: usize,
     /// NaN put in for fields that hold nothing or no number.
     pub(super) missing: usize,
+    /// Numbers right of a text: values of a header that stands beside the rows.
+    pub(super) labelled: usize,
 }
 
 /// How many numbers, gaps included, may still be kept: as many as the file has bytes. Rows that lack most of their
@@ -50,6 +52,11 @@ impl Column {
         self.values.push(value);
         self.printed.see(field);
         Ok(())
+    }
+
+    /// How many numbers it holds.
+    pub(super) fn numbers(&self) -> usize {
+        self.values.len().saturating_sub(self.missing)
     }
 
     /// What to say of its missing values.

@@ -12,18 +12,28 @@
 //! that does not run evenly is a channel of its own.
 //!
 //! **Plain**: the delimiter (tab, semicolon, comma, blanks) and the decimal sign are those that make most fields
-//! numbers.
-//! Titles and units (`Deflection (V)`, `[V]`, or a row of units) come from the lines above the numbers, comments (`#`,
-//! `%`) included.
-//! A column titled as time that runs evenly gives the sample rate and is no channel; otherwise it is one and there is
-//! no rate.
+//! numbers. Most lines say what a row has in each column (a number, a date or time of day, text, nothing); the first
+//! line that has the same begins the rows, and what is above it is the header. A line among the rows that begins like a
+//! line of the header, or has words and no number where rows have numbers, is no row: the header of a recording that
+//! was begun again, and a gap unless the times go on evenly.
+//! Titles and units (`Deflection (V)`, `[V]`, `Weg / m`, `C1 in V`, or a row of units or of their names) come from the
+//! lines above the numbers, comments (`#`, `%`) included. Units by their SI names (`Volt`) are given as symbols.
+//! A column titled as time, or a first column in a unit of time, that runs evenly gives the sample rate and is no
+//! channel; otherwise it is one and there is no rate. An interval or a rate that the header states by a key (`Sample
+//! Interval`, `Increment`, `delta t`, `tInc`, `Sampling Frequency`) is taken where the times agree with it or there
+//! are none; a first column that counts by 1 is no channel then. If times and header disagree there is no rate.
 //! Evenly: each time deviates from the straight line by at most 1e-6 of a step plus one unit of the last place it is
 //! printed to.
+//! A column of one number beside columns of more, and numbers behind words in front of the rows (a header beside them,
+//! as Tektronix writes it), are no channels.
 //!
 //! Source: National Instruments, "Specification for the LabVIEW Measurement File (.lvm)", ni.com/tutorial/4139/en.
 
 mod axis;
+mod channels;
 mod column;
+mod header;
+mod kind;
 mod lines;
 mod lvm;
 mod lvm_header;
@@ -31,7 +41,9 @@ mod lvm_join;
 mod number;
 mod plain;
 mod sniff;
+mod stated;
 mod titles;
+mod units;
 
 use crate::pinned::{Pinned, stretch_of};
 use crate::{Contents, Format, FormatError, Raw, Source};

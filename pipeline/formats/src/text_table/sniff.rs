@@ -1,8 +1,10 @@
 //! Finds delimiter and decimal sign of a plain table by looking at its first lines.
 
+use super::kind::Kind;
 use super::lines::BYTE_ORDER_MARK;
 use super::number;
 use crate::text::decode;
+use std::collections::BTreeMap;
 
 /// How fields are set apart and numbers printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,16 +26,17 @@ const DIALECTS: [Dialect; 7] = [
 ];
 
 /// What the first lines show.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Sniffed {
     pub(super) dialect: Dialect,
-    pub(super) columns: usize,
+    /// What most rows hold in each column.
+    pub(super) kinds: Vec<Kind>,
+    /// The column that every row begins with: the first of numbers or stamps that most rows fill.
+    pub(super) leading: usize,
     /// Which of the lines is the first row.
     pub(super) first_row: usize,
     /// Whether `1,2` could as well be one number with a decimal comma.
     pub(super) ambiguous: bool,
-    /// Whether the rows have a delimiter behind their last field.
-    pub(super) ends_with_delimiter: bool,
 }
 
 impl Dialect {
@@ -42,23 +45,26 @@ impl Dialect {
         if self.delimiter == ' ' { line.split_whitespace().collect() } else { line.split(self.delimiter).collect() }
     }
 
-    /// Fields that are numbers, and such that are neither empty nor numbers.
-    fn count(&self, fields: &[&str]) -> (usize, usize) {
-        let numbers = fields.iter().filter(|f| number::parse(f, self.decimal).is_some()).count();
-        let filled = fields.iter().filter(|f| !number::bare(f).is_empty()).count();
-        (numbers, filled - numbers.min(filled))
+    /// Fields that are numbers, and such that are text.
+    fn count(&self, line: &str) -> (usize, usize) {
+        let kinds = self.kinds(line);
+        let count = |kind: Kind| kinds.iter().filter(|k| **k == kind).count();
+        (count(Kind::Number), count(Kind::Text))
     }
 
-    fn is_row(&self, line: &str) -> Option<usize> {
-        let fields = self.fields(line);
-        let (numbers, others) = self.count(&fields);
-        (!is_comment(line) && numbers > 0 && numbers >= others).then_some(fields.len())
+    fn kinds(&self, line: &str) -> Vec<Kind> {
+        self.fields(line).into_iter().map(|field| Kind::of(field, self.decimal)).collect()
+    }
+
+    fn is_row(&self, line: &str) -> bool {
+        let (numbers, others) = self.count(line);
+        !is_comment(line) && numbers > 0 && numbers >= others
     }
 
     /// Numbers in the lines, less the fields of text: a wrong delimiter makes fewer numbers and some text.
     fn score(&self, lines: &[&str]) -> i64 {
-        let rows = lines.iter().filter(|line| self.is_row(line).is_some());
-        rows.map(|line| self.count(&self.fields(line))).map(|(numbers, others)| numbers as i64 - others as i64).sum()
+        let rows = lines.iter().filter(|line| self.is_row(line));
+        rows.map(|line| self.count(line)).map(|(numbers, others)| numbers as i64 - others as i64).sum()
     }
 }
 
@@ -73,32 +79,68 @@ pub(super) fn sniff(lines: &[&str]) -> Option<Sniffed> {
     if score <= 0 {
         return None;
     }
-    let widths: Vec<Option<usize>> = lines.iter().map(|line| dialect.is_row(line)).collect();
-    // The last row looked at is far behind any header; a cut off one is left out by the caller.
-    let columns = most_frequent(widths.iter().flatten().copied())?;
-    let first_row = widths.iter().position(|w| *w == Some(columns))?;
+    let rows: Vec<Vec<Kind>> = lines.iter().filter(|line| dialect.is_row(line)).map(|l| dialect.kinds(l)).collect();
+    let columns = heaviest(rows.iter().map(|kinds| (kinds.len(), weight(kinds))))?;
+    let fitting: Vec<&Vec<Kind>> = rows.iter().filter(|kinds| kinds.len() == columns).collect();
+    let kinds: Vec<Kind> = (0..columns).map(|column| kind_of(column, &fitting)).collect();
+    let leading = leading(&kinds, &fitting);
+    let first_row = first_row(lines, dialect, &kinds, leading)?;
     let comma_pairs = dialect == Dialect { delimiter: ',', decimal: '.' } && columns == 2;
-    let rows = || lines.iter().zip(&widths).filter(|(_, w)| **w == Some(columns)).map(|(line, _)| *line);
-    let ambiguous = comma_pairs && rows().all(|line| number::parse(line, ',').is_some());
+    let pairs = || lines.iter().filter(|line| dialect.is_row(line) && dialect.fields(line).len() == columns);
+    let ambiguous = comma_pairs && pairs().all(|line| number::parse(line, ',').is_some());
     // `0,05`: no whole number is printed with a leading 0, so the comma is decimal.
-    let leading_zero = |line: &str| line.split_once(',').is_some_and(|(_, b)| b.len() > 1 && b.starts_with('0'));
-    if ambiguous && rows().any(leading_zero) {
+    let leading_zero = |line: &&str| line.split_once(',').is_some_and(|(_, b)| b.len() > 1 && b.starts_with('0'));
+    if ambiguous && pairs().any(leading_zero) {
         let dialect = Dialect { delimiter: ' ', decimal: ',' };
-        return Some(Sniffed { dialect, columns: 1, first_row, ambiguous: false, ends_with_delimiter: false });
+        return Some(Sniffed { dialect, kinds: vec![Kind::Number], leading: 0, first_row, ambiguous: false });
     }
-    let ends_with_delimiter = dialect.delimiter != ' ' && rows().all(|line| line.ends_with(dialect.delimiter));
-    Some(Sniffed { dialect, columns, first_row, ambiguous, ends_with_delimiter })
+    Some(Sniffed { dialect, kinds, leading, first_row, ambiguous })
 }
 
-fn most_frequent(widths: impl Iterator<Item = usize>) -> Option<usize> {
-    let mut counts: Vec<(usize, usize)> = Vec::new();
-    for width in widths {
-        match counts.iter_mut().find(|(w, _)| *w == width) {
-            Some((_, count)) => *count += 1,
-            None => counts.push((width, 1)),
-        }
+/// How much a line says about what rows are: its numbers less its texts. Headers of a word and a number say nothing,
+/// however many there are; a table of such rows says a little.
+fn weight(kinds: &[Kind]) -> usize {
+    let count = |kind: Kind| kinds.iter().filter(|k| **k == kind).count();
+    1 + 1000 * count(Kind::Number).saturating_sub(count(Kind::Text))
+}
+
+/// The item with the largest sum of weights; of equal ones the larger.
+fn heaviest<T: Ord + Copy>(items: impl Iterator<Item = (T, usize)>) -> Option<T> {
+    let mut sums: BTreeMap<T, usize> = BTreeMap::new();
+    for (item, weight) in items {
+        *sums.entry(item).or_default() += weight;
     }
-    counts.into_iter().max_by_key(|&(width, count)| (count, width)).map(|(width, _)| width)
+    sums.into_iter().max_by_key(|&(item, sum)| (sum, item)).map(|(item, _)| item)
+}
+
+/// What the rows that fill a column hold there.
+fn kind_of(column: usize, rows: &[&Vec<Kind>]) -> Kind {
+    let filled = rows.iter().filter_map(|kinds| Some((*kinds.get(column)?, weight(kinds))));
+    heaviest(filled.filter(|(kind, _)| *kind != Kind::Empty)).unwrap_or(Kind::Empty)
+}
+
+fn leading(kinds: &[Kind], rows: &[&Vec<Kind>]) -> usize {
+    let is_value = |kind: Kind| matches!(kind, Kind::Number | Kind::Stamp);
+    let filled = |column: usize| rows.iter().filter(|row| row.get(column).is_some_and(|kind| is_value(*kind))).count();
+    let leads = |&(column, kind): &(usize, &Kind)| is_value(*kind) && 2 * filled(column) >= rows.len();
+    kinds.iter().enumerate().find(leads).map_or(0, |(column, _)| column)
+}
+
+/// The first line that is a row: as wide as rows are, without text where they have numbers, and with a first number. A
+/// line that fits worse is taken if there is no such line.
+fn first_row(lines: &[&str], dialect: Dialect, kinds: &[Kind], lead: usize) -> Option<usize> {
+    let fits = |line: &str| {
+        let found = dialect.kinds(line);
+        let fits = |(found, wanted): (&Kind, &Kind)| found == wanted || *found == Kind::Empty || is_text(*wanted);
+        found.len() == kinds.len() && found.iter().zip(kinds).all(fits) && found.get(lead) == kinds.get(lead)
+    };
+    let row = |line: &&str| dialect.is_row(line) && dialect.fields(line).len() == kinds.len();
+    let strict = lines.iter().position(|line| row(line) && fits(line));
+    strict.or_else(|| lines.iter().position(row))
+}
+
+fn is_text(kind: Kind) -> bool {
+    matches!(kind, Kind::Text | Kind::Empty)
 }
 
 /// Whether a file's first bytes are text with rows of numbers.

@@ -1,6 +1,7 @@
 //! Titles and units of columns.
 
 use super::number::bare;
+use super::units;
 use std::collections::HashMap;
 
 /// A column's title and unit.
@@ -10,54 +11,65 @@ pub(super) struct Title {
     pub(super) unit: String,
 }
 
-/// Units that make a row of short words a row of units.
-const KNOWN_UNITS: [&str; 27] = [
-    "s", "sec", "ms", "us", "µs", "ns", "min", "V", "mV", "uV", "µV", "A", "mA", "nA", "pA", "N", "nN", "pN", "m",
-    "mm", "um", "µm", "nm", "pm", "Hz", "kHz", "deg",
-];
+/// Words that stand in a row of units for a column without one.
+const NO_UNIT: [&str; 8] = ["sequence", "index", "sample", "samples", "points", "pts", "#", "-"];
 
-/// Splits `Deflection (V)` or `Deflection [V]`; without brackets, the title is the name.
+/// Splits `Deflection (V)`, `Deflection [V]`, `"Weg" s_A1 / m` (CASSY), `C1 in V` (Rohde & Schwarz); otherwise the
+/// title is the name.
 pub(super) fn split_unit(text: &str) -> Title {
-    let text = bare(text);
+    let text = bare(text.trim().strip_prefix("DEF=").unwrap_or(text));
     for (open, close) in [('(', ')'), ('[', ']')] {
         if let Some((name, unit)) = text.strip_suffix(close).and_then(|t| t.rsplit_once(open)) {
-            return Title { name: name.trim().to_owned(), unit: unit.trim().to_owned() };
+            return Title {
+                name: quoted(name).to_owned(),
+                unit: units::symbol(unit).unwrap_or_else(|| unit.trim().to_owned()),
+            };
         }
+    }
+    for mark in [" / ", " in "] {
+        let split = text.rsplit_once(mark).map(|(name, unit)| (name, unit.trim()));
+        if let Some((name, unit)) = split.and_then(|(name, unit)| Some((name, units::symbol(unit)?))) {
+            return Title { name: quoted(name).to_owned(), unit };
+        }
+    }
+    // `in s` is a unit without a name
+    if let Some(unit) = text.strip_prefix("in ").and_then(units::symbol) {
+        return Title { name: String::new(), unit };
     }
     Title { name: text.to_owned(), unit: String::new() }
 }
 
-/// Whether a row of fields names units only.
-pub(super) fn are_units(fields: &[String]) -> bool {
-    let mut filled = fields.iter().map(|f| bare(f)).filter(|f| !f.is_empty()).peekable();
-    if filled.peek().is_none() {
-        return false;
-    }
-    let bracketed = |f: &&str| (f.starts_with('[') && f.ends_with(']')) || (f.starts_with('(') && f.ends_with(')'));
-    let all: Vec<&str> = filled.collect();
-    all.iter().all(bracketed)
-        || (all.iter().any(|f| KNOWN_UNITS.contains(f))
-            && all.iter().all(|f| f.chars().count() <= 8 && !f.contains(' ')))
+/// `"Weg" s_A1`: what is between the quotes, with the symbol left out; otherwise all of it.
+fn quoted(name: &str) -> &str {
+    let name = name.trim();
+    name.strip_prefix('"').and_then(|rest| rest.split_once('"')).map_or(name, |(inside, _)| inside.trim())
 }
 
-/// Seconds in the unit of a time; none if it is no unit of time.
-pub(super) fn seconds(unit: &str) -> Option<f64> {
-    Some(match unit.to_lowercase().trim_end_matches('.') {
-        "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
-        "ms" | "msec" | "milliseconds" => 1e-3,
-        "us" | "µs" | "μs" | "usec" | "microseconds" => 1e-6,
-        "ns" | "nsec" | "nanoseconds" => 1e-9,
-        "min" | "minutes" => 60.0,
-        "h" | "hours" => 3600.0,
-        _ => return None,
-    })
+/// Whether a row of fields names units only: all in brackets, or most of them units and the others short words.
+pub(super) fn are_units(fields: &[String]) -> bool {
+    let all: Vec<&str> = fields.iter().map(|f| bare(f)).filter(|f| !f.is_empty()).collect();
+    let bracketed = |f: &&str| (f.starts_with('[') && f.ends_with(']')) || (f.starts_with('(') && f.ends_with(')'));
+    let is_unit = |f: &&&str| units::symbol(f).is_some() || NO_UNIT.contains(&f.to_lowercase().as_str());
+    let known = all.iter().filter(is_unit).count();
+    let short = all.iter().all(|f| f.chars().count() <= 8 && !f.contains(' '));
+    !all.is_empty() && (all.iter().all(bracketed) || (2 * known > all.len() && short))
+}
+
+/// The unit that a field of such a row names; empty for words that stand for none.
+pub(super) fn unit_of(field: &str) -> String {
+    let text = bare(field).trim_matches(['(', ')', '[', ']']).trim();
+    if NO_UNIT.contains(&text.to_lowercase().as_str()) {
+        return String::new();
+    }
+    units::symbol(text).unwrap_or_else(|| text.to_owned())
 }
 
 /// Whether a title is that of time.
 pub(super) fn is_time(title: &Title) -> bool {
     let name = title.name.to_lowercase();
-    let words = ["time", "t", "zeit", "temps", "elapsed time", "x_value", "timestamp", "relative time"];
-    words.contains(&name.as_str()) || (name.starts_with("time") && seconds(&title.unit).is_some())
+    let words =
+        ["time", "t", "zeit", "temps", "elapsed time", "x_value", "timestamp", "relative time", "second", "seconds"];
+    words.contains(&name.as_str()) || (name.starts_with("time") && units::seconds(&title.unit).is_some())
 }
 
 /// Locations: the title, `column_3` without one, `Title[2]` for the second of a title.
@@ -83,6 +95,9 @@ mod tests {
         assert_eq!(split_unit("PressCo ABS. (MPa)"), title("PressCo ABS.", "MPa"));
         assert_eq!(split_unit("[V]"), title("", "V"));
         assert_eq!(split_unit("Plain"), title("Plain", ""));
+        assert_eq!(split_unit("DEF=\"Zeit\" t / s"), title("Zeit", "s"));
+        assert_eq!(split_unit("C1 in V"), title("C1", "V"));
+        assert_eq!(split_unit("in / out"), title("in / out", ""));
     }
 
     #[test]

@@ -258,3 +258,108 @@ fn tables_are_recognised_by_name_and_looks() {
     );
     assert!(!is("a.txt", b"    -1\n    58\n1 2 3\n") && !is("a.csv", b""));
 }
+
+/// Location, unit and rate of each channel.
+fn described(contents: &Contents) -> Vec<(&str, &str, Option<f64>)> {
+    contents.channels.iter().map(|c| (c.location.as_str(), c.unit.as_str(), c.sample_rate_hz)).collect()
+}
+
+#[test]
+fn headers_of_oscilloscopes_are_no_samples() {
+    // The layouts are those of the writers' files; three rows of samples each, at 1 kHz.
+    let files = [
+        ("keysight.csv", "x-axis,1,2\nsecond,Volt,Volt\n-1.0E-03,1,4\n+0.0E+00,2,5\n+1.0E-03,3,6\n", ["1", "2"]),
+        (
+            "rigol_z.csv",
+            "X,CH1,CH2,Start,Increment,\r\nSequence,Volt,Volt,-2.0e-03,1.0e-03\r\n0,1,4,,\r\n1,2,5,,\r\n2,3,6,,\r\n",
+            ["CH1", "CH2"],
+        ),
+        ("rigol_5.csv", "CH1(V),CH2(V),,t0 =-5e-05, tInc = 1e-03,\n1,4,,\n2,5,,\n3,6,,\n", ["CH1", "CH2"]),
+        (
+            "rigol_e.csv",
+            "\"Number of Data points =\",3,\n\"Sampling Frequency (Hz)=\",1000,\n\"Scale (V/DIV) = \",0.1,2\n\
+             \"Time (s)\",\"a (V)\",\"b (V)\"\n0,1,4\n1E-3,2,5\n2E-3,3,6\n",
+            ["a", "b"],
+        ),
+        (
+            "tektronix.csv",
+            "Model,TBS\r\n\r\nHorizontal Units,S\r\nHorizontal Scale,0.1\r\nSample Interval,0.001\r\n\
+             Vertical Units,V\r\nLabel,\r\nTIME,CH1,CH2\r\n-8.000e-01,1,4\r\n-7.990e-01,2,5\r\n-7.980e-01,3,6\r\n",
+            ["CH1", "CH2"],
+        ),
+        (
+            "siglent.csv",
+            "Record Length,Analog:3\nSample Interval,Analog:0.001\nVertical Units,CH1:V,CH2:V\nSource,CH1,CH2\n\
+             Second,Volt,Volt\n-0.001,1,4\n0,2,5\n0.001,3,6\n",
+            ["CH1", "CH2"],
+        ),
+        ("rohde.csv", "in s,C1 in V,C2 in V\n0E+00,1,4\n1E-03,2,5\n2E-03,3,6\n", ["C1", "C2"]),
+        ("pico.csv", "Time,A,B\n(ms),(V),(V)\n\n0.0,1,4\n1.0,2,5\n2.0,3,6\n", ["A", "B"]),
+        (
+            "cassy.txt",
+            "MIN=0\t-1\t-5\r\nMAX=905,1\t1\t5\r\nSCALE=905,1\t0,5\t5\r\nDEC=1\t3\t4\r\n\
+             DEF=\"Zeit\" t / s\t\"U\" U_B1 / V\t\"U_k\" U_k / V\r\n0\t1\t4\r\n0,001\t2\t5\r\n0,002\t3\t6\r\n",
+            ["U", "U_k"],
+        ),
+        (
+            "labview.csv",
+            "waveform,a (V),b (V)\nt0,4/16/2021  11:31:19.5,4/16/2021  11:31:19.5\ndelta t,1E-3,1E-3\n\n\
+             time,a (V),b (V)\n4/16/2021  11:31:19.5,1,4\n4/16/2021  11:31:19.501,2,5\n4/16/2021  11:31:19.502,3,6\n",
+            ["a", "b"],
+        ),
+        ("comments.dat", "# fs = 1 kHz\n# n\ta [V]\tb [V]\n0\t1\t4\n1\t2\t5\n2\t3\t6\n", ["a", "b"]),
+    ];
+    for (name, text, locations) in files {
+        let found = table(name, text);
+        let wanted: Vec<_> = locations.iter().map(|location| (*location, "V", Some(1000.0))).collect();
+        assert_eq!(described(&found), wanted, "{name}: {:?}", found.remarks);
+        assert_eq!(values(&found.channels[0]), [1.0, 2.0, 3.0], "{name}");
+        assert_eq!(values(&found.channels[1]), [4.0, 5.0, 6.0], "{name}");
+    }
+}
+
+#[test]
+fn a_header_beside_the_rows_is_no_channel() {
+    // Tektronix TDS: 18 lines of the header, then rows go on without it.
+    let mut text = "Record Length,5.0e+01,,0.0000,1\nSample Interval,1.0e-03,,0.0010,2\nSource,CH1,,0.0020,3\n\
+        Vertical Units,V,,0.0030,4\nHorizontal Units,s,,0.0040,5\n"
+        .to_owned();
+    for row in 5..50 {
+        text += &format!(",,,0.{row:03}0,{}\n", row + 1);
+    }
+    let found = table("tds.csv", &text);
+    let last = found.channels.last().unwrap();
+    assert_eq!(values(last), (1..=50).map(f64::from).collect::<Vec<f64>>());
+    assert_eq!((last.unit.as_str(), last.sample_rate_hz), ("V", Some(1000.0)), "{:?}", found.remarks);
+    assert!(remarked(&found, "numbers behind words, values of a header"), "{:?}", found.remarks);
+}
+
+#[test]
+fn headers_among_the_rows_are_gaps_unless_time_goes_on() {
+    let head = "waveform,a\nt0,1/1/2021 10:00:00\ndelta t,1E-3\n\ntime,a\n";
+    let blocks = format!("{head}1/1/2021 10:00:00,1\n1/1/2021 10:00:01,2\n{head}1/1/2021 10:00:09,3\n{head}");
+    let found = table("blocks.csv", &blocks);
+    assert_eq!(described(&found), [("a", "", Some(1000.0))]);
+    assert_eq!((values(&found.channels[0]), found.channels[0].gaps.as_slice()), (vec![1.0, 2.0, 3.0], &[2][..]));
+    assert!(remarked(&found, "8 lines among the rows are no rows"), "{:?}", found.remarks);
+    // The times begin again behind the second header and go on behind the other.
+    let again = table("again.csv", "Time (s),a\n0,1\n0.1,2\n0.2,3\nTime (s),a\n0,4\n0.1,5\n0.2,6\n");
+    assert_eq!((again.channels[0].sample_rate_hz, again.channels[0].gaps.as_slice()), (Some(10.0), &[3][..]));
+    let on = table("on.csv", "Time (s),a\n0,1\n0.1,2\n0.2,3\nTime (s),a\n0.3,4\n0.4,5\n");
+    assert_eq!((on.channels[0].sample_rate_hz, on.channels[0].gaps.len(), on.channels[0].samples), (Some(10.0), 0, 5));
+    let other = table("other.csv", "dt,1E-3\nn,a\n0,1\n1,2\n2,3\ndt,2E-3\nn,a\n0,4\n1,5\n2,6\n");
+    assert!(
+        other.channels.iter().all(|c| c.sample_rate_hz.is_none())
+            && remarked(&other, "no sample rate: the header says")
+    );
+}
+
+#[test]
+fn a_stated_interval_and_the_times_must_agree() {
+    // Printed too coarsely to show the step, which the header states.
+    let coarse = table("coarse.csv", "Sample Interval,0.00025\nTIME,a\n0.000,1\n0.000,2\n0.001,3\n0.001,4\n0.001,5\n");
+    assert_eq!(described(&coarse), [("a", "", Some(4000.0))], "{:?}", coarse.remarks);
+    let wrong = table("wrong.csv", "Sample Interval,0.5\nTIME,a\n0.0,1\n0.1,2\n0.2,3\n");
+    assert_eq!(described(&wrong), [("TIME", "", None), ("a", "", None)]);
+    assert!(remarked(&wrong, "no sample rate: TIME steps by 1e-1, the header says «Sample Interval 0.5»"));
+}
