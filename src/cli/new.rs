@@ -52,13 +52,17 @@ pub struct NewPipelineArgs {
     /// Recordings: a folder of files of one kind, or files.
     #[arg(required = true, value_name = "RECORDINGS")]
     pub recordings: Vec<PathBuf>,
-    /// What to find.
-    #[arg(long, value_enum, default_value = "modes")]
-    pub goal: Goal,
-    /// The deflection signal, as `afmid inspect` names it [default: the channel that can carry a ringdown and is named
-    /// most like a deflection].
+    /// What to find [default: what the recordings look like, decay or modes].
+    #[arg(long, value_enum)]
+    pub goal: Option<Goal>,
+    /// The signal, as `afmid inspect` names it; of decays several, one for each sensor [default: the channel that can
+    /// carry a ringdown and is named most like a deflection; of decays all channels of that length and unit].
     #[arg(long, value_name = "NAME")]
-    pub channel: Option<String>,
+    pub channel: Vec<String>,
+    /// What files and channels are, of decays: hits, or sensors that saw the same hits [default: files are hits, channels
+    /// are sensors, cells are hits].
+    #[arg(long = "as", value_enum, value_name = "WHAT")]
+    pub records_are: Option<RecordsAre>,
     /// Samples per second in Hz, of files that state none.
     #[arg(long, value_name = "HZ")]
     pub rate: Option<f64>,
@@ -74,10 +78,22 @@ pub struct NewPipelineArgs {
     pub json: bool,
 }
 
+/// What files and channels are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RecordsAre {
+    /// Each channel of each file is a hit.
+    Hits,
+    /// All files and channels saw the same hits.
+    Sensors,
+}
+
 /// What a pipeline is to find.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Goal {
+    /// Modes, damping and mode shapes from free decays: after a hit, a release, a pulse, the end of a drive.
+    Decay,
     /// Transfer function and modes of the free lever, from averaged snap-offs, as in the paper.
+    #[value(alias = "snap-off")]
     Modes,
     /// Frequencies and quality factors from all snap-offs jointly, no average: the best errors.
     Ringdown,

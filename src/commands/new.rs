@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::output::print;
 use crate::printable::shown;
 use crate::relative::folder_of;
-use crate::scaffold::{Wanted, look, pipeline, python, rust};
+use crate::scaffold::{Wanted, choose, look, pipeline, python, rust};
 use crate::show::pretty;
 
 /// Writes what was asked for.
@@ -27,21 +27,32 @@ pub fn run(what: &New, registry: &Registry) -> Result<(), Failure> {
 fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failure> {
     let usage = |(problem, help): (String, Option<String>)| Failure::usage(problem, help);
     let source = look(&args.recordings).map_err(usage)?;
-    let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", args.goal.name())));
+    let wanted = Wanted {
+        goal: args.goal,
+        channels: &args.channel,
+        records_are: args.records_are,
+        rate_hz: args.rate,
+        unit: args.unit.as_deref(),
+    };
+    let choice = choose(&source, &wanted).map_err(usage)?;
+    let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", choice.goal.name())));
     // also a link to nothing
     if output.symlink_metadata().is_ok() {
         let help = "choose another file with -o, or remove it".to_owned();
         return Err(Failure::usage(format!("{} is there already", output.display()), Some(help)));
     }
     require_folder(folder_of(&output))?;
-    let wanted =
-        Wanted { goal: args.goal, channel: args.channel.as_deref(), rate_hz: args.rate, unit: args.unit.as_deref() };
-    let text = pipeline(&source, wanted, folder_of(&output)).map_err(usage)?;
+    let text = pipeline(&source, &choice, wanted, folder_of(&output)).map_err(usage)?;
     let plan = plan_text(&output.display().to_string(), &text, &[], registry)?;
     replace_with(&output, |file| std::fs::write(file, &text))
         .map_err(|error| Failure::failed(&error, error.help.clone()))?;
     if args.json {
-        return print(&pretty(&json!({ "config": output.display().to_string(), "recordings": source.files }))?);
+        return print(&pretty(&json!({
+            "config": output.display().to_string(),
+            "recordings": source.files,
+            "goal": choice.goal.name(),
+            "chosen": choice.why,
+        }))?);
     }
     let files = if source.files == 1 { "1 file".to_owned() } else { format!("{} files", source.files) };
     let name = output.file_stem().unwrap_or_default().to_string_lossy();

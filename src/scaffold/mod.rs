@@ -1,9 +1,11 @@
 //! Beginnings: configs for recordings that were looked at, stages of one's own.
 
+mod choice;
 mod pipeline;
 mod recordings;
 mod stage;
 
+pub use choice::choose;
 pub use pipeline::{Wanted, pipeline};
 pub use recordings::look;
 pub use stage::{python, rust};

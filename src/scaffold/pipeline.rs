@@ -4,16 +4,20 @@ use std::path::Path;
 
 use afmid_pipeline::toml::{Table, Value};
 
+use super::choice::{Choice, Question};
 use super::recordings::Source;
-use crate::cli::Goal;
-use crate::inspect::{Channel, LEAST_RATE_HZ};
+use crate::cli::{Goal, RecordsAre};
+use crate::inspect::LEAST_RATE_HZ;
+use crate::printable::one_line;
 use crate::relative::relative;
 
 /// What the user says of recordings beside what they hold.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
-    pub goal: Goal,
-    pub channel: Option<&'a str>,
+    /// None: what they look like.
+    pub goal: Option<Goal>,
+    pub channels: &'a [String],
+    pub records_are: Option<RecordsAre>,
     pub rate_hz: Option<f64>,
     pub unit: Option<&'a str>,
 }
@@ -22,6 +26,7 @@ impl Goal {
     /// The shipped config that finds it.
     const fn config(self) -> &'static str {
         match self {
+            Self::Decay => include_str!("../../configs/decay.toml"),
             Self::Modes => include_str!("../../configs/free-lever.toml"),
             Self::Ringdown => include_str!("../../configs/ringdown.toml"),
             Self::Diagnosis => include_str!("../../configs/diagnose.toml"),
@@ -32,6 +37,7 @@ impl Goal {
     /// Its name, which is the pipeline's.
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Decay => "decay",
             Self::Modes => "modes",
             Self::Ringdown => "ringdown",
             Self::Diagnosis => "diagnosis",
@@ -41,55 +47,58 @@ impl Goal {
 }
 
 /// The config for a file in `folder`. Errors: what is not known of the recordings, and how to say it.
-pub fn pipeline(source: &Source, wanted: Wanted<'_>, folder: &Path) -> Result<String, (String, Option<String>)> {
-    let channel = channel(source, wanted)?;
-    let params = records(source, channel, wanted, folder)?;
+pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
+    let params = records(source, choice, wanted, folder)?;
     let mut text = String::new();
-    let mut in_records = false;
-    for line in wanted.goal.config().lines() {
-        in_records = if line.starts_with("[[") { false } else { in_records || line == "uses = \"io.records\"" };
-        if line.starts_with("#:schema") {
+    let mut stage = "";
+    let mut of_its_data = false;
+    for line in choice.goal.config().lines() {
+        if let Some(uses) = line.strip_prefix("uses = ") {
+            stage = uses;
+        }
+        // what the shipped config says of its own data, down to where the pipeline begins
+        of_its_data = line != "[pipeline]" && (of_its_data || line.starts_with("# Data: "));
+        if of_its_data || line.starts_with("#:schema") {
             continue;
         }
-        if line.starts_with("name = ") {
-            text.push_str(&format!("name = \"{}\"\n", wanted.goal.name()));
-        } else if in_records && line.starts_with("params = ") {
-            text.push_str(&params);
-        } else {
-            text.push_str(&format!("{line}\n"));
+        match line.split_once(" = ") {
+            Some(("name", _)) => text.push_str(&format!("name = \"{}\"\n", choice.goal.name())),
+            Some(("params", _)) if stage == "\"io.records\"" => text.push_str(&params),
+            Some(("params", _)) if stage == "\"events.decay\"" => {
+                let records_are = match choice.records_are {
+                    None => "auto",
+                    Some(RecordsAre::Hits) => "hits",
+                    Some(RecordsAre::Sensors) => "sensors",
+                };
+                text.push_str(&format!("params = {{ as = \"{records_are}\" }}\n"));
+            }
+            _ => {
+                if line == "[pipeline]" && !choice.why.is_empty() {
+                    text.push_str(&format!("# chosen: {}\n", one_line(&choice.why)));
+                }
+                text.push_str(&format!("{line}\n"));
+            }
         }
     }
     Ok(text)
 }
 
-fn channel<'a>(source: &'a Source, wanted: Wanted<'_>) -> Result<&'a Channel, (String, Option<String>)> {
-    let file = source.file.display();
-    let names = || source.channels.iter().map(|channel| channel.location.as_str()).collect::<Vec<_>>().join(", ");
-    match wanted.channel {
-        Some(name) => source
-            .channels
-            .iter()
-            .find(|channel| channel.location == name)
-            .ok_or_else(|| (format!("{file} has no channel `{name}`"), Some(format!("it has {}", names())))),
-        None => source.best.and_then(|index| source.channels.get(index)).ok_or_else(|| {
-            (format!("{file}: {}", source.reason), Some("`afmid inspect` says what recordings hold".to_owned()))
-        }),
-    }
-}
-
 /// The `params` of the stage `records`.
-fn records(
-    source: &Source,
-    channel: &Channel,
-    wanted: Wanted<'_>,
-    folder: &Path,
-) -> Result<String, (String, Option<String>)> {
+fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
     let file = source.file.display();
     let text = |text: &str| Value::String(text.to_owned());
+    let channel = choice.channels[0];
     let files = source.patterns.iter().map(|pattern| text(&relative(pattern, folder).to_string_lossy()));
     let mut params = Table::new();
     params.insert("files".to_owned(), Value::Array(files.collect()));
     params.insert("channel".to_owned(), text(&channel.location));
+    if choice.channels.len() > 1 {
+        let all = choice.channels.iter().map(|channel| text(&channel.location)).collect();
+        params.insert("channels".to_owned(), Value::Array(all));
+    }
+    if choice.goal == Goal::Decay {
+        params.insert("piezo_channel".to_owned(), text(""));
+    }
     let rate = match (channel.sample_rate_hz, wanted.rate_hz) {
         (Some(rate), None) => rate,
         (None, Some(rate)) => {
@@ -128,6 +137,7 @@ fn records(
 mod tests {
     use std::path::PathBuf;
 
+    use super::super::choice::choose;
     use super::*;
 
     fn source(rate: Option<f64>, unit: &str) -> Source {
@@ -144,23 +154,31 @@ mod tests {
             patterns: vec![PathBuf::from("/lab/years/2004/*.tdms")],
             file: PathBuf::from("/lab/years/2004/a.tdms"),
             channels: vec![channel],
+            format: "native record".to_owned(),
             best: Some(0),
             reason: String::new(),
             files: 3,
         }
     }
 
-    const GOALS: [Goal; 4] = [Goal::Modes, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled];
+    const GOALS: [Goal; 5] = [Goal::Decay, Goal::Modes, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled];
 
     fn wanted(goal: Goal) -> Wanted<'static> {
-        Wanted { goal, channel: None, rate_hz: None, unit: None }
+        Wanted { goal: Some(goal), channels: &[], records_are: None, rate_hz: None, unit: None }
+    }
+
+    /// The config for the first channel.
+    fn of_first(source: &Source, wanted: Wanted<'_>, folder: &str) -> Result<String, Question> {
+        let goal = wanted.goal.expect("a goal");
+        let choice = Choice { goal, channels: vec![&source.channels[0]], records_are: None, why: String::new() };
+        pipeline(source, &choice, wanted, Path::new(folder))
     }
 
     #[test]
     fn every_goal_is_a_config_that_is_right() {
         let registry = crate::registry().expect("stages");
         for goal in GOALS {
-            let text = pipeline(&source(Some(5e6), "V"), wanted(goal), Path::new("/lab/configs")).expect("a config");
+            let text = of_first(&source(Some(5e6), "V"), wanted(goal), "/lab/configs").expect("a config");
             let plan = afmid_pipeline::graph::load("new.toml", &text, &[], &registry);
             let plan = plan.unwrap_or_else(|problems| panic!("{goal:?}: {problems:?}\n{text}"));
             let records = plan.node("records").expect("records");
@@ -172,18 +190,17 @@ mod tests {
 
     #[test]
     fn what_files_do_not_say_is_asked_for_and_what_they_say_is_not_overruled() {
-        let here = Path::new("/lab");
-        let ask = |source: Source, wanted: Wanted<'_>| pipeline(&source, wanted, here).expect_err("a question");
+        let ask = |source: Source, wanted: Wanted<'_>| of_first(&source, wanted, "/lab").expect_err("a question");
         let goal = wanted(Goal::Ringdown);
         assert!(ask(source(None, "V"), goal).1.expect("help").contains("--rate"));
         assert!(ask(source(Some(5e6), ""), goal).1.expect("help").contains("--unit"));
         assert!(ask(source(Some(5e6), "V"), Wanted { rate_hz: Some(1e6), ..goal }).0.contains("5000000"));
         assert!(ask(source(Some(5e6), "V"), Wanted { unit: Some("nm"), ..goal }).0.contains("unit V"));
-        assert!(
-            ask(source(Some(5e6), "V"), Wanted { channel: Some("ch"), ..goal }).1.expect("help").contains("/g/ch 0")
-        );
+        let other = ["ch".to_owned()];
+        let question = choose(&source(Some(5e6), "V"), &Wanted { channels: &other, ..goal }).expect_err("a question");
+        assert!(question.1.expect("help").contains("/g/ch 0"));
         let given = Wanted { rate_hz: Some(5e4), unit: Some("nm"), ..goal };
-        let text = pipeline(&source(None, ""), given, here).expect("a config");
+        let text = of_first(&source(None, ""), given, "/lab").expect("a config");
         assert!(text.contains("sample_rate_hz = 50000.0") && text.contains("min_sample_rate_hz = 50000.0"), "{text}");
     }
 }

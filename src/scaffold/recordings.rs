@@ -14,6 +14,8 @@ pub struct Source {
     pub patterns: Vec<PathBuf>,
     /// The file that was looked at.
     pub file: PathBuf,
+    /// Its format, for people.
+    pub format: String,
     /// All its channels.
     pub channels: Vec<Channel>,
     /// Which of them can best carry a ringdown, and why (not).
@@ -47,6 +49,7 @@ pub fn look(paths: &[PathBuf]) -> Result<Source, (String, Option<String>)> {
     match inspected.outcome {
         Outcome::Read(holdings) => Ok(Source {
             patterns,
+            format: holdings.format,
             best: holdings.ringdown.channel,
             reason: holdings.ringdown.reason,
             channels: holdings.channels,

@@ -4,6 +4,8 @@ use afmid_pipeline::{Channel, Record, StageError};
 
 /// Role of the deflection signal.
 pub(crate) const DEFLECTION: &str = "deflection";
+/// Role of each further sensor.
+pub(crate) const SENSOR: &str = "sensor";
 /// Role of the piezo's position.
 pub(crate) const PIEZO: &str = "piezo";
 

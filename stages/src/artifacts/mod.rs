@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | `records` | [`deflection`], [`piezo`] | |
 //! | `ensemble` | [`Ensemble`]; in memory [`Rows::of`](crate::ensemble::Rows), else `rows()` in blocks | [`NewEnsemble`] |
+//! | `decays` | [`Decays`] | [`decay_array`] |
 //! | `average` | [`Average`] | [`AveragedSet`] |
 //! | `pair` | [`Pair`] | [`NewPair`], [`PairSet`] |
 //! | `transfer` | [`Transfer`] | [`NewTransfer`] |
@@ -16,6 +17,7 @@
 mod average;
 mod channels;
 mod data_set;
+mod decays;
 mod density;
 mod ensemble;
 mod model;
@@ -26,8 +28,9 @@ mod roots;
 mod transfer;
 
 pub(crate) use average::{Average, AveragedSet, empty_average};
-pub(crate) use channels::{DEFLECTION, PIEZO, deflection, piezo};
+pub(crate) use channels::{DEFLECTION, PIEZO, SENSOR, deflection, piezo};
 pub use data_set::DataSet;
+pub(crate) use decays::{Decays, Sensor, decay_array};
 pub(crate) use density::{Density, NewDensity};
 pub(crate) use ensemble::{Ensemble, NewEnsemble, with_places};
 pub(crate) use model::{

@@ -266,7 +266,7 @@ fn middle(values: &[f64]) -> f64 {
     afmid_kernels::statistics::median(&mut values.to_vec())
 }
 
-fn common_rate(records: &[Record]) -> Result<f64, StageError> {
+pub(super) fn common_rate(records: &[Record]) -> Result<f64, StageError> {
     let Some(first) = records.first() else {
         return Err(StageError::new("there is no record"));
     };

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::consistency::{Consistency, check_consistency};
 use super::file_patterns::{Match, matching_files};
 use super::shared_data::moved;
-use crate::artifacts::{DEFLECTION, PIEZO, piezo};
+use crate::artifacts::{DEFLECTION, PIEZO, SENSOR, piezo};
 
 /// Opens records of any format by pattern.
 ///
@@ -48,6 +48,8 @@ pub struct Records {
     pub files: Vec<String>,
     /// The deflection signal, as the file names it: a dataset, channel, column or variable.
     pub channel: String,
+    /// Several sensors, as the file names them, instead of `channel`.
+    pub channels: Vec<String>,
     /// The piezo monitor, used where a file has it; empty: not looked for.
     pub piezo_channel: String,
     /// Least sample rate, in Hz. Why: twenty samples in a period of a 10 kHz lever, the softest in use; slower archives
@@ -74,6 +76,7 @@ impl Default for Records {
         Self {
             files: Vec::new(),
             channel: "/deflection".to_owned(),
+            channels: Vec::new(),
             piezo_channel: "/piezo".to_owned(),
             min_sample_rate_hz: 200e3,
             skip_unreadable: false,
@@ -107,6 +110,11 @@ impl Stage for Records {
         faults.require(!self.channel.is_empty(), || {
             "`channel` is empty, wanted a channel such as \"/deflection\"".to_owned()
         });
+        for (number, name) in self.channels.iter().enumerate() {
+            faults.require(!name.is_empty() && !self.channels[..number].contains(name), || {
+                format!("`channels` has \"{name}\", wanted names of channels, each once")
+            });
+        }
         let blank = self.unit.as_deref().is_some_and(|unit| unit.trim().is_empty());
         faults.require(!blank, || "`unit` is empty, wanted a unit such as \"V\"".to_owned());
         faults.take(self.how().reading.check());
@@ -185,7 +193,12 @@ impl Records {
     }
 
     fn open(&self, path: &Path, cx: &Context) -> Result<Opened, StageError> {
-        let mut wanted = vec![Wanted { role: DEFLECTION, location: &self.channel, required: true }];
+        let sensor = |(number, location)| {
+            let role = if number == 0 { DEFLECTION } else { SENSOR };
+            Wanted { role, location, required: true }
+        };
+        let named = if self.channels.is_empty() { std::slice::from_ref(&self.channel) } else { &self.channels[..] };
+        let mut wanted: Vec<Wanted> = named.iter().map(String::as_str).enumerate().map(sensor).collect();
         if !self.piezo_channel.is_empty() {
             wanted.push(Wanted { role: PIEZO, location: &self.piezo_channel, required: false });
         }

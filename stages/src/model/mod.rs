@@ -4,6 +4,8 @@
 mod bootstrap;
 mod contact;
 mod count;
+mod decay;
+mod decay_example;
 mod era;
 mod example;
 mod grey;
@@ -23,6 +25,7 @@ pub use crate::artifacts::DataSet;
 pub use bootstrap::BootstrapIntervals;
 pub use contact::ContactFit;
 pub use count::Count;
+pub use decay::{DecayFit, DecayNoise};
 pub use era::EraEstimate;
 pub use grey::GreyEstimate;
 pub use known::{KnownNumber, KnownQuantity};
@@ -50,6 +53,7 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<BootstrapIntervals>(),
     Entry::of::<Zeros>(),
     Entry::of::<RingdownFit>(),
+    Entry::of::<DecayFit>(),
     Entry::of::<ContactFit>(),
 ];
 

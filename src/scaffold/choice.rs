@@ -1,0 +1,178 @@
+//! What recordings look like: snap-offs of a lever, or free decays.
+
+use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, FreeDecay, find_decays};
+use afmid_pipeline::recording::{InputFiles, Reading, WholeFile};
+
+use super::pipeline::Wanted;
+use super::recordings::Source;
+use crate::cli::{Goal, RecordsAre};
+use crate::inspect::{Channel, LEAST_RATE_HZ};
+
+/// Why something cannot be chosen, and what to do.
+pub type Question = (String, Option<String>);
+
+/// What a config is written for.
+#[derive(Debug)]
+pub struct Choice<'a> {
+    pub goal: Goal,
+    /// The signals; of all goals but decays one.
+    pub channels: Vec<&'a Channel>,
+    /// What files and channels are, where the stage's default is not meant.
+    pub records_are: Option<RecordsAre>,
+    /// Why, for a comment in the config; empty where the user chose.
+    pub why: String,
+}
+
+/// Fewer distinct codes are those of a switch or a counter.
+const LEAST_CODES: usize = 16;
+/// Samples that are searched: a long record's first ones.
+const MOST_SEARCHED: usize = 1 << 22;
+/// Least step of the level, in peaks of the ringing, that a snap-off has: it lets the whole load go.
+const STEP: f64 = 0.5;
+
+/// Chooses by what the first file holds, as far as the user has not. Errors: what is not known, and how to say it.
+pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
+    let lever = || looks_like_a_lever(source);
+    match wanted.goal {
+        Some(Goal::Decay) => decay(source, wanted, false),
+        Some(goal) => one_channel(source, wanted, goal, String::new()),
+        None if lever() && !rings_without_a_step(source, wanted) => {
+            let why = format!("snap-offs: {} is of a force microscope", source.format);
+            one_channel(source, wanted, Goal::Modes, why)
+        }
+        None => decay(source, wanted, true),
+    }
+}
+
+fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
+    let channel = match wanted.channels {
+        [] => source.best.and_then(|index| source.channels.get(index)).ok_or_else(|| {
+            let help = "`afmid inspect` says what recordings hold".to_owned();
+            (format!("{}: {}", source.file.display(), source.reason), Some(help))
+        })?,
+        [one] => named(source, one)?,
+        [_, second, ..] => {
+            let help = "several sensors go with --goal decay".to_owned();
+            return Err((format!("one channel was wanted, --channel {second} is another"), Some(help)));
+        }
+    };
+    Ok(Choice { goal, channels: vec![channel], records_are: None, why })
+}
+
+/// A channel by its name. Errors: there is none.
+fn named<'a>(source: &'a Source, name: &str) -> Result<&'a Channel, Question> {
+    let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
+    let found = source.channels.iter().find(|channel| bare(&channel.location) == bare(name));
+    found.ok_or_else(|| {
+        let names: Vec<&str> = source.channels.iter().map(|channel| channel.location.as_str()).collect();
+        (format!("{} has no channel `{name}`", source.file.display()), Some(format!("it has {}", names.join(", "))))
+    })
+}
+
+/// Formats of force microscopes, and afmid's own; or a channel that is named as a deflection.
+fn looks_like_a_lever(source: &Source) -> bool {
+    let format = source.format.to_lowercase();
+    let of_microscope = ["native", "jpk", "nanoscope", "igor"].iter().any(|name| format.contains(name));
+    let named = source.channels.iter().any(|channel| channel.location.to_lowercase().contains("defl"));
+    let rate = source.channels.iter().filter_map(|channel| channel.sample_rate_hz).fold(f64::NAN, f64::max);
+    named || (of_microscope && (rate.is_nan() || rate >= LEAST_RATE_HZ))
+}
+
+/// Whether the best channel rings down from about the level that it rings round: nothing was let go.
+fn rings_without_a_step(source: &Source, wanted: &Wanted<'_>) -> bool {
+    let piezo = source.channels.iter().any(|channel| channel.location.to_lowercase().contains("piezo"));
+    let best = source.best.and_then(|index| source.channels.get(index));
+    let (Some(channel), false) = (best, piezo) else { return false };
+    let Ok((values, found)) = search(source, &[channel], wanted) else { return false };
+    let level = |decay: &FreeDecay| {
+        let tail = &values[0][decay.range.start + decay.range.len() / 2..decay.range.end];
+        tail.iter().sum::<f64>() / tail.len().max(1) as f64
+    };
+    let steps = found.decays.iter().filter(|decay| {
+        let before = decay.channels.first().and_then(|channel| channel.level_before);
+        let peak = decay.channels.first().map_or(f64::NAN, |channel| channel.peak.abs());
+        before.is_none_or(|before| (before - level(decay)).abs() > STEP * peak)
+    });
+    2 * steps.count() < found.decays.len()
+}
+
+fn decay<'a>(source: &'a Source, wanted: &Wanted<'_>, guessed: bool) -> Result<Choice<'a>, Question> {
+    let channels = match wanted.channels {
+        [] => sensors(source)?,
+        names => names.iter().map(|name| named(source, name)).collect::<Result<Vec<_>, _>>()?,
+    };
+    let cells = channels.len() > 1 && channels.iter().all(|channel| channel.location.ends_with('}'));
+    let records_are = wanted.records_are.or(cells.then_some(RecordsAre::Hits));
+    // cells are hits of their own: one is enough to see what they are
+    let seen = if records_are == Some(RecordsAre::Hits) { &channels[..1] } else { &channels[..] };
+    let (_, found) = search(source, seen, wanted)?;
+    let why = match (found.decays.first(), found.reason()) {
+        (Some(first), _) => {
+            let count = found.decays.len();
+            let time_s = first.range.start as f64 / rate(source, seen[0], wanted)?;
+            let decays = if count == 1 { "a free decay".to_owned() } else { format!("{count} free decays") };
+            format!("{decays} in {}, the first from {time_s:.4} s on, at {:.5} Hz", name(source), first.frequency_hz)
+        }
+        (None, Some(reason)) if guessed => {
+            let help = "look at it with `afmid inspect`; --channel names the signal, --goal says what to find";
+            return Err((format!("{}: no free decay, {reason}", source.file.display()), Some(help.to_owned())));
+        }
+        (None, reason) => format!("--goal decay; in {}: {}", name(source), reason.unwrap_or_default()),
+    };
+    Ok(Choice { goal: Goal::Decay, channels, records_are, why })
+}
+
+fn name(source: &Source) -> String {
+    source.file.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The channels with signals of the best one's length and unit.
+fn sensors(source: &Source) -> Result<Vec<&Channel>, Question> {
+    let usable = |channel: &&Channel| {
+        channel.values.as_ref().is_some_and(|values| values.codes >= LEAST_CODES && values.missing == 0)
+    };
+    let best = source.best.and_then(|index| source.channels.get(index)).filter(usable);
+    let Some(best) = best.or_else(|| source.channels.iter().filter(usable).max_by_key(|channel| channel.samples))
+    else {
+        let help = "`afmid inspect` says what recordings hold".to_owned();
+        return Err((format!("{}: {}", source.file.display(), source.reason), Some(help)));
+    };
+    let alike = |channel: &&Channel| {
+        usable(channel)
+            && (channel.samples, &channel.unit, channel.sample_rate_hz)
+                == (best.samples, &best.unit, best.sample_rate_hz)
+    };
+    Ok(source.channels.iter().filter(alike).collect())
+}
+
+/// The rate that the file states or the user. Errors: neither.
+fn rate(source: &Source, channel: &Channel, wanted: &Wanted<'_>) -> Result<f64, Question> {
+    channel.sample_rate_hz.or(wanted.rate_hz).ok_or_else(|| {
+        let help = "say how many samples a second with --rate HZ".to_owned();
+        (format!("{} states no sample rate", source.file.display()), Some(help))
+    })
+}
+
+/// The channels' samples, and the decays in them. Errors: they cannot be read, or are of different lengths.
+fn search(
+    source: &Source,
+    channels: &[&Channel],
+    wanted: &Wanted<'_>,
+) -> Result<(Vec<Vec<f64>>, DecaySearch), Question> {
+    let rate = rate(source, channels[0], wanted)?;
+    let plain = |problem: String| (format!("{}: {problem}", source.file.display()), None);
+    let file = WholeFile::open(&InputFiles::new(), &source.file, &Reading::of("auto", None))
+        .map_err(|error| plain(error.to_string()))?;
+    let read = |channel: &&Channel| {
+        let found = file.contents().channels.iter().find(|found| found.location == channel.location);
+        let found = found.ok_or_else(|| plain(format!("there is no channel {}", channel.location)))?;
+        let mut values = file.read(found).map_err(|error| plain(error.to_string()))?;
+        values.truncate(MOST_SEARCHED);
+        Ok(values)
+    };
+    let values: Vec<Vec<f64>> = channels.iter().map(read).collect::<Result<_, Question>>()?;
+    let slices: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    let found = find_decays(&slices, rate, &DecaySearchOptions::default());
+    let found = found.map_err(|error| plain(error.to_string()))?;
+    Ok((values, found))
+}

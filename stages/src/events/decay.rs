@@ -1,0 +1,360 @@
+//! The stage `events.decay`.
+
+use afmid_pipeline::{
+    Array, Channel, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
+};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use crate::artifacts::{PIEZO, Sensor, decay_array};
+use afmid_kernels::events::decay::{
+    DecayEnd, DecaySearch, DecaySearchOptions, DismissedReason, FreeDecay, find_decays,
+};
+
+/// Finds free decays in records: after a hit, a release, a pulse, or the end of a drive.
+///
+/// Model: quiet, an event, free ringing of any number of modes that dies away in noise; the same again. What does not
+/// die away is a steady oscillation, which has no quality factor to be had.
+/// Method: the energy of all channels over a period against the noise's; starts refined to the first departure from the
+/// quiet line before; the end is where the ringing is smaller than the noise, or the next start; the first free sample is
+/// the one from which later samples foretell the earlier ones backwards. Clipped samples are missing.
+/// Shapes: `decays` has a row per hit and channel over time, of the longest decay, and likewise what was quiet before
+/// the hits; `events` a row per decay, steady oscillation and start that is neither.
+/// Units: the channels' own; Hz; s.
+/// Accuracy: the first free sample lies on or after the true one in all but one of a hundred decays, late by less than
+/// half a period; the end within three quarters of the decay time or two periods (docs/results/decay.md).
+/// Errors: no free decay in any record; records of different rates or numbers of channels; samples that are missing.
+/// Source: R. V. Allen, Bull. Seismol. Soc. Am. 68 (1978) 1521; G. R. B. de Prony, J. Ec. Polytech. 1 (1795) 24.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct Decay {
+    /// What files and channels are: `auto` (a file is a hit, its channels are sensors), `hits` (each channel of each
+    /// file is a hit) or `sensors` (all files and channels saw the same hits).
+    #[serde(rename = "as")]
+    pub records_are: RecordsAre,
+    /// How decays are searched.
+    #[serde(flatten)]
+    pub search: DecaySearchOptions,
+}
+
+/// What files and channels are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RecordsAre {
+    /// A file is a hit, its channels are sensors.
+    #[default]
+    Auto,
+    /// Each channel of each file is a hit.
+    Hits,
+    /// All files and channels saw the same hits.
+    Sensors,
+}
+
+pub(super) const RECORDS: Port<Recording> = Port::new("records", "records", "records with one or several channels");
+pub(crate) const DECAYS: Port<Array> = Port::new("decays", "decays", "free decays, a row for each channel of each hit");
+pub(super) const EVENTS: Port<Table> =
+    Port::new("events", "decay-events", "decays and what was refused, by record and time");
+const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many hits, steady oscillations, what was refused");
+
+/// Longest record that is searched: half a gigabyte a channel.
+const LONGEST: usize = 1 << 26;
+
+impl Stage for Decay {
+    const HAS_KERNEL_OPTIONS: bool = true;
+    const SPEC: Spec = Spec {
+        name: "events.decay",
+        version: 1,
+        summary: "finds free decays in records: where they begin, where they drown in the noise",
+        inputs: &[RECORDS.spec()],
+        outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],
+        source: "R. V. Allen, Bull. Seismol. Soc. Am. 68 (1978) 1521",
+        ..Spec::STORED
+    };
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let records = &inputs.get(&RECORDS)?.records;
+        let rate = super::correlation::common_rate(records)?;
+        let groups = self.groups(records)?;
+        let sensors = sensors(&groups)?;
+        cx.expect(groups.len());
+        let searched = groups
+            .par_iter()
+            .map(|group| {
+                let searched = group.search(rate, &self.search).map_err(|error| error.at(&group.records[0].path));
+                cx.tick();
+                searched
+            })
+            .collect::<Result<Vec<Searched>, StageError>>()?;
+        let sensors: Vec<Sensor> = searched
+            .first()
+            .map(|first| first.found.channels.iter().filter_map(|&channel| sensors.get(channel).cloned()).collect())
+            .unwrap_or_default();
+        let hits: Vec<Vec<Vec<f64>>> = searched.iter().flat_map(Searched::hits).collect();
+        let rows: Vec<Row> = searched.iter().zip(&groups).flat_map(|(searched, group)| searched.rows(group)).collect();
+        if hits.is_empty() {
+            return Err(nothing_found(&rows, &groups));
+        }
+        for row in rows.iter().filter(|row| row.steady) {
+            cx.warn(format!("{}: {}", row.record, row.rejected));
+        }
+        let quiet: Vec<Vec<Vec<f64>>> = searched.iter().flat_map(Searched::quiet).collect();
+        let summary = summary(&rows, hits.len(), &sensors, rate)?;
+        Ok(Ports::new()
+            .with(&DECAYS, decay_array(&hits, &quiet, &sensors, rate)?)
+            .with(&EVENTS, table(&rows, rate))
+            .with(&SUMMARY, summary))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::decay_example::examples()
+    }
+}
+
+/// Channels that saw the same hits.
+struct Group<'a> {
+    /// The record of each channel.
+    records: Vec<&'a Record>,
+    channels: Vec<&'a Channel>,
+}
+
+/// What was found in a group.
+struct Searched {
+    values: Vec<Vec<f64>>,
+    found: DecaySearch,
+}
+
+impl Decay {
+    fn groups<'a>(&self, records: &'a [Record]) -> Result<Vec<Group<'a>>, StageError> {
+        let all = |record: &'a Record| {
+            record.channels.iter().filter(|channel| channel.role != PIEZO).map(move |channel| (record, channel))
+        };
+        let group = |pairs: Vec<(&'a Record, &'a Channel)>| {
+            let (records, channels) = pairs.into_iter().unzip();
+            Group { records, channels }
+        };
+        Ok(match self.records_are {
+            RecordsAre::Auto => records.iter().map(|record| group(all(record).collect())).collect(),
+            RecordsAre::Hits => records.iter().flat_map(all).map(|pair| group(vec![pair])).collect(),
+            RecordsAre::Sensors => vec![group(records.iter().flat_map(all).collect())],
+        })
+    }
+}
+
+/// The sensors of all groups. Errors: groups of different numbers of channels, or of different units.
+fn sensors(groups: &[Group]) -> Result<Vec<Sensor>, StageError> {
+    let Some(first) = groups.first() else { return Err(StageError::new("there is no record")) };
+    for group in groups {
+        let (found, wanted) = (group.channels.len(), first.channels.len());
+        if found != wanted || found == 0 {
+            let problem = format!("the record has {found} channels, {} has {wanted}", first.records[0].name);
+            return Err(StageError::new(problem).at(&group.records[0].path));
+        }
+        for (channel, own) in group.channels.iter().zip(&first.channels) {
+            if channel.unit != own.unit {
+                let problem = format!("{} is in {}, {} in {}", channel.location, channel.unit, own.location, own.unit);
+                return Err(StageError::new(problem).at(&group.records[0].path));
+            }
+        }
+    }
+    // one file a sensor: the file tells them apart
+    let several = first.records.iter().any(|record| record.name != first.records[0].name);
+    let name = |(record, channel): (&&Record, &&Channel)| match several {
+        true => format!("{} {}", record.name, channel.location),
+        false => channel.location.clone(),
+    };
+    let sensor = |pair: (&&Record, &&Channel)| Sensor { name: name(pair), unit: pair.1.unit.clone() };
+    Ok(first.records.iter().zip(&first.channels).map(sensor).collect())
+}
+
+impl Group<'_> {
+    fn search(&self, rate: f64, options: &DecaySearchOptions) -> Result<Searched, StageError> {
+        let samples = self.channels.first().map_or(0, |channel| channel.samples);
+        if samples > LONGEST {
+            return Err(StageError::new(format!("{samples} samples, wanted at most {LONGEST}"))
+                .help("cut the file into shorter ones"));
+        }
+        let mut values = Vec::with_capacity(self.channels.len());
+        for (channel, record) in self.channels.iter().zip(&self.records) {
+            if channel.samples != samples {
+                return Err(StageError::new(format!(
+                    "{} has {} samples, {} has {samples}: channels of one hit want one length",
+                    channel.location, channel.samples, self.channels[0].location
+                ))
+                .at(&record.path));
+            }
+            let read = channel.read(0, samples)?;
+            if let Some(k) = read.iter().position(|value| !value.is_finite()) {
+                return Err(StageError::new(format!("{}: sample {k} is missing", channel.location))
+                    .help("cut the file to stretches without gaps"));
+            }
+            values.push(read);
+        }
+        let slices: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+        let found = find_decays(&slices, rate, options).map_err(StageError::from_error)?;
+        Ok(Searched { values, found })
+    }
+}
+
+impl Searched {
+    /// Each decay in every searched channel, clipped samples NaN.
+    fn hits(&self) -> Vec<Vec<Vec<f64>>> {
+        let hit = |decay: &FreeDecay| {
+            let channel = |(&number, seen): (&usize, &_)| self.stretch(number, decay, seen);
+            self.found.channels.iter().zip(&decay.channels).map(channel).collect()
+        };
+        self.found.decays.iter().map(hit).collect()
+    }
+
+    fn stretch(
+        &self,
+        channel: usize,
+        decay: &FreeDecay,
+        seen: &afmid_kernels::events::decay::ChannelDecay,
+    ) -> Vec<f64> {
+        let mut values = self.values[channel][decay.range.clone()].to_vec();
+        for k in seen.clipped.iter().flat_map(Clone::clone) {
+            if let Some(value) = k.checked_sub(decay.range.start).and_then(|k| values.get_mut(k)) {
+                *value = f64::NAN;
+            }
+        }
+        values
+    }
+
+    /// What was before each hit, where it was quiet.
+    fn quiet(&self) -> Vec<Vec<Vec<f64>>> {
+        let before = self.found.decays.iter().filter_map(|decay| decay.quiet.clone());
+        before
+            .map(|range| {
+                self.found.channels.iter().map(|&channel| self.values[channel][range.clone()].to_vec()).collect()
+            })
+            .collect()
+    }
+
+    fn rows(&self, group: &Group) -> Vec<Row> {
+        let record = &group.records[0].name;
+        let mut rows: Vec<Row> = self.found.decays.iter().map(|decay| Row::of_decay(record, decay)).collect();
+        rows.extend(self.found.steady.iter().map(|steady| Row {
+            onset: steady.range.start,
+            first: steady.range.start,
+            end: steady.range.end,
+            frequency_hz: steady.frequency_hz,
+            rate_per_s: (steady.decline.rate_per_s, steady.decline.std_per_s),
+            peak: steady.amplitude.first().copied().unwrap_or(f64::NAN),
+            steady: true,
+            ..Row::refused(record, steady.range.start, steady.statement())
+        }));
+        rows.extend(self.found.dismissed.iter().map(|dismissed| {
+            let reason = match dismissed.reason {
+                DismissedReason::TooShort => "less than two periods above the noise",
+                DismissedReason::NoRinging => "nothing rings above the noise",
+            };
+            Row::refused(record, dismissed.onset, reason.to_owned())
+        }));
+        rows.sort_by_key(|row| row.onset);
+        if rows.is_empty() {
+            rows.push(Row::refused(record, 0, self.found.reason().unwrap_or_default()));
+        }
+        rows
+    }
+}
+
+/// A decay, or what is none.
+#[derive(Debug, Clone)]
+struct Row {
+    record: String,
+    onset: usize,
+    first: usize,
+    end: usize,
+    ends_at: &'static str,
+    frequency_hz: f64,
+    /// Decay rate and its standard error.
+    rate_per_s: (f64, f64),
+    peak: f64,
+    clipped: usize,
+    steady: bool,
+    /// Why it is none; empty for a decay.
+    rejected: String,
+}
+
+impl Row {
+    fn of_decay(record: &str, decay: &FreeDecay) -> Self {
+        Self {
+            record: record.to_owned(),
+            onset: decay.onset,
+            first: decay.range.start,
+            end: decay.range.end,
+            ends_at: match decay.end {
+                DecayEnd::Noise => "noise",
+                DecayEnd::NextEvent => "next event",
+                DecayEnd::RecordEnd => "end of the record",
+            },
+            frequency_hz: decay.frequency_hz,
+            rate_per_s: (decay.decline.rate_per_s, decay.decline.std_per_s),
+            peak: decay.channels.first().map_or(f64::NAN, |channel| channel.peak),
+            clipped: decay.channels.iter().flat_map(|channel| &channel.clipped).map(ExactSizeIterator::len).sum(),
+            steady: false,
+            rejected: String::new(),
+        }
+    }
+
+    fn refused(record: &str, onset: usize, rejected: String) -> Self {
+        Self {
+            record: record.to_owned(),
+            onset,
+            first: onset,
+            end: onset,
+            ends_at: "",
+            frequency_hz: f64::NAN,
+            rate_per_s: (f64::NAN, f64::NAN),
+            peak: f64::NAN,
+            clipped: 0,
+            steady: false,
+            rejected,
+        }
+    }
+}
+
+fn table(rows: &[Row], rate: f64) -> Table {
+    Table::of(rows)
+        .with("record", "", "file name of the record", |row| row.record.clone())
+        .with("onset_s", "s", "time of the hit in the record", |row| row.onset as f64 / rate)
+        .with("first", "1", "first free sample", |row| row.first)
+        .with("end", "1", "one past the last sample above the noise", |row| row.end)
+        .with("ends_at", "", "what ends it", |row| row.ends_at)
+        .with("frequency_hz", "Hz", "strongest frequency, to the width of a line", |row| row.frequency_hz)
+        .with_std(["decay_rate", "decay_rate_std"], "1/s", "decay rate of its amplitude", |row| row.rate_per_s)
+        .with("peak", "", "largest departure of the first channel, or a steady amplitude", |row| row.peak)
+        .with("clipped", "1", "clipped samples, left out", |row| row.clipped)
+        .with("rejected", "", "why it is no decay; empty if it is one", |row| row.rejected.clone())
+        .table()
+}
+
+fn summary(rows: &[Row], hits: usize, sensors: &[Sensor], rate: f64) -> Result<Document, StageError> {
+    let rejected = rows.iter().filter(|row| !row.rejected.is_empty());
+    let rejected = rejected.map(|row| json!({ "record": row.record, "reason": row.rejected }));
+    Document::new(&json!({
+        "events": { "found": hits, "rejected": rejected.collect::<Vec<Value>>() },
+        "channels": sensors,
+        "sample_rate_hz": rate,
+        "steady": rows.iter().filter(|row| row.steady).count(),
+    }))
+}
+
+/// Reasons that are named in an error.
+const MOST_REASONS: usize = 5;
+
+fn nothing_found(rows: &[Row], groups: &[Group]) -> StageError {
+    let reasons: Vec<String> =
+        rows.iter().take(MOST_REASONS).map(|row| format!("{}: {}", row.record, row.rejected)).collect();
+    let more = rows.len().saturating_sub(MOST_REASONS);
+    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+    let error = StageError::new(format!("no free decay in {} records: {}{more}", groups.len(), reasons.join("; ")));
+    match rows.iter().any(|row| row.steady) {
+        true => error.help(
+            "record the ringing after the drive has ended, or give its end: trigger = { given = { times_s = [...] } }",
+        ),
+        false => error.help("check the channel; `trigger = { given = { times_s = [...] } }` says where decays begin"),
+    }
+}

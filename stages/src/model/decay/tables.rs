@@ -1,0 +1,169 @@
+//! What the stage hands on.
+
+use afmid_pipeline::{Array, Axis, Document, StageError, Table};
+use num_complex::Complex64;
+use serde_json::{Value, json};
+
+use super::course::Course;
+use crate::artifacts::{Decays, SAMPLE_RATE_HZ, Sensor, mode_table};
+use afmid_kernels::ringdown::{ChannelRingdown, ModeEstimate, ModeShape, RecordFit, RingdownNoise, ShapePoint};
+
+/// Frequencies, quality factors, damping ratios.
+pub(super) fn modes_with_damping(fit: &ChannelRingdown) -> Table {
+    let modes = fit.modes();
+    let damping = Table::of(&modes)
+        .with_std(["damping_ratio", "damping_ratio_std"], "1", "share of critical damping", ModeEstimate::damping_ratio)
+        .table();
+    let mut table = mode_table(&modes);
+    table.columns.extend(damping.columns);
+    table
+}
+
+/// Shapes relative to their largest channel, and the modal assurance criterion between them.
+pub(super) fn shape_array(fit: &ChannelRingdown, sensors: &[Sensor]) -> Array {
+    let numbers = |count: usize| (1..=count).map(|k| k as f64).collect();
+    let points = || fit.shapes.iter().flat_map(|shape| &shape.points);
+    let mac = fit.mac();
+    let (over, pairs) = (&["mode", "channel"], &["mode", "other_mode"]);
+    let names: Vec<&str> = sensors.iter().map(|sensor| sensor.name.as_str()).collect();
+    let mac: Vec<f64> =
+        (0..mac.nrows()).flat_map(|i| (0..mac.ncols()).map(move |j| (i, j))).map(|at| mac[at]).collect();
+    Array::over(vec![
+        Axis::new("mode", "1", "number of the mode", numbers(fit.shapes.len())),
+        Axis::new("channel", "1", "number of the channel", numbers(sensors.len())),
+        Axis::new("other_mode", "1", "number of the other mode", numbers(fit.shapes.len())),
+    ])
+    .with(
+        "shape",
+        "1",
+        "amplitude and phase relative to the largest channel",
+        over,
+        points().map(|point| Complex64::new(point.value.re, point.value.im)).collect::<Vec<_>>(),
+    )
+    .with("re_std", "1", "standard error of its real part", over, points().map(|p| p.re_std()).collect::<Vec<f64>>())
+    .with(
+        "im_std",
+        "1",
+        "standard error of its imaginary part",
+        over,
+        points().map(|p| p.im_std()).collect::<Vec<f64>>(),
+    )
+    .with("mac", "1", "modal assurance criterion: 1 for shapes that are alike", pairs, mac)
+    .attribute("channels", names.join("\n"))
+}
+
+/// A mode in a hit.
+struct HitRow<'a> {
+    hit: usize,
+    mode: usize,
+    shape: &'a ModeShape,
+}
+
+/// Amplitude and phase of each mode in each hit, at the channel that its shape is relative to.
+pub(super) fn hit_table(fit: &ChannelRingdown) -> Table {
+    let row = |(mode, shape): (usize, &'_ ModeShape)| (0..shape.amplitudes.len()).map(move |hit| (hit, mode));
+    let mut rows: Vec<HitRow> = fit
+        .shapes
+        .iter()
+        .enumerate()
+        .flat_map(|(mode, shape)| row((mode, shape)).map(move |(hit, mode)| HitRow { hit, mode, shape }))
+        .collect();
+    rows.sort_by_key(|row| (row.hit, row.mode));
+    Table::of(&rows)
+        .with("hit", "1", "number of the hit", |row| row.hit + 1)
+        .with("mode", "1", "number of the mode", |row| row.mode + 1)
+        .with("channel", "1", "channel of its largest amplitude", |row| row.shape.reference + 1)
+        .with("amplitude", "", "amplitude there at the first free sample, in its unit", |row| {
+            row.shape.amplitudes[row.hit].norm()
+        })
+        .with("phase", "rad", "phase there", |row| row.shape.amplitudes[row.hit].arg())
+        .table()
+}
+
+/// The hit with the largest first sample's ringing, as measured and as fitted, in every channel.
+pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
+    let size = |hit: usize| {
+        let own = fit.records.iter().filter(|record| record.event == hit);
+        own.flat_map(|record| &record.residues).map(|residue| residue.norm_sqr()).sum::<f64>()
+    };
+    let largest = (0..decays.hits.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
+    let rows = decays.hits.get(largest).map_or(&[][..], Vec::as_slice);
+    let samples = rows.first().map_or(0, |row| row.len());
+    let measured: Vec<f64> = rows.iter().flat_map(|row| row.iter().copied()).collect();
+    let own = fit.records.iter().filter(|record| record.event == largest);
+    let fitted: Vec<f64> = own.flat_map(|record| signal(fit, record, 1.0 / decays.sample_rate_hz, samples)).collect();
+    let rest: Vec<f64> = measured.iter().zip(&fitted).map(|(y, m)| y - m).collect();
+    let unit = decays.sensors.first().map_or("", |sensor| &sensor.unit);
+    let over = &["channel", "time"];
+    Array::over(vec![
+        Axis::new("channel", "1", "number of the channel", (1..=rows.len()).map(|k| k as f64).collect()),
+        Axis::new(
+            "time",
+            "s",
+            "time since the first free sample",
+            (0..samples).map(|k| k as f64 / decays.sample_rate_hz).collect(),
+        ),
+    ])
+    .with("measured", unit, "free decay of the largest hit", over, measured)
+    .with("fitted", unit, "the same as fitted", over, fitted)
+    .with("residual", unit, "what is left", over, rest)
+    .attribute("hit", largest + 1)
+    .attribute(SAMPLE_RATE_HZ, decays.sample_rate_hz)
+}
+
+/// A record as fitted: the slope runs from -1 to 1 over it.
+fn signal(fit: &ChannelRingdown, record: &RecordFit, interval_s: f64, samples: usize) -> Vec<f64> {
+    let half = 0.5 * (samples.max(2) - 1) as f64;
+    let at = |k: usize| {
+        let ringing = |(pole, residue): (&faer::c64, &faer::c64)| (residue * (pole * interval_s * k as f64).exp()).re;
+        let sum: f64 = fit.poles.iter().zip(&record.residues).map(ringing).sum();
+        sum + record.offset + record.slope * (k as f64 / half - 1.0)
+    };
+    (0..samples).map(at).collect()
+}
+
+/// The contract of `show --json`, and what does not fit.
+pub(super) fn summary(fit: &ChannelRingdown, course: &Course, decays: &Decays<'_>) -> Result<Document, StageError> {
+    let modes = fit.modes();
+    let several = decays.sensors.len() > 1;
+    let mode = |(mode, shape): (&ModeEstimate, &ModeShape)| {
+        let damping = mode.damping_ratio();
+        let mut document = json!({
+            "frequency_hz": mode.frequency_hz.value,
+            "frequency_std_hz": mode.frequency_hz.std,
+            "quality_factor": mode.quality_factor.value,
+            "quality_factor_std": mode.quality_factor.std,
+            "damping_ratio": damping.value,
+            "damping_ratio_std": damping.std,
+        });
+        if several {
+            let point = |(sensor, point): (&Sensor, &ShapePoint)| {
+                json!({
+                    "channel": sensor.name,
+                    "re": point.value.re,
+                    "im": point.value.im,
+                    "re_std": point.re_std(),
+                    "im_std": point.im_std(),
+                })
+            };
+            document["shape"] = decays.sensors.iter().zip(&shape.points).map(point).collect::<Vec<Value>>().into();
+        }
+        document
+    };
+    let noise = |noise: &RingdownNoise| {
+        json!({
+            "white_std": noise.white.sqrt(),
+            "wander_std": noise.wander.iter().map(|part| part.variance).sum::<f64>().sqrt(),
+        })
+    };
+    Document::new(&json!({
+        "modes": modes.iter().zip(&fit.shapes).map(mode).collect::<Vec<Value>>(),
+        "hits": decays.hits.len(),
+        "channels": decays.sensors,
+        "converged": fit.verdict.converged,
+        "noise": fit.noise.iter().map(noise).collect::<Vec<Value>>(),
+        "course": course.document(),
+        "tried": fit.seen.iter().map(|seen| json!({ "modes": seen.modes, "gain": seen.gain, "kept": seen.kept }))
+            .collect::<Vec<Value>>(),
+    }))
+}
