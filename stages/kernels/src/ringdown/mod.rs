@@ -14,6 +14,23 @@
 //! assert!((quick.modes()[0].frequency_hz.value - mode.frequency_hz.value).abs() < mode.frequency_hz.std);
 //! # Ok::<(), afmid_kernels::model::ModelError>(())
 //! ```
+//!
+//! Several channels, shapes with them; the number of modes found by the data:
+//!
+//! ```
+//! use afmid_kernels::ringdown::{ChannelOptions, fit_channels};
+//! // 100 Hz, damping 1 %, seen by two sensors of opposite sign, 2 kHz
+//! let wave = |gain: f64, seed: usize| -> Vec<f64> {
+//!     let noise = |k: usize| 1e-3 * ((k * k * (seed + 1)) as f64).sin();
+//!     (0..1500).map(|k| gain * (-6.283e-3 * 0.5 * k as f64).exp() * (0.31416 * k as f64).sin() + noise(k)).collect()
+//! };
+//! let (first, second) = (wave(1.0, 1), wave(-0.5, 2));
+//! let fit = fit_channels(&[vec![&first, &second]], &[], 5e-4, &ChannelOptions::default())?;
+//! let damping = fit.modes()[0].damping_ratio();
+//! assert!(fit.poles.len() == 1 && (damping.value - 0.01).abs() < 5.0 * damping.std + 1e-5);
+//! assert!((fit.shapes[0].points[1].value.re + 0.5).abs() < 0.01);
+//! # Ok::<(), afmid_kernels::model::ModelError>(())
+//! ```
 
 mod absorbed;
 mod bootstrap;

@@ -16,11 +16,11 @@ const RATIO: f64 = 2.0;
 const SLOWEST: f64 = 0.25;
 
 /// Poles with one more, of the bank those that take most off what is left, strongest first, one per line; with how much
-/// that is, in variances of the white noise.
+/// that is, in variances of the noise.
 ///
 /// # Method
 /// For each decay rate the transform of what is left times the decaying exponential, over the exponential's energy: what
-/// a least-squares amplitude takes off, summed over all records with their channels' white noise as weight. One
+/// a least-squares amplitude takes off, summed over all records, each over its channel's noise at that frequency. One
 /// transform of twice the length per record and rate.
 pub(super) fn candidates(
     records: &Records<'_>,
@@ -35,21 +35,19 @@ pub(super) fn candidates(
     let rates: Vec<f64> = std::iter::successors(Some(SLOWEST / records.longest as f64), |rate| Some(rate * RATIO))
         .take_while(|rate| *rate < std::f64::consts::PI / (2.0 * least_q))
         .collect();
-    let left: Vec<(f64, Vec<f64>)> = records
+    let left: Vec<(usize, Vec<f64>)> = records
         .all
         .iter()
         .zip(&fitted.projection.solved)
-        .map(|(record, solved)| {
-            let level: f64 = noise[record.channel].white;
-            (1.0 / level.max(f64::MIN_POSITIVE), residual(record, fitted, &solved.own, records))
-        })
+        .map(|(record, solved)| (record.channel, residual(record, fitted, &solved.own, records)))
         .collect();
+    let weights: Vec<Vec<f64>> = noise.iter().map(|noise| weights(noise, interval_s, length)).collect();
     let slowest_bin = (length / records.longest).max(2);
     let peaks: Vec<(f64, c64)> = rates
         .par_iter()
         .flat_map_iter(|&rate| {
             let mut gain = vec![0.0; plan.bins()];
-            for (weight, values) in &left {
+            for (channel, values) in &left {
                 let decay = (-rate).exp();
                 let (mut factor, mut energy) = (1.0, 0.0);
                 let damped: Vec<f64> = values
@@ -62,7 +60,7 @@ pub(super) fn candidates(
                     })
                     .collect();
                 let power = plan.power(damped);
-                gain.iter_mut().zip(power).for_each(|(g, p)| *g += 2.0 * weight * p / energy);
+                gain.iter_mut().zip(power).zip(&weights[*channel]).for_each(|((g, p), w)| *g += 2.0 * w * p / energy);
             }
             let turn = std::f64::consts::TAU / length as f64;
             let allowed = |k: usize| {
@@ -105,4 +103,17 @@ pub(super) fn candidates(
             (gain, Poles(all))
         })
         .collect()
+}
+
+/// One over the variance per sample that white noise of the same density would have, at each bin.
+fn weights(noise: &RingdownNoise, interval_s: f64, length: usize) -> Vec<f64> {
+    let density = |k: usize| {
+        let cos = (std::f64::consts::TAU * k as f64 / length as f64).cos();
+        let wander = noise.wander.iter().map(|part| {
+            let decay = (-part.rate_per_s * interval_s).exp();
+            part.variance * (1.0 - decay * decay) / (1.0 - 2.0 * decay * cos + decay * decay).max(1e-300)
+        });
+        noise.white + wander.sum::<f64>()
+    };
+    (0..=length / 2).map(|k| 1.0 / density(k).max(f64::MIN_POSITIVE)).collect()
 }

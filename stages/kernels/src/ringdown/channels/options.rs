@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +49,10 @@ pub struct ChannelOptions {
     /// Least quality factor of a mode. Why 0.6: below 0.5 nothing oscillates.
     #[schemars(extend("exclusiveMinimum" = 0.5))]
     pub least_quality_factor: f64,
+    /// Start from these poles, rad/s, upper half plane, instead of finding modes; their number replaces `modes`. Default
+    /// none. For the early and the late part of a decay whose modes are known.
+    #[serde(skip)]
+    pub start: Vec<c64>,
     /// Missing samples per event and channel, clipped say; default empty: none. What stands there is never used.
     #[serde(skip)]
     pub missing: Vec<Vec<Vec<Range<usize>>>>,
@@ -61,6 +66,7 @@ impl Default for ChannelOptions {
             drift: true,
             false_alarm: 1e-3,
             least_quality_factor: 0.6,
+            start: Vec::new(),
             missing: Vec::new(),
         }
     }
@@ -80,6 +86,14 @@ impl ChannelOptions {
         if self.least_quality_factor.is_nan() || self.least_quality_factor <= 0.5 {
             let found = self.least_quality_factor;
             return Err(ModelError::Parameter { name: "least_quality_factor", found, wanted: "above 0.5" });
+        }
+        if let Some(pole) = self.start.iter().find(|s| !(s.re < 0.0 && s.im > 0.0 && s.is_finite())) {
+            let found = if pole.re < 0.0 { pole.im } else { pole.re };
+            return Err(ModelError::Parameter {
+                name: "start",
+                found,
+                wanted: "decaying poles of the upper half plane",
+            });
         }
         match &self.noise {
             ChannelNoise::Known(noise) if noise.len() != channels => {

@@ -58,7 +58,7 @@ pub fn fit_channels(
     }
     let records = Records::of(events, interval_s, options)?;
     let ladder = Ladder { records: &records, free, options };
-    let (step, seen) = ladder.climb()?;
+    let (step, seen) = if options.start.is_empty() { ladder.climb()? } else { (ladder.given(), Vec::new()) };
     let (fitted, noise) = ladder.refined(step);
     ChannelRingdown::of(&records, fitted, noise, seen)
 }
@@ -104,23 +104,37 @@ impl Ladder<'_> {
         gain <= 0.0 || chi_square_tail(gain, degrees) * places.powi(modes as i32) > self.options.false_alarm
     }
 
+    /// The fit from the poles of the options.
+    fn given(&self) -> Step {
+        let first = self.first_noise();
+        let fitted = self.fit(&Poles(self.options.start.clone()), &first, NEARLY);
+        self.settled(&fitted, &first)
+    }
+
+    fn first_noise(&self) -> Vec<RingdownNoise> {
+        match &self.options.noise {
+            ChannelNoise::Known(noise) => noise.clone(),
+            _ => first_noise(self.records),
+        }
+    }
+
     fn climb(&self) -> Result<(Step, Vec<OrderTried>), ModelError> {
         let (least, most) = match self.options.modes {
             ModesWanted::Fixed(count) => (count, count),
             ModesWanted::AtMost(count) => (0, count),
         };
-        let first = match &self.options.noise {
-            ChannelNoise::Known(noise) => noise.clone(),
-            _ => first_noise(self.records),
-        };
+        let first = self.first_noise();
         let fitted = self.fit(&Poles(Vec::new()), &first, NEARLY);
-        let mut needed = self.deviance(&fitted);
+        // without a mode all is noise: what that explains needs none
+        let rest = self.settled(&fitted, &first);
+        let mut needed = self.deviance(&fitted).min(rest.deviance);
         let mut current = Step { fitted, noise: first, deviance: needed };
+        let mut all_noise = Some(rest.noise);
         let mut seen = Vec::new();
         let mut best: Option<Step> = None;
         let mut place = 0;
         for modes in 1..=most {
-            let Some(next) = self.next(&current, modes <= least) else { break };
+            let Some(next) = self.next(&current, all_noise.take().as_deref(), modes <= least) else { break };
             let gain = needed - next.deviance;
             let kept = modes <= least || !self.by_chance(gain, modes - place);
             seen.push(OrderTried { modes, gain, kept });
@@ -146,12 +160,14 @@ impl Ladder<'_> {
     /// The best fit with a mode more; none where nothing is left that may be one, unless one is `wanted`.
     ///
     /// The second of the bank's places is tried where the first one gains no more than noise may.
-    fn next(&self, current: &Step, wanted: bool) -> Option<Step> {
+    /// `other`: another noise under which places are looked for.
+    fn next(&self, current: &Step, other: Option<&[RingdownNoise]>, wanted: bool) -> Option<Step> {
         let least_q = self.options.least_quality_factor;
-        let starts = candidates(self.records, &current.noise, &current.fitted, least_q, CANDIDATES);
+        let places = |noise: &[RingdownNoise]| candidates(self.records, noise, &current.fitted, least_q, CANDIDATES);
+        let mut starts = places(&current.noise);
+        starts.extend(other.into_iter().flat_map(places));
         let mut found: Option<Step> = None;
         for (gain, start) in starts {
-            // white noise in the bank: where there is wander it exceeds what the fit can gain
             if !wanted && self.by_chance(gain / BANK, 1) {
                 continue;
             }
