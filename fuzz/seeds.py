@@ -252,6 +252,75 @@ def text():
     write("text", "multi.lvm", head.format(x="Multi") + part + "X_Value\ta\tX_Value\tb\tComment\n" + "0.0\t1\t0.0\t2\n0.001\t3\t0.002\t4\n")
 
 
+# tables with headers of oscilloscopes
+def scope_tables():
+    write("text", "rigol.csv", "X,CH1,Start,Increment,\nSequence,Volt,-2.0e-03,1.0e-03\n" + "".join(f"{i},{value},,\n" for i, value in enumerate(SAMPLES)))
+    write("text", "beside.csv", "Record Length,3,,0.000,1\nSample Interval,1E-3,,0.001,2\nVertical Units,V,,0.002,3\n,,,0.003,4\n")
+    head = "waveform,a\nt0,1/1/2021 10:00:00\ndelta t,1E-3\n\ntime,a\n"
+    write("text", "blocks.csv", (head + "1/1/2021 10:00:00,1\n1/1/2021 10:00:01,2\n") * 2)
+
+
+# waveform audio
+def wav():
+    def chunk(name, data, order="<"):
+        return name + struct.pack(order + "I", len(data)) + data + b"\0" * (len(data) % 2)
+
+    def form(tag, channels, bits, order="<"):
+        frame = channels * bits // 8
+        return struct.pack(order + "HHIIHH", tag, channels, 8000, 8000 * frame, frame, bits)
+
+    guid = struct.pack("<HHI", 22, 16, 0) + struct.pack("<H", 1) + bytes.fromhex("000000001000800000aa00389b71")
+    codes = struct.pack("<6h", *SAMPLES)
+    both = chunk(b"fmt ", form(1, 2, 16)) + chunk(b"data", codes)
+    write("wav", "pcm.wav", chunk(b"RIFF", b"WAVE" + chunk(b"LIST", b"odd") + both))
+    write("wav", "extensible.wav", chunk(b"RIFF", b"WAVE" + chunk(b"fmt ", form(0xFFFE, 1, 24) + guid) + chunk(b"data", bytes(range(9)))))
+    write("wav", "float.wav", chunk(b"RIFF", b"WAVE" + chunk(b"fmt ", form(3, 1, 64)) + chunk(b"data", struct.pack("<6d", *SAMPLES))))
+    write("wav", "big.wav", chunk(b"RIFX", b"WAVE" + chunk(b"fmt ", form(1, 1, 16, ">"), ">") + chunk(b"data", struct.pack(">6h", *SAMPLES), ">"), ">"))
+    sizes = struct.pack("<QQQI", 90, 12, 6, 0)
+    write("wav", "long.wav", b"RF64" + b"\xff" * 4 + b"WAVE" + chunk(b"ds64", sizes) + chunk(b"fmt ", form(1, 1, 16)) + b"data" + b"\xff" * 4 + codes)
+
+
+# waveforms of oscilloscopes
+def scopes():
+    for order, name in [("<", "little"), (">", "big")]:
+        about = bytearray(346)
+        samples = struct.pack(order + "6h", *SAMPLES)
+        about[0:8], about[16:26], about[196:197], about[244:245] = b"WAVEDESC", b"LECROY_2_3", b"V", b"S"
+        struct.pack_into(order + "2h8i", about, 32, 1, int(order == "<"), 346, 0, 0, 32, 0, 0, len(samples), 0)
+        struct.pack_into(order + "i", about, 116, 6)
+        struct.pack_into(order + "i", about, 144, 2)
+        struct.pack_into(order + "3f", about, 156, 0.5, 2.0, 0.0)
+        struct.pack_into(order + "f", about, 176, 1e-6)
+        struct.pack_into(order + "dBBBBH", about, 296, 4.5, 3, 2, 1, 12, 2020)
+        whole = bytes(about) + b"\0" * 32 + samples
+        write("lecroy", f"{name}.trc", b"#9" + f"{len(whole):09}".encode() + whole)
+
+    def waveform(wide, label, kind, segment, *buffers):
+        out = struct.pack("<5ifdddii", 140, kind, len(buffers), 6, 0, 0.0, 0.0, 2e-6, 0.0, 2, 1)
+        out += b"22 NOV 2020".ljust(16, b"\0") + b"19:02:34".ljust(16, b"\0") + b"MODEL:SERIAL".ljust(24, b"\0") + label.ljust(16, b"\0")
+        out += struct.pack("<dI", 0.0, segment)
+        for kind, data in buffers:
+            width = 1 if kind == 6 else 4
+            out += struct.pack("<ihhq" if wide else "<ihhi", 16 if wide else 12, kind, width, len(data)) + data
+        return out
+
+    values = struct.pack("<6f", *SAMPLES)
+    for mark, wide, name in [(b"AG10", False, "agilent"), (b"RG03", True, "rigol")]:
+        parts = [waveform(wide, b"1", 1, 1, (1, values)), waveform(wide, b"1", 1, 2, (1, values))]
+        parts += [waveform(wide, b"2", 2, 0, (2, values), (3, values)), waveform(wide, b"D0", 6, 0, (6, b"\0\1"))]
+        body = b"".join(parts)
+        write("keysight", f"{name}.bin", mark + struct.pack("<qi" if wide else "<ii", 12 + len(body), len(parts)) + body)
+
+    begin = ':WFMPRE:BYT_NR 2;BIT_NR 16;ENCDG {coding};BN_FMT RI;BYT_OR MSB;NR_PT 6;WFID "Ch1, DC; a note";PT_FMT {form};XINCR 1.0E-5;XUNIT "s";'
+    begin += 'YMULT 0.5;YZERO 1.0;YOFF 2.0;YUNIT "V";:CURVE '
+    codes = struct.pack(">6h", *SAMPLES)
+    write("isf", "binary.isf", begin.format(coding="BIN", form="Y").encode() + b"#212" + codes)
+    write("isf", "envelope.isf", begin.format(coding="BIN", form="ENV").encode() + b"#212" + codes)
+    write("isf", "text.isf", begin.format(coding="ASC", form="Y") + ",".join(map(str, SAMPLES)) + "\n")
+    short = ':WFMP:NR_P 6;:WFMP:BYT_N 1;ENC BIN;BN_F RP;BYT_O LSB;WFI "Ch2";PT_F Y;XUN "s";XIN 1E-3;YUN "V";YMU 40E-3;YOF 0;YZE 0;:CURV #16'
+    write("isf", "short.isf", short.encode() + bytes(range(6)))
+
+
 # samples without a header; the first eight bytes are the description (entrances.rs)
 def raw():
     data = struct.pack("<64h", *[int(3000 * numpy.sin(i / 5)) for i in range(64)])
@@ -376,11 +445,11 @@ def plugins():
 
 # what inspect is given: one of each
 def inspected():
-    for target, name in [("tdms", "little.tdms"), ("npz", "deflated.npz"), ("mat", "level7-little.mat"), ("jpk", "deflated.jpk-force"), ("text", "comma.csv"), ("text", "one.lvm"), ("uff", "text.uff"), ("ibw", "version5-little.ibw"), ("nanoscope", "two-bytes.000"), ("foreign_hdf5", "plain.h5")]:
+    for target, name in [("tdms", "little.tdms"), ("npz", "deflated.npz"), ("mat", "level7-little.mat"), ("jpk", "deflated.jpk-force"), ("text", "comma.csv"), ("text", "one.lvm"), ("uff", "text.uff"), ("ibw", "version5-little.ibw"), ("nanoscope", "two-bytes.000"), ("wav", "pcm.wav"), ("lecroy", "little.trc"), ("keysight", "rigol.bin"), ("isf", "short.isf"), ("foreign_hdf5", "plain.h5")]:
         write("inspect", name, (CORPUS / target / name).read_bytes())
     decay = [int(20000 * numpy.exp(-i / 200) * numpy.sin(i / 3)) for i in range(1200)]
     write("inspect", "decay.csv", "time [s],y [V]\n" + "".join(f"{i * 1e-5:.5f},{value}\n" for i, value in enumerate(decay)))
 
 
-for make in (tdms, arrays, mat, ibw, nanoscope, jpk, uff, text, raw, foreign, configs, plugins, inspected):
+for make in (tdms, arrays, mat, ibw, nanoscope, jpk, uff, text, scope_tables, wav, scopes, raw, foreign, configs, plugins, inspected):
     make()

@@ -8,11 +8,15 @@ mod archive;
 mod budget;
 mod calendar;
 mod fail;
+mod fields;
 mod grid;
 pub mod igor;
 mod inflating;
+mod joined;
 pub mod jpk;
+pub mod keysight;
 mod lanes;
+pub mod lecroy;
 mod listing;
 pub mod matlab;
 pub mod nanoscope;
@@ -27,9 +31,11 @@ pub mod raw_binary;
 mod registry;
 mod regular;
 pub mod tdms;
+pub mod tektronix;
 mod text;
 pub mod text_table;
 pub mod uff;
+pub mod wav;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -95,6 +101,25 @@ pub struct FoundChannel {
     pub stored_as: &'static str,
     /// Where the samples come from.
     pub source: Arc<dyn Source>,
+}
+
+impl FoundChannel {
+    /// A channel that is described by nothing but its name: no unit, no rate, values as they are stored.
+    pub fn new(location: impl Into<String>, samples: usize, stored_as: &'static str, source: Arc<dyn Source>) -> Self {
+        Self {
+            location: location.into(),
+            samples,
+            unit: String::new(),
+            long_name: String::new(),
+            sample_rate_hz: None,
+            scale_factor: 1.0,
+            add_offset: 0.0,
+            fill_code: None,
+            gaps: Vec::new(),
+            stored_as,
+            source,
+        }
+    }
 }
 
 /// What a file holds.

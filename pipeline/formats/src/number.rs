@@ -38,6 +38,8 @@ pub enum Number {
     I16,
     /// Unsigned, 16 bits.
     U16,
+    /// Signed, 24 bits.
+    I24,
     /// Signed, 32 bits.
     I32,
     /// Unsigned, 32 bits.
@@ -58,6 +60,7 @@ impl Number {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
+            Self::I24 => 3,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
         }
@@ -70,6 +73,7 @@ impl Number {
             Self::U8 => "uint8",
             Self::I16 => "int16",
             Self::U16 => "uint16",
+            Self::I24 => "int24",
             Self::I32 => "int32",
             Self::U32 => "uint32",
             Self::I64 => "int64",
@@ -126,6 +130,8 @@ impl Number {
             Self::U8 => Raw::Int16(each(bytes, big, |b| i16::from(u8::from_le_bytes(b)))),
             Self::I16 => Raw::Int16(each(bytes, big, i16::from_le_bytes)),
             Self::U16 => Raw::Int32(each(bytes, big, |b| i32::from(u16::from_le_bytes(b)))),
+            // the three bytes are the upper ones of a word: the shift back keeps the sign
+            Self::I24 => Raw::Int32(each(bytes, big, |[a, b, c]: [u8; 3]| i32::from_le_bytes([0, a, b, c]) >> 8)),
             Self::I32 => Raw::Int32(each(bytes, big, i32::from_le_bytes)),
             Self::U32 => Raw::Float64(each(bytes, big, |b| f64::from(u32::from_le_bytes(b)))),
             Self::I64 => Raw::Float64(each(bytes, big, |b| i64::from_le_bytes(b) as f64)),

@@ -42,6 +42,19 @@ const INTERVALS: [&str; 10] = [
 /// Two statements of a rate agree if they differ by less: rates are often written with six digits.
 const AGREE: f64 = 1e-5;
 
+/// The rate of a step in seconds, to twelve digits: a difference of two times has no more.
+pub(crate) fn of_step(step_s: f64) -> f64 {
+    let rate = step_s.recip();
+    format!("{rate:.11e}").parse().unwrap_or(rate)
+}
+
+/// A step that is kept in single precision is the shortest decimal number that is rounded to it: instruments have steps
+/// of 1, 2 or 5 times a power of ten. One in double precision is taken as it is, unless it was widened from single.
+pub(crate) fn shortest(step: f64) -> f64 {
+    let single = step as f32;
+    if f64::from(single) == step { single.to_string().parse().unwrap_or(step) } else { step }
+}
+
 /// A number that is named like a sampling rate or interval.
 #[derive(Debug, Clone)]
 pub struct Clue {
@@ -91,5 +104,22 @@ pub fn agreed_rate(clues: &[Clue]) -> (Option<f64>, Option<String>) {
         (Some(first), Some(format!("the sampling rate is taken from {named}: {first} samples per second")))
     } else {
         (None, Some(format!("the sampling rate is left unknown because these disagree: {named}")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_single_precision_are_the_decimal_number_that_was_meant() {
+        // none of these is exact in binary
+        for (step, meant) in [(1e-9_f32, 1e-9_f64), (5e-6, 5e-6), (2.5e-3, 2.5e-3), (4e-7, 4e-7), (8e-4, 8e-4)] {
+            assert_ne!(f64::from(step), meant);
+            assert_eq!(shortest(f64::from(step)), meant);
+        }
+        assert_eq!(of_step(shortest(f64::from(1e-9_f32))), 1e9);
+        assert_eq!(shortest(1e-9), 1e-9);
+        assert_eq!(shortest(0.5), 0.5);
     }
 }

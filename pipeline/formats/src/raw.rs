@@ -49,6 +49,30 @@ impl Raw {
         }
     }
 
+    /// These samples and then those of `later`: of the same type, or both in double precision.
+    #[must_use]
+    pub(crate) fn followed_by(self, later: Self) -> Self {
+        match (self, later) {
+            (Self::Int16(mut a), Self::Int16(b)) => Self::Int16({
+                a.extend(b);
+                a
+            }),
+            (Self::Int32(mut a), Self::Int32(b)) => Self::Int32({
+                a.extend(b);
+                a
+            }),
+            (Self::Float32(mut a), Self::Float32(b)) => Self::Float32({
+                a.extend(b);
+                a
+            }),
+            (a, b) => Self::Float64({
+                let mut values = a.widened();
+                values.extend(b.widened());
+                values
+            }),
+        }
+    }
+
     /// The same samples, the last one first.
     #[must_use]
     pub fn reversed(mut self) -> Self {

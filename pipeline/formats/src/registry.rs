@@ -6,12 +6,16 @@ use std::path::Path;
 
 use crate::igor::IgorWave;
 use crate::jpk::JpkForce;
+use crate::keysight::Keysight;
+use crate::lecroy::LeCroy;
 use crate::matlab::Mat;
 use crate::nanoscope::Nanoscope;
 use crate::numpy::{Npy, Npz};
 use crate::tdms::Tdms;
+use crate::tektronix::TektronixIsf;
 use crate::text_table::TextTable;
 use crate::uff::Uff;
+use crate::wav::Wav;
 use crate::{Contents, Format, FormatError, fail};
 
 /// First bytes of a file that a format may look at.
@@ -52,6 +56,10 @@ const FORMATS: &[Known] = &[
     Known::of::<Npz>("npz", "NumPy archive"),
     Known::of::<JpkForce>("jpk", "JPK force curve"),
     Known::of::<Nanoscope>("nanoscope", "Bruker Nanoscope force curve"),
+    Known::of::<Wav>("wav", "Waveform audio"),
+    Known::of::<LeCroy>("lecroy", "LeCroy waveform"),
+    Known::of::<Keysight>("keysight", "Keysight or Rigol binary waveform"),
+    Known::of::<TektronixIsf>("isf", "Tektronix waveform"),
     Known::of::<Uff>("uff", "Universal File Format 58"),
     Known::of::<Mat>("mat", "MATLAB 4 to 7"),
     Known::of::<IgorWave>("ibw", "Igor binary wave"),

@@ -57,7 +57,8 @@ pub struct Records {
     /// Leave out files that cannot be opened, with a warning, instead of stopping.
     pub skip_unreadable: bool,
     /// The files' format: `auto` for what their bytes and names say, `native`, `hdf5` (any layout), `tdms`, `npy`,
-    /// `npz`, `jpk`, `nanoscope`, `uff`, `mat`, `ibw`, `text` (LVM, CSV), `raw`.
+    /// `npz`, `jpk`, `nanoscope`, `uff`, `mat`, `ibw`, `wav`, `lecroy`, `keysight` (and Rigol), `isf` (Tektronix), `text`
+    /// (LVM, CSV), `raw`.
     pub format: String,
     /// Samples per second in Hz, of files that state none. Absent: an error where a file states another.
     #[schemars(extend("exclusiveMinimum" = 0.0))]

@@ -1,8 +1,8 @@
 //! The headers of Igor binary waves: where things are, checked against the file's size.
 
 use crate::FormatError;
+use crate::fields::Fields;
 
-use super::fields::Fields;
 use super::kind::{Kind, kind};
 use crate::fail;
 use crate::number::Order;

@@ -16,7 +16,6 @@
 
 mod channels;
 mod clock;
-mod fields;
 mod header;
 mod kind;
 mod note;

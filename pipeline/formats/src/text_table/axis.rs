@@ -85,15 +85,10 @@ fn even_stretch(times: &[f64], printed: &Printed, row: usize, stated_step: Optio
     Ok(Even { step, rounded: true, uncertainty: worst_unit / (steps * step) })
 }
 
-/// The rate of a step in seconds, to twelve digits: the ends' difference has no more.
-pub(super) fn rate_hz(step_s: f64) -> f64 {
-    let rate = step_s.recip();
-    format!("{rate:.11e}").parse().unwrap_or(rate)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rate::of_step;
 
     fn column(texts: &[&str]) -> Column {
         let mut column = Column::default();
@@ -107,7 +102,7 @@ mod tests {
     #[test]
     fn an_even_axis_has_its_step() {
         let even = even(&column(&["0.0", "0.1", "0.2", "0.3"]), None).unwrap();
-        assert_eq!(rate_hz(even.step), 10.0);
+        assert_eq!(of_step(even.step), 10.0);
         assert!(!even.rounded);
     }
 

@@ -7,6 +7,7 @@ use super::plain::Rows;
 use super::titles::{self, Title};
 use super::units;
 use crate::FoundChannel;
+use crate::rate::of_step;
 use std::sync::Arc;
 
 /// Channels of the columns, with the rate of the time column among them, or the rate that the header states.
@@ -126,7 +127,7 @@ fn clock(
             let counter =
                 if counts { format!("; {first} counts the samples and is no channel") } else { String::new() };
             remarks.push(format!("the sample rate is taken from the header: «{words}»{counter}"));
-            Clock { rate_hz: Some(axis::rate_hz(step)), axis: counts.then_some(0) }
+            Clock { rate_hz: Some(of_step(step)), axis: counts.then_some(0) }
         }
         (None, Some(even)) => {
             let step = even.step;
@@ -163,7 +164,7 @@ fn rate(
         let even = axis::even_between(column, starts, Some(step_there)).is_ok() || axis::agrees(column, step_there);
         if even {
             remarks.push(format!("{runs}; the header says «{words}»"));
-            return (Some(axis::rate_hz(*step)), axis::even(column, Some(step_there)).is_ok());
+            return (Some(of_step(*step)), axis::even(column, Some(step_there)).is_ok());
         }
     }
     let whole = axis::even(column, None);
@@ -180,7 +181,7 @@ fn rate(
                 let relative = even.uncertainty;
                 remarks.push(format!("{location} is rounded: the sample rate is known to {relative:.1e} of itself"));
             }
-            (Some(axis::rate_hz(even.step * unit_s)), goes_on)
+            (Some(of_step(even.step * unit_s)), goes_on)
         }
         Err(why) => {
             remarks.push(format!("{location} gives no sample rate: {why}"));

@@ -6,6 +6,7 @@ use super::lvm::{Section, X};
 use super::lvm_header::{FileHeader, moment};
 use super::{Parsed, titles};
 use crate::FoundChannel;
+use crate::rate::of_step;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -116,7 +117,7 @@ impl Joined {
             samples: channel.values.len(),
             unit: channel.unit,
             long_name: channel.title,
-            sample_rate_hz: channel.step.map(axis::rate_hz),
+            sample_rate_hz: channel.step.map(of_step),
             scale_factor: 1.0,
             add_offset: 0.0,
             fill_code: None,

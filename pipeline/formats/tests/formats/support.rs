@@ -6,11 +6,20 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// A real file or folder; none, with a counted line, if the folder of real files is missing.
+/// A real file or folder of `loaders`; none, with a counted line, if the folder of real files is missing.
 pub fn real(name: &str) -> Option<PathBuf> {
+    shared("loaders", name)
+}
+
+/// A real file of an oscilloscope, of LabVIEW or of CASSY, or an empty name for all; as [`real`].
+pub fn scope(name: &str) -> Option<PathBuf> {
+    shared("scopes", name)
+}
+
+fn shared(folder: &str, name: &str) -> Option<PathBuf> {
     static MISSING: AtomicUsize = AtomicUsize::new(0);
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("AFMID_DATA").map_or_else(beside, PathBuf::from).join("loaders");
+    let folder = std::env::var_os("AFMID_DATA").map_or_else(beside, PathBuf::from).join(folder);
     if !folder.is_dir() {
         let count = MISSING.fetch_add(1, Ordering::Relaxed) + 1;
         println!("real file {count} not tested: {} is missing, built files stand in", folder.display());

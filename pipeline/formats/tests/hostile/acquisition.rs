@@ -1,10 +1,12 @@
 //! Damaged files: cut at some hundred places and with random bytes flipped. Never a panic, never much memory, always an
 //! end.
 
+use crate::scope_files::{Trace, bin_file, isf_file};
 use crate::support::{self, Random, peak_bytes};
 use crate::tdms_file::*;
 use afmid_formats::Format;
-use afmid_formats::{tdms::Tdms, text_table::TextTable, uff::Uff};
+use afmid_formats::{keysight::Keysight, lecroy::LeCroy, tdms::Tdms, tektronix::TektronixIsf};
+use afmid_formats::{text_table::TextTable, uff::Uff, wav::Wav};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -109,6 +111,45 @@ fn text_tables() {
     }
     torment::<TextTable>("a.csv", b"# made\nTime (s),a [V],\"b\"\n0.0,1.5,x\n0.1,-2.5,\n0.2,3e-3,4\n0.3,1,1\n", 800);
     torment::<TextTable>("a.dat", "Zeit\tKraft\ns\tµN\n0,0\t1,5\n0,1\t-2,5\n".as_bytes(), 800);
+}
+
+#[test]
+fn tables_with_headers_of_oscilloscopes() {
+    let rows = "0,1,4,,\n1,2,5,,\n2,3,6,,\n";
+    let rigol = format!("X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-2.0e-03,1.0e-03\n{rows}");
+    torment::<TextTable>("rigol.csv", rigol.as_bytes(), 400);
+    let beside = "Record Length,3,,0.0000,1\nSample Interval,1E-3,,0.0010,2\nVertical Units,V,,0.0020,3\n,,,0.0030,4\n";
+    torment::<TextTable>("tds.csv", beside.as_bytes(), 400);
+    let head = "waveform,a\nt0,1/1/2021 10:00:00\ndelta t,1E-3\n\ntime,a\n";
+    let blocks = format!("{head}1/1/2021 10:00:00,1\n1/1/2021 10:00:01,2\n{head}1/1/2021 10:00:09,3\n");
+    torment::<TextTable>("blocks.csv", blocks.as_bytes(), 400);
+}
+
+#[test]
+fn waveforms_of_oscilloscopes() {
+    for (big_endian, words) in [(false, true), (true, false)] {
+        let trace = Trace { big_endian, words, segments: 3, ..Trace::default() };
+        torment::<LeCroy>(&format!("{big_endian}.trc"), &trace.file(), 400);
+    }
+    let waves = [
+        ("1", 1, 1, vec![(1, vec![1.0, 2.0])]),
+        ("1", 1, 2, vec![(1, vec![3.0])]),
+        ("2", 2, 0, vec![(2, vec![1.0]), (3, vec![-1.0])]),
+        ("D", 6, 0, vec![(6, vec![1.0, 0.0])]),
+    ];
+    torment::<Keysight>("ag.bin", &bin_file(b"AG10", false, &waves), 400);
+    torment::<Keysight>("rg.bin", &bin_file(b"RG03", true, &waves), 400);
+    let preamble = ":WFMPRE:BYT_NR 2;ENCDG BIN;BN_FMT RI;BYT_OR MSB;NR_PT 4;WFID \"Ch1, DC\";PT_FMT ENV;XINCR 1.0E-5;\
+        XUNIT \"s\";YMULT 0.5;YZERO 1.0;YOFF 2.0;YUNIT \"V\"";
+    torment::<TektronixIsf>("binary.isf", &isf_file(preamble, b"#18\x00\x01\x00\x02\x00\x03\x00\x04"), 400);
+    torment::<TektronixIsf>("text.isf", &isf_file(&preamble.replace("BIN", "ASC"), b"4,-2,0,1e3\n"), 400);
+}
+
+#[test]
+fn wav_files() {
+    for name in ["u1", "i2", "f8"] {
+        torment::<Wav>(&format!("{name}.wav"), &std::fs::read(support::written(&format!("{name}.wav"))).unwrap(), 400);
+    }
 }
 
 #[test]

@@ -5,6 +5,8 @@ mod acquisition;
 mod arrays;
 #[path = "../formats/mat_builder.rs"]
 mod mat_builder;
+#[path = "../formats/scope_files.rs"]
+mod scope_files;
 #[path = "../formats/support.rs"]
 mod support;
 #[path = "../formats/tdms_file.rs"]
