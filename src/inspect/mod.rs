@@ -7,7 +7,7 @@ mod json;
 mod text;
 mod verdict;
 
-pub use channel::Channel;
+pub use channel::{Channel, Values};
 pub use file::{Inspected, Outcome, inspect};
 pub use json::inspected_json;
 pub use text::{file_text, folder_text};

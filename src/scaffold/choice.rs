@@ -6,7 +6,7 @@ use afmid_pipeline::recording::{InputFiles, Reading, WholeFile};
 use super::pipeline::Wanted;
 use super::recordings::Source;
 use crate::cli::{Goal, RecordsAre};
-use crate::inspect::{Channel, LEAST_RATE_HZ};
+use crate::inspect::{Channel, LEAST_RATE_HZ, Values};
 
 /// Why something cannot be chosen, and what to do.
 pub type Question = (String, Option<String>);
@@ -129,7 +129,8 @@ fn name(source: &Source) -> String {
 /// The channels with signals of the best one's length and unit.
 fn sensors(source: &Source) -> Result<Vec<&Channel>, Question> {
     let usable = |channel: &&Channel| {
-        channel.values.as_ref().is_some_and(|values| values.codes >= LEAST_CODES && values.missing == 0)
+        let signal = |values: &Values| values.codes >= LEAST_CODES && values.missing == 0;
+        !channel.is_axis && channel.values.as_ref().is_some_and(signal)
     };
     let best = source.best.and_then(|index| source.channels.get(index)).filter(usable);
     let Some(best) = best.or_else(|| source.channels.iter().filter(usable).max_by_key(|channel| channel.samples))

@@ -139,6 +139,7 @@ mod tests {
 
     use super::super::choice::choose;
     use super::*;
+    use crate::inspect::Channel;
 
     fn source(rate: Option<f64>, unit: &str) -> Source {
         let channel = Channel {
@@ -148,6 +149,7 @@ mod tests {
             unit: unit.to_owned(),
             stored_as: "int16",
             gaps: Vec::new(),
+            is_axis: false,
             values: None,
         };
         Source {

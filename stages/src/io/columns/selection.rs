@@ -40,7 +40,7 @@ impl Column {
     /// This channel of a file, if it has it. Errors: two have the name.
     pub(super) fn find<'a>(&self, contents: &'a Contents) -> Result<Option<&'a FoundChannel>, StageError> {
         let name = match self {
-            Self::Number(number) => return Ok(number.checked_sub(1).and_then(|index| contents.channels.get(index))),
+            Self::Number(number) => return Ok(number.checked_sub(1).and_then(|index| signals(contents).nth(index))),
             Self::Name(name) => name,
         };
         let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
@@ -70,13 +70,19 @@ impl Column {
     }
 }
 
+/// The channels that are no axes.
+fn signals(contents: &Contents) -> impl Iterator<Item = &FoundChannel> {
+    contents.channels.iter().filter(|channel| !channel.is_axis)
+}
+
 /// The channels by number and location, the first forty.
 fn listing(contents: &Contents) -> String {
     const MOST: usize = 40;
-    let numbered = contents.channels.iter().enumerate().take(MOST);
+    let numbered = signals(contents).enumerate().take(MOST);
     let mut names: Vec<String> = numbered.map(|(i, channel)| format!("{} `{}`", i + 1, channel.location)).collect();
-    if contents.channels.len() > MOST {
-        names.push(format!("{} more", contents.channels.len() - MOST));
+    let more = signals(contents).count().saturating_sub(MOST);
+    if more > 0 {
+        names.push(format!("{more} more"));
     }
     if names.is_empty() { "none at all".to_owned() } else { names.join(", ") }
 }
