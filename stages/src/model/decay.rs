@@ -7,12 +7,12 @@ use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Spec, Stage
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use self::course::Course;
+use self::course::{Course, Followed, follow};
 use self::tables::{fit_array, hit_table, modes_with_damping, shape_array, summary};
 use super::count::Count;
 use crate::artifacts::Decays;
 use crate::events::DECAYS;
-use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, ModesWanted, fit_channels};
+use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, ModesWanted};
 
 /// Fits modes and mode shapes to free decays: one set of poles for all channels of all hits.
 ///
@@ -20,8 +20,8 @@ use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Mod
 /// its own, noise of each channel white with wander. Of several hits the residues of a mode are one complex shape over
 /// the channels times an amplitude per hit: tested, not imposed.
 /// Method: maximum likelihood by variable projection; modes one by one, each kept if noise alone gains as much with a
-/// probability below `false_alarm`. The first and the last part of the decays are fitted by themselves too: what moves
-/// with the amplitude is said, with both ends.
+/// probability below `false_alarm`. The first and the last part of the decays are fitted by themselves too: where a mode
+/// moves with its amplitude the last part counts, cut again until nothing moves, and both ends are said.
 /// Shapes: `modes` by row, ascending; `shapes` over mode and channel with the modal assurance criterion over mode and
 /// mode; `hits` a row per hit and mode; `course` a row per mode and part; `fit` over channel and time of the largest hit.
 /// Units: Hz; shapes relative to the channel with the largest amplitude; amplitudes in the channels' units.
@@ -40,9 +40,21 @@ pub struct DecayFit {
     pub max_modes: usize,
     /// Noise beside the ringing: `estimated` (white and wander, per channel) or `white`.
     pub noise: DecayNoise,
+    /// What counts where modes move while they die away: `auto`, the last part, in which they do not, or `whole`, all.
+    pub part: FittedPart,
     /// How it is fitted.
     #[serde(flatten)]
     pub fit: ChannelOptions,
+}
+
+/// What counts where modes move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FittedPart {
+    /// The last part, in which they do not move.
+    Auto,
+    /// All of each decay.
+    Whole,
 }
 
 /// Noise beside the ringing.
@@ -57,7 +69,13 @@ pub enum DecayNoise {
 
 impl Default for DecayFit {
     fn default() -> Self {
-        Self { modes: Count::Auto, max_modes: 12, noise: DecayNoise::Estimated, fit: ChannelOptions::default() }
+        Self {
+            modes: Count::Auto,
+            max_modes: 12,
+            noise: DecayNoise::Estimated,
+            part: FittedPart::Auto,
+            fit: ChannelOptions::default(),
+        }
     }
 }
 
@@ -84,18 +102,22 @@ impl Stage for DecayFit {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let decays = Decays::new(inputs.get(&DECAYS)?)?;
-        let interval_s = 1.0 / decays.sample_rate_hz;
-        let options = self.options(&decays);
-        let fit = fit_channels(&decays.hits, &decays.quiet, interval_s, &options).map_err(StageError::from_error)?;
-        let course = Course::of(&decays, &options, &fit);
-        self.warn(&fit, &course, &decays, cx);
+        let Followed { fit, from, course } =
+            follow(&decays, &self.options(), self.part == FittedPart::Whole).map_err(StageError::from_error)?;
+        let from_s = from as f64 / decays.sample_rate_hz;
+        self.warn(&fit, &decays, cx);
+        course.iter().flat_map(Course::warnings).for_each(|warning| cx.warn(warning));
+        if from > 0 {
+            cx.warn(format!("the modes are those of the last part, from {from_s:.4} s on, in which they are smallest; `course` has both ends"));
+        }
+        let empty = || Course::EMPTY.table();
         Ok(Ports::new()
             .with(&MODES, modes_with_damping(&fit))
             .with(&SHAPES, shape_array(&fit, &decays.sensors))
             .with(&HITS, hit_table(&fit))
-            .with(&COURSE, course.table())
-            .with(&FIT, fit_array(&fit, &decays))
-            .with(&SUMMARY, summary(&fit, &course, &decays)?))
+            .with(&COURSE, course.as_ref().map_or_else(empty, Course::table))
+            .with(&FIT, fit_array(&fit, &decays, from))
+            .with(&SUMMARY, summary(&fit, course.as_ref(), &decays, from_s)?))
     }
 
     fn examples() -> Vec<Example> {
@@ -104,7 +126,7 @@ impl Stage for DecayFit {
 }
 
 impl DecayFit {
-    fn options(&self, decays: &Decays<'_>) -> ChannelOptions {
+    fn options(&self) -> ChannelOptions {
         ChannelOptions {
             modes: match self.modes {
                 Count::Fixed(modes) => ModesWanted::Fixed(modes),
@@ -114,13 +136,12 @@ impl DecayFit {
                 DecayNoise::Estimated => ChannelNoise::Estimated,
                 DecayNoise::White => ChannelNoise::White,
             },
-            missing: decays.missing(),
             ..self.fit.clone()
         }
     }
 
     /// Warns where something does not fit.
-    fn warn(&self, fit: &ChannelRingdown, course: &Course, decays: &Decays<'_>, cx: &Context) {
+    fn warn(&self, fit: &ChannelRingdown, decays: &Decays<'_>, cx: &Context) {
         if !fit.verdict.converged {
             cx.warn(format!(
                 "no minimum after {} steps: the last was {:.2} standard errors",
@@ -141,6 +162,5 @@ impl DecayFit {
                 mode.rank_one.p_value
             ));
         }
-        course.warnings().into_iter().for_each(|warning| cx.warn(warning));
     }
 }

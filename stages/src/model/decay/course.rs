@@ -1,105 +1,153 @@
-//! Whether modes keep their frequency and damping while they die away.
+//! Whether modes keep their frequency and damping while they die away, and the part in which they do.
+
+use std::ops::Range;
 
 use afmid_pipeline::Table;
 use serde_json::{Value, json};
 
 use crate::artifacts::Decays;
-use afmid_kernels::ringdown::{ChannelOptions, ChannelRingdown, ModesWanted, fit_channels};
-use afmid_kernels::ringdown::{Estimate, ModeEstimate};
+use afmid_kernels::model::ModelError;
+use afmid_kernels::ringdown::{ChannelOptions, ChannelRingdown, Estimate, ModeEstimate, ModesWanted, fit_channels};
 
 /// Modes of a part of the decays.
 #[derive(Debug, Clone)]
 struct Part {
     name: &'static str,
-    /// Of the decays' first free samples, s.
+    /// After the decays' first free samples, s.
     from_s: f64,
     to_s: f64,
     modes: Vec<ModeEstimate>,
 }
 
-/// Modes of the first and of the last part, as far as either has them.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Course {
-    parts: Vec<Part>,
-    /// Per mode of the whole fit its place in each part.
-    places: Vec<[Option<usize>; 2]>,
+impl Part {
+    const NONE: Self = Self { name: "", from_s: f64::NAN, to_s: f64::NAN, modes: Vec::new() };
 }
 
-/// Decay times of the slowest mode after which the last part begins: its amplitude has fallen to a quarter.
+/// Modes of the first and of the last part.
+#[derive(Debug, Clone)]
+pub(super) struct Course([Part; 2]);
+
+/// The fit that counts, where it begins, and how the modes got there.
+pub(super) struct Followed {
+    pub fit: ChannelRingdown,
+    /// Samples after the first free ones from which it is fitted.
+    pub from: usize,
+    /// None where the decays are too short to be cut.
+    pub course: Option<Course>,
+}
+
+/// Decay times of the strongest mode after which the last part begins: its amplitude has fallen to a quarter.
 const LATE: f64 = 1.4;
+/// Cuts at most: each leaves a quarter of the amplitude.
+const MOST_CUTS: usize = 3;
 /// Standard errors of a difference that noise alone yields once in 10,000 modes.
 const MOVED: f64 = 4.0;
 /// Relative change below which nobody would call it one.
 const LEAST_CHANGE: f64 = 1e-5;
 
+/// Fits the decays, and again what is left of them when the modes have moved on, until they do not move any more.
+/// Errors: those of the kernel for the whole.
+pub(super) fn follow(decays: &Decays<'_>, options: &ChannelOptions, whole: bool) -> Result<Followed, ModelError> {
+    let longest = decays.hits.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
+    let interval_s = 1.0 / decays.sample_rate_hz;
+    let mut followed = Followed { fit: fitted(decays, options, 0..longest)?, from: 0, course: None };
+    let mut first: Option<Part> = None;
+    for _ in 0..MOST_CUTS {
+        let from = followed.from;
+        let Some(rate) = strongest(&followed.fit) else { break };
+        let cut = from + ((LATE / (rate * interval_s)) as usize).clamp(1, ((longest - from) / 2).max(1));
+        let Ok(late) = fitted(decays, options, cut..longest) else { break };
+        let few = ChannelOptions { modes: ModesWanted::AtMost(late.poles.len().max(1)), ..options.clone() };
+        let Ok(early) = fitted(decays, &few, from..cut) else { break };
+        let part = |name, range: Range<usize>, fit: &ChannelRingdown| Part {
+            name,
+            from_s: range.start as f64 * interval_s,
+            to_s: range.end as f64 * interval_s,
+            modes: fit.modes(),
+        };
+        let early = part("first", from..cut, &early);
+        let last = part("last", cut..longest, &late);
+        let moves = Course([early.clone(), last.clone()]).moves();
+        followed.course = Some(Course([first.get_or_insert(early).clone(), last]));
+        if whole || !moves {
+            break;
+        }
+        followed = Followed { fit: late, from: cut, ..followed };
+    }
+    Ok(followed)
+}
+
+/// The fit of a part of all decays that reach into it.
+fn fitted(decays: &Decays<'_>, options: &ChannelOptions, part: Range<usize>) -> Result<ChannelRingdown, ModelError> {
+    let (mut hits, mut missing) = (Vec::new(), Vec::new());
+    for (hit, gaps) in decays.hits.iter().zip(decays.missing()) {
+        let length = hit.first().map_or(0, |row| row.len());
+        if length <= part.start {
+            continue;
+        }
+        let end = part.end.min(length);
+        hits.push(hit.iter().map(|row| &row[part.start..end]).collect::<Vec<&[f64]>>());
+        let inside = |gap: Range<usize>| {
+            gap.start.clamp(part.start, end) - part.start..gap.end.clamp(part.start, end) - part.start
+        };
+        let row = |gaps: Vec<Range<usize>>| gaps.into_iter().map(inside).filter(|gap| !gap.is_empty()).collect();
+        missing.push(gaps.into_iter().map(row).collect());
+    }
+    let options = ChannelOptions { missing, ..options.clone() };
+    fit_channels(&hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options)
+}
+
+/// Decay rate of the mode with the most energy, 1/s.
+fn strongest(fit: &ChannelRingdown) -> Option<f64> {
+    let energy = |j: usize| {
+        let all: f64 = fit.records.iter().filter_map(|record| record.residues.get(j)).map(|r| r.norm_sqr()).sum();
+        all / -fit.poles[j].re
+    };
+    (0..fit.poles.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b))).map(|j| -fit.poles[j].re)
+}
+
 impl Course {
-    /// Fits both parts by themselves. What cannot be fitted is left out.
-    pub fn of(decays: &Decays<'_>, options: &ChannelOptions, fit: &ChannelRingdown) -> Self {
-        let whole = fit.modes();
-        let slowest = fit.poles.iter().map(|pole| -pole.re).fold(f64::INFINITY, f64::min);
-        let interval_s = 1.0 / decays.sample_rate_hz;
-        let longest = decays.hits.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
-        let cut = ((LATE / (slowest * interval_s)) as usize).min(longest / 2);
-        let part = |name, from: usize, to: usize| {
-            let inside = |row: &&[f64]| row.len() > from;
-            let hits: Vec<Vec<&[f64]>> = decays
-                .hits
-                .iter()
-                .filter(|hit| hit.iter().all(inside))
-                .map(|hit| hit.iter().map(|row| &row[from..to.min(row.len())]).collect())
-                .collect();
-            let missing = decays.missing();
-            let kept = decays.hits.iter().zip(missing).filter(|(hit, _)| hit.iter().all(inside));
-            let shifted = |gap: std::ops::Range<usize>| gap.start.max(from) - from..gap.end.min(to).max(from) - from;
-            let missing = kept
-                .map(|(_, rows)| {
-                    let row = |gaps: Vec<std::ops::Range<usize>>| {
-                        gaps.into_iter().map(shifted).filter(|gap| !gap.is_empty()).collect()
-                    };
-                    rows.into_iter().map(row).collect()
-                })
-                .collect();
-            let options = ChannelOptions { modes: ModesWanted::AtMost(whole.len().max(1)), missing, ..options.clone() };
-            let modes = fit_channels(&hits, &decays.quiet, interval_s, &options).ok()?.modes();
-            Some(Part { name, from_s: from as f64 * interval_s, to_s: to.min(longest) as f64 * interval_s, modes })
+    /// Of decays that are too short to be cut.
+    pub const EMPTY: Self = Self([Part::NONE, Part::NONE]);
+
+    /// The modes that both parts have: each the other's nearest.
+    fn pairs(&self) -> Vec<[&ModeEstimate; 2]> {
+        let distance = |a: &ModeEstimate, b: &ModeEstimate| (a.frequency_hz.value / b.frequency_hz.value).ln().abs();
+        fn nearest<'a>(
+            to: &ModeEstimate,
+            among: &'a [ModeEstimate],
+            distance: impl Fn(&ModeEstimate, &ModeEstimate) -> f64,
+        ) -> Option<&'a ModeEstimate> {
+            among.iter().min_by(|a, b| distance(a, to).total_cmp(&distance(b, to)))
+        }
+        let [first, last] = &self.0;
+        let pair = |late: &'_ ModeEstimate| {
+            let early = nearest(late, &first.modes, distance)?;
+            let back = nearest(early, &last.modes, distance)?;
+            (back == late).then_some(*early)
         };
-        let parts: Vec<Part> = [part("first", 0, cut), part("last", cut, longest)].into_iter().flatten().collect();
-        let nearest = |part: Option<&Part>, mode: &ModeEstimate| {
-            let modes = &part?.modes;
-            let f = mode.frequency_hz.value;
-            let distance = |other: &ModeEstimate| (other.frequency_hz.value / f).ln().abs();
-            let best = (0..modes.len()).min_by(|&a, &b| distance(&modes[a]).total_cmp(&distance(&modes[b])))?;
-            // another mode of the whole fit is nearer: it is that one's
-            let own = whole.iter().all(|other| {
-                (modes[best].frequency_hz.value / other.frequency_hz.value).ln().abs() >= distance(&modes[best])
-            });
-            own.then_some(best)
-        };
-        let places = if parts.len() == 2 {
-            whole.iter().map(|mode| [0, 1].map(|i| nearest(parts.get(i), mode))).collect()
-        } else {
-            Vec::new()
-        };
-        Self { parts, places }
+        last.modes
+            .iter()
+            .filter_map(|late| {
+                let early = pair(late)?;
+                Some([first.modes.iter().find(|mode| **mode == early)?, late])
+            })
+            .collect()
     }
 
-    /// Pairs of the same mode in both parts, by the number of the mode.
-    fn pairs(&self) -> Vec<(usize, [&ModeEstimate; 2])> {
-        let pair = |(number, places): (usize, &[Option<usize>; 2])| {
-            let [first, last] = [0, 1].map(|i| places[i].and_then(|k| self.parts.get(i)?.modes.get(k)));
-            Some((number, [first?, last?]))
-        };
-        self.places.iter().enumerate().filter_map(pair).collect()
+    /// Whether any mode moves.
+    fn moves(&self) -> bool {
+        self.pairs().into_iter().any(moves)
     }
 
     pub fn table(&self) -> Table {
         let pairs = self.pairs();
-        let rows: Vec<(usize, &Part, &ModeEstimate)> = pairs
-            .iter()
-            .flat_map(|(number, modes)| self.parts.iter().zip(modes).map(move |(part, mode)| (*number, part, *mode)))
+        let rows: Vec<(usize, &Part, &ModeEstimate)> = (1..)
+            .zip(&pairs)
+            .flat_map(|(number, modes)| self.0.iter().zip(modes).map(move |(part, mode)| (number, part, *mode)))
             .collect();
         Table::of(&rows)
-            .with("mode", "1", "number of the mode", |(number, ..)| number + 1)
+            .with("mode", "1", "number among the modes that both parts have", |(number, ..)| *number)
             .with("part", "", "part of the decays", |(_, part, _)| part.name)
             .with("from_s", "s", "its begin after the first free sample", |(_, part, _)| part.from_s)
             .with("to_s", "s", "its end", |(_, part, _)| part.to_s)
@@ -111,43 +159,45 @@ impl Course {
     }
 
     pub fn document(&self) -> Value {
-        let pair = |(number, [first, last]): &(usize, [&ModeEstimate; 2])| {
-            let end = |mode: &ModeEstimate| {
-                let damping = mode.damping_ratio();
-                json!({
-                    "frequency_hz": mode.frequency_hz.value,
-                    "frequency_std_hz": mode.frequency_hz.std,
-                    "damping_ratio": damping.value,
-                    "damping_ratio_std": damping.std,
-                })
-            };
-            json!({ "mode": number + 1, "first": end(first), "last": end(last), "moves": moves(first, last) })
+        let end = |part: &Part, mode: &ModeEstimate| {
+            let damping = mode.damping_ratio();
+            json!({
+                "from_s": part.from_s,
+                "to_s": part.to_s,
+                "frequency_hz": mode.frequency_hz.value,
+                "frequency_std_hz": mode.frequency_hz.std,
+                "damping_ratio": damping.value,
+                "damping_ratio_std": damping.std,
+            })
         };
-        self.pairs().iter().map(pair).collect::<Vec<Value>>().into()
+        let pair = |pair: [&ModeEstimate; 2]| json!({ "first": end(&self.0[0], pair[0]), "last": end(&self.0[1], pair[1]), "moves": moves(pair) });
+        self.pairs().into_iter().map(pair).collect::<Vec<Value>>().into()
     }
 
     /// One for each mode that moves.
     pub fn warnings(&self) -> Vec<String> {
-        let warning = |(number, [first, last]): (usize, [&ModeEstimate; 2])| {
+        let warning = |[first, last]: [&ModeEstimate; 2]| {
             let (before, after) = (first.damping_ratio(), last.damping_ratio());
-            moves(first, last).then(|| {
-                format!(
-                    "mode {} moves while it dies away: {:.7} to {:.7} Hz, damping ratio {:.4} to {:.4} %: not linear, and \
-                     its errors above are too small (`course` has both ends)",
-                    number + 1,
-                    first.frequency_hz.value,
-                    last.frequency_hz.value,
-                    100.0 * before.value,
-                    100.0 * after.value
-                )
-            })
+            let [early, late] = &self.0;
+            format!(
+                "a mode moves while it dies away: {:.7} Hz and a damping ratio of {:.4} % from {:.4} to {:.4} s, {:.7} Hz \
+                 and {:.4} % from {:.4} to {:.4} s: not linear",
+                first.frequency_hz.value,
+                100.0 * before.value,
+                early.from_s,
+                early.to_s,
+                last.frequency_hz.value,
+                100.0 * after.value,
+                late.from_s,
+                late.to_s
+            )
         };
-        self.pairs().into_iter().filter_map(warning).collect()
+        self.pairs().into_iter().filter(|pair| moves(*pair)).map(warning).collect()
     }
 }
 
 /// Whether frequency or damping differ by more than noise allows.
-fn moves(first: &ModeEstimate, last: &ModeEstimate) -> bool {
+fn moves([first, last]: [&ModeEstimate; 2]) -> bool {
     let differ = |a: Estimate, b: Estimate| {
         let change = (a.value - b.value).abs();
         change > MOVED * a.std.hypot(b.std) && change > LEAST_CHANGE * a.value.abs()

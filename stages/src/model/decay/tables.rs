@@ -81,13 +81,17 @@ pub(super) fn hit_table(fit: &ChannelRingdown) -> Table {
 }
 
 /// The hit with the largest first sample's ringing, as measured and as fitted, in every channel.
-pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
+pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>, from: usize) -> Array {
     let size = |hit: usize| {
         let own = fit.records.iter().filter(|record| record.event == hit);
         own.flat_map(|record| &record.residues).map(|residue| residue.norm_sqr()).sum::<f64>()
     };
-    let largest = (0..decays.hits.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
-    let rows = decays.hits.get(largest).map_or(&[][..], Vec::as_slice);
+    let hits = fit.records.iter().map(|record| record.event + 1).max().unwrap_or(0);
+    let largest = (0..hits).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
+    // hits that end before the fitted part are not in the fit
+    let fitted_hits = decays.hits.iter().filter(|hit| hit.first().is_some_and(|row| row.len() > from));
+    let rows: Vec<&[f64]> =
+        fitted_hits.map(|hit| hit.iter().map(|row| &row[from..]).collect()).nth(largest).unwrap_or_default();
     let samples = rows.first().map_or(0, |row| row.len());
     let measured: Vec<f64> = rows.iter().flat_map(|row| row.iter().copied()).collect();
     let own = fit.records.iter().filter(|record| record.event == largest);
@@ -101,7 +105,7 @@ pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
             "time",
             "s",
             "time since the first free sample",
-            (0..samples).map(|k| k as f64 / decays.sample_rate_hz).collect(),
+            (from..from + samples).map(|k| k as f64 / decays.sample_rate_hz).collect(),
         ),
     ])
     .with("measured", unit, "free decay of the largest hit", over, measured)
@@ -123,7 +127,12 @@ fn signal(fit: &ChannelRingdown, record: &RecordFit, interval_s: f64, samples: u
 }
 
 /// The contract of `show --json`, and what does not fit.
-pub(super) fn summary(fit: &ChannelRingdown, course: &Course, decays: &Decays<'_>) -> Result<Document, StageError> {
+pub(super) fn summary(
+    fit: &ChannelRingdown,
+    course: Option<&Course>,
+    decays: &Decays<'_>,
+    from_s: f64,
+) -> Result<Document, StageError> {
     let modes = fit.modes();
     let several = decays.sensors.len() > 1;
     let mode = |(mode, shape): (&ModeEstimate, &ModeShape)| {
@@ -162,7 +171,8 @@ pub(super) fn summary(fit: &ChannelRingdown, course: &Course, decays: &Decays<'_
         "channels": decays.sensors,
         "converged": fit.verdict.converged,
         "noise": fit.noise.iter().map(noise).collect::<Vec<Value>>(),
-        "course": course.document(),
+        "fitted_from_s": from_s,
+        "course": course.map_or_else(|| json!([]), Course::document),
         "tried": fit.seen.iter().map(|seen| json!({ "modes": seen.modes, "gain": seen.gain, "kept": seen.kept }))
             .collect::<Vec<Value>>(),
     }))
