@@ -25,7 +25,7 @@ const CRATES: [Crate; 5] = [
             &["fields", "inflating", "opened", "raw"],
             &["packed"],
             &["grid"],
-            &["archive", "joined", "listing"],
+            &["archive", "axes", "joined", "listing"],
             &[
                 "igor",
                 "jpk",

@@ -5,6 +5,7 @@
 //! [`Source`] reads any stretch of these. Nothing here knows physics, HDF5 or the rest of afmid.
 
 mod archive;
+mod axes;
 mod budget;
 mod calendar;
 mod fail;
@@ -40,6 +41,7 @@ pub mod wav;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use axes::settle as settle_axes;
 pub use budget::most_inflated;
 pub use grid::numbers_in_file;
 pub use lanes::Lanes;
@@ -97,6 +99,8 @@ pub struct FoundChannel {
     pub fill_code: Option<f64>,
     /// Samples before which the recording was interrupted: a restart, a lost buffer. Ascending.
     pub gaps: Vec<usize>,
+    /// Whether it is an axis (times, frequencies, a counter) and no signal.
+    pub is_axis: bool,
     /// Type of the stored samples, for people: `int16`, `float64`.
     pub stored_as: &'static str,
     /// Where the samples come from.
@@ -116,6 +120,7 @@ impl FoundChannel {
             add_offset: 0.0,
             fill_code: None,
             gaps: Vec::new(),
+            is_axis: false,
             stored_as,
             source,
         }

@@ -133,6 +133,7 @@ impl Listing {
             add_offset: 0.0,
             fill_code: None,
             gaps: Vec::new(),
+            is_axis: false,
             stored_as: grid.number.name(),
             source: Arc::new(grid),
         };

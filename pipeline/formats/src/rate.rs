@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 /// Names whose value is a rate in hertz. `IO_rate_[Hz]` and `IO_samp_rate_[Hz]` are those of general-mode AFM files.
-const RATES: [&str; 19] = [
+const RATES: [&str; 22] = [
     "fs",
     "Fs",
     "f_s",
@@ -19,6 +19,9 @@ const RATES: [&str; 19] = [
     "SamplingRate",
     "sampling_frequency",
     "SamplingFrequency",
+    "Sampling Frequency",
+    "Sampling Rate",
+    "Sample Rate",
     "sampling_rate_hz",
     "samplerate_hz",
     "IO_samp_rate_[Hz]",

@@ -41,3 +41,8 @@ members = dict(deflection=np.sin(np.arange(500) / 9), codes=(np.arange(1000, dty
                fs=np.float64(2.5e6), label=np.array("nm"), spectrum=np.zeros(3, complex))
 np.savez(data / "stored.npz", **members)
 np.savez_compressed(data / "deflated.npz", **members)
+
+# objects beside numbers; times of an array and of a longer one
+np.savez_compressed(data / "objects.npz", notes=np.array([{"a": 1}, None], dtype=object), y=ramp / 8.0, times=np.arange(40) * 1e-4,
+                    long=np.zeros(41))
+np.savez(data / "object_stored.npz", y=ramp / 8.0, notes=np.array(["x" * 500, None], dtype=object))

@@ -64,6 +64,7 @@ pub(super) fn of(
             add_offset: 0.0,
             fill_code: None,
             gaps: Vec::new(),
+            is_axis: false,
             stored_as: code.name(),
             source: Arc::new(Grid {
                 store: Store::File(file.pinned().clone()),

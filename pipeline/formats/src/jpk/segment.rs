@@ -95,6 +95,7 @@ pub(super) fn channels(
             add_offset: line.offset,
             fill_code: None,
             gaps: Vec::new(),
+            is_axis: false,
             stored_as: code.name(),
             source: Arc::clone(&source),
         };

@@ -11,7 +11,7 @@
 //! axis that is longer than 1 is time. Locations are as MATLAB counts, from 1: `/x`, column 2 `/x[2]`, `/x[2,3]`, field
 //! `/s.f`, `/s(2).f` of an array of structs, `/c{2}` of a cell array. Single numbers are remarks, as are texts; the
 //! sampling rate comes from a single number with a usual name (`fs`, `dt`, `Tinterval`, ...) in the same struct or,
-//! failing that, around it.
+//! failing that, around it; or from an array of times (`t`, `time`, an `xData` beside `yData`) that runs evenly.
 //!
 //! A compressed variable of at most 64 MiB is inflated to its end when the file is opened, so that damage shows, and
 //! once more and kept when one of its channels is read; a longer one is inflated by stream. All of a file may come to
@@ -28,6 +28,7 @@ mod nested;
 mod stream;
 mod text;
 
+use crate::axes::settle;
 use crate::fail;
 use crate::pinned::{Pinned, read_at};
 use crate::{Contents, Format, FormatError};
@@ -45,16 +46,18 @@ impl Format for Mat {
         let (pinned, file) = Pinned::open(path)?;
         let mut head = vec![0; pinned.bytes().min(520) as usize];
         read_at(&file, 0, &mut head)?;
-        if level5::recognises(&head) {
-            level5::open(&pinned, &head)
+        let mut contents = if level5::recognises(&head) {
+            level5::open(&pinned, &head)?
         } else if level4::recognises(&head) {
-            level4::open(&pinned, file)
+            level4::open(&pinned, file)?
         } else {
-            Err(fail::at(
+            return Err(fail::at(
                 0,
                 "neither the 128 bytes that MATLAB 5 to 7 begin a file with nor a variable of MATLAB 4",
                 "this is no MAT-file, or a damaged one",
-            ))
-        }
+            ));
+        };
+        settle(&mut contents);
+        Ok(contents)
     }
 }

@@ -67,6 +67,7 @@ pub(super) fn channels(
             add_offset: 0.0,
             fill_code: None,
             gaps: Vec::new(),
+            is_axis: false,
             stored_as: code.name(),
             source: if part.backwards { Arc::new(Backwards(grid)) } else { Arc::new(grid) },
         });

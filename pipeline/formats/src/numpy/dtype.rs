@@ -11,6 +11,9 @@ const MOST_FIELDS: usize = 4096;
 /// Names and indices of a field with those around it: together with `MOST_FIELDS` they bound the memory.
 const MOST_SUFFIX_BYTES: usize = 512;
 
+/// What an array of objects holds: one pickle for all, of a length that the header does not say.
+pub(super) const PICKLED: &str = "Python objects, pickled";
+
 /// A part of an element.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Field {
@@ -123,7 +126,7 @@ fn simple(code: &str) -> Result<(Part, u64), String> {
     let size = rest.as_str();
     let size = size.split('[').next().unwrap_or_default();
     if kind == 'O' {
-        return Ok((Part::Other("Python objects, pickled".to_owned()), 8));
+        return Ok((Part::Other(PICKLED.to_owned()), 8));
     }
     let size: u64 = size.parse().map_err(|_| wrong())?;
     let number = match (kind, size) {

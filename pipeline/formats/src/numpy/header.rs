@@ -1,6 +1,6 @@
 //! The header of an NPY file: magic, version, length, and a Python dictionary.
 
-use super::dtype::{self, Field};
+use super::dtype::{self, Field, Part};
 use super::literal::{self, Literal};
 use crate::FormatError;
 use crate::fail;
@@ -53,6 +53,11 @@ pub(super) fn lead(head: &[u8], available: u64) -> Result<((u8, u8), u64, u64), 
 }
 
 impl Header {
+    /// Whether the data are a pickle instead of elements.
+    pub(super) fn is_pickled(&self) -> bool {
+        self.fields.iter().any(|field| matches!(&field.what, Part::Other(what) if what == dtype::PICKLED))
+    }
+
     /// Reads the dictionary that begins at byte `at`.
     pub(super) fn of(version: (u8, u8), at: u64, dictionary: &[u8]) -> Result<Self, FormatError> {
         let wrong = |at, problem: String| fail::at(at, problem, DAMAGED);

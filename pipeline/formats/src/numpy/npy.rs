@@ -3,6 +3,7 @@
 use super::array::Named;
 use super::dtype::Part;
 use super::header::{self, Header, LEAD_BYTES, MAGIC};
+use crate::axes::settle;
 use crate::fail;
 use crate::grid::Store;
 use crate::listing::Listing;
@@ -44,7 +45,9 @@ impl Format for Npy {
         }
         Named { name: "array", header: &header, store: Store::File(pinned.clone()), at: 0 }.list(&mut listing)?;
         let (major, minor) = header.version;
-        Ok(listing.finish(format!("NumPy NPY {major}.{minor}")))
+        let mut contents = listing.finish(format!("NumPy NPY {major}.{minor}"));
+        settle(&mut contents);
+        Ok(contents)
     }
 }
 

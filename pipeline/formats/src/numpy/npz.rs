@@ -1,9 +1,11 @@
 //! Archives of arrays.
 
 use super::array::Named;
+use super::dtype::PICKLED;
 use super::header::{self, Header, LEAD_BYTES};
 use super::npy::header_at;
 use crate::archive::{Archive, MAGIC, Member, Refused};
+use crate::axes::settle;
 use crate::fail;
 use crate::grid::Store;
 use crate::listing::Listing;
@@ -50,7 +52,9 @@ impl Format for Npz {
         if listing.channels() == 0 {
             listing.remark("the archive has no array of two and more numbers");
         }
-        Ok(listing.finish("NumPy NPZ".to_owned()))
+        let mut contents = listing.finish("NumPy NPZ".to_owned());
+        settle(&mut contents);
+        Ok(contents)
     }
 }
 
@@ -65,6 +69,10 @@ fn list(listing: &mut Listing, archive: &Archive, member: &Member, name: &str) -
             (packed_header(&packed, member)?, Store::Packed(Arc::new(packed)), 0)
         }
     };
+    if header.is_pickled() {
+        listing.remark(format!("/{} holds {PICKLED}, no channel", name.escape_debug()));
+        return Ok(());
+    }
     let (wanted, found) = (header.bytes.saturating_add(header.data_bytes), member.bytes);
     // NumPy writes nothing else into a member; what is deflated must not be inflated beyond the array.
     if wanted != found {

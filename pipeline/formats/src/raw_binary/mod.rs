@@ -188,6 +188,7 @@ impl RawBinary {
             add_offset: self.add_offset,
             fill_code: None,
             gaps: Vec::new(),
+            is_axis: false,
             stored_as: grid.number.name(),
             source: Arc::new(grid),
         }

@@ -7,6 +7,7 @@ use super::timing;
 use super::walk::Recorded;
 use crate::number::Order;
 use crate::pinned::Pinned;
+use crate::rate::agreed_rate;
 use crate::{Contents, FoundChannel};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -22,8 +23,9 @@ pub(super) fn contents(recorded: Recorded, pinned: &Pinned) -> Contents {
     let started_at = began.or(stated).and_then(|stamp| stamp.iso()).unwrap_or_default();
     let scalings = scalings(&objects);
     let locations = locations(&objects);
+    let named: Vec<(Option<f64>, Option<String>)> = (0..objects.len()).map(|at| named_rate(at, &objects)).collect();
     let mut channels = Vec::new();
-    for ((object, scaling), location) in objects.iter_mut().zip(scalings).zip(locations) {
+    for (((object, scaling), location), named) in objects.iter_mut().zip(scalings).zip(locations).zip(named) {
         if object.streams.is_empty() {
             if object.index.is_some() {
                 remarks.push(format!("{location} has no samples: it is left out"));
@@ -31,7 +33,13 @@ pub(super) fn contents(recorded: Recorded, pinned: &Pinned) -> Contents {
             continue;
         }
         match scaling.and_then(|scaling| channel(object, scaling, &location, pinned, &mut remarks)) {
-            Ok(channel) => channels.push(channel),
+            Ok(mut channel) => {
+                if channel.sample_rate_hz.is_none() {
+                    channel.sample_rate_hz = named.0;
+                    remarks.extend(named.1.filter(|remark| !remarks.contains(remark)));
+                }
+                channels.push(channel);
+            }
             Err(why) => remarks.push(format!("{location} is left out: {why}")),
         }
         if let (Some(own), Some(first)) = (object.timing.began, began)
@@ -85,9 +93,25 @@ fn channel(
         add_offset,
         fill_code: None,
         gaps: std::mem::take(&mut object.gaps),
+        is_axis: false,
         stored_as: kind.name(),
         source: Arc::new(Samples { pinned: pinned.clone(), extents, kind, digital, curve }),
     })
+}
+
+/// The rate that a property named like one states where there is no waveform: of the channel, else of its group, else of
+/// the file; and what to say of it.
+fn named_rate(at: usize, objects: &[Object]) -> (Option<f64>, Option<String>) {
+    let none = (None, None);
+    let Some(object) = objects.get(at) else { return none };
+    if object.streams.is_empty() || timing::increment_s(&object.properties).is_some() || object.timing.uneven {
+        return none;
+    }
+    let group = group_and_channel(&object.path).map(|(group, _)| format!("/'{}'", group.replace('\'', "''")));
+    let around = [Some(object.path.clone()), group, Some("/".to_owned())];
+    let clues = |path: String| objects.iter().find(|o| o.path == path).map(|o| o.properties.clues(&path));
+    let nearest = around.into_iter().flatten().filter_map(clues).find(|clues| !clues.is_empty());
+    nearest.map_or(none, |clues| agreed_rate(&clues))
 }
 
 /// The samples that go into the scaling: those of the scaler it names, else the first ones.

@@ -38,6 +38,7 @@ mod stamp;
 mod timing;
 mod walk;
 
+use crate::axes::settle;
 use crate::pinned::Pinned;
 use crate::{Contents, Format, FormatError};
 use std::path::Path;
@@ -54,6 +55,8 @@ impl Format for Tdms {
     fn open(path: &Path) -> Result<Contents, FormatError> {
         let (pinned, file) = Pinned::open(path)?;
         let recorded = walk::walk(&file, pinned.bytes())?;
-        Ok(channel::contents(recorded, &pinned))
+        let mut contents = channel::contents(recorded, &pinned);
+        settle(&mut contents);
+        Ok(contents)
     }
 }

@@ -6,6 +6,7 @@ use super::stamp::Stamp;
 use crate::FormatError;
 use crate::fail;
 use crate::number::Order;
+use crate::rate::Clue;
 use std::collections::BTreeMap;
 
 /// A property's value.
@@ -26,7 +27,7 @@ impl Properties {
     /// Keeps a property if it is one of those read here: a file may state thousands of others with every segment.
     pub(super) fn keep(&mut self, name: String, value: Value) {
         let wanted = ["wf_", "NI_", "unit_string", "DateTime", "description"].iter().any(|w| name.starts_with(w));
-        if wanted {
+        if wanted || Clue::of(&name, "", 1.0).is_some() {
             self.0.insert(name, value);
         }
     }
@@ -52,6 +53,17 @@ impl Properties {
             Some(Value::Time(time)) => Some(*time).filter(|t| t.is_known()),
             _ => None,
         }
+    }
+
+    /// What is named like a sampling rate; a number may be written as text.
+    pub(super) fn clues(&self, location: &str) -> Vec<Clue> {
+        let value = |value: &Value| match value {
+            Value::Number(number) => Some(*number),
+            Value::Text(text) => crate::text::number(text),
+            _ => None,
+        };
+        let clue = |(name, found): (&String, &Value)| Clue::of(name, &format!("{location}@{name}"), value(found)?);
+        self.0.iter().filter_map(clue).collect()
     }
 
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {

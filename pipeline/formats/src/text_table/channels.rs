@@ -23,7 +23,7 @@ pub(super) fn of(mut rows: Rows, mut titles: Vec<Title>, remarks: &mut Vec<Strin
     let count = rows.count;
     let mut channels = Vec::new();
     for (number, ((column, title), location)) in rows.columns.into_iter().zip(&titles).zip(locations).enumerate() {
-        if clock.axis == Some(number) {
+        if clock.axis == Some(number) && clock.rate_hz.is_some() {
             continue;
         }
         if column.values.is_empty() {
@@ -50,6 +50,7 @@ pub(super) fn of(mut rows: Rows, mut titles: Vec<Title>, remarks: &mut Vec<Strin
             add_offset: 0.0,
             fill_code: None,
             gaps: rows.starts.iter().copied().filter(|start| *start < column.values.len()).collect(),
+            is_axis: clock.axis == Some(number),
             stored_as: "text",
             source: Arc::new(Parsed(column.values)),
         });
@@ -90,7 +91,7 @@ fn state_units(rows: &Rows, titles: &mut [Title], time: Option<usize>) {
     }
 }
 
-/// The sample rate and the column that it makes superfluous.
+/// The sample rate, and the column of times or of a counter: superfluous where there is a rate.
 #[derive(Debug, Default)]
 struct Clock {
     rate_hz: Option<f64>,
@@ -115,7 +116,7 @@ fn clock(
         if goes_on {
             rows.starts.clear();
         }
-        return Clock { rate_hz, axis: rate_hz.map(|_| at) };
+        return Clock { rate_hz, axis: Some(at) };
     }
     let without_unit = titles.first().is_some_and(|title| title.unit.is_empty());
     let counter = rows.columns.first().filter(|_| rows.columns.len() > 1 && without_unit);
@@ -133,7 +134,7 @@ fn clock(
             let step = even.step;
             remarks
                 .push(format!("{first} rises evenly by {step:e}: title it «Time (s)» if it is time, to give the rate"));
-            Clock::default()
+            Clock { rate_hz: None, axis: Some(0) }
         }
         (None, None) => Clock::default(),
     }

@@ -1,9 +1,17 @@
 //! Fields at fixed columns, as FORTRAN writes them.
 
+use crate::text::latin;
+
 /// The text of columns `from..to` (from 0) without blanks around it.
+///
+/// A column is a character: of one byte, as the standard has it, or of several in a line of UTF-8 (`m/s²`), which newer
+/// writers pad to as many characters. What is no UTF-8 is Latin-1.
 pub(super) fn text(line: &[u8], from: usize, to: usize) -> String {
-    let field = line.get(from..to.min(line.len())).unwrap_or_default();
-    field.trim_ascii().iter().map(|&b| char::from(b)).collect()
+    let count = to.saturating_sub(from);
+    match std::str::from_utf8(line) {
+        Ok(text) if !line.is_ascii() => text.chars().skip(from).take(count).collect::<String>().trim().to_owned(),
+        _ => latin(line.get(from..to.min(line.len())).unwrap_or_default().trim_ascii()),
+    }
 }
 
 /// The text, unless it says that there is none.

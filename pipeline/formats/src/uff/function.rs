@@ -74,6 +74,7 @@ fn function(
         add_offset: 0.0,
         fill_code: None,
         gaps: Vec::new(),
+        is_axis: false,
         stored_as,
         source,
     };
@@ -86,7 +87,8 @@ fn function(
     let mut channels = vec![channel(location.to_owned(), &header.ordinate.unit, name, rate, stored_as, ordinate)];
     if let Some((source, stored_as)) = abscissa {
         let label = format!("abscissa of {location}: {}", header.abscissa.label);
-        channels.push(channel(format!("{location}/abscissa"), &header.abscissa.unit, label, None, stored_as, source));
+        let abscissa = channel(format!("{location}/abscissa"), &header.abscissa.unit, label, None, stored_as, source);
+        channels.push(FoundChannel { is_axis: true, ..abscissa });
     }
     Ok(channels)
 }

@@ -78,12 +78,13 @@ fn versions_booleans_scalars_and_empty_arrays() {
 #[test]
 fn every_numeric_field_is_a_channel() {
     let contents = npy("fields.npy");
-    assert_eq!(locations(&contents), ["/array.time", "/array.code", "/array.xy[0]", "/array.xy[1]", "/array.in.z"]);
+    assert_eq!(locations(&contents), ["/array.code", "/array.xy[0]", "/array.xy[1]", "/array.in.z"]);
     let is = |location: &str, first: f64, step: f64| {
         let wanted: Vec<f64> = (0..40).map(|n| first + step * f64::from(n)).collect();
         assert_eq!(samples(channel(&contents, location)), wanted, "{location}");
     };
-    is("/array.time", 0.0, 1e-3);
+    // the times are the rate of the others
+    assert!(contents.channels.iter().all(|channel| channel.sample_rate_hz == Some(1000.0)));
     is("/array.code", 0.0, 1.0);
     is("/array.xy[0]", -40.0, 2.0);
     is("/array.xy[1]", -39.0, 2.0);
@@ -126,4 +127,18 @@ fn archives_stored_and_deflated() {
             assert!(remarked(&contents, text), "{text}: {:?}", contents.remarks);
         }
     }
+}
+
+#[test]
+fn an_object_does_not_take_the_other_arrays_with_it() {
+    for (name, rate) in [("objects.npz", Some(1e4)), ("object_stored.npz", None)] {
+        let contents = Npz::open(&written(name)).unwrap();
+        let y = channel(&contents, "/y");
+        assert_eq!(samples(y), (-20..20).map(|n| f64::from(n) / 8.0).collect::<Vec<f64>>(), "{name}");
+        assert_eq!(y.sample_rate_hz, rate, "{name}");
+        assert!(remarked(&contents, "/notes holds Python objects, pickled, no channel"), "{:?}", contents.remarks);
+    }
+    let contents = Npz::open(&written("objects.npz")).unwrap();
+    assert_eq!(locations(&contents), ["/y", "/long"]);
+    assert_eq!(channel(&contents, "/long").sample_rate_hz, None);
 }

@@ -339,3 +339,29 @@ fn files_are_recognised() {
     assert!(Tdms::recognises(b"TDSm\x0e\0\0\0", path));
     assert!(!Tdms::recognises(b"TDSh", path) && !Tdms::recognises(b"", path));
 }
+
+#[test]
+fn a_rate_by_name_is_taken_where_there_is_no_waveform() {
+    let named = |name, value| vec![(name, value)];
+    let channel_of = |properties| object("/'g'/'a'", Index::Plain { code: 2, values: 2 }, properties);
+    let open = |name: &str, objects: &[Object]| contents(name, &segment(false, ALL, objects, &i16s(false, &[1, -2])));
+    let rate = |found: &Contents| channel(found, "/g/a").sample_rate_hz;
+    let own = open("own", &[channel_of(named("SamplingFrequency", Property::F64(5120.0)))]);
+    assert_eq!(rate(&own), Some(5120.0));
+    assert!(remarked(&own, "the sampling rate is taken from /'g'/'a'@SamplingFrequency = 5120"));
+    let root = object("/", Index::None, named("Sampling Rate", Property::Text("2000")));
+    assert_eq!(rate(&open("root", &[root, channel_of(Vec::new())])), Some(2000.0));
+    let group = object("/'g'", Index::None, named("dt", Property::F64(0.01)));
+    assert_eq!(rate(&open("group", &[group, channel_of(Vec::new())])), Some(100.0));
+    let both = vec![("wf_increment", Property::F64(0.5)), ("fs", Property::F64(7.0))];
+    assert_eq!(rate(&open("both", &[channel_of(both)])), Some(2.0));
+}
+
+#[test]
+fn a_channel_of_times_is_an_axis() {
+    let objects = [plain("/'g'/'Time'", 10, 4), plain("/'g'/'a'", 2, 4)];
+    let raw = [f64s(false, &[0.0, 0.25, 0.5, 0.75]), i16s(false, &[1, -2, 3, -4])].concat();
+    let found = contents("times", &segment(false, ALL, &objects, &raw));
+    assert_eq!(locations(&found), ["/g/a"]);
+    assert_eq!(channel(&found, "/g/a").sample_rate_hz, Some(4.0));
+}

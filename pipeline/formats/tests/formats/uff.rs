@@ -1,6 +1,6 @@
 //! Universal files: built ones, and real ones against pyuff 2.5.8.
 
-use crate::support::{assert_sum, locations, open, real, remarked, values};
+use crate::support::{assert_sum, locations, open, real, remarked, scope, values};
 use afmid_formats::uff::Uff;
 use afmid_formats::{Contents, Format, FormatError, Raw};
 
@@ -241,4 +241,26 @@ fn universal_files_are_recognised() {
     let is = |head: &[u8]| Uff::recognises(head, std::path::Path::new("x"));
     assert!(is(b"    -1\n    58\n") && is(b"\r\n    -1\r\n    58b     1\r\n") && is(b"    -1\n   151\n"));
     assert!(!is(b"") && !is(b"-1\nhello\n") && !is(b"1\n2\n") && !is(b"    -1\n"));
+}
+
+#[test]
+fn units_in_utf_8_and_latin_1() {
+    let dataset = bytes(&time(b" 1.00000E+00 2.00000E+00\n", 2, 2));
+    let text = String::from_utf8(dataset).unwrap();
+    // as many characters as before: the field is padded to 20
+    let changed = text.replace("Displacement         m   ", "Beschl. °            m/s²");
+    assert_ne!(text, changed);
+    let latin: Vec<u8> = changed.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap()).collect();
+    for bytes in [changed.into_bytes(), latin] {
+        let contents = open::<Uff>("units.uff", &bytes).unwrap();
+        assert_eq!(contents.channels[0].unit, "m/s²");
+        assert_eq!(values(&contents.channels[0]), [1.0, 2.0]);
+    }
+    if let Some(path) = scope("utf8_units.uff") {
+        // pyuff 2.5.8: 13 values at 20 kHz, the first -3.81956, the last -5.84096; the file's unit is m/s²
+        let contents = Uff::open(&path).unwrap();
+        let found = values(&contents.channels[0]);
+        assert_eq!((found.len(), found[0], found[12]), (13, -3.81956, -5.84096));
+        assert_eq!((contents.channels[0].unit.as_str(), contents.channels[0].sample_rate_hz), ("m/s²", Some(20_000.0)));
+    }
 }

@@ -139,6 +139,7 @@ impl Series {
             add_offset,
             fill_code,
             gaps: Vec::new(),
+            is_axis: false,
             stored_as: self.number.name(),
             source,
         };

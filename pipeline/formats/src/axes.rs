@@ -1,0 +1,486 @@
+//! Axes among arrays: times and frequencies beside signals.
+//!
+//! Programs that save arrays save times as one more array. By its name it is an axis: `time`, `t`, `/group/time`,
+//! `Out.Time`, `frequency`; or `xData` beside a `yData` of the same length, or cells beside cells of the same length, if
+//! it rises evenly (a cell from zero on). It is never a signal.
+//! Times that run evenly give their rate to the arrays of their length that lie in the same group or struct, or deeper:
+//! a cell `{3}` of times to the cell `{3}` beside it; of the cells of one array the first of times to the first of
+//! signals. Nothing else gets that rate.
+
+use crate::rate::of_step;
+use crate::{Contents, FoundChannel};
+use std::collections::HashMap;
+
+/// Names of arrays of times, in lower case. A capital `T` is a temperature or a period.
+const TIMES: [&str; 9] = ["time", "times", "zeit", "temps", "tout", "tvec", "timestamp", "timestamps", "time_axis"];
+/// Ends of such names that state the unit.
+const UNITS: [(&str, f64); 5] = [("_s", 1.0), ("_ms", 1e-3), ("_us", 1e-6), ("_ns", 1e-9), ("_sec", 1.0)];
+/// Names of arrays of frequencies, in lower case.
+const FREQUENCIES: [&str; 6] = ["frequency", "frequencies", "freq", "freqs", "frequency_hz", "freq_hz"];
+
+/// Largest deviation from evenness, in steps. Times are often saved in few digits; a missing sample is a whole step.
+const TOLERANCE: f64 = 1e-2;
+/// Deviations above this are remarked: a millionth of a step is rounding.
+const REMARKED: f64 = 1e-6;
+/// Coarsest rounding, in steps, that still shows a lost sample beyond doubt.
+const COARSEST: f64 = 0.25;
+/// Two statements of a rate agree if they differ by less: rates are often written with six digits.
+const AGREE: f64 = 1e-5;
+
+/// Samples read at once.
+const PIECE: usize = 1 << 16;
+/// Axes up to this are read whole. Of longer ones as many samples are read, in pieces spread over all: where samples are
+/// missing all times behind it are off the line between the ends.
+const READ: usize = 1 << 22;
+/// More axes than this are no recording.
+const MOST_AXES: usize = 1 << 12;
+
+/// Where an array is: `/group/name{3}` is `name`, cell `{3}`, in `/group`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Place<'a> {
+    parent: &'a str,
+    name: &'a str,
+    cell: &'a str,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    /// Seconds in its unit, if the name says so.
+    Time(Option<f64>),
+    Frequency,
+    /// The x to a y.
+    Abscissa,
+    /// A cell beside others.
+    Cell,
+}
+
+/// An axis, and the step of its times in seconds.
+#[derive(Debug)]
+struct Axis {
+    at: usize,
+    kind: Kind,
+    step_s: Option<f64>,
+}
+
+/// What axes are found by: parent, name where it matters, cell, samples.
+type Key = (String, String, String, usize);
+
+/// The axes of a file.
+#[derive(Debug, Default)]
+struct Axes {
+    all: Vec<Axis>,
+    by_key: HashMap<Key, Vec<usize>>,
+}
+
+/// Finds the axes among a file's channels: marks them, takes those out that are said by a rate, and gives that rate.
+pub fn settle(contents: &mut Contents) {
+    let Contents { channels, remarks, .. } = contents;
+    let axes = Axes::among(channels, remarks);
+    let is_axis: HashMap<usize, usize> = axes.all.iter().enumerate().map(|(number, axis)| (axis.at, number)).collect();
+    let mut said = vec![false; axes.all.len()];
+    let mut signals = HashMap::new();
+    for at in 0..channels.len() {
+        if is_axis.contains_key(&at) {
+            continue;
+        }
+        let fitting = channels.get(at).and_then(|channel| axes.nearest(channel, &mut signals));
+        let Some((number, axis)) = fitting.and_then(|number| Some((number, axes.all.get(number)?))) else { continue };
+        let name = channels.get(axis.at).map(|axis| axis.location.clone()).unwrap_or_default();
+        let Some(channel) = channels.get_mut(at) else { continue };
+        if give(channel, axis, &name, remarks)
+            && let Some(said) = said.get_mut(number)
+        {
+            *said = true;
+        }
+    }
+    for axis in &axes.all {
+        if let Some(channel) = channels.get_mut(axis.at) {
+            channel.is_axis = true;
+            channel.sample_rate_hz = None;
+        }
+    }
+    let mut at = 0;
+    channels.retain(|_| {
+        let gone = is_axis.get(&at).and_then(|number| said.get(*number)).copied().unwrap_or(false);
+        at += 1;
+        !gone
+    });
+}
+
+/// Gives a channel the rate of its axis. Whether the axis is said by that.
+fn give(channel: &mut FoundChannel, axis: &Axis, name: &str, remarks: &mut Vec<String>) -> bool {
+    let Some(step_s) = axis.step_s else {
+        if axis.kind == Kind::Frequency {
+            // its samples follow one another along another axis than time
+            channel.sample_rate_hz = None;
+        }
+        return false;
+    };
+    let rate = of_step(step_s);
+    let stated = channel.sample_rate_hz;
+    if let Some(stated) = stated.filter(|stated| (stated - rate).abs() > AGREE * rate) {
+        channel.sample_rate_hz = None;
+        let what = format!("{} has no sample rate", channel.location);
+        remarks.push(format!("{what}: the file says {stated} Hz, {name} steps by {step_s} s"));
+        return false;
+    }
+    channel.sample_rate_hz = Some(stated.unwrap_or(rate));
+    true
+}
+
+impl Axes {
+    fn among(channels: &[FoundChannel], remarks: &mut Vec<String>) -> Self {
+        let mut places: HashMap<Key, usize> = HashMap::new();
+        for channel in channels {
+            if let Some(place) = Place::of(&channel.location) {
+                *places.entry(place.key(place.name, place.cell, channel.samples)).or_default() += 1;
+                *places.entry(place.key(place.name, "", channel.samples)).or_default() += 1;
+            }
+        }
+        let mut axes = Self::default();
+        for (at, channel) in channels.iter().enumerate() {
+            let Some(place) = Place::of(&channel.location) else { continue };
+            let Some(kind) = kind(channel, &place, &places) else { continue };
+            let Some(axis) = axis(at, kind, channel, remarks) else { continue };
+            let (name, cell) = match kind {
+                Kind::Abscissa => (ordinate(place.name).unwrap_or_default(), place.cell),
+                Kind::Cell => (place.name.to_owned(), ""),
+                Kind::Time(_) | Kind::Frequency => (String::new(), place.cell),
+            };
+            axes.by_key.entry(place.key(&name, cell, channel.samples)).or_default().push(axes.all.len());
+            axes.all.push(axis);
+            if axes.all.len() >= MOST_AXES {
+                remarks.push(format!("only the first {MOST_AXES} axes are looked at"));
+                break;
+            }
+        }
+        axes
+    }
+
+    /// The axis that fits a channel: of its length, in its group or the nearest one around it, and of its cell.
+    /// `signals` counts the cells of each array that were not axes.
+    fn nearest(&self, channel: &FoundChannel, signals: &mut HashMap<Key, usize>) -> Option<usize> {
+        let location = channel.location.as_str();
+        // columns of an array lie where it lies
+        let bare = location.strip_suffix(']').and_then(|rest| rest.rsplit_once('[')).map_or(location, |(bare, _)| bare);
+        let place = Place::of(bare)?;
+        let find = |key: &Key| self.by_key.get(key);
+        let own = |name: &str, cell: &str| place.key(name, cell, channel.samples);
+        let beside = own(place.name, "");
+        let cells = find(&beside).filter(|axes| !place.cell.is_empty() && self.are_cells(axes));
+        if let Some(axes) = cells {
+            let count = signals.entry(beside).or_default();
+            *count += 1;
+            let same_step = || axes.first().filter(|_| self.same_step(axes));
+            return axes.get(*count - 1).or_else(same_step).copied();
+        }
+        for key in [own(place.name, place.cell), own("", place.cell), own("", "")] {
+            if let Some(first) = find(&key).and_then(|axes| axes.iter().find(|axis| !self.is_cell(**axis))) {
+                return Some(*first);
+            }
+        }
+        let mut parent = place.parent;
+        while let Some(cut) = parent.rfind(['/', '.', '{', '(']) {
+            parent = parent.get(..cut).unwrap_or_default();
+            let around = Place { parent, ..place }.key("", "", channel.samples);
+            if let Some(first) = find(&around).and_then(|axes| axes.first()) {
+                return Some(*first);
+            }
+        }
+        None
+    }
+
+    fn is_cell(&self, number: usize) -> bool {
+        self.all.get(number).is_some_and(|axis| axis.kind == Kind::Cell)
+    }
+
+    fn are_cells(&self, numbers: &[usize]) -> bool {
+        numbers.first().is_some_and(|number| self.is_cell(*number))
+    }
+
+    fn same_step(&self, numbers: &[usize]) -> bool {
+        let mut steps = numbers.iter().filter_map(|number| self.all.get(*number)?.step_s);
+        let first = steps.next().unwrap_or_default();
+        steps.all(|step| (step - first).abs() <= AGREE * first)
+    }
+}
+
+/// What kind of axis a channel is by its name and those beside it.
+fn kind(channel: &FoundChannel, place: &Place, places: &HashMap<Key, usize>) -> Option<Kind> {
+    let lower = place.name.to_lowercase();
+    if FREQUENCIES.contains(&lower.as_str()) {
+        return Some(Kind::Frequency);
+    }
+    if channel.is_axis {
+        return None;
+    }
+    let is_time = |name: &str| TIMES.contains(&name) || (name == "t" && place.name.starts_with('t'));
+    if is_time(&lower) {
+        return Some(Kind::Time(None));
+    }
+    let unit = UNITS.iter().find_map(|(end, seconds)| Some((lower.strip_suffix(end)?, *seconds)));
+    if let Some((_, seconds)) = unit.filter(|(name, _)| is_time(name)) {
+        return Some(Kind::Time(Some(seconds)));
+    }
+    let partner = ordinate(place.name).map(|name| place.key(&name, place.cell, channel.samples));
+    if partner.is_some_and(|key| places.contains_key(&key)) {
+        return Some(Kind::Abscissa);
+    }
+    let beside = || places.get(&place.key(place.name, "", channel.samples)).is_some_and(|cells| *cells > 1);
+    (!place.cell.is_empty() && beside()).then_some(Kind::Cell)
+}
+
+/// The name of the y to an x: `xData` has `yData`.
+fn ordinate(name: &str) -> Option<String> {
+    let rest = |x: char| name.strip_prefix(x);
+    rest('x').map(|rest| format!("y{rest}")).or_else(|| rest('X').map(|rest| format!("Y{rest}")))
+}
+
+impl<'a> Place<'a> {
+    /// None for one of several columns: an axis is an array of its own.
+    fn of(location: &'a str) -> Option<Self> {
+        if location.ends_with(']') {
+            return None;
+        }
+        let cell_at = if location.ends_with('}') { location.rfind('{')? } else { location.len() };
+        let (whole, cell) = location.split_at(cell_at);
+        let name_at = whole.rfind(['/', '.']).map_or(0, |mark| mark + 1);
+        let (parent, name) = whole.split_at(name_at);
+        Some(Self { parent: parent.trim_end_matches(['/', '.']), name, cell })
+    }
+
+    fn key(&self, name: &str, cell: &str, samples: usize) -> Key {
+        (self.parent.to_owned(), name.to_owned(), cell.to_owned(), samples)
+    }
+}
+
+/// The axis at `at`, unless it is an x or a cell that does not rise evenly.
+fn axis(at: usize, kind: Kind, channel: &FoundChannel, remarks: &mut Vec<String>) -> Option<Axis> {
+    let location = &channel.location;
+    let unit_s = match kind {
+        Kind::Frequency => {
+            remarks.push(format!("{location} is an axis of frequencies, no signal"));
+            return Some(Axis { at, kind, step_s: None });
+        }
+        Kind::Time(unit_s) => unit_s,
+        Kind::Abscissa | Kind::Cell => None,
+    };
+    let stated = unit_s.or_else(|| seconds(&channel.unit));
+    let Even { first, step, off } = match even(channel) {
+        Ok(even) => even,
+        Err(_) if matches!(kind, Kind::Abscissa | Kind::Cell) => return None,
+        Err(why) => {
+            remarks.push(format!("{location} is an axis of times and gives no sample rate: {why}"));
+            return Some(Axis { at, kind, step_s: None });
+        }
+    };
+    // What has no name is an axis only if it begins at zero as recordings do: a ramp begins anywhere.
+    if kind == Kind::Cell && first.abs() > step {
+        return None;
+    }
+    let unknown = stated.is_none() && !channel.unit.is_empty();
+    // Without a unit, whole numbers count samples, or ticks of a clock.
+    let counts = stated.is_none() && step.fract() == 0.0;
+    if unknown || counts {
+        let unit =
+            if unknown { format!("in «{}»", channel.unit) } else { "in whole numbers without a unit".to_owned() };
+        remarks.push(format!("{location} is an axis, evenly by {step} {unit}: it gives no sample rate"));
+        return Some(Axis { at, kind, step_s: None });
+    }
+    let unit = if stated.is_none() { " (no unit: taken as seconds)" } else { "" };
+    let rounded = if off > REMARKED { format!(", to {off:.1e} of a step") } else { String::new() };
+    remarks
+        .push(format!("{location}{unit} runs evenly by {step}{rounded}: the sample rate of the arrays of its length"));
+    Some(Axis { at, kind, step_s: Some(step * stated.unwrap_or(1.0)) })
+}
+
+fn seconds(unit: &str) -> Option<f64> {
+    Some(match unit.to_lowercase().as_str() {
+        "s" | "sec" | "second" | "seconds" => 1.0,
+        "ms" | "millisecond" | "milliseconds" => 1e-3,
+        "us" | "µs" | "μs" | "microsecond" | "microseconds" => 1e-6,
+        "ns" | "nanosecond" | "nanoseconds" => 1e-9,
+        _ => return None,
+    })
+}
+
+/// Times that run evenly: the first, the step, and the largest deviation in steps.
+#[derive(Debug, Clone, Copy)]
+struct Even {
+    first: f64,
+    step: f64,
+    off: f64,
+}
+
+/// Errors: why times do not run evenly.
+fn even(channel: &FoundChannel) -> Result<Even, String> {
+    let samples = channel.samples;
+    if samples < 3 {
+        return Err(format!("it has {samples} values"));
+    }
+    let read = |start: usize, count: usize| -> Result<Vec<f64>, String> {
+        let raw = channel.source.read(start, count).map_err(|error| error.problem)?;
+        let mut values = Vec::with_capacity(count);
+        raw.scale_into(channel.scale_factor, channel.add_offset, &mut values);
+        Ok(values)
+    };
+    let end = |at: usize| read(at, 1)?.first().copied().ok_or_else(|| "it is empty".to_owned());
+    let (first, last) = (end(0)?, end(samples - 1)?);
+    let step = (last - first) / (samples - 1) as f64;
+    if !(step.is_finite() && step > 0.0) {
+        return Err("it does not rise".to_owned());
+    }
+    let epsilon = if channel.stored_as == "float32" { f64::from(f32::EPSILON) } else { f64::EPSILON };
+    // rounding of both times, and of the arithmetic that made them
+    let rounding = 4.0 * epsilon * first.abs().max(last.abs());
+    if rounding > COARSEST * step {
+        return Err(format!("its type is too coarse to show steps of {step:e}"));
+    }
+    let mut worst = 0.0_f64;
+    let pieces = samples.div_ceil(PIECE);
+    let every = samples.div_ceil(READ);
+    for piece in (0..pieces).step_by(every) {
+        let start = piece * PIECE;
+        for (row, time) in (start..).zip(read(start, PIECE.min(samples - start))?) {
+            let off = (time - (first + row as f64 * step)).abs();
+            if off.is_nan() || off > TOLERANCE * step + rounding {
+                return Err(format!("value {row} is {:.3e} steps off", off / step));
+            }
+            worst = worst.max(off / step);
+        }
+    }
+    Ok(Even { first, step, off: worst })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pinned::stretch_of;
+    use crate::{FormatError, Raw, Source};
+    use std::sync::Arc;
+
+    #[derive(Debug)]
+    struct Values(Vec<f64>);
+
+    impl Source for Values {
+        fn read(&self, start: usize, count: usize) -> Result<Raw, FormatError> {
+            stretch_of(&self.0, start, count)
+        }
+    }
+
+    fn channel(location: &str, values: Vec<f64>) -> FoundChannel {
+        FoundChannel::new(location, values.len(), "float64", Arc::new(Values(values)))
+    }
+
+    fn times(count: u32, step: f64) -> Vec<f64> {
+        (0..count).map(|row| f64::from(row) * step).collect()
+    }
+
+    fn noise(count: u32) -> Vec<f64> {
+        (0..count).map(|row| f64::from(row * 7919 % 97)).collect()
+    }
+
+    /// Location, rate and whether it is an axis.
+    fn settled(channels: Vec<FoundChannel>) -> Vec<(String, Option<f64>, bool)> {
+        let mut contents = Contents { format: String::new(), started_at: String::new(), channels, remarks: Vec::new() };
+        settle(&mut contents);
+        contents.channels.into_iter().map(|c| (c.location, c.sample_rate_hz, c.is_axis)).collect()
+    }
+
+    fn is(location: &str, rate: Option<f64>) -> (String, Option<f64>, bool) {
+        (location.to_owned(), rate, false)
+    }
+
+    #[test]
+    fn times_give_their_rate_to_arrays_of_their_length() {
+        for name in ["/time", "/t", "/Time", "/time_s"] {
+            let found =
+                settled(vec![channel(name, times(50, 1e-3)), channel("/y", noise(50)), channel("/z", noise(49))]);
+            assert_eq!(found, [is("/y", Some(1000.0)), is("/z", None)], "{name}");
+        }
+        let milliseconds = settled(vec![channel("/t_ms", times(50, 0.5)), channel("/y[2]", noise(50))]);
+        assert_eq!(milliseconds, [is("/y[2]", Some(2000.0))]);
+    }
+
+    #[test]
+    fn axes_belong_to_their_struct_and_their_cell() {
+        let structs = settled(vec![
+            channel("/Out.Time", times(50, 0.1)),
+            channel("/Out.y", noise(50)),
+            channel("/Out.in.y", noise(50)),
+            channel("/Other.y", noise(50)),
+        ]);
+        assert_eq!(structs, [is("/Out.y", Some(10.0)), is("/Out.in.y", Some(10.0)), is("/Other.y", None)]);
+        let cells = settled(vec![
+            channel("/t{1}", times(50, 0.1)),
+            channel("/t{2}", times(50, 0.2)),
+            channel("/y{1}", noise(50)),
+            channel("/y{2}", noise(50)),
+        ]);
+        assert_eq!(cells, [is("/y{1}", Some(10.0)), is("/y{2}", Some(5.0))]);
+    }
+
+    #[test]
+    fn an_x_beside_a_y_is_an_axis_if_it_rises_evenly() {
+        let even = settled(vec![channel("/xData{1}", times(50, 0.1)), channel("/yData{1}", noise(50))]);
+        assert_eq!(even, [is("/yData{1}", Some(10.0))]);
+        let input = settled(vec![channel("/x", noise(50)), channel("/y", noise(50))]);
+        assert_eq!(input, [is("/x", None), is("/y", None)]);
+        let alone = settled(vec![channel("/x", times(50, 0.1)), channel("/u", noise(50))]);
+        assert_eq!(alone, [is("/x", None), is("/u", None)]);
+    }
+
+    #[test]
+    fn cells_of_times_are_axes_of_the_cells_beside_them() {
+        let cells = |steps: [f64; 2]| {
+            settled(vec![
+                channel("/d{1}", times(50, steps[0])),
+                channel("/d{2}", times(50, steps[1])),
+                channel("/d{3}", noise(50)),
+                channel("/d{4}", noise(50)),
+            ])
+        };
+        assert_eq!(cells([0.1, 0.1]), [is("/d{3}", Some(10.0)), is("/d{4}", Some(10.0))]);
+        assert_eq!(cells([0.1, 0.2]), [is("/d{3}", Some(10.0)), is("/d{4}", Some(5.0))]);
+        let ramp: Vec<f64> = times(50, 0.1).iter().map(|value| value - 3.0).collect();
+        let ramps = settled(vec![channel("/d{1}", ramp), channel("/d{2}", noise(50))]);
+        assert_eq!(ramps, [is("/d{1}", None), is("/d{2}", None)]);
+    }
+
+    #[test]
+    fn rounded_times_are_even_and_a_lost_sample_is_not() {
+        let rounded: Vec<f64> = times(1000, 1.953125e-4).iter().map(|t| (t * 1e7).round() / 1e7).collect();
+        let found = settled(vec![channel("/t", rounded.clone()), channel("/y", noise(1000))]);
+        // the ends are rounded by half a unit of 1e-7 each, over 999 steps
+        assert!((found[0].1.unwrap() / 5120.0 - 1.0).abs() < 1e-7 / (999.0 * 1.953125e-4));
+        let mut lost = rounded;
+        lost.iter_mut().skip(500).for_each(|time| *time += 1.953125e-4);
+        assert!(settled(vec![channel("/t", lost), channel("/y", noise(1000))])[0].2);
+    }
+
+    #[test]
+    fn axes_without_a_rate_are_axes_all_the_same() {
+        let axis = |location: &str| (location.to_owned(), None, true);
+        let uneven = settled(vec![channel("/t", noise(50)), channel("/y", noise(50))]);
+        assert_eq!(uneven, [axis("/t"), is("/y", None)]);
+        let counter = settled(vec![channel("/t", times(50, 1.0)), channel("/y", noise(50))]);
+        assert_eq!(counter, [axis("/t"), is("/y", None)]);
+        let mut response = channel("/s.gain", noise(50));
+        response.sample_rate_hz = Some(5.0);
+        let frequency = settled(vec![channel("/s.frequency", times(50, 0.1)), response]);
+        assert_eq!(frequency, [axis("/s.frequency"), is("/s.gain", None)]);
+        let temperature = settled(vec![channel("/T", times(50, 0.1)), channel("/y", noise(50))]);
+        assert_eq!(temperature, [is("/T", None), is("/y", None)]);
+    }
+
+    #[test]
+    fn a_rate_that_disagrees_with_the_times_is_unknown() {
+        let mut stated = channel("/y", noise(50));
+        stated.sample_rate_hz = Some(999.0);
+        let found = settled(vec![channel("/t", times(50, 1e-3)), stated.clone()]);
+        assert_eq!(found, [("/t".to_owned(), None, true), is("/y", None)]);
+        stated.sample_rate_hz = Some(1000.001);
+        let found = settled(vec![channel("/t", times(50, 1e-3)), stated]);
+        assert_eq!(found, [is("/y", Some(1000.001))]);
+    }
+}
