@@ -154,7 +154,8 @@ impl<'a> Table<'a> {
         let first = fields.get(lead).map(kind);
         let as_many = fields.len() == self.sniffed.kinds.len();
         if as_many && first == Some(Kind::Number) {
-            return false;
+            let found = || fields.iter().map(kind).collect::<Vec<Kind>>();
+            return lead > 0 && sniff::is_labelled(&found(), &self.sniffed.kinds, lead);
         }
         let first_is_text = first == Some(Kind::Text);
         let repeated = || fields.first().is_some_and(|field| self.header.contains(number::bare(field)));
@@ -168,11 +169,11 @@ impl<'a> Table<'a> {
 
     fn row(&mut self, fields: &[&str], line: &Line) -> Result<(), FormatError> {
         let decimal = self.sniffed.dialect.decimal;
-        if self.sniffed.kinds.first() == Some(&Kind::Text) {
+        if matches!(self.sniffed.kinds.first(), Some(Kind::Text | Kind::Empty)) {
             // A header beside the rows: `Sample Interval,4E-7,,-0.00122,0.12` (Tektronix TDS).
             self.rows.stated.read(fields, &[], decimal);
         }
-        let has_text = self.sniffed.kinds.contains(&Kind::Text);
+        let has_text = self.sniffed.kinds.iter().any(|kind| matches!(kind, Kind::Text | Kind::Empty));
         let mut behind_text = false;
         for (column, field) in self.rows.columns.iter_mut().zip(fields) {
             let before = column.numbers();

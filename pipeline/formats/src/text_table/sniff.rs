@@ -113,10 +113,17 @@ fn heaviest<T: Ord + Copy>(items: impl Iterator<Item = (T, usize)>) -> Option<T>
     sums.into_iter().max_by_key(|&(item, sum)| (sum, item)).map(|(item, _)| item)
 }
 
-/// What the rows that fill a column hold there.
+/// What most rows hold in a column.
 fn kind_of(column: usize, rows: &[&Vec<Kind>]) -> Kind {
-    let filled = rows.iter().filter_map(|kinds| Some((*kinds.get(column)?, weight(kinds))));
-    heaviest(filled.filter(|(kind, _)| *kind != Kind::Empty)).unwrap_or(Kind::Empty)
+    let found = rows.iter().filter_map(|kinds| Some((*kinds.get(column)?, weight(kinds))));
+    heaviest(found).unwrap_or(Kind::Empty)
+}
+
+/// Whether a line labels what stands in its columns of numbers: by a text in front of the first of them, where rows have
+/// nothing. A text further in front is the key of a header beside the rows, one behind it a mark in a row.
+pub(super) fn is_labelled(found: &[Kind], kinds: &[Kind], leading: usize) -> bool {
+    let before = |kinds: &[Kind]| leading.checked_sub(1).and_then(|at| kinds.get(at)).copied();
+    before(found) == Some(Kind::Text) && before(kinds) == Some(Kind::Empty)
 }
 
 fn leading(kinds: &[Kind], rows: &[&Vec<Kind>]) -> usize {
@@ -132,7 +139,10 @@ fn first_row(lines: &[&str], dialect: Dialect, kinds: &[Kind], lead: usize) -> O
     let fits = |line: &str| {
         let found = dialect.kinds(line);
         let fits = |(found, wanted): (&Kind, &Kind)| found == wanted || *found == Kind::Empty || is_text(*wanted);
-        found.len() == kinds.len() && found.iter().zip(kinds).all(fits) && found.get(lead) == kinds.get(lead)
+        found.len() == kinds.len()
+            && !is_labelled(&found, kinds, lead)
+            && found.iter().zip(kinds).all(fits)
+            && found.get(lead) == kinds.get(lead)
     };
     let row = |line: &&str| dialect.is_row(line) && dialect.fields(line).len() == kinds.len();
     let strict = lines.iter().position(|line| row(line) && fits(line));

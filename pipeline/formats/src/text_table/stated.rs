@@ -7,8 +7,8 @@ use super::number;
 use super::units::{hertz, seconds};
 use crate::text::brief;
 
-/// Keys whose value is the time between two samples: Tektronix and Siglent, Rigol, LabVIEW, and plain words.
-const INTERVALS: [&str; 13] = [
+/// Keys whose value is the time between two samples: Tektronix and Siglent, Rigol, LabVIEW, Yokogawa, and plain words.
+const INTERVALS: [&str; 14] = [
     "sample interval",
     "sampling interval",
     "increment",
@@ -19,6 +19,7 @@ const INTERVALS: [&str; 13] = [
     "time increment",
     "delta t",
     "delta_x",
+    "hresolution",
     "sample period",
     "sampling period",
     "dt",

@@ -206,6 +206,9 @@ fn holes_text_columns_and_one_column() {
     ] {
         assert!(remarked(&found, words), "{words}: {:?}", found.remarks);
     }
+    // a mark in a row is no header
+    let marked = table("marked.csv", "t,mark,a\n0,,1\n1,,2\n2,trigger,3\n3,,4\n");
+    assert_eq!(values(marked.channels.last().unwrap()), [1.0, 2.0, 3.0, 4.0]);
     let one = table("one.txt", "Deflection (V)\n1.5\n2.5\n3.5\n");
     assert_eq!((locations(&one), values(&one.channels[0])), (vec!["Deflection"], vec![1.5, 2.5, 3.5]));
     let comma = table("decimal.txt", "0,05\n1,10\n");
@@ -294,6 +297,19 @@ fn headers_of_oscilloscopes_are_no_samples() {
             ["CH1", "CH2"],
         ),
         ("rohde.csv", "in s,C1 in V,C2 in V\n0E+00,1,4\n1E-03,2,5\n2E-03,3,6\n", ["C1", "C2"]),
+        ("rigol_d.csv", "X,CH1,CH2,\nSecond,Volt,Volt,\n-1.0e-03,1,4,\n0,2,5,\n1.0e-03,3,6,\n", ["CH1", "CH2"]),
+        (
+            "lecroy.csv",
+            "LECROYWR64Xi-A,50672,Waveform\nSegments,1,SegmentSize,3\nSegment,TrigTime,TimeSinceSegment1\n\
+             #1,09-Nov-2022 09:23:52,0\nTime,C1 (V),C2 (V)\n-1e-03,1,4\n0,2,5\n1e-03,3,6\n",
+            ["C1", "C2"],
+        ),
+        (
+            "yokogawa.csv",
+            "\"Header Size\",6\n\"Model Name\",\"DL850\"\n\"TraceName\",\"A\",\"B\"\n\"BlockSize\",3,3\n\
+             \"VUnit\",\"V\",\"V\"\n\"HResolution\",1E-03,1E-03\n\"\",\"A (V)\",\"B (V)\"\n,1,4\n,2,5\n,3,6\n",
+            ["A", "B"],
+        ),
         ("pico.csv", "Time,A,B\n(ms),(V),(V)\n\n0.0,1,4\n1.0,2,5\n2.0,3,6\n", ["A", "B"]),
         (
             "cassy.txt",
