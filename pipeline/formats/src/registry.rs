@@ -54,7 +54,7 @@ const FORMATS: &[Known] = &[
     Known::of::<Tdms>("tdms", "NI TDMS"),
     Known::of::<Npy>("npy", "NumPy array"),
     Known::of::<Npz>("npz", "NumPy archive"),
-    Known::of::<JpkForce>("jpk", "JPK force curve"),
+    Known::of::<JpkForce>("jpk", "JPK force curves and maps"),
     Known::of::<Nanoscope>("nanoscope", "Bruker Nanoscope force curve"),
     Known::of::<Wav>("wav", "Waveform audio"),
     Known::of::<LeCroy>("lecroy", "LeCroy waveform"),

@@ -5,7 +5,7 @@
 
 or the file's name and `refused`. The tests compare these lines with what afmid-formats gives (formats/scopes.rs). WAV
 files are read by SciPy, tables by pandas with the number of header lines written here, MATLAB by SciPy; waveforms of
-oscilloscopes by the few lines below, from the makers' descriptions. Run: python tests/independent.py FILE...
+oscilloscopes and force curves of JPK by the few lines below, from the makers' descriptions. Run: python tests/independent.py FILE...
 """
 import io
 import re
@@ -96,7 +96,43 @@ def isf(path):
     return [("V", 1 / number(b"XIN"), values)]
 
 
-READERS = {".wav": wav, ".trc": trc, ".bin": scope_bin, ".isf": isf, ".csv": tables, ".txt": tables}
+def jpk(path):
+    """Base channels, codes times multiplier plus offset. The file's name is followed by the channel's."""
+    import zipfile
+
+    archive = zipfile.ZipFile(path)
+
+    def properties(name):
+        lines = archive.read(name).decode("latin-1").splitlines()
+        return dict(line.split("=", 1) for line in lines if "=" in line and not line.startswith("#"))
+
+    shared = properties("shared-data/header.properties")
+    found = {}
+    for name in archive.namelist():
+        folder, _, last = name.rpartition("/")
+        if last != "segment-header.properties":
+            continue
+        own = properties(name)
+        rate = int(own["force-segment-header.num-points"]) / float(own["force-segment-header.duration"])
+        for channel in own["channels.list"].split():
+            info = f"lcd-info.{own[f'channel.{channel}.lcd-info.*']}."
+            member = f"{folder}/{own.get(f'channel.{channel}.data.file.name', f'channels/{channel}.dat')}"
+            if member not in archive.namelist():
+                continue  # a raster that is computed
+            file = archive.read(member)
+            unit = shared[info + "unit.unit"]
+            if info + "encoder.type" in shared:
+                kinds = {"signedshort": ">i2", "signedinteger": ">i4", "unsignedshort": ">u2", "unsignedinteger": ">u4"}
+                kind = kinds[shared[info + "encoder.type"].removesuffix("-limited")]
+                scale, zero = (float(shared[info + "encoder.scaling." + key]) for key in ("multiplier", "offset"))
+                values = np.frombuffer(file, kind).astype(float) * scale + zero
+            else:
+                values = np.frombuffer(file, {"float-data": ">f4", "double-data": ">f8"}[shared[info + "type"]]).astype(float)
+            found[f"/{folder}/{channel}"] = (unit, rate, values)
+    return found
+
+
+READERS = {".wav": wav, ".trc": trc, ".bin": scope_bin, ".isf": isf, ".csv": tables, ".txt": tables, ".jpk-force-map": jpk, ".jpk-qi-series": jpk}
 
 
 def main():
@@ -107,10 +143,11 @@ def main():
         except ValueError:
             print(path.name, "refused", sep="\t")
             continue
-        for unit, rate, values in found:
+        named = found.items() if isinstance(found, dict) else [("", channel) for channel in found]
+        for channel, (unit, rate, values) in named:
             weighted = float(np.dot(np.arange(1, len(values) + 1), values))
             numbers = [values.sum(), abs(values).sum(), weighted, values[0], values[-1]]
-            print(path.name, unit, rate if rate else "-", len(values), *(repr(float(n)) for n in numbers), sep="\t")
+            print(path.name + channel, unit, rate if rate else "-", len(values), *(repr(float(n)) for n in numbers), sep="\t")
 
 
 if __name__ == "__main__":

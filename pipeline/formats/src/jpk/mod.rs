@@ -1,8 +1,9 @@
-//! JPK (Bruker) NanoWizard force curves: `.jpk-force`.
+//! JPK (Bruker) NanoWizard force curves, maps of them and quantitative imaging: `.jpk-force`, `.jpk-force-map`,
+//! `.jpk-qi-data`, `.jpk-qi-series`.
 //!
 //! Source: the layout and the property names as the readers afmformats (`fmt_jpk`, with an example header,
 //! <https://github.com/AFM-analysis/afmformats>), Gwyddion (`jpkscan.c`) and Hooke use them; no public specification
-//! was found, and no real file was at hand.
+//! was found. A map and a series of quantitative imaging were at hand.
 //!
 //! - A zip archive: `header.properties`; per segment (extend, pause, retract) `segments/N/segment-header.properties`
 //!   and big-endian samples in `segments/N/channels/*.dat`; in files of version 2 what segments share is in
@@ -12,7 +13,8 @@
 //!   `/segments/0/vDeflection/force`.
 //!   The chain of conversions is put together into one straight line.
 //! - The sample rate is the segment's number of points by its duration.
-//! - Maps (`.jpk-force-map`, `.jpk-qi-data`) are refused: thousands of curves with an index of their own.
+//! - Maps (`.jpk-force-map`, `.jpk-qi-data`) hold curves, each like a file of its own: `/index/3/segments/0/vDeflection`.
+//!   Of a map with very many only the first curves are listed. Images beside the curves are left out.
 
 mod archive;
 mod channel;
@@ -20,6 +22,7 @@ mod conversions;
 mod properties;
 mod segment;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::{Contents, Format, FormatError};
@@ -32,6 +35,9 @@ use properties::{Properties, Table};
 /// JPK force curves.
 pub struct JpkForce;
 
+/// Beyond this many channels no further curve is listed: 10,000 curves would be half a million.
+const MOST_CHANNELS: usize = 1 << 15;
+
 impl Format for JpkForce {
     fn recognises(head: &[u8], path: &Path) -> bool {
         let holds = |name: &[u8]| head.windows(name.len()).any(|w| w == name);
@@ -42,45 +48,50 @@ impl Format for JpkForce {
     fn open(path: &Path) -> Result<Contents, FormatError> {
         let mut archive = Archive::open(path)?;
         let names = archive::names(&archive);
-        let segments = segment::numbers(names.iter().map(String::as_str));
+        let segments = segment::all(names.iter().map(String::as_str));
         if segments.is_empty() {
-            return Err(refuse(&names, path));
+            return Err(refuse(&names));
         }
         let general = archive::table(&mut archive, "header.properties")?.unwrap_or_default();
         let shared = archive::table(&mut archive, "shared-data/header.properties")?.unwrap_or_default();
         let mut remarks = Vec::new();
         let mut channels = Vec::new();
         let mut started_at = String::new();
-        for number in segments {
-            let table = archive::table(&mut archive, &segment::header_name(number))?.unwrap_or_default();
+        let curves = segments.iter().filter_map(|segment| segment.curve).collect::<BTreeSet<u32>>().len();
+        let mut latest = None;
+        for segment in segments {
+            // whole curves: a half would be taken for a whole one
+            if channels.len() > MOST_CHANNELS && segment.curve != latest {
+                remarks.push(format!(
+                    "the curves from number {} on are left out: too many to list",
+                    segment.curve.unwrap_or(0)
+                ));
+                break;
+            }
+            latest = segment.curve;
+            let table = archive::table(&mut archive, &segment.header_name())?.unwrap_or_default();
             let properties = Properties::new(table, &shared);
             if started_at.is_empty() {
                 started_at = properties.get("force-segment-header.time-stamp").and_then(iso).unwrap_or_default();
             }
-            segment::channels(&mut archive, number, &properties, &mut channels, &mut remarks)?;
+            segment::channels(&mut archive, segment, &properties, &mut channels, &mut remarks)?;
         }
         let version = general.get("file-format-version").or_else(|| shared.get("file-format-version"));
-        Ok(Contents { format: format_name(version, &shared), started_at, channels, remarks })
+        Ok(Contents { format: format_name(version, curves, &shared), started_at, channels, remarks })
     }
 }
 
-fn format_name(version: Option<&String>, shared: &Table) -> String {
+fn format_name(version: Option<&String>, curves: usize, shared: &Table) -> String {
+    let what = if curves > 0 { format!("map of {curves} force curves") } else { "force curve".to_owned() };
     let layout = if shared.is_empty() { "" } else { ", shared headers" };
     format!(
-        "JPK force curve {}{layout}, big-endian",
+        "JPK {what} {}{layout}, big-endian",
         version.map_or("of unknown version".to_owned(), |v| text::brief(v, 20))
     )
 }
 
 /// Why an archive without segments is not read.
-fn refuse(names: &[String], path: &Path) -> FormatError {
-    let curves = names.iter().filter(|n| n.starts_with("index/") && n.ends_with("/header.properties")).count();
-    if curves > 0 || matches!(text::extension(path).as_str(), "jpk-force-map" | "jpk-qi-data") {
-        return fail::plain(
-            format!("found a map of {curves} force curves, wanted a single force curve"),
-            "in JPK Data Processing, export the curves of interest as .jpk-force files",
-        );
-    }
+fn refuse(names: &[String]) -> FormatError {
     fail::plain(
         format!(
             "found an archive of {} entries without `segments/0/segment-header.properties`, wanted a JPK force curve",

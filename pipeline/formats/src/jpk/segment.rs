@@ -16,34 +16,56 @@ use crate::text;
 /// Real segments have about ten.
 const MOST_CHANNELS: usize = 256;
 
-/// Numbers of the segments that have a header, ascending.
-pub(super) fn numbers<'n>(names: impl Iterator<Item = &'n str>) -> BTreeSet<u32> {
-    let number = |name: &str| {
-        let digits = name.strip_prefix("segments/")?.strip_suffix("/segment-header.properties")?;
-        // one spelling per number, so that the name can be made from it again
-        digits.parse().ok().filter(|n: &u32| n.to_string() == digits)
-    };
-    names.filter_map(number).collect()
+/// A segment of a curve: in a map the curve has a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Segment {
+    pub(super) curve: Option<u32>,
+    number: u32,
 }
 
-/// Name of a segment's header.
-pub(super) fn header_name(number: u32) -> String {
-    format!("segments/{number}/segment-header.properties")
+impl Segment {
+    /// The segment whose header has this name.
+    fn of_header(name: &str) -> Option<Self> {
+        // one spelling per number, so that the name can be made from it again
+        let number = |digits: &str| digits.parse().ok().filter(|n: &u32| n.to_string() == digits);
+        let (curve, rest) = match name.strip_prefix("index/").and_then(|rest| rest.split_once('/')) {
+            Some((digits, rest)) => (Some(number(digits)?), rest),
+            None => (None, name),
+        };
+        let digits = rest.strip_prefix("segments/")?.strip_suffix("/segment-header.properties")?;
+        Some(Self { curve, number: number(digits)? })
+    }
+
+    /// Its folder in the archive.
+    fn folder(self) -> String {
+        let curve = self.curve.map(|curve| format!("index/{curve}/")).unwrap_or_default();
+        format!("{curve}segments/{}", self.number)
+    }
+
+    /// Name of its header.
+    pub(super) fn header_name(self) -> String {
+        format!("{}/segment-header.properties", self.folder())
+    }
+}
+
+/// The segments that have a header, ascending, curve after curve.
+pub(super) fn all<'n>(names: impl Iterator<Item = &'n str>) -> BTreeSet<Segment> {
+    names.filter_map(Segment::of_header).collect()
 }
 
 /// Adds a segment's channels. Errors: an entry lies outside the file.
 pub(super) fn channels(
     archive: &mut Archive,
-    number: u32,
+    segment: Segment,
     properties: &Properties<'_>,
     found: &mut Vec<FoundChannel>,
     remarks: &mut Vec<String>,
 ) -> Result<(), FormatError> {
+    let folder = segment.folder();
     let points = properties.get("force-segment-header.num-points").and_then(text::number).filter(|&n| n >= 0.0);
     let sample_rate_hz = sample_rate_hz(properties, points);
     if sample_rate_hz.is_none() {
-        remarks
-            .push(format!("segment {number}: no number of points and duration above 0 in its header: no sample rate"));
+        remarks.push(format!("{folder}: no number of points and duration above 0 in its header: no sample rate"));
     }
     let style = properties
         .get("force-segment-header.settings.style")
@@ -51,12 +73,12 @@ pub(super) fn channels(
     let names = channel_names(properties);
     if names.len() > MOST_CHANNELS {
         return Err(fail::plain(
-            format!("segment {number}: found {} channels, wanted at most {MOST_CHANNELS}", names.len()),
+            format!("{folder}: found {} channels, wanted at most {MOST_CHANNELS}", names.len()),
             "the archive is damaged: copy it again from where it was recorded",
         ));
     }
     for name in names {
-        let whose = format!("/segments/{number}/{name}");
+        let whose = format!("/{folder}/{name}");
         let file =
             channel::get(properties, &name, "file.name").map_or_else(|| format!("channels/{name}.dat"), str::to_owned);
         let encoding = match channel::encoding(properties, &name) {
@@ -66,11 +88,9 @@ pub(super) fn channels(
                 continue;
             }
         };
-        let Some(entry) = archive::locate(archive, &format!("segments/{number}/{file}"))? else {
-            remarks.push(format!(
-                "{whose} is left out: the archive has no entry `segments/{number}/{}`",
-                text::brief(&file, 80)
-            ));
+        let Some(entry) = archive::locate(archive, &format!("{folder}/{file}"))? else {
+            remarks
+                .push(format!("{whose} is left out: the archive has no entry `{folder}/{}`", text::brief(&file, 80)));
             continue;
         };
         let Encoding { code, line, unit } = encoding;

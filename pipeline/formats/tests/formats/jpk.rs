@@ -1,5 +1,5 @@
-//! JPK force curves, built byte by byte; there are no free real ones. Values are compared with afmformats' reading of
-//! the same bytes.
+//! JPK force curves and maps, built byte by byte. Values are compared with afmformats' reading of the same bytes; real
+//! files are compared in scopes_real.rs.
 
 use std::io::Write;
 use std::path::Path;
@@ -145,6 +145,11 @@ fn version_1(deflate: bool) -> Vec<u8> {
 
 /// A file whose segments share what their channels have in common.
 fn version_2() -> Vec<u8> {
+    curves(&[("", 2)])
+}
+
+/// Curves of that layout: the folder and the number of segments of each.
+fn curves(folders: &[(&str, u32)]) -> Vec<u8> {
     let shared = String::from(
         "lcd-info.0.channel.name=vDeflection\nlcd-info.0.type=short-data\nlcd-info.0.encoder.type=signedshort\n",
     ) + &deflection("lcd-info.0.", "encoder")
@@ -160,13 +165,16 @@ fn version_2() -> Vec<u8> {
         shared.as_bytes(),
         true,
     );
-    zip = zip.add("segments/", b"", false);
-    for number in 0..2 {
-        zip = zip
-            .add(&format!("segments/{number}/"), b"", false)
-            .add(&format!("segments/{number}/segment-header.properties"), header.as_bytes(), true)
-            .add(&format!("segments/{number}/channels/vDeflection.dat"), &shorts(), true)
-            .add(&format!("segments/{number}/channels/height.dat"), &integers(), true);
+    for (curve, segments) in folders {
+        zip = zip.add(&format!("{curve}segments/"), b"", false);
+        for number in 0..*segments {
+            let folder = format!("{curve}segments/{number}");
+            zip = zip
+                .add(&format!("{folder}/"), b"", false)
+                .add(&format!("{folder}/segment-header.properties"), header.as_bytes(), true)
+                .add(&format!("{folder}/channels/vDeflection.dat"), &shorts(), true)
+                .add(&format!("{folder}/channels/height.dat"), &integers(), true);
+        }
     }
     zip.finish()
 }
@@ -296,15 +304,22 @@ fn what_is_no_channel_of_numbers_is_remarked() {
 }
 
 #[test]
-fn maps_and_other_archives_are_refused() {
-    let map = Zip::default()
-        .add("header.properties", b"", true)
-        .add("index/0/header.properties", b"", true)
-        .add("index/1/header.properties", b"", true)
-        .finish();
-    let error = refusal("m.jpk-force-map", &map);
-    assert!(error.problem.contains("a map of 2 force curves") && error.help.unwrap().contains("export"));
-    assert!(refusal("m.jpk-qi-data", &Zip::default().add("a", b"", true).finish()).problem.contains("map"));
+fn maps_hold_curves_one_behind_the_other() {
+    let map = curves(&[("index/0/", 2), ("index/10/", 1)]);
+    let (_folder, contents) = open_bytes::<JpkForce>("map.jpk-force-map", &map);
+    let contents = contents.unwrap();
+    assert!(contents.format.starts_with("JPK map of 2 force curves 0.13"), "{}", contents.format);
+    let base = ["/index/0/segments/0", "/index/0/segments/1", "/index/10/segments/0"];
+    for folder in base {
+        let c = channel(&contents, &format!("{folder}/vDeflection"));
+        assert_eq!((c.samples, c.sample_rate_hz), (5, Some(20.0)), "{folder}");
+        assert_eq!(values(c), values(channel(&contents, "/index/0/segments/0/vDeflection")));
+    }
+    assert_eq!(contents.channels.len(), 18);
+}
+
+#[test]
+fn other_archives_are_refused() {
     assert!(
         refusal("m.zip", &Zip::default().add("a", b"", true).finish())
             .problem
