@@ -363,7 +363,23 @@ def foreign():
         file["y"] = numpy.arange(8.0).reshape(1, 8)
         file["y"].attrs["MATLAB_class"] = numpy.bytes_("double")
 
+    def frame(file):
+        group = file.create_group("df")
+        group.attrs["pandas_type"] = numpy.bytes_("frame_table")
+        records = numpy.zeros(6, [("index", "<f8"), ("values_block_0", "<f8", (2,)), ("code", "<i2")])
+        records["index"], records["code"] = numpy.arange(6) * 1e-3, SAMPLES
+        table = group.create_dataset("table", data=records, chunks=(4,), compression="gzip", shuffle=True)
+        table.attrs["values_block_0_kind"], table.attrs["index_kind"] = numpy.bytes_("(lp0\nVy\np1\naVz\np2\na."), numpy.bytes_("float")
+        fixed = file.create_group("fixed")
+        fixed.attrs["pandas_type"] = numpy.bytes_("frame")
+        fixed["axis1"], fixed["block0_items"] = numpy.arange(6) * 1e-3, numpy.array(["a", "b"], "S")
+        fixed["block0_values"] = numpy.zeros((6, 2))
+        codes = file.create_group("jpk")
+        codes.attrs["encoder.scaling.multiplier"], codes.attrs["encoder.scaling.unit.unit"] = 1e-9, numpy.bytes_("V")
+        codes["y"] = numpy.array(SAMPLES, "<i4")
+
     save("plain", plain)
+    save("frame", frame)
     save("chunked", chunked)
     save("latest", chunked, libver="latest")
     save("odd", odd)

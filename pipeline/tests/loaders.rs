@@ -214,3 +214,36 @@ fn check(name: &str, path: &Path, expected: &Expected) {
         }
     }
 }
+
+/// HDF5 files of `scopes` as h5py reads them: `f[path][:, n]` times the group's `encoder.scaling.multiplier` plus its
+/// offset.
+#[test]
+fn hdf5_recordings_of_microscopes_and_fibres_have_values_not_codes_and_no_times_among_their_signals() {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let folder = std::env::var_os("AFMID_DATA").map_or_else(beside, PathBuf::from).join("scopes");
+    if !folder.is_dir() {
+        println!("stand-in: 0 of 2 real files tested, {} is missing", folder.display());
+        return;
+    }
+    let open =
+        |name: &str| open_contents(&InputFiles::new(), &folder.join(name), &Reading::of("auto", None)).unwrap().1;
+    let jpk = open("jpk_sample_0.h5-jpk");
+    let values = |location: &str| {
+        let channel = jpk.channels.iter().find(|channel| channel.location == location).unwrap();
+        let mut values = Vec::new();
+        let raw = channel.source.read(0, channel.samples).unwrap();
+        raw.scale_into(channel.scale_factor, channel.add_offset, &mut values);
+        (channel.unit.clone(), channel.sample_rate_hz, values)
+    };
+    let (unit, rate, error) = values("/Measurement_000/Channel_000/Error[0]");
+    let least = error.iter().copied().fold(f64::INFINITY, f64::min);
+    // the least code is -6350353
+    assert_eq!((unit.as_str(), rate, error.len(), least), ("V", None, 16_384, -6_350_353.0 * 5.227_498_044_396_503e-9));
+    let (unit, _, phase) = values("/Measurement_000/Channel_002/Phase[0]");
+    assert_eq!((unit.as_str(), phase.len()), ("deg", 16_384));
+    assert!(phase.iter().all(|value| (-180.0..=180.0).contains(value)));
+    let fibre = open("das_valencia_febus.h5");
+    assert!(fibre.channels.iter().all(|channel| channel.is_axis && channel.sample_rate_hz.is_none()));
+    assert_eq!(fibre.channels[0].location, "/fa1-20050027/Source1/time");
+    assert!(fibre.remarks.iter().any(|remark| remark.contains("shape [10, 250, 100]")), "{:?}", fibre.remarks);
+}

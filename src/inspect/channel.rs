@@ -19,6 +19,8 @@ pub struct Channel {
     pub stored_as: &'static str,
     /// Samples before which the recording was interrupted.
     pub gaps: Vec<usize>,
+    /// Whether it is an axis and no signal.
+    pub is_axis: bool,
     /// What the samples are; none for channels behind the first ones of a file with very many, which are listed only.
     pub values: Option<Values>,
 }
@@ -48,6 +50,7 @@ impl Channel {
             unit: found.unit.clone(),
             stored_as: found.stored_as,
             gaps: found.gaps.clone(),
+            is_axis: found.is_axis,
             values,
         })
     }

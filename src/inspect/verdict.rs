@@ -62,6 +62,9 @@ pub fn of_file(channels: &[Channel]) -> Verdict {
 }
 
 fn of_channel(channel: &Channel) -> (Answer, String) {
+    if channel.is_axis {
+        return (Answer::No, "it is an axis, no signal".to_owned());
+    }
     let longest = channel.longest_stretch();
     if longest < LEAST_SAMPLES {
         let reason = format!("{longest} samples without interruption, wanted at least {LEAST_SAMPLES}");
@@ -119,7 +122,16 @@ mod tests {
     fn channel(location: &str, rate: Option<f64>, samples: usize) -> Channel {
         let values = Some(Values { least: -1.0, largest: 1.0, codes: 200, missing: 0, saturated: 0 });
         let (location, unit) = (location.to_owned(), "V".to_owned());
-        Channel { location, samples, sample_rate_hz: rate, unit, stored_as: "int16", gaps: Vec::new(), values }
+        Channel {
+            location,
+            samples,
+            sample_rate_hz: rate,
+            unit,
+            stored_as: "int16",
+            gaps: Vec::new(),
+            is_axis: false,
+            values,
+        }
     }
 
     #[test]
@@ -132,6 +144,7 @@ mod tests {
             (channel("/a", Some(1e4), 90_000), Answer::No, "min_sample_rate_hz"),
             (channel("/a", None, 90_000), Answer::Unknown, "sample_rate_hz"),
             (channel("/a", Some(5e6), 500), Answer::No, "500 samples"),
+            (Channel { is_axis: true, ..good() }, Answer::No, "an axis, no signal"),
             (Channel { gaps: (0..90_000).step_by(1000).collect(), ..good() }, Answer::No, "1000 samples"),
             (with(values(2, 0, 0)), Answer::No, "different values"),
             (with(values(200, 0, 60_000)), Answer::No, "67 % of the samples are clipped"),

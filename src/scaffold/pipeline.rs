@@ -138,6 +138,7 @@ mod tests {
             unit: unit.to_owned(),
             stored_as: "int16",
             gaps: Vec::new(),
+            is_axis: false,
             values: None,
         };
         Source {

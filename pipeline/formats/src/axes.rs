@@ -12,7 +12,20 @@ use crate::{Contents, FoundChannel};
 use std::collections::HashMap;
 
 /// Names of arrays of times, in lower case. A capital `T` is a temperature or a period.
-const TIMES: [&str; 9] = ["time", "times", "zeit", "temps", "tout", "tvec", "timestamp", "timestamps", "time_axis"];
+const TIMES: [&str; 11] = [
+    "time",
+    "times",
+    "zeit",
+    "temps",
+    "tout",
+    "tvec",
+    "timestamp",
+    "timestamps",
+    "time_axis",
+    // what pandas calls them in HDF5: of a table or a series, and of a fixed frame
+    "index",
+    "axis1",
+];
 /// Ends of such names that state the unit.
 const UNITS: [(&str, f64); 5] = [("_s", 1.0), ("_ms", 1e-3), ("_us", 1e-6), ("_ns", 1e-9), ("_sec", 1.0)];
 /// Names of arrays of frequencies, in lower case.
@@ -48,6 +61,8 @@ enum Kind {
     /// Seconds in its unit, if the name says so.
     Time(Option<f64>),
     Frequency,
+    /// An axis that the file marks as one and that is of neither.
+    Unnamed,
     /// The x to a y.
     Abscissa,
     /// A cell beside others.
@@ -60,6 +75,8 @@ struct Axis {
     at: usize,
     kind: Kind,
     step_s: Option<f64>,
+    /// How far the step may be from the true one, relative.
+    uncertainty: f64,
 }
 
 /// What axes are found by: parent, name where it matters, cell, samples.
@@ -116,7 +133,7 @@ fn give(channel: &mut FoundChannel, axis: &Axis, name: &str, remarks: &mut Vec<S
         }
         return false;
     };
-    let rate = of_step(step_s);
+    let rate = fewest_digits(of_step(step_s), axis.uncertainty);
     let stated = channel.sample_rate_hz;
     if let Some(stated) = stated.filter(|stated| (stated - rate).abs() > AGREE * rate) {
         channel.sample_rate_hz = None;
@@ -145,7 +162,7 @@ impl Axes {
             let (name, cell) = match kind {
                 Kind::Abscissa => (ordinate(place.name).unwrap_or_default(), place.cell),
                 Kind::Cell => (place.name.to_owned(), ""),
-                Kind::Time(_) | Kind::Frequency => (String::new(), place.cell),
+                Kind::Time(_) | Kind::Frequency | Kind::Unnamed => (String::new(), place.cell),
             };
             axes.by_key.entry(place.key(&name, cell, channel.samples)).or_default().push(axes.all.len());
             axes.all.push(axis);
@@ -175,19 +192,26 @@ impl Axes {
             return axes.get(*count - 1).or_else(same_step).copied();
         }
         for key in [own(place.name, place.cell), own("", place.cell), own("", "")] {
-            if let Some(first) = find(&key).and_then(|axes| axes.iter().find(|axis| !self.is_cell(**axis))) {
-                return Some(*first);
+            if let Some(best) = find(&key).and_then(|axes| self.best(axes)) {
+                return Some(best);
             }
         }
         let mut parent = place.parent;
         while let Some(cut) = parent.rfind(['/', '.', '{', '(']) {
             parent = parent.get(..cut).unwrap_or_default();
             let around = Place { parent, ..place }.key("", "", channel.samples);
-            if let Some(first) = find(&around).and_then(|axes| axes.first()) {
-                return Some(*first);
+            if let Some(best) = find(&around).and_then(|axes| self.best(axes)) {
+                return Some(best);
             }
         }
         None
+    }
+
+    /// The first axis that gives a rate: there may be a counter beside the times. Without one the first of all.
+    fn best(&self, numbers: &[usize]) -> Option<usize> {
+        let no_cell = || numbers.iter().copied().filter(|number| !self.is_cell(*number));
+        let gives = |number: &usize| self.all.get(*number).is_some_and(|axis| axis.step_s.is_some());
+        no_cell().find(gives).or_else(|| no_cell().next())
     }
 
     fn is_cell(&self, number: usize) -> bool {
@@ -205,14 +229,18 @@ impl Axes {
     }
 }
 
+/// Whether an array of this name holds times.
+pub fn names_times(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let bare = UNITS.iter().find_map(|(end, _)| lower.strip_suffix(end)).unwrap_or(&lower);
+    TIMES.contains(&lower.as_str()) || TIMES.contains(&bare) || (bare == "t" && name.starts_with('t'))
+}
+
 /// What kind of axis a channel is by its name and those beside it.
 fn kind(channel: &FoundChannel, place: &Place, places: &HashMap<Key, usize>) -> Option<Kind> {
     let lower = place.name.to_lowercase();
     if FREQUENCIES.contains(&lower.as_str()) {
         return Some(Kind::Frequency);
-    }
-    if channel.is_axis {
-        return None;
     }
     let is_time = |name: &str| TIMES.contains(&name) || (name == "t" && place.name.starts_with('t'));
     if is_time(&lower) {
@@ -221,6 +249,9 @@ fn kind(channel: &FoundChannel, place: &Place, places: &HashMap<Key, usize>) -> 
     let unit = UNITS.iter().find_map(|(end, seconds)| Some((lower.strip_suffix(end)?, *seconds)));
     if let Some((_, seconds)) = unit.filter(|(name, _)| is_time(name)) {
         return Some(Kind::Time(Some(seconds)));
+    }
+    if channel.is_axis {
+        return Some(seconds(&channel.unit).map_or(Kind::Unnamed, |seconds| Kind::Time(Some(seconds))));
     }
     let partner = ordinate(place.name).map(|name| place.key(&name, place.cell, channel.samples));
     if partner.is_some_and(|key| places.contains_key(&key)) {
@@ -260,18 +291,22 @@ fn axis(at: usize, kind: Kind, channel: &FoundChannel, remarks: &mut Vec<String>
     let unit_s = match kind {
         Kind::Frequency => {
             remarks.push(format!("{location} is an axis of frequencies, no signal"));
-            return Some(Axis { at, kind, step_s: None });
+            return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
+        }
+        Kind::Unnamed => {
+            remarks.push(format!("{location} is an axis, no signal"));
+            return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
         }
         Kind::Time(unit_s) => unit_s,
         Kind::Abscissa | Kind::Cell => None,
     };
     let stated = unit_s.or_else(|| seconds(&channel.unit));
-    let Even { first, step, off } = match even(channel) {
+    let Even { first, step, off, uncertainty } = match even(channel) {
         Ok(even) => even,
         Err(_) if matches!(kind, Kind::Abscissa | Kind::Cell) => return None,
         Err(why) => {
             remarks.push(format!("{location} is an axis of times and gives no sample rate: {why}"));
-            return Some(Axis { at, kind, step_s: None });
+            return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
         }
     };
     // What has no name is an axis only if it begins at zero as recordings do: a ramp begins anywhere.
@@ -285,13 +320,13 @@ fn axis(at: usize, kind: Kind, channel: &FoundChannel, remarks: &mut Vec<String>
         let unit =
             if unknown { format!("in «{}»", channel.unit) } else { "in whole numbers without a unit".to_owned() };
         remarks.push(format!("{location} is an axis, evenly by {step} {unit}: it gives no sample rate"));
-        return Some(Axis { at, kind, step_s: None });
+        return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
     }
     let unit = if stated.is_none() { " (no unit: taken as seconds)" } else { "" };
     let rounded = if off > REMARKED { format!(", to {off:.1e} of a step") } else { String::new() };
     remarks
         .push(format!("{location}{unit} runs evenly by {step}{rounded}: the sample rate of the arrays of its length"));
-    Some(Axis { at, kind, step_s: Some(step * stated.unwrap_or(1.0)) })
+    Some(Axis { at, kind, step_s: Some(step * stated.unwrap_or(1.0)), uncertainty })
 }
 
 fn seconds(unit: &str) -> Option<f64> {
@@ -304,12 +339,21 @@ fn seconds(unit: &str) -> Option<f64> {
     })
 }
 
-/// Times that run evenly: the first, the step, and the largest deviation in steps.
+/// Of the numbers within an uncertainty (relative) of this one, that with the fewest digits: times that are rounded
+/// allow several rates.
+fn fewest_digits(number: f64, uncertainty: f64) -> f64 {
+    let rounded = (0..12).filter_map(|digits: usize| format!("{number:.digits$e}").parse::<f64>().ok());
+    let mut within = rounded.filter(|rounded| (rounded - number).abs() <= uncertainty * number.abs());
+    within.next().unwrap_or(number)
+}
+
+/// Times that run evenly: the first, the step, the largest deviation in steps, and the step's relative uncertainty.
 #[derive(Debug, Clone, Copy)]
 struct Even {
     first: f64,
     step: f64,
     off: f64,
+    uncertainty: f64,
 }
 
 /// Errors: why times do not run evenly.
@@ -349,7 +393,9 @@ fn even(channel: &FoundChannel) -> Result<Even, String> {
             worst = worst.max(off / step);
         }
     }
-    Ok(Even { first, step, off: worst })
+    // both ends may be off by the largest deviation
+    let uncertainty = (2.0 * worst + rounding / step) / (samples - 1) as f64;
+    Ok(Even { first, step, off: worst, uncertainty })
 }
 
 #[cfg(test)]
@@ -451,8 +497,8 @@ mod tests {
     fn rounded_times_are_even_and_a_lost_sample_is_not() {
         let rounded: Vec<f64> = times(1000, 1.953125e-4).iter().map(|t| (t * 1e7).round() / 1e7).collect();
         let found = settled(vec![channel("/t", rounded.clone()), channel("/y", noise(1000))]);
-        // the ends are rounded by half a unit of 1e-7 each, over 999 steps
-        assert!((found[0].1.unwrap() / 5120.0 - 1.0).abs() < 1e-7 / (999.0 * 1.953125e-4));
+        // of the rates that the rounding allows the one with the fewest digits
+        assert_eq!(found, [is("/y", Some(5120.0))]);
         let mut lost = rounded;
         lost.iter_mut().skip(500).for_each(|time| *time += 1.953125e-4);
         assert!(settled(vec![channel("/t", lost), channel("/y", noise(1000))])[0].2);
@@ -469,6 +515,12 @@ mod tests {
         response.sample_rate_hz = Some(5.0);
         let frequency = settled(vec![channel("/s.frequency", times(50, 0.1)), response]);
         assert_eq!(frequency, [axis("/s.frequency"), is("/s.gain", None)]);
+        let both = vec![
+            channel("/df/index", times(50, 1.0)),
+            channel("/df/time", times(50, 0.1)),
+            channel("/df/y", noise(50)),
+        ];
+        assert_eq!(settled(both), [axis("/df/index"), is("/df/y", Some(10.0))]);
         let temperature = settled(vec![channel("/T", times(50, 0.1)), channel("/y", noise(50))]);
         assert_eq!(temperature, [is("/T", None), is("/y", None)]);
     }

@@ -41,7 +41,7 @@ pub mod wav;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use axes::settle as settle_axes;
+pub use axes::{names_times, settle as settle_axes};
 pub use budget::most_inflated;
 pub use grid::numbers_in_file;
 pub use lanes::Lanes;

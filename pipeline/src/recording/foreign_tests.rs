@@ -48,3 +48,63 @@ fn every_storage_of_other_programs_is_read_or_refused_clearly() {
     }
     assert_eq!(files, 25);
 }
+
+/// Location, rate and unit of each channel of a file; a star marks axes.
+fn described(path: &std::path::Path) -> (Vec<String>, Contents) {
+    let (_, contents) = open_contents(&InputFiles::new(), path, &Reading::of("hdf5", None)).unwrap();
+    let describe = |channel: &FoundChannel| {
+        let rate = channel.sample_rate_hz.map_or("-".to_owned(), |rate| rate.to_string());
+        let star = if channel.is_axis { "*" } else { "" };
+        format!("{}{star} {rate} {}", channel.location, channel.unit).trim_end().to_owned()
+    };
+    (contents.channels.iter().map(describe).collect(), contents)
+}
+
+#[test]
+fn tables_and_times_of_pandas_pytables_and_others_are_columns_and_rates() {
+    let folder = Folder::new("tables");
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
+    let python = root.join(".tools/bin/python");
+    assert!(python.exists(), "h5py is missing: run `make test-deps`");
+    let output = Command::new(python).arg(root.join("tests/foreign_tables.py")).arg(&folder.0).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let both = (0..40).map(|column| format!("/signals/both[{column}] 1000"));
+    let arrays = ["/codes 1000".to_owned()].into_iter().chain(both);
+    let arrays: Vec<String> = arrays.chain(["/signals/longer -".to_owned(), "/signals/y 1000".to_owned()]).collect();
+    let owned = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<String>>();
+    let cases = [
+        ("fixed", owned(&["/df/y 1000", "/df/z 1000"]), "/df/y"),
+        ("fixed-moments", owned(&["/df/y 1000", "/df/z 1000"]), "/df/y"),
+        ("fixed-column", owned(&["/df/axis1* -", "/df/y 1000", "/df/z 1000"]), "/df/y"),
+        ("series", owned(&["/df/values 1000"]), "/df/values"),
+        ("table", owned(&["/df/table.y 1000", "/df/table.z 1000"]), "/df/table.y"),
+        ("table-moments", owned(&["/df/table.y 1000", "/df/table.z 1000"]), "/df/table.y"),
+        ("table-columns", owned(&["/df/table.y 1000", "/df/table.z 1000"]), "/df/table.y"),
+        ("pytables", owned(&["/run/records.y 1000", "/run/records.code 1000"]), "/run/records.y"),
+        ("arrays", arrays, "/signals/y"),
+        ("scale", owned(&["/y 1000"]), "/y"),
+        ("jpk", owned(&["/Channel_000/y - V"]), "/Channel_000/y"),
+    ];
+    for (name, wanted, y) in cases {
+        let path = folder.file(&format!("{name}.h5"));
+        let (found, contents) = described(&path);
+        assert_eq!(found, wanted, "{name}: {:?}", contents.remarks);
+        let channel = contents.channels.iter().find(|channel| channel.location == y).unwrap();
+        let mut values = Vec::new();
+        let raw = channel.source.read(0, channel.samples).unwrap();
+        raw.scale_into(channel.scale_factor, channel.add_offset, &mut values);
+        assert_eq!(values.len(), 500, "{name}");
+        // codes of 1e-9, and the rounding of exp and cos in another library
+        let tolerance = if name == "jpk" { 1e-9 } else { 1e-14 };
+        for (sample, value) in values.iter().enumerate() {
+            let t = sample as f64 * 1e-3;
+            let truth = (-8.0 * t).exp() * (2.0 * std::f64::consts::PI * 50.0 * t).cos();
+            assert!((value - truth).abs() <= tolerance, "{name}: {value} instead of {truth} at {sample}");
+        }
+        assert_eq!(channel.source.read(499, 1).unwrap().widened().len(), 1);
+        assert!(channel.source.read(500, 1).is_err());
+    }
+    let (_, contents) = described(&folder.file("arrays.h5"));
+    let said = |words: &str| contents.remarks.iter().any(|remark| remark.contains(words));
+    assert!(said("/codes holds whole numbers in «V» without a scale"), "{:?}", contents.remarks);
+}

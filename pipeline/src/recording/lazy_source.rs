@@ -59,7 +59,7 @@ impl LazySource {
         if let Some(source) = self.native.get() {
             return Ok(source);
         }
-        let source = super::native::open_source(&self.files, &self.path, self.state()?, &self.location)?;
+        let source = super::native::open_source(&self.files, &self.path, self.state()?, &self.location, None)?;
         if source.samples != self.samples {
             return Err(self.error("the file is not the one that was recorded: its channel has another length"));
         }

@@ -8,12 +8,12 @@ use hdf5::dataset::Layout;
 use hdf5::datatype::ByteOrder;
 use hdf5::filters::Filter;
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
-use hdf5::{Dataset, File, Group, Location};
+use hdf5::{Dataset, Datatype, File, Group, Location};
 
 use super::chunk::ChunkFilter;
 use super::chunk_cache::ChunkCache;
 use super::input_files::{HashedHdf5, InputFiles, require_same, require_state};
-use super::source::{ChunkPlace, Hdf5Source, Place};
+use super::source::{ChunkPlace, Hdf5Source, Item, Place};
 use super::{Channel, Reading, Record};
 use crate::error::StageError;
 use crate::files::FileState;
@@ -101,7 +101,7 @@ pub(crate) fn is_native(files: &InputFiles, path: &Path) -> bool {
     hdf5::sync::sync(|| open_file(path, &vetted).is_ok_and(|file| states_rate(&file)))
 }
 
-fn states_rate(file: &File) -> bool {
+pub(super) fn states_rate(file: &File) -> bool {
     has_attribute(file, "sample_rate_hz")
 }
 
@@ -155,7 +155,7 @@ fn open_channel(
     wanted: &Wanted,
 ) -> Result<Channel, StageError> {
     let (location, allowance) = (wanted.location, file.allowance());
-    let source = describe(chunks, allowance, dataset, hashed, location)?;
+    let source = describe(chunks, allowance, dataset, hashed, location, None)?;
     let unit = text_attribute(dataset, "units", allowance).ok_or_else(|| {
         StageError::new(format!("{location}: the attribute `units` is missing"))
             .help("state the unit of stored * scale_factor + add_offset, such as `V`")
@@ -183,13 +183,22 @@ fn open_channel(
     })
 }
 
-/// Opens one dataset of a file in this state as a source of samples. Errors: as [`open_native`]; the file is in another
-/// state.
+/// A number in the records of a dataset.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Part {
+    pub(super) number: Number,
+    /// Byte of it in a record.
+    pub(super) offset: usize,
+}
+
+/// Opens one dataset of a file in this state as a source of samples, or one number of its records. Errors: as
+/// [`open_native`]; the file is in another state.
 pub(super) fn open_source(
     files: &InputFiles,
     path: &Path,
     state: FileState,
     location: &str,
+    part: Option<Part>,
 ) -> Result<Hdf5Source, StageError> {
     let hashed = files.inspect_hdf5(path)?;
     require_same(path, &hashed.state, &state)?;
@@ -197,7 +206,7 @@ pub(super) fn open_source(
     let dataset =
         file.dataset(location).map_err(|_| StageError::new(format!("there is no channel `{location}`")).at(path))?;
     require_own(&dataset, location).map_err(|error| error.at(path))?;
-    let source = describe(files.chunks(), file.allowance(), &dataset, (path, &hashed), location)
+    let source = describe(files.chunks(), file.allowance(), &dataset, (path, &hashed), location, part)
         .map_err(|error| error.at(path))?;
     // the library opened it by name
     require_state(path, &state)?;
@@ -210,6 +219,7 @@ fn describe(
     dataset: &Dataset,
     (path, hashed): (&Path, &HashedHdf5),
     location: &str,
+    part: Option<Part>,
 ) -> Result<Hdf5Source, StageError> {
     let fail = |problem: String| StageError::new(format!("{location}: {problem}"));
     let hdf5 = |error: hdf5::Error| fail(format!("damaged: {error}"));
@@ -219,16 +229,25 @@ fn describe(
         return Err(fail(format!("found {found}, wanted one dimension, time")));
     };
     let dtype = dataset.dtype().map_err(hdf5)?;
-    let kind = dtype.to_descriptor().ok().and_then(|descriptor| sample_type(&descriptor)).ok_or_else(|| {
-        let odd = |_| format!("an unusual number of {} bytes", dtype.size());
-        let found = dtype.to_descriptor().map_or_else(odd, |descriptor| descriptor.to_string());
-        fail(format!("the samples are {found}, wanted int8 to int32, uint8 to uint32, float32 or float64"))
-            .help("store the converter's codes as int16 with scale_factor and add_offset")
-    })?;
-    check_samples(dataset, kind.bytes() as usize, allowance).map_err(|error| fail(error.problem))?;
-    let big_endian = matches!(dtype.byte_order(), ByteOrder::BigEndian);
+    let (kind, offset) = match part {
+        Some(part) => (part.number, part.offset),
+        None => (number_of(&dtype).map_err(|error| fail(error.problem).help(error.help.unwrap_or_default()))?, 0),
+    };
+    let item = Item { bytes: if part.is_some() { dtype.size() } else { kind.bytes() as usize }, offset };
+    if offset.checked_add(kind.bytes() as usize).is_none_or(|end| end > item.bytes) {
+        return Err(fail(format!("damaged: a number at byte {offset} of records of {} bytes", item.bytes)));
+    }
+    check_samples(dataset, item.bytes, allowance).map_err(|error| fail(error.problem))?;
+    let order = dtype.byte_order();
     check_filters(dataset).map_err(|error| fail(error.problem).help(error.help.unwrap_or_default()))?;
-    let place = locate(dataset, kind, samples, hashed.state.size()).map_err(fail)?;
+    let place = locate(dataset, item.bytes as u64, samples, hashed.state.size()).map_err(fail)?;
+    // the library converts numbers, not parts of records
+    if part.is_some() && (place == Place::Library || !matches!(order, ByteOrder::BigEndian | ByteOrder::LittleEndian)) {
+        return Err(fail(
+            "records that are not stored in one stretch or in gzip chunks, all in one byte order".to_owned(),
+        )
+        .help("store the column as a dataset of its own"));
+    }
     Ok(Hdf5Source {
         path: path.to_owned(),
         state: hashed.state,
@@ -236,10 +255,23 @@ fn describe(
         location: location.to_owned(),
         samples,
         kind,
-        big_endian,
+        item,
+        big_endian: matches!(order, ByteOrder::BigEndian),
         place,
         number: chunks.source_number(),
         chunks: chunks.clone(),
+    })
+}
+
+/// The type of a dataset's numbers. Errors: another type than those of native records.
+fn number_of(dtype: &Datatype) -> Result<Number, StageError> {
+    let descriptor = dtype.to_descriptor();
+    descriptor.as_ref().ok().and_then(sample_type).ok_or_else(|| {
+        let odd = |_| format!("an unusual number of {} bytes", dtype.size());
+        let found = descriptor.map_or_else(odd, |descriptor| descriptor.to_string());
+        let wanted = "int8 to int32, uint8 to uint32, float32 or float64";
+        StageError::new(format!("the samples are {found}, wanted {wanted}"))
+            .help("store the converter's codes as int16 with scale_factor and add_offset")
     })
 }
 
@@ -284,7 +316,7 @@ pub(super) fn sample_type(descriptor: &TypeDescriptor) -> Option<Number> {
 }
 
 /// Asks HDF5 where the samples lie. Errors: a place outside the file.
-fn locate(dataset: &Dataset, kind: Number, samples: usize, file_size: u64) -> Result<Place, String> {
+fn locate(dataset: &Dataset, item_bytes: u64, samples: usize, file_size: u64) -> Result<Place, String> {
     let creation = dataset.dcpl().map_err(|error| format!("damaged: {error}"))?;
     let inside = |offset: u64, bytes: u64| match offset.checked_add(bytes) {
         Some(end) if end <= file_size => Ok(()),
@@ -293,7 +325,7 @@ fn locate(dataset: &Dataset, kind: Number, samples: usize, file_size: u64) -> Re
     match creation.layout() {
         Layout::Contiguous => match dataset.offset() {
             Some(offset) => {
-                inside(offset, samples as u64 * kind.bytes())?;
+                inside(offset, (samples as u64).saturating_mul(item_bytes))?;
                 Ok(Place::Contiguous { offset })
             }
             None => Ok(Place::Library),
@@ -303,7 +335,7 @@ fn locate(dataset: &Dataset, kind: Number, samples: usize, file_size: u64) -> Re
             let Some(&[length]) = creation.chunk().as_deref().filter(|chunk| chunk.len() == 1) else {
                 return Err("damaged: the chunks have another rank than the dataset".to_owned());
             };
-            let bytes = (length as u64).saturating_mul(kind.bytes());
+            let bytes = (length as u64).saturating_mul(item_bytes);
             if bytes > MOST_CHUNK_BYTES {
                 return Err(format!("stored in chunks of {bytes} bytes, wanted at most {MOST_CHUNK_BYTES} each"));
             }
@@ -311,7 +343,7 @@ fn locate(dataset: &Dataset, kind: Number, samples: usize, file_size: u64) -> Re
             for chunk in &chunks {
                 inside(chunk.offset, chunk.bytes as u64)?;
                 // deflate shrinks by at most 1032 to 1
-                if (length as u64).saturating_mul(kind.bytes()) > (chunk.bytes as u64 + 1).saturating_mul(1100) {
+                if (length as u64).saturating_mul(item_bytes) > (chunk.bytes as u64 + 1).saturating_mul(1100) {
                     return Err(format!("damaged: a chunk of {length} samples in {} bytes", chunk.bytes));
                 }
             }

@@ -21,7 +21,7 @@ pub fn read_series(files: &InputFiles, path: &Path, location: &str) -> Result<Ve
         Ok(read_number_attribute(files, path, location, name)?.unwrap_or(otherwise))
     };
     let (scale, offset) = (optional("scale_factor", 1.0)?, optional("add_offset", 0.0)?);
-    let source: Hdf5Source = open_source(files, path, state, location)?;
+    let source: Hdf5Source = open_source(files, path, state, location, None)?;
     if source.samples > LONGEST {
         let problem = format!("{location} has {} values, wanted at most {LONGEST}", source.samples);
         return Err(StageError::new(problem).at(path));

@@ -45,6 +45,14 @@ pub(super) struct ChunkPlace {
     pub(super) skipped_filters: u32,
 }
 
+/// An element of a dataset: a number, or a record with a number in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Item {
+    pub(super) bytes: usize,
+    /// Byte of the number.
+    pub(super) offset: usize,
+}
+
 /// A [`Source`] over one HDF5 dataset. Holds no handle between reads.
 #[derive(Debug)]
 pub(super) struct Hdf5Source {
@@ -55,6 +63,8 @@ pub(super) struct Hdf5Source {
     pub(super) location: String,
     pub(super) samples: usize,
     pub(super) kind: Number,
+    /// Bytes from one sample to the next, and of what lies before the number: a column of a table of records.
+    pub(super) item: Item,
     pub(super) big_endian: bool,
     pub(super) place: Place,
     pub(super) chunks: ChunkCache,
@@ -75,7 +85,7 @@ impl Source for Hdf5Source {
     }
 
     fn is_direct(&self) -> bool {
-        matches!(self.place, Place::Contiguous { .. })
+        matches!(self.place, Place::Contiguous { .. }) && self.is_plain()
     }
 }
 
@@ -90,15 +100,35 @@ impl Hdf5Source {
         let file = self.open()?;
         match &self.place {
             Place::Contiguous { offset } => {
-                let at = offset + start as u64 * self.kind.bytes();
-                self.kind.read(count, self.big_endian, |bytes| self.fill(&file, at, bytes))
+                let at = offset + start as u64 * self.item.bytes as u64;
+                if self.is_plain() {
+                    return self.kind.read(count, self.big_endian, |bytes| self.fill(&file, at, bytes));
+                }
+                let mut items = vec![0; count * self.item.bytes];
+                self.fill(&file, at, &mut items)?;
+                Ok(self.kind.decode(&self.numbers_of(items), self.big_endian))
             }
             Place::Chunked { length, chunks, filters } => {
                 let bytes = self.read_chunks(&file, start, end, *length, chunks, filters)?;
-                Ok(self.kind.decode(&bytes, self.big_endian))
+                Ok(self.kind.decode(&self.numbers_of(bytes), self.big_endian))
             }
             Place::Library => self.read_by_library(start, end),
         }
+    }
+
+    /// Whether the elements are the numbers.
+    fn is_plain(&self) -> bool {
+        self.item.bytes as u64 == self.kind.bytes()
+    }
+
+    /// The numbers in elements that lie side by side.
+    fn numbers_of(&self, items: Vec<u8>) -> Vec<u8> {
+        if self.is_plain() {
+            return items;
+        }
+        let Item { bytes, offset } = self.item;
+        let number = offset..offset + self.kind.bytes() as usize;
+        items.chunks_exact(bytes).flat_map(|item| item.get(number.clone()).unwrap_or_default()).copied().collect()
     }
 
     fn error(&self, problem: impl std::fmt::Display) -> StageError {
@@ -129,7 +159,7 @@ impl Hdf5Source {
         chunks: &[ChunkPlace],
         filters: &[ChunkFilter],
     ) -> Result<Vec<u8>, StageError> {
-        let sample = self.kind.bytes() as usize;
+        let sample = self.item.bytes;
         let mut bytes = Vec::with_capacity((end - start) * sample);
         for index in start / length..=(end - 1) / length {
             let place = chunks.get(index).ok_or_else(|| self.error(format!("chunk {index} is missing")))?;

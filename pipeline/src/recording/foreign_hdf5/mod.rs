@@ -1,35 +1,43 @@
 //! HDF5 files of any layout: every dataset of numbers is a channel, or several.
 //!
-//! - Groups at any depth (to 32) and hard links only; datasets of one dimension, and the lanes of two-dimensional ones.
+//! - Groups at any depth (to 32) and hard links only; datasets of one dimension, the lanes of two-dimensional ones, and
+//!   the columns of tables of records (PyTables, pandas): `/df/table.y`.
 //! - Of two dimensions the last is time, as in NSID and in the main datasets of USID and general-mode AFM (a row per
 //!   position, flattened), unless it has at most 16 samples and the other at least 16 times as many: then the columns
-//!   are the channels. MATLAB 7.3 stores its arrays transposed, so that there the columns of MATLAB are the channels.
+//!   are the channels; the first is time if it is as long as an array of times beside it, or in a frame of pandas.
+//!   MATLAB 7.3 stores its arrays transposed, so that there the columns of MATLAB are the channels.
 //!   Channels are numbered from 0, in MATLAB's files from 1: `/x[2]`.
 //! - Unit from the attribute `units` or `unit`, name from `long_name` or `quantity`, scale from `scale_factor` and
 //!   `add_offset`, missing samples from `_FillValue` or `missing_value`.
 //! - Sample rate from a number that is named like one (`sample_rate_hz`, `sampling_rate`, `fs`, `dt`, ...): an
 //!   attribute of the dataset, else an attribute or a dataset of one number in its group, else in the groups around it.
+//! - Arrays of times (`/time`, the index of pandas, dimension scales in a unit of time) are axes: [`settle_axes`].
+//! - Integers in a unit but without a scale are codes, of which the unit is not known. JPK's files state the scale in
+//!   attributes of the group: `encoder.scaling.multiplier`, `encoder.scaling.offset`, `encoder.scaling.unit.unit`.
 //! - Text, structs, references, complex and half-precision numbers are remarks.
 //!
 //! Source: The HDF Group, "HDF5 File Format Specification", version 3; pycroscopy, "USID" and "NSID" data models
 //! (<https://pycroscopy.github.io/USID>, <https://pycroscopy.github.io/pyNSID>); MathWorks, "MAT-File Versions" (7.3 is
-//! HDF5).
+//! HDF5); PyTables, "File format"; pandas writes `DataFrame.to_hdf` by it, fixed and as a table.
 
 mod matrix;
+mod pandas;
 mod scope;
+mod times;
 mod variable;
 mod walk;
 
 use std::path::Path;
 
-use afmid_formats::{Contents, most_inflated};
+use afmid_formats::{Contents, most_inflated, settle_axes};
 
 use super::input_files::{InputFiles, require_state};
-use super::native::text_attribute;
+use super::native::{states_rate, text_attribute};
 use crate::error::StageError;
 use crate::hdf5_files::read::open_file;
 use scope::Scopes;
-use variable::Variable;
+use times::Times;
+use variable::{About, Series, Variable};
 
 /// More channels are no recordings but an image or a map.
 const MOST_CHANNELS: usize = 1 << 16;
@@ -45,43 +53,66 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
     let matlab = starts_like_matlab(path);
     let mut remarks = Vec::new();
     let mut scopes = Scopes::default();
-    scopes.attributes(&file, "");
+    scopes.attributes(&file, "", allowance);
     let mut variables = Vec::new();
     // each may be within the bounds that all of them exceed
     let (mut bytes, most_bytes) = (0_u64, most_inflated(hashed.state.size()));
-    for found in walk::datasets(&file, &mut scopes, &mut remarks) {
-        match Variable::of(&found, matlab, allowance) {
+    let found = walk::datasets(&file, &mut scopes, allowance, &mut remarks);
+    let times = Times::of(&found);
+    for found in found {
+        let series = match Variable::of(&found, matlab, allowance, &times) {
             Ok(Variable::Single(value)) => {
                 scopes.number(&found.group, &found.name, &found.location, value);
                 remarks.push(format!("{} is the single number {value}, no channel", found.location));
+                continue;
             }
-            Ok(Variable::Series(series)) if bytes.saturating_add(series.bytes()) > most_bytes => remarks.push(format!(
+            Ok(Variable::Series(series)) => series,
+            Err(why) => {
+                remarks.push(format!("{} is left out: {why}", found.location));
+                continue;
+            }
+        };
+        let all: u64 = series.iter().map(Series::bytes).fold(0, u64::saturating_add);
+        if bytes.saturating_add(all) > most_bytes {
+            remarks.push(format!(
                 "{} is left out: with it the samples come to more than {most_bytes} bytes, the most that is read of a \
                  file of {}",
                 found.location,
                 hashed.state.size()
-            )),
-            Ok(Variable::Series(series)) => {
-                bytes += series.bytes();
-                variables.push((found, series));
-            }
-            Err(why) => remarks.push(format!("{} is left out: {why}", found.location)),
+            ));
+        } else {
+            bytes += all;
+            variables.push((found, series));
         }
     }
+    let native = states_rate(&file);
     let mut channels = Vec::new();
     for (found, series) in &variables {
         let (rate, remark) = scopes.rate_of(found);
         remarks.extend(remark.filter(|remark| !remarks.contains(remark)));
-        if channels.len() + series.lanes() > MOST_CHANNELS {
-            remarks.push(format!("{} is left out: its {} channels are too many", found.location, series.lanes()));
-            continue;
-        }
-        match series.channels((files, path, &hashed), found, allowance, rate, if matlab { 1 } else { 0 }, &mut remarks)
-        {
-            Ok(more) => channels.extend(more),
-            Err(error) => remarks.push(format!("{} is left out: {}", found.location, error.problem)),
+        for series in series {
+            if channels.len() + series.lanes() > MOST_CHANNELS {
+                let (location, count) = (&found.location, series.lanes());
+                remarks.push(format!("{location} is left out: its {count} channels are too many"));
+                continue;
+            }
+            let base = if matlab { 1 } else { 0 };
+            let about = About { scopes: &scopes, sample_rate_hz: rate, base, native, allowance };
+            match series.channels((files, path, &hashed), found, &about, &mut remarks) {
+                Ok(more) => channels.extend(more),
+                Err(error) => {
+                    let why = format!("{} is left out: {}", found.location, error.problem);
+                    // all columns of a table for one reason
+                    if !remarks.contains(&why) {
+                        remarks.push(why);
+                    }
+                }
+            }
         }
     }
+    let mut contents = Contents { format: String::new(), started_at: String::new(), channels, remarks };
+    settle_axes(&mut contents);
+    let Contents { channels, mut remarks, .. } = contents;
     let unsaid = remarks.len().saturating_sub(MOST_REMARKS);
     if unsaid > 0 {
         remarks.truncate(MOST_REMARKS);

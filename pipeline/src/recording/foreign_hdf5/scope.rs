@@ -1,13 +1,13 @@
 //! Numbers that are named like a sample rate, and what they are about.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use afmid_formats::{Clue, agreed_rate, rate_in};
 use hdf5::Location;
 
 use super::walk::Found;
-use crate::hdf5_files::read::attribute_names;
-use crate::recording::native::number_attribute;
+use crate::hdf5_files::read::{Allowance, attribute_names};
+use crate::recording::native::{has_attribute, number_attribute, text_attribute};
 
 /// More statements of a rate are ignored: a damaged file could make millions.
 const MOST_CLUES: usize = 4096;
@@ -17,11 +17,34 @@ const MOST_CLUES: usize = 4096;
 pub(super) struct Scopes {
     clues: HashMap<String, Vec<Clue>>,
     count: usize,
+    /// Groups that are frames or series of pandas.
+    frames: HashSet<String>,
+    /// Groups that state how codes become values.
+    encoders: HashMap<String, Encoder>,
+}
+
+/// How JPK's files state that codes become values: value = code * multiplier + offset.
+#[derive(Debug, Clone)]
+pub(super) struct Encoder {
+    pub(super) multiplier: f64,
+    pub(super) offset: f64,
+    pub(super) unit: String,
 }
 
 impl Scopes {
     /// Takes the attributes of a group.
-    pub(super) fn attributes(&mut self, group: &Location, path: &str) {
+    pub(super) fn attributes(&mut self, group: &Location, path: &str, allowance: &Allowance) {
+        if has_attribute(group, "pandas_type") && self.frames.len() < MOST_CLUES {
+            self.frames.insert(path.to_owned());
+        }
+        let number = |name: &str| number_attribute(group, path, name).ok().filter(|number| number.is_finite());
+        if let Some(multiplier) = number("encoder.scaling.multiplier").filter(|number| *number != 0.0)
+            && self.encoders.len() < MOST_CLUES
+        {
+            let offset = number("encoder.scaling.offset").unwrap_or(0.0);
+            let unit = text_attribute(group, "encoder.scaling.unit.unit", allowance).unwrap_or_default();
+            self.encoders.insert(path.to_owned(), Encoder { multiplier, offset, unit });
+        }
         for clue in clues(group, path) {
             self.add(path, clue);
         }
@@ -39,6 +62,16 @@ impl Scopes {
             self.count += 1;
             self.clues.entry(scope.to_owned()).or_default().push(clue);
         }
+    }
+
+    /// Whether a group is a frame or a series of pandas.
+    pub(super) fn is_frame(&self, group: &str) -> bool {
+        self.frames.contains(group)
+    }
+
+    /// How the codes in a group become values.
+    pub(super) fn encoder(&self, group: &str) -> Option<&Encoder> {
+        self.encoders.get(group)
     }
 
     /// The rate of a dataset, and what to say of it.

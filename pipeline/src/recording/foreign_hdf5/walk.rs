@@ -6,6 +6,7 @@ use hdf5::{Dataset, Group, LinkType, LocationType};
 
 use super::scope::Scopes;
 use crate::hdf5_files::links::require_own_values;
+use crate::hdf5_files::read::Allowance;
 
 /// No recorder nests its groups as deep.
 const DEEPEST: usize = 32;
@@ -25,8 +26,13 @@ pub(super) struct Found {
 }
 
 /// Datasets of a file, in the order of their names, group by group; attributes of groups go to `scopes`.
-pub(super) fn datasets(file: &Group, scopes: &mut Scopes, remarks: &mut Vec<String>) -> Vec<Found> {
-    let mut walk = Walk { scopes, remarks, found: Vec::new(), seen: HashMap::new(), objects: 0, links: 0 };
+pub(super) fn datasets(
+    file: &Group,
+    scopes: &mut Scopes,
+    allowance: &Allowance,
+    remarks: &mut Vec<String>,
+) -> Vec<Found> {
+    let mut walk = Walk { scopes, allowance, remarks, found: Vec::new(), seen: HashMap::new(), objects: 0, links: 0 };
     walk.is_new(file, "/");
     walk.group(file, "", 0);
     if walk.links > 0 {
@@ -41,6 +47,7 @@ pub(super) fn datasets(file: &Group, scopes: &mut Scopes, remarks: &mut Vec<Stri
 
 struct Walk<'a> {
     scopes: &'a mut Scopes,
+    allowance: &'a Allowance,
     remarks: &'a mut Vec<String>,
     found: Vec<Found>,
     /// Groups that are listed, by what the library tells them apart with, and where: several hard links may lead to
@@ -80,6 +87,10 @@ impl Walk<'_> {
 
     fn member(&mut self, group: &Group, path: &str, name: String, depth: usize) {
         let location = format!("{path}/{name}");
+        // indexes of PyTables over a table's columns: sorted copies of what is there
+        if name.starts_with("_i_") {
+            return self.remarks.push(format!("{location} is an index of PyTables, no recording"));
+        }
         // where MATLAB keeps what its cells and objects refer to
         if path.is_empty() && matches!(name.as_str(), "#refs#" | "#subsystem#") {
             return self.remarks.push(format!("{location} holds parts of MATLAB's cells and objects, no channel"));
@@ -99,7 +110,7 @@ impl Walk<'_> {
                     if !self.is_new(&inner, &location) {
                         return;
                     }
-                    self.scopes.attributes(&inner, &location);
+                    self.scopes.attributes(&inner, &location, self.allowance);
                     self.group(&inner, &location, depth + 1);
                 }
                 Err(error) => self.remarks.push(format!("{location} cannot be opened: {error}")),
