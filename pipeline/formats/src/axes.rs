@@ -33,8 +33,8 @@ const FREQUENCIES: [&str; 6] = ["frequency", "frequencies", "freq", "freqs", "fr
 
 /// Largest deviation from evenness, in steps. Times are often saved in few digits; a missing sample is a whole step.
 const TOLERANCE: f64 = 1e-2;
-/// Deviations above this are told: a millionth of a step is rounding.
-const TOLD: f64 = 1e-6;
+/// Deviations above this are remarked: a millionth of a step is rounding.
+const REMARKED: f64 = 1e-6;
 /// Coarsest rounding, in steps, that still shows a lost sample beyond doubt.
 const COARSEST: f64 = 0.25;
 /// Two statements of a rate agree if they differ by less: rates are often written with six digits.
@@ -323,7 +323,7 @@ fn axis(at: usize, kind: Kind, channel: &FoundChannel, remarks: &mut Vec<String>
         return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
     }
     let unit = if stated.is_none() { " (no unit: taken as seconds)" } else { "" };
-    let rounded = if off > TOLD { format!(", to {off:.1e} of a step") } else { String::new() };
+    let rounded = if off > REMARKED { format!(", to {off:.1e} of a step") } else { String::new() };
     remarks
         .push(format!("{location}{unit} runs evenly by {step}{rounded}: the sample rate of the arrays of its length"));
     Some(Axis { at, kind, step_s: Some(step * stated.unwrap_or(1.0)), uncertainty })
