@@ -22,7 +22,8 @@ impl Pitch {
     /// The strongest oscillation and the slowest of those that have a twentieth of its power.
     ///
     /// Method: periodograms of the differences from a straight line, each over its own sum; power within 12 % of each
-    /// frequency, in which a line counts whole and drift, whose density falls with the square, little. No taper: it would hide a decay at an end of the record.
+    /// frequency, in which a line counts whole and drift, whose density falls with the square, little. No taper: it
+    /// would hide a decay at an end of the record.
     pub fn of(channels: &[&[f64]]) -> Self {
         let samples = channels[0].len();
         let plan = RealTransform::new(samples);

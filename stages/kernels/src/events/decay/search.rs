@@ -28,8 +28,8 @@ const LEAST_FALL: f64 = 1e-3;
 /// Finds the free decays of one record.
 ///
 /// # Model
-/// Quiet, an event (hit, release, pulse, end of a drive), free ringing of any number of modes that dies away in white or
-/// slowly wandering noise; the same again. Offset and drift slower than the ringing.
+/// Quiet, an event (hit, release, pulse, end of a drive), free ringing of any number of modes that dies away in white
+/// or slowly wandering noise; the same again. Offset and drift slower than the ringing.
 /// # Method
 /// 1. The strongest oscillation sets the period. Each channel less its running mean over two periods, over its noise
 ///    (quietest stretches), squared and added: the envelope.
@@ -44,8 +44,8 @@ const LEAST_FALL: f64 = 1e-3;
 /// The channels' own; samples; Hz.
 /// # Accuracy
 /// First free sample: on or after the true one in all but one of a hundred decays, late by less than half a period;
-/// end: where amplitude and noise are equal, to three quarters of the decay time or two periods (docs/results/decay.md).
-/// Cost: some `100 N C` operations.
+/// end: where amplitude and noise are equal, to three quarters of the decay time or two periods
+/// (docs/results/decay.md). Cost: some `100 N C` operations.
 /// # Errors
 /// No channel, unequal lengths, fewer than 64 samples, values that are not finite, options out of range.
 /// # Source

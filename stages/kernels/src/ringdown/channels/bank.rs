@@ -19,9 +19,9 @@ const SLOWEST: f64 = 0.25;
 /// that is, in variances of the noise.
 ///
 /// # Method
-/// For each decay rate the transform of what is left times the decaying exponential, over the exponential's energy: what
-/// a least-squares amplitude takes off, summed over all records, each over its channel's noise at that frequency. One
-/// transform of twice the length per record and rate.
+/// For each decay rate the transform of what is left times the decaying exponential, over the exponential's energy:
+/// what a least-squares amplitude takes off, summed over all records, each over its channel's noise at that frequency.
+/// One transform of twice the length per record and rate.
 pub(super) fn candidates(
     records: &Records<'_>,
     noise: &[RingdownNoise],

@@ -49,8 +49,8 @@ pub struct ChannelOptions {
     /// Least quality factor of a mode. Why 0.6: below 0.5 nothing oscillates.
     #[schemars(extend("exclusiveMinimum" = 0.5))]
     pub least_quality_factor: f64,
-    /// Start from these poles, rad/s, upper half plane, instead of finding modes; their number replaces `modes`. Default
-    /// none. For the early and the late part of a decay whose modes are known.
+    /// Start from these poles, rad/s, upper half plane, instead of finding modes; their number replaces `modes`.
+    /// Default none. For the early and the late part of a decay whose modes are known.
     #[serde(skip)]
     pub start: Vec<c64>,
     /// Missing samples per event and channel, clipped say; default empty: none. What stands there is never used.

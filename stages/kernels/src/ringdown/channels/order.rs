@@ -25,9 +25,9 @@ const NOISE_ROUNDS: usize = 2;
 /// Fits modes with shared poles to all channels of all events at once.
 ///
 /// # Model
-/// `y_ec(k) = sum_j Re(rho_ecj exp(s_j k T)) + offset_ec + slope_ec k + n_c(k)`: poles shared by all channels c and events
-/// e, residues free, noise of each channel white with wander of its own. Of several events the residues of a mode are
-/// one complex shape times an amplitude per event; that is tested, not imposed.
+/// `y_ec(k) = sum_j Re(rho_ecj exp(s_j k T)) + offset_ec + slope_ec k + n_c(k)`: poles shared by all channels c and
+/// events e, residues free, noise of each channel white with wander of its own. Of several events the residues of a
+/// mode are one complex shape times an amplitude per event; that is tested, not imposed.
 /// # Method
 /// Maximum likelihood by variable projection: records whitened by their channel's noise, amplitudes solved for by
 /// orthogonal triangles, Levenberg-Marquardt on the poles. Modes are found one by one: a bank of decaying exponentials
@@ -45,8 +45,8 @@ const NOISE_ROUNDS: usize = 2;
 /// # Errors
 /// No event, unequal lengths, too few samples, values that are not finite, no oscillation.
 /// # Source
-/// G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; S. M. Kay, Fundamentals of Statistical Signal Processing
-/// II, 1998, chapter 7 (unknown arrival and frequency).
+/// G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; S. M. Kay, Fundamentals of Statistical Signal
+/// Processing II, 1998, chapter 7 (unknown arrival and frequency).
 pub fn fit_channels(
     events: &[Vec<&[f64]>],
     free: &[Vec<&[f64]>],
@@ -159,21 +159,30 @@ impl Ladder<'_> {
 
     /// The best fit with a mode more; none where nothing is left that may be one, unless one is `wanted`.
     ///
-    /// The second of the bank's places is tried where the first one gains no more than noise may.
-    /// `other`: another noise under which places are looked for.
+    /// Starts are the bank's best places under the present noise and under its white part alone: ringing that is not
+    /// yet fitted looks like wander, and wander like ringing. The banks' further places are tried where the best ones
+    /// gain no more than noise may. `other`: one more noise under which places are looked for.
     fn next(&self, current: &Step, other: Option<&[RingdownNoise]>, wanted: bool) -> Option<Step> {
         let least_q = self.options.least_quality_factor;
         let places = |noise: &[RingdownNoise]| candidates(self.records, noise, &current.fitted, least_q, CANDIDATES);
-        let mut starts = places(&current.noise);
-        starts.extend(other.into_iter().flat_map(places));
+        let plain: Vec<RingdownNoise> = current.noise.iter().map(|noise| RingdownNoise::white(noise.white)).collect();
+        let mut banks = vec![places(&current.noise)];
+        if current.noise != plain {
+            banks.push(places(&plain));
+        }
+        banks.extend(other.map(places));
         let mut found: Option<Step> = None;
-        for (gain, start) in starts {
-            if !wanted && self.by_chance(gain / BANK, 1) {
-                continue;
-            }
-            let step = self.settled(&self.fit(&start, &current.noise, NEARLY), &current.noise);
-            if found.as_ref().is_none_or(|best| step.deviance < best.deviance) {
-                found = Some(step);
+        let mut tried: Vec<Poles> = Vec::new();
+        for rank in 0..CANDIDATES {
+            for (gain, start) in banks.iter().filter_map(|bank| bank.get(rank)) {
+                if tried.contains(start) || !wanted && self.by_chance(gain / BANK, 1) {
+                    continue;
+                }
+                tried.push(start.clone());
+                let step = self.settled(&self.fit(start, &current.noise, NEARLY), &current.noise);
+                if found.as_ref().is_none_or(|best| step.deviance < best.deviance) {
+                    found = Some(step);
+                }
             }
             let best = found.as_ref().map_or(f64::INFINITY, |best| best.deviance);
             if !self.by_chance(current.deviance - best, 1) {

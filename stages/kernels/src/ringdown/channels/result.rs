@@ -147,8 +147,8 @@ impl ChannelRingdown {
         self.poles.iter().enumerate().map(|(j, &pole)| mode(pole, &self.covariance, 2 * j)).collect()
     }
 
-    /// Modes, by number, whose shape is not the same in all events, at the 0.1 % level: a nonlinear system, a sensor that
-    /// moved, or hits in another direction that excite a second mode of that frequency.
+    /// Modes, by number, whose shape is not the same in all events, at the 0.1 % level: a nonlinear system, a sensor
+    /// that moved, or hits in another direction that excite a second mode of that frequency.
     pub fn shapes_that_differ(&self) -> Vec<usize> {
         (0..self.shapes.len()).filter(|&j| !self.shapes[j].rank_one.holds()).collect()
     }
@@ -156,8 +156,8 @@ impl ChannelRingdown {
     /// Pairs of modes, by number, within three half widths of each other and of one shape (modal assurance criterion
     /// above 0.95).
     ///
-    /// A mode whose frequency or damping moves with its amplitude leaves such pairs in a linear fit; of a true close pair
-    /// the shapes differ. With one channel there is no shape to tell them apart: all near pairs are listed.
+    /// A mode whose frequency or damping moves with its amplitude leaves such pairs in a linear fit; of a true close
+    /// pair the shapes differ. With one channel there is no shape to tell them apart: all near pairs are listed.
     pub fn pairs_of_one_shape(&self) -> Vec<(usize, usize)> {
         let near = |i: usize, j: usize| {
             let (a, b) = (self.poles[i], self.poles[j]);

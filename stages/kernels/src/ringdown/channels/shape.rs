@@ -91,8 +91,8 @@ impl Residues {
     ///
     /// # Method
     /// `rho_ec = a_e phi_c`, `phi` 1 at the reference: Gauss-Newton from the reference channel's residues, weights the
-    /// inverse of the full covariance `D + K S K^T` (records' own, and the poles' that all share) by Woodbury's identity.
-    /// Covariance of the shape: that of the fit's parameters.
+    /// inverse of the full covariance `D + K S K^T` (records' own, and the poles' that all share) by Woodbury's
+    /// identity. Covariance of the shape: that of the fit's parameters.
     pub fn shape(&self) -> ModeShape {
         let (e, c) = (self.events, self.channels);
         let power = |channel: usize| (0..e).map(|i| self.values[i * c + channel].norm_sqr()).sum::<f64>();
