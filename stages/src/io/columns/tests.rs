@@ -54,8 +54,9 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     let stage = |change: fn(&mut Columns)| {
         let mut stage = Columns {
             file: "a.csv".to_owned(),
+            // the times, which are no signal and have no number
             inputs: vec![Column::Name("t".to_owned())],
-            output: Column::Number(3),
+            output: Column::Number(2),
             missing: vec![-1.0],
             sample_rate_hz: Some(1.0),
             ..Columns::default()
@@ -65,11 +66,11 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     };
     let error = |stage: &Columns| run(stage, folder.path()).map(|_| ()).unwrap_err().to_string();
     assert!(run(&stage(|_| {}), folder.path()).is_ok());
-    assert!(error(&stage(|s| s.inputs = vec![Column::Number(2)])).contains("misses sample 1"));
+    assert!(error(&stage(|s| s.inputs = vec![Column::Number(1)])).contains("misses sample 1"));
     assert!(error(&stage(|s| s.sample_rate_hz = None)).contains("no sample rate"));
     let unequal = |s: &mut Columns| {
         s.sample_rate_hz = None;
-        s.time = Some(Column::Number(1));
+        s.time = Some(Column::Name("t".to_owned()));
     };
     assert!(error(&stage(unequal)).contains("not equally spaced"));
     assert!(error(&stage(|s| s.verification = Some([2, 9]))).contains("the record has 4 samples"));

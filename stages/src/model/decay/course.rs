@@ -38,10 +38,13 @@ pub(super) struct Followed {
 
 /// Decay times of the strongest mode after which the last part begins: its amplitude has fallen to a quarter.
 const LATE: f64 = 1.4;
-/// Cuts at most: each leaves a quarter of the amplitude.
-const MOST_CUTS: usize = 3;
+/// Cuts at most: each leaves a quarter of the amplitude, and soon noise alone.
+const MOST_CUTS: usize = 1;
 /// Standard errors of a difference that noise alone yields once in 10,000 modes.
 const MOVED: f64 = 4.0;
+/// Change of a frequency in half widths, or of a damping relative to itself, up to which one linear mode stands for all:
+/// its phase is then wrong by less than a tenth of a radian while it decays.
+const FAR: f64 = 0.1;
 /// Relative change below which nobody would call it one.
 const LEAST_CHANGE: f64 = 1e-5;
 
@@ -67,7 +70,7 @@ pub(super) fn follow(decays: &Decays<'_>, options: &ChannelOptions, whole: bool)
         };
         let early = part("first", from..cut, &early);
         let last = part("last", cut..longest, &late);
-        let moves = Course([early.clone(), last.clone()]).moves();
+        let moves = Course([early.clone(), last.clone()]).matters();
         followed.course = Some(Course([first.get_or_insert(early).clone(), last]));
         if whole || !moves {
             break;
@@ -93,8 +96,31 @@ fn fitted(decays: &Decays<'_>, options: &ChannelOptions, part: Range<usize>) -> 
         let row = |gaps: Vec<Range<usize>>| gaps.into_iter().map(inside).filter(|gap| !gap.is_empty()).collect();
         missing.push(gaps.into_iter().map(row).collect());
     }
-    let options = ChannelOptions { missing, ..options.clone() };
-    fit_channels(&hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options)
+    let fit = |modes| {
+        let options = ChannelOptions { modes, missing: missing.clone(), ..options.clone() };
+        fit_channels(&hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options)
+    };
+    let mut found = fit(options.modes)?;
+    // what does not die away is a line, no mode: the others are fitted without it
+    while let (ModesWanted::AtMost(_), count) = (options.modes, determined(&found))
+        && count < found.poles.len()
+        && count > 0
+    {
+        found = fit(ModesWanted::Fixed(count))?;
+    }
+    Ok(found)
+}
+
+/// Standard errors of its damping that a mode must have, and most of half its width that its frequency's error may be.
+const DETERMINED: (f64, f64) = (3.0, 1.0);
+
+/// How many modes die away by more than chance, at frequencies that are known to their width.
+fn determined(fit: &ChannelRingdown) -> usize {
+    let known = |mode: &ModeEstimate| {
+        let (f, damping) = (mode.frequency_hz, mode.damping_ratio());
+        damping.value > DETERMINED.0 * damping.std && f.std < DETERMINED.1 * f.value * damping.value
+    };
+    fit.modes().iter().filter(|mode| known(mode)).count()
 }
 
 /// Decay rate of the mode with the most energy, 1/s.
@@ -135,9 +161,14 @@ impl Course {
             .collect()
     }
 
-    /// Whether any mode moves.
-    fn moves(&self) -> bool {
-        self.pairs().into_iter().any(moves)
+    /// Whether any mode moves so far that one linear mode cannot stand for both parts.
+    fn matters(&self) -> bool {
+        let matters = |[first, last]: [&ModeEstimate; 2]| {
+            let (damping, early) = (last.damping_ratio().value, first.damping_ratio().value);
+            let shift = (first.frequency_hz.value / last.frequency_hz.value - 1.0).abs();
+            shift > FAR * damping || (early / damping - 1.0).abs() > FAR
+        };
+        self.pairs().into_iter().any(|pair| moves(pair) && matters(pair))
     }
 
     pub fn table(&self) -> Table {
