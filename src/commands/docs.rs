@@ -64,8 +64,9 @@ const TUTORIALS: [(&str, &str); 4] = [
 ];
 
 /// What was measured: accuracy, performance, diagnosis.
-const RESULTS: [(&str, &str); 15] = [
+const RESULTS: [(&str, &str); 16] = [
     ("Modes from ringdowns", "ringdown.md"),
+    ("Free decays in several channels", "decay.md"),
     ("Models from a frequency response", "frequency-response.md"),
     ("The grey modal form", "grey.md"),
     ("Contact stiffness", "contact.md"),

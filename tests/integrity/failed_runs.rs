@@ -12,14 +12,14 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Reads a table, then windows it by a window that is longer than the record where `broken`.
+/// Reads a table and fits it, with more block rows than the record has samples where `broken`.
 fn config(broken: bool) -> String {
-    let poles = if broken { 35 } else { 2 };
+    let block_rows = if broken { 300 } else { 20 };
     format!(
         "[pipeline]\nname = \"a\"\nseed = 1\n[[stage]]\nid = \"data\"\nuses = \"io.columns\"\n\
          params = {{ file = \"data.csv\", sample_rate_hz = 100.0 }}\n\
          [[stage]]\nid = \"model\"\nuses = \"model.pem\"\ninputs = {{ pair = \"data.pair\" }}\n\
-         params = {{ order = {poles}, set = \"identification\" }}\n\
+         params = {{ order = 2, block_rows = {block_rows}, set = \"identification\" }}\n\
          [[stage]]\nid = \"modes\"\nuses = \"model.modes\"\ninputs = {{ model = \"model.model\" }}\n"
     )
 }
@@ -29,7 +29,7 @@ fn what_succeeded_is_kept_beside_the_output_which_is_not_touched() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     let mut y = [0.0_f64; 2];
-    let rows: String = (0..60_u32)
+    let rows: String = (0..600_u32)
         .map(|k| {
             let u = f64::from((k * 7919 + 13) % 31) / 31.0 - 0.5;
             y = [1.6 * y[0] - 0.8 * y[1] + u, y[0]];

@@ -33,12 +33,6 @@ pub(crate) fn release(samples: usize, t0: usize, load: f64) -> Vec<f64> {
         .collect()
 }
 
-/// White Gaussian noise.
-pub(crate) fn white_noise(samples: usize, std: f64, seed: u64) -> Vec<f64> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    (0..samples).map(|_| std * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng)).collect()
-}
-
 /// Twelve releases of 4096 samples whose amplitudes scatter by a tenth, in noise of one millivolt.
 pub(crate) fn ensemble() -> Array {
     let (count, samples) = (12, 4096);

@@ -6,10 +6,12 @@ use afmid_pipeline::recording::{
     Codes, InputFiles, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native,
 };
 use afmid_pipeline::{Example, Ports, Record, Recording, StageError};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 use super::decay::{DECAYS, EVENTS, RECORDS};
 use crate::artifacts::{DEFLECTION, Decays, SENSOR};
-use crate::ensemble::example::white_noise;
 
 /// An example's inputs have no parameters, so its folder is fixed.
 const FOLDER: &str = "/tmp/afmid-example-decay";
@@ -62,6 +64,12 @@ pub(crate) fn signal(hit: bool, sensor: usize) -> Vec<f64> {
         }
     };
     (0..5000).map(|k| gain * ringing(k) + noise[k]).collect()
+}
+
+/// White Gaussian noise.
+pub(crate) fn white_noise(samples: usize, std: f64, seed: u64) -> Vec<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..samples).map(|_| std * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng)).collect()
 }
 
 fn record(name: &str, hit: bool) -> Result<Record, StageError> {

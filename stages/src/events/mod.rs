@@ -2,7 +2,7 @@
 
 mod correlation;
 mod decay;
-mod decay_example;
+pub(crate) mod decay_example;
 mod example;
 mod extraction;
 mod listing;

@@ -4,8 +4,8 @@ use afmid_pipeline::{Example, Ports, StageError};
 
 use super::decay::{MODES, SUMMARY};
 use crate::artifacts::{Sensor, decay_array};
-use crate::ensemble::example::white_noise;
 use crate::events::DECAYS;
+use crate::events::decay_example::white_noise;
 
 const RATE_HZ: f64 = 1000.0;
 /// Frequencies and quality factors.

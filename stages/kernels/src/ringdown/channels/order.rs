@@ -33,7 +33,8 @@ const NOISE_ROUNDS: usize = 2;
 /// orthogonal triangles, Levenberg-Marquardt on the poles. Modes are found one by one: a bank of decaying exponentials
 /// over what is left gives the next pole, all poles are fitted again, and the mode is kept if twice the gain of the
 /// log-likelihood is exceeded by noise, at the best of all places, with a probability below
-/// [`ChannelOptions::false_alarm`]; each that the others make needless is left out again. Noise and fit in turns.
+/// [`ChannelOptions::false_alarm`]; each without which the others explain as much is left out again. Noise and fit in
+/// turns.
 /// Shapes: rank-one fit of the residues with their covariance.
 /// # Shapes
 /// `events`: per event C records of equal length, from the first free sample on; events may differ in length. `free`:
@@ -192,7 +193,7 @@ impl Ladder<'_> {
         found
     }
 
-    /// Leaves out modes that the others make needless.
+    /// Leaves out modes without which the others explain as much.
     fn pruned(&self, step: Step, seen: &mut Vec<OrderTried>) -> Step {
         let mut step = step;
         loop {
