@@ -1,4 +1,4 @@
-# The two commands: `make demo` runs the main job, `make test` passes the tests.
+# The two commands: `make demo` runs the main job, `make test` runs the tests.
 .PHONY: deps test-deps demo test test-interop test-slurm lint book fuzz deny sbom
 
 CMAKE_VERSION = 3.31.6

@@ -82,3 +82,51 @@ fn the_doctor_finds_this_machine_fit_and_a_blocked_cache_not() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.lines().any(|line| line.starts_with("x cache")) && text.contains("--cache"), "{text}");
 }
+
+/// Modes of a file by three commands: frequency, its error, damping ratio, its error.
+fn modes_by_three_commands(here: &Path, file: &str, said: &[String]) -> Vec<[f64; 4]> {
+    let (config, result) = (format!("{file}.toml"), format!("{file}.result.h5"));
+    let mut new = vec!["new", "pipeline", file, "-o", &config];
+    new.extend(said.iter().map(String::as_str));
+    stdout(here, &new);
+    stdout(here, &["run", &config, "-o", &result, "--cache", "cache"]);
+    let shown: Value = serde_json::from_str(&stdout(here, &["show", &result, "modes", "--json"])).expect("JSON");
+    let names = ["frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std"];
+    let number = |mode: &Value, name: &str| mode[name].as_f64().unwrap_or_else(|| panic!("{file}: {shown}"));
+    shown["modes"].as_array().expect("modes").iter().map(|mode| names.map(|name| number(mode, name))).collect()
+}
+
+#[test]
+fn one_decay_gives_the_same_modes_from_any_file_by_three_commands() {
+    let python = common::python_bin().join("python");
+    let script = Path::new(common::ROOT).join("tests/decay_files.py");
+    let (mut covered, mut all) = (0, 0);
+    for seed in 0..5 {
+        let scratch = tempfile::tempdir().expect("a folder");
+        let here = scratch.path();
+        let written =
+            Command::new(&python).arg(&script).arg(here).arg(seed.to_string()).output().expect("python starts");
+        assert!(written.status.success(), "{}", String::from_utf8_lossy(&written.stderr));
+        let written: Value = serde_json::from_slice(&written.stdout).expect("JSON");
+        let truth: Vec<[f64; 2]> = serde_json::from_value(written["modes"].clone()).expect("modes");
+        let mut first: Option<Vec<[f64; 4]>> = None;
+        for (file, said) in written["files"].as_object().expect("files") {
+            let said: Vec<String> = serde_json::from_value(said.clone()).expect("arguments");
+            let modes = modes_by_three_commands(here, file, &said);
+            assert_eq!(modes.len(), truth.len(), "{file}, seed {seed}: {modes:?}");
+            let first = first.get_or_insert_with(|| modes.clone());
+            for (own, other) in modes.iter().zip(first) {
+                // twelve digits of a universal file, and where the search ends
+                let far = (own[0] - other[0]).abs() / other[1] + (own[2] - other[2]).abs() / other[3];
+                assert!(far < 1e-3, "{file}, seed {seed}: {own:?} {other:?}");
+            }
+        }
+        for (mode, [frequency, damping]) in first.expect("files").iter().zip(truth) {
+            let inside = |value: f64, std: f64, truth: f64| usize::from((value - truth).abs() < 1.96 * std);
+            covered += inside(mode[0], mode[1], frequency) + inside(mode[2], mode[3], damping);
+            all += 2;
+        }
+    }
+    // of 30 intervals of 95 % fewer than 25 hold the truth once in a thousand times
+    assert!(covered >= 25, "{covered} of {all} intervals hold the truth");
+}

@@ -27,7 +27,7 @@ const CHAPTERS: [(&str, &str); 13] = [
     ("Glossary", "glossary.md"),
     ("Architecture", "architecture.md"),
     ("Plugins", "plugins.md"),
-    ("What a stage must keep", "stage-spec.md"),
+    ("What a stage must do", "stage-spec.md"),
     ("Decisions", "decisions/README.md"),
 ];
 

@@ -10,6 +10,7 @@
 //! The page loads nothing, follows the reader's colour scheme and prints. The same run gives the same bytes.
 
 mod batch;
+mod decay;
 mod diagnosis;
 mod figure;
 mod find;

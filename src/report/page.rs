@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::batch::{self, Link};
+use super::decay;
 use super::diagnosis;
 use super::figure::Figure;
 use super::find::all;
@@ -118,7 +119,8 @@ fn shown_text(out: &mut Output, state: &mut State, value: &Text) -> Result<(), m
 /// A batch's own; or the diagnosis first, where there is one: it is what the run was for.
 fn sections(run: &RunResult, link: &Link<'_>) -> impl Iterator<Item = Drawn> {
     let batch = batch::sections(run, link);
-    let of_run = if batch.is_empty() { paper::sections(run) } else { Vec::new() };
+    let of_run = || decay::sections(run).unwrap_or_else(|| paper::sections(run));
+    let of_run = if batch.is_empty() { of_run() } else { Vec::new() };
     batch.into_iter().chain(diagnosis::section(run)).chain(of_run)
 }
 

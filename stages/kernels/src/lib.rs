@@ -1,7 +1,8 @@
 //! Kernels of afmid, for any program: slices in, plain structs out; no files, no pipeline, no clock, nothing that lives
 //! as long as the process.
 //!
-//! Front doors, each with its model, its cost and an example from data to numbers with errors:
+//! Front doors, each with its model, shapes, cost, source and an example from data to numbers, with errors where there
+//! are any:
 //!
 //! | module | from | to |
 //! |---|---|---|
@@ -11,6 +12,8 @@
 //! | [`grey`] | input and output, numbers that are known | modes with static shares, real poles, a delay |
 //! | [`spectra`] | records | ETFE, smoothed responses, power spectra, thermal fits |
 //! | [`contact`] | poles in contact and free | contact stiffness and damping |
+//! | [`events::decay`] | records | where free decays begin and end |
+//! | [`modes`] | a model with its covariance | frequencies, quality factors, static shares, zeros |
 //! | [`simulate`] | a lever, a contact, a detector | records with their truth |
 //!
 //! From the ground up, each using only those before it:

@@ -335,7 +335,7 @@ fn summary(rows: &[Row], hits: usize, sensors: &[Sensor], rate: f64) -> Result<D
     let rejected = rows.iter().filter(|row| !row.rejected.is_empty());
     let rejected = rejected.map(|row| json!({ "record": row.record, "reason": row.rejected }));
     Document::new(&json!({
-        "events": { "found": hits, "rejected": rejected.collect::<Vec<Value>>() },
+        "events": { "found": hits, "kind": "decay", "rejected": rejected.collect::<Vec<Value>>() },
         "channels": sensors,
         "sample_rate_hz": rate,
         "steady": rows.iter().filter(|row| row.steady).count(),

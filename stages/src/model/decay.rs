@@ -108,7 +108,16 @@ impl Stage for DecayFit {
         self.warn(&fit, &decays, cx);
         course.iter().flat_map(Course::warnings).for_each(|warning| cx.warn(warning));
         if from > 0 {
-            cx.warn(format!("the modes are those of the last part, from {from_s:.4} s on, in which they are smallest; `course` has both ends"));
+            let gone: Vec<String> =
+                course.iter().flat_map(Course::gone).map(|frequency_hz| format!("{frequency_hz:.6} Hz")).collect();
+            let more = match gone.is_empty() {
+                true => String::new(),
+                false => format!("; {} died away before: `part = \"whole\"` has all", gone.join(", ")),
+            };
+            cx.warn(format!(
+                "the modes are those of the last part, from {from_s:.4} s on, in which they are smallest; `course` has \
+                 both ends{more}"
+            ));
         }
         let empty = || Course::EMPTY.table();
         Ok(Ports::new()

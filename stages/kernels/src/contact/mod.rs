@@ -1,5 +1,17 @@
 //! Stiffness and damping of the contact between tip and sample, from the resonances that it shifts.
 //!
+//! # Model
+//! The tip's compliance `G(s) = (1/k) (sum_n c_n w_n^2 / (s^2 + w_n / Q_n s + w_n^2) + 1 - sum_n c_n)`; the contact
+//! `kappa(s) = k_c + eta s + mu s^2`. Poles of the coupled lever are where `1 + kappa G = 0`. [`contact_stiffness`] takes
+//! poles alone, [`joint_contact`] poles and residues of both ringings.
+//! # Shapes
+//! N free modes with a tip share each, M coupled poles, M <= N; covariances over real and imaginary part in turn.
+//! # Cost
+//! Some ten evaluations of M N terms: microseconds.
+//! # Source
+//! U. Rabe, K. Janser and W. Arnold, Rev. Sci. Instrum. 67 (1996) 3281; A. C. Aitken, Proc. R. Soc. Edinb. 55 (1936) 42
+//! (generalised least squares).
+//!
 //! ```
 //! use afmid_kernels::contact::{CoupledPoles, FreeLever, contact_stiffness, coupled_poles};
 //! use afmid_kernels::ringdown::{Estimate, ModeEstimate};
@@ -14,7 +26,9 @@
 //! let start = [faer::c64::new(-5e4, 1.2e6), faer::c64::new(-5e4, 3e6)];
 //! let poles = coupled_poles(&lever, [60.0, 8e-6], &start).ok_or("no poles")?;
 //! let contact = contact_stiffness(&lever, &CoupledPoles::independent(&poles, 100.0))?;
-//! assert!((contact.stiffness_n_per_m.value - 60.0).abs() < 1e-6);
+//! let stiffness = contact.stiffness_n_per_m;
+//! assert!((stiffness.value - 60.0).abs() < 1e-6 && stiffness.std > 0.0);
+//! println!("{:.2} N/m +- {:.2} N/m", stiffness.value, stiffness.std);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

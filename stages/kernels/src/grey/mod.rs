@@ -1,6 +1,18 @@
 //! Modes, real poles, delay and feedthrough from inputs and outputs: the grey modal form, fitted at the limit of white
 //! noise.
 //!
+//! # Model
+//! `G(s) = exp(-s d) (sum_n g_n w_n^2 / (s^2 + w_n / Q_n s + w_n^2) + d0) prod_k p_k / (s + p_k)`; `y = G u + offset +
+//! slope t + e`, e white or with the spectrum of its residuals. u is held between samples, linear, or band-limited
+//! ([`InputBetween`]); d is any part of a sample.
+//! # Shapes
+//! Experiments of u (several inputs one after the other) and y; a parameter for each `w_n, Q_n, g_n, p_k`, d and d0.
+//! # Cost
+//! O(N (modes + poles)) per iteration; some ten iterations.
+//! # Source
+//! L. Ljung, System Identification (1999), sections 4.3 (grey forms) and 7.4; G. H. Golub and V. Pereyra, SIAM J. Numer.
+//! Anal. 10 (1973) 413.
+//!
 //! ```
 //! use afmid_kernels::grey::{GreyOptions, GreyQuantity, fit_grey};
 //! use afmid_kernels::pem::Experiment;

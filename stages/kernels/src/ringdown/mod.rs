@@ -1,5 +1,20 @@
 //! Ringdowns of several events, fitted jointly at the limit of their noise.
 //!
+//! # Model
+//! Releases ([`fit_ringdowns`]): `y_e(k) = a_e sum_j Re(rho_j exp(s_j (k T - t_e))) + offset_e + slope_e x_k + n(k)`, x
+//! from -1 to 1 over the event; poles `s_j` and residues `rho_j` are shared, amplitude, onset, offset and slope each
+//! event's own; n thermal, 1/f and white. Decays in several channels ([`fit_channels`]): poles shared, the residues of
+//! each event and channel its own. A mode has the frequency `abs(s) / 2 pi` and the quality factor `abs(s) / (-2 Re s)`.
+//! # Shapes
+//! Events of one length each, C channels of one length per event; covariance over real and imaginary part of each pole
+//! in turn.
+//! # Cost
+//! [`fit_ringdowns`] about 3 ms per record of 8192 samples and round of noise; [`fit_channels`] `N C (4 modes)^2` per
+//! step; [`fit_decay`], one record in white noise, 0.4 ms.
+//! # Source
+//! S. M. Kay, Fundamentals of Statistical Signal Processing I (1993), chapter 7; G. H. Golub and V. Pereyra, SIAM J.
+//! Numer. Anal. 10 (1973) 413.
+//!
 //! ```
 //! use afmid_kernels::ringdown::{DecayOptions, NoiseSource, RingdownOptions, fit_decay, fit_ringdowns};
 //! // one damped cosine, sampled at 1 MS/s: 50 kHz, Q = 40

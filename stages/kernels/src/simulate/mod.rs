@@ -7,8 +7,15 @@
 //! # Model
 //! Modes of a lever on a moved base, free or in contact with a spring and a damper; between events linear, propagated
 //! exactly (matrix exponential). Crossings are found to 1e-8 of a sample.
+//! `m_n q_n'' + m_n w_n / Q_n q_n' + m_n w_n^2 q_n = F + thermal noise` for each mode; the tip moves by the sum of the
+//! modes' tip shares, the detector sees that of their detector shares behind its real poles.
+//! # Shapes
+//! One channel of N samples, and the events with time, height and force.
 //! # Cost
 //! O(modes^2) per sample.
+//! # Source
+//! C. Van Loan, IEEE Trans. Autom. Control 23 (1978) 395 (matrix exponential with noise); H. B. Callen and T. A. Welton,
+//! Phys. Rev. 83 (1951) 34 (thermal force).
 //!
 //! ```
 //! use afmid_kernels::simulate::{AfmSystem, Contact, Detector, Drive, EventKind, ModalLever, Mode, Sampling, TriangleRamp, simulate_motion};

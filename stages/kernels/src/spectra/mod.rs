@@ -3,9 +3,18 @@
 //! Sign and scale: `X_k = N^(-1/2) sum_n x_n exp(-i 2 pi k n / N)` at the bins `k f_s / N` from zero to half the sample
 //! rate. Undefined values are NaN.
 //!
-//! [`etfe`] divides transforms (Eqs. 5 to 7), [`local_rational`] and [`local_polynomial`] smooth it, [`power_spectrum`] and [`average_spectra`] are for noise,
-//! [`thermal_fit`] reads modes
-//! from it, [`thermal_peak`] one of several. A transform costs O(N log N), a local fit O(bins x neighbours).
+//! # Model
+//! [`etfe`]: `G(k) = Y_k / U_k` (Eqs. 5 to 7) with the variance `phi_k / abs(U_k)^2` (Eq. 10); [`local_rational`] and
+//! [`local_polynomial`] smooth its real and imaginary part. [`power_spectrum`] and [`average_spectra`] are for noise;
+//! [`thermal_fit`] fits `A (2/pi) (f0^3/Q) / ((f0^2 - f^2)^2 + (f f0/Q)^2) + W + B/f` to a density, [`thermal_peak`] one
+//! of several peaks.
+//! # Shapes
+//! N real samples give N/2 + 1 bins; a response, its variance and the bins have one length.
+//! # Cost
+//! A transform O(N log N), a local fit O(bins x neighbours).
+//! # Source
+//! R. W. Stark et al., Rev. Sci. Instrum. (2005), Eqs. 5 to 7 and 10; R. Pintelon and J. Schoukens, System
+//! Identification (2012), chapters 2 and 7; P. Whittle, Ark. Mat. 2 (1953) 423.
 //!
 //! ```
 //! use afmid_kernels::spectra::{EndTreatment, EtfeSettings, Intersample, difference, etfe};

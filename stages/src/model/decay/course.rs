@@ -42,6 +42,8 @@ const LATE: f64 = 1.4;
 const MOST_CUTS: usize = 1;
 /// Standard errors of a difference that noise alone yields once in 10,000 modes.
 const MOVED: f64 = 4.0;
+/// Distance in half widths beyond which two modes are not one that has moved.
+const SAME: f64 = 10.0;
 /// Change of a frequency in half widths, or of a damping relative to itself, up to which one linear mode stands for all:
 /// its phase is then wrong by less than a tenth of a radian while it decays.
 const FAR: f64 = 0.1;
@@ -57,11 +59,12 @@ pub(super) fn follow(decays: &Decays<'_>, options: &ChannelOptions, whole: bool)
     let mut first: Option<Part> = None;
     for _ in 0..MOST_CUTS {
         let from = followed.from;
-        let Some(rate) = strongest(&followed.fit) else { break };
+        let Some((_, rate)) = strongest(&followed.fit) else { break };
         let cut = from + ((LATE / (rate * interval_s)) as usize).clamp(1, ((longest - from) / 2).max(1));
         let Ok(late) = fitted(decays, options, cut..longest) else { break };
         let few = ChannelOptions { modes: ModesWanted::AtMost(late.poles.len().max(1)), ..options.clone() };
         let Ok(early) = fitted(decays, &few, from..cut) else { break };
+        let Some(late_mode) = strongest(&late).map(|(mode, _)| late.modes()[mode]) else { break };
         let part = |name, range: Range<usize>, fit: &ChannelRingdown| Part {
             name,
             from_s: range.start as f64 * interval_s,
@@ -70,7 +73,7 @@ pub(super) fn follow(decays: &Decays<'_>, options: &ChannelOptions, whole: bool)
         };
         let early = part("first", from..cut, &early);
         let last = part("last", cut..longest, &late);
-        let moves = Course([early.clone(), last.clone()]).matters();
+        let moves = Course([early.clone(), last.clone()]).matters(late_mode);
         followed.course = Some(Course([first.get_or_insert(early).clone(), last]));
         if whole || !moves {
             break;
@@ -123,13 +126,13 @@ fn determined(fit: &ChannelRingdown) -> usize {
     fit.modes().iter().filter(|mode| known(mode)).count()
 }
 
-/// Decay rate of the mode with the most energy, 1/s.
-fn strongest(fit: &ChannelRingdown) -> Option<f64> {
+/// The mode with the most energy and its decay rate, 1/s.
+fn strongest(fit: &ChannelRingdown) -> Option<(usize, f64)> {
     let energy = |j: usize| {
         let all: f64 = fit.records.iter().filter_map(|record| record.residues.get(j)).map(|r| r.norm_sqr()).sum();
         all / -fit.poles[j].re
     };
-    (0..fit.poles.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b))).map(|j| -fit.poles[j].re)
+    (0..fit.poles.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b))).map(|j| (j, -fit.poles[j].re))
 }
 
 impl Course {
@@ -150,7 +153,8 @@ impl Course {
         let pair = |late: &'_ ModeEstimate| {
             let early = nearest(late, &first.modes, distance)?;
             let back = nearest(early, &last.modes, distance)?;
-            (back == late).then_some(*early)
+            let width = early.damping_ratio().value.max(late.damping_ratio().value);
+            (back == late && distance(early, late) < SAME * width).then_some(*early)
         };
         last.modes
             .iter()
@@ -161,14 +165,14 @@ impl Course {
             .collect()
     }
 
-    /// Whether any mode moves so far that one linear mode cannot stand for both parts.
-    fn matters(&self) -> bool {
+    /// Whether this mode of the last part, its strongest, has moved so far that one linear mode cannot stand for both.
+    fn matters(&self, strongest: ModeEstimate) -> bool {
         let matters = |[first, last]: [&ModeEstimate; 2]| {
             let (damping, early) = (last.damping_ratio().value, first.damping_ratio().value);
             let shift = (first.frequency_hz.value / last.frequency_hz.value - 1.0).abs();
             shift > FAR * damping || (early / damping - 1.0).abs() > FAR
         };
-        self.pairs().into_iter().any(|pair| moves(pair) && matters(pair))
+        self.pairs().into_iter().any(|pair| *pair[1] == strongest && moves(pair) && matters(pair))
     }
 
     pub fn table(&self) -> Table {
@@ -203,6 +207,13 @@ impl Course {
         };
         let pair = |pair: [&ModeEstimate; 2]| json!({ "first": end(&self.0[0], pair[0]), "last": end(&self.0[1], pair[1]), "moves": moves(pair) });
         self.pairs().into_iter().map(pair).collect::<Vec<Value>>().into()
+    }
+
+    /// Frequencies, Hz, of modes of the first part that the last one does not have.
+    pub fn gone(&self) -> Vec<f64> {
+        let pairs = self.pairs();
+        let gone = self.0[0].modes.iter().filter(|mode| !pairs.iter().any(|pair| pair[0] == *mode));
+        gone.map(|mode| mode.frequency_hz.value).collect()
     }
 
     /// One for each mode that moves.

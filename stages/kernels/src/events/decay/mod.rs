@@ -3,6 +3,15 @@
 //! [`find_decays`] returns stretches that a sum of decaying exponentials describes, ready for a fit; a steady
 //! oscillation is recognised as one and not taken for a decay.
 //!
+//! # Model
+//! Quiet, an event, `sum_j Re(rho_j exp(s_j t))` in noise, the same again; offset and drift slower than the ringing.
+//! # Shapes
+//! C channels of N samples of the same instants.
+//! # Cost
+//! Some `100 N C` operations.
+//! # Source
+//! R. V. Allen, Bull. Seismol. Soc. Am. 68 (1978) 1521; G. R. B. de Prony, J. Ec. Polytech. 1 (1795) 24.
+//!
 //! ```
 //! use afmid_kernels::events::decay::{DecaySearchOptions, find_decays};
 //!
