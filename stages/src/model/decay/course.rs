@@ -59,12 +59,11 @@ pub(super) fn follow(decays: &Decays<'_>, options: &ChannelOptions, whole: bool)
     let mut first: Option<Part> = None;
     for _ in 0..MOST_CUTS {
         let from = followed.from;
-        let Some((_, rate)) = strongest(&followed.fit) else { break };
+        let Some(rate) = strongest(&followed.fit) else { break };
         let cut = from + ((LATE / (rate * interval_s)) as usize).clamp(1, ((longest - from) / 2).max(1));
         let Ok(late) = fitted(decays, options, cut..longest) else { break };
         let few = ChannelOptions { modes: ModesWanted::AtMost(late.poles.len().max(1)), ..options.clone() };
         let Ok(early) = fitted(decays, &few, from..cut) else { break };
-        let Some(late_mode) = strongest(&late).map(|(mode, _)| late.modes()[mode]) else { break };
         let part = |name, range: Range<usize>, fit: &ChannelRingdown| Part {
             name,
             from_s: range.start as f64 * interval_s,
@@ -73,7 +72,7 @@ pub(super) fn follow(decays: &Decays<'_>, options: &ChannelOptions, whole: bool)
         };
         let early = part("first", from..cut, &early);
         let last = part("last", cut..longest, &late);
-        let moves = Course([early.clone(), last.clone()]).matters(late_mode);
+        let moves = Course([early.clone(), last.clone()]).matters(&weighty(&late));
         followed.course = Some(Course([first.get_or_insert(early).clone(), last]));
         if whole || !moves {
             break;
@@ -116,23 +115,47 @@ fn fitted(decays: &Decays<'_>, options: &ChannelOptions, part: Range<usize>) -> 
 
 /// Standard errors of its damping that a mode must have, and most of half its width that its frequency's error may be.
 const DETERMINED: (f64, f64) = (3.0, 1.0);
+/// Share of the energy of a stronger mode, within whose width it lies, below which a mode is that one's lack of fit.
+const COMPANION: f64 = 0.01;
+/// Share of all energy from which on it matters whether a mode moves.
+const WEIGHTY: f64 = 0.01;
 
-/// How many modes die away by more than chance, at frequencies that are known to their width.
+/// How many modes die away by more than chance, at frequencies that are known to their width, and are no companions of
+/// stronger ones.
 fn determined(fit: &ChannelRingdown) -> usize {
-    let known = |mode: &ModeEstimate| {
-        let (f, damping) = (mode.frequency_hz, mode.damping_ratio());
+    let (modes, energy) = (fit.modes(), energies(fit));
+    let known = |j: usize| {
+        let (f, damping) = (modes[j].frequency_hz, modes[j].damping_ratio());
         damping.value > DETERMINED.0 * damping.std && f.std < DETERMINED.1 * f.value * damping.value
     };
-    fit.modes().iter().filter(|mode| known(mode)).count()
+    let companion = |j: usize| {
+        let f = |k: usize| modes[k].frequency_hz.value;
+        let width = |k: usize| f(k) * modes[k].damping_ratio().value;
+        (0..modes.len()).any(|k| energy[j] < COMPANION * energy[k] && (f(j) - f(k)).abs() < width(j).max(width(k)))
+    };
+    (0..modes.len()).filter(|&j| known(j) && !companion(j)).count()
 }
 
-/// The mode with the most energy and its decay rate, 1/s.
-fn strongest(fit: &ChannelRingdown) -> Option<(usize, f64)> {
-    let energy = |j: usize| {
+/// Energy of each mode over all hits and channels, in units of their own.
+fn energies(fit: &ChannelRingdown) -> Vec<f64> {
+    let energy = |(j, pole): (usize, &faer::c64)| {
         let all: f64 = fit.records.iter().filter_map(|record| record.residues.get(j)).map(|r| r.norm_sqr()).sum();
-        all / -fit.poles[j].re
+        all / -pole.re
     };
-    (0..fit.poles.len()).max_by(|&a, &b| energy(a).total_cmp(&energy(b))).map(|j| (j, -fit.poles[j].re))
+    fit.poles.iter().enumerate().map(energy).collect()
+}
+
+/// Decay rate of the mode with the most energy, 1/s.
+fn strongest(fit: &ChannelRingdown) -> Option<f64> {
+    let energy = energies(fit);
+    (0..energy.len()).max_by(|&a, &b| energy[a].total_cmp(&energy[b])).map(|j| -fit.poles[j].re)
+}
+
+/// The modes with a fair share of all energy.
+fn weighty(fit: &ChannelRingdown) -> Vec<ModeEstimate> {
+    let energy = energies(fit);
+    let all: f64 = energy.iter().sum();
+    fit.modes().into_iter().zip(energy).filter(|(_, own)| *own > WEIGHTY * all).map(|(mode, _)| mode).collect()
 }
 
 impl Course {
@@ -165,14 +188,14 @@ impl Course {
             .collect()
     }
 
-    /// Whether this mode of the last part, its strongest, has moved so far that one linear mode cannot stand for both.
-    fn matters(&self, strongest: ModeEstimate) -> bool {
+    /// Whether one of these modes of the last part has moved so far that one linear mode cannot stand for both.
+    fn matters(&self, weighty: &[ModeEstimate]) -> bool {
         let matters = |[first, last]: [&ModeEstimate; 2]| {
             let (damping, early) = (last.damping_ratio().value, first.damping_ratio().value);
             let shift = (first.frequency_hz.value / last.frequency_hz.value - 1.0).abs();
             shift > FAR * damping || (early / damping - 1.0).abs() > FAR
         };
-        self.pairs().into_iter().any(|pair| *pair[1] == strongest && moves(pair) && matters(pair))
+        self.pairs().into_iter().any(|pair| weighty.contains(pair[1]) && moves(pair) && matters(pair))
     }
 
     pub fn table(&self) -> Table {
