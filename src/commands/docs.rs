@@ -56,9 +56,10 @@ fn contents(registry: &Registry) -> String {
 }
 
 /// The tutorials, in reading order.
-const TUTORIALS: [(&str, &str); 4] = [
+const TUTORIALS: [(&str, &str); 5] = [
     ("The paper in ten minutes", "paper.md"),
     ("My own recordings", "recordings.md"),
+    ("A hammer's hit", "vibration.md"),
     ("Find what my model misses", "diagnosis.md"),
     ("My own stage", "stage.md"),
 ];

@@ -7,11 +7,8 @@ use super::contents::format_of;
 use super::how::Reading;
 use super::input_files::{HashedFile, InputFiles};
 use super::opened_files::contents;
-use super::{Contents, FoundChannel};
+use super::{Contents, FoundChannel, most_inflated};
 use crate::error::StageError;
-
-/// Most samples of a channel that is read whole: half a gigabyte of them.
-const LONGEST: usize = 1 << 26;
 
 /// A file that is small enough for its channels to be read whole: measured input and output, not an archive.
 #[derive(Debug)]
@@ -37,11 +34,13 @@ impl WholeFile {
 
     /// All values of a channel in its unit, NaN where samples are missing: stored * scale_factor + add_offset.
     ///
-    /// Errors: more than 2^26 samples; as [`super::Source::read`]; the file is no longer the one that was hashed.
+    /// Errors: more numbers than half of what a file of that size may inflate to; as [`super::Source::read`]; the file is no longer the one that was hashed.
     pub fn read(&self, channel: &FoundChannel) -> Result<Vec<f64>, StageError> {
-        if channel.samples > LONGEST {
+        // a channel that is read whole is kept several times: as read, without its level, in parts
+        let most = most_inflated(self.hashed.size()) / 16;
+        if channel.samples as u64 > most {
             let problem =
-                format!("{} has {} samples, wanted at most {LONGEST} at once", channel.location, channel.samples);
+                format!("{} has {} samples, wanted at most {most} at once", channel.location, channel.samples);
             return Err(StageError::new(problem).at(self.hashed.path()).help("cut the file into shorter ones"));
         }
         let stored = channel.source.read(0, channel.samples).map_err(|error| error.in_file(self.hashed.path()))?;
