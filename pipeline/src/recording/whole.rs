@@ -34,7 +34,8 @@ impl WholeFile {
 
     /// All values of a channel in its unit, NaN where samples are missing: stored * scale_factor + add_offset.
     ///
-    /// Errors: more numbers than half of what a file of that size may inflate to; as [`super::Source::read`]; the file is no longer the one that was hashed.
+    /// Errors: numbers of more than half of what compressed data of a file of that size may come to; as
+    /// [`super::Source::read`]; the file is no longer the one that was hashed.
     pub fn read(&self, channel: &FoundChannel) -> Result<Vec<f64>, StageError> {
         // a channel that is read whole is kept several times: as read, without its level, in parts
         let most = most_inflated(self.hashed.size()) / 16;

@@ -21,7 +21,7 @@ use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Mod
 /// the channels times an amplitude per hit: tested, not imposed.
 /// Method: maximum likelihood by variable projection; modes one by one, each kept if noise alone gains as much with a
 /// probability below `false_alarm`. The first and the last part of the decays are fitted by themselves too: where a mode
-/// moves with its amplitude the last part counts, cut again until nothing moves, and both ends are said.
+/// moves with its amplitude the last part counts, and both ends are said.
 /// Shapes: `modes` by row, ascending; `shapes` over mode and channel with the modal assurance criterion over mode and
 /// mode; `hits` a row per hit and mode; `course` a row per mode and part; `fit` over channel and time of the largest hit.
 /// Units: Hz; shapes relative to the channel with the largest amplitude; amplitudes in the channels' units.
@@ -40,7 +40,7 @@ pub struct DecayFit {
     pub max_modes: usize,
     /// Noise beside the ringing: `estimated` (white and wander, per channel) or `white`.
     pub noise: DecayNoise,
-    /// What counts where modes move while they die away: `auto`, the last part, in which they do not, or `whole`, all.
+    /// What counts where modes move while they die away: `auto`, the last part, or `whole`, all.
     pub part: FittedPart,
     /// How it is fitted.
     #[serde(flatten)]
@@ -51,7 +51,7 @@ pub struct DecayFit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FittedPart {
-    /// The last part, in which they do not move.
+    /// The last part.
     Auto,
     /// All of each decay.
     Whole,

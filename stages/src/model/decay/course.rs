@@ -38,8 +38,6 @@ pub(super) struct Followed {
 
 /// Decay times of the strongest mode after which the last part begins: its amplitude has fallen to a quarter.
 const LATE: f64 = 1.4;
-/// Cuts at most: each leaves a quarter of the amplitude, and soon noise alone.
-const MOST_CUTS: usize = 1;
 /// Standard errors of a difference that noise alone yields once in 10,000 modes.
 const MOVED: f64 = 4.0;
 /// Distance in half widths beyond which two modes are not one that has moved.
@@ -50,36 +48,28 @@ const FAR: f64 = 0.1;
 /// Relative change below which nobody would call it one.
 const LEAST_CHANGE: f64 = 1e-5;
 
-/// Fits the decays, and again what is left of them when the modes have moved on, until they do not move any more.
-/// Errors: those of the kernel for the whole.
+/// Fits the decays, their first and their last part: the last part counts where the modes have moved on by then, unless
+/// the `whole` is asked for. Errors: those of the kernel for the whole.
 pub(super) fn follow(decays: &Decays<'_>, options: &ChannelOptions, whole: bool) -> Result<Followed, ModelError> {
     let longest = decays.hits.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
     let interval_s = 1.0 / decays.sample_rate_hz;
-    let mut followed = Followed { fit: fitted(decays, options, 0..longest)?, from: 0, course: None };
-    let mut first: Option<Part> = None;
-    for _ in 0..MOST_CUTS {
-        let from = followed.from;
-        let Some(rate) = strongest(&followed.fit) else { break };
-        let cut = from + ((LATE / (rate * interval_s)) as usize).clamp(1, ((longest - from) / 2).max(1));
-        let Ok(late) = fitted(decays, options, cut..longest) else { break };
-        let few = ChannelOptions { modes: ModesWanted::AtMost(late.poles.len().max(1)), ..options.clone() };
-        let Ok(early) = fitted(decays, &few, from..cut) else { break };
-        let part = |name, range: Range<usize>, fit: &ChannelRingdown| Part {
-            name,
-            from_s: range.start as f64 * interval_s,
-            to_s: range.end as f64 * interval_s,
-            modes: fit.modes(),
-        };
-        let early = part("first", from..cut, &early);
-        let last = part("last", cut..longest, &late);
-        let moves = Course([early.clone(), last.clone()]).matters(&weighty(&late));
-        followed.course = Some(Course([first.get_or_insert(early).clone(), last]));
-        if whole || !moves {
-            break;
-        }
-        followed = Followed { fit: late, from: cut, ..followed };
-    }
-    Ok(followed)
+    let fit = fitted(decays, options, 0..longest)?;
+    let uncut = |fit| Ok(Followed { fit, from: 0, course: None });
+    let Some(rate) = strongest(&fit) else { return uncut(fit) };
+    let cut = ((LATE / (rate * interval_s)) as usize).clamp(1, (longest / 2).max(1));
+    let Ok(late) = fitted(decays, options, cut..longest) else { return uncut(fit) };
+    let few = ChannelOptions { modes: ModesWanted::AtMost(late.poles.len().max(1)), ..options.clone() };
+    let Ok(early) = fitted(decays, &few, 0..cut) else { return uncut(fit) };
+    let part = |name, range: Range<usize>, fit: &ChannelRingdown| Part {
+        name,
+        from_s: range.start as f64 * interval_s,
+        to_s: range.end as f64 * interval_s,
+        modes: fit.modes(),
+    };
+    let course = Course([part("first", 0..cut, &early), part("last", cut..longest, &late)]);
+    let moved = course.matters(&weighty(&late));
+    let (fit, from) = if moved && !whole { (late, cut) } else { (fit, 0) };
+    Ok(Followed { fit, from, course: Some(course) })
 }
 
 /// The fit of a part of all decays that reach into it.
