@@ -52,13 +52,17 @@ pub struct NewPipelineArgs {
     /// Recordings: a folder of files of one kind, or files.
     #[arg(required = true, value_name = "RECORDINGS")]
     pub recordings: Vec<PathBuf>,
-    /// What to find [default: what the recordings look like, decay or modes].
+    /// What to find [default: what the recordings look like].
     #[arg(long, value_enum)]
     pub goal: Option<Goal>,
     /// The signal, as `afmid inspect` names it; of decays several, one for each sensor [default: the channel that can
     /// carry a ringdown and is named most like a deflection; of decays all channels of that length and unit].
     #[arg(long, value_name = "NAME")]
     pub channel: Vec<String>,
+    /// The measured input, as `afmid inspect` names it; several of several inputs [default: channels named as a force,
+    /// an input, a drive].
+    #[arg(long, value_name = "NAME")]
+    pub input: Vec<String>,
     /// What files and channels are, of decays: hits, or sensors that saw the same hits [default: files are hits, channels
     /// are sensors, cells are hits].
     #[arg(long = "as", value_enum, value_name = "WHAT")]
@@ -101,4 +105,6 @@ pub enum Goal {
     Diagnosis,
     /// The lever in contact beside the free one: snap-ins as well.
     Coupled,
+    /// Transfer function and modes from a measured input and output.
+    InputOutput,
 }

@@ -30,6 +30,7 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
     let wanted = Wanted {
         goal: args.goal,
         channels: &args.channel,
+        inputs: &args.input,
         records_are: args.records_are,
         rate_hz: args.rate,
         unit: args.unit.as_deref(),

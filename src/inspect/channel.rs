@@ -54,13 +54,6 @@ impl Channel {
             values,
         })
     }
-
-    /// Samples of the longest stretch without a gap.
-    pub fn longest_stretch(&self) -> usize {
-        let ends = self.gaps.iter().copied().chain([self.samples]);
-        let starts = std::iter::once(0).chain(self.gaps.iter().copied());
-        starts.zip(ends).map(|(start, end)| end.saturating_sub(start)).max().unwrap_or(0)
-    }
 }
 
 fn values(found: &FoundChannel) -> Result<Values, FormatError> {

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use super::channel::Channel;
-use super::verdict::LEAST_RATE_HZ;
 
 /// The `io.records` stage that reads a channel of a file, with the parameters that it needs; what only the user knows
 /// is left to fill in.
@@ -19,10 +18,8 @@ pub fn stage(path: &Path, channel: &Channel) -> String {
         format!("files = [{}]", text(&file.to_string_lossy())),
         format!("channel = {}", text(&channel.location)),
     ];
-    match channel.sample_rate_hz {
-        None => lines.push("# sample_rate_hz = ...  # the file states none: fill it in".to_owned()),
-        Some(rate) if rate < LEAST_RATE_HZ => lines.push(format!("min_sample_rate_hz = {rate:?}  # below the default")),
-        Some(_) => {}
+    if channel.sample_rate_hz.is_none() {
+        lines.push("# sample_rate_hz = ...  # the file states none: fill it in".to_owned());
     }
     if channel.unit.is_empty() {
         lines.push("# unit = \"...\"  # the file states none: fill it in".to_owned());

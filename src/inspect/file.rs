@@ -68,7 +68,7 @@ fn read(path: &Path) -> Result<Holdings, StageError> {
     let channels = contents.channels.iter().enumerate();
     let channels: Vec<Channel> =
         channels.map(|(index, found)| Channel::of(found, index < MOST_READ)).collect::<Result<_, _>>()?;
-    let ringdown = of_file(&channels);
+    let ringdown = of_file(&channels, &contents.channels);
     let best = ringdown.channel.and_then(|index| channels.get(index));
     Ok(Holdings {
         format: if name == "native" { format!("native record ({})", contents.format) } else { contents.format },

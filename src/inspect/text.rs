@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::channel::Channel;
 use super::file::{Holdings, Inspected, Outcome};
+use super::verdict::{Answer, Verdict};
 use crate::printable::{help_line, one_line};
 use crate::show::{grid, number};
 
@@ -72,34 +73,89 @@ fn row(channel: &Channel) -> Vec<String> {
     ]
 }
 
-/// The files of a folder, one line each.
+/// The files of a folder: a line for those alike that follow each other, then the reasons, each once.
 pub fn folder_text(folder: &Path, files: &[Inspected]) -> String {
-    let header = ["file", "format", "channels", "samples", "rate/Hz", "ringdown", "reason"];
-    let rows = files.iter().map(|inspected| line(folder, inspected));
-    let rows: Vec<Vec<String>> = std::iter::once(header.map(str::to_owned).to_vec()).chain(rows).collect();
-    format!("{}\n{}", one_line(&folder.display().to_string()), grid(&rows))
+    let lines: Vec<(String, Line)> = files.iter().map(|inspected| (name(folder, inspected), line(inspected))).collect();
+    let groups: Vec<&[(String, Line)]> = lines.chunk_by(|(_, one), (_, next)| one.cells == next.cells).collect();
+    let header = ["file", "format", "channels", "samples", "rate/Hz", "ringdown"].map(str::to_owned).to_vec();
+    let rows = groups.iter().filter_map(|group| row_of(group));
+    let rows: Vec<Vec<String>> = std::iter::once(header).chain(rows).collect();
+    let mut text = format!("{}\n{}", one_line(&folder.display().to_string()), grid(&rows));
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for (name, reason) in groups.iter().flat_map(|group| reasons_of(group)) {
+        match reasons.iter_mut().find(|(known, _)| *known == reason) {
+            Some((_, names)) => names.push(name),
+            None => reasons.push((reason, vec![name])),
+        }
+    }
+    if !reasons.is_empty() {
+        text.push('\n');
+    }
+    for (reason, names) in reasons.iter().take(MOST_ROWS) {
+        text += &format!("{}: {}\n", one_line(&names.join(", ")), one_line(reason));
+    }
+    text + &more(reasons.len(), "reasons")
 }
 
-fn line(folder: &Path, inspected: &Inspected) -> Vec<String> {
-    let name = inspected.file.strip_prefix(folder).unwrap_or(&inspected.file).display().to_string();
-    let short = |format: &str, ringdown: &str, reason: &str| {
-        let unknown = || "-".to_owned();
-        vec![name.clone(), format.to_owned(), unknown(), unknown(), unknown(), ringdown.to_owned(), reason.to_owned()]
+/// The reasons of files that are alike: of ringdowns in many files that of the first.
+fn reasons_of(group: &[(String, Line)]) -> Vec<(String, &str)> {
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (file, line) in group.iter().filter(|(_, line)| !line.reason.is_empty()) {
+        match reasons.iter_mut().find(|(known, _)| *known == line.reason || line.found) {
+            Some((_, files)) => files.push(file),
+            None => reasons.push((&line.reason, vec![file])),
+        }
+    }
+    let named = |files: &[&str]| match files {
+        [first, .., _] => format!("{first} and {} more", files.len() - 1),
+        _ => files.concat(),
+    };
+    reasons.into_iter().map(|(reason, files)| (named(&files), reason)).collect()
+}
+
+/// What is said of a file: cells of the table, and the reason below it.
+struct Line {
+    cells: Vec<String>,
+    reason: String,
+    /// Whether a ringdown was found: the reason then gives numbers of its own.
+    found: bool,
+}
+
+/// The row of files that are alike.
+fn row_of(group: &[(String, Line)]) -> Option<Vec<String>> {
+    let (first, line) = group.first()?;
+    let name = match group.len() {
+        1 => first.clone(),
+        count => format!("{first} ... {} ({count} files)", group.last()?.0),
+    };
+    Some(std::iter::once(name).chain(line.cells.iter().cloned()).collect())
+}
+
+fn name(folder: &Path, inspected: &Inspected) -> String {
+    inspected.file.strip_prefix(folder).unwrap_or(&inspected.file).display().to_string()
+}
+
+fn line(inspected: &Inspected) -> Line {
+    let unknown = || "-".to_owned();
+    let short = |format: &str, reason: &str| Line {
+        cells: vec![format.to_owned(), unknown(), unknown(), unknown(), unknown()],
+        reason: reason.to_owned(),
+        found: false,
     };
     match &inspected.outcome {
-        Outcome::Own => short("a result of afmid's", "-", "no recording"),
-        Outcome::Refused { problem, .. } => short("refused", "-", problem),
+        Outcome::Own => short("a result of afmid's", ""),
+        Outcome::Refused { problem, .. } => short("refused", problem),
         Outcome::Read(holdings) => {
             let best = holdings.ringdown.channel.and_then(|index| holdings.channels.get(index));
-            vec![
-                name,
+            let cells = vec![
                 holdings.format.clone(),
                 holdings.channels.len().to_string(),
-                best.map_or_else(|| "-".to_owned(), |channel| channel.samples.to_string()),
-                best.and_then(|channel| channel.sample_rate_hz).map_or_else(|| "-".to_owned(), number),
+                best.map_or_else(unknown, |channel| channel.samples.to_string()),
+                best.and_then(|channel| channel.sample_rate_hz).map_or_else(unknown, number),
                 holdings.ringdown.answer.word().to_owned(),
-                holdings.ringdown.reason.clone(),
-            ]
+            ];
+            let Verdict { answer, reason, .. } = &holdings.ringdown;
+            Line { cells, reason: reason.clone(), found: *answer > Answer::No }
         }
     }
 }

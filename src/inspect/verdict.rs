@@ -1,16 +1,12 @@
-//! Whether a channel can carry a ringdown.
+//! Whether a file holds a ringdown.
+
+use afmid_pipeline::recording::FoundChannel;
 
 use super::channel::{Channel, MOST_CODES, Values};
+use super::ringing::{longest_stretch, ringdown};
 
-/// Least sample rate that `io.records` accepts by default.
-pub const LEAST_RATE_HZ: f64 = 200e3;
-
-/// A ringdown of a few samples identifies nothing: the shipped configs take windows of 8192, the shortest useful ones
-/// have an eighth.
-const LEAST_SAMPLES: usize = 1024;
-
-/// Samples in a period of a ring that is still well sampled.
-const PERIOD_SAMPLES: f64 = 20.0;
+/// Fewer samples hold no two periods and the noise to tell them from.
+const LEAST_SAMPLES: usize = 64;
 
 /// Fewer distinct codes are those of a switch or a counter.
 const LEAST_CODES: usize = 16;
@@ -18,14 +14,17 @@ const LEAST_CODES: usize = 16;
 /// More samples at the ends of the range than this share: what rang is cut off.
 const MOST_SATURATED: f64 = 0.5;
 
-/// Whether a ringdown can be in it.
+/// Channels of a file that are searched for a ringdown, at most.
+const MOST_SEARCHED: usize = 16;
+
+/// Whether a ringdown is in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Answer {
-    /// It cannot.
+    /// None.
     No,
     /// The file does not say enough.
     Unknown,
-    /// Nothing speaks against it.
+    /// At least one.
     Yes,
 }
 
@@ -49,60 +48,43 @@ pub struct Verdict {
     pub channel: Option<usize>,
 }
 
-/// The verdict on a file: that on its best channel; of equals the one that is named like a deflection, else the first.
-pub fn of_file(channels: &[Channel]) -> Verdict {
+/// The verdict on a file: that on its first channel with a ringdown, those named like a deflection before the others;
+/// without one that on the first channel which could hold one.
+pub fn of_file(channels: &[Channel], found: &[FoundChannel]) -> Verdict {
     let named = |channel: &Channel| channel.location.to_ascii_lowercase().contains("defl");
-    let judged = channels.iter().enumerate().map(|(index, channel)| (of_channel(channel), index, channel));
-    // of equals max_by_key takes the last, so the order is turned
-    let best = judged.rev().max_by_key(|((answer, _), _, channel)| (*answer, named(channel)));
-    match best {
-        Some(((answer, reason), index, _)) => Verdict { answer, reason, channel: Some(index) },
-        None => Verdict { answer: Answer::No, reason: "the file has no channel of numbers".to_owned(), channel: None },
+    let mut order: Vec<usize> = (0..channels.len().min(found.len())).collect();
+    order.sort_by_key(|&index| (unusable(&channels[index]).is_some(), !named(&channels[index])));
+    let mut best: Option<Verdict> = None;
+    for index in order.into_iter().take(MOST_SEARCHED) {
+        let (answer, reason) = match unusable(&channels[index]) {
+            Some(reason) => (Answer::No, reason),
+            None => ringdown(&found[index]),
+        };
+        if best.as_ref().is_none_or(|best| answer > best.answer) {
+            best = Some(Verdict { answer, reason, channel: Some(index) });
+        }
+        if answer > Answer::No {
+            break;
+        }
     }
+    let none = || "the file has no channel of numbers".to_owned();
+    best.unwrap_or_else(|| Verdict { answer: Answer::No, reason: none(), channel: None })
 }
 
-fn of_channel(channel: &Channel) -> (Answer, String) {
+/// Why a channel can hold no ringdown, whatever its samples do.
+fn unusable(channel: &Channel) -> Option<String> {
     if channel.is_axis {
-        return (Answer::No, "it is an axis, no signal".to_owned());
+        return Some("it is an axis, no signal".to_owned());
     }
-    let longest = channel.longest_stretch();
+    let longest = longest_stretch(channel.samples, &channel.gaps).len();
     if longest < LEAST_SAMPLES {
-        let reason = format!("{longest} samples without interruption, wanted at least {LEAST_SAMPLES}");
-        return (Answer::No, reason);
+        return Some(format!("{longest} samples without interruption, wanted at least {LEAST_SAMPLES}"));
     }
-    if let Some(reason) = channel.values.as_ref().and_then(|values| unusable(values, channel.samples)) {
-        return (Answer::No, reason);
-    }
-    match channel.sample_rate_hz {
-        None => (Answer::Unknown, "the file states no sample rate: give `sample_rate_hz`".to_owned()),
-        Some(rate) if rate < LEAST_RATE_HZ => (
-            Answer::No,
-            format!(
-                "{rate} samples per second, wanted at least {LEAST_RATE_HZ}: a lever rings at 10 kHz and more. At this \
-                 rate a ring of up to {} Hz could be sampled: if the resonator is that slow, set `min_sample_rate_hz`",
-                rate / PERIOD_SAMPLES
-            ),
-        ),
-        Some(rate) if channel.values.is_none() => (
-            Answer::Unknown,
-            format!(
-                "{rate} samples per second, {longest} samples without interruption; not read, the file has too many \
-                 channels"
-            ),
-        ),
-        Some(rate) => (
-            Answer::Yes,
-            format!(
-                "{rate} samples per second, {longest} samples without interruption: enough for a lever's first mode of \
-                 up to {} Hz",
-                rate / PERIOD_SAMPLES
-            ),
-        ),
-    }
+    channel.values.as_ref().and_then(|values| unusable_values(values, channel.samples))
 }
 
 /// Why values can be no recorded ring.
-fn unusable(values: &Values, samples: usize) -> Option<String> {
+fn unusable_values(values: &Values, samples: usize) -> Option<String> {
     let valid = samples.saturating_sub(values.missing);
     if valid < LEAST_SAMPLES {
         return Some(format!("{} of {samples} samples are missing", values.missing));
@@ -117,54 +99,79 @@ fn unusable(values: &Values, samples: usize) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use afmid_pipeline::recording::{FormatError, Raw, Source};
+
     use super::*;
 
-    fn channel(location: &str, rate: Option<f64>, samples: usize) -> Channel {
-        let values = Some(Values { least: -1.0, largest: 1.0, codes: 200, missing: 0, saturated: 0 });
-        let (location, unit) = (location.to_owned(), "V".to_owned());
-        Channel {
-            location,
-            samples,
-            sample_rate_hz: rate,
-            unit,
-            stored_as: "int16",
-            gaps: Vec::new(),
-            is_axis: false,
-            values,
+    #[derive(Debug)]
+    struct Values64(Vec<f64>);
+
+    impl Source for Values64 {
+        fn read(&self, start: usize, count: usize) -> Result<Raw, FormatError> {
+            Ok(Raw::Float64(self.0[start..start + count].to_vec()))
         }
+    }
+
+    /// A channel with these samples.
+    fn channel(location: &str, rate: Option<f64>, y: Vec<f64>) -> (Channel, FoundChannel) {
+        let mut found = FoundChannel::new(location, y.len(), "float64", Arc::new(Values64(y)));
+        found.sample_rate_hz = rate;
+        (Channel::of(&found, true).expect("samples"), found)
+    }
+
+    /// Quiet, then 100 periods of 20 samples that decay with Q = 30 or do not.
+    fn rings(decays: bool) -> Vec<f64> {
+        let noise = |k: usize| 1e-3 * ((k * k) as f64).sin();
+        let ring = |k: usize| {
+            let t = k as f64 - 1000.0;
+            if t < 0.0 && decays { 0.0 } else { (if decays { -t / 191.0 } else { 0.0 }).exp() * (t * 0.314_159).sin() }
+        };
+        (0..3000).map(|k| ring(k) + noise(k)).collect()
+    }
+
+    fn verdict(channels: Vec<(Channel, FoundChannel)>) -> Verdict {
+        let (channels, found): (Vec<Channel>, Vec<FoundChannel>) = channels.into_iter().unzip();
+        of_file(&channels, &found)
     }
 
     #[test]
     fn each_reason_is_given() {
-        let good = || channel("/a", Some(5e6), 90_000);
-        let with = |values: Values| Channel { values: Some(values), ..good() };
+        let good = |rate| channel("/a", rate, rings(true));
+        let changed = |change: &dyn Fn(&mut Channel)| {
+            let mut channel = good(Some(5e3));
+            change(&mut channel.0);
+            channel
+        };
         let values = |codes, missing, saturated| Values { least: 0.0, largest: 1.0, codes, missing, saturated };
+        let noise: Vec<f64> = rings(true)[..1000].to_vec();
         for (channel, answer, word) in [
-            (good(), Answer::Yes, "first mode of up to 250000 Hz"),
-            (channel("/a", Some(1e4), 90_000), Answer::No, "min_sample_rate_hz"),
-            (channel("/a", None, 90_000), Answer::Unknown, "sample_rate_hz"),
-            (channel("/a", Some(5e6), 500), Answer::No, "500 samples"),
-            (Channel { is_axis: true, ..good() }, Answer::No, "an axis, no signal"),
-            (Channel { gaps: (0..90_000).step_by(1000).collect(), ..good() }, Answer::No, "1000 samples"),
-            (with(values(2, 0, 0)), Answer::No, "different values"),
-            (with(values(200, 0, 60_000)), Answer::No, "67 % of the samples are clipped"),
-            (with(values(200, 89_500, 0)), Answer::No, "89500 of 90000 samples are missing"),
-            (Channel { values: None, ..good() }, Answer::Unknown, "not read"),
+            (good(Some(5e3)), Answer::Yes, "a free decay from 0.2"),
+            (good(Some(5e3)), Answer::Yes, "at 249.98"),
+            (good(None), Answer::Unknown, "20.0 samples a period; the file states no sample rate"),
+            (channel("/a", Some(5e3), rings(false)), Answer::No, "steady oscillation at 250"),
+            (channel("/a", None, rings(false)), Answer::No, "steady oscillation of 20.0 samples a period"),
+            (channel("/a", Some(5e3), noise), Answer::No, "noise alone"),
+            (channel("/a", Some(5e3), vec![0.5; 60]), Answer::No, "60 samples without interruption"),
+            (changed(&|c| c.is_axis = true), Answer::No, "an axis, no signal"),
+            (changed(&|c| c.gaps = (0..3000).step_by(50).collect()), Answer::No, "50 samples"),
+            (changed(&|c| c.values = Some(values(2, 0, 0))), Answer::No, "different values"),
+            (changed(&|c| c.values = Some(values(200, 0, 2000))), Answer::No, "67 % of the samples are clipped"),
+            (changed(&|c| c.values = Some(values(200, 2950, 0))), Answer::No, "2950 of 3000 samples are missing"),
         ] {
-            let verdict = of_file(&[channel]);
+            let verdict = verdict(vec![channel]);
             assert!(verdict.answer == answer && verdict.reason.contains(word), "{verdict:?}");
         }
-        assert_eq!(of_file(&[]).answer, Answer::No);
+        assert_eq!(of_file(&[], &[]).answer, Answer::No);
     }
 
     #[test]
-    fn the_best_channel_decides_and_a_deflection_goes_first() {
-        let slow = || channel("/slow", Some(1e3), 90_000);
-        let (first, named) = (channel("/a", Some(5e6), 90_000), channel("/Deflection", Some(5e6), 90_000));
-        assert_eq!(of_file(&[slow(), first, named]).channel, Some(2));
-        assert_eq!(
-            of_file(&[slow(), channel("/a", Some(5e6), 90_000), channel("/b", Some(5e6), 90_000)]).channel,
-            Some(1)
-        );
+    fn the_channel_that_rings_decides_and_a_deflection_goes_first() {
+        let (still, first) = (|| channel("/still", Some(5e3), rings(false)), channel("/a", Some(5e3), rings(true)));
+        let named = channel("/Deflection", Some(5e3), rings(true));
+        assert_eq!(verdict(vec![still(), first, named]).channel, Some(2));
+        let [a, b] = ["/a", "/b"].map(|name| channel(name, Some(5e3), rings(true)));
+        assert_eq!(verdict(vec![still(), a, b]).channel, Some(1));
     }
 }

@@ -1,12 +1,14 @@
-//! What recordings look like: snap-offs of a lever, or free decays.
+//! What recordings look like: snap-offs of a lever, free decays, measured input and output, a steady oscillation.
 
 use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, FreeDecay, find_decays};
-use afmid_pipeline::recording::{InputFiles, Reading, WholeFile};
+use afmid_pipeline::recording::{InputFiles, Reading, open_contents};
 
+use super::channels::{drives, input_and_output, named, nothing, sensors, usable};
 use super::pipeline::Wanted;
 use super::recordings::Source;
 use crate::cli::{Goal, RecordsAre};
-use crate::inspect::{Channel, LEAST_RATE_HZ, Values};
+use crate::inspect::{Channel, counted, first_samples};
+use crate::show::number;
 
 /// Why something cannot be chosen, and what to do.
 pub type Question = (String, Option<String>);
@@ -17,56 +19,53 @@ pub struct Choice<'a> {
     pub goal: Goal,
     /// The signals; of all goals but decays one.
     pub channels: Vec<&'a Channel>,
+    /// The measured inputs; of input and output alone.
+    pub inputs: Vec<&'a Channel>,
     /// What files and channels are, where the stage's default is not meant.
     pub records_are: Option<RecordsAre>,
     /// Why, for a comment in the config; empty where the user chose.
     pub why: String,
 }
 
-/// Fewer distinct codes are those of a switch or a counter.
-const LEAST_CODES: usize = 16;
-/// Samples that are searched: a long record's first ones.
-const MOST_SEARCHED: usize = 1 << 22;
 /// Least step of the level, in peaks of the ringing, that a snap-off has: it lets the whole load go.
 const STEP: f64 = 0.5;
 
 /// Chooses by what the first file holds, as far as the user has not. Errors: what is not known, and how to say it.
 pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
-    let lever = || looks_like_a_lever(source);
     match wanted.goal {
         Some(Goal::Decay) => decay(source, wanted, false),
+        Some(Goal::InputOutput) => input_output(source, wanted),
         Some(goal) => one_channel(source, wanted, goal, String::new()),
-        None if lever() && !rings_without_a_step(source, wanted) => {
+        None if !wanted.inputs.is_empty() => input_output(source, wanted),
+        None if looks_like_a_lever(source) && !rings_without_a_step(source, wanted) => {
             let why = format!("snap-offs: {} is of a force microscope", source.format);
             one_channel(source, wanted, Goal::Modes, why)
+        }
+        None if wanted.channels.is_empty() && source.channels.iter().any(|channel| usable(&channel) && drives(channel)) => {
+            input_output(source, wanted)
         }
         None => decay(source, wanted, true),
     }
 }
 
+/// Measured input and output.
+fn input_output<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
+    let (inputs, output) = input_and_output(source, wanted)?;
+    let names: Vec<&str> = inputs.iter().map(|input| input.location.as_str()).collect();
+    let why = format!("measured input {} and output {} in {}", names.join(", "), output.location, name(source));
+    Ok(Choice { goal: Goal::InputOutput, channels: vec![output], inputs, records_are: None, why })
+}
+
 fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
     let channel = match wanted.channels {
-        [] => source.best.and_then(|index| source.channels.get(index)).ok_or_else(|| {
-            let help = "`afmid inspect` says what recordings hold".to_owned();
-            (format!("{}: {}", source.file.display(), source.reason), Some(help))
-        })?,
+        [] => source.best.and_then(|index| source.channels.get(index)).ok_or_else(|| nothing(source))?,
         [one] => named(source, one)?,
         [_, second, ..] => {
             let help = "several sensors go with --goal decay".to_owned();
             return Err((format!("one channel was wanted, --channel {second} is another"), Some(help)));
         }
     };
-    Ok(Choice { goal, channels: vec![channel], records_are: None, why })
-}
-
-/// A channel by its name. Errors: there is none.
-fn named<'a>(source: &'a Source, name: &str) -> Result<&'a Channel, Question> {
-    let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
-    let found = source.channels.iter().find(|channel| bare(&channel.location) == bare(name));
-    found.ok_or_else(|| {
-        let names: Vec<&str> = source.channels.iter().map(|channel| channel.location.as_str()).collect();
-        (format!("{} has no channel `{name}`", source.file.display()), Some(format!("it has {}", names.join(", "))))
-    })
+    Ok(Choice { goal, channels: vec![channel], inputs: Vec::new(), records_are: None, why })
 }
 
 /// Formats of force microscopes, and afmid's own; or a channel that is named as a deflection.
@@ -74,8 +73,7 @@ fn looks_like_a_lever(source: &Source) -> bool {
     let format = source.format.to_lowercase();
     let of_microscope = ["native", "jpk", "nanoscope", "igor"].iter().any(|name| format.contains(name));
     let named = source.channels.iter().any(|channel| channel.location.to_lowercase().contains("defl"));
-    let rate = source.channels.iter().filter_map(|channel| channel.sample_rate_hz).fold(f64::NAN, f64::max);
-    named || (of_microscope && (rate.is_nan() || rate >= LEAST_RATE_HZ))
+    named || of_microscope
 }
 
 /// Whether the best channel rings down from about the level that it rings round: nothing was let go.
@@ -110,8 +108,8 @@ fn decay<'a>(source: &'a Source, wanted: &Wanted<'_>, guessed: bool) -> Result<C
         (Some(first), _) => {
             let count = found.decays.len();
             let time_s = first.range.start as f64 / rate(source, seen[0], wanted)?;
-            let decays = if count == 1 { "a free decay".to_owned() } else { format!("{count} free decays") };
-            format!("{decays} in {}, the first from {time_s:.4} s on, at {:.5} Hz", name(source), first.frequency_hz)
+            let from = format!("from {} s on, at {} Hz", number(time_s), number(first.frequency_hz));
+            format!("{}: {} {from}", name(source), counted(count))
         }
         (None, Some(reason)) if guessed => {
             let help = "look at it with `afmid inspect`; --channel names the signal, --goal says what to find";
@@ -119,31 +117,11 @@ fn decay<'a>(source: &'a Source, wanted: &Wanted<'_>, guessed: bool) -> Result<C
         }
         (None, reason) => format!("--goal decay; in {}: {}", name(source), reason.unwrap_or_default()),
     };
-    Ok(Choice { goal: Goal::Decay, channels, records_are, why })
+    Ok(Choice { goal: Goal::Decay, channels, inputs: Vec::new(), records_are, why })
 }
 
 fn name(source: &Source) -> String {
     source.file.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// The channels with signals of the best one's length and unit.
-fn sensors(source: &Source) -> Result<Vec<&Channel>, Question> {
-    let usable = |channel: &&Channel| {
-        let signal = |values: &Values| values.codes >= LEAST_CODES && values.missing == 0;
-        !channel.is_axis && channel.values.as_ref().is_some_and(signal)
-    };
-    let best = source.best.and_then(|index| source.channels.get(index)).filter(usable);
-    let Some(best) = best.or_else(|| source.channels.iter().filter(usable).max_by_key(|channel| channel.samples))
-    else {
-        let help = "`afmid inspect` says what recordings hold".to_owned();
-        return Err((format!("{}: {}", source.file.display(), source.reason), Some(help)));
-    };
-    let alike = |channel: &&Channel| {
-        usable(channel)
-            && (channel.samples, &channel.unit, channel.sample_rate_hz)
-                == (best.samples, &best.unit, best.sample_rate_hz)
-    };
-    Ok(source.channels.iter().filter(alike).collect())
 }
 
 /// The rate that the file states or the user. Errors: neither.
@@ -162,14 +140,12 @@ fn search(
 ) -> Result<(Vec<Vec<f64>>, DecaySearch), Question> {
     let rate = rate(source, channels[0], wanted)?;
     let plain = |problem: String| (format!("{}: {problem}", source.file.display()), None);
-    let file = WholeFile::open(&InputFiles::new(), &source.file, &Reading::of("auto", None))
+    let (_, contents) = open_contents(&InputFiles::new(), &source.file, &Reading::of("auto", None))
         .map_err(|error| plain(error.to_string()))?;
     let read = |channel: &&Channel| {
-        let found = file.contents().channels.iter().find(|found| found.location == channel.location);
+        let found = contents.channels.iter().find(|found| found.location == channel.location);
         let found = found.ok_or_else(|| plain(format!("there is no channel {}", channel.location)))?;
-        let mut values = file.read(found).map_err(|error| plain(error.to_string()))?;
-        values.truncate(MOST_SEARCHED);
-        Ok(values)
+        first_samples(found).map_err(|error| plain(error.to_string()))
     };
     let values: Vec<Vec<f64>> = channels.iter().map(read).collect::<Result<_, Question>>()?;
     let slices: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();

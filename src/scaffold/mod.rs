@@ -1,5 +1,6 @@
 //! Beginnings: configs for recordings that were looked at, stages of one's own.
 
+mod channels;
 mod choice;
 mod pipeline;
 mod recordings;

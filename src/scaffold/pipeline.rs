@@ -7,7 +7,7 @@ use afmid_pipeline::toml::{Table, Value};
 use super::choice::{Choice, Question};
 use super::recordings::Source;
 use crate::cli::{Goal, RecordsAre};
-use crate::inspect::LEAST_RATE_HZ;
+use crate::inspect::Channel;
 use crate::printable::one_line;
 use crate::relative::relative;
 
@@ -17,6 +17,7 @@ pub struct Wanted<'a> {
     /// None: what they look like.
     pub goal: Option<Goal>,
     pub channels: &'a [String],
+    pub inputs: &'a [String],
     pub records_are: Option<RecordsAre>,
     pub rate_hz: Option<f64>,
     pub unit: Option<&'a str>,
@@ -31,6 +32,7 @@ impl Goal {
             Self::Ringdown => include_str!("../../configs/ringdown.toml"),
             Self::Diagnosis => include_str!("../../configs/diagnose.toml"),
             Self::Coupled => include_str!("../../configs/coupled-lever.toml"),
+            Self::InputOutput => include_str!("../../configs/input-output.toml"),
         }
     }
 
@@ -42,13 +44,26 @@ impl Goal {
             Self::Ringdown => "ringdown",
             Self::Diagnosis => "diagnosis",
             Self::Coupled => "coupled",
+            Self::InputOutput => "input-output",
+        }
+    }
+
+    /// The stage of that config that reads the recordings.
+    const fn reader(self) -> &'static str {
+        match self {
+            Self::InputOutput => "io.columns",
+            _ => "io.records",
         }
     }
 }
 
 /// The config for a file in `folder`. Errors: what is not known of the recordings, and how to say it.
 pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
-    let params = records(source, choice, wanted, folder)?;
+    let params = match choice.goal {
+        Goal::InputOutput => columns(source, choice, wanted, folder),
+        _ => records(source, choice, wanted, folder),
+    }?;
+    let reader = format!("\"{}\"", choice.goal.reader());
     let mut text = String::new();
     let mut stage = "";
     let mut of_its_data = false;
@@ -63,7 +78,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
         }
         match line.split_once(" = ") {
             Some(("name", _)) => text.push_str(&format!("name = \"{}\"\n", choice.goal.name())),
-            Some(("params", _)) if stage == "\"io.records\"" => text.push_str(&params),
+            Some(("params", _)) if stage == reader => text.push_str(&params),
             Some(("params", _)) if stage == "\"events.decay\"" => {
                 let records_are = match choice.records_are {
                     None => "auto",
@@ -99,23 +114,8 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     if choice.goal == Goal::Decay {
         params.insert("piezo_channel".to_owned(), text(""));
     }
-    let rate = match (channel.sample_rate_hz, wanted.rate_hz) {
-        (Some(rate), None) => rate,
-        (None, Some(rate)) => {
-            params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
-            rate
-        }
-        (Some(rate), Some(other)) if rate == other => rate,
-        (Some(rate), Some(_)) => {
-            return Err((format!("{file} states {rate} samples per second"), Some("leave --rate out".to_owned())));
-        }
-        (None, None) => {
-            let help = "say how many samples a second with --rate HZ".to_owned();
-            return Err((format!("{file} states no sample rate"), Some(help)));
-        }
-    };
-    if rate < LEAST_RATE_HZ {
-        params.insert("min_sample_rate_hz".to_owned(), Value::Float(rate));
+    if let Some(rate) = rate(channel, wanted, &file)? {
+        params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
     }
     match (channel.unit.as_str(), wanted.unit) {
         ("", Some(unit)) => {
@@ -133,13 +133,51 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     Ok(format!("params = {}\n", Value::Table(params)))
 }
 
+/// The `params` of the stage `data`.
+fn columns(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
+    let text = |text: &str| Value::String(text.to_owned());
+    let output = choice.channels[0];
+    if source.files > 1 {
+        let help = "give one file; several hits or runs in one go with --goal decay or frf";
+        let problem = format!("{} files, wanted one record of input and output", source.files);
+        return Err((problem, Some(help.to_owned())));
+    }
+    let mut params = Table::new();
+    params.insert("file".to_owned(), text(&relative(&source.file, folder).to_string_lossy()));
+    let inputs = choice.inputs.iter().map(|input| text(&input.location)).collect();
+    params.insert("inputs".to_owned(), Value::Array(inputs));
+    params.insert("output".to_owned(), text(&output.location));
+    if let Some(rate) = rate(output, wanted, &source.file.display())? {
+        params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
+    }
+    if let Some(unit) = wanted.unit {
+        params.insert("output_unit".to_owned(), text(unit));
+    }
+    Ok(format!("params = {}\n", Value::Table(params)))
+}
+
+/// The sample rate to be stated. Errors: the file states none and the user neither; both do, and differ.
+fn rate(channel: &Channel, wanted: Wanted<'_>, file: &dyn std::fmt::Display) -> Result<Option<f64>, Question> {
+    match (channel.sample_rate_hz, wanted.rate_hz) {
+        (Some(_), None) => Ok(None),
+        (None, Some(rate)) => Ok(Some(rate)),
+        (Some(rate), Some(other)) if rate == other => Ok(None),
+        (Some(rate), Some(_)) => {
+            Err((format!("{file} states {rate} samples per second"), Some("leave --rate out".to_owned())))
+        }
+        (None, None) => {
+            let help = "say how many samples a second with --rate HZ".to_owned();
+            Err((format!("{file} states no sample rate"), Some(help)))
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
 
     use super::super::choice::choose;
     use super::*;
-    use crate::inspect::Channel;
 
     fn source(rate: Option<f64>, unit: &str) -> Source {
         let channel = Channel {
@@ -166,13 +204,13 @@ mod tests {
     const GOALS: [Goal; 5] = [Goal::Decay, Goal::Modes, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled];
 
     fn wanted(goal: Goal) -> Wanted<'static> {
-        Wanted { goal: Some(goal), channels: &[], records_are: None, rate_hz: None, unit: None }
+        Wanted { goal: Some(goal), channels: &[], inputs: &[], records_are: None, rate_hz: None, unit: None }
     }
 
     /// The config for the first channel.
     fn of_first(source: &Source, wanted: Wanted<'_>, folder: &str) -> Result<String, Question> {
         let goal = wanted.goal.expect("a goal");
-        let choice = Choice { goal, channels: vec![&source.channels[0]], records_are: None, why: String::new() };
+        let choice = Choice { goal, channels: vec![&source.channels[0]], inputs: Vec::new(), records_are: None, why: String::new() };
         pipeline(source, &choice, wanted, Path::new(folder))
     }
 
@@ -203,6 +241,6 @@ mod tests {
         assert!(question.1.expect("help").contains("/g/ch 0"));
         let given = Wanted { rate_hz: Some(5e4), unit: Some("nm"), ..goal };
         let text = of_first(&source(None, ""), given, "/lab").expect("a config");
-        assert!(text.contains("sample_rate_hz = 50000.0") && text.contains("min_sample_rate_hz = 50000.0"), "{text}");
+        assert!(text.contains("sample_rate_hz = 50000.0"), "{text}");
     }
 }

@@ -78,9 +78,14 @@ impl Steady {
     pub fn statement(&self) -> String {
         let Decline { rate_per_s, std_per_s } = self.decline;
         let shape = if self.growing { "grows" } else { "does not decay" };
+        // six digits
+        let decimals = (5.0 - self.frequency_hz.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+        let rate = match std_per_s.is_finite() {
+            true => format!(" (decay rate {rate_per_s:.3e} +- {std_per_s:.1e} 1/s)"),
+            false => String::new(),
+        };
         format!(
-            "steady oscillation at {:.6} Hz: its amplitude {shape} (decay rate {rate_per_s:.3e} +- {std_per_s:.1e} \
-             1/s), so Q cannot be had from it",
+            "steady oscillation at {:.decimals$} Hz: its amplitude {shape}{rate}, so Q cannot be had from it",
             self.frequency_hz
         )
     }

@@ -202,6 +202,11 @@ impl<'a> Record<'a> {
         }
         let range = first..end;
         let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
+        // what does not turn twice is a relaxation
+        if tone.frequency * (range.len() as f64) < LEAST_PERIODS as f64 {
+            found.dismissed.push(DismissedDecay { onset, reason: DismissedReason::TooShort });
+            return end;
+        }
         let frequency_hz = tone.frequency * self.rate_hz;
         if self.is_steady(&tone.decline, &range, why, options) {
             let Decline { rate_per_s, std_per_s } = tone.decline;

@@ -1,0 +1,92 @@
+//! Which channels of a file are the signals, which the inputs.
+
+use super::choice::Question;
+use super::pipeline::Wanted;
+use super::recordings::Source;
+use crate::inspect::{Channel, Values};
+
+/// Fewer distinct codes are those of a switch or a counter.
+const LEAST_CODES: usize = 16;
+/// How names of inputs begin.
+const INPUTS: [&str; 8] = ["input", "force", "hammer", "excit", "drive", "stimul", "torque", "actuat"];
+
+/// A channel by its name. Errors: there is none.
+pub fn named<'a>(source: &'a Source, name: &str) -> Result<&'a Channel, Question> {
+    let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
+    let found = source.channels.iter().find(|channel| bare(&channel.location) == bare(name));
+    found.ok_or_else(|| {
+        let names: Vec<&str> = source.channels.iter().map(|channel| channel.location.as_str()).collect();
+        (format!("{} has no channel `{name}`", source.file.display()), Some(format!("it has {}", names.join(", "))))
+    })
+}
+
+/// The channels with signals of the best one's length and unit. Errors: there is none.
+pub fn sensors(source: &Source) -> Result<Vec<&Channel>, Question> {
+    let best = source.best.and_then(|index| source.channels.get(index)).filter(usable);
+    let longest = || source.channels.iter().filter(usable).max_by_key(|channel| channel.samples);
+    let best = best.or_else(longest).ok_or_else(|| nothing(source))?;
+    let alike = |channel: &&Channel| {
+        usable(channel)
+            && !drives(channel)
+            && (channel.samples, &channel.unit, channel.sample_rate_hz)
+                == (best.samples, &best.unit, best.sample_rate_hz)
+    };
+    let found: Vec<&Channel> = source.channels.iter().filter(alike).collect();
+    Ok(if found.is_empty() { vec![best] } else { found })
+}
+
+/// Inputs and output: as they were named, else by their names. Errors: what cannot be told, and how to say it.
+pub fn input_and_output<'a>(
+    source: &'a Source,
+    wanted: &Wanted<'_>,
+) -> Result<(Vec<&'a Channel>, &'a Channel), Question> {
+    let signals: Vec<&Channel> = source.channels.iter().filter(usable).collect();
+    let inputs: Vec<&Channel> = match wanted.inputs {
+        [] => signals.iter().copied().filter(|channel| drives(channel)).collect(),
+        names => names.iter().map(|name| named(source, name)).collect::<Result<_, _>>()?,
+    };
+    let listed = || signals.iter().map(|channel| channel.location.as_str()).collect::<Vec<_>>().join(", ");
+    if inputs.is_empty() {
+        let help = format!("say with --input which of {} drives the others", listed());
+        return Err((format!("{} does not say which channel is the input", source.file.display()), Some(help)));
+    }
+    let others: Vec<&Channel> = signals
+        .iter()
+        .copied()
+        .filter(|channel| channel.samples == inputs[0].samples)
+        .filter(|channel| !inputs.iter().any(|input| input.location == channel.location))
+        .collect();
+    match (wanted.channels, &others[..]) {
+        ([one], _) => Ok((inputs, named(source, one)?)),
+        ([], [only]) => Ok((inputs, only)),
+        ([], []) => {
+            let problem = format!("{} has no further channel of that length", source.file.display());
+            Err((problem, Some("--channel names the output, --input the input".to_owned())))
+        }
+        _ => {
+            let problem = format!("{} has several channels that could be the output", source.file.display());
+            Err((problem, Some(format!("say with --channel which one of {}", listed()))))
+        }
+    }
+}
+
+/// Whether a channel is named as an input: force, hammer, drive, `u`, `u2`, `uBenchMark`.
+pub fn drives(channel: &Channel) -> bool {
+    let name = channel.location.rsplit(['/', '.']).next().unwrap_or_default();
+    let lower = name.to_lowercase();
+    let after_u = name.strip_prefix('u').and_then(|rest| rest.chars().next());
+    let u = name == "u" || after_u.is_some_and(|next| next.is_ascii_digit() || next.is_ascii_uppercase() || next == '_');
+    u || INPUTS.iter().any(|begin| lower.starts_with(begin))
+}
+
+/// Whether a channel holds a signal.
+pub fn usable(channel: &&Channel) -> bool {
+    let signal = |values: &Values| values.codes >= LEAST_CODES && values.missing == 0;
+    !channel.is_axis && channel.values.as_ref().is_some_and(signal)
+}
+
+/// That a file has no signal.
+pub fn nothing(source: &Source) -> Question {
+    let help = "`afmid inspect` says what recordings hold".to_owned();
+    (format!("{}: {}", source.file.display(), source.reason), Some(help))
+}
