@@ -130,3 +130,90 @@ fn one_decay_gives_the_same_modes_from_any_file_by_three_commands() {
     // of 30 intervals of 95 % fewer than 25 hold the truth once in a thousand times
     assert!(covered >= 25, "{covered} of {all} intervals hold the truth");
 }
+
+/// White noise: sums of twelve uniform numbers.
+fn white(seed: u64, samples: usize) -> Vec<f64> {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut uniform = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..samples).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+}
+
+/// What comes out of a resonance of 50 Hz, Q = 5, at 1 kHz.
+fn resonance(input: &[f64]) -> Vec<f64> {
+    let w = std::f64::consts::TAU * 50.0 / 1e3;
+    let (decay, turn) = ((-w / 10.0).exp(), w * (1.0 - 0.01_f64).sqrt());
+    let (mut last, mut before, mut before_input) = (0.0, 0.0, 0.0);
+    let step = |u: &f64| {
+        let next = 2.0 * decay * turn.cos() * last - decay * decay * before + before_input;
+        (before, last, before_input) = (last, next, *u);
+        next
+    };
+    input.iter().map(step).collect()
+}
+
+fn table(here: &Path, name: &str, header: &str, columns: &[&[f64]]) {
+    let row = |k: usize| {
+        let values: Vec<String> = columns.iter().map(|column| format!("{:.9}", column[k])).collect();
+        format!("{:.4},{}\n", k as f64 * 1e-3, values.join(","))
+    };
+    let rows: String = (0..columns[0].len()).map(row).collect();
+    std::fs::write(here.join(name), format!("{header}\n{rows}")).expect("a table");
+}
+
+#[test]
+fn the_data_choose_the_pipeline_and_its_numbers_hold() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let (force, sensor) = (white(1, 20_000), white(2, 20_000));
+    let moved: Vec<f64> = resonance(&force).iter().zip(&sensor).map(|(y, e)| y + 0.1 * e).collect();
+    let hum = |k: usize| (std::f64::consts::TAU * 0.0321 * k as f64).sin() + 0.05 * sensor[k];
+    table(here, "hum.csv", "Time (s),Signal (V)", &[&(0..20_000).map(hum).collect::<Vec<f64>>()]);
+    table(here, "noise.csv", "Time (s),Signal (V)", &[&moved]);
+    table(here, "both.csv", "Time (s),force (N),motion (m)", &[&force, &moved]);
+    let shown = |file: &str, goal: &str, id: &str| -> Value {
+        let (config, result) = (format!("{file}.toml"), format!("{file}.h5"));
+        let new: Value =
+            serde_json::from_str(&stdout(here, &["new", "pipeline", file, "-o", &config, "--json"])).expect("JSON");
+        assert_eq!(new["goal"], goal, "{new}");
+        stdout(here, &["run", &config, "-o", &result, "--cache", "cache"]);
+        serde_json::from_str(&stdout(here, &["show", &result, id, "--json"])).expect("JSON")
+    };
+    // within four standard errors
+    let near = |found: &Value, std: &Value, truth: f64| {
+        let (value, std) = (found.as_f64().expect("a value"), std.as_f64().expect("an error"));
+        assert!((value - truth).abs() < 4.0 * std, "{value} +- {std}, wanted {truth}");
+    };
+    let steady = &shown("hum.csv", "steady", "oscillation")["oscillations"][0];
+    near(&steady["frequency_hz"], &steady["frequency_std_hz"], 32.1);
+    let thermal = shown("noise.csv", "thermal", "thermal");
+    near(&thermal["frequency"]["value"], &thermal["frequency"]["robust_std"], 50.0);
+    near(&thermal["quality_factor"]["value"], &thermal["quality_factor"]["robust_std"], 5.0);
+    let modes = &shown("both.csv", "input-output", "modes")["modes"];
+    near(&modes[0]["frequency_hz"], &modes[0]["frequency_std_hz"], 50.0);
+    near(&modes[0]["damping_ratio"], &modes[0]["damping_ratio_std"], 0.1);
+}
+
+#[test]
+fn what_a_file_does_not_say_of_its_input_is_asked_for() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let force = white(3, 2000);
+    let [first, second] = [resonance(&force), white(4, 2000)];
+    table(here, "t.csv", "Time (s),force,a,b", &[&force, &first, &second]);
+    let refused = |arguments: &[&str]| {
+        let output = afmid(here, arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    assert!(refused(&["new", "pipeline", "t.csv"]).contains("say with --channel which one of force, a, b"));
+    let named = refused(&["new", "pipeline", "t.csv", "--input", "c"]);
+    assert!(named.contains("no channel `c`") && named.contains("force, a, b"), "{named}");
+    stdout(here, &["new", "pipeline", "t.csv", "--input", "force", "--channel", "b", "-o", "c.toml"]);
+    let text = std::fs::read_to_string(here.join("c.toml")).expect("a config");
+    assert!(text.contains("inputs = [\"force\"]") && text.contains("output = \"b\""), "{text}");
+}

@@ -7,14 +7,19 @@ Prints the true frequencies and damping ratios, and for each file what has to be
 
 import json
 import pathlib
+import struct
 import sys
 
 import h5py
+import nptdms
 import numpy as np
+import pandas
 import scipy.io
 import scipy.io.wavfile
 
 RATE_HZ = 5000.0
+# a code of 16 bits, in volts; a number of single precision holds it
+CODE = 2.0**-13
 MODES = [(211.0, 0.004), (463.0, 0.006), (921.0, 0.003)]
 
 
@@ -27,7 +32,8 @@ def decay(seed):
     for (frequency, damping), amplitude in zip(MODES, [1.0, 0.6, 0.4]):
         w = 2 * np.pi * frequency
         y += amplitude * np.exp(-damping * w * since) * np.sin(w * np.sqrt(1 - damping**2) * since + random.uniform(0, 6))
-    return np.where(since < 0, 0.0, y) + 0.01 * random.standard_normal(len(t)), t
+    y = np.where(since < 0, 0.0, y) + 0.01 * random.standard_normal(len(t))
+    return np.round(y / CODE) * CODE, t
 
 
 def universal(path, y):
@@ -40,6 +46,35 @@ def universal(path, y):
     lines += [f"{0:10d}    0    0    0 NONE                 NONE                "] * 2
     lines += ["".join(f"{value:20.12E}" for value in y[k : k + 4]) for k in range(0, len(y), 4)]
     path.write_text("\n".join(lines + ["    -1", ""]))
+
+
+def lecroy(path, y):
+    """LeCroy's binary waveform, template LECROY_2_3: a descriptor of 346 bytes, then codes of 16 bits."""
+    descriptor = bytearray(346)
+    codes = np.round(y / CODE).astype("<i2").tobytes()
+    for place, form, value in [
+        (0, "16s", b"WAVEDESC"),
+        (16, "16s", b"LECROY_2_3"),
+        (32, "<H", 1),  # words
+        (34, "<H", 1),  # low byte first
+        (36, "<i", 346),
+        (60, "<i", len(codes)),
+        (76, "16s", b"LECROYWS"),
+        (116, "<i", len(y)),
+        (128, "<i", len(y) - 1),
+        (144, "<i", 1),
+        (156, "<f", CODE),
+        (164, "<f", 32767.0),
+        (168, "<f", -32768.0),
+        (172, "<h", 16),
+        (176, "<f", 1 / RATE_HZ),
+        (196, "48s", b"V"),
+        (244, "48s", b"S"),
+    ]:
+        struct.pack_into(form, descriptor, place, value)
+    # 26 November 2026, 12:00
+    struct.pack_into("<dbbbbhh", descriptor, 296, 0.0, 0, 12, 26, 11, 2026, 0)
+    path.write_bytes(bytes(descriptor) + codes)
 
 
 def main():
@@ -62,7 +97,14 @@ def main():
             file[name].attrs["MATLAB_class"] = np.bytes_("double")
     with open(folder / "b.mat", "r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
-    asked = {"a.csv": [], "a.wav": volts, "a.mat": volts, "a.npy": volts + rate, "a.uff": [], "a.h5": [], "b.mat": volts}
+    with nptdms.TdmsWriter(folder / "a.tdms") as file:
+        properties = {"wf_increment": 1 / RATE_HZ, "wf_start_offset": 0.0, "wf_samples": len(y), "unit_string": "V"}
+        file.write_segment([nptdms.ChannelObject("decay", "signal", y, properties)])
+    pandas.DataFrame({"signal": y}, index=pandas.Index(t, name="time")).to_hdf(folder / "p.h5", key="decay")
+    lecroy(folder / "a.trc", y)
+    asked = {name: [] for name in ["a.csv", "a.tdms", "a.uff", "a.h5", "a.trc"]}
+    asked |= {name: volts for name in ["a.wav", "a.mat", "b.mat", "p.h5"]}
+    asked["a.npy"] = volts + rate
     print(json.dumps({"modes": MODES, "files": asked}))
 
 

@@ -107,4 +107,8 @@ pub enum Goal {
     Coupled,
     /// Transfer function and modes from a measured input and output.
     InputOutput,
+    /// Resonance, quality factor and noise floor of a resonator that nothing but noise drives.
+    Thermal,
+    /// Frequency and harmonics of an oscillation that does not decay.
+    Steady,
 }

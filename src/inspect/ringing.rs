@@ -12,6 +12,9 @@ use crate::show::number;
 /// Samples that are searched: a long record's first ones.
 const MOST_SEARCHED: usize = 1 << 22;
 
+/// What decays of a random vibration are.
+const RANDOM: &str = "rises and falls of a random vibration, no free decays: `afmid new pipeline` takes its spectrum";
+
 /// The longest stretch without an interruption before samples `gaps`; of equals the first.
 pub fn longest_stretch(samples: usize, gaps: &[usize]) -> Range<usize> {
     let ends = gaps.iter().copied().chain([samples]);
@@ -35,9 +38,9 @@ pub fn first_samples(found: &FoundChannel) -> Result<Vec<f64>, StageError> {
 pub fn ringdown(found: &FoundChannel) -> (Answer, String) {
     let rate = found.sample_rate_hz;
     // without a rate the search is in samples
-    let searched = first_samples(found)
-        .map_err(|error| error.problem)
-        .and_then(|y| find_decays(&[&y], rate.unwrap_or(1.0), &DecaySearchOptions::default()).map_err(|e| e.to_string()));
+    let searched = first_samples(found).map_err(|error| error.problem).and_then(|y| {
+        find_decays(&[&y], rate.unwrap_or(1.0), &DecaySearchOptions::default()).map_err(|e| e.to_string())
+    });
     match (searched, rate) {
         (Ok(search), Some(rate)) => of_search(&search, rate),
         (Ok(search), None) => without_rate(&search),
@@ -47,6 +50,7 @@ pub fn ringdown(found: &FoundChannel) -> (Answer, String) {
 
 fn of_search(search: &DecaySearch, rate: f64) -> (Answer, String) {
     match (search.decays.first(), search.reason()) {
+        (Some(_), _) if search.random => (Answer::No, RANDOM.to_owned()),
         (Some(first), _) => {
             let start_s = first.range.start as f64 / rate;
             let (frequency, samples) = (first.frequency_hz, rate / first.frequency_hz);
@@ -61,6 +65,7 @@ fn of_search(search: &DecaySearch, rate: f64) -> (Answer, String) {
 fn without_rate(search: &DecaySearch) -> (Answer, String) {
     let unknown = "the file states no sample rate: give `sample_rate_hz`";
     match (search.decays.first(), search.steady.first()) {
+        (Some(_), _) if search.random => (Answer::No, RANDOM.to_owned()),
         (Some(first), _) => {
             let (start, samples) = (first.range.start, 1.0 / first.frequency_hz);
             let from = format!("from sample {start} on, {samples:.1} samples a period");

@@ -75,7 +75,8 @@ pub fn drives(channel: &Channel) -> bool {
     let name = channel.location.rsplit(['/', '.']).next().unwrap_or_default();
     let lower = name.to_lowercase();
     let after_u = name.strip_prefix('u').and_then(|rest| rest.chars().next());
-    let u = name == "u" || after_u.is_some_and(|next| next.is_ascii_digit() || next.is_ascii_uppercase() || next == '_');
+    let u =
+        name == "u" || after_u.is_some_and(|next| next.is_ascii_digit() || next.is_ascii_uppercase() || next == '_');
     u || INPUTS.iter().any(|begin| lower.starts_with(begin))
 }
 

@@ -1,10 +1,13 @@
 //! What recordings look like: snap-offs of a lever, free decays, measured input and output, a steady oscillation.
 
 use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, FreeDecay, find_decays};
+use afmid_kernels::harmonics::{HarmonicOptions, fit_harmonics};
+use afmid_kernels::signal::{Detrend, Welch};
+use afmid_kernels::spectra::{AveragedDensity, SeenThrough, ThermalFitSettings, thermal_fit};
 use afmid_pipeline::recording::{InputFiles, Reading, open_contents};
 
 use super::channels::{drives, input_and_output, named, nothing, sensors, usable};
-use super::pipeline::Wanted;
+use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
 use crate::cli::{Goal, RecordsAre};
 use crate::inspect::{Channel, counted, first_samples};
@@ -30,6 +33,9 @@ pub struct Choice<'a> {
 /// Least step of the level, in peaks of the ringing, that a snap-off has: it lets the whole load go.
 const STEP: f64 = 0.5;
 
+/// Least quality factor of a resonance: below it the density has no maximum.
+const LEAST_QUALITY: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// Chooses by what the first file holds, as far as the user has not. Errors: what is not known, and how to say it.
 pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     match wanted.goal {
@@ -41,7 +47,9 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
             let why = format!("snap-offs: {} is of a force microscope", source.format);
             one_channel(source, wanted, Goal::Modes, why)
         }
-        None if wanted.channels.is_empty() && source.channels.iter().any(|channel| usable(&channel) && drives(channel)) => {
+        None if wanted.channels.is_empty()
+            && source.channels.iter().any(|channel| usable(&channel) && drives(channel)) =>
+        {
             input_output(source, wanted)
         }
         None => decay(source, wanted, true),
@@ -103,21 +111,66 @@ fn decay<'a>(source: &'a Source, wanted: &Wanted<'_>, guessed: bool) -> Result<C
     let records_are = wanted.records_are.or(cells.then_some(RecordsAre::Hits));
     // cells are hits of their own: one is enough to see what they are
     let seen = if records_are == Some(RecordsAre::Hits) { &channels[..1] } else { &channels[..] };
-    let (_, found) = search(source, seen, wanted)?;
+    let (values, found) = search(source, seen, wanted)?;
+    let record = name(source);
+    let other = |goal, why| {
+        let channel = channels[0];
+        Ok(Choice { goal, channels: vec![channel], inputs: Vec::new(), records_are: None, why })
+    };
     let why = match (found.decays.first(), found.reason()) {
+        (Some(_), _) if guessed && found.random => {
+            return other(Goal::Thermal, format!("{record}: rises and falls of a random vibration, no free decays"));
+        }
         (Some(first), _) => {
-            let count = found.decays.len();
             let time_s = first.range.start as f64 / rate(source, seen[0], wanted)?;
             let from = format!("from {} s on, at {} Hz", number(time_s), number(first.frequency_hz));
-            format!("{}: {} {from}", name(source), counted(count))
+            format!("{record}: {} {from}", counted(found.decays.len()))
+        }
+        (None, Some(reason)) if guessed && !found.steady.is_empty() && is_coherent(&values[0]) => {
+            return other(Goal::Steady, format!("{record}: {reason}"));
+        }
+        (None, Some(_)) if guessed && has_resonance(&values[0]) => {
+            return other(Goal::Thermal, format!("{record}: noise with a resonance in it"));
         }
         (None, Some(reason)) if guessed => {
             let help = "look at it with `afmid inspect`; --channel names the signal, --goal says what to find";
             return Err((format!("{}: no free decay, {reason}", source.file.display()), Some(help.to_owned())));
         }
-        (None, reason) => format!("--goal decay; in {}: {}", name(source), reason.unwrap_or_default()),
+        (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };
     Ok(Choice { goal: Goal::Decay, channels, inputs: Vec::new(), records_are, why })
+}
+
+/// Whether one oscillation has most of the power: the narrow band of a resonance in noise has a phase that wanders.
+fn is_coherent(values: &[f64]) -> bool {
+    fit_harmonics(values, 1.0, &HarmonicOptions::default()).is_ok_and(|fit| {
+        let amplitude = fit.harmonics.first().map_or(0.0, |first| first.amplitude);
+        0.5 * amplitude.powi(2) > fit.residual_rms.powi(2)
+    })
+}
+
+/// Whether the spectrum of noise has a resonance: it is fitted, and stands above the floor.
+fn has_resonance(values: &[f64]) -> bool {
+    let segment = segment_samples(values.len());
+    let spectrum = Welch::new(segment, 1.0, Detrend::Mean).and_then(|mut welch| {
+        welch.push(values);
+        Ok((welch.average()?, 1.0 / segment as f64))
+    });
+    let Ok((average, bin)) = spectrum else { return false };
+    // the removed mean and the fold
+    let inner = 4..average.density.len().saturating_sub(4);
+    let frequency: Vec<f64> = inner.clone().map(|k| k as f64 * bin).collect();
+    let density = AveragedDensity {
+        frequency_hz: &frequency,
+        density: average.density.get(inner).unwrap_or_default(),
+        averages: average.independent_segments(),
+        through: Some(SeenThrough::Hann),
+    };
+    thermal_fit(density, ThermalFitSettings::default()).is_ok_and(|fit| {
+        let at_peak =
+            std::f64::consts::FRAC_2_PI * fit.variance.value * fit.quality_factor.value / fit.frequency_hz.value;
+        at_peak > fit.white.value && fit.quality_factor.value > LEAST_QUALITY
+    })
 }
 
 fn name(source: &Source) -> String {

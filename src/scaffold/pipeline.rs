@@ -33,6 +33,8 @@ impl Goal {
             Self::Diagnosis => include_str!("../../configs/diagnose.toml"),
             Self::Coupled => include_str!("../../configs/coupled-lever.toml"),
             Self::InputOutput => include_str!("../../configs/input-output.toml"),
+            Self::Thermal => include_str!("../../configs/thermal.toml"),
+            Self::Steady => include_str!("../../configs/steady.toml"),
         }
     }
 
@@ -45,6 +47,8 @@ impl Goal {
             Self::Diagnosis => "diagnosis",
             Self::Coupled => "coupled",
             Self::InputOutput => "input-output",
+            Self::Thermal => "thermal",
+            Self::Steady => "steady",
         }
     }
 
@@ -87,6 +91,10 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
                 };
                 text.push_str(&format!("params = {{ as = \"{records_are}\" }}\n"));
             }
+            Some(("params", _)) if stage == "\"spectrum.welch\"" => {
+                let samples = segment_samples(choice.channels[0].samples);
+                text.push_str(&format!("params = {{ segment_samples = {samples}, stretches = \"all\" }}\n"));
+            }
             _ => {
                 if line == "[pipeline]" && !choice.why.is_empty() {
                     text.push_str(&format!("# chosen: {}\n", one_line(&choice.why)));
@@ -111,7 +119,7 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
         let all = choice.channels.iter().map(|channel| text(&channel.location)).collect();
         params.insert("channels".to_owned(), Value::Array(all));
     }
-    if choice.goal == Goal::Decay {
+    if matches!(choice.goal, Goal::Decay | Goal::Thermal | Goal::Steady) {
         params.insert("piezo_channel".to_owned(), text(""));
     }
     if let Some(rate) = rate(channel, wanted, &file)? {
@@ -131,6 +139,11 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
         _ => {}
     }
     Ok(format!("params = {}\n", Value::Table(params)))
+}
+
+/// Samples of a segment of a spectrum: a power of two, at least 30 of them in a record, half overlapping.
+pub fn segment_samples(samples: usize) -> usize {
+    (samples / 16).max(64).next_power_of_two().min(1 << 22) / 2
 }
 
 /// The `params` of the stage `data`.
@@ -201,7 +214,8 @@ mod tests {
         }
     }
 
-    const GOALS: [Goal; 5] = [Goal::Decay, Goal::Modes, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled];
+    const GOALS: [Goal; 7] =
+        [Goal::Decay, Goal::Modes, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled, Goal::Thermal, Goal::Steady];
 
     fn wanted(goal: Goal) -> Wanted<'static> {
         Wanted { goal: Some(goal), channels: &[], inputs: &[], records_are: None, rate_hz: None, unit: None }
@@ -210,7 +224,13 @@ mod tests {
     /// The config for the first channel.
     fn of_first(source: &Source, wanted: Wanted<'_>, folder: &str) -> Result<String, Question> {
         let goal = wanted.goal.expect("a goal");
-        let choice = Choice { goal, channels: vec![&source.channels[0]], inputs: Vec::new(), records_are: None, why: String::new() };
+        let choice = Choice {
+            goal,
+            channels: vec![&source.channels[0]],
+            inputs: Vec::new(),
+            records_are: None,
+            why: String::new(),
+        };
         pipeline(source, &choice, wanted, Path::new(folder))
     }
 

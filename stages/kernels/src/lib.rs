@@ -13,12 +13,13 @@
 //! | [`spectra`] | records | ETFE, smoothed responses, power spectra, thermal fits |
 //! | [`contact`] | poles in contact and free | contact stiffness and damping |
 //! | [`events::decay`] | records | where free decays begin and end |
+//! | [`harmonics`] | a steady oscillation | frequency, amplitudes and phases of its harmonics |
 //! | [`modes`] | a model with its covariance | frequencies, quality factors, static shares, zeros |
 //! | [`simulate`] | a lever, a contact, a detector | records with their truth |
 //!
 //! From the ground up, each using only those before it:
 //! [`linear_algebra`], [`signal`], [`statistics`], [`effects`], [`Monitor`] - [`optimise`] - [`events`] -
-//! [`calibration`], [`force`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`], [`subspace`],
+//! [`calibration`], [`force`], [`harmonics`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`], [`subspace`],
 //! [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`]. Kernels that fit many times
 //! take a [`Monitor`]: [`ringdown::fit_counted_ringdowns`], [`validation::choose_order`], [`validation::bootstrap`].
 //!
@@ -38,6 +39,7 @@ pub mod effects;
 pub mod events;
 pub mod force;
 pub mod grey;
+pub mod harmonics;
 pub mod linear_algebra;
 pub mod model;
 pub mod modes;

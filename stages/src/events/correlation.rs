@@ -294,11 +294,13 @@ fn nothing_found(listed: &Listed, records: &[Record]) -> StageError {
     let more = listed.refused.len().saturating_sub(reasons.len());
     let more = if more > 0 { format!("; and {more} more") } else { String::new() };
     let rate = records.first().map_or(f64::NAN, |record| record.sample_rate_hz);
-    StageError::new(format!("no usable event in {} records: {}{more}", records.len(), reasons.join("; "))).help(format!(
-        "check the channel, its sign, and `kind`: `afmid inspect` says where a record rings, `io.records` and \
+    StageError::new(format!("no usable event in {} records: {}{more}", records.len(), reasons.join("; "))).help(
+        format!(
+            "check the channel, its sign, and `kind`: `afmid inspect` says where a record rings, `io.records` and \
          `io.overview` alone draw one (`afmid report`). The records have {rate} samples per second: a recorder of less \
          than twenty samples a period filters a lever's ringing out"
-    ))
+        ),
+    )
 }
 
 #[cfg(test)]

@@ -72,7 +72,7 @@ pub(crate) fn white_noise(samples: usize, std: f64, seed: u64) -> Vec<f64> {
     (0..samples).map(|_| std * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng)).collect()
 }
 
-fn record(name: &str, hit: bool) -> Result<Record, StageError> {
+pub(crate) fn record(name: &str, hit: bool) -> Result<Record, StageError> {
     std::fs::create_dir_all(FOLDER).map_err(|error| StageError::from_error(error).at(FOLDER))?;
     let path = Path::new(FOLDER).join(format!("{name}.h5"));
     let channel = |sensor: usize| NativeChannel {

@@ -9,6 +9,8 @@ mod decay_example;
 mod era;
 mod example;
 mod grey;
+mod harmonics;
+mod harmonics_example;
 mod known;
 mod modes;
 mod order;
@@ -28,6 +30,7 @@ pub use count::Count;
 pub use decay::{DecayFit, DecayNoise};
 pub use era::EraEstimate;
 pub use grey::GreyEstimate;
+pub use harmonics::Harmonics;
 pub use known::{KnownNumber, KnownQuantity};
 pub use modes::Modes;
 pub use order::Order;
@@ -54,6 +57,7 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<Zeros>(),
     Entry::of::<RingdownFit>(),
     Entry::of::<DecayFit>(),
+    Entry::of::<Harmonics>(),
     Entry::of::<ContactFit>(),
 ];
 

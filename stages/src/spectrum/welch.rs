@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::artifacts::{NewDensity, SAMPLE_RATE_HZ};
+use crate::artifacts::{NewDensity, SAMPLE_RATE_HZ, deflection};
 use crate::calibration::FreeSettings;
 use crate::calibration::reading::{common_rate, push_free, read_blocks, read_free};
 use crate::io::DENSITY;
@@ -19,11 +19,11 @@ use afmid_kernels::spectra::{RecordSpectrum, average_spectra};
 /// Stationary noise while the lever is free: each segment's periodogram is exponentially distributed about the density.
 /// # Method
 /// Segments under a Hann window, each overlapping the next by half, their means removed; averaged over all free
-/// stretches of all records.
+/// stretches of all records, or over all that they hold.
 /// # Shapes
 /// One value per bin, from zero to half the sample rate.
 /// # Units
-/// V^2/Hz, one-sided; its sum times the bin width is the mean square.
+/// The signal's unit squared per hertz, one-sided; its sum times the bin width is the mean square.
 /// # Accuracy
 /// `standard_error` from the number of independent segments (overlap counted), `record_error` from the scatter between
 /// records, which also holds drift: where the second is larger, the noise is not stationary. A bin sees an equivalent
@@ -38,13 +38,25 @@ pub struct Welch {
     /// Samples per segment, even. Why: bins of 305 Hz at 5 MS/s, a quarter of the paper's first peak.
     #[schemars(range(min = 16, max = 4_194_304))]
     pub segment_samples: usize,
+    /// What is averaged: `free` stretches of force curves, or `all` of each record: a resonator that nothing touches.
+    pub stretches: Stretches,
     /// What counts as a free stretch.
     pub free: FreeSettings,
 }
 
+/// What is averaged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stretches {
+    /// Stretches without contact and without events.
+    Free,
+    /// All of each record.
+    All,
+}
+
 impl Default for Welch {
     fn default() -> Self {
-        Self { segment_samples: 16_384, free: FreeSettings::default() }
+        Self { segment_samples: 16_384, stretches: Stretches::Free, free: FreeSettings::default() }
     }
 }
 
@@ -55,7 +67,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Welch {
     const SPEC: Spec = Spec {
         name: "spectrum.welch",
-        version: 1,
+        version: 2,
         summary: "averages periodograms of free stretches into a density with its uncertainty",
         inputs: &[RECORDS.spec()],
         outputs: &[DENSITY.spec(), SUMMARY.spec()],
@@ -96,6 +108,7 @@ impl Stage for Welch {
                 "the records' spectra scatter {excess:.1} times as much as chance: the noise is not stationary"
             ));
         }
+        let unit = deflection(&records[0])?.unit.clone();
         let summary = Document::new(&json!({
             "records": found.len(),
             "segments": average.segments,
@@ -104,7 +117,7 @@ impl Stage for Welch {
             "bin_hz": bin_hz,
             "equivalent_noise_bandwidth_hz": 1.5 * bin_hz,
             "record_scatter": excess.is_finite().then_some(excess),
-            "mean_square_v2": average.density.iter().sum::<f64>() * bin_hz,
+            "mean_square": { "value": average.density.iter().sum::<f64>() * bin_hz, "unit": format!("{unit}^2") },
         }))?;
         let frequency = (0..average.density.len()).map(|k| k as f64 * bin_hz).collect();
         let density = NewDensity {
@@ -112,14 +125,14 @@ impl Stage for Welch {
             density: average.density,
             standard_error: average.standard_error,
             averages: average.averages,
-            signal_unit: "V",
+            signal_unit: &unit,
             error_if: " if stationary",
         };
         let density = density
             .through("hann")
             .with(
                 "record_error",
-                "V^2/Hz",
+                &format!("{unit}^2/Hz"),
                 "its standard error from the scatter of records",
                 &["frequency_hz"],
                 average.record_error,
@@ -153,11 +166,17 @@ impl Stage for Welch {
 impl Welch {
     /// A record's average; none without a free stretch that is long enough.
     fn spectrum(&self, record: &Record, rate: f64, empty: &Collector) -> Result<Option<RecordSpectrum>, StageError> {
-        let rule = self.free.rule(rate, self.segment_samples);
-        let free = read_free(record, &read_blocks(record, self.free.block_samples)?, rule)?;
+        let all = 0..deflection(record)?.samples;
+        let stretches = match self.stretches {
+            Stretches::All => vec![all],
+            Stretches::Free => {
+                let rule = self.free.rule(rate, self.segment_samples);
+                read_free(record, &read_blocks(record, self.free.block_samples)?, rule)?.stretches
+            }
+        };
         let mut collector = empty.fresh();
-        push_free(record, &free.stretches, &mut collector)?;
-        let stretches = free.stretches.iter().filter(|stretch| stretch.len() >= self.segment_samples).count();
+        push_free(record, &stretches, &mut collector)?;
+        let stretches = stretches.iter().filter(|stretch| stretch.len() >= self.segment_samples).count();
         let Ok(average) = collector.average() else { return Ok(None) };
         Ok(Some(RecordSpectrum {
             density: average.density,

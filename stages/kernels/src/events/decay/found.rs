@@ -124,6 +124,9 @@ pub struct DecaySearch {
     pub largest_energy: f64,
     /// Numbers of the channels that are searched: all but the drive's.
     pub channels: Vec<usize>,
+    /// Whether the decays look like the rises and falls of a random vibration: many, in a signal that is normally
+    /// distributed.
+    pub random: bool,
 }
 
 impl DecaySearch {

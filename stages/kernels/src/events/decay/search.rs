@@ -22,6 +22,11 @@ const QUIET_PERIODS: usize = 4;
 const LEAST_PERIODS: usize = 2;
 /// Fall of the amplitude, nepers, that is a decay whatever its slope's error: two periods of a low Q have none.
 const CERTAIN_FALL: f64 = 1.5;
+/// Rises that may be those of a random vibration. Why: fewer do not know a fourth moment.
+const RANDOM_RISES: usize = 10;
+/// Departure of a random vibration's kurtosis from that of a normal distribution. Why: four standard errors of 1,500
+/// independent samples, of which ten rises have some.
+const RANDOM_KURTOSIS: f64 = 0.5;
 /// Fall of the amplitude, nepers, below which an instrument's own gain may have drifted.
 const LEAST_FALL: f64 = 1e-3;
 
@@ -66,12 +71,14 @@ pub fn find_decays(
         largest_energy: record.envelope.largest(0, record.envelope.samples()),
         noise_std: record.noise_std.clone(),
         channels: record.numbers.clone(),
+        random: false,
     };
     let mut since = 0;
     for (place, &onset) in starts.iter().enumerate() {
         let next = starts.get(place + 1).copied().unwrap_or(record.envelope.samples());
         since = record.judge(onset, since, next, options, &mut found);
     }
+    found.random = record.is_random(&found);
     while found.decays.len() > options.most {
         let size = |d: &FreeDecay| d.channels.iter().zip(&record.noise_std).map(|(c, s)| (c.peak / s).powi(2)).sum();
         let sizes: Vec<f64> = found.decays.iter().map(size).collect();
@@ -257,6 +264,19 @@ impl<'a> Record<'a> {
             return why != DecayEnd::Noise && fall < 0.5;
         }
         decline.rate_per_s < options.decline_significance * decline.std_per_s || total < LEAST_FALL
+    }
+
+    /// Whether the decays may be those of a random vibration, which is normally distributed.
+    ///
+    /// Hits `x` decay times apart have a fourth moment of `1.5 x` times the second's square: 6 and more with quiet
+    /// between them. Of hits some two decay times apart it is a normal distribution's: they are taken for random.
+    fn is_random(&self, found: &DecaySearch) -> bool {
+        let kurtosis = |swing: &Vec<f64>| {
+            let moment = |power: i32| swing.iter().map(|y| y.powi(power)).sum::<f64>() / swing.len() as f64;
+            moment(4) / moment(2).powi(2).max(f64::MIN_POSITIVE)
+        };
+        let normal = |swing: &Vec<f64>| (kurtosis(swing) - 3.0).abs() < RANDOM_KURTOSIS;
+        found.decays.len() >= RANDOM_RISES && self.swings.iter().all(normal)
     }
 
     fn channels_of(&self, range: &Range<usize>, quiet: Option<&Range<usize>>, next: usize) -> Vec<ChannelDecay> {

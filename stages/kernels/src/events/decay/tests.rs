@@ -279,3 +279,37 @@ fn options_are_read_as_they_are_written() {
     let read: DecaySearchOptions = serde_json::from_str(r#"{"trigger": {"drive-end": {}}}"#).unwrap();
     assert_eq!(read.trigger, DecayTrigger::DriveEnd { channel: None });
 }
+
+/// White noise through a resonance of `period` samples.
+fn vibration(seed: u64, quality: f64, period: f64, samples: usize) -> Vec<f64> {
+    let s = num_complex::Complex64::new(-std::f64::consts::PI / (quality * period), std::f64::consts::TAU / period);
+    let z = s.exp();
+    let (mut last, mut before) = (0.0, 0.0);
+    let drive = white_noise(samples, 1.0, seed);
+    let sensor = white_noise(samples, 0.5, seed + 1000);
+    drive
+        .iter()
+        .zip(sensor)
+        .map(|(force, noise)| {
+            let next = force + 2.0 * z.re * last - z.norm_sqr() * before;
+            (before, last) = (last, next);
+            next + noise
+        })
+        .collect()
+}
+
+#[test]
+fn a_random_vibration_is_said_to_be_one_and_hits_are_not() {
+    let (mut missed, mut false_ones) = (0, 0);
+    for (seed, quality) in (0..40).zip([1.5, 3.0, 6.0, 12.0].into_iter().cycle()) {
+        let found = find_decays(&[&vibration(seed, quality, 14.3, 60_000)], 1e3, &DecaySearchOptions::default());
+        missed += usize::from(!found.unwrap().random);
+        // a dozen hits, four decay times apart: no quiet between them
+        let mut plan = Plan { contact_s: 0.0, modes: vec![(100.0, 30.0)], ..Plan::drawn(seed) };
+        let apart = 4.0 * 30.0 / (std::f64::consts::PI * 100.0);
+        plan.hits = (0..12).map(|i| (0.2 + f64::from(i) * apart, 1.0)).collect();
+        plan.samples = ((0.3 + 12.0 * apart) * plan.rate_hz) as usize;
+        false_ones += usize::from(search(&plan).random);
+    }
+    assert!(missed <= 1 && false_ones == 0, "{missed} missed, {false_ones} false");
+}

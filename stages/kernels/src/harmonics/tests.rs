@@ -1,0 +1,107 @@
+use rand::{Rng, SeedableRng};
+use rand_distr::StandardNormal;
+
+use super::*;
+
+const RATE: f64 = 10e3;
+
+/// Fundamental of amplitude 1 with a tenth of its third harmonic, in noise with a pole (0: white).
+fn simulated(seed: u64, frequency: f64, noise: f64, pole: f64) -> Vec<f64> {
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let mut e = 0.0;
+    (0..4000)
+        .map(|k| {
+            let white: f64 = random.sample(StandardNormal);
+            e = pole * e + noise * white;
+            let turn = std::f64::consts::TAU * frequency * k as f64 / RATE;
+            0.3 + (turn + 0.4).cos() + 0.1 * (3.0 * turn - 1.0).cos() + e
+        })
+        .collect()
+}
+
+#[test]
+fn errors_are_those_stated_in_white_and_in_coloured_noise() {
+    for pole in [0.0, 0.9] {
+        let mut squares = [0.0; 4];
+        let seeds = 300;
+        for seed in 0..seeds {
+            let frequency = 300.0 + 0.7 * seed as f64;
+            let fit = fit_harmonics(&simulated(seed, frequency, 0.05, pole), RATE, &HarmonicOptions::default());
+            let fit = fit.expect("a fit");
+            let (first, third) = (fit.harmonics[0], fit.harmonics[2]);
+            let z = [
+                (fit.frequency_hz - frequency) / fit.frequency_std_hz,
+                (first.amplitude - 1.0) / first.amplitude_std,
+                (third.amplitude - 0.1) / third.amplitude_std,
+                (first.phase_rad - 0.4) / first.phase_std_rad,
+            ];
+            squares.iter_mut().zip(z).for_each(|(s, z)| *s += z * z / seeds as f64);
+        }
+        // rms of 300 normal deviates: 1 +- 0.041; four standard errors
+        for rms in squares.map(f64::sqrt) {
+            assert!((0.84..1.16).contains(&rms), "pole {pole}: {squares:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_harmonic_is_rarely_one_and_what_is_always() {
+    let (mut false_ones, mut tried) = (0, 0);
+    for seed in 0..100 {
+        let fit = fit_harmonics(&simulated(seed, 417.3, 0.05, 0.0), RATE, &HarmonicOptions::default()).expect("a fit");
+        assert!(fit.harmonics[2].p_value < 1e-6, "{fit:?}");
+        let others = fit.harmonics.iter().filter(|h| ![1, 3].contains(&h.number));
+        tried += others.clone().count();
+        false_ones += others.filter(|h| h.p_value < 0.01).count();
+    }
+    // 800 at 1 %: 8 +- 2.8
+    assert!(false_ones <= 20, "{false_ones} of {tried}");
+}
+
+#[test]
+fn a_steady_tone_is_steady_and_wander_is_seen_and_counted() {
+    let (mut alarms, mut missed) = (0, 0);
+    for seed in 0..200 {
+        let fit = |y: &[f64]| fit_harmonics(y, RATE, &HarmonicOptions::default()).expect("a fit");
+        let y = simulated(seed, 417.3, 0.05, 0.0);
+        let steady = fit(&y);
+        alarms += usize::from(steady.amplitude.p_value < 0.01) + usize::from(steady.phase.p_value < 0.01);
+        // frequency rises by 0.1 % over the record
+        let swept: Vec<f64> = (0..4000)
+            .map(|k| {
+                let t = k as f64 / RATE;
+                let turn = std::f64::consts::TAU * 417.3 * (t + 0.5 * 1e-3 * t * t / 0.4);
+                turn.cos() + (y[k] - 0.3 - (std::f64::consts::TAU * 417.3 * t + 0.4).cos()) * 0.2
+            })
+            .collect();
+        let swept = fit(&swept);
+        missed += usize::from(swept.phase.p_value > 1e-6);
+        assert!(swept.frequency_std_hz > steady.frequency_std_hz, "{swept:?}");
+    }
+    // 400 tests at 1 %: 4 +- 2
+    assert!(alarms <= 12 && missed == 0, "{alarms} alarms, {missed} missed");
+}
+
+#[test]
+fn the_fundamental_may_be_weaker_than_its_harmonics() {
+    let y = |k: usize| {
+        let turn = std::f64::consts::TAU * 0.0123 * k as f64;
+        0.2 * turn.cos() + (2.0 * turn).cos() + 1e-3 * ((k * k) as f64).sin()
+    };
+    let y: Vec<f64> = (0..4000).map(y).collect();
+    let fit = fit_harmonics(&y, 1.0, &HarmonicOptions::default()).expect("a fit");
+    assert!((fit.frequency_hz - 0.0123).abs() < 1e-6, "{fit:?}");
+    assert!((fit.harmonics[1].amplitude - 1.0).abs() < 1e-3, "{fit:?}");
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused() {
+    let fit = |y: &[f64], options: HarmonicOptions| fit_harmonics(y, 1.0, &options).unwrap_err().to_string();
+    let default = HarmonicOptions::default;
+    let tone: Vec<f64> = (0..100).map(|k| (0.3 * k as f64).sin()).collect();
+    assert!(fit(&tone[..20], default()).contains("20 samples"));
+    assert!(fit(&[1.0; 100], default()).contains("no line"));
+    assert!(fit(&[&tone[..50], &[f64::NAN; 50]].concat(), default()).contains("sample 50"));
+    assert!(fit(&tone, HarmonicOptions { parts: 2, ..default() }).contains("parts is 2"));
+    assert!(fit(&tone, HarmonicOptions { near_hz: Some(0.6), ..default() }).contains("near_hz"));
+}
