@@ -20,8 +20,8 @@ use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Dro
 /// its own, noise of each channel white with wander. Of several hits the residues of a mode are one complex shape over
 /// the channels times an amplitude per hit: tested, not imposed.
 /// Method: maximum likelihood by variable projection; modes one by one, each kept if noise alone gains as much with a
-/// probability below `false_alarm`. Exponentials that a mode leaves because it moves with its amplitude (in its line, of
-/// its shape, twice as fast) and lines that do not die away are left out. The first and the last part of the decays are
+/// probability below `false_alarm`. Exponentials that a mode leaves because it moves with its amplitude (in its line,
+/// of its shape, twice as fast) and lines that do not die away are left out. The first and the last part of the decays are
 /// fitted too and their difference is tested: where a mode moves and none has died away, the last part counts.
 /// Shapes: `modes` by row, ascending; `shapes` over mode and channel with the modal assurance criterion over mode and
 /// mode; `hits` a row per hit and mode; `course` a row per mode and part; `fit` over channel and time of the largest hit.
@@ -112,8 +112,8 @@ impl Stage for DecayFit {
         let companions = followed.dropped.iter().filter(|d| d.reason != Dropped::Steady).count();
         if companions > 0 {
             cx.warn(format!(
-                "{companions} of the fitted exponentials are companions of modes that move with their amplitude and are \
-                 left out: `summary` lists them under `dropped`"
+                "{companions} of the fitted exponentials are companions of modes that move with their amplitude and \
+                 are left out: `summary` lists them under `dropped`"
             ));
         }
         parts.warnings(followed.from).into_iter().for_each(|warning| cx.warn(warning));

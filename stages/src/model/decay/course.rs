@@ -110,13 +110,14 @@ impl<'a> Parts<'a> {
         };
         if from > 0 {
             warnings.push(format!(
-                "the modes are those of the last part, from {:.4} s on, in which they are smallest; `course` has both ends",
+                "the modes are those of the last part, from {:.4} s on, in which they are smallest; `course` has \
+                 both ends",
                 self.cut_s
             ));
         } else if !moving.is_empty() && !self.gone.is_empty() {
             warnings.push(format!(
-                "the modes are those of the whole decays, errors widened: {} died away before the last part; `course` has \
-                 both ends of the others",
+                "the modes are those of the whole decays, errors widened: {} died away before the last part; \
+                 `course` has both ends of the others",
                 frequencies(&self.gone)
             ));
         }
@@ -126,8 +127,8 @@ impl<'a> Parts<'a> {
     fn warning(&self, course: &ModeCourse) -> String {
         let (before, after) = (course.first.damping_ratio(), course.last.damping_ratio());
         format!(
-            "a mode moves while it dies away: {:.7} Hz and a damping ratio of {:.4} % up to {:.4} s, {:.7} Hz and {:.4} % \
-             from there to {:.4} s ({:.1} and {:.1} standard errors): not linear",
+            "a mode moves while it dies away: {:.7} Hz and a damping ratio of {:.4} % up to {:.4} s, {:.7} Hz and \
+             {:.4} % from there to {:.4} s ({:.1} and {:.1} standard errors): not linear",
             course.first.frequency_hz.value,
             100.0 * before.value,
             self.cut_s,

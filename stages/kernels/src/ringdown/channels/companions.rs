@@ -59,8 +59,9 @@ pub(super) fn steady(fit: &ChannelRingdown, duration_s: f64) -> Vec<usize> {
 /// Frequency and damping that change with a power p >= 1 of the amplitude: `exp(s t) (1 + c_1 exp(-p a t) + ..)` with
 /// the decay rate a, so all but the first term die away `1 + p >= 2` times as fast, within the line of the first.
 /// # Method
-/// Slowest first: a pole whose frequency is nearer to that of a slower mode than the larger half width, of its shape and
-/// with at least twice its decay rate (less two standard errors). Of several such modes that with the most energy.
+/// Slowest first: a pole whose frequency is nearer to that of a slower mode than its own half width, of that mode's
+/// shape and with at least twice its decay rate (less two standard errors). Of several such modes that with the most
+/// energy.
 pub(super) fn companions(fit: &ChannelRingdown) -> Vec<(usize, usize, f64)> {
     let energy = energies(fit);
     let mut order: Vec<usize> = (0..energy.len()).collect();

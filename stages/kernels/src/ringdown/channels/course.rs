@@ -60,8 +60,8 @@ pub struct FollowedDecay {
 pub const MOVES: f64 = 1e-3;
 /// Decay times of the strongest mode after which the last part begins.
 ///
-/// The error of the difference between the parts' frequencies is least there: with `u = 2 a t`, the information before is
-/// `(1 - e^-u) (1 - u^2 e^-u / (1 - e^-u)^2)` and after `e^-u` of all; the sum of inverses has its minimum at u = 1.8.
+/// The error of the difference between the parts' frequencies is least there: with `u = 2 a t`, the information before
+/// is `(1 - e^-u) (1 - u^2 e^-u / (1 - e^-u)^2)` of all and after `e^-u`; the sum of inverses is least at u = 1.8.
 /// What a frequency quadratic in the amplitude moves between the parts does not depend on the cut.
 const CUT: f64 = 0.9;
 /// Energy of a mode in a part, in variances of the noise, that a comparison needs: its damping is known to a fifth.
@@ -78,8 +78,8 @@ const FAR: f64 = 0.1;
 /// exponentials in a linear fit: these companions lie in its line and have its shape.
 /// # Method
 /// Exponentials in the line of a slower one, of its shape and at least twice as fast, are dropped ([`Dropped`]): their
-/// modes are fitted again without them, errors widened by what is then left round each line; of all other modes they stay
-/// nuisances. All are fitted to the first and to the
+/// modes are fitted again without them, errors widened by what is then left round each line; of all other modes they
+/// stay nuisances. All are fitted to the first and to the
 /// last part: for a linear system they are the same there (chi square of the difference of both poles at the level
 /// [`MOVES`] for all modes together). With one channel every shape is the same: there the line and the rate decide.
 /// # Shapes

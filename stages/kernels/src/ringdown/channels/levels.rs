@@ -15,7 +15,7 @@ use crate::statistics::chi_square_tail;
 const BAND: f64 = 20.0;
 /// Decay times after which a line has no weight: `exp(-8)`, a millionth of its energy.
 const GONE: f64 = 8.0;
-/// Probability with which noise alone is called a lack of fit: one line in a thousand has its error widened for nothing.
+/// Probability with which noise alone is called a lack of fit: one error in a thousand is widened for nothing.
 const LEVEL: f64 = 1e-3;
 
 /// Variance per sample that white noise of the same density would have, at `turn` rad per sample.

@@ -149,7 +149,8 @@ impl Ladder<'_> {
     /// Gain of twice the log-likelihood of a step over an earlier one, for its modes at `places`.
     ///
     /// Method: fall of the energy over the variance of what the step leaves; where noise is estimated, round these
-    /// modes' lines. A line so broad that the noise is not flat over it is compared with coloured noise.
+    /// modes' lines. What is left of coloured noise looks like modes of a few periods: under such noise the likelihoods
+    /// count too, each fit under its own noise.
     fn gain(&self, before: &Mark, step: &Step, places: &[c64]) -> f64 {
         let fall = |c: usize| before.energy[c] - step.energy[c];
         if self.given_noise() {
@@ -159,16 +160,18 @@ impl Ladder<'_> {
             degrees(self.records, &step.fitted).iter().zip(&step.energy).map(|(d, e)| (e / d).max(1e-300)).collect();
         let mut variance = usual.clone();
         if self.options.noise == ChannelNoise::Estimated {
-            if self.is_coloured(&step.noise, places, &step.fitted.poles) {
-                return self.deviance(before) - self.deviance(&step.mark());
-            }
             let left = residuals(self.records, &step.fitted);
             let local = |place: &c64| local_variances(self.records, &left, &step.fitted.poles, *place, &usual);
             let all: Vec<Vec<f64>> = places.iter().map(local).collect();
             let most = |c: usize| all.iter().map(|own| own[c]).reduce(f64::max).unwrap_or(usual[c]);
             variance = (0..usual.len()).map(most).collect();
         }
-        (0..usual.len()).map(|c| fall(c) / variance[c]).sum()
+        let gain = (0..usual.len()).map(|c| fall(c) / variance[c]).sum();
+        let coloured = step.noise.iter().any(|noise| !noise.is_white());
+        if !coloured || self.by_chance(gain, places.len()) || self.operations(&step.fitted.poles) > WHITENED {
+            return gain;
+        }
+        gain.min(self.deviance(before) - self.deviance(&step.mark()))
     }
 
     /// Whether noise alone would gain that much with `modes` further ones.

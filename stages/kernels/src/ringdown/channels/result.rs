@@ -58,8 +58,8 @@ pub struct ChannelRingdown {
     pub noise: Vec<RingdownNoise>,
     /// Whitened energy over degrees of freedom of each channel: 1 by construction where the noise is estimated.
     pub reduced_chi_square: Vec<f64>,
-    /// Factor by which the variance of each mode's estimates is larger than that of noise alone, for what is left round its
-    /// line; 1 where noise alone may leave as much. Standard errors count it.
+    /// Factor by which the variance of each mode's estimates is larger than that of noise alone, for what is left round
+    /// its line; 1 where noise alone may leave as much. Standard errors count it.
     pub lack_of_fit: Vec<f64>,
     /// How the search ended.
     pub verdict: RingdownVerdict,
