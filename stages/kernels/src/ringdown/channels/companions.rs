@@ -87,7 +87,8 @@ fn one_shape(fit: &ChannelRingdown, i: usize, j: usize) -> bool {
     let noise = |k: usize| {
         let points = &fit.shapes[k].points;
         let size: f64 = points.iter().map(|p| p.value.norm_sqr()).sum();
-        points.iter().map(|p| p.covariance[0] + p.covariance[2]).sum::<f64>() / size
+        // of noise alone: with all that the model lacks any two shapes would be one
+        points.iter().map(|p| p.covariance[0] + p.covariance[2]).sum::<f64>() / size / fit.lack_of_fit[k]
     };
     let apart = 1.0 - fit.shapes[i].mac(&fit.shapes[j]);
     apart < ORTHOGONAL.0 + ORTHOGONAL.1 * (noise(i) + noise(j))
