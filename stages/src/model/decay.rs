@@ -7,12 +7,12 @@ use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Spec, Stage
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use self::course::{Course, Followed, follow};
+use self::course::Parts;
 use self::tables::{fit_array, hit_table, modes_with_damping, shape_array, summary};
 use super::count::Count;
 use crate::artifacts::Decays;
 use crate::events::DECAYS;
-use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, ModesWanted};
+use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, ModesWanted, follow_channels};
 
 /// Fits modes and mode shapes to free decays: one set of poles for all channels of all hits.
 ///
@@ -20,13 +20,13 @@ use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Mod
 /// its own, noise of each channel white with wander. Of several hits the residues of a mode are one complex shape over
 /// the channels times an amplitude per hit: tested, not imposed.
 /// Method: maximum likelihood by variable projection; modes one by one, each kept if noise alone gains as much with a
-/// probability below `false_alarm`. The first and the last part of the decays are fitted by themselves too: where a mode
-/// moves with its amplitude the last part counts, and both ends are said.
+/// probability below `false_alarm`. Exponentials that a mode leaves because it moves with its amplitude (in its line,
+/// of its shape, twice as fast) and lines that do not die away are left out. The first and the last part of the decays are
+/// fitted too and their difference is tested: where a mode moves and none has died away, the last part counts.
 /// Shapes: `modes` by row, ascending; `shapes` over mode and channel with the modal assurance criterion over mode and
 /// mode; `hits` a row per hit and mode; `course` a row per mode and part; `fit` over channel and time of the largest hit.
 /// Units: Hz; shapes relative to the channel with the largest amplitude; amplitudes in the channels' units.
-/// Accuracy: docs/results/decay.md. Standard errors are those of the noise that the fit leaves: of a decay that is not
-/// exponential they are too small, which `course` shows.
+/// Accuracy: docs/results/decay.md. Standard errors count what the fit leaves round each mode (`lack_of_fit`).
 /// Errors: no decay; too few samples; no oscillation.
 /// Source: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; R. J. Allemang, D. L. Brown, Proc. 1st IMAC (1982)
 /// 110.
@@ -92,7 +92,7 @@ impl Stage for DecayFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.decay",
-        version: 1,
+        version: 2,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), FIT.spec(), SUMMARY.spec()],
@@ -102,31 +102,28 @@ impl Stage for DecayFit {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let decays = Decays::new(inputs.get(&DECAYS)?)?;
-        let Followed { fit, from, course } =
-            follow(&decays, &self.options(), self.part == FittedPart::Whole).map_err(StageError::from_error)?;
-        let from_s = from as f64 / decays.sample_rate_hz;
-        self.warn(&fit, &decays, cx);
-        course.iter().flat_map(Course::warnings).for_each(|warning| cx.warn(warning));
-        if from > 0 {
-            let gone: Vec<String> =
-                course.iter().flat_map(Course::gone).map(|frequency_hz| format!("{frequency_hz:.6} Hz")).collect();
-            let more = match gone.is_empty() {
-                true => String::new(),
-                false => format!("; {} died away before: `part = \"whole\"` has all", gone.join(", ")),
-            };
+        let whole = self.part == FittedPart::Whole;
+        let options = ChannelOptions { missing: decays.missing(), ..self.options() };
+        let followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, whole)
+            .map_err(StageError::from_error)?;
+        let parts = Parts::new(&followed, &decays);
+        let fit = &followed.fit;
+        self.warn(fit, &decays, cx);
+        let companions = followed.dropped.iter().filter(|d| d.reason != Dropped::Steady).count();
+        if companions > 0 {
             cx.warn(format!(
-                "the modes are those of the last part, from {from_s:.4} s on, in which they are smallest; `course` has \
-                 both ends{more}"
+                "{companions} of the fitted exponentials are companions of modes that move with their amplitude and \
+                 are left out: `summary` lists them under `dropped`"
             ));
         }
-        let empty = || Course::EMPTY.table();
+        parts.warnings(followed.from).into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new()
-            .with(&MODES, modes_with_damping(&fit))
-            .with(&SHAPES, shape_array(&fit, &decays.sensors))
-            .with(&HITS, hit_table(&fit))
-            .with(&COURSE, course.as_ref().map_or_else(empty, Course::table))
-            .with(&FIT, fit_array(&fit, &decays, from))
-            .with(&SUMMARY, summary(&fit, course.as_ref(), &decays, from_s)?))
+            .with(&MODES, modes_with_damping(fit))
+            .with(&SHAPES, shape_array(fit, &decays.sensors))
+            .with(&HITS, hit_table(fit))
+            .with(&COURSE, parts.table())
+            .with(&FIT, fit_array(fit, &decays, followed.from))
+            .with(&SUMMARY, summary(&followed, &parts, &decays)?))
     }
 
     fn examples() -> Vec<Example> {
@@ -160,6 +157,17 @@ impl DecayFit {
         let found = fit.poles.len();
         if self.modes == Count::Auto && found == self.max_modes {
             cx.warn(format!("`modes = \"auto\"` found {found}, all that `max_modes` allows: there may be more"));
+        }
+        let lacking: Vec<String> = (1..)
+            .zip(&fit.lack_of_fit)
+            .filter(|(_, factor)| **factor > 1.0)
+            .map(|(number, factor)| format!("{number} ({:.3})", factor.sqrt()))
+            .collect();
+        if !lacking.is_empty() {
+            cx.warn(format!(
+                "the fit leaves more than noise round modes {}: their standard errors are widened by the factors given",
+                lacking.join(", ")
+            ));
         }
         for (number, mode) in fit.shapes.iter().enumerate().filter(|(_, shape)| !shape.rank_one.holds()) {
             cx.warn(format!(

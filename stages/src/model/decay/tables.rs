@@ -4,9 +4,11 @@ use afmid_pipeline::{Array, Axis, Document, StageError, Table};
 use num_complex::Complex64;
 use serde_json::{Value, json};
 
-use super::course::Course;
+use super::course::{Parts, dropped_document};
 use crate::artifacts::{Decays, SAMPLE_RATE_HZ, Sensor, mode_table};
-use afmid_kernels::ringdown::{ChannelRingdown, ModeEstimate, ModeShape, RecordFit, RingdownNoise, ShapePoint};
+use afmid_kernels::ringdown::{
+    ChannelRingdown, FollowedDecay, ModeEstimate, ModeShape, RecordFit, RingdownNoise, ShapePoint,
+};
 
 /// Frequencies, quality factors, damping ratios.
 pub(super) fn modes_with_damping(fit: &ChannelRingdown) -> Table {
@@ -14,8 +16,12 @@ pub(super) fn modes_with_damping(fit: &ChannelRingdown) -> Table {
     let damping = Table::of(&modes)
         .with_std(["damping_ratio", "damping_ratio_std"], "1", "share of critical damping", ModeEstimate::damping_ratio)
         .table();
+    let lack = Table::of(&fit.lack_of_fit)
+        .with("lack_of_fit", "1", "factor of the variances for what the fit leaves round the mode; 1: noise", |f| *f)
+        .table();
     let mut table = mode_table(&modes);
     table.columns.extend(damping.columns);
+    table.columns.extend(lack.columns);
     table
 }
 
@@ -128,11 +134,11 @@ fn signal(fit: &ChannelRingdown, record: &RecordFit, interval_s: f64, samples: u
 
 /// The contract of `show --json`, and what does not fit.
 pub(super) fn summary(
-    fit: &ChannelRingdown,
-    course: Option<&Course>,
+    followed: &FollowedDecay,
+    parts: &Parts<'_>,
     decays: &Decays<'_>,
-    from_s: f64,
 ) -> Result<Document, StageError> {
+    let fit = &followed.fit;
     let modes = fit.modes();
     let several = decays.sensors.len() > 1;
     let mode = |(mode, shape): (&ModeEstimate, &ModeShape)| {
@@ -171,8 +177,10 @@ pub(super) fn summary(
         "channels": decays.sensors,
         "converged": fit.verdict.converged,
         "noise": fit.noise.iter().map(noise).collect::<Vec<Value>>(),
-        "fitted_from_s": from_s,
-        "course": course.map_or_else(|| json!([]), Course::document),
+        "lack_of_fit": fit.lack_of_fit,
+        "fitted_from_s": followed.from as f64 / decays.sample_rate_hz,
+        "course": parts.document(),
+        "dropped": dropped_document(&followed.dropped),
         "tried": fit.seen.iter().map(|seen| json!({ "modes": seen.modes, "gain": seen.gain, "kept": seen.kept }))
             .collect::<Vec<Value>>(),
     }))

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::basis::Poles;
 use super::fit::Fitted;
+use super::levels::density;
 use super::noise::residual;
 use super::records::Records;
 use crate::ringdown::RingdownNoise;
@@ -107,13 +108,6 @@ pub(super) fn candidates(
 
 /// One over the variance per sample that white noise of the same density would have, at each bin.
 fn weights(noise: &RingdownNoise, interval_s: f64, length: usize) -> Vec<f64> {
-    let density = |k: usize| {
-        let cos = (std::f64::consts::TAU * k as f64 / length as f64).cos();
-        let wander = noise.wander.iter().map(|part| {
-            let decay = (-part.rate_per_s * interval_s).exp();
-            part.variance * (1.0 - decay * decay) / (1.0 - 2.0 * decay * cos + decay * decay).max(1e-300)
-        });
-        noise.white + wander.sum::<f64>()
-    };
-    (0..=length / 2).map(|k| 1.0 / density(k).max(f64::MIN_POSITIVE)).collect()
+    let turn = std::f64::consts::TAU / length as f64;
+    (0..=length / 2).map(|k| density(noise, interval_s, turn * k as f64).recip()).collect()
 }

@@ -1,22 +1,32 @@
 //! Free decays in several channels, fitted with shared poles: frequencies, damping and complex mode shapes.
 //!
-//! [`fit_channels`] is the front door. In reading order: options, records (what is fitted), basis and projection
-//! (amplitudes solved for), fit (the search on poles), noise (of each channel), bank (where another mode may be), order
-//! (how many there are), shape (rank-one residues), result.
+//! [`fit_channels`] is the front door. In reading order: options, records (what is fitted), basis, recursion and
+//! projection (amplitudes solved for), fit (the search on poles), noise (of each channel), levels (of what
+//! is left round a line), bank (where another mode may be), order
+//! (how many there are), shape (rank-one residues), result,
+//! companions (what is no mode), course (whether modes move: [`follow_channels`]).
 
 mod bank;
 mod basis;
+mod companions;
+mod course;
+#[cfg(test)]
+mod course_tests;
 mod fit;
+mod levels;
 mod noise;
 mod options;
 mod order;
 mod projection;
 mod records;
+mod recursion;
 mod result;
 mod shape;
 #[cfg(test)]
 mod tests;
 
+pub use companions::{Dropped, DroppedMode};
+pub use course::{Course, FollowedDecay, MOVES, ModeCourse, follow_channels};
 pub use options::{ChannelNoise, ChannelOptions, ModesWanted};
 pub use order::fit_channels;
 pub use result::{ChannelRingdown, OrderTried, RecordFit};

@@ -18,6 +18,9 @@ const WANDER_GAIN: f64 = 18.0;
 /// Bins of a Hann periodogram per independent one.
 const CORRELATED: f64 = 1.94;
 
+/// Amplitudes per sample below which what they absorb changes no variance by more than that.
+const NEGLIGIBLE: f64 = 1e-3;
+
 /// Noise before anything is known: second differences of the quieter half of each channel's records.
 pub(super) fn first_noise(records: &Records<'_>) -> Vec<RingdownNoise> {
     let of = |channel: usize| {
@@ -146,9 +149,15 @@ fn of_pattern(records: &Records<'_>, fitted: &Fitted, members: &[(usize, &Record
         })
         .collect();
     let mut observed = summed_periodograms(&residuals, &taper);
+    let own = own_count(fitted.poles.0.len(), records.drift);
+    let count = members.len() as f64;
+    if (own as f64) < NEGLIGIBLE * samples as f64 {
+        observed.iter_mut().for_each(|o| *o /= count);
+        let parts = expected_parts(shape, records.interval_s, &gaps.lag_weights(&taper));
+        return Bins { observed, parts, count };
+    }
     // what the own amplitudes have absorbed: their columns times the root of their covariance
     let all = columns(&fitted.poles, records.interval_s, fitted.unit_s, samples, records.drift);
-    let own = own_count(fitted.poles.0.len(), records.drift);
     let root = &fitted.projection.solved[members[0].0].root;
     let directions: Vec<Vec<f64>> = (0..own)
         .map(|j| {
@@ -161,7 +170,6 @@ fn of_pattern(records: &Records<'_>, fitted: &Fitted, members: &[(usize, &Record
         })
         .collect();
     let absorbed = summed_periodograms(&directions, &taper);
-    let count = members.len() as f64;
     observed.iter_mut().zip(absorbed).for_each(|(o, a)| *o = *o / count + a);
     let parts = expected_parts(shape, records.interval_s, &gaps.lag_weights(&taper));
     Bins { observed, parts, count }

@@ -1,15 +1,17 @@
 //! How many modes there are: one after the other, each judged by what it explains.
 
 use super::bank::candidates;
-use super::basis::Poles;
+use super::basis::{Poles, own_count};
 use super::fit::{ARRIVED, Fitted, NEARLY};
-use super::noise::{estimated, first_noise, rescaled};
+use super::levels::{density, flat, local_variances, residuals};
+use super::noise::{degrees, estimated, first_noise, rescaled};
 use super::options::{ChannelNoise, ChannelOptions, ModesWanted};
 use super::records::Records;
 use super::result::{ChannelRingdown, OrderTried};
 use crate::model::{ModelError, finite};
 use crate::ringdown::RingdownNoise;
 use crate::statistics::chi_square_tail;
+use faer::c64;
 
 /// Candidates of the bank that are tried for each further mode.
 const CANDIDATES: usize = 2;
@@ -19,6 +21,9 @@ const BEYOND: usize = 1;
 const BANK: f64 = 0.5;
 /// Weighted square of a mode's amplitudes over its gain from which on no fit without it is tried.
 const CERTAIN: f64 = 10.0;
+/// Operations of a step up to which noise is whitened that is not flat over a mode's line: a tenth of a second. Beyond,
+/// least squares stay unbiased and lose a little.
+const WHITENED: f64 = 5e7;
 /// Turns of noise and fit at the end.
 const NOISE_ROUNDS: usize = 2;
 
@@ -60,15 +65,34 @@ pub fn fit_channels(
     let records = Records::of(events, interval_s, options)?;
     let ladder = Ladder { records: &records, free, options };
     let (step, seen) = if options.start.is_empty() { ladder.climb()? } else { (ladder.given(), Vec::new()) };
-    let (fitted, noise) = ladder.refined(step);
-    ChannelRingdown::of(&records, fitted, noise, seen)
+    ChannelRingdown::of(&records, ladder.refined(step), seen)
 }
 
 /// A fit with its noise.
 struct Step {
     fitted: Fitted,
+    /// Under which it was fitted.
+    weights: Vec<RingdownNoise>,
+    /// What it leaves.
     noise: Vec<RingdownNoise>,
-    deviance: f64,
+    /// Energy that each channel leaves, in its own unit; of given noise the whitened one.
+    energy: Vec<f64>,
+}
+
+/// What later steps are compared with.
+#[derive(Clone)]
+struct Mark {
+    poles: Poles,
+    weights: Vec<RingdownNoise>,
+    noise: Vec<RingdownNoise>,
+    energy: Vec<f64>,
+}
+
+impl Step {
+    fn mark(&self) -> Mark {
+        let (poles, weights) = (self.fitted.poles.clone(), self.weights.clone());
+        Mark { poles, weights, noise: self.noise.clone(), energy: self.energy.clone() }
+    }
 }
 
 struct Ladder<'a> {
@@ -82,20 +106,72 @@ impl Ladder<'_> {
         Fitted::of(self.records, noise, start, self.options.least_quality_factor, arrived)
     }
 
-    /// The noise of a fit, and the fit under that noise.
-    fn settled(&self, fitted: &Fitted, noise: &[RingdownNoise]) -> Step {
-        let noise = estimated(self.records, self.free, fitted, noise, &self.options.noise);
-        let fitted = self.fit(&fitted.poles, &noise, NEARLY);
-        let deviance = self.deviance(&fitted);
-        Step { fitted, noise, deviance }
+    fn given_noise(&self) -> bool {
+        matches!(self.options.noise, ChannelNoise::Known(_))
     }
 
-    fn deviance(&self, fitted: &Fitted) -> f64 {
-        match &self.options.noise {
-            // given variances are not scaled
-            ChannelNoise::Known(_) => fitted.energy.iter().chain(&fitted.log_variance).sum(),
-            _ => fitted.deviance(self.records),
+    /// A fit under these weights, its energies in the channels' own units.
+    fn weighed(&self, start: &Poles, weights: &[RingdownNoise]) -> Step {
+        let fitted = self.fit(start, weights, NEARLY);
+        let unit = |c: usize| if self.given_noise() { 1.0 } else { weights[c].white };
+        let energy = fitted.energy.iter().enumerate().map(|(c, energy)| energy * unit(c)).collect();
+        Step { fitted, weights: weights.to_vec(), noise: weights.to_vec(), energy }
+    }
+
+    /// The same with each channel's weight from what it leaves, and its noise.
+    fn settled(&self, step: Step) -> Step {
+        if self.given_noise() {
+            return step;
         }
+        let weights = rescaled(self.records, &step.fitted, &step.weights);
+        let mut step = self.weighed(&step.fitted.poles, &weights);
+        step.noise = estimated(self.records, self.free, &step.fitted, &step.weights, &self.options.noise);
+        step
+    }
+
+    /// Minus twice the log-likelihood under white or under coloured noise, whichever is likelier.
+    fn deviance(&self, mark: &Mark) -> f64 {
+        let of = |noise: &[RingdownNoise]| self.fit(&mark.poles, noise, NEARLY).deviance(self.records);
+        of(&mark.weights).min(of(&mark.noise))
+    }
+
+    /// Operations of a step of the fit under coloured noise.
+    fn operations(&self, poles: &Poles) -> f64 {
+        let columns = own_count(poles.0.len(), self.records.drift) + 2 * poles.0.len();
+        self.records.all.iter().map(|record| record.values.len() as f64).sum::<f64>() * (columns * columns) as f64
+    }
+
+    /// Whether noise that is not flat over these lines can be whitened in reasonable time.
+    fn is_coloured(&self, noise: &[RingdownNoise], lines: &[c64], poles: &Poles) -> bool {
+        !flat(noise, lines, self.records.interval_s) && self.operations(poles) < WHITENED
+    }
+
+    /// Gain of twice the log-likelihood of a step over an earlier one, for its modes at `places`.
+    ///
+    /// Method: fall of the energy over the variance of what the step leaves; where noise is estimated, round these
+    /// modes' lines. What is left of coloured noise looks like modes of a few periods: under such noise the likelihoods
+    /// count too, each fit under its own noise.
+    fn gain(&self, before: &Mark, step: &Step, places: &[c64]) -> f64 {
+        let fall = |c: usize| before.energy[c] - step.energy[c];
+        if self.given_noise() {
+            return (0..step.energy.len()).map(fall).sum();
+        }
+        let usual: Vec<f64> =
+            degrees(self.records, &step.fitted).iter().zip(&step.energy).map(|(d, e)| (e / d).max(1e-300)).collect();
+        let mut variance = usual.clone();
+        if self.options.noise == ChannelNoise::Estimated {
+            let left = residuals(self.records, &step.fitted);
+            let local = |place: &c64| local_variances(self.records, &left, &step.fitted.poles, *place, &usual);
+            let all: Vec<Vec<f64>> = places.iter().map(local).collect();
+            let most = |c: usize| all.iter().map(|own| own[c]).reduce(f64::max).unwrap_or(usual[c]);
+            variance = (0..usual.len()).map(most).collect();
+        }
+        let gain = (0..usual.len()).map(|c| fall(c) / variance[c]).sum();
+        let coloured = step.noise.iter().any(|noise| !noise.is_white());
+        if !coloured || self.by_chance(gain, places.len()) || self.operations(&step.fitted.poles) > WHITENED {
+            return gain;
+        }
+        gain.min(self.deviance(before) - self.deviance(&step.mark()))
     }
 
     /// Whether noise alone would gain that much with `modes` further ones.
@@ -107,9 +183,7 @@ impl Ladder<'_> {
 
     /// The fit from the poles of the options.
     fn given(&self) -> Step {
-        let first = self.first_noise();
-        let fitted = self.fit(&Poles(self.options.start.clone()), &first, NEARLY);
-        self.settled(&fitted, &first)
+        self.settled(self.weighed(&Poles(self.options.start.clone()), &self.first_noise()))
     }
 
     fn first_noise(&self) -> Vec<RingdownNoise> {
@@ -124,23 +198,21 @@ impl Ladder<'_> {
             ModesWanted::Fixed(count) => (count, count),
             ModesWanted::AtMost(count) => (0, count),
         };
-        let first = self.first_noise();
-        let fitted = self.fit(&Poles(Vec::new()), &first, NEARLY);
+        let mut current = self.weighed(&Poles(Vec::new()), &self.first_noise());
+        let mut needed = current.mark();
         // without a mode all is noise: what that explains needs none
-        let rest = self.settled(&fitted, &first);
-        let mut needed = self.deviance(&fitted).min(rest.deviance);
-        let mut current = Step { fitted, noise: first, deviance: needed };
-        let mut all_noise = Some(rest.noise);
+        needed.noise = self.settled(self.weighed(&Poles(Vec::new()), &self.first_noise())).noise;
+        let mut all_noise = Some(needed.noise.clone());
         let mut seen = Vec::new();
         let mut best: Option<Step> = None;
         let mut place = 0;
         for modes in 1..=most {
             let Some(next) = self.next(&current, all_noise.take().as_deref(), modes <= least) else { break };
-            let gain = needed - next.deviance;
+            let gain = self.gain(&needed, &next, &next.fitted.poles.0[place.min(modes - 1)..]);
             let kept = modes <= least || !self.by_chance(gain, modes - place);
             seen.push(OrderTried { modes, gain, kept });
             if kept {
-                (needed, place) = (next.deviance, modes);
+                (needed, place) = (next.mark(), modes);
                 best = None;
             } else if modes > place + BEYOND {
                 break;
@@ -172,25 +244,28 @@ impl Ladder<'_> {
             banks.push(places(&plain));
         }
         banks.extend(other.map(places));
+        let before = current.mark();
         let mut found: Option<Step> = None;
         let mut tried: Vec<Poles> = Vec::new();
+        let cost = |step: &Step| -> f64 { step.fitted.energy.iter().sum() };
         for rank in 0..CANDIDATES {
             for (gain, start) in banks.iter().filter_map(|bank| bank.get(rank)) {
                 if tried.contains(start) || !wanted && self.by_chance(gain / BANK, 1) {
                     continue;
                 }
                 tried.push(start.clone());
-                let step = self.settled(&self.fit(start, &current.noise, NEARLY), &current.noise);
-                if found.as_ref().is_none_or(|best| step.deviance < best.deviance) {
+                let step = self.weighed(start, &current.weights);
+                if found.as_ref().is_none_or(|best| cost(&step) < cost(best)) {
                     found = Some(step);
                 }
             }
-            let best = found.as_ref().map_or(f64::INFINITY, |best| best.deviance);
-            if !self.by_chance(current.deviance - best, 1) {
+            let Some(best) = &found else { continue };
+            let last = best.fitted.poles.0.len() - 1;
+            if rank + 1 == CANDIDATES || !self.by_chance(self.gain(&before, best, &best.fitted.poles.0[last..]), 1) {
                 break;
             }
         }
-        found
+        found.map(|step| self.settled(step))
     }
 
     /// Leaves out modes without which the others explain as much.
@@ -203,33 +278,71 @@ impl Ladder<'_> {
             }
             let without = |j: usize| {
                 let mut poles = step.fitted.poles.clone();
-                poles.0.remove(j);
-                self.settled(&self.fit(&poles, &step.noise, NEARLY), &step.noise)
+                let place = poles.0.remove(j);
+                let smaller = self.weighed(&poles, &step.weights);
+                (self.gain(&self.settled(smaller).mark(), &step, &[place]), poles)
             };
             let doubtful = |j: &usize| self.by_chance(step.fitted.projection.strength(*j) / CERTAIN, 1);
-            let least = (0..count).filter(doubtful).map(without).min_by(|a, b| a.deviance.total_cmp(&b.deviance));
+            let least = (0..count).filter(doubtful).map(without).min_by(|a, b| a.0.total_cmp(&b.0));
             match least {
-                Some(smaller) if self.by_chance(smaller.deviance - step.deviance, 1) => {
-                    let gain = smaller.deviance - step.deviance;
+                Some((gain, smaller)) if self.by_chance(gain, 1) => {
                     seen.push(OrderTried { modes: count - 1, gain, kept: true });
-                    step = smaller;
+                    step = self.settled(self.weighed(&smaller, &step.weights));
                 }
                 _ => return step,
             }
         }
     }
 
-    /// Noise and fit in turns to the end.
-    fn refined(&self, step: Step) -> (Fitted, Vec<RingdownNoise>) {
+    /// Noise and fit in turns to the end, and the level of the noise round each mode over that of the fit, per channel.
+    ///
+    /// Method: noise that is flat over each mode's line needs no whitening: least squares, each channel with the level
+    /// of its noise round the modes, and errors with the level at each.
+    fn refined(&self, step: Step) -> Refined {
         let Step { mut fitted, mut noise, .. } = step;
+        let level =
+            |noise: &RingdownNoise, s: &c64| density(noise, self.records.interval_s, s.im * self.records.interval_s);
+        let even = !self.given_noise() && !self.is_coloured(&noise, &fitted.poles.0, &fitted.poles);
+        if even {
+            let poles = fitted.poles.0.clone();
+            let mean = |noise: &RingdownNoise| poles.iter().map(|s| level(noise, s)).sum::<f64>() / poles.len() as f64;
+            for round in 0..NOISE_ROUNDS {
+                let white: Vec<RingdownNoise> = noise.iter().map(|noise| RingdownNoise::white(mean(noise))).collect();
+                fitted = self.fit(&fitted.poles, &white, if round + 1 == NOISE_ROUNDS { ARRIVED } else { NEARLY });
+                noise = match noise.iter().all(RingdownNoise::is_white) {
+                    true => rescaled(self.records, &fitted, &white),
+                    false => estimated(self.records, self.free, &fitted, &white, &self.options.noise),
+                };
+            }
+            let white: Vec<RingdownNoise> = noise.iter().map(|noise| RingdownNoise::white(mean(noise))).collect();
+            fitted = self.fit(&fitted.poles, &white, ARRIVED);
+            let levels = noise
+                .iter()
+                .zip(&white)
+                .map(|(noise, white)| fitted.poles.0.iter().map(|s| level(noise, s) / white.white).collect())
+                .collect();
+            return Refined { fitted, noise, levels };
+        }
+        if !self.given_noise() {
+            fitted = self.fit(&fitted.poles, &noise, NEARLY);
+        }
         for _ in 0..NOISE_ROUNDS {
             noise = estimated(self.records, self.free, &fitted, &noise, &self.options.noise);
             fitted = self.fit(&fitted.poles, &noise, ARRIVED);
         }
-        if !matches!(self.options.noise, ChannelNoise::Known(_)) {
+        if !self.given_noise() {
             noise = rescaled(self.records, &fitted, &noise);
             fitted = self.fit(&fitted.poles, &noise, ARRIVED);
         }
-        (fitted, noise)
+        let levels = vec![vec![1.0; fitted.poles.0.len()]; self.records.channels];
+        Refined { fitted, noise, levels }
     }
+}
+
+/// The last fit.
+pub(super) struct Refined {
+    pub fitted: Fitted,
+    pub noise: Vec<RingdownNoise>,
+    /// Per channel and mode: density of the noise at the mode over the level under which it was fitted.
+    pub levels: Vec<Vec<f64>>,
 }

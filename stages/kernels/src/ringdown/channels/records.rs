@@ -112,6 +112,11 @@ pub(super) struct Group {
 }
 
 impl Group {
+    /// Whether noise is white and no sample is missing.
+    pub fn is_plain(&self) -> bool {
+        self.whitener.is_none() && self.mask.is_empty()
+    }
+
     /// Whitens signals in place, as the members were, but for their scale.
     pub fn whiten(&self, signals: &mut [Vec<f64>]) {
         match &self.whitener {

@@ -3,7 +3,9 @@
 use faer::{Mat, c64};
 
 use super::fit::Fitted;
+use super::levels::{lack_of_fit, residuals};
 use super::noise::degrees;
+use super::order::Refined;
 use super::records::Records;
 use super::shape::{ModeShape, Residues};
 use crate::linear_algebra::{product, symmetric_inverse};
@@ -56,6 +58,9 @@ pub struct ChannelRingdown {
     pub noise: Vec<RingdownNoise>,
     /// Whitened energy over degrees of freedom of each channel: 1 by construction where the noise is estimated.
     pub reduced_chi_square: Vec<f64>,
+    /// Factor by which the variance of each mode's estimates is larger than that of noise alone, for what is left round
+    /// its line; 1 where noise alone may leave as much. Standard errors count it.
+    pub lack_of_fit: Vec<f64>,
     /// How the search ended.
     pub verdict: RingdownVerdict,
     /// Every number of modes that was tried, in order.
@@ -63,15 +68,13 @@ pub struct ChannelRingdown {
 }
 
 impl ChannelRingdown {
-    pub(super) fn of(
-        records: &Records<'_>,
-        fitted: Fitted,
-        noise: Vec<RingdownNoise>,
-        seen: Vec<OrderTried>,
-    ) -> Result<Self, ModelError> {
+    pub(super) fn of(records: &Records<'_>, refined: Refined, seen: Vec<OrderTried>) -> Result<Self, ModelError> {
+        let Refined { fitted, noise, levels } = refined;
         let modes = fitted.poles.0.len();
-        let (information, _) = fitted.projection.normal();
-        let scaled = symmetric_inverse(&information);
+        let lack = lack_of_fit(records, &residuals(records, &fitted), &fitted.poles, &noise);
+        // variance round mode j of a record over that of the fit
+        let level = |r: usize, j: usize| levels[records.all[r].channel][j] * lack[j];
+        let scaled = sandwich(&fitted, &level);
         if (0..2 * modes).any(|i| !(scaled[(i, i)].is_finite() && scaled[(i, i)] > 0.0)) {
             return Err(ModelError::Degenerate("no finite covariance"));
         }
@@ -85,7 +88,7 @@ impl ChannelRingdown {
             .iter()
             .map(|solved| product(solved.root.as_ref(), solved.root.transpose()))
             .collect();
-        let block = |r: usize, j: usize| Mat::from_fn(2, 2, |a, b| own[r][(2 * j + a, 2 * j + b)]);
+        let block = |r: usize, j: usize| Mat::from_fn(2, 2, |a, b| level(r, j) * own[r][(2 * j + a, 2 * j + b)]);
         let coupling = |r: usize, j: usize| {
             let k = &fitted.projection.solved[r].coupling;
             Mat::from_fn(2, 2 * modes, |a, b| k[(2 * j + a, b)])
@@ -137,6 +140,7 @@ impl ChannelRingdown {
             shapes,
             noise,
             reduced_chi_square,
+            lack_of_fit: order.iter().map(|&j| lack[j]).collect(),
             verdict: fitted.verdict,
             seen,
         })
@@ -153,22 +157,24 @@ impl ChannelRingdown {
         (0..self.shapes.len()).filter(|&j| !self.shapes[j].rank_one.holds()).collect()
     }
 
-    /// Pairs of modes, by number, within three half widths of each other and of one shape (modal assurance criterion
-    /// above 0.95).
-    ///
-    /// A mode whose frequency or damping moves with its amplitude leaves such pairs in a linear fit; of a true close
-    /// pair the shapes differ. With one channel there is no shape to tell them apart: all near pairs are listed.
-    pub fn pairs_of_one_shape(&self) -> Vec<(usize, usize)> {
-        let near = |i: usize, j: usize| {
-            let (a, b) = (self.poles[i], self.poles[j]);
-            (a - b).norm() < 3.0 * a.re.abs().max(b.re.abs()) && self.shapes[i].mac(&self.shapes[j]) > 0.95
-        };
-        let count = self.poles.len();
-        (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))).filter(|&(i, j)| near(i, j)).collect()
-    }
-
     /// Modal assurance criteria between the shapes: modes x modes, 1 on the diagonal.
     pub fn mac(&self) -> Mat<f64> {
         Mat::from_fn(self.shapes.len(), self.shapes.len(), |i, j| self.shapes[i].mac(&self.shapes[j]))
     }
+}
+
+/// Covariance of the poles' parameters where the variance round mode j of record r is `level(r, j)` times the fit's.
+///
+/// Method: `A^-1 B A^-1` with the information A and the scores' covariance B.
+fn sandwich(fitted: &Fitted, level: &dyn Fn(usize, usize) -> f64) -> Mat<f64> {
+    let (information, _) = fitted.projection.normal();
+    let inverse = symmetric_inverse(&information);
+    let mut scores = Mat::<f64>::zeros(information.nrows(), information.ncols());
+    for (r, solved) in fitted.projection.solved.iter().enumerate() {
+        let root: Vec<f64> = (0..fitted.poles.0.len()).map(|j| level(r, j).sqrt()).collect();
+        for i in 0..scores.nrows() {
+            (0..scores.ncols()).for_each(|k| scores[(i, k)] += root[i / 2] * root[k / 2] * solved.information[(i, k)]);
+        }
+    }
+    product(product(inverse.as_ref(), scores.as_ref()).as_ref(), inverse.as_ref())
 }

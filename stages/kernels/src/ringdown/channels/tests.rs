@@ -151,31 +151,6 @@ fn a_start_replaces_the_search_for_modes() {
 }
 
 #[test]
-fn a_mode_that_moves_with_its_amplitude_leaves_a_pair_of_one_shape() {
-    let (_, shapes) = truth();
-    let noise: Vec<Vec<f64>> = (0..3).map(|c| white_noise(4000, 1e-3, c)).collect();
-    let data: Vec<Vec<f64>> = (0..3)
-        .map(|c| {
-            let mut phase = 0.0;
-            (0..4000)
-                .map(|k| {
-                    // softens by 1 % at full amplitude
-                    let amplitude = (-6.0 * k as f64 * INTERVAL_S).exp();
-                    phase += TAU * 110.0 * (1.0 - 0.01 * amplitude * amplitude) * INTERVAL_S;
-                    (shapes[0][c] * c64::cis(phase)).re * amplitude + noise[c][k]
-                })
-                .collect()
-        })
-        .collect();
-    let event: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
-    let fit = fit_channels(&[event], &[], INTERVAL_S, &ChannelOptions::default()).unwrap();
-    assert!(!fit.pairs_of_one_shape().is_empty(), "{:?}", fit.modes());
-    let linear = records(&HITS[..1], 1500, 1e-3, 1);
-    let fit = fit_channels(&borrowed(&linear), &[], INTERVAL_S, &ChannelOptions::default()).unwrap();
-    assert!(fit.pairs_of_one_shape().is_empty() && fit.shapes_that_differ().is_empty());
-}
-
-#[test]
 #[ignore = "minutes: the number of modes over many seeds of noise, wander and drift"]
 fn noise_and_wander_have_no_modes() {
     let mut wrong = 0;

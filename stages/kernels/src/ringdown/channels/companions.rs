@@ -1,0 +1,133 @@
+//! What is no mode of its own: lines that do not die away, and companions of modes that move with their amplitude.
+
+use faer::Mat;
+
+use super::result::ChannelRingdown;
+use crate::ringdown::ModeEstimate;
+
+/// Why a fitted exponential is no mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Dropped {
+    /// Its damping is not above zero at the 0.1 % level: a line of a drive or of the mains.
+    Steady,
+    /// It lies within the line of another mode, has its shape and dies away twice as fast or faster: what that mode's
+    /// motion leaves.
+    Companion {
+        /// Number of that mode, from 0, among the modes that are left.
+        of: usize,
+        /// Modal assurance criterion between the shapes.
+        mac: f64,
+    },
+}
+
+/// A fitted exponential that is no mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DroppedMode {
+    /// As fitted.
+    pub mode: ModeEstimate,
+    /// Why.
+    pub reason: Dropped,
+}
+
+/// Standard errors of damping exceeded by noise alone once in a thousand (one-sided).
+const DETERMINED: f64 = 3.09;
+/// Share of a shape's energy that may be orthogonal to a stronger mode's: what lies there is known no better than the
+/// lack of fit. Noise adds three times its own share.
+const ORTHOGONAL: (f64, f64) = (0.05, 3.0);
+
+/// Energy of each mode over all hits and channels, in units of their own.
+pub(super) fn energies(fit: &ChannelRingdown) -> Vec<f64> {
+    let energy = |(j, pole): (usize, &faer::c64)| {
+        let all: f64 = fit.records.iter().filter_map(|record| record.residues.get(j)).map(|r| r.norm_sqr()).sum();
+        all / -pole.re
+    };
+    fit.poles.iter().enumerate().map(energy).collect()
+}
+
+/// Modes that do not die away, by number: by less than 1/e within the longest record, and no more than noise allows.
+pub(super) fn steady(fit: &ChannelRingdown, duration_s: f64) -> Vec<usize> {
+    let rate = |j: usize| -fit.poles[j].re;
+    // by the error of noise alone: what the model lacks makes no line of a decay
+    let error = |j: usize| (fit.covariance[(2 * j, 2 * j)].max(0.0) / fit.lack_of_fit[j]).sqrt();
+    let dies = |j: usize| rate(j) > DETERMINED * error(j);
+    (0..fit.poles.len()).filter(|&j| rate(j) * duration_s < 1.0 && !dies(j)).collect()
+}
+
+/// Companions with the mode of each, and the modal assurance criterion between them.
+///
+/// # Model
+/// Frequency and damping that change with a power p >= 1 of the amplitude: `exp(s t) (1 + c_1 exp(-p a t) + ..)` with
+/// the decay rate a, so all but the first term die away `1 + p >= 2` times as fast, within the line of the first.
+/// # Method
+/// Slowest first: a pole whose frequency is nearer to that of a slower mode than its own half width, of that mode's
+/// shape and with at least twice its decay rate (less two standard errors). Of several such modes that with the most
+/// energy.
+pub(super) fn companions(fit: &ChannelRingdown) -> Vec<(usize, usize, f64)> {
+    let energy = energies(fit);
+    let mut order: Vec<usize> = (0..energy.len()).collect();
+    order.sort_by(|&a, &b| fit.poles[b].re.total_cmp(&fit.poles[a].re));
+    let mut kept: Vec<usize> = Vec::new();
+    let mut found = Vec::new();
+    for &i in &order {
+        let belongs = |j: &&usize| {
+            let (a, b) = (fit.poles[i], fit.poles[**j]);
+            let error = |k: usize| fit.covariance[(2 * k, 2 * k)].max(0.0).sqrt();
+            let faster = -a.re + 2.0 * error(i).hypot(2.0 * error(**j)) >= -2.0 * b.re;
+            (a.im - b.im).abs() < a.re.abs() && faster && one_shape(fit, i, **j)
+        };
+        match kept.iter().filter(belongs).max_by(|a, b| energy[**a].total_cmp(&energy[**b])) {
+            Some(&j) => found.push((i, j, fit.shapes[i].mac(&fit.shapes[j]))),
+            None => kept.push(i),
+        }
+    }
+    found
+}
+
+fn one_shape(fit: &ChannelRingdown, i: usize, j: usize) -> bool {
+    let noise = |k: usize| {
+        let points = &fit.shapes[k].points;
+        let size: f64 = points.iter().map(|p| p.value.norm_sqr()).sum();
+        // of noise alone: with all that the model lacks any two shapes would be one
+        points.iter().map(|p| p.covariance[0] + p.covariance[2]).sum::<f64>() / size / fit.lack_of_fit[k]
+    };
+    let apart = 1.0 - fit.shapes[i].mac(&fit.shapes[j]);
+    apart < ORTHOGONAL.0 + ORTHOGONAL.1 * (noise(i) + noise(j))
+}
+
+impl ChannelRingdown {
+    /// The same without these modes, which stay in what was fitted: nuisances.
+    pub(super) fn without(&self, modes: &[usize]) -> Self {
+        let keep: Vec<usize> = (0..self.poles.len()).filter(|j| !modes.contains(j)).collect();
+        let place = |i: usize| 2 * keep[i / 2] + i % 2;
+        let mut out = self.clone();
+        out.poles = keep.iter().map(|&j| self.poles[j]).collect();
+        out.shapes = keep.iter().map(|&j| self.shapes[j].clone()).collect();
+        out.lack_of_fit = keep.iter().map(|&j| self.lack_of_fit[j]).collect();
+        out.covariance = Mat::from_fn(2 * keep.len(), 2 * keep.len(), |i, j| self.covariance[(place(i), place(j))]);
+        for (record, full) in out.records.iter_mut().zip(&self.records) {
+            record.residues = keep.iter().map(|&j| full.residues[j]).collect();
+            record.residue_covariance = keep.iter().map(|&j| full.residue_covariance[j]).collect();
+        }
+        out
+    }
+
+    /// Takes over a mode of another fit of the same records.
+    pub(super) fn take_over(&mut self, mode: usize, other: &Self, from: usize) {
+        self.poles[mode] = other.poles[from];
+        self.shapes[mode] = other.shapes[from].clone();
+        self.lack_of_fit[mode] = other.lack_of_fit[from];
+        for a in 0..2 {
+            for i in 0..self.covariance.nrows() {
+                self.covariance[(2 * mode + a, i)] = 0.0;
+                self.covariance[(i, 2 * mode + a)] = 0.0;
+            }
+        }
+        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            self.covariance[(2 * mode + a, 2 * mode + b)] = other.covariance[(2 * from + a, 2 * from + b)];
+        }
+        for (own, record) in self.records.iter_mut().zip(&other.records) {
+            own.residues[mode] = record.residues[from];
+            own.residue_covariance[mode] = record.residue_covariance[from];
+        }
+    }
+}

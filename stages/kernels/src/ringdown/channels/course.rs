@@ -1,0 +1,256 @@
+//! Whether modes keep their frequency and damping while they die away.
+
+use std::ops::Range;
+
+use faer::c64;
+
+use super::companions::{Dropped, DroppedMode, companions, energies, steady};
+use super::levels::density;
+use super::options::{ChannelOptions, ModesWanted};
+use super::order::fit_channels;
+use super::result::ChannelRingdown;
+use crate::model::ModelError;
+use crate::ringdown::ModeEstimate;
+use crate::statistics::chi_square_tail;
+
+/// A mode in the first and in the last part of the decays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModeCourse {
+    /// Its estimate in the first part.
+    pub first: ModeEstimate,
+    /// Its estimate in the last part.
+    pub last: ModeEstimate,
+    /// Difference of the frequencies (last less first) over its standard error.
+    pub frequency_z: f64,
+    /// The same of the damping ratios.
+    pub damping_z: f64,
+    /// Probability of poles as far apart in a linear decay.
+    pub p_value: f64,
+    /// Whether that is below [`MOVES`] over the number of modes.
+    pub moves: bool,
+}
+
+/// What both parts say.
+#[derive(Debug, Clone)]
+pub struct Course {
+    /// Sample at which the first part ends and the last begins.
+    pub cut: usize,
+    /// Modes that both parts have, ascending.
+    pub modes: Vec<ModeCourse>,
+    /// Fit of the first part.
+    pub first: ChannelRingdown,
+    /// Fit of the last part.
+    pub last: ChannelRingdown,
+}
+
+/// A fit of decays, its companions left out, and how its modes change.
+#[derive(Debug, Clone)]
+pub struct FollowedDecay {
+    /// Modes of all of the decays; of the last part where modes move and none has died away by then.
+    pub fit: ChannelRingdown,
+    /// First sample that it counts.
+    pub from: usize,
+    /// Fitted exponentials that are no modes.
+    pub dropped: Vec<DroppedMode>,
+    /// None where the decays are too short to be cut.
+    pub course: Option<Course>,
+}
+
+/// Probability that any mode of a linear decay is said to move.
+pub const MOVES: f64 = 1e-3;
+/// Decay times of the strongest mode after which the last part begins.
+///
+/// The error of the difference between the parts' frequencies is least there: with `u = 2 a t`, the information before
+/// is `(1 - e^-u) (1 - u^2 e^-u / (1 - e^-u)^2)` of all and after `e^-u`; the sum of inverses is least at u = 1.8.
+/// What a frequency quadratic in the amplitude moves between the parts does not depend on the cut.
+const CUT: f64 = 0.9;
+/// Energy of a mode in a part, in variances of the noise, that a comparison needs: its damping is known to a fifth.
+const KNOWN: f64 = 50.0;
+/// Phase in radian by which a linear mode may be wrong while the mode that it stands for dies away: a tenth, a shift of
+/// the frequency by a tenth of the half width; likewise of the damping.
+const FAR: f64 = 0.1;
+
+/// Fits decays as [`fit_channels`] does, looks whether their modes move with their amplitude, and leaves out what is no
+/// mode.
+///
+/// # Model
+/// As [`fit_channels`] in each part. A mode whose frequency and damping change while it dies away is several
+/// exponentials in a linear fit: these companions lie in its line and have its shape.
+/// # Method
+/// Exponentials in the line of a slower one, of its shape and at least twice as fast, are dropped ([`Dropped`]): their
+/// modes are fitted again without them, errors widened by what is then left round each line; of all other modes they
+/// stay nuisances. All are fitted to the first and to the
+/// last part: for a linear system they are the same there (chi square of the difference of both poles at the level
+/// [`MOVES`] for all modes together). With one channel every shape is the same: there the line and the rate decide.
+/// # Shapes
+/// As [`fit_channels`]; `whole`: the fit is that of the whole even where modes move.
+/// # Units
+/// As [`fit_channels`].
+/// # Accuracy
+/// docs/results/decay.md.
+/// # Errors
+/// Those of [`fit_channels`].
+/// # Source
+/// A. Wald, Trans. Am. Math. Soc. 54 (1943) 426; R. J. Allemang, D. L. Brown, Proc. 1st IMAC (1982) 110.
+pub fn follow_channels(
+    events: &[Vec<&[f64]>],
+    free: &[Vec<&[f64]>],
+    interval_s: f64,
+    options: &ChannelOptions,
+    whole: bool,
+) -> Result<FollowedDecay, ModelError> {
+    let decays = Decays { events, free, interval_s, options };
+    let all = fit_channels(events, free, interval_s, options)?;
+    let fixed = matches!(options.modes, ModesWanted::Fixed(_)) || !options.start.is_empty();
+    let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
+    let still = if fixed { Vec::new() } else { steady(&all, longest as f64 * interval_s) };
+    let mut dropped: Vec<DroppedMode> = Vec::new();
+    dropped.extend(still.iter().map(|&j| DroppedMode { mode: all.modes()[j], reason: Dropped::Steady }));
+    if still.len() == all.poles.len() {
+        return Err(ModelError::Degenerate("no oscillation that dies away"));
+    }
+    let mut fit = all.without(&still);
+    let lines: Vec<c64> = still.iter().map(|&j| all.poles[j]).collect();
+    let found = if fixed { Vec::new() } else { companions(&fit) };
+    let mut alone = fit.clone();
+    if !found.is_empty() {
+        let gone: Vec<usize> = found.iter().map(|pair| pair.0).collect();
+        let modes = fit.modes();
+        let mut left = fit.without(&gone);
+        let start: Vec<c64> = left.poles.iter().chain(&lines).copied().collect();
+        let number = |j: usize| nearest(&left.poles, fit.poles[j]).unwrap_or(0);
+        let reason = |of: usize, mac: f64| Dropped::Companion { of: number(of), mac };
+        dropped.extend(found.iter().map(|&(i, of, mac)| DroppedMode { mode: modes[i], reason: reason(of, mac) }));
+        alone = without_lines(&decays.of_part(0..usize::MAX, &start)?, &lines);
+        // companions stay as nuisances of all other modes
+        for of in found.iter().map(|pair| number(pair.1)).collect::<std::collections::BTreeSet<usize>>() {
+            if let Some(from) = nearest(&alone.poles, left.poles[of]) {
+                left.take_over(of, &alone, from);
+            }
+        }
+        fit = left;
+    }
+    let course = decays.course(&alone, &lines);
+    let late =
+        course.as_ref().filter(|course| !whole && course.matters() && course.last.poles.len() == fit.poles.len());
+    let (fit, from) = match late {
+        Some(course) => (course.last.clone(), course.cut),
+        None => (fit, 0),
+    };
+    Ok(FollowedDecay { fit, from, dropped, course })
+}
+
+struct Decays<'a> {
+    events: &'a [Vec<&'a [f64]>],
+    free: &'a [Vec<&'a [f64]>],
+    interval_s: f64,
+    options: &'a ChannelOptions,
+}
+
+impl Decays<'_> {
+    /// The fit of a part of all decays that reach into it, from these poles.
+    fn of_part(&self, part: Range<usize>, start: &[c64]) -> Result<ChannelRingdown, ModelError> {
+        let (mut events, mut missing) = (Vec::new(), Vec::new());
+        for (number, event) in self.events.iter().enumerate() {
+            let length = event.first().map_or(0, |row| row.len());
+            let end = part.end.min(length);
+            if end <= part.start {
+                continue;
+            }
+            events.push(event.iter().map(|row| &row[part.start..end]).collect::<Vec<&[f64]>>());
+            let inside = |gap: &Range<usize>| {
+                gap.start.clamp(part.start, end) - part.start..gap.end.clamp(part.start, end) - part.start
+            };
+            let row = |gaps: &Vec<Range<usize>>| gaps.iter().map(inside).filter(|gap| !gap.is_empty()).collect();
+            missing.extend(self.options.missing.get(number).map(|rows| rows.iter().map(row).collect()));
+        }
+        let options = ChannelOptions { start: start.to_vec(), missing, ..self.options.clone() };
+        fit_channels(&events, self.free, self.interval_s, &options)
+    }
+
+    /// Both parts, with those modes of the whole that each can tell of.
+    fn course(&self, fit: &ChannelRingdown, lines: &[c64]) -> Option<Course> {
+        let energy = energies(fit);
+        let strongest = (0..energy.len()).max_by(|&a, &b| energy[a].total_cmp(&energy[b]))?;
+        let longest = self.events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
+        let cut = (CUT / (-fit.poles[strongest].re * self.interval_s)) as usize;
+        let cut = cut.clamp(1, (longest / 2).max(1));
+        let (first, last): (Vec<c64>, Vec<c64>) = (self.known(fit, 0, cut), self.known(fit, cut, longest));
+        let part = |range, poles: &[c64]| {
+            let start: Vec<c64> = poles.iter().chain(lines).copied().collect();
+            if poles.is_empty() { None } else { self.of_part(range, &start).ok() }
+        };
+        let (first, last) = (part(0..cut, &first)?, part(cut..longest, &last)?);
+        let (first, last) = (without_lines(&first, lines), without_lines(&last, lines));
+        let modes = courses(&first, &last);
+        Some(Course { cut, modes, first, last })
+    }
+
+    /// Poles whose mode has enough energy in a part.
+    fn known(&self, fit: &ChannelRingdown, from: usize, to: usize) -> Vec<c64> {
+        let energy = |j: usize| -> f64 {
+            let rate = -2.0 * fit.poles[j].re * self.interval_s;
+            let share = ((-rate * from as f64).exp() - (-rate * to as f64).exp()) / rate;
+            let turn = fit.poles[j].im * self.interval_s;
+            let of = |record: &super::result::RecordFit| {
+                0.5 * record.residues[j].norm_sqr() * share / density(&fit.noise[record.channel], self.interval_s, turn)
+            };
+            fit.records.iter().map(of).sum::<f64>() / fit.lack_of_fit[j]
+        };
+        (0..fit.poles.len()).filter(|&j| energy(j) > KNOWN).map(|j| fit.poles[j]).collect()
+    }
+}
+
+fn without_lines(fit: &ChannelRingdown, lines: &[c64]) -> ChannelRingdown {
+    let gone: Vec<usize> = lines.iter().filter_map(|line| nearest(&fit.poles, *line)).collect();
+    fit.without(&gone)
+}
+
+fn nearest(poles: &[c64], to: c64) -> Option<usize> {
+    (0..poles.len()).min_by(|&a, &b| (poles[a] - to).norm().total_cmp(&(poles[b] - to).norm()))
+}
+
+/// Modes that are each other's nearest in both parts.
+fn courses(first: &ChannelRingdown, last: &ChannelRingdown) -> Vec<ModeCourse> {
+    let pairs: Vec<(usize, usize)> = (0..last.poles.len())
+        .filter_map(|j| nearest(&first.poles, last.poles[j]).map(|i| (i, j)))
+        .filter(|&(i, j)| nearest(&last.poles, first.poles[i]) == Some(j))
+        .collect();
+    let (before, after) = (first.modes(), last.modes());
+    let course = |&(i, j): &(usize, usize)| {
+        let d = last.poles[j] - first.poles[i];
+        let sum =
+            |a: usize, b: usize| first.covariance[(2 * i + a, 2 * i + b)] + last.covariance[(2 * j + a, 2 * j + b)];
+        let (rr, ri, ii) = (sum(0, 0), sum(0, 1), sum(1, 1));
+        let square = (ii * d.re * d.re - 2.0 * ri * d.re * d.im + rr * d.im * d.im) / (rr * ii - ri * ri);
+        let p_value = if square.is_finite() { chi_square_tail(square.max(0.0), 2) } else { 1.0 };
+        let z = |a: crate::ringdown::Estimate, b: crate::ringdown::Estimate| (b.value - a.value) / a.std.hypot(b.std);
+        let (a, b) = (before[i], after[j]);
+        ModeCourse {
+            first: a,
+            last: b,
+            frequency_z: z(a.frequency_hz, b.frequency_hz),
+            damping_z: z(a.damping_ratio(), b.damping_ratio()),
+            p_value,
+            moves: p_value * (pairs.len() as f64) < MOVES,
+        }
+    };
+    pairs.iter().map(course).collect()
+}
+
+impl Course {
+    /// Whether a mode has moved so far that one linear mode cannot stand for both parts.
+    fn matters(&self) -> bool {
+        self.modes.iter().filter(|mode| mode.moves).any(|mode| {
+            let (early, late) = (mode.first.damping_ratio().value, mode.last.damping_ratio().value);
+            let shift = (mode.first.frequency_hz.value / mode.last.frequency_hz.value - 1.0).abs();
+            shift > FAR * late || (early / late - 1.0).abs() > FAR
+        })
+    }
+
+    /// Modes of the first part that the last one does not have.
+    pub fn gone(&self) -> Vec<ModeEstimate> {
+        let kept = |mode: &ModeEstimate| self.modes.iter().any(|course| course.first == *mode);
+        self.first.modes().into_iter().filter(|mode| !kept(mode)).collect()
+    }
+}
