@@ -4,8 +4,8 @@ use crate::linear_algebra::eigenvalues;
 use faer::{Mat, c64};
 
 use super::jacobian::{Noise, Point, residual};
+use super::levenberg_marquardt::{Limits, minimise};
 use super::predictor::Problem;
-use super::search::{Limits, minimise};
 use super::state::State;
 use super::whitening::Whitened;
 use crate::model::{ModelError, coordinates, sections};
@@ -112,7 +112,7 @@ mod tests {
                 slope: false,
                 missing: Vec::new(),
                 priors: 0,
-                shelf: BufferPool::default(),
+                buffers: BufferPool::default(),
             };
             let found = levinson(&autocovariance(&problem, &y, 12), 4000);
             // standard error sqrt((1 - 0.8^2) / 4000) = 0.0095: four of them; BIC errs upwards in one of hundreds
