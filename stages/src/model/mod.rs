@@ -19,6 +19,7 @@ mod stabilisation;
 mod subspace;
 mod system_poles;
 mod vector_fitting;
+mod whiteness;
 mod zeros;
 
 pub use crate::artifacts::DataSet;

@@ -18,6 +18,7 @@ pub use correlation_averaging::{Aligned, Averaging, AveragingSettings, Misfit, c
 pub use cross_correlation::{CrossCorrelator, Match};
 pub use despike::despike;
 pub use detection::{Candidate, Detection, DetectionSettings, Dismissal, Dismissed, detect};
+pub(crate) use fractional_shift::interpolation_weights;
 pub use fractional_shift::{REACH, band_limited_derivative, fractional_shift};
 pub use kind::EventKind;
 pub use level_change::{LevelChange, level_change};

@@ -63,6 +63,8 @@ mod tangent;
 mod tests;
 mod whitening;
 
+pub(crate) use autoregression::{largest_order, least_bic, levinson};
+
 pub use crate::optimise::Ending;
 pub use covariance::ResidualColour;
 pub(crate) use covariance::covariance as time_domain_covariance;
