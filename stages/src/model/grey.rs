@@ -18,7 +18,7 @@ use self::tables::{mode_table, named, parameter_table, static_gain, with_interva
 use super::known::KnownNumber;
 use super::order::simulated_percent;
 use super::pem::{MODEL, PAIR, RESIDUALS, SUMMARY, ending};
-use super::whiteness::{coloured, test_document};
+use super::whiteness::{coloured, residual_share, test_document};
 use crate::artifacts::{
     DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, innovations, state_nuisances, state_space, state_t0_ambiguity,
 };
@@ -32,14 +32,14 @@ use afmid_kernels::validation::{Nuisances, TestResult, fit_percent, simulate_hel
 /// Model: G(s) = exp(-s d) [sum g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + d0] prod p_k / (s + p_k); y = G u + offset +
 /// drift + e, with e unfiltered (output error). The delay may be any part of a sample; several inputs (`force` over
 /// `input` and time) have gains and d0 each and share the rest.
-/// Method: each partial fraction discretised for the force between its samples, delay included: in closed form (modified
-/// z-transform) for a held or linear force, by quadrature under a windowed-sinc interpolation for a band-limited one.
-/// With `between = "auto"` each is fitted from the held force's minimum, and the likeliest is taken if twice its log
-/// likelihood is 3.84 above that of held (chi-square 95 %, one degree of freedom: a wrong one is taken in at most 2.5 %);
-/// the noise is taken as autoregressive there, order by BIC; `input_between_samples` in the summary has the figures.
-/// Gains, d0, offset, drift and initial state by variable projection, the rest by Levenberg-Marquardt with analytic
-/// slopes. Starts from subspace estimates, given modes or the poles of the model on port `start`, and a grid of real poles
-/// and delays. Missing responses are left out.
+/// Method: each partial fraction discretised for the force between its samples, delay included: in closed form
+/// (modified z-transform) for a held or linear force, by quadrature under a windowed-sinc interpolation for a
+/// band-limited one. With `between = "auto"` each is fitted from the held force's minimum, and the likeliest is taken
+/// if twice its log likelihood is 3.84 above that of held (chi-square 95 %, one degree of freedom: a wrong one is taken
+/// in at most 2.5 %); the noise is taken as autoregressive there, order by BIC; `input_between_samples` in the summary
+/// has the figures. Gains, d0, offset, drift and initial state by variable projection, the rest by Levenberg-Marquardt
+/// with analytic slopes. Starts from subspace estimates, given modes or the poles of the model on port `start`, and a
+/// grid of real poles and delays. Missing responses are left out.
 /// Shapes: `modes` by mode, `parameters` by parameter; `residual` and `prediction` (here the simulation) over time;
 /// `model` as of `model.pem`, with one or two poles at z = 0 for the delay.
 /// Units: Hz, seconds; gains in volts per volt where the force is given as static deflection.
@@ -47,11 +47,11 @@ use afmid_kernels::validation::{Nuisances, TestResult, fit_percent, simulate_hel
 /// follow the residual's own spectrum, but under thermal noise `model.ringdown` is more precise. A delay is
 /// distinguished from a real pole by the shape of the first samples alone: the errors say how well. `model` is exact up
 /// to two samples of delay, beyond which whole samples are reported as `dead_samples` and warned of. For a band-limited
-/// force, whose response no causal model of finite order has, it is the closest one up to 0.9 of half the sample rate, and
-/// its error is warned of.
+/// force, whose response no causal model of finite order has, it is the closest one up to 0.9 of half the sample rate,
+/// and its error is warned of.
 /// Errors: too few samples, values that are not finite, a response that is constant, fewer oscillations than `modes`,
-/// knowledge of what is not fitted. No convergence is a warning, and so are a number on a bound, whose error is unknown,
-/// and a residual that is not white (Ljung-Box, p < 0.001).
+/// knowledge of what is not fitted. No convergence is a warning, and so are a number on a bound, whose error is
+/// unknown, and a residual that is not white (Ljung-Box, p < 0.001).
 /// Source: L. Ljung, System Identification, 1999, chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003)
 /// R1; E. I. Jury, Theory and Application of the z-Transform Method, 1964.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -128,7 +128,7 @@ impl Stage for GreyEstimate {
         let experiment = Experiment { input: &series.input, output: &series.output };
         let fit = fit_grey(&[experiment], 1.0 / rate, &options).map_err(StageError::from_error)?;
         let test = residual_test(&fit);
-        self.warn(&fit, &test, series.output.len(), cx);
+        self.warn(&fit, &test, &series.output, cx);
         let identified = identified(&fit, &series)?;
         let mut model = state_space(&identified, self.set, first)?;
         state_nuisances(&mut model, Nuisances { offset: self.fit.offset, slope: self.fit.drift });
@@ -199,7 +199,8 @@ impl GreyEstimate {
         })
     }
 
-    fn warn(&self, fit: &Grey, test: &Result<TestResult, ModelError>, samples: usize, cx: &Context) {
+    fn warn(&self, fit: &Grey, test: &Result<TestResult, ModelError>, output: &[f64], cx: &Context) {
+        let samples = output.len();
         if !fit.verdict.converged {
             cx.warn(format!(
                 "no minimum after {} steps: {:.2} standard errors to go; try other modes, real poles or starts",
@@ -220,7 +221,8 @@ impl GreyEstimate {
         let remedy = format!(
             "standard errors {errors}, and what the model cannot follow is not noise: try more modes or real poles, or `model.pem`"
         );
-        if let Some(warning) = coloured(test, &remedy) {
+        let share = residual_share(fit.experiments.first().map_or(&[][..], |own| own.residual.as_slice()), output);
+        if let Some(warning) = coloured(test, share, &remedy) {
             cx.warn(warning);
         }
         if fit.discrete.response_error > 0.0 {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::order::{Order, choice_document, simulated_percent};
-use super::whiteness::{coloured, test_document};
+use super::whiteness::{coloured, residual_share, test_document};
 use crate::artifacts::{DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, state_nuisances, state_space, state_t0_ambiguity};
 use crate::ensemble::LEAST_EVENTS;
 use crate::watched::Watched;
@@ -26,10 +26,10 @@ type Tested = Result<TestResult, ModelError>;
 /// Model: Eq. 8, x(t+Ts) = A x + B u + K e, y = C x + D u + e + offset + drift; the initial state is estimated along.
 /// Method: minimum of the squared one-step prediction errors by Levenberg-Marquardt with analytic sensitivities; all
 /// that enters linearly is eliminated exactly. Poles and predictor are stable by construction: sections of second order
-/// in reflection coefficients. Starts from subspace estimates of the wanted order and of up to six less. The model is one
-/// in discrete time: an input that is held between samples and one that runs linearly give the same poles and other B and
-/// D, which are free, so that both are fitted exactly and the data cannot tell them apart; poles and errors are right for
-/// either. A band-limited input is fitted approximately (`model.grey` has it exactly).
+/// in reflection coefficients. Starts from subspace estimates of the wanted order and of up to six less. The model is
+/// one in discrete time: an input that is held between samples and one that runs linearly give the same poles and other
+/// B and D, which are free, so that both are fitted exactly and the data cannot tell them apart; poles and errors are
+/// right for either. A band-limited input is fitted approximately (`model.grey` has it exactly).
 /// Shapes: `residual`, `prediction` over time; A order x order; covariance of the 2 order + 1 parameters of A, B and D.
 /// Several inputs (`force` over `input` and time) give B and D as many columns.
 /// Units: volts to volts where the force is given as static deflection.
@@ -132,7 +132,8 @@ impl Stage for Pem {
             ));
         }
         let tests = self.tests(&fit, &input, &output);
-        if let Some(warning) = coloured(&tests.0, self.remedy()) {
+        let share = residual_share(fit.residuals.first().map_or(&[], Vec::as_slice), &output);
+        if let Some(warning) = coloured(&tests.0, share, self.remedy()) {
             cx.warn(warning);
         }
         let summary = self.summary(&fit, choice.as_ref(), (&input, &output, &unit), first, &tests)?;

@@ -17,8 +17,8 @@ const HALF: f64 = 1e-3;
 /// The input's interpolation for one fraction of a delay, shared by all exponentials.
 ///
 /// # Model
-/// `u(t) = sum_n u_n w(t - n)`, w a sinc under a Kaiser window of 32 samples to either side: sines of up to 0.86 of half
-/// the sample rate to 2e-5, up to 0.9 to 1e-4 (see `events::fractional_shift`).
+/// `u(t) = sum_n u_n w(t - n)`, w a sinc under a Kaiser window of 32 samples to either side: sines of up to 0.86 of
+/// half the sample rate to 2e-5, up to 0.9 to 1e-4 (see `events::fractional_shift`).
 /// # Method
 /// `x(k) = exp(mu) x(k-1) + int_0^1 exp(mu (1 - v)) u(k - 1 + v - tau) dv`; the integral by Gauss and Legendre's rule.
 pub(super) struct Interpolation {

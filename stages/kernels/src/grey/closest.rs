@@ -12,8 +12,8 @@ use crate::linear_algebra::Qr;
 const EDGE: f64 = 0.9 * std::f64::consts::PI;
 const GRID: usize = 256;
 
-/// Angular frequencies per sample at which the closest model is sought: an even grid, and each mode's line, which may be
-/// narrower than the grid.
+/// Angular frequencies per sample at which the closest model is sought: an even grid, and each mode's line, which may
+/// be narrower than the grid.
 fn band(point: &Point) -> Vec<f64> {
     let even = (0..GRID).map(|k| EDGE * (k as f64 + 0.5) / GRID as f64);
     let lines = point.modes.iter().flat_map(|[w, q]| [-0.5, 0.0, 0.5].map(|part| w * (1.0 + part / q)));

@@ -29,8 +29,8 @@ pub struct DiscreteGrey {
     pub dead_samples: usize,
     /// Covariance of all a, then all b and D of each input.
     pub covariance: Mat<f64>,
-    /// Root mean square error of its response up to 0.9 of half the sample rate, over that of the response itself: 0 where
-    /// it is exact, as for held and linear input.
+    /// Root mean square error of its response up to 0.9 of half the sample rate, over that of the response itself: 0
+    /// where it is exact, as for held and linear input.
     pub response_error: f64,
 }
 
@@ -114,8 +114,8 @@ impl Parts {
     }
 }
 
-/// Denominators of all sections without numerators, and the poles of the last ones: real ones and, where one is, that at
-/// zero.
+/// Denominators of all sections without numerators, and the poles of the last ones: real ones and, where one is, that
+/// at zero.
 pub(super) fn denominators(upper: &[c64], real: &[c64], delay: Delay) -> (Parts, Vec<f64>) {
     // real poles and those at zero, two to a section
     let mut singles: Vec<f64> = real.iter().map(|step| step.re).collect();

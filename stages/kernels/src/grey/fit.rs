@@ -36,10 +36,10 @@ const ROUNDS: usize = 4;
 /// # Method
 /// Each exponential of the partial fractions is discretised for the input between samples, delay included: in closed
 /// form (modified z-transform) for held and linear input, by quadrature of the windowed-sinc interpolation for
-/// band-limited input. Where the input between samples is left open, see [`IntersampleChoice`]. Gains, d0, offsets and initial states are eliminated by variable projection;
-/// Levenberg-Marquardt with analytic slopes on ln w, ln Q, ln p and d. Start: subspace estimates, then a grid of real
-/// poles and delays. A step costs `2 N m^2` operations for N samples and m raw columns (8 per mode and 4 per real pole
-/// with an initial state): docs/results/timings.md.
+/// band-limited input. Where the input between samples is left open, see [`IntersampleChoice`]. Gains, d0, offsets and
+/// initial states are eliminated by variable projection; Levenberg-Marquardt with analytic slopes on ln w, ln Q, ln p
+/// and d. Start: subspace estimates, then a grid of real poles and delays. A step costs `2 N m^2` operations for N
+/// samples and m raw columns (8 per mode and 4 per real pole with an initial state): docs/results/timings.md.
 /// # Shapes
 /// N samples of output per experiment, NaN where missing; inputs one after the other.
 /// # Units

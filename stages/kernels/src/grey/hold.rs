@@ -5,8 +5,8 @@ use super::moments::moments;
 use crate::effects::Intersample;
 use faer::c64;
 
-/// One exponential's response to the samples round a step: `x(k) = exp(mu) x(k-1) + sum gains u`, ascending in time, with
-/// the slopes of the gains by mu.
+/// One exponential's response to the samples round a step: `x(k) = exp(mu) x(k-1) + sum gains u`, ascending in time,
+/// with the slopes of the gains by mu.
 #[derive(Debug, Clone)]
 pub(super) struct Taps {
     pub step: c64,
@@ -70,8 +70,8 @@ pub(super) fn reach(kind: Intersample) -> (usize, usize) {
     }
 }
 
-/// Samples at the beginning (besides the delay's) and at the end of a record whose input between samples depends on what
-/// was not recorded.
+/// Samples at the beginning (besides the delay's) and at the end of a record whose input between samples depends on
+/// what was not recorded.
 pub(super) fn unknown_ends(kind: Intersample) -> (usize, usize) {
     if kind == Intersample::BandLimited { reach(kind) } else { (0, 0) }
 }

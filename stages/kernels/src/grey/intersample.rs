@@ -67,7 +67,7 @@ impl IntersampleChoice {
         known.max_by(|a, b| a.advantage.total_cmp(&b.advantage)).map_or(Intersample::Held, |fit| fit.kind)
     }
 
-    /// Whether the likeliest is told apart from the next.
+    /// Whether the likeliest is distinguishable from the next.
     pub fn distinguishable(&self) -> bool {
         self.lead >= DISTINGUISHABLE
     }

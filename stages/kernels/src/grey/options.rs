@@ -80,8 +80,8 @@ pub enum BetweenSamples {
     Held,
     /// It goes straight to the next sample.
     Linear,
-    /// It is the band-limited signal that the samples determine, as behind an anti-alias filter: exact to 1e-4 below 0.9
-    /// of half the sample rate. 33 samples at the beginning (unless settled or at rest) and 31 at the end are not
+    /// It is the band-limited signal that the samples determine, as behind an anti-alias filter: exact to 1e-4 below
+    /// 0.9 of half the sample rate. 33 samples at the beginning (unless settled or at rest) and 31 at the end are not
     /// counted: what was not recorded decides on them.
     BandLimited,
 }

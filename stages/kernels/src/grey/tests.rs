@@ -17,10 +17,10 @@ pub(super) const T: f64 = 1e-6;
 /// `[f, Q, gain]` of each mode, real poles in Hz, delay, d0.
 #[derive(Clone)]
 pub(super) struct Truth {
-    modes: Vec<[f64; 3]>,
-    poles: Vec<f64>,
+    pub modes: Vec<[f64; 3]>,
+    pub poles: Vec<f64>,
     pub delay: f64,
-    d0: f64,
+    pub d0: f64,
 }
 
 impl Truth {
