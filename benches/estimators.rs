@@ -8,7 +8,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use afmid_kernels::contact::{CoupledPoles, FreeLever, LOADED_BEAM_SHARES, contact_stiffness, coupled_poles};
-use afmid_kernels::grey::{Before, GreyOptions, GreyStart, fit_grey};
+use afmid_kernels::grey::{Before, BetweenSamples, GreyOptions, GreyStart, fit_grey};
 use afmid_kernels::model::ModelError;
 use afmid_kernels::pem::{Experiment, PemOptions, refit};
 use afmid_kernels::ringdown::{DecayOptions, Estimate, ModeEstimate, RingdownOptions, fit_decay, fit_ringdowns};
@@ -122,7 +122,8 @@ fn grey(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("grey form, four modes, 8192 samples");
     group.sampling_mode(SamplingMode::Flat);
     for (name, start) in [("subspace start", GreyStart::Subspace), ("modes given", GreyStart::Modes(near))] {
-        let options = GreyOptions { history: Before::Settled, start, ..GreyOptions::default() };
+        let (history, between) = (Before::Settled, BetweenSamples::Held);
+        let options = GreyOptions { history, between, start, ..GreyOptions::default() };
         group.bench_function(name, |bench| {
             bench.iter(|| {
                 let experiment = Experiment { input: black_box(&u), output: &y };

@@ -1,5 +1,6 @@
 //! The stage `model.grey`.
 
+mod between;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -12,24 +13,31 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use self::between::{between_document, name_of};
 use self::tables::{mode_table, named, parameter_table, static_gain, with_interval};
 use super::known::KnownNumber;
 use super::order::simulated_percent;
 use super::pem::{MODEL, PAIR, RESIDUALS, SUMMARY, ending};
+use super::whiteness::{coloured, residual_share, test_document};
 use crate::artifacts::{
     DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, innovations, state_nuisances, state_space, state_t0_ambiguity,
 };
 use afmid_kernels::grey::{Grey, GreyHold, GreyOptions, GreyQuantity, GreyStart, fit_grey};
+use afmid_kernels::model::ModelError;
 use afmid_kernels::pem::{Experiment, Identified, ResidualColour};
-use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, whiteness};
+use afmid_kernels::validation::{Nuisances, TestResult, fit_percent, simulate_held_out, whiteness};
 
 /// Fits modes, real poles, delay and feedthrough to force and response: the grey modal form.
 ///
 /// Model: G(s) = exp(-s d) [sum g_n w_n^2 / (s^2 + w_n/Q_n s + w_n^2) + d0] prod p_k / (s + p_k); y = G u + offset +
 /// drift + e, with e unfiltered (output error). The delay may be any part of a sample; several inputs (`force` over
 /// `input` and time) have gains and d0 each and share the rest.
-/// Method: each partial fraction discretised in closed form for the force between its samples, delay included (modified
-/// z-transform); gains, d0, offset, drift and initial state by variable projection, the rest by Levenberg-Marquardt
+/// Method: each partial fraction discretised for the force between its samples, delay included: in closed form
+/// (modified z-transform) for a held or linear force, by quadrature under a windowed-sinc interpolation for a
+/// band-limited one. With `between = "auto"` each is fitted from the held force's minimum, and the likeliest is taken
+/// if twice its log likelihood is 3.84 above that of held (chi-square 95 %, one degree of freedom: a wrong one is taken
+/// in at most 2.5 %); the noise is taken as autoregressive there, order by BIC; `input_between_samples` in the summary
+/// has the figures. Gains, d0, offset, drift and initial state by variable projection, the rest by Levenberg-Marquardt
 /// with analytic slopes. Starts from subspace estimates, given modes or the poles of the model on port `start`, and a
 /// grid of real poles and delays. Missing responses are left out.
 /// Shapes: `modes` by mode, `parameters` by parameter; `residual` and `prediction` (here the simulation) over time;
@@ -38,9 +46,12 @@ use afmid_kernels::validation::{Nuisances, fit_percent, simulate_held_out, white
 /// Accuracy: the Cramer-Rao bound in white noise, unbiased, 95 % intervals that hold (docs/results/grey.md); the errors
 /// follow the residual's own spectrum, but under thermal noise `model.ringdown` is more precise. A delay is
 /// distinguished from a real pole by the shape of the first samples alone: the errors say how well. `model` is exact up
-/// to two samples of delay, beyond which whole samples are reported as `dead_samples` and warned of.
+/// to two samples of delay, beyond which whole samples are reported as `dead_samples` and warned of. For a band-limited
+/// force, whose response no causal model of finite order has, it is the closest one up to 0.9 of half the sample rate,
+/// and its error is warned of.
 /// Errors: too few samples, values that are not finite, a response that is constant, fewer oscillations than `modes`,
-/// knowledge of what is not fitted. No convergence is a warning, and so is a number on a bound, whose error is unknown.
+/// knowledge of what is not fitted. No convergence is a warning, and so are a number on a bound, whose error is
+/// unknown, and a residual that is not white (Ljung-Box, p < 0.001).
 /// Source: L. Ljung, System Identification, 1999, chapters 4 and 7; G. Golub and V. Pereyra, Inverse Problems 19 (2003)
 /// R1; E. I. Jury, Theory and Application of the z-Transform Method, 1964.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -86,7 +97,7 @@ impl Stage for GreyEstimate {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.grey",
-        version: 4,
+        version: 5,
         summary: "fits modes, real poles, delay and feedthrough: the grey modal form",
         inputs: &[PAIR.spec(), START.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec(), MODES.spec(), PARAMETERS.spec()],
@@ -116,14 +127,16 @@ impl Stage for GreyEstimate {
         let options = self.options(inputs.find(&START)?)?;
         let experiment = Experiment { input: &series.input, output: &series.output };
         let fit = fit_grey(&[experiment], 1.0 / rate, &options).map_err(StageError::from_error)?;
-        self.warn(&fit, series.output.len(), cx);
+        let test = residual_test(&fit);
+        self.warn(&fit, &test, &series.output, cx);
         let identified = identified(&fit, &series)?;
         let mut model = state_space(&identified, self.set, first)?;
         state_nuisances(&mut model, Nuisances { offset: self.fit.offset, slope: self.fit.drift });
         state_t0_ambiguity(&mut model, pair.t0_ambiguity_s());
         model.attributes.insert("delay_s".to_owned(), fit.model.delay_s.into());
+        model.attributes.insert("input_between_samples".to_owned(), name_of(fit.model.between).into());
         model.attributes.insert("dead_samples".to_owned(), fit.discrete.dead_samples.into());
-        let summary = self.summary(&fit, &identified, &series, first)?;
+        let summary = self.summary(&fit, &test, (&identified, &series), first)?;
         let residual = fit.experiments.first().map_or_else(Vec::new, |own| own.residual.clone());
         let prediction = series.output.iter().zip(&residual).map(|(y, e)| y - e).collect::<Vec<f64>>();
         let residuals = Array::over(vec![Axis::new("time", "s", "time since t0", series.time.clone())])
@@ -186,7 +199,8 @@ impl GreyEstimate {
         })
     }
 
-    fn warn(&self, fit: &Grey, samples: usize, cx: &Context) {
+    fn warn(&self, fit: &Grey, test: &Result<TestResult, ModelError>, output: &[f64], cx: &Context) {
+        let samples = output.len();
         if !fit.verdict.converged {
             cx.warn(format!(
                 "no minimum after {} steps: {:.2} standard errors to go; try other modes, real poles or starts",
@@ -203,6 +217,20 @@ impl GreyEstimate {
                 cx.warn(format!("the data say nothing of the {name}: leave it out or give it"));
             }
         }
+        let errors = if self.coloured { "follow its spectrum" } else { "do not count this (`coloured = true` does)" };
+        let remedy = format!(
+            "standard errors {errors}, and what the model cannot follow is not noise: try more modes or real poles, or `model.pem`"
+        );
+        let share = residual_share(fit.experiments.first().map_or(&[][..], |own| own.residual.as_slice()), output);
+        if let Some(warning) = coloured(test, share, &remedy) {
+            cx.warn(warning);
+        }
+        if fit.discrete.response_error > 0.0 {
+            cx.warn(format!(
+                "the force is band-limited between its samples: the model on port `model`, which is causal, has its response up to 0.9 of half the sample rate to {:.1e} rms; `parameters` and `modes` are exact",
+                fit.discrete.response_error
+            ));
+        }
         if fit.discrete.dead_samples > 0 {
             cx.warn(format!(
                 "the model comes {} whole samples before the delay of {:.4e} s: shift the force by them before it is simulated",
@@ -214,8 +242,8 @@ impl GreyEstimate {
     fn summary(
         &self,
         fit: &Grey,
-        identified: &Identified,
-        series: &PairSeries,
+        test: &Result<TestResult, ModelError>,
+        (identified, series): (&Identified, &PairSeries),
         first: usize,
     ) -> Result<Document, StageError> {
         let samples = series.output.len();
@@ -223,7 +251,6 @@ impl GreyEstimate {
         let present: Vec<usize> = (0..samples).filter(|&k| residual.get(k).is_some_and(|e| e.is_finite())).collect();
         let measured: Vec<f64> = present.iter().map(|&k| series.output[k]).collect();
         let simulated: Vec<f64> = present.iter().map(|&k| series.output[k] - residual[k]).collect();
-        let left: Vec<f64> = present.iter().map(|&k| residual[k]).collect();
         let nuisances = Nuisances { offset: self.fit.offset, slope: self.fit.drift };
         let shares = fit.static_shares(0);
         let modes: Vec<Value> = fit
@@ -249,7 +276,6 @@ impl GreyEstimate {
                 json!({ "name": name, "unit": unit, "estimate": with_interval(p.estimate) })
             })
             .collect();
-        let test = whiteness(&left, 25 + fit.parameters.len(), fit.parameters.len()).ok();
         Document::new(&json!({
             "modes": modes,
             "parameters": parameters,
@@ -271,9 +297,17 @@ impl GreyEstimate {
             "simulation_fit_percent": simulated_percent(identified, &late(fit, series), &series.output, nuisances),
             "offset_v": identified.offsets.first(),
             "drift_v_per_s": identified.slopes.first(),
-            "whiteness": test.map(|t| json!({ "statistic": t.statistic, "freedom": t.freedom, "p_value": t.p_value })),
+            "input_between_samples": between_document(fit),
+            "whiteness": test_document(test),
         }))
     }
+}
+
+/// Whiteness of what is left of the samples that count.
+fn residual_test(fit: &Grey) -> Result<TestResult, ModelError> {
+    let residual = fit.experiments.first().map_or(&[][..], |own| own.residual.as_slice());
+    let left: Vec<f64> = residual.iter().copied().filter(|e| e.is_finite()).collect();
+    whiteness(&left, 25 + fit.parameters.len(), fit.parameters.len())
 }
 
 /// The inputs, later by the whole samples that the discrete model leaves out.

@@ -21,6 +21,7 @@ mod stabilisation;
 mod subspace;
 mod system_poles;
 mod vector_fitting;
+mod whiteness;
 mod zeros;
 
 pub use crate::artifacts::DataSet;

@@ -8,20 +8,28 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::order::{Order, choice_document, simulated_percent};
+use super::whiteness::{coloured, residual_share, test_document};
 use crate::artifacts::{DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, state_nuisances, state_space, state_t0_ambiguity};
 use crate::ensemble::LEAST_EVENTS;
 use crate::watched::Watched;
-use afmid_kernels::pem::{Ending, Experiment, Identified, PemOptions, identify};
+use afmid_kernels::model::ModelError;
+use afmid_kernels::pem::{Ending, Experiment, Focus, Identified, NoiseModel, PemOptions, identify};
 use afmid_kernels::validation::{
     Nuisances, OrderChoice, TestResult, choose_order, fit_percent, input_dependence, whiteness,
 };
+
+/// A residual test, or why there is none.
+type Tested = Result<TestResult, ModelError>;
 
 /// Identifies a state-space model in innovations form from force and response.
 ///
 /// Model: Eq. 8, x(t+Ts) = A x + B u + K e, y = C x + D u + e + offset + drift; the initial state is estimated along.
 /// Method: minimum of the squared one-step prediction errors by Levenberg-Marquardt with analytic sensitivities; all
 /// that enters linearly is eliminated exactly. Poles and predictor are stable by construction: sections of second order
-/// in reflection coefficients. Starts from subspace estimates of the wanted order and of up to six less.
+/// in reflection coefficients. Starts from subspace estimates of the wanted order and of up to six less. The model is
+/// one in discrete time: an input that is held between samples and one that runs linearly give the same poles and other
+/// B and D, which are free, so that both are fitted exactly and the data cannot tell them apart; poles and errors are
+/// right for either. A band-limited input is fitted approximately (`model.grey` has it exactly).
 /// Shapes: `residual`, `prediction` over time; A order x order; covariance of the 2 order + 1 parameters of A, B and D.
 /// Several inputs (`force` over `input` and time) give B and D as many columns.
 /// Units: volts to volts where the force is given as static deflection.
@@ -29,7 +37,7 @@ use afmid_kernels::validation::{
 /// the residual's own spectrum, so wander that the model leaves is counted.
 /// Errors: too few samples for the order, values that are not finite, a response that is constant; missing outputs,
 /// unless the errors that are made small are those of the simulation without noise filter (`noise = "white"`), which
-/// leaves them out. No convergence is a warning.
+/// leaves them out. No convergence is a warning, and so is a residual that is not white (Ljung-Box, p < 0.001).
 /// Source: Stark et al. 2005, Eq. 8; L. Ljung, System Identification, 1999, chapters 7 and 10.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
@@ -80,7 +88,7 @@ impl Stage for Pem {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.pem",
-        version: 8,
+        version: 9,
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],
@@ -123,7 +131,12 @@ impl Stage for Pem {
                 fit.verdict.at_limit
             ));
         }
-        let summary = self.summary(&fit, choice.as_ref(), (&input, &output, &unit), first)?;
+        let tests = self.tests(&fit, &input, &output);
+        let share = residual_share(fit.residuals.first().map_or(&[], Vec::as_slice), &output);
+        if let Some(warning) = coloured(&tests.0, share, self.remedy()) {
+            cx.warn(warning);
+        }
+        let summary = self.summary(&fit, choice.as_ref(), (&input, &output, &unit), first, &tests)?;
         let mut model = state_space(&fit, self.set, first)?;
         state_nuisances(&mut model, Nuisances { offset: self.fit.offset, slope: self.fit.drift });
         state_t0_ambiguity(&mut model, pair.t0_ambiguity_s());
@@ -161,29 +174,41 @@ impl Pem {
         )))
     }
 
+    /// Whiteness of the residual, and what of the first input is left in it.
+    fn tests(&self, fit: &Identified, input: &[f64], output: &[f64]) -> (Tested, Tested) {
+        let residual = fit.residuals.first().map_or(&[][..], Vec::as_slice);
+        let (order, first) = (fit.model.order(), input.get(..output.len()).unwrap_or(input));
+        let lags = self.test_lags + order;
+        (whiteness(residual, lags, order), input_dependence(first, residual, lags))
+    }
+
+    /// What to do about a residual that is not white.
+    fn remedy(&self) -> &'static str {
+        match (self.fit.noise, self.fit.focus) {
+            (NoiseModel::White, _) | (_, Focus::Simulation) => {
+                "standard errors follow its spectrum, but the fit is not the most efficient: try a higher order, or a noise model (`noise`, `focus`)"
+            }
+            _ => {
+                "standard errors follow its spectrum, but modes or noise are missing in the model: try a higher order or another `noise`"
+            }
+        }
+    }
+
     fn summary(
         &self,
         fit: &Identified,
         choice: Option<&OrderChoice>,
         (input, output, unit): (&[f64], &[f64], &str),
         first: usize,
+        tests: &(Tested, Tested),
     ) -> Result<Document, StageError> {
         let residual = fit.residuals.first().map_or(&[][..], Vec::as_slice);
         let predicted: Vec<f64> = output.iter().zip(residual).map(|(y, e)| y - e).collect();
-        let order = fit.model.order();
-        let lags = self.test_lags + order;
-        let (all_inputs, input) = (input, input.get(..output.len()).unwrap_or(input));
         let nuisances = Nuisances { offset: self.fit.offset, slope: self.fit.drift };
-        let test = |result: Result<TestResult, afmid_kernels::model::ModelError>| {
-            result.map_or(
-                json!(null),
-                |t| json!({ "statistic": t.statistic, "freedom": t.freedom, "p_value": t.p_value }),
-            )
-        };
         let verdict = &fit.verdict;
         let samples = output.len() as f64;
         Document::new(&json!({
-            "order": order,
+            "order": fit.model.order(),
             "order_choice": choice.map(choice_document),
             "set": self.set,
             "samples": output.len(),
@@ -195,11 +220,11 @@ impl Pem {
             "coordinates_at_limit": verdict.at_limit,
             "innovation_std": { "value": fit.innovation_variance.sqrt(), "unit": unit },
             "prediction_fit_percent": fit_percent(output, &predicted).ok(),
-            "simulation_fit_percent": simulated_percent(fit, all_inputs, output, nuisances),
+            "simulation_fit_percent": simulated_percent(fit, input, output, nuisances),
             "offset_v": fit.offsets.first(),
             "drift_v_per_s": fit.slopes.first(),
-            "whiteness": test(whiteness(residual, lags, order)),
-            "input_dependence": test(input_dependence(input, residual, lags)),
+            "whiteness": test_document(&tests.0),
+            "input_dependence": test_document(&tests.1),
             "singular_values": fit.singular_values,
         }))
     }

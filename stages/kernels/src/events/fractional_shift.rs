@@ -48,7 +48,7 @@ pub fn band_limited_derivative(values: &[f64], start: usize, count: usize) -> Ve
 }
 
 /// Weights of the samples `-REACH + 1 ..= REACH` round a position `fraction` (0 to 1) after sample 0.
-fn interpolation_weights(fraction: f64) -> Vec<f64> {
+pub(crate) fn interpolation_weights(fraction: f64) -> Vec<f64> {
     let mut weights = raw_weights(fraction);
     let sum: f64 = weights.iter().sum();
     weights.iter_mut().for_each(|weight| *weight /= sum);

@@ -4,8 +4,9 @@ use crate::linear_algebra::Qr;
 use faer::{Mat, c64};
 
 use super::fractions::Fractions;
-use super::hold::{Hold, InputBetween, delayed, parts};
+use super::hold::{Between, Taps, parts, reach};
 use super::layout::Layout;
+use crate::effects::Intersample;
 
 /// One experiment, checked.
 #[derive(Debug, Clone)]
@@ -18,16 +19,18 @@ pub(super) struct Series<'a> {
     pub levels: Vec<f64>,
     /// Samples at the start that say nothing: they hold what was put in before the record.
     pub masked: usize,
+    /// Samples at the end that say nothing: their input between samples depends on later ones.
+    pub masked_end: usize,
 }
 
 impl Series<'_> {
     /// Samples that count.
     pub fn present(&self) -> usize {
-        self.output.iter().skip(self.masked).filter(|y| !y.is_nan()).count()
+        (0..self.output.len()).filter(|&k| self.counts(k)).count()
     }
 
     pub fn counts(&self, k: usize) -> bool {
-        k >= self.masked && !self.output[k].is_nan()
+        k >= self.masked && k + self.masked_end < self.output.len() && !self.output[k].is_nan()
     }
 }
 
@@ -37,27 +40,49 @@ const BLOCK: usize = 1024;
 const GONE: f64 = 1e-280;
 
 /// State of one exponential: its response, the response's slope by the pole.
-#[derive(Clone, Copy)]
 struct Running {
-    hold: Hold,
+    taps: Taps,
     value: c64,
     slope: c64,
 }
 
 impl Running {
-    fn new(mu: c64, fraction: f64, between: InputBetween) -> Self {
+    fn new(mu: c64, between: &Between) -> Self {
         let zero = c64::new(0.0, 0.0);
-        Self { hold: Hold::of(mu, fraction, between), value: zero, slope: zero }
+        Self { taps: between.taps(mu), value: zero, slope: zero }
     }
 
-    fn step(&mut self, u: [f64; 3]) {
-        let (input, input_slope) = self.hold.input(u);
-        let z = self.hold.step;
+    fn step(&mut self, u: &[f64]) {
+        let (input, input_slope) = self.taps.input(u);
+        let z = self.taps.step;
         self.slope = z * (self.slope + self.value) + input_slope;
         self.value = z * self.value + input;
         if self.value.norm_sqr() + self.slope.norm_sqr() < GONE {
             (self.value, self.slope) = (c64::new(0.0, 0.0), c64::new(0.0, 0.0));
         }
+    }
+}
+
+/// The samples of an input that a step depends on, less its level.
+struct Windows {
+    /// From the first step's first sample on; zero before the record, the last sample after it.
+    padded: Vec<f64>,
+    width: usize,
+}
+
+impl Windows {
+    fn new(series: &Series<'_>, input: usize, whole: usize, (before, after): (usize, usize)) -> Self {
+        let (u, level, samples) = (series.inputs[input], series.levels[input], series.output.len());
+        let width = before + after + 1;
+        let at = |i: usize| match i.checked_sub(whole + before) {
+            None => 0.0,
+            Some(k) => u.get(k).or(u.last()).map_or(0.0, |u| u - level),
+        };
+        Self { padded: (0..samples + width - 1).map(at).collect(), width }
+    }
+
+    fn at(&self, k: usize) -> &[f64] {
+        &self.padded[k..k + self.width]
     }
 }
 
@@ -67,14 +92,17 @@ pub(super) fn visit(
     layout: Layout,
     fractions: &Fractions,
     delay: f64,
-    between: InputBetween,
+    kind: Intersample,
     mut take: impl FnMut(usize, &Mat<f64>),
 ) {
     let (whole, fraction) = parts(delay);
     let mus: Vec<c64> =
         fractions.upper.iter().copied().chain(fractions.decays.iter().map(|p| c64::new(-p, 0.0))).collect();
+    let between = Between::new(kind, fraction);
+    let windows: Vec<Windows> =
+        (0..series.inputs.len()).map(|input| Windows::new(series, input, whole, reach(kind))).collect();
     let mut running: Vec<Running> =
-        series.inputs.iter().flat_map(|_| mus.iter().map(|mu| Running::new(*mu, fraction, between))).collect();
+        series.inputs.iter().flat_map(|_| mus.iter().map(|mu| Running::new(*mu, &between))).collect();
     let mut free: Vec<(c64, c64)> = mus.iter().map(|mu| (mu.exp(), c64::new(1.0, 0.0))).collect();
     let samples = series.output.len();
     let centre = 0.5 * (samples.max(2) - 1) as f64;
@@ -85,16 +113,15 @@ pub(super) fn visit(
         for row in 0..rows {
             let k = first + row;
             let counts = series.counts(k);
-            for (input, u) in series.inputs.iter().enumerate() {
-                let at = |back: usize| k.checked_sub(back).map_or(0.0, |i| u[i] - series.levels[input]);
-                let u = [at(whole + 2), at(whole + 1), at(whole)];
+            for (input, windows) in windows.iter().enumerate() {
+                let u = windows.at(k);
                 let own = &mut running[input * mus.len()..(input + 1) * mus.len()];
                 own.iter_mut().for_each(|state| state.step(u));
                 if counts {
                     let top = input * layout.per_input();
                     let values = own.iter().map(|state| (state.value, state.slope));
                     put(&mut block, row, top, layout, values);
-                    let [now, slope] = delayed(u, fraction, between);
+                    let [now, slope] = between.delayed(u);
                     block[(row, top + layout.delayed())] = now;
                     block[(row, top + layout.delayed() + 1)] = slope;
                 }
@@ -143,11 +170,11 @@ pub(super) fn triangle(
     layout: Layout,
     fractions: &Fractions,
     delay: f64,
-    between: InputBetween,
+    kind: Intersample,
 ) -> Mat<f64> {
     let width = layout.width() + 1;
     let mut r = Mat::<f64>::zeros(0, width);
-    visit(series, layout, fractions, delay, between, |_, block| {
+    visit(series, layout, fractions, delay, kind, |_, block| {
         let top = r.nrows();
         let stacked = Mat::from_fn(top + block.nrows(), width, |i, j| match i.checked_sub(top) {
             None => r[(i, j)],

@@ -9,10 +9,10 @@ use rayon::prelude::*;
 
 use super::columns::{Series, triangle};
 use super::fractions::Fractions;
-use super::hold::InputBetween;
 use super::layout::{Layout, Linear, Weights, slopes};
 use super::point::Point;
 use super::rules::Rules;
+use crate::effects::Intersample;
 use crate::model::ModelError;
 use crate::ringdown::Knowledge;
 
@@ -21,7 +21,7 @@ pub(super) struct Problem<'a> {
     pub series: Vec<Series<'a>>,
     pub layout: Layout,
     pub linear: Linear,
-    pub between: InputBetween,
+    pub between: Intersample,
     pub rules: Rules,
 }
 

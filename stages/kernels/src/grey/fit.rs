@@ -7,12 +7,15 @@ use super::discrete::discrete;
 use super::errors::{Errors, errors};
 use super::evaluation::{Evaluation, Normal, Problem, combined, solved};
 use super::fractions::Fractions;
+use super::hold::unknown_ends;
+use super::intersample::{IntersampleChoice, choose};
 use super::layout::{Layout, Linear};
 use super::options::{Before, GreyKnown, GreyOptions, GreyQuantity};
 use super::result::{Grey, GreyExperiment, GreyHold, GreyMode, GreyModel, GreyParameter};
 use super::rules::Rules;
 use super::search::{Found, search};
 use super::start::begin;
+use crate::effects::Intersample;
 use crate::model::{ModelError, finite};
 use crate::pem::{Experiment, PemOptions, longest_complete};
 use crate::ringdown::{Estimate, Knowledge};
@@ -31,11 +34,12 @@ const ROUNDS: usize = 4;
 /// slope t + what was left from before + e`, e not filtered (output error). Poles and delay are shared by all
 /// experiments and inputs, gains and d0 by all experiments.
 /// # Method
-/// Each exponential of the partial fractions is discretised in closed form for the input between samples, delay
-/// included (modified z-transform). Gains, d0, offsets and initial states are eliminated by variable projection;
-/// Levenberg-Marquardt with analytic slopes on ln w, ln Q, ln p and d. Start: subspace estimates, then a grid of real
-/// poles and delays. A step costs `2 N m^2` operations for N samples and m raw columns (8 per mode and 4 per real pole
-/// with an initial state): docs/results/timings.md.
+/// Each exponential of the partial fractions is discretised for the input between samples, delay included: in closed
+/// form (modified z-transform) for held and linear input, by quadrature of the windowed-sinc interpolation for
+/// band-limited input. Where the input between samples is left open, see [`IntersampleChoice`]. Gains, d0, offsets and
+/// initial states are eliminated by variable projection; Levenberg-Marquardt with analytic slopes on ln w, ln Q, ln p
+/// and d. Start: subspace estimates, then a grid of real poles and delays. A step costs `2 N m^2` operations for N
+/// samples and m raw columns (8 per mode and 4 per real pole with an initial state): docs/results/timings.md.
 /// # Shapes
 /// N samples of output per experiment, NaN where missing; inputs one after the other.
 /// # Units
@@ -63,25 +67,46 @@ pub fn fit_grey(experiments: &[Experiment<'_>], sample_time_s: f64, options: &Gr
     });
     mask(&mut problem, options, if delayed { Some(START_MASK as f64) } else { given });
     let start = begin(&problem, options, sample_time_s, (&input, output))?;
+    let found = refined(&mut problem, options, start)?;
+    if options.between.stated().is_some() {
+        return conclude(&problem, &found, sample_time_s, options, None);
+    }
+    let (choice, likeliest) = choose(&problem, options, &found)?;
+    match likeliest {
+        None => conclude(&problem, &found, sample_time_s, options, Some(choice)),
+        Some(point) => {
+            problem.between = choice.chosen;
+            mask(&mut problem, options, Some(point.delay + 1.0));
+            let start = problem.evaluate(&point, problem.variance(&found.best))?;
+            let found = refined(&mut problem, options, start)?;
+            conclude(&problem, &found, sample_time_s, options, Some(choice))
+        }
+    }
+}
+
+/// Searches from `start`, until the samples that are left out and the noise that expectations are weighed with fit what
+/// is found.
+fn refined(problem: &mut Problem<'_>, options: &GreyOptions, start: Evaluation) -> Result<Found, ModelError> {
     let mut weighed = problem.variance(&start);
-    let mut found = search(&problem, start, weighed, options.max_iterations)?;
+    let mut found = search(problem, start, weighed, options.max_iterations)?;
     let mut steps = found.verdict.iterations;
     let expects = options.known.iter().any(|k| matches!(k.knowledge, Knowledge::About(..)));
+    let (lead, _) = unknown_ends(problem.between);
     for _ in 0..ROUNDS {
         let (delay, variance) = (found.best.point.delay, problem.variance(&found.best));
         let masked = problem.series.first().map_or(0, |series| series.masked) as f64;
-        let enough = masked == 0.0 || (delay..delay + 2.5).contains(&masked);
+        let enough = masked == 0.0 || (delay..delay + 2.5).contains(&(masked - lead as f64));
         if enough && (!expects || (variance / weighed - 1.0).abs() < 1e-2) {
             break;
         }
-        mask(&mut problem, options, Some(delay + 1.0));
+        mask(problem, options, Some(delay + 1.0));
         weighed = variance;
         let from = problem.evaluate(&found.best.point, weighed)?;
-        found = search(&problem, from, weighed, options.max_iterations)?;
+        found = search(problem, from, weighed, options.max_iterations)?;
         steps += found.verdict.iterations;
     }
     found.verdict.iterations = steps;
-    conclude(&problem, &found, sample_time_s, options)
+    Ok(found)
 }
 
 /// The options with what they leave unsaid: no delay is a delay of zero.
@@ -93,13 +118,23 @@ fn settled(options: &GreyOptions) -> GreyOptions {
     settled
 }
 
-/// Leaves out the samples that hold what was put in before the record.
+/// Leaves out the samples that depend on what was put in before the record or after it.
 fn mask(problem: &mut Problem<'_>, options: &GreyOptions, delay: Option<f64>) {
+    mask_for(problem, options, delay, problem.between);
+}
+
+/// The same as an input of another kind has it.
+pub(super) fn mask_for(problem: &mut Problem<'_>, options: &GreyOptions, delay: Option<f64>, kind: Intersample) {
+    let (lead, tail) = unknown_ends(kind);
     let samples = match delay {
-        Some(delay) if options.history == Before::Anything => delay.ceil() as usize,
-        _ => 0,
+        _ if options.history != Before::Anything => 0,
+        Some(delay) => delay.ceil() as usize + lead,
+        None => lead,
     };
-    problem.series.iter_mut().for_each(|s| s.masked = samples.min(s.output.len() / 2));
+    for series in &mut problem.series {
+        let most = series.output.len() / 2;
+        (series.masked, series.masked_end) = (samples.min(most), tail.min(most / 2));
+    }
 }
 
 /// Checked options and data as a problem. Errors: see [`fit_grey`].
@@ -143,7 +178,7 @@ fn checked<'a>(
         series: Vec::new(),
         layout,
         linear: Linear { feedthrough: options.feedthrough, offset: options.offset, slope: options.drift },
-        between: options.between,
+        between: options.between.stated().unwrap_or_default(),
         rules,
     };
     for experiment in experiments {
@@ -180,8 +215,9 @@ fn series<'a>(
         .iter()
         .map(|u| if options.history == Before::Rest { 0.0 } else { u.first().copied().unwrap_or(0.0) })
         .collect();
-    let series = Series { inputs, output, levels, masked: 0 };
-    let wanted = 2 * own + 2 * START_MASK;
+    let series = Series { inputs, output, levels, masked: 0, masked_end: 0 };
+    let (lead, tail) = unknown_ends(options.between.stated().unwrap_or_default());
+    let wanted = 2 * own + 2 * START_MASK + lead + tail;
     if series.present() < wanted {
         return Err(ModelError::TooShort { found: series.present(), wanted });
     }
@@ -193,6 +229,7 @@ fn conclude(
     found: &Found,
     sample_time_s: f64,
     options: &GreyOptions,
+    intersample: Option<IntersampleChoice>,
 ) -> Result<Grey, ModelError> {
     let at = &found.best;
     let variance = problem.variance(at);
@@ -209,6 +246,7 @@ fn conclude(
         parameters,
         experiments: own(problem, at, &normal, &errors, variance),
         noise_variance: variance,
+        intersample,
         verdict: found.verdict,
         discrete,
     })

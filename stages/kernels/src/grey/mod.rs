@@ -3,8 +3,8 @@
 //!
 //! # Model
 //! `G(s) = exp(-s d) (sum_n g_n w_n^2 / (s^2 + w_n / Q_n s + w_n^2) + d0) prod_k p_k / (s + p_k)`; `y = G u + offset +
-//! slope t + e`, e white or with the spectrum of its residuals. u is held between samples, linear, or band-limited
-//! ([`InputBetween`]); d is any part of a sample.
+//! slope t + e`, e white or with the spectrum of its residuals. u is held between samples, linear, or band-limited,
+//! as stated or as the data choose ([`BetweenSamples`]); d is any part of a sample.
 //! # Shapes
 //! Experiments of u (several inputs one after the other) and y; a parameter for each `w_n, Q_n, g_n, p_k`, d and d0.
 //! # Cost
@@ -32,6 +32,8 @@
 //! # Ok::<(), afmid_kernels::model::ModelError>(())
 //! ```
 
+mod band_limited;
+mod closest;
 mod columns;
 mod discrete;
 mod errors;
@@ -39,6 +41,9 @@ mod evaluation;
 mod fit;
 mod fractions;
 mod hold;
+mod intersample;
+#[cfg(test)]
+mod intersample_tests;
 mod layout;
 mod moments;
 mod options;
@@ -50,8 +55,9 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+pub use crate::effects::Intersample;
 pub use discrete::DiscreteGrey;
 pub use fit::fit_grey;
-pub use hold::InputBetween;
-pub use options::{Before, GreyKnown, GreyOptions, GreyQuantity, GreyStart};
+pub use intersample::{DISTINGUISHABLE, IntersampleChoice, IntersampleFit};
+pub use options::{Before, BetweenSamples, GreyKnown, GreyOptions, GreyQuantity, GreyStart};
 pub use result::{Grey, GreyExperiment, GreyHold, GreyMode, GreyModel, GreyParameter};

@@ -3,8 +3,9 @@
 use faer::{Mat, c64};
 
 use super::discrete::DiscreteGrey;
-use super::hold::InputBetween;
+use super::intersample::IntersampleChoice;
 use super::options::GreyQuantity;
+use crate::effects::Intersample;
 use crate::pem::Verdict;
 use crate::ringdown::{Estimate, ModeEstimate};
 
@@ -35,7 +36,7 @@ pub struct GreyModel {
     /// d0 of each input.
     pub feedthrough: Vec<f64>,
     /// What the input does between samples.
-    pub between: InputBetween,
+    pub between: Intersample,
     /// Seconds between samples.
     pub sample_time_s: f64,
 }
@@ -114,6 +115,8 @@ pub struct Grey {
     pub experiments: Vec<GreyExperiment>,
     /// Variance of the residuals.
     pub noise_variance: f64,
+    /// How the input between samples was chosen; none where it was given.
+    pub intersample: Option<IntersampleChoice>,
     /// How the search ended.
     pub verdict: Verdict,
     /// The same as a discrete state-space model.

@@ -4,29 +4,31 @@ use faer::{Mat, c64};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-use super::{Before, Grey, GreyHold, GreyKnown, GreyOptions, GreyQuantity, GreyStart, InputBetween, fit_grey};
+use super::{
+    Before, BetweenSamples, Grey, GreyHold, GreyKnown, GreyOptions, GreyQuantity, GreyStart, Intersample, fit_grey,
+};
 use crate::fixture::white_noise;
 use crate::linear_algebra::symmetric_inverse;
 use crate::pem::{Experiment, ResidualColour};
 use crate::ringdown::Knowledge;
 
-const T: f64 = 1e-6;
+pub(super) const T: f64 = 1e-6;
 
 /// `[f, Q, gain]` of each mode, real poles in Hz, delay, d0.
 #[derive(Clone)]
-struct Truth {
-    modes: Vec<[f64; 3]>,
-    poles: Vec<f64>,
-    delay: f64,
-    d0: f64,
+pub(super) struct Truth {
+    pub modes: Vec<[f64; 3]>,
+    pub poles: Vec<f64>,
+    pub delay: f64,
+    pub d0: f64,
 }
 
 impl Truth {
-    fn two() -> Self {
+    pub fn two() -> Self {
         Self { modes: vec![[20e3, 15.0, 1.0], [83e3, 60.0, 0.3]], poles: vec![150e3], delay: 1.37e-6, d0: 0.1 }
     }
 
-    fn values(&self) -> Vec<f64> {
+    pub fn values(&self) -> Vec<f64> {
         let modes = self.modes.iter().flat_map(|m| [m[0], m[1]]);
         let gains = self.modes.iter().map(|m| m[2]);
         modes.chain(self.poles.clone()).chain([self.delay]).chain(gains).chain([self.d0]).collect()
@@ -42,7 +44,7 @@ impl Truth {
         }
     }
 
-    fn transfer(&self, s: c64) -> c64 {
+    pub fn transfer(&self, s: c64) -> c64 {
         let mode = |m: &[f64; 3]| {
             let w = TAU * m[0];
             c64::new(m[2] * w * w, 0.0) / (s * s + s * (w / m[1]) + w * w)
@@ -64,8 +66,8 @@ impl Truth {
         poles.into_iter().map(around).collect()
     }
 
-    /// Settled under `u[0]` before.
-    fn response(&self, u: &[f64], between: InputBetween) -> Vec<f64> {
+    /// Settled under `u[0]` before; held or linear input.
+    pub fn response(&self, u: &[f64], between: Intersample) -> Vec<f64> {
         let residues = self.residues();
         let direct = if self.poles.is_empty() { self.d0 } else { 0.0 };
         let step = |t: f64| -> f64 {
@@ -80,16 +82,16 @@ impl Truth {
         let knots: Vec<(f64, f64)> = (0..u.len() as isize)
             .filter_map(|k| {
                 let change = match between {
-                    InputBetween::Held => at(k) - at(k - 1),
-                    InputBetween::Linear => (at(k + 1) - 2.0 * at(k) + at(k - 1)) / T,
+                    Intersample::Held => at(k) - at(k - 1),
+                    _ => (at(k + 1) - 2.0 * at(k) + at(k - 1)) / T,
                 };
                 (change != 0.0).then_some((k as f64 * T, change))
             })
             .collect();
         let rest = self.transfer(c64::new(0.0, 0.0)).re * u[0];
         let own: &dyn Fn(f64) -> f64 = match between {
-            InputBetween::Held => &step,
-            InputBetween::Linear => &ramp,
+            Intersample::Held => &step,
+            _ => &ramp,
         };
         (0..u.len())
             .map(|k| {
@@ -110,11 +112,17 @@ fn binary(samples: usize, hold: usize, seed: u64) -> Vec<f64> {
     (0..samples).map(|k| signs[k / hold].signum()).collect()
 }
 
-fn options() -> GreyOptions {
-    GreyOptions { modes: 2, real_poles: 1, block_rows: 40, history: Before::Settled, ..GreyOptions::default() }
+/// The two modes and the real pole of the truth, input held between samples.
+pub(super) fn options() -> GreyOptions {
+    let between = BetweenSamples::Held;
+    GreyOptions { modes: 2, real_poles: 1, block_rows: 40, history: Before::Settled, between, ..GreyOptions::default() }
 }
 
-fn found(fit: &Grey) -> Vec<(f64, f64)> {
+fn stated(kind: Intersample) -> BetweenSamples {
+    if kind == Intersample::Held { BetweenSamples::Held } else { BetweenSamples::Linear }
+}
+
+pub(super) fn found(fit: &Grey) -> Vec<(f64, f64)> {
     fit.parameters.iter().map(|p| (p.estimate.value, p.estimate.std)).collect()
 }
 
@@ -123,15 +131,16 @@ fn noise_free_data_are_recovered_to_rounding() {
     let slow = Truth { delay: 0.0, ..Truth::two() };
     let late = Truth { delay: 7.25e-6, d0: -0.2, ..Truth::two() };
     for (truth, between) in [
-        (Truth::two(), InputBetween::Held),
-        (Truth::two(), InputBetween::Linear),
-        (late, InputBetween::Held),
-        (slow, InputBetween::Linear),
+        (Truth::two(), Intersample::Held),
+        (Truth::two(), Intersample::Linear),
+        (late, Intersample::Held),
+        (slow, Intersample::Linear),
     ] {
-        let u = if between == InputBetween::Held { binary(1500, 16, 3) } else { white_noise(1500, 1.0, 3) };
+        let u = if between == Intersample::Held { binary(1500, 16, 3) } else { white_noise(1500, 1.0, 3) };
         let y: Vec<f64> = truth.response(&u, between).iter().map(|y| y + 0.3).collect();
         for before in [Before::Settled, Before::Anything] {
-            let options = GreyOptions { between, history: before, delay: truth.delay > 0.0, ..options() };
+            let options =
+                GreyOptions { between: stated(between), history: before, delay: truth.delay > 0.0, ..options() };
             let fit = fit_grey(&[Experiment { input: &u, output: &y }], T, &options).unwrap();
             let values: Vec<f64> = truth.values();
             let off = found(&fit)
@@ -152,17 +161,17 @@ fn noise_free_data_are_recovered_to_rounding() {
 #[test]
 fn the_discrete_model_simulates_what_the_grey_form_does() {
     for (delay, between) in [
-        (0.0, InputBetween::Held),
-        (0.6e-6, InputBetween::Held),
-        (1.37e-6, InputBetween::Held),
-        (1.37e-6, InputBetween::Linear),
-        (5.8e-6, InputBetween::Held),
+        (0.0, Intersample::Held),
+        (0.6e-6, Intersample::Held),
+        (1.37e-6, Intersample::Held),
+        (1.37e-6, Intersample::Linear),
+        (5.8e-6, Intersample::Held),
     ] {
         let truth = Truth { delay, ..Truth::two() };
-        let mut u = if between == InputBetween::Held { binary(1500, 16, 3) } else { white_noise(1500, 1.0, 3) };
+        let mut u = if between == Intersample::Held { binary(1500, 16, 3) } else { white_noise(1500, 1.0, 3) };
         u[..20].fill(0.0);
         let y = truth.response(&u, between);
-        let options = GreyOptions { between, delay: delay > 0.0, ..options() };
+        let options = GreyOptions { between: stated(between), delay: delay > 0.0, ..options() };
         let fit = fit_grey(&[Experiment { input: &u, output: &y }], T, &options).unwrap();
         let discrete = &fit.discrete;
         let dead = discrete.dead_samples;
@@ -190,7 +199,7 @@ fn bound(truth: &Truth, u: &[f64], std: f64, nuisances: &[Vec<f64>], masked: usi
             let moved = |d: f64| {
                 let mut values = values.clone();
                 values[i] += d;
-                truth.with(&values).response(u, InputBetween::Held)
+                truth.with(&values).response(u, Intersample::Held)
             };
             moved(step).iter().zip(moved(-step)).map(|(a, b)| (a - b) / (2.0 * step)).collect()
         })
@@ -206,7 +215,7 @@ fn bound(truth: &Truth, u: &[f64], std: f64, nuisances: &[Vec<f64>], masked: usi
 fn monte_carlo(before: Before, colour: ResidualColour, seeds: u64) -> (Vec<[f64; 3]>, f64) {
     let (truth, std, samples) = (Truth::two(), 0.02, 2048);
     let u = binary(samples, 16, 11);
-    let clean = truth.response(&u, InputBetween::Held);
+    let clean = truth.response(&u, Intersample::Held);
     let options = GreyOptions { history: before, colour, ..options() };
     let results: Vec<Vec<(f64, f64)>> = (1..=seeds)
         .into_par_iter()
@@ -271,7 +280,7 @@ fn errors_reach_the_bound_and_intervals_hold() {
 fn knowledge_holds_and_what_sits_on_a_bound_has_no_error() {
     let truth = Truth::two();
     let u = binary(2048, 16, 11);
-    let clean = truth.response(&u, InputBetween::Held);
+    let clean = truth.response(&u, Intersample::Held);
     let y: Vec<f64> = clean.iter().zip(white_noise(2048, 0.02, 5)).map(|(y, n)| y + n).collect();
     let fitted = |known: Vec<GreyKnown>| {
         fit_grey(&[Experiment { input: &u, output: &y }], T, &GreyOptions { known, ..options() }).unwrap()
@@ -320,7 +329,7 @@ fn missing_samples_several_experiments_and_inputs() {
     let experiments: Vec<(Vec<f64>, Vec<f64>)> = (0..10)
         .map(|e| {
             let (u, v) = (binary(1200, 16, 20 + e), binary(1200, 16, 50 + e));
-            let (a, b) = (one.response(&u, InputBetween::Held), two.response(&v, InputBetween::Held));
+            let (a, b) = (one.response(&u, Intersample::Held), two.response(&v, Intersample::Held));
             let noise = white_noise(1200, 0.02, 80 + e);
             let mut y: Vec<f64> = (0..1200).map(|k| a[k] + b[k] + noise[k] + 0.1 * e as f64).collect();
             y[300 + 10 * e as usize..360 + 10 * e as usize].fill(f64::NAN);
@@ -356,7 +365,7 @@ fn missing_samples_several_experiments_and_inputs() {
 fn starts_can_be_given_and_wrong_requests_are_refused() {
     let truth = Truth::two();
     let u = binary(1500, 16, 3);
-    let y = truth.response(&u, InputBetween::Held);
+    let y = truth.response(&u, Intersample::Held);
     let data = [Experiment { input: &u, output: &y }];
     let given = GreyStart::Modes(vec![[20.5e3, 10.0], [82.5e3, 40.0]]);
     let fit = fit_grey(&data, T, &GreyOptions { start: given, ..options() }).unwrap();

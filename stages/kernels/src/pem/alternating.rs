@@ -4,10 +4,10 @@ use faer::c64;
 
 use super::conclusion::Jacobian;
 use super::jacobian::{Noise, Point};
+use super::levenberg_marquardt::{Limits, minimise};
 use super::noise::{Seen, gain, intensities};
 use super::options::NoiseModel;
 use super::predictor::Problem;
-use super::search::{Limits, minimise};
 use super::starts::{lowest, refined};
 use super::state::State;
 use super::tangent::{Tangent, Transform, periodogram, remaining};

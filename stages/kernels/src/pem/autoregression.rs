@@ -4,8 +4,8 @@ use crate::linear_algebra::eigenvalues;
 use faer::{Mat, c64};
 
 use super::jacobian::{Noise, Point, residual};
+use super::levenberg_marquardt::{Limits, minimise};
 use super::predictor::Problem;
-use super::search::{Limits, minimise};
 use super::state::State;
 use super::whitening::Whitened;
 use crate::model::{ModelError, coordinates, sections};
@@ -15,6 +15,11 @@ const ROUNDS: usize = 3;
 /// Largest order of the noise filter, and least samples for each of its coefficients.
 const LARGEST: usize = 24;
 const SAMPLES_EACH: usize = 20;
+
+/// Largest order of a noise filter for so many samples.
+pub(crate) fn largest_order(samples: usize) -> usize {
+    LARGEST.min(samples / SAMPLES_EACH).max(1)
+}
 
 /// Refits an output error with its residual whitened: generalised least squares for Box and Jenkins' model with noise
 /// `1 / A_e`.
@@ -38,8 +43,8 @@ pub(crate) fn whitened(problem: &Problem, mut state: State, limits: Limits) -> R
 /// Sections of the polynomial that whitens `e` (rows of all experiments). Errors: no convergence of its roots.
 fn autoregression(problem: &Problem, e: &[f64]) -> Result<Vec<[f64; 2]>, ModelError> {
     let samples = problem.measured().iter().map(|(_, y)| y.len()).sum();
-    let most = LARGEST.min(samples / SAMPLES_EACH).max(1);
-    let polynomial = levinson(&autocovariance(problem, e, most), samples);
+    let most = largest_order(samples);
+    let polynomial = least_bic(levinson(&autocovariance(problem, e, most)), samples).coefficients;
     let order = polynomial.len();
     if order == 0 {
         return Ok(Vec::new());
@@ -64,12 +69,21 @@ fn autocovariance(problem: &Problem, e: &[f64], most: usize) -> Vec<f64> {
     sums
 }
 
-/// Coefficients `1 + a1 q^-1 + ...` without the leading one, of the order with the least BIC: stable whatever the data.
-fn levinson(covariance: &[f64], samples: usize) -> Vec<f64> {
-    let n = samples as f64;
+/// A one-step predictor of a stationary process.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Autoregression {
+    /// `1 + a1 q^-1 + ...` without the leading one: stable.
+    pub coefficients: Vec<f64>,
+    /// Variance of its errors, in units of the autocovariance.
+    pub variance: f64,
+}
+
+/// Predictors of ascending order, from none on, up to where nothing but rounding is left to predict; empty for a
+/// process that is zero.
+pub(crate) fn levinson(covariance: &[f64]) -> Vec<Autoregression> {
     let Some((&zero, _)) = covariance.split_first().filter(|(zero, _)| **zero > 0.0) else { return Vec::new() };
     let (mut a, mut error): (Vec<f64>, f64) = (Vec::new(), zero);
-    let (mut best, mut least) = (Vec::new(), n * zero.ln());
+    let mut all = vec![Autoregression { coefficients: Vec::new(), variance: zero }];
     for order in 1..covariance.len() {
         let reach: f64 = a.iter().enumerate().map(|(j, a)| a * covariance[order - 1 - j]).sum();
         let reflection = -(covariance[order] + reach) / error;
@@ -77,16 +91,20 @@ fn levinson(covariance: &[f64], samples: usize) -> Vec<f64> {
         a.iter_mut().zip(&turned).for_each(|(a, t)| *a += t);
         a.push(reflection);
         error *= 1.0 - reflection * reflection;
-        // nothing left to predict: rounding
         if error.is_nan() || error <= 1e-14 * zero {
             break;
         }
-        let score = n * error.ln() + order as f64 * n.ln();
-        if score < least {
-            (best, least) = (a.clone(), score);
-        }
+        all.push(Autoregression { coefficients: a.clone(), variance: error });
     }
-    best
+    all
+}
+
+/// The predictor with the least BIC.
+pub(crate) fn least_bic(predictors: Vec<Autoregression>, samples: usize) -> Autoregression {
+    let n = samples as f64;
+    let score = |order: usize, variance: f64| n * variance.ln() + order as f64 * n.ln();
+    let scored = predictors.into_iter().enumerate().map(|(order, own)| (score(order, own.variance), own));
+    scored.min_by(|x, y| x.0.total_cmp(&y.0)).map(|(_, own)| own).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -112,13 +130,13 @@ mod tests {
                 slope: false,
                 missing: Vec::new(),
                 priors: 0,
-                shelf: BufferPool::default(),
+                buffers: BufferPool::default(),
             };
-            let found = levinson(&autocovariance(&problem, &y, 12), 4000);
+            let found = least_bic(levinson(&autocovariance(&problem, &y, 12)), 4000).coefficients;
             // standard error sqrt((1 - 0.8^2) / 4000) = 0.0095: four of them; BIC errs upwards in one of hundreds
             assert!((found[0] + 1.6).abs() < 0.038 && (found[1] - 0.8).abs() < 0.038, "{found:?}");
             assert!(found.len() <= 4, "{found:?}");
         }
-        assert!(levinson(&[0.0, 0.0], 10).is_empty());
+        assert!(least_bic(levinson(&[0.0, 0.0]), 10).coefficients.is_empty());
     }
 }

@@ -24,14 +24,14 @@ pub(crate) struct Columns {
     /// Where each begins.
     starts: Vec<usize>,
     rows: usize,
-    shelf: BufferPool,
+    buffers: BufferPool,
 }
 
 impl Columns {
     /// With any contents, to be overwritten: but for those of several records, which are zeros.
     ///
     /// `records`: how many lie one after the other in the rows.
-    pub fn new(rows: usize, parts: &[Part], records: usize, shelf: &BufferPool) -> Self {
+    pub fn new(rows: usize, parts: &[Part], records: usize, buffers: &BufferPool) -> Self {
         let (mut starts, mut end, overlapping) = (Vec::new(), 0, records == 1);
         for part in parts {
             match *part {
@@ -49,11 +49,11 @@ impl Columns {
                 }
             }
         }
-        let mut storage = shelf.take(end);
+        let mut storage = buffers.take(end);
         if !overlapping {
             storage.fill(0.0);
         }
-        Self { storage, starts, rows, shelf: shelf.clone() }
+        Self { storage, starts, rows, buffers: buffers.clone() }
     }
 
     /// How many columns.
@@ -94,7 +94,7 @@ impl Columns {
 
     /// The same with some rows cleared, nothing overlapping.
     pub fn without_rows(&self, rows: &[usize]) -> Self {
-        let mut all = Self::new(self.rows, &[Part::Single(self.count())], 1, &self.shelf);
+        let mut all = Self::new(self.rows, &[Part::Single(self.count())], 1, &self.buffers);
         for (index, column) in self.slices().into_iter().enumerate() {
             all.single_mut(index).copy_from_slice(column);
         }
@@ -200,7 +200,7 @@ impl Bank {
     }
 }
 
-/// Most storages on a shelf, and the largest of them in numbers.
+/// Most storages in a pool, and the largest of them in numbers.
 const SPARE: usize = 4;
 const LARGEST: usize = 1 << 19;
 
@@ -212,9 +212,9 @@ pub(crate) struct BufferPool(Arc<Mutex<Vec<Vec<f64>>>>);
 impl BufferPool {
     /// So many numbers, any.
     fn take(&self, count: usize) -> Vec<f64> {
-        let found = self.0.lock().ok().and_then(|mut shelf| {
-            let index = shelf.iter().position(|storage| storage.capacity() >= count)?;
-            Some(shelf.swap_remove(index))
+        let found = self.0.lock().ok().and_then(|mut buffers| {
+            let index = buffers.iter().position(|storage| storage.capacity() >= count)?;
+            Some(buffers.swap_remove(index))
         });
         let mut storage = found.unwrap_or_default();
         storage.resize(count, 0.0);
@@ -225,11 +225,11 @@ impl BufferPool {
         if storage.capacity() > LARGEST {
             return;
         }
-        // nothing is lost on a shelf that cannot be used
-        if let Ok(mut shelf) = self.0.lock() {
-            shelf.push(storage);
-            if shelf.len() > SPARE {
-                shelf.swap_remove(0);
+        // nothing is lost in a pool that cannot be used
+        if let Ok(mut buffers) = self.0.lock() {
+            buffers.push(storage);
+            if buffers.len() > SPARE {
+                buffers.swap_remove(0);
             }
         }
     }
@@ -237,7 +237,7 @@ impl BufferPool {
 
 impl Drop for Columns {
     fn drop(&mut self) {
-        self.shelf.put(std::mem::take(&mut self.storage));
+        self.buffers.put(std::mem::take(&mut self.storage));
     }
 }
 
@@ -249,10 +249,10 @@ mod tests {
     fn columns_of_a_section_are_a_row_apart_whether_they_overlap_or_not() {
         let (rows, sections) = (300, [[-1.2, 0.5], [-0.9, 0.0]]);
         let signal = |k: usize| (k * 7919 % 13) as f64 - 6.0;
-        let shelf = BufferPool::default();
+        let buffers = BufferPool::default();
         for delay in [0, 1] {
             let columns = |records: usize| {
-                let mut columns = Columns::new(rows, &[Part::Sections(3), Part::Single(1)], records, &shelf);
+                let mut columns = Columns::new(rows, &[Part::Sections(3), Part::Single(1)], records, &buffers);
                 let place = Place { top: 0, length: rows, column: 0, width: 3, delay };
                 columns.respond(place, &sections, |start, chunk| {
                     chunk.iter_mut().enumerate().for_each(|(k, x)| *x = [signal(start + k); SIDE_BY_SIDE]);

@@ -115,6 +115,6 @@ pub(super) fn checked<'a>(
         slope: options.drift,
         missing,
         priors: 0,
-        shelf: BufferPool::default(),
+        buffers: BufferPool::default(),
     })
 }

@@ -96,7 +96,7 @@ pub(crate) fn coefficient_jacobian(
     let a = point.a();
     let c = if let Noise::Free(c) = &point.noise { Some(sections(c)) } else { None };
     let count = if c.is_some() { 2 * n } else { n };
-    let mut jacobian = Columns::new(problem.rows(), &[Part::Single(count)], 1, &problem.shelf);
+    let mut jacobian = Columns::new(problem.rows(), &[Part::Single(count)], 1, &problem.buffers);
     let mut top = 0;
     for (index, (_, y)) in problem.experiments.iter().enumerate() {
         let e = &e[top..top + y.len()];

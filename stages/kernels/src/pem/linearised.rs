@@ -60,23 +60,23 @@ impl Linearised {
     }
 }
 
-/// Half the cost near a point, to second order, in scaled coordinates.
+/// Half the cost near a point, to second order, in scaled coordinates: gradient and (half the cost's) Hessian.
 pub(super) struct Quadratic {
     pub gradient: Vec<f64>,
-    curvature: Mat<f64>,
+    hessian: Mat<f64>,
     axes: Symmetric,
 }
 
 impl Quadratic {
-    pub fn new(gradient: Vec<f64>, curvature: Mat<f64>) -> Result<Self, ModelError> {
-        let axes = Symmetric::new(&curvature)?;
-        Ok(Self { gradient, curvature, axes })
+    pub fn new(gradient: Vec<f64>, hessian: Mat<f64>) -> Result<Self, ModelError> {
+        let axes = Symmetric::new(&hessian)?;
+        Ok(Self { gradient, hessian, axes })
     }
 
     /// Fall of the cost that a step promises.
     pub fn promised(&self, step: &[f64]) -> f64 {
-        let bent = |i: usize| (0..step.len()).map(|j| self.curvature[(i, j)] * step[j]).sum::<f64>();
-        -step.iter().enumerate().map(|(i, s)| s * (2.0 * self.gradient[i] + bent(i))).sum::<f64>()
+        let product = |i: usize| (0..step.len()).map(|j| self.hessian[(i, j)] * step[j]).sum::<f64>();
+        -step.iter().enumerate().map(|(i, s)| s * (2.0 * self.gradient[i] + product(i))).sum::<f64>()
     }
 
     /// Step for damping `lambda`; where the cost curves down, it goes down as if it curved up.

@@ -6,7 +6,7 @@
 //! slope of y.
 //! # Method
 //! Starts from subspace estimates ([`crate::subspace`]; `starts`), then Levenberg-Marquardt steps on the one-step
-//! prediction errors (`search`, by [`crate::optimise::descend`]) with analytic derivatives (`jacobian`) and a secant
+//! prediction errors (`levenberg_marquardt`, by [`crate::optimise::descend`]) with analytic derivatives (`jacobian`) and a secant
 //! estimate of the curvature that they leave out (`secant`); x0, offset, slope, B and D are eliminated in every step
 //! (variable projection, `projection`). [`identify`] minimises; [`refit`] starts from a model; [`with_poles`] keeps the
 //! poles.
@@ -47,6 +47,7 @@ mod covariance;
 mod data;
 mod identify;
 mod jacobian;
+mod levenberg_marquardt;
 mod linearised;
 mod noise;
 mod options;
@@ -54,7 +55,6 @@ mod predictor;
 mod products;
 mod projection;
 mod rotation;
-mod search;
 mod secant;
 mod starts;
 mod state;
@@ -62,6 +62,8 @@ mod tangent;
 #[cfg(test)]
 mod tests;
 mod whitening;
+
+pub(crate) use autoregression::{largest_order, least_bic, levinson};
 
 pub use crate::optimise::Ending;
 pub use covariance::ResidualColour;

@@ -71,7 +71,12 @@ pub(crate) fn intensities(
     weights.resize(whole, 0.0);
     powers.resize(whole, 0.0);
     basis.iter_mut().for_each(|basis| basis.resize(whole, 1.0));
-    pulp::Arch::new().dispatch(Climb { weights: &weights, powers: &powers, basis: &basis, values: &mut values });
+    pulp::Arch::new().dispatch(MultiplicativeUpdates {
+        weights: &weights,
+        powers: &powers,
+        basis: &basis,
+        values: &mut values,
+    });
     let white = values[0].max(f64::MIN_POSITIVE);
     Intensities { white, forces: values.split_off(1) }
 }
@@ -79,15 +84,15 @@ pub(crate) fn intensities(
 /// Bins at a time, a multiple of the lanes of any vector unit: what is computed of them stays in the first-level cache.
 const LANES: usize = 256;
 
-/// Carries the multiplicative updates to the vector units.
-struct Climb<'a> {
+/// The multiplicative updates of the intensities, for the vector units.
+struct MultiplicativeUpdates<'a> {
     weights: &'a [f64],
     powers: &'a [f64],
     basis: &'a [Vec<f64>],
     values: &'a mut [f64],
 }
 
-impl pulp::WithSimd for Climb<'_> {
+impl pulp::WithSimd for MultiplicativeUpdates<'_> {
     type Output = ();
 
     #[inline(always)]

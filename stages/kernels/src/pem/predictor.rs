@@ -21,7 +21,7 @@ pub(crate) struct Problem<'a> {
     /// How many of the last experiments are a prior's: they begin at rest and have no offset or slope.
     pub priors: usize,
     /// Storage of columns, used again and again.
-    pub shelf: BufferPool,
+    pub buffers: BufferPool,
 }
 
 /// Share of the output's changes that a shortened problem sees, and its least samples for each linear parameter.
@@ -62,7 +62,7 @@ impl<'a> Problem<'a> {
         (4 * rows <= 3 * self.rows()).then(|| Problem {
             experiments,
             missing: Vec::new(),
-            shelf: self.shelf.clone(),
+            buffers: self.buffers.clone(),
             ..*self
         })
     }
@@ -103,7 +103,7 @@ impl<'a> Problem<'a> {
         // a prior's have none of their own
         let spare = self.columns() - self.nuisance_column(self.measured().len());
         parts.push(Part::Single(spare + 1));
-        let mut columns = Columns::new(self.rows(), &parts, self.experiments.len(), &self.shelf);
+        let mut columns = Columns::new(self.rows(), &parts, self.experiments.len(), &self.buffers);
         let mut top = 0;
         for (index, Signals { lanes, further }) in whitened.experiments.iter().enumerate() {
             self.fill_input(&mut columns, top, 0, lanes, |s| s[INPUT], a);

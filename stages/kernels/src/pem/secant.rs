@@ -1,4 +1,4 @@
-//! What the gradients along the way say of the cost's curvature.
+//! The secant estimate of the curvature that the Jacobian leaves out.
 
 use faer::Mat;
 
@@ -31,7 +31,7 @@ impl Secant {
         Mat::from_fn(scale.len(), scale.len(), |i, j| self.curvature[(i, j)] * scale[i] * scale[j])
     }
 
-    /// What was learnt, for a cost that is so many times as large; nothing where the two have nothing in common.
+    /// The estimate for a cost that is so many times as large; zero where the two have nothing in common.
     pub fn rescale(&mut self, factor: f64) {
         if (1.0 / ALIKE..=ALIKE).contains(&factor) {
             self.curvature *= faer::Scale(factor);
@@ -40,9 +40,9 @@ impl Secant {
         }
     }
 
-    /// Learns from a step (coordinates), the gradients before and after it (half the cost's), and `J^T J step` after
-    /// it.
-    fn learn(&mut self, step: &[f64], before: &[f64], after: &[f64], normal: &[f64]) {
+    /// Updates the curvature by a step (coordinates), the gradients before and after it (half the cost's), and
+    /// `J^T J step` after it.
+    fn update(&mut self, step: &[f64], before: &[f64], after: &[f64], normal: &[f64]) {
         let q = step.len();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
@@ -73,12 +73,12 @@ pub(super) struct Taken {
 }
 
 impl Taken {
-    /// What the gradient after the step says of the curvature.
-    pub fn teach(&self, secant: &mut Secant, scale: &[f64], gradient: &[f64], normal: &Mat<f64>) {
+    /// Updates the secant estimate by the gradient after the step.
+    pub fn update(&self, secant: &mut Secant, scale: &[f64], gradient: &[f64], normal: &Mat<f64>) {
         let q = self.step.len();
         let scaled: Vec<f64> = self.step.iter().zip(scale).map(|(d, s)| if *s > 0.0 { d / s } else { 0.0 }).collect();
-        let bent: Vec<f64> = (0..q).map(|i| (0..q).map(|j| normal[(i, j)] * scaled[j]).sum()).collect();
-        secant.learn(&self.step, &self.gradient, &unscaled(gradient, scale), &unscaled(&bent, scale));
+        let product: Vec<f64> = (0..q).map(|i| (0..q).map(|j| normal[(i, j)] * scaled[j]).sum()).collect();
+        secant.update(&self.step, &self.gradient, &unscaled(gradient, scale), &unscaled(&product, scale));
     }
 }
 
@@ -88,15 +88,15 @@ mod tests {
 
     #[test]
     fn the_secant_is_right_along_the_last_step_and_symmetric() {
-        // curvature [2 1; 1 3], of which J^T J is the diagonal
-        let bent = [[2.0, 1.0], [1.0, 3.0]];
+        // Hessian [2 1; 1 3], of which J^T J is the diagonal
+        let hessian = [[2.0, 1.0], [1.0, 3.0]];
         let mut secant = Secant::new(2);
         for step in [[0.1, 0.0], [0.05, -0.2], [-0.1, 0.1]] {
             let times = |rows: [[f64; 2]; 2]| rows.map(|row| row[0] * step[0] + row[1] * step[1]);
-            let (change, normal) = (times(bent), times([[2.0, 0.0], [0.0, 3.0]]));
+            let (change, normal) = (times(hessian), times([[2.0, 0.0], [0.0, 3.0]]));
             let before = [0.3, -0.1];
             let after = [before[0] + change[0], before[1] + change[1]];
-            secant.learn(&step, &before, &after, &normal);
+            secant.update(&step, &before, &after, &normal);
             let c = &secant.curvature;
             for i in 0..2 {
                 let held = c[(i, 0)] * step[0] + c[(i, 1)] * step[1];
@@ -104,21 +104,21 @@ mod tests {
             }
             assert!((c[(0, 1)] - c[(1, 0)]).abs() < 1e-14);
         }
-        // what curves down is not learnt: the step's change says nothing of a minimum
-        let learnt = secant.clone();
-        secant.learn(&[0.1, 0.0], &[0.0, 0.0], &[-0.2, 0.0], &[0.1, 0.0]);
-        assert_eq!(secant.curvature, learnt.curvature);
+        // negative curvature is not taken up: the step's change says nothing of a minimum
+        let earlier = secant.clone();
+        secant.update(&[0.1, 0.0], &[0.0, 0.0], &[-0.2, 0.0], &[0.1, 0.0]);
+        assert_eq!(secant.curvature, earlier.curvature);
     }
 
     #[test]
-    fn what_was_learnt_goes_on_in_proportion_or_not_at_all() {
+    fn the_estimate_goes_on_in_proportion_or_not_at_all() {
         let (step, before, after, normal) = ([0.1, 0.05], [0.3, -0.1], [0.52, 0.1], [0.2, 0.15]);
         let mut own = Secant::new(2);
-        own.learn(&step, &before, &after, &normal);
+        own.update(&step, &before, &after, &normal);
         // the same in units half as large: all of the cost is four times as large
         let four = |x: [f64; 2]| x.map(|x| 4.0 * x);
         let mut other = Secant::new(2);
-        other.learn(&step, &four(before), &four(after), &four(normal));
+        other.update(&step, &four(before), &four(after), &four(normal));
         let mut carried = own.clone();
         carried.rescale(4.0);
         for (i, j) in [(0, 0), (0, 1), (1, 1)] {

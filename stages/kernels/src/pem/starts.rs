@@ -8,8 +8,8 @@ use crate::linear_algebra::{eigenvalues, least_squares};
 use faer::{Mat, c64};
 
 use super::jacobian::{Noise, Point};
+use super::levenberg_marquardt::{Limits, minimise};
 use super::predictor::Problem;
-use super::search::{Limits, minimise};
 use super::state::State;
 use crate::model::{ModelError, coordinates, roots, section_order};
 use crate::subspace::{Subspace, Weight};

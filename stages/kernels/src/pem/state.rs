@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::columns::Columns;
 use super::jacobian::{Point, coefficient_jacobian, residual, to_coordinates};
+use super::levenberg_marquardt::FIRST_DAMPING;
 use super::predictor::Problem;
 use super::projection::{Projection, Sensitivities};
-use super::search::DAMPING;
 use super::secant::Secant;
 use super::whitening::Whitened;
 use crate::model::ModelError;
@@ -53,7 +53,7 @@ impl State {
     fn through(problem: &Problem, point: Point, whitened: Arc<Whitened>) -> Result<Self, ModelError> {
         let regressors = problem.regressors(&point.a(), &whitened);
         let projection = Projection::new(problem, &regressors)?;
-        let memory = Memory { damping: DAMPING, secant: Secant::new(point.len()) };
+        let memory = Memory { damping: FIRST_DAMPING, secant: Secant::new(point.len()) };
         Ok(Self {
             point,
             whitened,
@@ -66,8 +66,8 @@ impl State {
         })
     }
 
-    /// The same model seen through another whitening or in other data: iterations go on; what was learnt of the
-    /// curvature goes on in proportion to the costs.
+    /// The same model seen through another whitening or in other data: iterations go on; the secant
+    /// estimate goes on in proportion to the costs.
     pub fn carried(problem: &Problem, point: Point, from: &Self) -> Result<Self, ModelError> {
         let next = Self::new(problem, point)?;
         let memory = if next.point.len() == from.point.len() {

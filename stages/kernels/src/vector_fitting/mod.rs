@@ -1,4 +1,25 @@
 //! Vector fitting in the z plane: a rational transfer function through a measured frequency response.
+//!
+//! ```
+//! use afmid_kernels::c64;
+//! use afmid_kernels::modes::{ModeCriteria, poles};
+//! use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFitting, vector_fitting};
+//! // the response of a resonance at 50 kHz with Q = 40, sampled at 1 MS/s, at 400 frequencies, with noise
+//! let (w, a) = (std::f64::consts::TAU * 50e3 * 1e-6, std::f64::consts::PI * 50e3 / 40.0 * 1e-6);
+//! let (a1, a2) = (-2.0 * (-a).exp() * w.cos(), (-2.0 * a).exp());
+//! let frequency_hz: Vec<f64> = (1..=400).map(|k| 500.0 * f64::from(k)).collect();
+//! let noise = |k: usize| 1e-3 * c64::new(((k * k) as f64).sin(), ((k * k + 7) as f64).sin());
+//! let clean = |f: f64| {
+//!     let z = c64::cis(std::f64::consts::TAU * f * 1e-6);
+//!     z * 0.1 / ((z + a1) * z + a2)
+//! };
+//! let transfer: Vec<c64> = frequency_hz.iter().enumerate().map(|(k, f)| clean(*f) + noise(k)).collect();
+//! let measured = MeasuredResponse { frequency_hz: &frequency_hz, transfer: &transfer, variance: None };
+//! let fit = vector_fitting(measured, 1e-6, &VectorFitting { order: 2, ..VectorFitting::default() })?;
+//! let mode = poles(&fit.model, &fit.covariance, &ModeCriteria::default())?[0].root;
+//! assert!((mode.frequency_hz - 50e3 * (1.0 + 1.0 / 6400.0_f64).sqrt()).abs() < 5.0 * mode.frequency_std_hz);
+//! # Ok::<(), afmid_kernels::model::ModelError>(())
+//! ```
 
 mod basis;
 mod linear;

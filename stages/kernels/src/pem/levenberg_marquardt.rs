@@ -1,4 +1,4 @@
-//! The search on the projected problem.
+//! Levenberg-Marquardt on the projected problem: [`minimise`] is the front door, [`descend`] the iteration.
 //!
 //! Steps are scaled column by column; a coordinate at its limit that pulls outwards is held. The gradient is measured
 //! as the share of the residual that lies in the tangent space: `share * sqrt(N)` is the distance to the minimum in
@@ -22,8 +22,8 @@ pub(crate) struct Limits {
     pub gradient: f64,
 }
 
-/// Damping of the first step.
-pub(super) const DAMPING: f64 = 1e-3;
+/// Damping parameter of the first step.
+pub(super) const FIRST_DAMPING: f64 = 1e-3;
 
 /// Residual energy over output energy at which only rounding is left: at once, and when no step lowers it any more.
 const EXACT: f64 = 1e-26;
@@ -35,7 +35,7 @@ const PAIRINGS: usize = 3;
 /// Iterates to the minimum or to a limit; where it stalls, real poles are paired again. Errors: the starting point
 /// cannot be evaluated.
 pub(crate) fn minimise(problem: &Problem, start: State, limits: Limits) -> Result<State, ModelError> {
-    let mut state = search(problem, start, limits)?;
+    let mut state = levenberg_marquardt(problem, start, limits)?;
     for _ in 0..PAIRINGS {
         if state.ending != Ending::Stalled || matches!(state.point.noise, Noise::Free(_)) {
             break;
@@ -46,7 +46,7 @@ pub(crate) fn minimise(problem: &Problem, start: State, limits: Limits) -> Resul
         let point = Point { poles: coordinates(&all), noise: state.point.noise.clone() };
         let next = State { iterations: state.iterations, ..State::new(problem, point)? };
         let cost = state.projection.cost;
-        let next = search(problem, next, limits)?;
+        let next = levenberg_marquardt(problem, next, limits)?;
         if next.projection.cost < cost || next.ending == Ending::Minimum {
             state = next;
         } else {
@@ -56,20 +56,21 @@ pub(crate) fn minimise(problem: &Problem, start: State, limits: Limits) -> Resul
     Ok(state)
 }
 
-fn search(problem: &Problem, start: State, limits: Limits) -> Result<State, ModelError> {
+/// One run of steps, with the damping parameter and the secant estimate that `start` brings.
+fn levenberg_marquardt(problem: &Problem, start: State, limits: Limits) -> Result<State, ModelError> {
     let output: f64 =
         problem.experiments.iter().flat_map(|(_, y)| y.iter()).filter(|y| !y.is_nan()).map(|y| y * y).sum();
     let Memory { mut damping, secant } = start.memory.clone();
     let iterations = start.iterations;
-    let mut fit = Fit { problem, output, tolerance: limits.gradient, secant, last: None };
+    let mut errors = PredictionErrors { problem, output, tolerance: limits.gradient, secant, last: None };
     let steps = optimise::Limits { steps: limits.iterations, ..optimise::Limits::NONE };
-    let found = descend(&mut fit, start, &mut damping, Damping::FAST_RISE, steps)?;
-    let memory = Memory { damping, secant: fit.secant };
+    let found = descend(&mut errors, start, &mut damping, Damping::FAST_RISE, steps)?;
+    let memory = Memory { damping, secant: errors.secant };
     Ok(State { ending: found.ending, iterations: iterations + found.steps, memory, ..found.point })
 }
 
-/// Prediction errors as an objective.
-struct Fit<'a, 'b> {
+/// The sum of squared prediction errors as an objective.
+struct PredictionErrors<'a, 'b> {
     problem: &'a Problem<'b>,
     /// Energy of the output.
     output: f64,
@@ -79,28 +80,28 @@ struct Fit<'a, 'b> {
     last: Option<Taken>,
 }
 
-/// The cost near a point, with and without the curvature that the Jacobian misses.
+/// The cost near a point: its Hessian as `J^T J`, or with the secant estimate of what `J^T J` leaves out.
 struct Local {
     scale: Vec<f64>,
-    plain: Quadratic,
-    bent: Quadratic,
+    gauss_newton: Quadratic,
+    with_secant: Quadratic,
     coordinates: Vec<f64>,
 }
 
 impl Local {
     /// The model that steps are taken by.
     fn trusted(&self, secant: &Secant) -> &Quadratic {
-        if secant.trusted { &self.bent } else { &self.plain }
+        if secant.trusted { &self.with_secant } else { &self.gauss_newton }
     }
 }
 
-impl Fit<'_, '_> {
+impl PredictionErrors<'_, '_> {
     fn ended(&self, at: &State) -> Ending {
         if at.projection.cost <= NEARLY_EXACT * self.output { Ending::Exact } else { Ending::Stalled }
     }
 }
 
-impl Objective for Fit<'_, '_> {
+impl Objective for PredictionErrors<'_, '_> {
     type Point = State;
     type Local = Local;
     /// New coordinates.
@@ -124,11 +125,11 @@ impl Objective for Fit<'_, '_> {
         }
         let (gradient, normal) = (linearised.gradient(), linearised.normal());
         if let Some(taken) = self.last.take() {
-            taken.teach(&mut self.secant, &linearised.scale, &gradient, &normal);
+            taken.update(&mut self.secant, &linearised.scale, &gradient, &normal);
         }
-        let plain = Quadratic::new(gradient.clone(), normal.clone())?;
-        let bent = Quadratic::new(gradient, &normal + self.secant.scaled(&linearised.scale))?;
-        Ok(Some(Local { scale: linearised.scale, plain, bent, coordinates }))
+        let gauss_newton = Quadratic::new(gradient.clone(), normal.clone())?;
+        let with_secant = Quadratic::new(gradient, &normal + self.secant.scaled(&linearised.scale))?;
+        Ok(Some(Local { scale: linearised.scale, gauss_newton, with_secant, coordinates }))
     }
 
     fn trial(&mut self, at: &State, local: &Local, damping: f64) -> Result<Trial<State, Vec<f64>>, ModelError> {
@@ -145,8 +146,8 @@ impl Objective for Fit<'_, '_> {
         let fall = from.projection.cost - to.projection.cost;
         let promised = local.trusted(&self.secant).promised(&scaled);
         self.secant.trusted =
-            (local.bent.promised(&scaled) - fall).abs() < (local.plain.promised(&scaled) - fall).abs();
-        self.last = Some(Taken { step, gradient: unscaled(&local.plain.gradient, &local.scale) });
+            (local.with_secant.promised(&scaled) - fall).abs() < (local.gauss_newton.promised(&scaled) - fall).abs();
+        self.last = Some(Taken { step, gradient: unscaled(&local.gauss_newton.gradient, &local.scale) });
         to.gradient = from.gradient;
         // the cost no longer moves by more than its rounding
         let ending = (fall / from.projection.cost < 1e-13).then(|| self.ended(to));
