@@ -218,8 +218,12 @@ impl GreyEstimate {
             }
         }
         let errors = if self.coloured { "follow its spectrum" } else { "do not count this (`coloured = true` does)" };
+        let chosen = match fit.intersample {
+            Some(_) => ", as which the choice of `between` counts it",
+            None => "",
+        };
         let remedy = format!(
-            "standard errors {errors}, and what the model cannot follow is not noise: try more modes or real poles, or `model.pem`"
+            "standard errors {errors}, and what the model cannot follow is not noise{chosen}: try more modes or real poles, or `model.pem`"
         );
         let share = residual_share(fit.experiments.first().map_or(&[][..], |own| own.residual.as_slice()), output);
         if let Some(warning) = coloured(test, share, &remedy) {

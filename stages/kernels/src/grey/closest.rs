@@ -50,7 +50,7 @@ pub(super) fn closest(point: &Point, fractions: &Fractions, gains: &[f64], feedt
     let (mut parts, _) = denominators(&upper, &real, delay);
     let band = band(point);
     let rows: Vec<Vec<c64>> = band.iter().map(|omega| basis(&parts, *omega)).collect();
-    let part = |value: c64, i: usize| if i % 2 == 0 { value.re } else { value.im };
+    let part = |value: c64, i: usize| if i.is_multiple_of(2) { value.re } else { value.im };
     let count = parts.orders.iter().sum::<usize>() + 1;
     let qr = Qr::new(Mat::from_fn(2 * band.len(), count, |i, j| part(rows[i / 2][j], i)));
     let r = qr.r();

@@ -63,7 +63,7 @@ fn a_band_limited_input_is_fitted_as_such() {
 
 #[test]
 fn the_data_choose_between_held_linear_and_band_limited() {
-    // a lead of some 30 on average: 2 ln L of the truth over a wrong kind has a standard deviation of twice its root
+    // the least lead of 40 seeds is 29 here: far from 3.84, so that none of the seeds may err
     let (seeds, std) = (40, 0.01);
     for kind in KINDS {
         let (u, y) = clean(kind, 5);

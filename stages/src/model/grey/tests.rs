@@ -75,6 +75,10 @@ fn a_release_gives_its_modes_its_delay_and_a_model_that_others_read() {
         a.iter().zip(b).for_each(|(a, b)| assert!((a / b - 1.0).abs() < 1e-4, "{column} {a} {b}"));
     }
     assert_eq!(outputs.get(&PARAMETERS).unwrap().real("value").unwrap().len(), 8);
+    // a single release does not say what the force did between two samples
+    let between = &found["input_between_samples"];
+    assert_eq!((between["kind"].as_str(), between["chosen_by"].as_str()), (Some("held"), Some("data")), "{between}");
+    assert!(between["over_held_in_2_log_likelihood"]["linear"].is_number(), "{between}");
     // its model is a start again
     let again = Ports::new().with(&PAIR, pair(1)).with(&START, model.clone());
     let (outputs, _) = run(TWO, &again).unwrap();
