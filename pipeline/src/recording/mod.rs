@@ -38,7 +38,7 @@ pub use series::{read_number_attribute, read_series};
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native, write_native_in};
 
 pub use afmid_formats::{
-    Contents, Degree, FormatError, FoundChannel, Parts, Raw, RawBinary, Source, formats, most_inflated,
+    Contents, Degree, FormatError, FoundChannel, Parts, Raw, RawBinary, Source, formats, most_inflated, unit_ratio,
 };
 pub use contents::open_contents;
 pub use how::{How, Reading};

@@ -75,6 +75,19 @@ pub struct FoundResponse {
     pub input: Option<Degree>,
 }
 
+/// The unit of output over input.
+pub fn unit_ratio(output: &str, input: &str) -> String {
+    let grouped = |unit: &str| if unit.contains('/') { format!("({unit})") } else { unit.to_owned() };
+    match (output, input) {
+        (output, "" | "1") => output.to_owned(),
+        ("" | "1", input) => format!("1/{}", grouped(input)),
+        (output, input) if output == input => "1".to_owned(),
+        // some writers state the whole ratio with the numerator
+        (output, input) if output.ends_with(&format!("/{input}")) => output.to_owned(),
+        (output, input) => format!("{}/{}", grouped(output), grouped(input)),
+    }
+}
+
 /// Evenly spaced numbers that no file has to list.
 #[derive(Debug)]
 struct Even {

@@ -60,7 +60,7 @@ pub(super) fn unit_of(field: &str) -> String {
     // `(m/s²)(N)`: the units of output and input of a frequency response
     let whole = bare(field).trim();
     if let Some((over, under)) = whole.strip_prefix('(').and_then(|t| t.strip_suffix(')')?.split_once(")(")) {
-        return if over.contains('/') { format!("({over})/{under}") } else { format!("{over}/{under}") };
+        return crate::unit_ratio(over, under);
     }
     let text = bare(field).trim_matches(['(', ')', '[', ']']).trim();
     if NO_UNIT.contains(&text.to_lowercase().as_str()) {

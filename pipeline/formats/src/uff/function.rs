@@ -6,7 +6,7 @@ use super::scan::{Data, Dataset, Scanned};
 use crate::grid::{Grid, Store};
 use crate::number::Number;
 use crate::pinned::Pinned;
-use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts, Source};
+use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts, Source, unit_ratio};
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
@@ -124,22 +124,10 @@ fn response(dataset: &Dataset, location: &str, pinned: &Pinned) -> Result<FoundR
         parts: Parts::RealImaginary,
         guessed: false,
         coherence: None,
-        unit: ratio(&header.ordinate.unit, &header.denominator.unit),
+        unit: unit_ratio(&header.ordinate.unit, &header.denominator.unit),
         output,
         input,
     })
-}
-
-/// The unit of output over input.
-fn ratio(over: &str, under: &str) -> String {
-    let grouped = |unit: &str| if unit.contains('/') { format!("({unit})") } else { unit.to_owned() };
-    match (over, under) {
-        (_, "") => over.to_owned(),
-        ("", _) => format!("1/{}", grouped(under)),
-        // some writers state the whole ratio with the numerator
-        (over, under) if over.ends_with(&format!("/{under}")) => over.to_owned(),
-        (over, under) => format!("{}/{}", grouped(over), grouped(under)),
-    }
 }
 
 fn rate(header: &Header, location: &str, remarks: &mut Vec<String>) -> Option<f64> {
