@@ -20,7 +20,7 @@ fn polar(f: f64) -> (f64, f64) {
     (re.hypot(im), im.atan2(re))
 }
 
-/// A file's contents, by whoever recognises it.
+/// A file's contents, by the format that recognises it.
 fn contents(ending: &str, bytes: &[u8]) -> Contents {
     let file = Temporary::new(ending, bytes);
     let found = recognise(&head_of(&file.0).unwrap(), &file.0).unwrap().open(&file.0).unwrap();
