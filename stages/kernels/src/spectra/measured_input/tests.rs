@@ -117,7 +117,7 @@ fn the_variance_of_h2_and_hv_is_that_of_their_scatter() {
 }
 
 #[test]
-fn two_inputs_are_told_apart_with_their_variances() {
+fn two_inputs_are_separated_with_their_variances() {
     let (one, other, seeds) = (impulse_response(0.8), impulse_response(1.6), 40);
     let exact = [truth(&one), truth(&other)];
     let (mut square, mut stated) = (0.0, 0.0);
