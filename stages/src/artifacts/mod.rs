@@ -9,6 +9,7 @@
 //! | `average` | [`Average`] | [`AveragedSet`] |
 //! | `pair` | [`Pair`] | [`NewPair`], [`PairSet`] |
 //! | `transfer` | [`Transfer`] | [`NewTransfer`] |
+//! | `frf` | [`Frf`] | [`NewFrf`] |
 //! | `power-density` | [`Density`] | [`NewDensity`] |
 //! | `model` | [`innovations`], [`further_inputs`] | [`state_space`] |
 //! | `modes`, `roots` | [`modes()`], [`roots()`] | [`mode_table`], [`root_table`] |
@@ -20,6 +21,7 @@ mod data_set;
 mod decays;
 mod density;
 mod ensemble;
+mod frf;
 mod model;
 mod modes;
 mod pair;
@@ -33,6 +35,8 @@ pub use data_set::DataSet;
 pub(crate) use decays::{Decays, Sensor, decay_array};
 pub(crate) use density::{Density, NewDensity};
 pub(crate) use ensemble::{Ensemble, NewEnsemble, with_places};
+pub use frf::Quantity;
+pub(crate) use frf::{Frf, NewFrf, Point, ResponseOf};
 pub(crate) use model::{
     first_sample, further_inputs, innovations, nuisances, state_nuisances, state_space, state_t0_ambiguity,
     t0_ambiguity_s,

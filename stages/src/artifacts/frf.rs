@@ -1,0 +1,286 @@
+//! `frf`: frequency responses that were measured, a row for each pair of output and input.
+
+use afmid_pipeline::{Array, Attribute, Axis, StageError};
+use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::SAMPLE_RATE_HZ;
+
+const FREQUENCY_HZ: &str = "frequency_hz";
+const RESPONSE: &str = "response";
+const FRF: &str = "frf";
+const VARIANCE: &str = "variance";
+const COHERENCE: &str = "coherence";
+const RESPONSES: &str = "responses";
+const QUANTITY: &str = "quantity";
+const DRIVING_POINT: &str = "driving_point";
+const AVERAGES: &str = "averages";
+const ADDED_DECAY_PER_S: &str = "added_decay_per_s";
+
+/// What output over input is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quantity {
+    /// Displacement over force.
+    Receptance,
+    /// Velocity over force.
+    Mobility,
+    /// Acceleration over force.
+    Accelerance,
+    /// Any other ratio.
+    #[default]
+    Transfer,
+}
+
+impl Quantity {
+    /// As the artifact states it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Receptance => "receptance",
+            Self::Mobility => "mobility",
+            Self::Accelerance => "accelerance",
+            Self::Transfer => "transfer",
+        }
+    }
+
+    /// Errors: an artifact's text that is none of these.
+    fn from_name(name: &str) -> Result<Self, StageError> {
+        let all = [Self::Receptance, Self::Mobility, Self::Accelerance, Self::Transfer];
+        all.into_iter().find(|quantity| quantity.name() == name).ok_or_else(|| {
+            let wanted = all.map(Self::name).join(", ");
+            StageError::new(format!("attribute `{QUANTITY}` is `{name}`, wanted one of {wanted}"))
+        })
+    }
+}
+
+/// A point with the direction in which it moves or is pushed.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Point {
+    /// As the file names it; equal names are one point.
+    pub name: String,
+    /// `x`, `y`, `z`, `rx`, `ry`, `rz`; empty where it is not stated.
+    #[serde(default)]
+    pub direction: String,
+    /// Whether it was mounted, or struck, against the direction: the values have been turned round already.
+    #[serde(default)]
+    pub turned: bool,
+    /// Along the structure; none where it is not stated.
+    #[serde(default)]
+    pub position_m: Option<f64>,
+}
+
+impl Point {
+    /// Whether both are one point in one direction.
+    pub fn is(&self, other: &Self) -> bool {
+        self.name == other.name && self.direction == other.direction
+    }
+}
+
+/// What a row is from.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ResponseOf {
+    pub output: Point,
+    pub input: Point,
+}
+
+/// Frequency responses: `frf` over `response` and `frequency_hz`, ascending, NaN where it is not known; with `variance`,
+/// the expected squared error of the complex value, and `coherence` where these are known.
+#[derive(Debug, Clone)]
+pub(crate) struct Frf<'a> {
+    pub frequency_hz: &'a [f64],
+    /// What each row is from.
+    pub responses: Vec<ResponseOf>,
+    /// Response by response.
+    pub frf: &'a [Complex64],
+    pub variance: Option<&'a [f64]>,
+    pub coherence: Option<&'a [f64]>,
+    pub quantity: Quantity,
+    /// Output over input.
+    pub unit: &'a str,
+    /// The row whose output and input are one point in one direction.
+    pub driving_point: Option<usize>,
+    /// Samples per second of what it was measured from.
+    pub sample_rate_hz: Option<f64>,
+    /// Records, hits or segments that were averaged.
+    pub averages: Option<f64>,
+    /// What an exponential window added to the decay rate of every mode, 1/s; to be subtracted from `-Re(s)`.
+    pub added_decay_per_s: f64,
+}
+
+impl<'a> Frf<'a> {
+    /// Reads an artifact. Errors: not one of these.
+    pub fn new(array: &'a Array) -> Result<Self, StageError> {
+        let text = |name: &str| array.attributes.get(name).and_then(Attribute::as_str).unwrap_or_default();
+        let responses: Vec<ResponseOf> = serde_json::from_str(text(RESPONSES))
+            .map_err(|error| StageError::new(format!("attribute `{RESPONSES}` does not list responses: {error}")))?;
+        let frequency_hz = &array.axis(FREQUENCY_HZ)?.values;
+        let values = responses.len() * frequency_hz.len();
+        let whole = |name: &str, found: usize| match found == values {
+            true => Ok(()),
+            false => Err(StageError::new(format!(
+                "`{name}` has {found} values, wanted {values}: {} of each of {} responses",
+                frequency_hz.len(),
+                responses.len()
+            ))),
+        };
+        let real = |name: &str| -> Result<Option<&'a [f64]>, StageError> {
+            let Some(variable) = array.variables.iter().find(|variable| variable.name == name) else { return Ok(None) };
+            whole(name, variable.values.len())?;
+            array.real(name).map(Some)
+        };
+        let number = |name: &str| array.attributes.get(name).and_then(Attribute::as_f64);
+        let frf = array.complex(FRF)?;
+        whole(FRF, frf.len())?;
+        let driving_point = number(DRIVING_POINT).map(|row| row as usize);
+        if let Some(row) = driving_point.filter(|row| *row >= responses.len()) {
+            let problem = format!("`{DRIVING_POINT}` is row {row}, there are {} responses", responses.len());
+            return Err(StageError::new(problem));
+        }
+        Ok(Self {
+            frequency_hz,
+            frf,
+            variance: real(VARIANCE)?,
+            coherence: real(COHERENCE)?,
+            quantity: Quantity::from_name(text(QUANTITY))?,
+            unit: &array.variable(FRF)?.unit,
+            driving_point,
+            sample_rate_hz: number(SAMPLE_RATE_HZ),
+            averages: number(AVERAGES),
+            added_decay_per_s: number(ADDED_DECAY_PER_S).unwrap_or(0.0),
+            responses,
+        })
+    }
+
+    /// The values of one response; none where there is no such.
+    pub fn row(&self, response: usize) -> &'a [Complex64] {
+        row_of(self.frf, response, self.frequency_hz.len())
+    }
+
+    /// The expected squared errors of one response; none where they are not known.
+    pub fn row_variance(&self, response: usize) -> Option<&'a [f64]> {
+        self.variance.map(|values| row_of(values, response, self.frequency_hz.len()))
+    }
+}
+
+fn row_of<T>(values: &[T], row: usize, length: usize) -> &[T] {
+    values.get(row * length..(row + 1) * length).unwrap_or_default()
+}
+
+/// Measured frequency responses to be made; the parts are those of [`Frf`].
+#[derive(Debug, Clone, Default)]
+pub(crate) struct NewFrf {
+    pub frequency_hz: Vec<f64>,
+    pub responses: Vec<ResponseOf>,
+    pub frf: Vec<Complex64>,
+    pub variance: Option<Vec<f64>>,
+    pub coherence: Option<Vec<f64>>,
+    pub quantity: Quantity,
+    pub unit: String,
+    pub driving_point: Option<usize>,
+    pub sample_rate_hz: Option<f64>,
+    pub averages: Option<f64>,
+    pub added_decay_per_s: f64,
+}
+
+impl NewFrf {
+    /// The artifact.
+    pub fn array(self) -> Result<Array, StageError> {
+        let names = serde_json::to_string(&self.responses).map_err(StageError::from_error)?;
+        let numbers = (1..=self.responses.len()).map(|row| row as f64).collect();
+        let axes = vec![
+            Axis::new(RESPONSE, "1", "number of the response", numbers),
+            Axis::new(FREQUENCY_HZ, "Hz", "frequency", self.frequency_hz),
+        ];
+        let over = &[RESPONSE, FREQUENCY_HZ];
+        let mut array = Array::over(axes)
+            .with(FRF, &self.unit, "measured frequency response", over, self.frf)
+            .attribute(RESPONSES, names)
+            .attribute(QUANTITY, self.quantity.name())
+            .attribute(ADDED_DECAY_PER_S, self.added_decay_per_s);
+        if let Some(variance) = self.variance {
+            array = array.with(VARIANCE, &squared(&self.unit), "expected squared error", over, variance);
+        }
+        if let Some(coherence) = self.coherence {
+            array = array.with(COHERENCE, "1", "ordinary coherence of output and input", over, coherence);
+        }
+        if let Some(row) = self.driving_point {
+            array = array.attribute(DRIVING_POINT, row);
+        }
+        for (name, value) in [(SAMPLE_RATE_HZ, self.sample_rate_hz), (AVERAGES, self.averages)] {
+            array = value.into_iter().fold(array, |array, value| array.attribute(name, value));
+        }
+        Ok(array)
+    }
+}
+
+fn squared(unit: &str) -> String {
+    match unit {
+        "" | "1" => unit.to_owned(),
+        _ => format!("({unit})^2"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(name: &str, position_m: Option<f64>) -> Point {
+        Point { name: name.to_owned(), direction: "z".to_owned(), turned: name == "2", position_m }
+    }
+
+    fn two_responses() -> NewFrf {
+        let response = |output: &str| ResponseOf { output: point(output, Some(0.5)), input: point("1", None) };
+        NewFrf {
+            frequency_hz: vec![1.0, 2.5, 3.0],
+            responses: vec![response("1"), response("2")],
+            frf: (0..6).map(|k| Complex64::new(f64::from(k), -1.0)).collect(),
+            unit: "m/N".to_owned(),
+            quantity: Quantity::Receptance,
+            driving_point: Some(0),
+            ..NewFrf::default()
+        }
+    }
+
+    #[test]
+    fn responses_come_back_as_they_were_written_with_what_is_known_and_nothing_else() {
+        let array = two_responses().array().unwrap();
+        array.validate().unwrap();
+        let read = Frf::new(&array).unwrap();
+        assert_eq!(read.responses, two_responses().responses);
+        assert_eq!((read.quantity, read.unit, read.driving_point), (Quantity::Receptance, "m/N", Some(0)));
+        assert_eq!(read.row(1), &two_responses().frf[3..]);
+        assert!(read.row(2).is_empty() && read.variance.is_none() && read.coherence.is_none());
+        assert_eq!((read.sample_rate_hz, read.averages, read.added_decay_per_s), (None, None, 0.0));
+        assert!(read.responses[0].output.is(&read.responses[0].input));
+
+        let array = NewFrf {
+            variance: Some((0..6).map(f64::from).collect()),
+            coherence: Some(vec![0.5; 6]),
+            sample_rate_hz: Some(10.0),
+            averages: Some(4.0),
+            added_decay_per_s: 3.0,
+            ..two_responses()
+        }
+        .array()
+        .unwrap();
+        array.validate().unwrap();
+        let read = Frf::new(&array).unwrap();
+        assert_eq!(read.row_variance(1).unwrap(), [3.0, 4.0, 5.0]);
+        assert_eq!((read.sample_rate_hz, read.averages, read.added_decay_per_s), (Some(10.0), Some(4.0), 3.0));
+        assert_eq!(array.variable(VARIANCE).unwrap().unit, "(m/N)^2");
+    }
+
+    #[test]
+    fn what_is_no_set_of_responses_is_refused_with_the_reason() {
+        let error = |new: NewFrf| Frf::new(&new.array().unwrap()).unwrap_err().to_string();
+        assert!(error(NewFrf { frequency_hz: vec![1.0], ..two_responses() }).contains("wanted 2: 1 of each of 2"));
+        assert!(error(NewFrf { variance: Some(vec![1.0]), ..two_responses() }).contains("`variance` has 1 values"));
+        assert!(error(NewFrf { driving_point: Some(2), ..two_responses() }).contains("row 2"));
+        let other = two_responses().array().unwrap().attribute(QUANTITY, "stiffness");
+        assert!(Frf::new(&other).unwrap_err().to_string().contains("`stiffness`, wanted one of receptance"));
+        assert!(Frf::new(&Array::default()).unwrap_err().to_string().contains("does not list responses"));
+    }
+}
