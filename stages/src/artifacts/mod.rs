@@ -41,7 +41,7 @@ pub(crate) use model::{
     first_sample, further_inputs, innovations, nuisances, state_nuisances, state_space, state_t0_ambiguity,
     t0_ambiguity_s,
 };
-pub(crate) use modes::{mode_table, modes};
+pub(crate) use modes::{mode_document, mode_table, modes};
 pub(crate) use pair::{NewPair, Pair, PairSeries, PairSet, with_counts};
 pub(crate) use ringing::{ringing, ringing_array};
 pub(crate) use roots::{RootRow, root_table, roots};

@@ -2,6 +2,7 @@
 
 use afmid_kernels::ringdown::{Estimate, ModeEstimate};
 use afmid_pipeline::{StageError, Table};
+use serde_json::{Value, json};
 
 const FREQUENCY_HZ: &str = "frequency_hz";
 const FREQUENCY_STD_HZ: &str = "frequency_std_hz";
@@ -16,11 +17,25 @@ pub(crate) fn modes(table: &Table) -> Result<Vec<ModeEstimate>, StageError> {
     Ok(frequency.into_iter().zip(quality).map(mode).collect())
 }
 
+/// A mode in the JSON of `show`; what else is known of it is added.
+pub(crate) fn mode_document(mode: &ModeEstimate) -> Value {
+    let damping = mode.damping_ratio();
+    json!({
+        "frequency_hz": mode.frequency_hz.value,
+        "frequency_std_hz": mode.frequency_hz.std,
+        "quality_factor": mode.quality_factor.value,
+        "quality_factor_std": mode.quality_factor.std,
+        "damping_ratio": damping.value,
+        "damping_ratio_std": damping.std,
+    })
+}
+
 /// A table of modes by row; what else is known of them is added to it.
 pub(crate) fn mode_table(modes: &[ModeEstimate]) -> Table {
     Table::of(modes)
         .with_std([FREQUENCY_HZ, FREQUENCY_STD_HZ], "Hz", "resonance frequency", |m| m.frequency_hz)
         .with_std([QUALITY_FACTOR, QUALITY_FACTOR_STD], "1", "quality factor", |m| m.quality_factor)
+        .with_std(["damping_ratio", "damping_ratio_std"], "1", "share of critical damping", ModeEstimate::damping_ratio)
         .table()
 }
 

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::course::Parts;
-use self::tables::{fit_array, hit_table, modes_with_damping, shape_array, summary};
+use self::tables::{fit_array, hit_table, modes_with_lack, shape_array, summary};
 use super::count::Count;
 use crate::artifacts::Decays;
 use crate::events::DECAYS;
@@ -118,7 +118,7 @@ impl Stage for DecayFit {
         }
         parts.warnings(followed.from).into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new()
-            .with(&MODES, modes_with_damping(fit))
+            .with(&MODES, modes_with_lack(fit))
             .with(&SHAPES, shape_array(fit, &decays.sensors))
             .with(&HITS, hit_table(fit))
             .with(&COURSE, parts.table())

@@ -20,7 +20,8 @@ use super::order::simulated_percent;
 use super::pem::{MODEL, PAIR, RESIDUALS, SUMMARY, ending};
 use super::whiteness::{coloured, residual_share, test_document};
 use crate::artifacts::{
-    DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, innovations, state_nuisances, state_space, state_t0_ambiguity,
+    DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, innovations, mode_document, state_nuisances, state_space,
+    state_t0_ambiguity,
 };
 use afmid_kernels::grey::{Grey, GreyHold, GreyOptions, GreyQuantity, GreyStart, fit_grey};
 use afmid_kernels::model::ModelError;
@@ -97,7 +98,7 @@ impl Stage for GreyEstimate {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.grey",
-        version: 5,
+        version: 6,
         summary: "fits modes, real poles, delay and feedthrough: the grey modal form",
         inputs: &[PAIR.spec(), START.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec(), MODES.spec(), PARAMETERS.spec()],
@@ -262,14 +263,10 @@ impl GreyEstimate {
             .iter()
             .zip(&shares)
             .map(|(mode, share)| {
-                json!({
-                    "frequency_hz": mode.frequency_hz.value,
-                    "frequency_std_hz": mode.frequency_hz.std,
-                    "quality_factor": mode.quality_factor.value,
-                    "quality_factor_std": mode.quality_factor.std,
-                    "static_share": share.value,
-                    "static_share_std": share.std,
-                })
+                let mut document = mode_document(mode);
+                document["static_share"] = share.value.into();
+                document["static_share_std"] = share.std.into();
+                document
             })
             .collect();
         let parameters: Vec<Value> = fit

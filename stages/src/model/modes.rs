@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 
 use super::pem::MODEL;
 use crate::artifacts::{
-    DataSet, Pair, SAMPLE_RATE_HZ, first_sample, further_inputs, innovations, mode_table, nuisances, root_table,
-    t0_ambiguity_s,
+    DataSet, Pair, SAMPLE_RATE_HZ, first_sample, further_inputs, innovations, mode_document, mode_table, nuisances,
+    root_table, t0_ambiguity_s,
 };
 use afmid_kernels::model::InnovationsModel;
 use afmid_kernels::modes::{
@@ -92,7 +92,7 @@ impl Stage for Modes {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 6,
+        version: 7,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -138,7 +138,7 @@ impl Stage for Modes {
         )
         .map_err(StageError::from_error)?;
         let summary = Document::new(&json!({
-            "modes": modes.iter().map(|mode| mode_document(mode)).collect::<Vec<Value>>(),
+            "modes": modes.iter().map(|mode| with_share(mode)).collect::<Vec<Value>>(),
             "fit_percent": {
                 "identification": fits.identification,
                 "held_out": fits.held_out,
@@ -257,24 +257,23 @@ fn held_out(half: &StateSpace, pair: &Array) -> Result<Fits, StageError> {
     })
 }
 
-fn mode_document(mode: &Pole) -> Value {
-    json!({
-        "frequency_hz": mode.root.frequency_hz,
-        "frequency_std_hz": mode.root.frequency_std_hz,
-        "quality_factor": mode.root.quality_factor,
-        "quality_factor_std": mode.root.quality_factor_std,
-        "static_share": mode.static_share,
-        "static_share_std": mode.static_share_std,
-    })
+fn estimate(mode: &Pole) -> ModeEstimate {
+    ModeEstimate {
+        frequency_hz: Estimate { value: mode.root.frequency_hz, std: mode.root.frequency_std_hz },
+        quality_factor: Estimate { value: mode.root.quality_factor, std: mode.root.quality_factor_std },
+    }
+}
+
+fn with_share(mode: &Pole) -> Value {
+    let mut document = mode_document(&estimate(mode));
+    document["static_share"] = mode.static_share.into();
+    document["static_share_std"] = mode.static_share_std.into();
+    document
 }
 
 fn modes_with_shares(modes: &[&Pole]) -> Table {
     let column = |value: fn(&Pole) -> f64| modes.iter().map(|mode| value(mode)).collect::<Vec<f64>>();
-    let estimate = |mode: &&Pole| ModeEstimate {
-        frequency_hz: Estimate { value: mode.root.frequency_hz, std: mode.root.frequency_std_hz },
-        quality_factor: Estimate { value: mode.root.quality_factor, std: mode.root.quality_factor_std },
-    };
-    let estimates: Vec<ModeEstimate> = modes.iter().map(estimate).collect();
+    let estimates: Vec<ModeEstimate> = modes.iter().map(|mode| estimate(mode)).collect();
     mode_table(&estimates)
         .with("static_share", "1", "part of the static gain", column(|m| m.static_share))
         .with("static_share_std", "1", "its standard error", column(|m| m.static_share_std))

@@ -147,7 +147,7 @@ impl Stage for RingdownFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.ringdown",
-        version: 4,
+        version: 5,
         summary: "fits the modes of all events jointly, at the limit of their noise",
         inputs: &[ENSEMBLE.spec(), FREE.spec()],
         outputs: &[MODES.spec(), EVENTS.spec(), SPECTRUM.spec(), POLES.spec(), SUMMARY.spec()],

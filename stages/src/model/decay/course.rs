@@ -146,6 +146,7 @@ pub(super) fn dropped_document(dropped: &[DroppedMode]) -> Value {
     let row = |dropped: &DroppedMode| {
         let (reason, of, mac) = match dropped.reason {
             Dropped::Steady => ("steady", None, None),
+            Dropped::Broad => ("broad", None, None),
             Dropped::Companion { of, mac } => ("companion", Some(of + 1), Some(mac)),
         };
         json!({

@@ -5,24 +5,15 @@ use num_complex::Complex64;
 use serde_json::{Value, json};
 
 use super::course::{Parts, dropped_document};
-use crate::artifacts::{Decays, SAMPLE_RATE_HZ, Sensor, mode_table};
+use crate::artifacts::{Decays, SAMPLE_RATE_HZ, Sensor, mode_document, mode_table};
 use afmid_kernels::ringdown::{
     ChannelRingdown, FollowedDecay, ModeEstimate, ModeShape, RecordFit, RingdownNoise, ShapePoint,
 };
 
-/// Frequencies, quality factors, damping ratios.
-pub(super) fn modes_with_damping(fit: &ChannelRingdown) -> Table {
-    let modes = fit.modes();
-    let damping = Table::of(&modes)
-        .with_std(["damping_ratio", "damping_ratio_std"], "1", "share of critical damping", ModeEstimate::damping_ratio)
-        .table();
-    let lack = Table::of(&fit.lack_of_fit)
-        .with("lack_of_fit", "1", "factor of the variances for what the fit leaves round the mode; 1: noise", |f| *f)
-        .table();
-    let mut table = mode_table(&modes);
-    table.columns.extend(damping.columns);
-    table.columns.extend(lack.columns);
-    table
+/// The modes, and how much more than noise the fit leaves round each.
+pub(super) fn modes_with_lack(fit: &ChannelRingdown) -> Table {
+    let what = "factor of the variances for what the fit leaves round the mode; 1: noise";
+    mode_table(&fit.modes()).with("lack_of_fit", "1", what, fit.lack_of_fit.clone())
 }
 
 /// Shapes relative to their largest channel, and the modal assurance criterion between them.
@@ -142,15 +133,7 @@ pub(super) fn summary(
     let modes = fit.modes();
     let several = decays.sensors.len() > 1;
     let mode = |(mode, shape): (&ModeEstimate, &ModeShape)| {
-        let damping = mode.damping_ratio();
-        let mut document = json!({
-            "frequency_hz": mode.frequency_hz.value,
-            "frequency_std_hz": mode.frequency_hz.std,
-            "quality_factor": mode.quality_factor.value,
-            "quality_factor_std": mode.quality_factor.std,
-            "damping_ratio": damping.value,
-            "damping_ratio_std": damping.std,
-        });
+        let mut document = mode_document(mode);
         if several {
             let point = |(sensor, point): (&Sensor, &ShapePoint)| {
                 json!({

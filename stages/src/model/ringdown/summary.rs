@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use super::ErrorSource;
 use super::tables::named;
+use crate::artifacts::mode_document;
 use afmid_kernels::ringdown::{ModeCount, ModeEstimate, Ringdown};
 
 /// The summary; numbers that are unknown are null.
@@ -17,7 +18,7 @@ pub(super) fn summary(
     seen: &[ModeCount],
 ) -> Result<Document, StageError> {
     Document::new(&json!({
-        "modes": modes.iter().map(mode).collect::<Vec<Value>>(),
+        "modes": modes.iter().map(mode_document).collect::<Vec<Value>>(),
         "events": fit.events.len(),
         "error_source": error_source,
         "converged": fit.verdict.converged,
@@ -32,15 +33,6 @@ pub(super) fn summary(
         "on_bound": fit.on_bound.iter().map(|quantity| named(*quantity)).collect::<Vec<String>>(),
         "mode_numbers": seen.iter().map(count).collect::<Vec<Value>>(),
     }))
-}
-
-fn mode(mode: &ModeEstimate) -> Value {
-    json!({
-        "frequency_hz": mode.frequency_hz.value,
-        "frequency_std_hz": mode.frequency_hz.std,
-        "quality_factor": mode.quality_factor.value,
-        "quality_factor_std": mode.quality_factor.std,
-    })
 }
 
 fn count(count: &ModeCount) -> Value {

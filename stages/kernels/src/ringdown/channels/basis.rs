@@ -16,6 +16,16 @@ impl Poles {
         Self(values.chunks_exact(2).map(|v| c64::new(v[0] / unit_s, v[1] / unit_s)).collect())
     }
 
+    /// The same with poles of less than the least quality factor moved to it, at their decay rate.
+    pub fn bounded(mut self, least_quality_factor: f64) -> Self {
+        // |s| = 2 Q |Re s|, and a rounding more
+        let least = (4.0 * least_quality_factor * least_quality_factor - 1.0).max(0.0).sqrt() * (1.0 + 1e-12);
+        for s in &mut self.0 {
+            s.im = s.im.max(-s.re * least);
+        }
+        self
+    }
+
     /// Whether all decay and oscillate, above the least quality factor and below half the sample rate.
     pub fn valid(&self, interval_s: f64, least_quality_factor: f64) -> bool {
         self.0.iter().all(|s| {

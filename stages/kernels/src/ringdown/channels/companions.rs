@@ -10,6 +10,9 @@ use crate::ringdown::ModeEstimate;
 pub enum Dropped {
     /// Its damping is not above zero at the 0.1 % level: a line of a drive or of the mains.
     Steady,
+    /// Its quality factor is not above `1/sqrt(2)` at the 0.1 % level: its response has no maximum. A drift, a coupling
+    /// capacitor or what the model lacks, fitted along with the modes.
+    Broad,
     /// It lies within the line of another mode, has its shape and dies away twice as fast or faster: what that mode's
     /// motion leaves.
     Companion {
@@ -29,7 +32,7 @@ pub struct DroppedMode {
     pub reason: Dropped,
 }
 
-/// Standard errors of damping exceeded by noise alone once in a thousand (one-sided).
+/// Standard errors exceeded by noise alone once in a thousand (one-sided).
 const DETERMINED: f64 = 3.09;
 /// Share of a shape's energy that may be orthogonal to a stronger mode's: what lies there is known no better than the
 /// lack of fit. Noise adds three times its own share.
@@ -51,6 +54,18 @@ pub(super) fn steady(fit: &ChannelRingdown, duration_s: f64) -> Vec<usize> {
     let error = |j: usize| (fit.covariance[(2 * j, 2 * j)].max(0.0) / fit.lack_of_fit[j]).sqrt();
     let dies = |j: usize| rate(j) > DETERMINED * error(j);
     (0..fit.poles.len()).filter(|&j| rate(j) * duration_s < 1.0 && !dies(j)).collect()
+}
+
+/// Modes whose response has no maximum, by number.
+pub(super) fn broad(fit: &ChannelRingdown) -> Vec<usize> {
+    // Q above 1/sqrt(2): the pole turns faster than it decays
+    let faster = |j: usize| {
+        let (rate, turn, both) = (2 * j, 2 * j + 1, (2 * j, 2 * j + 1));
+        // the covariance is of the real part, which is minus the rate
+        let variance = fit.covariance[(rate, rate)] + fit.covariance[(turn, turn)] + 2.0 * fit.covariance[both];
+        (fit.poles[j].im + fit.poles[j].re) / variance.max(0.0).sqrt()
+    };
+    (0..fit.poles.len()).filter(|&j| faster(j).is_nan() || faster(j) < DETERMINED).collect()
 }
 
 /// Companions with the mode of each, and the modal assurance criterion between them.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use faer::c64;
 
-use super::companions::{Dropped, DroppedMode, companions, energies, steady};
+use super::companions::{Dropped, DroppedMode, broad, companions, energies, steady};
 use super::levels::density;
 use super::options::{ChannelOptions, ModesWanted};
 use super::order::fit_channels;
@@ -79,7 +79,7 @@ const FAR: f64 = 0.1;
 /// # Method
 /// Exponentials in the line of a slower one, of its shape and at least twice as fast, are dropped ([`Dropped`]): their
 /// modes are fitted again without them, errors widened by what is then left round each line; of all other modes they
-/// stay nuisances. All are fitted to the first and to the
+/// stay nuisances; so do exponentials without a maximum in their response. All are fitted to the first and to the
 /// last part: for a linear system they are the same there (chi square of the difference of both poles at the level
 /// [`MOVES`] for all modes together). With one channel every shape is the same: there the line and the rate decide.
 /// # Shapes
@@ -104,12 +104,16 @@ pub fn follow_channels(
     let fixed = matches!(options.modes, ModesWanted::Fixed(_)) || !options.start.is_empty();
     let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
     let still = if fixed { Vec::new() } else { steady(&all, longest as f64 * interval_s) };
+    let wide = if fixed { Vec::new() } else { broad(&all) };
     let mut dropped: Vec<DroppedMode> = Vec::new();
-    dropped.extend(still.iter().map(|&j| DroppedMode { mode: all.modes()[j], reason: Dropped::Steady }));
-    if still.len() == all.poles.len() {
+    let modes = all.modes();
+    dropped.extend(still.iter().map(|&j| DroppedMode { mode: modes[j], reason: Dropped::Steady }));
+    dropped.extend(wide.iter().map(|&j| DroppedMode { mode: modes[j], reason: Dropped::Broad }));
+    let no_modes: Vec<usize> = still.iter().chain(&wide).copied().collect();
+    if no_modes.len() == all.poles.len() {
         return Err(ModelError::Degenerate("no oscillation that dies away"));
     }
-    let mut fit = all.without(&still);
+    let mut fit = all.without(&no_modes);
     let lines: Vec<c64> = still.iter().map(|&j| all.poles[j]).collect();
     let found = if fixed { Vec::new() } else { companions(&fit) };
     let mut alone = fit.clone();

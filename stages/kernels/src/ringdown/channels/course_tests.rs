@@ -2,8 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use faer::c64;
-
 use super::*;
 use crate::fixture::white_noise;
 
@@ -175,4 +173,34 @@ fn a_weak_mode_far_from_a_strong_one_that_moves_survives() {
     }
     // noise adds a mode in a thousand records
     assert!(lost <= 1, "{lost}");
+}
+
+/// A coupling capacitor or a sensor that relaxes: an exponential beside the modes.
+#[test]
+fn a_relaxation_beside_the_modes_is_no_mode_and_does_not_bias_them() {
+    let modes = [linear(120.0, 0.004, 1.0), linear(273.0, 0.006, 0.5)];
+    let (mut right, mut squares) = (0, 0.0);
+    for seed in 0..30 {
+        let relaxes = |k: usize| 0.4 * (-(k as f64) * INTERVAL_S / (0.02 * 1.15_f64.powi(seed as i32))).exp();
+        let mut y = records(&modes, 1, 0.005, 500 + seed);
+        y[0].iter_mut().enumerate().for_each(|(k, y)| *y += relaxes(k));
+        let rows = vec![vec![y[0].as_slice()]];
+        let found = follow_channels(&rows, &[], INTERVAL_S, &ChannelOptions::default(), true).expect("a fit").fit;
+        let estimates = found.modes();
+        if estimates.len() != 2 {
+            println!("seed {seed}: {estimates:?}");
+            continue;
+        }
+        right += 1;
+        for (mode, estimate) in modes.iter().zip(&estimates) {
+            // the simulated frequency is that of the damped oscillation
+            let length = (1.0 + mode.damping.powi(2)).sqrt();
+            let (frequency, damping) = (mode.frequency_hz * length, mode.damping / length);
+            squares += ((estimate.frequency_hz.value - frequency) / estimate.frequency_hz.std).powi(2);
+            squares += ((estimate.damping_ratio().value - damping) / estimate.damping_ratio().std).powi(2);
+        }
+    }
+    // 120 squares of normal deviates: 1 +- 0.13
+    let mean = squares / (4.0 * f64::from(right));
+    assert!(right >= 29 && (0.6..1.5).contains(&mean), "{right} of 30 right, {mean}");
 }

@@ -118,13 +118,15 @@ impl Objective for Fit<'_> {
         damping: f64,
     ) -> Result<Trial<At, f64>, Infallible> {
         let (step, _) = damped_step(information, gradient, damping);
-        let mut values = at.poles.values(self.unit_s);
-        values.iter_mut().zip(&step).for_each(|(v, s)| *v += s);
-        let poles = Poles::from_values(&values, self.unit_s);
+        let from = at.poles.values(self.unit_s);
+        let values: Vec<f64> = from.iter().zip(&step).map(|(v, s)| v + s).collect();
+        // one at its bound must not hold the others
+        let poles = Poles::from_values(&values, self.unit_s).bounded(self.least_q);
         if !poles.valid(self.records.interval_s, self.least_q) {
             return Ok(None);
         }
-        let gain: f64 = step.iter().zip(gradient).map(|(s, g)| s * g).sum();
+        let taken = poles.values(self.unit_s).into_iter().zip(&from).map(|(to, from)| to - from);
+        let gain: f64 = taken.zip(gradient).map(|(s, g)| s * g).sum();
         // in units of the noise that is really there
         let excess = at.cost / self.observed as f64;
         Ok(Some((self.at(poles), (gain.max(0.0) / excess.max(f64::MIN_POSITIVE)).sqrt())))

@@ -46,7 +46,8 @@ pub struct ChannelOptions {
     /// not there, and one that is there needs an amplitude of six standard errors.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub false_alarm: f64,
-    /// Least quality factor of a mode. Why 0.6: below 0.5 nothing oscillates.
+    /// Least quality factor of an exponential. Why 0.5005: at 0.5 a pair is a real pole twice; so near to it a coupling
+    /// capacitor or a relaxing sensor finds its place, and is dropped afterwards.
     #[schemars(extend("exclusiveMinimum" = 0.5))]
     pub least_quality_factor: f64,
     /// Start from these poles, rad/s, upper half plane, instead of finding modes; their number replaces `modes`.
@@ -65,7 +66,7 @@ impl Default for ChannelOptions {
             noise: ChannelNoise::Estimated,
             drift: true,
             false_alarm: 1e-3,
-            least_quality_factor: 0.6,
+            least_quality_factor: 0.5005,
             start: Vec::new(),
             missing: Vec::new(),
         }
