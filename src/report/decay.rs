@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::figure::{Axis, Colour, Figure, Mark, Panel, Row, Stroke};
 use super::find::{Found, all};
-use super::number::{number, quantity, with_error};
+use super::number::{quantity, with_error};
 use super::paper::Drawn;
 use super::view::{Head, TableView};
 
@@ -54,11 +54,17 @@ fn modes(found: &Found<'_, Document>) -> Option<TableView> {
     let document = &found.value.0;
     let modes = document.get("modes")?.as_array()?;
     let heads = ["mode", "frequency", "damping ratio", "quality factor"].map(|name| Head::number(name, ""));
-    let from_s = at(document, "fitted_from_s");
-    let part = if from_s > 0.0 {
-        format!(" From {} s after the first free samples on.", number(from_s))
-    } else {
-        String::new()
+    let late: Vec<String> = document
+        .get("course")
+        .and_then(|course| course.as_array())
+        .into_iter()
+        .flatten()
+        .filter(|mode| mode["last_part_counts"] == true)
+        .map(|mode| mode["mode"].to_string())
+        .collect();
+    let part = match late.len() {
+        0 => String::new(),
+        _ => format!(" Of mode {} the last part counts: it moves while it dies away.", late.join(", ")),
     };
     let caption =
         format!("Modes (stage {}). In brackets: one standard error of the last digits.{part}", found.stage.id);

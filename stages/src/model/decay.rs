@@ -40,7 +40,7 @@ pub struct DecayFit {
     pub max_modes: usize,
     /// Noise beside the ringing: `estimated` (white and wander, per channel) or `white`.
     pub noise: DecayNoise,
-    /// What counts where modes move while they die away: `auto`, the last part, or `whole`, all.
+    /// What counts of a mode that moves far while it dies away: `auto`, its last part, or `whole`, all.
     pub part: FittedPart,
     /// How it is fitted.
     #[serde(flatten)]
@@ -51,7 +51,7 @@ pub struct DecayFit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FittedPart {
-    /// The last part.
+    /// The last part of those modes.
     Auto,
     /// All of each decay.
     Whole,
@@ -109,20 +109,20 @@ impl Stage for DecayFit {
         let parts = Parts::new(&followed, &decays);
         let fit = &followed.fit;
         self.warn(fit, &decays, cx);
-        let companions = followed.dropped.iter().filter(|d| d.reason != Dropped::Steady).count();
+        let companions = followed.dropped.iter().filter(|d| matches!(d.reason, Dropped::Companion { .. })).count();
         if companions > 0 {
             cx.warn(format!(
                 "{companions} of the fitted exponentials are companions of modes that move with their amplitude and \
                  are left out: `summary` lists them under `dropped`"
             ));
         }
-        parts.warnings(followed.from).into_iter().for_each(|warning| cx.warn(warning));
+        parts.warnings(whole).into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new()
             .with(&MODES, modes_with_lack(fit))
             .with(&SHAPES, shape_array(fit, &decays.sensors))
-            .with(&HITS, hit_table(fit))
+            .with(&HITS, hit_table(&followed.whole))
             .with(&COURSE, parts.table())
-            .with(&FIT, fit_array(fit, &decays, followed.from))
+            .with(&FIT, fit_array(&followed.whole, &decays))
             .with(&SUMMARY, summary(&followed, &parts, &decays)?))
     }
 

@@ -6,14 +6,13 @@ use afmid_pipeline::Table;
 use serde_json::{Value, json};
 
 use crate::artifacts::Decays;
-use afmid_kernels::ringdown::{Dropped, DroppedMode, FollowedDecay, ModeCourse, ModeEstimate};
+use afmid_kernels::ringdown::{Dropped, DroppedMode, Estimate, FollowedDecay, ModeCourse, ModeEstimate};
 
-/// The parts' modes with the times of the parts.
+/// The modes in both parts, with the decays' times.
 pub(super) struct Parts<'a> {
     modes: &'a [ModeCourse],
-    gone: Vec<ModeEstimate>,
+    sample_rate_hz: f64,
     /// After the decays' first free samples, s.
-    cut_s: f64,
     end_s: f64,
 }
 
@@ -29,37 +28,32 @@ struct PartRow<'a> {
 
 impl<'a> Parts<'a> {
     pub fn new(followed: &'a FollowedDecay, decays: &Decays<'_>) -> Self {
-        let second = |samples: usize| samples as f64 / decays.sample_rate_hz;
         let longest = decays.hits.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
-        let course = followed.course.as_ref();
-        Self {
-            modes: course.map_or(&[], |course| &course.modes),
-            gone: course.map(|course| course.gone()).unwrap_or_default(),
-            cut_s: course.map_or(f64::NAN, |course| second(course.cut)),
-            end_s: second(longest),
-        }
+        let sample_rate_hz = decays.sample_rate_hz;
+        Self { modes: &followed.course, sample_rate_hz, end_s: longest as f64 / sample_rate_hz }
     }
 
-    fn times(&self) -> [Range<f64>; 2] {
-        [0.0..self.cut_s, self.cut_s..self.end_s]
+    fn times(&self, course: &ModeCourse) -> [Range<f64>; 2] {
+        let cut_s = course.cut as f64 / self.sample_rate_hz;
+        [0.0..cut_s, cut_s..self.end_s]
     }
 
     pub fn table(&self) -> Table {
-        let [first, last] = self.times();
-        let row = |number, course: &'a ModeCourse, part, mode, time: &Range<f64>| PartRow {
-            number,
+        let row = |course: &'a ModeCourse, part, mode, time: &Range<f64>| PartRow {
+            number: course.mode + 1,
             course,
             part,
             mode,
             from_s: time.start,
             to_s: time.end,
         };
-        let both = |(number, course): (usize, &'a ModeCourse)| {
-            [row(number, course, "first", course.first, &first), row(number, course, "last", course.last, &last)]
+        let both = |course: &'a ModeCourse| {
+            let [first, last] = self.times(course);
+            [row(course, "first", course.first, &first), row(course, "last", course.last, &last)]
         };
-        let rows: Vec<PartRow<'_>> = (1..).zip(self.modes).flat_map(both).collect();
+        let rows: Vec<PartRow<'_>> = self.modes.iter().flat_map(both).collect();
         Table::of(&rows)
-            .with("mode", "1", "number among the modes that both parts have", |row| row.number)
+            .with("mode", "1", "number of the mode", |row| row.number)
             .with("part", "", "part of the decays", |row| row.part)
             .with("from_s", "s", "its begin after the first free sample", |row| row.from_s)
             .with("to_s", "s", "its end", |row| row.to_s)
@@ -76,7 +70,6 @@ impl<'a> Parts<'a> {
     }
 
     pub fn document(&self) -> Value {
-        let [first, last] = self.times();
         let end = |time: &Range<f64>, mode: &ModeEstimate| {
             let damping = mode.damping_ratio();
             json!({
@@ -89,56 +82,48 @@ impl<'a> Parts<'a> {
             })
         };
         let both = |course: &ModeCourse| {
+            let [first, last] = self.times(course);
             json!({
+                "mode": course.mode + 1,
                 "first": end(&first, &course.first),
                 "last": end(&last, &course.last),
                 "frequency_z": course.frequency_z,
                 "damping_z": course.damping_z,
                 "p_value": course.p_value,
                 "moves": course.moves,
+                "last_part_counts": course.far,
             })
         };
         self.modes.iter().map(both).collect::<Vec<Value>>().into()
     }
 
-    /// One for each mode that moves, and one for the part that counts.
-    pub fn warnings(&self, from: usize) -> Vec<String> {
-        let moving: Vec<&ModeCourse> = self.modes.iter().filter(|course| course.moves).collect();
-        let mut warnings: Vec<String> = moving.iter().map(|course| self.warning(course)).collect();
-        let frequencies = |modes: &[ModeEstimate]| {
-            modes.iter().map(|mode| format!("{:.6} Hz", mode.frequency_hz.value)).collect::<Vec<_>>().join(", ")
-        };
-        if from > 0 {
-            warnings.push(format!(
-                "the modes are those of the last part, from {:.4} s on, in which they are smallest; `course` has \
-                 both ends",
-                self.cut_s
-            ));
-        } else if !moving.is_empty() && !self.gone.is_empty() {
-            warnings.push(format!(
-                "the modes are those of the whole decays, errors widened: {} died away before the last part; \
-                 `course` has both ends of the others",
-                frequencies(&self.gone)
-            ));
-        }
-        warnings
+    /// One for each mode that moves; `whole`: the last part does not count.
+    pub fn warnings(&self, whole: bool) -> Vec<String> {
+        self.modes.iter().filter(|course| course.moves).map(|course| self.warning(course, whole)).collect()
     }
 
-    fn warning(&self, course: &ModeCourse) -> String {
+    fn warning(&self, course: &ModeCourse, whole: bool) -> String {
         let (before, after) = (course.first.damping_ratio(), course.last.damping_ratio());
+        let counts = if course.far && !whole { ", the last part counts" } else { "" };
         format!(
-            "a mode moves while it dies away: {:.7} Hz and a damping ratio of {:.4} % up to {:.4} s, {:.7} Hz and \
-             {:.4} % from there to {:.4} s ({:.1} and {:.1} standard errors): not linear",
-            course.first.frequency_hz.value,
-            100.0 * before.value,
-            self.cut_s,
-            course.last.frequency_hz.value,
-            100.0 * after.value,
-            self.end_s,
+            "mode {} moves while it dies away: {} Hz and a damping ratio of {} % up to {:.4} s, {} Hz and {} % from there \
+             on ({:.1} and {:.1} standard errors){counts}: not linear",
+            course.mode + 1,
+            digits(course.first.frequency_hz, 1.0),
+            digits(before, 100.0),
+            course.cut as f64 / self.sample_rate_hz,
+            digits(course.last.frequency_hz, 1.0),
+            digits(after, 100.0),
             course.frequency_z,
             course.damping_z
         )
     }
+}
+
+/// A value times a factor, to a tenth of its standard error.
+fn digits(estimate: Estimate, factor: f64) -> String {
+    let decimals = (1.0 - (factor * estimate.std).abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{:.decimals$}", factor * estimate.value)
 }
 
 /// What was fitted and is no mode.

@@ -78,17 +78,15 @@ pub(super) fn hit_table(fit: &ChannelRingdown) -> Table {
 }
 
 /// The hit with the largest first sample's ringing, as measured and as fitted, in every channel.
-pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>, from: usize) -> Array {
+pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
     let size = |hit: usize| {
         let own = fit.records.iter().filter(|record| record.event == hit);
         own.flat_map(|record| &record.residues).map(|residue| residue.norm_sqr()).sum::<f64>()
     };
     let hits = fit.records.iter().map(|record| record.event + 1).max().unwrap_or(0);
     let largest = (0..hits).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
-    // hits that end before the fitted part are not in the fit
-    let fitted_hits = decays.hits.iter().filter(|hit| hit.first().is_some_and(|row| row.len() > from));
-    let rows: Vec<&[f64]> =
-        fitted_hits.map(|hit| hit.iter().map(|row| &row[from..]).collect()).nth(largest).unwrap_or_default();
+    let hit = decays.hits.get(largest);
+    let rows: Vec<&[f64]> = hit.map(|hit| hit.iter().map(|row| &row[..]).collect()).unwrap_or_default();
     let samples = rows.first().map_or(0, |row| row.len());
     let measured: Vec<f64> = rows.iter().flat_map(|row| row.iter().copied()).collect();
     let own = fit.records.iter().filter(|record| record.event == largest);
@@ -102,7 +100,7 @@ pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>, from: usize)
             "time",
             "s",
             "time since the first free sample",
-            (from..from + samples).map(|k| k as f64 / decays.sample_rate_hz).collect(),
+            (0..samples).map(|k| k as f64 / decays.sample_rate_hz).collect(),
         ),
     ])
     .with("measured", unit, "free decay of the largest hit", over, measured)
@@ -161,7 +159,6 @@ pub(super) fn summary(
         "converged": fit.verdict.converged,
         "noise": fit.noise.iter().map(noise).collect::<Vec<Value>>(),
         "lack_of_fit": fit.lack_of_fit,
-        "fitted_from_s": followed.from as f64 / decays.sample_rate_hz,
         "course": parts.document(),
         "dropped": dropped_document(&followed.dropped),
         "tried": fit.seen.iter().map(|seen| json!({ "modes": seen.modes, "gain": seen.gain, "kept": seen.kept }))

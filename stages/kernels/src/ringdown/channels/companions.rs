@@ -128,6 +128,15 @@ impl ChannelRingdown {
 
     /// Takes over a mode of another fit of the same records.
     pub(super) fn take_over(&mut self, mode: usize, other: &Self, from: usize) {
+        self.take_pole(mode, other, from);
+        for (own, record) in self.records.iter_mut().zip(&other.records) {
+            own.residues[mode] = record.residues[from];
+            own.residue_covariance[mode] = record.residue_covariance[from];
+        }
+    }
+
+    /// Takes over pole and shape of a mode of another fit.
+    pub(super) fn take_pole(&mut self, mode: usize, other: &Self, from: usize) {
         self.poles[mode] = other.poles[from];
         self.shapes[mode] = other.shapes[from].clone();
         self.lack_of_fit[mode] = other.lack_of_fit[from];
@@ -139,10 +148,6 @@ impl ChannelRingdown {
         }
         for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             self.covariance[(2 * mode + a, 2 * mode + b)] = other.covariance[(2 * from + a, 2 * from + b)];
-        }
-        for (own, record) in self.records.iter_mut().zip(&other.records) {
-            own.residues[mode] = record.residues[from];
-            own.residue_covariance[mode] = record.residue_covariance[from];
         }
     }
 }

@@ -10,12 +10,16 @@ use super::options::{ChannelOptions, ModesWanted};
 use super::order::fit_channels;
 use super::result::ChannelRingdown;
 use crate::model::ModelError;
-use crate::ringdown::ModeEstimate;
+use crate::ringdown::{Estimate, ModeEstimate};
 use crate::statistics::chi_square_tail;
 
 /// A mode in the first and in the last part of the decays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModeCourse {
+    /// Number of the mode in the fit, from 0.
+    pub mode: usize,
+    /// Sample at which the first part ends and the last begins.
+    pub cut: usize,
     /// Its estimate in the first part.
     pub first: ModeEstimate,
     /// Its estimate in the last part.
@@ -28,37 +32,26 @@ pub struct ModeCourse {
     pub p_value: f64,
     /// Whether that is below [`MOVES`] over the number of modes.
     pub moves: bool,
-}
-
-/// What both parts say.
-#[derive(Debug, Clone)]
-pub struct Course {
-    /// Sample at which the first part ends and the last begins.
-    pub cut: usize,
-    /// Modes that both parts have, ascending.
-    pub modes: Vec<ModeCourse>,
-    /// Fit of the first part.
-    pub first: ChannelRingdown,
-    /// Fit of the last part.
-    pub last: ChannelRingdown,
+    /// Whether it has moved so far that one linear mode cannot stand for both parts: the fit then has its last part.
+    pub far: bool,
 }
 
 /// A fit of decays, its companions left out, and how its modes change.
 #[derive(Debug, Clone)]
 pub struct FollowedDecay {
-    /// Modes of all of the decays; of the last part where modes move and none has died away by then.
+    /// Modes of all of the decays; those that have moved far have the poles and shapes of their last part.
     pub fit: ChannelRingdown,
-    /// First sample that it counts.
-    pub from: usize,
+    /// The fit of all of the decays alone: what residues and residuals belong to.
+    pub whole: ChannelRingdown,
     /// Fitted exponentials that are no modes.
     pub dropped: Vec<DroppedMode>,
-    /// None where the decays are too short to be cut.
-    pub course: Option<Course>,
+    /// Modes that both of their parts have, ascending.
+    pub course: Vec<ModeCourse>,
 }
 
 /// Probability that any mode of a linear decay is said to move.
 pub const MOVES: f64 = 1e-3;
-/// Decay times of the strongest mode after which the last part begins.
+/// Decay times of a mode after which its last part begins.
 ///
 /// The error of the difference between the parts' frequencies is least there: with `u = 2 a t`, the information before
 /// is `(1 - e^-u) (1 - u^2 e^-u / (1 - e^-u)^2)` of all and after `e^-u`; the sum of inverses is least at u = 1.8.
@@ -66,6 +59,9 @@ pub const MOVES: f64 = 1e-3;
 const CUT: f64 = 0.9;
 /// Energy of a mode in a part, in variances of the noise, that a comparison needs: its damping is known to a fifth.
 const KNOWN: f64 = 50.0;
+/// Decay rates that share a cut, the largest over the smallest: at half or twice its best place the error is a tenth
+/// more.
+const ONE_CUT: f64 = 2.0;
 /// Phase in radian by which a linear mode may be wrong while the mode that it stands for dies away: a tenth, a shift of
 /// the frequency by a tenth of the half width; likewise of the damping.
 const FAR: f64 = 0.1;
@@ -79,9 +75,10 @@ const FAR: f64 = 0.1;
 /// # Method
 /// Exponentials in the line of a slower one, of its shape and at least twice as fast, are dropped ([`Dropped`]): their
 /// modes are fitted again without them, errors widened by what is then left round each line; of all other modes they
-/// stay nuisances; so do exponentials without a maximum in their response. All are fitted to the first and to the
-/// last part: for a linear system they are the same there (chi square of the difference of both poles at the level
-/// [`MOVES`] for all modes together). With one channel every shape is the same: there the line and the rate decide.
+/// stay nuisances; so do exponentials without a maximum in their response. Modes of like decay rate are fitted to the
+/// first and to the last part by themselves: for a linear system they are the same there (chi square of the difference of
+/// both poles at the level [`MOVES`] for all modes together). With one channel every shape is the same: there the line
+/// and the rate decide.
 /// # Shapes
 /// As [`fit_channels`]; `whole`: the fit is that of the whole even where modes move.
 /// # Units
@@ -134,14 +131,12 @@ pub fn follow_channels(
         }
         fit = left;
     }
-    let course = decays.course(&alone, &lines);
-    let late =
-        course.as_ref().filter(|course| !whole && course.matters() && course.last.poles.len() == fit.poles.len());
-    let (fit, from) = match late {
-        Some(course) => (course.last.clone(), course.cut),
-        None => (fit, 0),
-    };
-    Ok(FollowedDecay { fit, from, dropped, course })
+    let (course, late) = decays.courses(&alone, &lines);
+    let whole_fit = fit.clone();
+    for (mode, (last, number)) in course.iter().zip(&late).filter(|(mode, _)| mode.far && !whole) {
+        fit.take_pole(mode.mode, last, *number);
+    }
+    Ok(FollowedDecay { fit, whole: whole_fit, dropped, course })
 }
 
 struct Decays<'a> {
@@ -172,10 +167,38 @@ impl Decays<'_> {
         fit_channels(&events, self.free, self.interval_s, &options)
     }
 
-    /// Both parts, with those modes of the whole that each can tell of.
-    fn course(&self, fit: &ChannelRingdown, lines: &[c64]) -> Option<Course> {
+    /// The modes in both parts, and where the last is from: a fit and the mode's number in it.
+    fn courses(&self, fit: &ChannelRingdown, lines: &[c64]) -> (Vec<ModeCourse>, Vec<(ChannelRingdown, usize)>) {
+        let mut found: Vec<(ModeCourse, (ChannelRingdown, usize))> = Vec::new();
+        for group in groups(fit) {
+            let Some((cut, first, last)) = self.parts(fit, &group, lines) else { continue };
+            for (i, j) in pairs(&first, &last) {
+                let mode = nearest(&fit.poles, last.poles[j]).filter(|mode| group.contains(mode));
+                let known = found.iter().any(|(course, _)| Some(course.mode) == mode);
+                if let Some(mode) = mode.filter(|_| !known) {
+                    found.push((course(mode, cut, (&first, i), (&last, j)), (last.clone(), j)));
+                }
+            }
+        }
+        found.sort_by_key(|(course, _)| course.mode);
+        let count = found.len() as f64;
+        for (course, _) in &mut found {
+            course.moves = course.p_value * count < MOVES;
+            course.far &= course.moves;
+        }
+        found.into_iter().unzip()
+    }
+
+    /// The cut for a group of modes, and the fits before and behind it, each with those modes of the whole that it can
+    /// tell of.
+    fn parts(
+        &self,
+        fit: &ChannelRingdown,
+        group: &[usize],
+        lines: &[c64],
+    ) -> Option<(usize, ChannelRingdown, ChannelRingdown)> {
         let energy = energies(fit);
-        let strongest = (0..energy.len()).max_by(|&a, &b| energy[a].total_cmp(&energy[b]))?;
+        let strongest = *group.iter().max_by(|&&a, &&b| energy[a].total_cmp(&energy[b]))?;
         let longest = self.events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
         let cut = (CUT / (-fit.poles[strongest].re * self.interval_s)) as usize;
         let cut = cut.clamp(1, (longest / 2).max(1));
@@ -185,9 +208,7 @@ impl Decays<'_> {
             if poles.is_empty() { None } else { self.of_part(range, &start).ok() }
         };
         let (first, last) = (part(0..cut, &first)?, part(cut..longest, &last)?);
-        let (first, last) = (without_lines(&first, lines), without_lines(&last, lines));
-        let modes = courses(&first, &last);
-        Some(Course { cut, modes, first, last })
+        Some((cut, without_lines(&first, lines), without_lines(&last, lines)))
     }
 
     /// Poles whose mode has enough energy in a part.
@@ -214,47 +235,52 @@ fn nearest(poles: &[c64], to: c64) -> Option<usize> {
     (0..poles.len()).min_by(|&a, &b| (poles[a] - to).norm().total_cmp(&(poles[b] - to).norm()))
 }
 
-/// Modes that are each other's nearest in both parts.
-fn courses(first: &ChannelRingdown, last: &ChannelRingdown) -> Vec<ModeCourse> {
-    let pairs: Vec<(usize, usize)> = (0..last.poles.len())
-        .filter_map(|j| nearest(&first.poles, last.poles[j]).map(|i| (i, j)))
-        .filter(|&(i, j)| nearest(&last.poles, first.poles[i]) == Some(j))
-        .collect();
-    let (before, after) = (first.modes(), last.modes());
-    let course = |&(i, j): &(usize, usize)| {
-        let d = last.poles[j] - first.poles[i];
-        let sum =
-            |a: usize, b: usize| first.covariance[(2 * i + a, 2 * i + b)] + last.covariance[(2 * j + a, 2 * j + b)];
-        let (rr, ri, ii) = (sum(0, 0), sum(0, 1), sum(1, 1));
-        let square = (ii * d.re * d.re - 2.0 * ri * d.re * d.im + rr * d.im * d.im) / (rr * ii - ri * ri);
-        let p_value = if square.is_finite() { chi_square_tail(square.max(0.0), 2) } else { 1.0 };
-        let z = |a: crate::ringdown::Estimate, b: crate::ringdown::Estimate| (b.value - a.value) / a.std.hypot(b.std);
-        let (a, b) = (before[i], after[j]);
-        ModeCourse {
-            first: a,
-            last: b,
-            frequency_z: z(a.frequency_hz, b.frequency_hz),
-            damping_z: z(a.damping_ratio(), b.damping_ratio()),
-            p_value,
-            moves: p_value * (pairs.len() as f64) < MOVES,
+/// Modes of like decay rate, slowest first.
+fn groups(fit: &ChannelRingdown) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..fit.poles.len()).collect();
+    order.sort_by(|&a, &b| fit.poles[b].re.total_cmp(&fit.poles[a].re));
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for j in order {
+        match groups.last_mut() {
+            Some(group) if fit.poles[j].re > ONE_CUT * fit.poles[group[0]].re => group.push(j),
+            _ => groups.push(vec![j]),
         }
-    };
-    pairs.iter().map(course).collect()
+    }
+    groups
 }
 
-impl Course {
-    /// Whether a mode has moved so far that one linear mode cannot stand for both parts.
-    fn matters(&self) -> bool {
-        self.modes.iter().filter(|mode| mode.moves).any(|mode| {
-            let (early, late) = (mode.first.damping_ratio().value, mode.last.damping_ratio().value);
-            let shift = (mode.first.frequency_hz.value / mode.last.frequency_hz.value - 1.0).abs();
-            shift > FAR * late || (early / late - 1.0).abs() > FAR
-        })
-    }
+/// Modes that are each other's nearest in both parts.
+fn pairs(first: &ChannelRingdown, last: &ChannelRingdown) -> Vec<(usize, usize)> {
+    (0..last.poles.len())
+        .filter_map(|j| nearest(&first.poles, last.poles[j]).map(|i| (i, j)))
+        .filter(|&(i, j)| nearest(&last.poles, first.poles[i]) == Some(j))
+        .collect()
+}
 
-    /// Modes of the first part that the last one does not have.
-    pub fn gone(&self) -> Vec<ModeEstimate> {
-        let kept = |mode: &ModeEstimate| self.modes.iter().any(|course| course.first == *mode);
-        self.first.modes().into_iter().filter(|mode| !kept(mode)).collect()
+fn course(
+    mode: usize,
+    cut: usize,
+    (first, i): (&ChannelRingdown, usize),
+    (last, j): (&ChannelRingdown, usize),
+) -> ModeCourse {
+    let d = last.poles[j] - first.poles[i];
+    let sum = |a: usize, b: usize| first.covariance[(2 * i + a, 2 * i + b)] + last.covariance[(2 * j + a, 2 * j + b)];
+    let (rr, ri, ii) = (sum(0, 0), sum(0, 1), sum(1, 1));
+    let square = (ii * d.re * d.re - 2.0 * ri * d.re * d.im + rr * d.im * d.im) / (rr * ii - ri * ri);
+    let p_value = if square.is_finite() { chi_square_tail(square.max(0.0), 2) } else { 1.0 };
+    let z = |a: Estimate, b: Estimate| (b.value - a.value) / a.std.hypot(b.std);
+    let (a, b) = (first.modes()[i], last.modes()[j]);
+    let (early, late) = (a.damping_ratio().value, b.damping_ratio().value);
+    let shift = (a.frequency_hz.value / b.frequency_hz.value - 1.0).abs();
+    ModeCourse {
+        mode,
+        cut,
+        first: a,
+        last: b,
+        frequency_z: z(a.frequency_hz, b.frequency_hz),
+        damping_z: z(a.damping_ratio(), b.damping_ratio()),
+        p_value,
+        moves: false,
+        far: shift > FAR * late || (early / late - 1.0).abs() > FAR,
     }
 }

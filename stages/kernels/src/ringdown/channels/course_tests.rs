@@ -94,12 +94,12 @@ fn a_linear_decay_moves_no_more_often_than_the_level_says() {
             println!("seed {seed}, {channels}: {:?} {:?} {:?}", found.fit.modes(), found.dropped, found.fit.seen);
             wrong += 1;
         }
-        let course = found.course.unwrap();
-        if course.modes.iter().any(|mode| mode.moves) {
-            println!("seed {seed}, {channels} moves: {:?}", course.modes);
+        let course = &found.course;
+        if course.iter().any(|mode| mode.moves) {
+            println!("seed {seed}, {channels} moves: {course:?}");
             moved += 1;
         }
-        for mode in &course.modes {
+        for mode in course {
             square += mode.frequency_z.powi(2) + mode.damping_z.powi(2);
             count += 2.0;
         }
@@ -120,23 +120,23 @@ fn a_mode_that_moves_is_one_mode_with_two_ends() {
         let mover = Mode { frequency_hz: 120.0, damping: 0.003, amplitude: 1.0, shift: 0.003, more: 0.5 };
         let modes = [mover, linear(273.0, 0.004, 0.5)];
         let found = followed(&records(&modes, channels, noise, 500 + seed));
-        let course = found.course.clone().unwrap();
+        let course = &found.course;
         let right = found.fit.poles.len() == 2 && (found.fit.modes()[0].frequency_hz.value / 120.0 - 1.0).abs() < 0.004;
         if !right {
             println!(
                 "seed {seed}, {channels}, {noise}: {:?}\n   {:?}\n {:?}\n {:?}",
                 found.fit.modes(),
                 found.dropped,
-                course.modes,
+                course,
                 found.fit.seen
             );
             wrong += 1;
         }
-        let Some(first) = course.modes.first() else { continue };
-        moved += usize::from(first.moves && !course.modes.iter().skip(1).any(|mode| mode.moves));
+        let Some(first) = course.first() else { continue };
+        moved += usize::from(first.moves && !course.iter().skip(1).any(|mode| mode.moves));
         // truth of a part: slopes of phase and logarithm of the amplitude, weighted with the energy
         let path = course_of(&mover);
-        for (range, mode) in [(0..course.cut, first.first), (course.cut..SAMPLES, first.last)] {
+        for (range, mode) in [(0..first.cut, first.first), (first.cut..SAMPLES, first.last)] {
             let (turn, rate) = slopes(&path[range.clone()]);
             let (f, damping) = (turn.hypot(rate) / TAU, -rate / turn.hypot(rate));
             let z = [

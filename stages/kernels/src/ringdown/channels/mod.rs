@@ -26,7 +26,7 @@ mod shape;
 mod tests;
 
 pub use companions::{Dropped, DroppedMode};
-pub use course::{Course, FollowedDecay, MOVES, ModeCourse, follow_channels};
+pub use course::{FollowedDecay, MOVES, ModeCourse, follow_channels};
 pub use options::{ChannelNoise, ChannelOptions, ModesWanted};
 pub use order::fit_channels;
 pub use result::{ChannelRingdown, OrderTried, RecordFit};
