@@ -3,6 +3,7 @@
 
 Run it with an interpreter that has h5py and numpy: .tools/bin/python fuzz/seeds.py after `make test-deps`. Every file is made here, none is measured.
 """
+import gzip
 import io
 import json
 import struct
@@ -459,6 +460,22 @@ def plugins():
     write("plugin_lines", "claims-much", lines(shake, {"id": 1, "result": description}, {"id": 2, "result": claims}))
 
 
+# frequency responses
+def responses():
+    rows = [(0.5 * k, 3.0 - k, 2.0 / k) for k in range(1, 9)]
+    lines = "".join(f"{f:e}\t{a:e}\t{b:e}\n" for f, a, b in rows)
+    write("responses", "signal-calc.txt", "Frequency\t Real\t Imaginary\n\nUnits:\nHz\t(m)(N)\t \n" + lines)
+    write("responses", "packed.txt.gz", gzip.compress(lines.encode(), mtime=0))
+    write("responses", "amplitude.csv", "Frequency (Hz),Mag (dB),Phase (deg),Coherence\n" + "".join(f"{f},{a},{b},0.5\n" for f, a, b in rows))
+    text = "    -1\n    58\nan FRF\nNONE\nNONE\nNONE\nNONE\n"
+    text += f"{4:5}{0:10}{0:5}{0:10} {'NONE':10}{3:10}{-3:4} {'NONE':10}{12:10}{1:4}\n"
+    text += f"{5:10}{8:10}{1:10}{0.5:13.5E}{0.5:13.5E}{0.0:13.5E}\n"
+    axis = lambda quantity, unit: f"{quantity:10}{0:5}{0:5}{0:5} {'NONE':20} {unit:20}\n"
+    text += axis(18, "Hz") + axis(8, "m") + axis(13, "N") + axis(0, "NONE")
+    text += "".join(f"{a:13.5E}{b:13.5E}\n" for _, a, b in rows)
+    write("responses", "complex.uff", text + "    -1\n")
+
+
 # what inspect is given: one of each
 def inspected():
     for target, name in [("tdms", "little.tdms"), ("npz", "deflated.npz"), ("mat", "level7-little.mat"), ("jpk", "deflated.jpk-force"), ("text", "comma.csv"), ("text", "one.lvm"), ("uff", "text.uff"), ("ibw", "version5-little.ibw"), ("nanoscope", "two-bytes.000"), ("wav", "pcm.wav"), ("lecroy", "little.trc"), ("keysight", "rigol.bin"), ("isf", "short.isf"), ("foreign_hdf5", "plain.h5")]:
@@ -467,5 +484,5 @@ def inspected():
     write("inspect", "decay.csv", "time [s],y [V]\n" + "".join(f"{i * 1e-5:.5f},{value}\n" for i, value in enumerate(decay)))
 
 
-for make in (tdms, arrays, mat, ibw, nanoscope, jpk, uff, text, scope_tables, wav, scopes, raw, foreign, configs, plugins, inspected):
+for make in (tdms, arrays, mat, ibw, nanoscope, jpk, uff, text, scope_tables, wav, scopes, raw, foreign, configs, plugins, responses, inspected):
     make()

@@ -9,7 +9,8 @@ use std::sync::LazyLock;
 use afmid::doors;
 use afmid_pipeline::outcome::PortSpec;
 use afmid_pipeline::recording::{
-    Contents, How, RawBinary, Reading, Source, Wanted, formats, open_contents, open_native, open_records,
+    Contents, How, Parts, RawBinary, Reading, Source, Wanted, formats, open_contents, open_native, open_records,
+    read_responses,
 };
 use afmid_pipeline::store::StageIdentity;
 use afmid_pipeline::{InputFiles, Registry, Shape, plugin};
@@ -36,6 +37,7 @@ pub const ENTRANCES: &[Entrance] = &[
     Entrance { name: "keysight", enter: |bytes| reader("keysight", bytes) },
     Entrance { name: "isf", enter: |bytes| reader("isf", bytes) },
     Entrance { name: "text", enter: |bytes| reader("text", bytes) },
+    Entrance { name: "responses", enter: responses },
     Entrance { name: "raw_binary", enter: raw_binary },
     Entrance { name: "native_record", enter: native_record },
     Entrance { name: "foreign_hdf5", enter: foreign_hdf5 },
@@ -95,6 +97,24 @@ fn reader(format: &str, bytes: &[u8]) {
     if let Some(contents) = opened(known.open(&path)) {
         assert!(recognised || !contents.format.is_empty(), "{format}: a format without a name");
         read_all(&contents);
+    }
+}
+
+/// Frequency responses of whatever the bytes are, packed or not: as many values as frequencies.
+fn responses(bytes: &[u8]) {
+    let head = &bytes[..bytes.len().min(4096)];
+    let names = ["input.txt.gz", "input.uff", "input.mat", "input.csv"];
+    let knows = |name: &&&str| formats().iter().any(|known| known.recognises(head, Path::new(name)));
+    let packed = bytes.starts_with(b"\x1f\x8b");
+    let name = names.iter().find(knows).filter(|_| !packed).unwrap_or(&names[0]);
+    for parts in [None, Some(Parts::RealImaginary)] {
+        match read_responses(&InputFiles::new(), &file(name, bytes), &Reading::of("auto", None), parts) {
+            Ok(found) => found.iter().for_each(|response| {
+                assert!(response.frequency_hz.is_sorted(), "frequencies that do not ascend");
+                assert_eq!(response.values.len(), response.frequency_hz.len(), "other values than frequencies");
+            }),
+            Err(error) => assert!(!error.to_string().is_empty(), "refused without a reason"),
+        }
     }
 }
 

@@ -428,7 +428,13 @@ mod tests {
 
     /// Location, rate and whether it is an axis.
     fn settled(channels: Vec<FoundChannel>) -> Vec<(String, Option<f64>, bool)> {
-        let mut contents = Contents { format: String::new(), started_at: String::new(), channels, remarks: Vec::new() };
+        let mut contents = Contents {
+            format: String::new(),
+            started_at: String::new(),
+            channels,
+            responses: Vec::new(),
+            remarks: Vec::new(),
+        };
         settle(&mut contents);
         contents.channels.into_iter().map(|c| (c.location, c.sample_rate_hz, c.is_axis)).collect()
     }

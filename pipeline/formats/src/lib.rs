@@ -31,6 +31,7 @@ mod raw;
 pub mod raw_binary;
 mod registry;
 mod regular;
+mod responses;
 pub mod tdms;
 pub mod tektronix;
 mod text;
@@ -51,6 +52,7 @@ pub use raw::Raw;
 pub use raw_binary::{RawBinary, SampleType};
 pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};
 pub use regular::{open_regular, read_regular};
+pub use responses::{Degree, FoundResponse, Frequencies, Parts, hertz, responses, unit_ratio};
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
 ///
@@ -136,6 +138,8 @@ pub struct Contents {
     pub started_at: String,
     /// Its channels of numbers, in the file's order.
     pub channels: Vec<FoundChannel>,
+    /// Its frequency responses that are stored as complex numbers, in the file's order.
+    pub responses: Vec<FoundResponse>,
     /// Whatever a user should know: parts that are no channel of numbers and why, missing metadata, a truncated end.
     pub remarks: Vec<String>,
 }

@@ -4,7 +4,7 @@ use crate::grid::{Grid, Store};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::rate::{Clue, rate_in};
-use crate::{Contents, FoundChannel};
+use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
@@ -55,6 +55,7 @@ pub(crate) struct Listing {
     /// Each location with the number of times it was wanted.
     locations: HashMap<String, usize>,
     clues: HashMap<String, Vec<Clue>>,
+    responses: Vec<FoundResponse>,
     remarks: Vec<String>,
     unsaid: usize,
     bytes: usize,
@@ -114,6 +115,45 @@ impl Listing {
                 big_endian: array.big_endian,
             };
             self.channel(array, &index, grid);
+        }
+    }
+
+    /// An array of complex numbers whose imaginary parts begin at byte `imaginary` of the same store. Its bytes must have
+    /// been found to lie within the file.
+    pub(crate) fn complex(&mut self, array: &Array, imaginary: u64) {
+        let Some(lanes) = Lanes::of(&array.shape, array.first_axis_fastest).filter(|lanes| lanes.samples > 1) else {
+            return;
+        };
+        let bytes = lanes.count().saturating_mul(2 * (DESCRIPTION_BYTES + 4 * array.location.len()));
+        if bytes > MOST_BYTES.saturating_sub(self.bytes) {
+            return self.remark(format!("{} is left out: its responses are too many to list", array.location));
+        }
+        self.bytes += bytes;
+        for (index, first) in lanes.each(array.base) {
+            let location = format!("{}{index}", array.location);
+            let values = [array.first, imaginary].map(|from| {
+                let grid = Grid {
+                    store: array.store.clone(),
+                    first: from + first * array.item_bytes,
+                    step: lanes.step * array.item_bytes,
+                    samples: lanes.samples,
+                    number: array.number,
+                    big_endian: array.big_endian,
+                };
+                FoundChannel::new(location.clone(), lanes.samples, grid.number.name(), Arc::new(grid))
+            });
+            self.responses.push(FoundResponse {
+                location,
+                frequencies: Frequencies::Beside,
+                frequency_unit: String::new(),
+                values,
+                parts: Parts::RealImaginary,
+                guessed: false,
+                coherence: None,
+                unit: String::new(),
+                output: None,
+                input: None,
+            });
         }
     }
 
@@ -177,6 +217,6 @@ impl Listing {
             self.remarks.push(format!("{} more remarks of this kind", self.unsaid));
         }
         let channels = self.channels.into_iter().map(|(_, channel)| channel).collect();
-        Contents { format, started_at: String::new(), channels, remarks: self.remarks }
+        Contents { format, started_at: String::new(), channels, responses: self.responses, remarks: self.remarks }
     }
 }

@@ -6,11 +6,13 @@ mod contents;
 mod errors;
 mod foreign_hdf5;
 mod how;
+mod inflated;
 mod input_files;
 mod lazy_source;
 mod native;
 mod open;
 mod opened_files;
+mod responses;
 mod series;
 mod source;
 mod stretches;
@@ -35,10 +37,13 @@ pub use native::{Wanted, open_native};
 pub use series::{read_number_attribute, read_series};
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native, write_native_in};
 
-pub use afmid_formats::{Contents, FormatError, FoundChannel, Raw, RawBinary, Source, formats, most_inflated};
+pub use afmid_formats::{
+    Contents, Degree, FormatError, FoundChannel, Parts, Raw, RawBinary, Source, formats, most_inflated, unit_ratio,
+};
 pub use contents::open_contents;
 pub use how::{How, Reading};
 pub use open::{Opened, agreed_rate, open_records, recognised};
+pub use responses::{FileResponse, read_responses};
 pub use whole::WholeFile;
 
 use crate::error::StageError;

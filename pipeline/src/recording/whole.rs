@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::contents::format_of;
+use super::contents::{format_of, open_contents};
 use super::how::Reading;
+use super::inflated::Inflated;
 use super::input_files::{HashedFile, InputFiles};
 use super::opened_files::contents;
 use super::{Contents, FoundChannel, most_inflated};
@@ -15,16 +16,22 @@ use crate::error::StageError;
 pub struct WholeFile {
     hashed: HashedFile,
     contents: Arc<Contents>,
+    /// What a packed file holds, as long as its channels may be read.
+    _inflated: Option<Inflated>,
 }
 
 impl WholeFile {
-    /// Opens it. Errors: as [`super::open_contents`].
+    /// Opens it, also packed with gzip. Errors: as [`super::open_contents`]; it cannot be unpacked.
     pub fn open(files: &InputFiles, path: &Path, reading: &Reading) -> Result<Self, StageError> {
         reading.check()?;
         let hashed = files.hashed(path)?;
+        if let Some(inflated) = Inflated::of(path)? {
+            let (_, contents) = open_contents(files, inflated.path(), reading).map_err(|error| error.at(path))?;
+            return Ok(Self { hashed, contents: Arc::new(contents), _inflated: Some(inflated) });
+        }
         let reading = Reading { format: format_of(files, path, reading)?.to_owned(), raw: reading.raw.clone() };
         let contents = contents(files, path, hashed.state(), &reading)?;
-        Ok(Self { hashed, contents })
+        Ok(Self { hashed, contents, _inflated: None })
     }
 
     /// What it holds.

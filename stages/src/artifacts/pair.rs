@@ -63,6 +63,11 @@ impl<'a> Pair<'a> {
         self.array.real(&set.of(STANDARD_ERROR))
     }
 
+    /// Whether the output's standard error is known.
+    pub fn has_standard_error(&self, set: DataSet) -> bool {
+        self.array.variable(&set.of(STANDARD_ERROR)).is_ok()
+    }
+
     /// Units of force and response.
     pub fn units(&self) -> Result<[&'a str; 2], StageError> {
         Ok([&self.array.variable(FORCE)?.unit, &self.array.variable(RESPONSE)?.unit])

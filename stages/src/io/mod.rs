@@ -7,6 +7,7 @@ mod code_census;
 pub mod columns;
 mod consistency;
 mod file_patterns;
+pub mod frf;
 mod memory;
 mod natural_order;
 mod overview;
@@ -22,6 +23,8 @@ pub use code_census::{CensusSettings, ChannelCensus, Found};
 pub use columns::Columns;
 pub use consistency::{Consistency, check_consistency};
 pub use file_patterns::{Match, matching_files};
+pub(crate) use frf::FRF;
+pub use frf::Frf;
 pub use memory::{MemorySource, memory_channel, memory_record};
 pub use natural_order::natural_order;
 pub use overview::Overview;
@@ -34,6 +37,7 @@ pub use stretch_extremes::StretchExtremes;
 pub const STAGES: &[Entry] = &[
     Entry::of::<Records>(),
     Entry::of::<Columns>(),
+    Entry::of::<Frf>(),
     Entry::of::<Spectrum>(),
     Entry::of::<Census>(),
     Entry::of::<Overview>(),

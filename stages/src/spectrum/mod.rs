@@ -4,6 +4,8 @@ mod etfe;
 mod example;
 mod frf;
 mod frf_example;
+mod measured_example;
+mod measured_frf;
 mod periodogram;
 mod smoothing;
 mod thermal;
@@ -13,8 +15,11 @@ mod window;
 
 #[cfg(test)]
 mod chain_tests;
+#[cfg(test)]
+mod columns_tests;
 pub use etfe::Etfe;
 pub use frf::Frf;
+pub use measured_frf::{BlocksAre, EstimatorIs, MeasuredFrf};
 pub use periodogram::Periodogram;
 pub use smoothing::{Smoothing, SmoothingMethod};
 pub use thermal::{SpectrumWindow, Thermal};
@@ -29,6 +34,7 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<Periodogram>(),
     Entry::of::<Etfe>(),
     Entry::of::<Frf>(),
+    Entry::of::<MeasuredFrf>(),
     Entry::of::<Smoothing>(),
     Entry::of::<Thermal>(),
     Entry::of::<Welch>(),

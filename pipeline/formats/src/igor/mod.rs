@@ -70,6 +70,7 @@ impl Format for IgorWave {
             format: format!("Igor binary wave {}, {}", header.version, header.order.name()),
             started_at: started_at(&header, &note, &mut remarks),
             channels,
+            responses: Vec::new(),
             remarks,
         })
     }

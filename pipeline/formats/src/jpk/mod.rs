@@ -77,7 +77,13 @@ impl Format for JpkForce {
             segment::channels(&mut archive, segment, &properties, &mut channels, &mut remarks)?;
         }
         let version = general.get("file-format-version").or_else(|| shared.get("file-format-version"));
-        Ok(Contents { format: format_name(version, curves, &shared), started_at, channels, remarks })
+        Ok(Contents {
+            format: format_name(version, curves, &shared),
+            started_at,
+            channels,
+            responses: Vec::new(),
+            remarks,
+        })
     }
 }
 

@@ -64,7 +64,13 @@ impl Format for Keysight {
         let version = String::from_utf8_lossy(head.get(2..4).unwrap_or_default()).into_owned();
         let started_at = waveforms.iter().find_map(|w| w.started_at.clone()).unwrap_or_default();
         let channels = channels::of(&file, waveforms, &mut remarks);
-        Ok(Contents { format: format!("{maker} binary waveform, version {version}"), started_at, channels, remarks })
+        Ok(Contents {
+            format: format!("{maker} binary waveform, version {version}"),
+            started_at,
+            channels,
+            responses: Vec::new(),
+            remarks,
+        })
     }
 }
 

@@ -64,7 +64,13 @@ impl Format for LeCroy {
         };
         let order = if about.big_endian { "big" } else { "little" };
         let format = format!("LeCroy waveform, template {}, {order}-endian", about.template);
-        Ok(Contents { format, started_at: about.started_at.clone(), channels: vec![channel], remarks })
+        Ok(Contents {
+            format,
+            started_at: about.started_at.clone(),
+            channels: vec![channel],
+            responses: Vec::new(),
+            remarks,
+        })
     }
 }
 

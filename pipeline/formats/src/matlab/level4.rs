@@ -153,7 +153,10 @@ fn variable(listing: &mut Listing, stream: &mut Stream, pinned: &Pinned, header:
     match (header.kind, parts) {
         (1, _) => texts(listing, stream, &array, pinned.bytes(), data)?,
         (2, _) => listing.remark(format!("/{name} is a sparse matrix, no channel")),
-        (_, 2) => listing.remark(format!("/{name} is complex, no channel: real and imaginary part would be two")),
+        (_, 2) => {
+            listing.remark(format!("/{name} is complex, no channel: real and imaginary part would be two"));
+            listing.complex(&array, first + data / 2);
+        }
         _ if rows * columns == 1 => {
             let bytes = stream.bytes(data, pinned.bytes(), "a number")?;
             let value = number.decode(&bytes, header.big_endian).widened().first().copied().unwrap_or_default();

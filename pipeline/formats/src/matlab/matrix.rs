@@ -7,6 +7,7 @@ use crate::FormatError;
 use crate::fail;
 use crate::grid::Store;
 use crate::listing::{Array, Listing};
+use crate::number::Number;
 
 /// MATLAB's limit is 63; anything beyond this is damage.
 const MOST_NAME_BYTES: u64 = 256;
@@ -125,11 +126,49 @@ impl Walk<'_> {
     }
 
     fn numbers(&mut self, head: &Head, place: &Place, class: &str) -> Result<(), FormatError> {
+        let (tag, number) = self.numbers_tag(head, place)?;
+        let big_endian = self.elements.big_endian;
+        let array = |first: u64, number: Number, long_name: String| Array {
+            location: place.location.clone(),
+            scope: place.scope.clone(),
+            long_name,
+            shape: head.shape.clone(),
+            first_axis_fastest: true,
+            base: 1,
+            store: self.store.clone(),
+            first,
+            item_bytes: number.bytes(),
+            number,
+            big_endian,
+        };
         if head.flags & COMPLEX != 0 {
             let location = &place.location;
+            let real = array(tag.data_at, number, location.clone());
+            self.elements.go_on(tag.next_at, head.end)?;
+            let (imaginary, second) = self.numbers_tag(head, place)?;
             self.listing.remark(format!("{location} is complex, no channel: real and imaginary part would be two"));
+            // parts of two types are left out: nobody writes them for what was measured
+            if second == number {
+                self.listing.complex(&real, imaginary.data_at);
+            }
             return Ok(());
         }
+        if head.count == 1 {
+            let bytes = self.elements.stream.bytes(tag.bytes, head.end, "a number")?;
+            let value = number.decode(&bytes, big_endian).widened().first().copied().unwrap_or_default();
+            self.listing.scalar(&place.scope, &place.name, &place.location, value);
+            return Ok(());
+        }
+        let logical = if head.flags & LOGICAL != 0 { "logical " } else { "" };
+        let global = if head.flags & GLOBAL != 0 { "global " } else { "" };
+        let sizes: Vec<String> = head.shape.iter().map(usize::to_string).collect();
+        let long_name = format!("{} ({global}{logical}{class} {})", place.location, sizes.join("x"));
+        self.listing.array(&array(tag.data_at, number, long_name));
+        Ok(())
+    }
+
+    /// The tag of as many numbers as an array has, and their type.
+    fn numbers_tag(&mut self, head: &Head, place: &Place) -> Result<(Tag, Number), FormatError> {
         let tag = self.elements.tag(head.end, "the numbers of an array")?;
         let Some(number) = class::number(tag.kind) else {
             let problem = format!("the numbers of {} have type {}, which is none of numbers", place.location, tag.kind);
@@ -140,30 +179,7 @@ impl Walk<'_> {
             let problem = format!("{location} has {count} numbers of {} bytes, in {bytes} bytes", number.bytes());
             return Err(self.elements.stream.error(tag.at, problem, fail::COPY_AGAIN));
         }
-        let big_endian = self.elements.big_endian;
-        if head.count == 1 {
-            let bytes = self.elements.stream.bytes(tag.bytes, head.end, "a number")?;
-            let value = number.decode(&bytes, big_endian).widened().first().copied().unwrap_or_default();
-            self.listing.scalar(&place.scope, &place.name, &place.location, value);
-            return Ok(());
-        }
-        let logical = if head.flags & LOGICAL != 0 { "logical " } else { "" };
-        let global = if head.flags & GLOBAL != 0 { "global " } else { "" };
-        let sizes: Vec<String> = head.shape.iter().map(usize::to_string).collect();
-        self.listing.array(&Array {
-            location: place.location.clone(),
-            scope: place.scope.clone(),
-            long_name: format!("{} ({global}{logical}{class} {})", place.location, sizes.join("x")),
-            shape: head.shape.clone(),
-            first_axis_fastest: true,
-            base: 1,
-            store: self.store.clone(),
-            first: tag.data_at,
-            item_bytes: number.bytes(),
-            number,
-            big_endian,
-        });
-        Ok(())
+        Ok((tag, number))
     }
 
     fn text(&mut self, head: &Head, place: &Place) -> Result<(), FormatError> {

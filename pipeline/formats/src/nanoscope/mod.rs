@@ -59,6 +59,7 @@ impl Format for Nanoscope {
             format: format!("Bruker Nanoscope {}, force curve", header.version()),
             started_at: header.date(&mut remarks),
             channels,
+            responses: Vec::new(),
             remarks,
         })
     }

@@ -107,7 +107,7 @@ impl RawBinary {
         let channels = grids.into_iter().enumerate().map(|(number, grid)| self.channel(number, grid)).collect();
         let order = if self.big_endian { "big" } else { "little" };
         let format = format!("raw binary, {}, {order}-endian", self.number().name());
-        Ok(Contents { format, started_at: String::new(), channels, remarks })
+        Ok(Contents { format, started_at: String::new(), channels, responses: Vec::new(), remarks })
     }
 
     /// The values alone, before any file is opened. Errors: one is out of its range.

@@ -54,7 +54,13 @@ pub(super) fn contents(recorded: Recorded, pinned: &Pinned) -> Contents {
     }
     let number = if version == 4712 { "1.0" } else { "2.0" };
     let order = if order == Order::Little { "little-endian" } else { "big-endian" };
-    Contents { format: format!("NI TDMS {number} ({version}), {order}"), started_at, channels, remarks }
+    Contents {
+        format: format!("NI TDMS {number} ({version}), {order}"),
+        started_at,
+        channels,
+        responses: Vec::new(),
+        remarks,
+    }
 }
 
 fn channel(

@@ -77,7 +77,13 @@ impl Format for TektronixIsf {
             ..FoundChannel::new(format!("/{}{end}", preamble.source()), samples, stored_as, source)
         };
         let channels = ends.iter().zip(sources).map(channel).collect();
-        Ok(Contents { format: "Tektronix waveform (ISF)".to_owned(), started_at: String::new(), channels, remarks })
+        Ok(Contents {
+            format: "Tektronix waveform (ISF)".to_owned(),
+            started_at: String::new(),
+            channels,
+            responses: Vec::new(),
+            remarks,
+        })
     }
 }
 

@@ -118,6 +118,13 @@ fn clock(
         }
         return Clock { rate_hz, axis: Some(at) };
     }
+    if let (Some(title), Some(column)) = (titles.first(), rows.columns.first())
+        && titles::is_frequency(title)
+        && rows.columns.len() > 1
+        && column.values.is_sorted()
+    {
+        return Clock { rate_hz: None, axis: Some(0) };
+    }
     let without_unit = titles.first().is_some_and(|title| title.unit.is_empty());
     let counter = rows.columns.first().filter(|_| rows.columns.len() > 1 && without_unit);
     let even = counter.and_then(|column| axis::even_between(column, &rows.starts, None).ok());

@@ -9,7 +9,9 @@ use super::titles::{self, Title};
 /// Titles and units from the header's lines.
 pub(super) fn titles(lines: &[&str], sniffed: &Sniffed) -> Vec<Title> {
     // A line that says something of the whole table has no titles, wherever it stands.
-    let candidates = lines.iter().rev().filter(|l| !l.trim().is_empty() && !is_key(first_field(l, sniffed)));
+    let said = || lines.iter().rev().filter(|l| !l.trim().is_empty());
+    let above_units = said().nth(1).is_some_and(|line| announces_units(line));
+    let candidates = said().filter(|l| !announces_units(l) && !is_key(first_field(l, sniffed)));
     let fitting = |line: &&str| fields(uncommented(line), sniffed).filter(|f| f.iter().any(|f| !f.trim().is_empty()));
     let mut rows = candidates.map_while(fitting);
     let Some(mut lowest) = rows.next() else { return vec![Title::default(); sniffed.kinds.len()] };
@@ -19,7 +21,7 @@ pub(super) fn titles(lines: &[&str], sniffed: &Sniffed) -> Vec<Title> {
             field.clear();
         }
     }
-    let units_only = titles::are_units(&lowest);
+    let units_only = above_units || titles::are_units(&lowest);
     let names = rows.next().filter(|_| units_only);
     let title = |(column, field): (usize, &String)| {
         let name = names.as_ref().map(|names| names.get(column).map_or("", |name| number::bare(name)));
@@ -44,6 +46,11 @@ pub(super) fn cells<'a>(line: &'a str, sniffed: &Sniffed) -> Vec<&'a str> {
     let line = uncommented(line);
     // Blanks set words apart, too: a line of them is one field.
     if sniffed.dialect.delimiter == ' ' { line.split('\t').collect() } else { sniffed.dialect.fields(line) }
+}
+
+/// Whether a line says that the next one has the units (SignalCalc: `Units:`).
+fn announces_units(line: &str) -> bool {
+    line.trim().trim_end_matches(':').eq_ignore_ascii_case("units")
 }
 
 fn uncommented(line: &str) -> &str {

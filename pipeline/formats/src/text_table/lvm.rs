@@ -64,6 +64,7 @@ pub(super) fn open(lines: &mut Lines) -> Result<Contents, FormatError> {
         format,
         started_at: started_at.unwrap_or_default(),
         channels: joined.channels(&mut remarks),
+        responses: Vec::new(),
         remarks,
     })
 }

@@ -49,7 +49,7 @@ pub(super) fn open(lines: &mut Lines) -> Result<Contents, FormatError> {
     let count = sniffed.kinds.len();
     let format = format!("table of text, {count} columns set apart by {delimiter}, decimal «{decimal}»");
     let channels = channels::of(table.finish(), titles, &mut remarks);
-    Ok(Contents { format, started_at: String::new(), channels, remarks })
+    Ok(Contents { format, started_at: String::new(), channels, responses: Vec::new(), remarks })
 }
 
 /// What all rows hold.

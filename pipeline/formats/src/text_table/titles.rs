@@ -57,6 +57,11 @@ pub(super) fn are_units(fields: &[String]) -> bool {
 
 /// The unit that a field of such a row names; empty for words that stand for none.
 pub(super) fn unit_of(field: &str) -> String {
+    // `(m/s²)(N)`: the units of output and input of a frequency response
+    let whole = bare(field).trim();
+    if let Some((over, under)) = whole.strip_prefix('(').and_then(|t| t.strip_suffix(')')?.split_once(")(")) {
+        return crate::unit_ratio(over, under);
+    }
     let text = bare(field).trim_matches(['(', ')', '[', ']']).trim();
     if NO_UNIT.contains(&text.to_lowercase().as_str()) {
         return String::new();
@@ -70,6 +75,12 @@ pub(super) fn is_time(title: &Title) -> bool {
     let words =
         ["time", "t", "zeit", "temps", "elapsed time", "x_value", "timestamp", "relative time", "second", "seconds"];
     words.contains(&name.as_str()) || (name.starts_with("time") && units::seconds(&title.unit).is_some())
+}
+
+/// Whether a title is that of frequency.
+pub(super) fn is_frequency(title: &Title) -> bool {
+    let named = ["frequency", "freq", "frequenz"].contains(&title.name.trim().to_lowercase().as_str());
+    named || units::hertz(&title.unit).is_some()
 }
 
 /// Locations: the title, `column_3` without one, `Title[2]` for the second of a title.

@@ -6,7 +6,7 @@ use super::scan::{Data, Dataset, Scanned};
 use crate::grid::{Grid, Store};
 use crate::number::Number;
 use crate::pinned::Pinned;
-use crate::{Contents, FoundChannel, Source};
+use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts, Source, unit_ratio};
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
@@ -15,7 +15,7 @@ pub(super) fn contents(scanned: Scanned, pinned: &Pinned) -> Contents {
     let Scanned { datasets, others, mut remarks } = scanned;
     let started_at = datasets.iter().find_map(|d| d.header.started_at.clone()).unwrap_or_default();
     let (mut text, mut binary) = (false, false);
-    let mut channels = Vec::new();
+    let (mut channels, mut responses) = (Vec::new(), Vec::new());
     let mut seen: HashMap<String, usize> = HashMap::new();
     for (number, dataset) in datasets.iter().enumerate() {
         match dataset.data {
@@ -25,6 +25,13 @@ pub(super) fn contents(scanned: Scanned, pinned: &Pinned) -> Contents {
         let name = dataset.header.response.clone();
         let times = seen.entry(name.clone()).and_modify(|n| *n += 1).or_insert(1);
         let location = if *times == 1 { name } else { format!("{name}[{times}]") };
+        if dataset.header.complex && dataset.header.is_response() {
+            match response(dataset, &location, pinned) {
+                Ok(found) => responses.push(found),
+                Err(why) => remarks.push(format!("the frequency response {location} is left out: {why}")),
+            }
+            continue;
+        }
         match function(dataset, &location, pinned, &mut remarks) {
             Ok(found) => channels.extend(found),
             Err(why) => {
@@ -36,12 +43,16 @@ pub(super) fn contents(scanned: Scanned, pinned: &Pinned) -> Contents {
     for (dataset, count) in others {
         remarks.push(format!("{count} datasets {dataset} are left out: only 58 and 58b hold samples"));
     }
+    if !responses.is_empty() {
+        let count = responses.len();
+        remarks.push(format!("{count} frequency responses are no recordings: the stage `io.frf` reads them"));
+    }
     let kinds = match (text, binary) {
         (true, true) => "datasets 58 and 58b",
         (false, true) => "dataset 58b",
         _ => "dataset 58",
     };
-    Contents { format: format!("Universal File Format, {kinds}"), started_at, channels, remarks }
+    Contents { format: format!("Universal File Format, {kinds}"), started_at, channels, responses, remarks }
 }
 
 /// The channels of a dataset: its ordinate and, if uneven, its abscissa. Errors: why there is none.
@@ -58,31 +69,20 @@ fn function(
     if header.points == 0 {
         return Err("it has no values".to_owned());
     }
-    let (ordinate, abscissa) = sources(dataset, pinned)?;
+    let (mut ordinates, abscissa) = sources(dataset, pinned)?;
+    let ordinate = ordinates.pop().ok_or("it has no values")?;
     let rate = rate(header, location, remarks);
     let mut long_name = header.identification.join(", ");
     if long_name.is_empty() {
         header.ordinate.label.clone_into(&mut long_name);
     }
     let channel = |location: String, unit: &str, long_name: String, rate, stored_as, source| FoundChannel {
-        location,
-        samples: header.points as usize,
         unit: unit.to_owned(),
         long_name,
         sample_rate_hz: rate,
-        scale_factor: 1.0,
-        add_offset: 0.0,
-        fill_code: None,
-        gaps: Vec::new(),
-        is_axis: false,
-        stored_as,
-        source,
+        ..FoundChannel::new(location, header.points as usize, stored_as, source)
     };
-    let stored_as = match (dataset.data, header.double) {
-        (Data::Text, _) => "text",
-        (_, true) => "float64",
-        (_, false) => "float32",
-    };
+    let stored_as = stored_as(dataset);
     let name = format!("{long_name} ({})", header.function_name());
     let mut channels = vec![channel(location.to_owned(), &header.ordinate.unit, name, rate, stored_as, ordinate)];
     if let Some((source, stored_as)) = abscissa {
@@ -91,6 +91,43 @@ fn function(
         channels.push(FoundChannel { is_axis: true, ..abscissa });
     }
     Ok(channels)
+}
+
+fn stored_as(dataset: &Dataset) -> &'static str {
+    match (dataset.data, dataset.header.double) {
+        (Data::Text, _) => "text",
+        (_, true) => "float64",
+        (_, false) => "float32",
+    }
+}
+
+/// A frequency response. Errors: why there is none.
+fn response(dataset: &Dataset, location: &str, pinned: &Pinned) -> Result<FoundResponse, String> {
+    let header = &dataset.header;
+    let samples = header.points as usize;
+    if samples == 0 {
+        return Err("it has no values".to_owned());
+    }
+    let (ordinates, abscissa) = sources(dataset, pinned)?;
+    let [real, imaginary] = <[Arc<dyn Source>; 2]>::try_from(ordinates).map_err(|_| "its values are no pairs")?;
+    let part = |source| FoundChannel::new(location, samples, stored_as(dataset), source);
+    let listed = |(source, stored_as)| {
+        Frequencies::Listed(FoundChannel::new(format!("{location}/abscissa"), samples, stored_as, source))
+    };
+    let even = Frequencies::Even(header.abscissa_start, header.abscissa_step);
+    let [output, input] = header.degrees.clone();
+    Ok(FoundResponse {
+        location: location.to_owned(),
+        frequencies: abscissa.map_or(even, listed),
+        frequency_unit: header.abscissa.unit.clone(),
+        values: [part(real), part(imaginary)],
+        parts: Parts::RealImaginary,
+        guessed: false,
+        coherence: None,
+        unit: unit_ratio(&header.ordinate.unit, &header.denominator.unit),
+        output,
+        input,
+    })
 }
 
 fn rate(header: &Header, location: &str, remarks: &mut Vec<String>) -> Option<f64> {
@@ -118,11 +155,13 @@ fn rate(header: &Header, location: &str, remarks: &mut Vec<String>) -> Option<f6
 
 type Abscissa = Option<(Arc<dyn Source>, &'static str)>;
 
-/// Where ordinate and, if uneven, abscissa come from. Errors: the data are not as many as the points.
-fn sources(dataset: &Dataset, pinned: &Pinned) -> Result<(Arc<dyn Source>, Abscissa), String> {
+/// Where ordinates (one, or real and imaginary part) and, if uneven, abscissa come from. Errors: the data are not as
+/// many as the points.
+fn sources(dataset: &Dataset, pinned: &Pinned) -> Result<(Vec<Arc<dyn Source>>, Abscissa), String> {
     let header = &dataset.header;
     let bytes = dataset.to.saturating_sub(dataset.from);
-    let per_point = if header.even { 1 } else { 2 };
+    let parts = header.numbers() as u64;
+    let per_point = if header.even { parts } else { parts + 1 };
     let points = header.points;
     let pinned = pinned.clone();
     if dataset.data == Data::Text {
@@ -130,30 +169,32 @@ fn sources(dataset: &Dataset, pinned: &Pinned) -> Result<(Arc<dyn Source>, Absci
         if points.saturating_mul(2 * per_point) > bytes.saturating_add(1) {
             return Err(format!("{points} points are stated, its {bytes} bytes cannot hold them"));
         }
-        let widths: &'static [usize] = match (header.double, header.even) {
-            (false, _) => &[13],
-            (true, true) => &[20],
-            (true, false) => &[13, 20],
+        let widths: &'static [usize] = match (header.double, header.even, header.complex) {
+            (false, ..) => &[13],
+            (true, true, _) => &[20],
+            (true, false, false) => &[13, 20],
+            (true, false, true) => &[13, 20, 20],
         };
         let (points, every) = (points as usize, per_point as usize);
         let numbers = points * every;
         let text = Text { pinned, from: dataset.from, to: dataset.to, widths, numbers, parsed: OnceLock::new() };
         let text = Arc::new(text);
-        let pick = |first| Arc::new(Picked { text: Arc::clone(&text), first, every, samples: points });
+        let pick =
+            |first| -> Arc<dyn Source> { Arc::new(Picked { text: Arc::clone(&text), first, every, samples: points }) };
         let abscissa: Abscissa = if header.even { None } else { Some((pick(0), "text")) };
-        return Ok((pick(every - 1), abscissa));
+        return Ok(((every - header.numbers()..every).map(pick).collect(), abscissa));
     }
     let width = if header.double { 8 } else { 4 };
     // The abscissa is single precision by the standard; some writers make it as wide as the ordinate.
     let abscissa_widths: &[u64] = if header.even { &[0] } else { &[4, 8] };
-    let fits = |x: &&u64| points.checked_mul(width + **x) == Some(bytes);
-    let padded = |x: &&u64| points.checked_mul(width + **x).is_some_and(|wanted| wanted <= bytes);
+    let fits = |x: &&u64| points.checked_mul(parts * width + **x) == Some(bytes);
+    let padded = |x: &&u64| points.checked_mul(parts * width + **x).is_some_and(|wanted| wanted <= bytes);
     let Some(&abscissa_width) =
         abscissa_widths.iter().find(fits).or_else(|| abscissa_widths.iter().find(padded).filter(|_| header.even))
     else {
         return Err(format!("{points} points are stated, which its {bytes} bytes of data do not match"));
     };
-    let step = width + abscissa_width;
+    let step = parts * width + abscissa_width;
     let big_endian = dataset.data == Data::BigEndian;
     let samples = points as usize;
     let source = |first, double| Grid {
@@ -164,9 +205,11 @@ fn sources(dataset: &Dataset, pinned: &Pinned) -> Result<(Arc<dyn Source>, Absci
         number: if double { Number::F64 } else { Number::F32 },
         big_endian,
     };
-    let ordinate = source(dataset.from + abscissa_width, header.double);
+    let part = |part: u64| -> Arc<dyn Source> {
+        Arc::new(source(dataset.from + abscissa_width + part * width, header.double))
+    };
     let wide = abscissa_width == 8;
     let stored_as = if wide { "float64" } else { "float32" };
     let abscissa: Abscissa = if header.even { None } else { Some((Arc::new(source(dataset.from, wide)), stored_as)) };
-    Ok((Arc::new(ordinate), abscissa))
+    Ok(((0..parts).map(part).collect(), abscissa))
 }

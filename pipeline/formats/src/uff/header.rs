@@ -1,6 +1,7 @@
 //! The eleven header records of dataset 58.
 
 use super::fixed::{number, stated, text};
+use crate::Degree;
 use crate::FormatError;
 use crate::fail;
 
@@ -20,6 +21,8 @@ pub(super) struct Header {
     pub(super) function: i64,
     /// Name of the response, or its node and direction.
     pub(super) response: String,
+    /// What responds, and what is excited, where it is stated.
+    pub(super) degrees: [Option<Degree>; 2],
     /// The lines of identification that say something.
     pub(super) identification: Vec<String>,
     /// When, as ISO 8601, if the third line of identification is a date.
@@ -32,6 +35,8 @@ pub(super) struct Header {
     pub(super) abscissa_step: f64,
     pub(super) abscissa: Axis,
     pub(super) ordinate: Axis,
+    /// What the ordinate is divided by.
+    pub(super) denominator: Axis,
 }
 
 /// What runs along an axis.
@@ -46,7 +51,7 @@ pub(super) struct Axis {
 impl Header {
     /// Reads the records.
     pub(super) fn read(records: &[Record]) -> Result<Self, FormatError> {
-        let [id1, id2, id3, id4, id5, dof, form, abscissa, ordinate, ..] = records else {
+        let [id1, id2, id3, id4, id5, dof, form, abscissa, ordinate, denominator, ..] = records else {
             let at = records.last().map_or(0, |r| r.at);
             return Err(fail::at(
                 at,
@@ -68,6 +73,7 @@ impl Header {
         Ok(Self {
             function: integer(dof, 0, 5),
             response: response(dof),
+            degrees: [degree(dof, 31), degree(dof, 56)],
             identification: [id1, id2, id4, id5].iter().filter_map(|r| stated(&r.line, 0, 80)).collect(),
             started_at: moment(&text(&id3.line, 0, 80)),
             complex,
@@ -78,6 +84,7 @@ impl Header {
             abscissa_step: step,
             abscissa: axis(abscissa),
             ordinate: axis(ordinate),
+            denominator: axis(denominator),
         })
     }
 
@@ -99,6 +106,16 @@ impl Header {
             "spectrum",
         ];
         usize::try_from(self.function).ok().and_then(|f| NAMES.get(f).copied()).unwrap_or("function")
+    }
+
+    /// Whether it is output over input: a frequency response or a transmissibility.
+    pub(super) fn is_response(&self) -> bool {
+        matches!(self.function, 4 | 5)
+    }
+
+    /// Numbers of one value.
+    pub(super) fn numbers(&self) -> usize {
+        if self.complex { 2 } else { 1 }
     }
 
     /// Seconds in the abscissa's unit, if it is time.
@@ -145,13 +162,28 @@ fn integer(record: &Record, from: usize, to: usize) -> i64 {
     text(&record.line, from, to).parse().unwrap_or(0)
 }
 
+/// The axis of a direction, by its number.
+fn direction_name(direction: i64) -> &'static str {
+    const AXES: [&str; 7] = ["", "X", "Y", "Z", "RX", "RY", "RZ"];
+    usize::try_from(direction.unsigned_abs()).ok().and_then(|d| AXES.get(d).copied()).unwrap_or("")
+}
+
+/// The degree of freedom whose name is at column `from`, its node and direction behind; none where neither name nor
+/// node is stated. The node tells points apart, names may repeat.
+fn degree(record: &Record, from: usize) -> Option<Degree> {
+    let (node, direction) = (integer(record, from + 10, from + 20), integer(record, from + 20, from + 24));
+    let name = stated(&record.line, from, from + 10);
+    let name = if node == 0 { name? } else { node.to_string() };
+    let direction_name = direction_name(direction).to_lowercase();
+    Some(Degree { name, direction: direction_name, against: direction < 0 })
+}
+
 fn response(record: &Record) -> String {
     if let Some(name) = stated(&record.line, 31, 41) {
         return name;
     }
-    const AXES: [&str; 7] = ["", "X", "Y", "Z", "RX", "RY", "RZ"];
     let direction = integer(record, 51, 55);
-    let axis = usize::try_from(direction.unsigned_abs()).ok().and_then(|d| AXES.get(d).copied()).unwrap_or("");
+    let axis = direction_name(direction);
     let sign = match direction {
         0 => "",
         d if d < 0 => "-",

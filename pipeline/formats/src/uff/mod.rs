@@ -6,7 +6,9 @@
 //! - An even abscissa that is time gives the sample rate. Over another quantity (a spectrum over frequency) there is
 //!   none: a remark states the abscissa.
 //! - An uneven abscissa is a channel of its own, `…/abscissa`; then there is no rate, and a remark.
-//! - Complex functions and other datasets are no channels: a remark says so.
+//! - Complex frequency responses and transmissibilities (functions 4 and 5) are listed as such, with node and direction
+//!   of response and reference; they are no channels.
+//! - Other complex functions and other datasets are left out: a remark says so.
 //! - The data of 58b are read as they are asked for; text is parsed on the first read and kept.
 //!
 //! Source: Structural Dynamics Research Corporation, "Universal Dataset Number 58" and University of Cincinnati SDRL,

@@ -75,6 +75,6 @@ impl Format for Wav {
         let channels = (0..u64::from(coding.channels)).map(channel).collect();
         let order = if chunks.big_endian { ", big-endian" } else { "" };
         let format = format!("WAV ({}), {}{order}", chunks.kind, coding.number.name());
-        Ok(Contents { format, started_at: String::new(), channels, remarks })
+        Ok(Contents { format, started_at: String::new(), channels, responses: Vec::new(), remarks })
     }
 }

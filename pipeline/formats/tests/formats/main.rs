@@ -12,6 +12,7 @@ mod numpy_written;
 mod raw_binary;
 mod raw_order;
 mod registry;
+mod responses;
 mod scope_files;
 mod scopes_built;
 mod scopes_real;

@@ -16,6 +16,11 @@ pub fn scope(name: &str) -> Option<PathBuf> {
     shared("scopes", name)
 }
 
+/// A real folder of hammer tests; as [`real`].
+pub fn real_hammer(name: &str) -> Option<PathBuf> {
+    shared("hammer", name)
+}
+
 fn shared(folder: &str, name: &str) -> Option<PathBuf> {
     static MISSING: AtomicUsize = AtomicUsize::new(0);
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");

@@ -110,7 +110,8 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
             }
         }
     }
-    let mut contents = Contents { format: String::new(), started_at: String::new(), channels, remarks };
+    let mut contents =
+        Contents { format: String::new(), started_at: String::new(), channels, responses: Vec::new(), remarks };
     settle_axes(&mut contents);
     let Contents { channels, mut remarks, .. } = contents;
     let unsaid = remarks.len().saturating_sub(MOST_REMARKS);
@@ -122,7 +123,13 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
     // the library opened it by name
     require_state(path, &hashed.state)?;
     let format = if matlab { "MATLAB 7.3 MAT-file (HDF5)" } else { "HDF5 file" };
-    Ok(Contents { format: format.to_owned(), started_at: started_at.unwrap_or_default(), channels, remarks })
+    Ok(Contents {
+        format: format.to_owned(),
+        started_at: started_at.unwrap_or_default(),
+        channels,
+        responses: Vec::new(),
+        remarks,
+    })
 }
 
 /// MATLAB's files have a text in a user block before HDF5 begins.

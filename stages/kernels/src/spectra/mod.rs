@@ -5,7 +5,8 @@
 //!
 //! # Model
 //! [`etfe`]: `G(k) = Y_k / U_k` (Eqs. 5 to 7) with the variance `phi_k / abs(U_k)^2` (Eq. 10); [`local_rational`] and
-//! [`local_polynomial`] smooth its real and imaginary part. [`power_spectrum`] and [`average_spectra`] are for noise;
+//! [`local_polynomial`] smooth its real and imaginary part. [`frequency_response`] averages those of measured
+//! inputs. [`power_spectrum`] and [`average_spectra`] are for noise;
 //! [`thermal_fit`] fits `A (2/pi) (f0^3/Q) / ((f0^2 - f^2)^2 + (f f0/Q)^2) + W + B/f` to a density, [`thermal_peak`] one
 //! of several peaks.
 //! # Shapes
@@ -51,6 +52,8 @@ mod lanes;
 mod least_squares;
 mod local_polynomial;
 mod local_rational;
+mod measured_input;
+mod neighbour_scatter;
 mod neighbours;
 mod power;
 mod presence;
@@ -67,6 +70,10 @@ pub use fourier::{bin_frequencies, transform};
 pub use intersample::{Intersample, response_frequencies};
 pub use local_polynomial::{PolynomialSettings, local_polynomial};
 pub use local_rational::{RationalSettings, local_rational};
+pub use measured_input::{
+    Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, frequency_response, hits, segments,
+};
+pub use neighbour_scatter::neighbour_scatter;
 pub use neighbours::{Bins, Smoothed, SuppressedLine};
 pub use power::{PowerSpectrum, power_spectrum};
 pub use presence::Presence;

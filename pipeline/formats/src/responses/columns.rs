@@ -1,0 +1,168 @@
+//! Frequency responses from columns of real numbers.
+
+use super::role::{Role, degrees, role};
+use super::{FoundResponse, Frequencies, Parts};
+use crate::{Contents, FormatError, FoundChannel, fail};
+
+/// A column that is no axis.
+struct Column<'a> {
+    channel: &'a FoundChannel,
+    role: Option<Role>,
+    /// What is left of its title.
+    name: String,
+    used: bool,
+}
+
+/// The frequency responses of a file: those that its reader has found, or else those that its columns make. `parts`
+/// says what the columns are in turn; none: their titles say it.
+///
+/// Errors: no frequencies; columns that cannot be paired; a phase that may be in degrees or radians.
+pub fn responses(contents: &Contents, parts: Option<Parts>) -> Result<Vec<FoundResponse>, FormatError> {
+    if !contents.responses.is_empty() {
+        return Ok(contents.responses.clone());
+    }
+    let channels = &contents.channels;
+    let columns: Vec<Column> = channels.iter().filter(|channel| !is_frequency(channel)).map(Column::of).collect();
+    let titled = columns.iter().any(|column| column.role.is_some_and(|role| role != Role::Frequency));
+    let pairs = match (parts, titled) {
+        (None, true) => by_title(columns)?,
+        (given, _) => in_turn(columns, given)?,
+    };
+    if pairs.is_empty() {
+        return Err(none_found(contents));
+    }
+    pairs.into_iter().map(|pair| pair.response(channels)).collect()
+}
+
+/// The axis that has a response's frequencies: of as many values, the one whose location has the longest beginning in
+/// common with that of the response.
+pub(super) fn frequencies_for<'a>(
+    location: &str,
+    samples: usize,
+    channels: &'a [FoundChannel],
+) -> Option<&'a FoundChannel> {
+    let common = |other: &str| location.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    let fitting = |channel: &&FoundChannel| is_frequency(channel) && channel.samples == samples;
+    // the first of several alike
+    channels.iter().rev().filter(fitting).max_by_key(|channel| common(&channel.location))
+}
+
+/// Whether a channel holds frequencies: titled so, or an axis without a title.
+fn is_frequency(channel: &FoundChannel) -> bool {
+    match role(channel).0 {
+        Some(role) => role == Role::Frequency,
+        None => channel.is_axis && !crate::names_times(&channel.location),
+    }
+}
+
+impl<'a> Column<'a> {
+    fn of(channel: &'a FoundChannel) -> Self {
+        let (role, name) = role(channel);
+        Self { channel, role, name, used: channel.is_axis }
+    }
+}
+
+/// Two columns that make a response.
+struct Pair<'a> {
+    values: [&'a FoundChannel; 2],
+    parts: Parts,
+    guessed: bool,
+    coherence: Option<&'a FoundChannel>,
+}
+
+impl Pair<'_> {
+    fn response(&self, channels: &[FoundChannel]) -> Result<FoundResponse, FormatError> {
+        let [first, second] = self.values;
+        if first.samples != second.samples {
+            let problem =
+                format!("{} has {} values, {} has {}", first.location, first.samples, second.location, second.samples);
+            return Err(fail::plain(problem, "a response wants as many of both parts"));
+        }
+        let unit = match self.parts {
+            Parts::RealImaginary if first.unit.is_empty() => second.unit.clone(),
+            Parts::AmplitudePhase { decibels: true, .. } => String::new(),
+            _ => first.unit.clone(),
+        };
+        let mut found = FoundResponse {
+            location: first.location.clone(),
+            frequencies: Frequencies::Beside,
+            frequency_unit: String::new(),
+            values: [first.clone(), second.clone()],
+            parts: self.parts,
+            guessed: self.guessed,
+            coherence: self.coherence.cloned(),
+            unit,
+            output: None,
+            input: None,
+        };
+        let frequency = found.frequency_channel(channels)?;
+        found.frequency_unit.clone_from(&frequency.unit);
+        found.frequencies = Frequencies::Listed(frequency);
+        Ok(found)
+    }
+}
+
+/// Pairs by what titles say.
+fn by_title(mut columns: Vec<Column<'_>>) -> Result<Vec<Pair<'_>>, FormatError> {
+    let mut pairs = Vec::new();
+    for at in 0..columns.len() {
+        let Some(column) = columns.get(at).filter(|column| !column.used) else { continue };
+        let wanted = match column.role {
+            Some(Role::Real) => Role::Imaginary,
+            Some(Role::Amplitude | Role::Decibels) => Role::Phase,
+            _ => continue,
+        };
+        let (first, decibels) = (column.channel, column.role == Some(Role::Decibels));
+        let Some(second) = take(&mut columns, at, wanted) else {
+            let problem = format!("{} has no column of its {}", first.location, said(wanted));
+            return Err(fail::plain(problem, "title both parts of each response, or say what the columns are"));
+        };
+        let coherence = take(&mut columns, at, Role::Coherence);
+        let parts = match wanted {
+            Role::Phase => Parts::AmplitudePhase { decibels, degrees: degrees(second).ok_or_else(|| unclear(second))? },
+            _ => Parts::RealImaginary,
+        };
+        pairs.push(Pair { values: [first, second], parts, guessed: false, coherence });
+    }
+    Ok(pairs)
+}
+
+/// The column of this role that belongs to column `at`: of the same name, or else the next without a name of its own.
+fn take<'a>(columns: &mut [Column<'a>], at: usize, wanted: Role) -> Option<&'a FoundChannel> {
+    let name = columns.get(at).map(|column| column.name.clone()).unwrap_or_default();
+    let fits = |column: &Column| !column.used && column.role == Some(wanted);
+    let named = columns.iter().position(|column| fits(column) && column.name == name);
+    let next = columns.iter().enumerate().position(|(k, column)| k > at && fits(column) && column.name.is_empty());
+    let found = columns.get_mut(named.or(next)?)?;
+    found.used = true;
+    Some(found.channel)
+}
+
+/// Pairs of neighbours.
+fn in_turn<'a>(columns: Vec<Column<'a>>, parts: Option<Parts>) -> Result<Vec<Pair<'a>>, FormatError> {
+    let is_part = |column: &Column| !column.used && column.role != Some(Role::Coherence);
+    let left: Vec<&FoundChannel> = columns.into_iter().filter(is_part).map(|column| column.channel).collect();
+    if left.len() % 2 == 1 {
+        let problem = format!("{} columns beside the frequencies, wanted two of each response", left.len());
+        return Err(fail::plain(problem, "leave out what is no part of a response, or give the columns titles"));
+    }
+    let (chosen, guessed) = (parts.unwrap_or(Parts::RealImaginary), parts.is_none());
+    let pair = |values: &[&'a FoundChannel; 2]| Pair { values: *values, parts: chosen, guessed, coherence: None };
+    Ok(left.as_chunks().0.iter().map(pair).collect())
+}
+
+fn said(role: Role) -> &'static str {
+    if role == Role::Phase { "phase" } else { "imaginary part" }
+}
+
+fn unclear(phase: &FoundChannel) -> FormatError {
+    let problem = format!("the phase {} may be in degrees or in radians: the file does not say", phase.location);
+    fail::plain(problem, "say what the columns are")
+}
+
+fn none_found(contents: &Contents) -> FormatError {
+    let names: Vec<&str> = contents.channels.iter().take(20).map(|channel| channel.location.as_str()).collect();
+    let names = if names.is_empty() { "no numbers at all".to_owned() } else { names.join(", ") };
+    let problem = format!("no frequency response in this {}; it has: {names}", contents.format);
+    fail::plain(problem, "wanted: frequencies with real and imaginary part, or amplitude and phase, of each response")
+}

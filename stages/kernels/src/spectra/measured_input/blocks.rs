@@ -1,0 +1,145 @@
+//! Blocks of measured input and output, and what is done to them before the transform.
+
+use crate::signal::hann;
+use crate::spectra::SpectrumError;
+use crate::spectra::error::finite;
+use crate::statistics::median;
+
+/// Inputs and outputs over the same samples.
+#[derive(Debug, Clone)]
+pub struct Block<'a> {
+    /// One or several.
+    pub inputs: Vec<&'a [f64]>,
+    /// One or several.
+    pub outputs: Vec<&'a [f64]>,
+}
+
+/// What blocks are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BlockKind {
+    /// Each holds a hit and what rings after it.
+    Hits {
+        /// Samples on either side of an input's largest one beyond which it is set to zero; none leaves it as it is.
+        force_window: Option<usize>,
+        /// Inputs and outputs are multiplied by `exp(-d t)` with this `d`, in 1/s; 0 for nothing.
+        added_decay_per_s: f64,
+    },
+    /// Segments of a long record, each overlapping the next by half; a Hann window is put on them.
+    Segments,
+}
+
+/// Share of samples that are the same number from which an input was under a force window when it was recorded: less
+/// than half the samples of a sensor's noise are the same code. Zeros may have been moved by an offset since.
+const WINDOWED: f64 = 0.5;
+
+/// A block's series, ready for the transform.
+pub(super) struct Prepared {
+    pub inputs: Vec<Vec<f64>>,
+    pub outputs: Vec<Vec<f64>>,
+    /// Whether all inputs were under a force window already.
+    pub windowed_before: bool,
+}
+
+/// The segments of a record: as many samples each, every one beginning in the middle of that before.
+///
+/// # Errors
+/// A length of less than eight samples, a record that is shorter, unequal series.
+pub fn segments<'a>(record: &Block<'a>, samples: usize) -> Result<Vec<Block<'a>>, SpectrumError> {
+    let whole = check(record)?;
+    if samples < 8 || whole < samples {
+        return Err(SpectrumError::TooShort { got: whole.min(samples), wanted: samples.max(8) });
+    }
+    let cut = |series: &[&'a [f64]], from: usize| series.iter().map(|x| &x[from..from + samples]).collect();
+    let block = |from| Block { inputs: cut(&record.inputs, from), outputs: cut(&record.outputs, from) };
+    Ok((0..=whole - samples).step_by(samples / 2).map(block).collect())
+}
+
+/// The hits in a record: of `samples` each, the first `before` of them before the first input comes to the share `level`
+/// of its largest value; a hit within the samples of another is part of that. Those that the record cuts off are left
+/// out.
+///
+/// # Errors
+/// Fewer than eight samples, more than the record has, not more than `before`; unequal series.
+pub fn hits<'a>(
+    record: &Block<'a>,
+    samples: usize,
+    before: usize,
+    level: f64,
+) -> Result<Vec<Block<'a>>, SpectrumError> {
+    let whole = check(record)?;
+    if samples < 8 || samples <= before || whole < samples {
+        return Err(SpectrumError::TooShort { got: whole.min(samples), wanted: samples.max(before + 1).max(8) });
+    }
+    let force = record.inputs.first().copied().unwrap_or_default();
+    let offset = median(&mut force.to_vec());
+    let largest = force.iter().map(|value| (value - offset).abs()).fold(0.0, f64::max);
+    let (mut found, mut from) = (Vec::new(), 0);
+    while let Some(rise) = (from..whole).find(|&k| largest > 0.0 && (force[k] - offset).abs() >= level * largest) {
+        let end = rise + samples - before;
+        if let Some(first) = rise.checked_sub(before).filter(|_| end <= whole) {
+            let cut = |series: &[&'a [f64]]| series.iter().map(|x| &x[first..end]).collect();
+            found.push(Block { inputs: cut(&record.inputs), outputs: cut(&record.outputs) });
+        }
+        from = end;
+    }
+    Ok(found)
+}
+
+/// The length of all series. Errors: unequal, none, not finite.
+pub(super) fn check(block: &Block<'_>) -> Result<usize, SpectrumError> {
+    let samples = block.inputs.first().map_or(0, |input| input.len());
+    let wanted = samples.max(8);
+    if samples < 8 || block.outputs.is_empty() {
+        return Err(SpectrumError::TooShort { got: samples, wanted });
+    }
+    for (name, series) in [("an input", &block.inputs), ("an output", &block.outputs)] {
+        for values in series {
+            if values.len() != samples {
+                return Err(SpectrumError::Lengths { name, got: values.len(), wanted: samples });
+            }
+            finite(name, values)?;
+        }
+    }
+    Ok(samples)
+}
+
+impl Prepared {
+    /// Offsets removed, windows put on.
+    pub fn of(block: &Block<'_>, kind: BlockKind, sample_rate_hz: f64) -> Self {
+        let windowed_before = block.inputs.iter().all(|input| is_windowed(input));
+        let prepare = |values: &[f64], is_input: bool| match kind {
+            BlockKind::Segments => without_mean(values),
+            BlockKind::Hits { force_window, added_decay_per_s } => {
+                let offset = median(&mut values.to_vec());
+                let mut values: Vec<f64> = values.iter().map(|value| value - offset).collect();
+                if let Some(reach) = force_window.filter(|_| is_input) {
+                    clear_beyond(&mut values, reach);
+                }
+                let decay = |k: usize| (-added_decay_per_s * k as f64 / sample_rate_hz).exp();
+                values.iter().enumerate().map(|(k, value)| value * decay(k)).collect()
+            }
+        };
+        let all = |series: &[&[f64]], is_input| series.iter().map(|values| prepare(values, is_input)).collect();
+        Self { inputs: all(&block.inputs, true), outputs: all(&block.outputs, false), windowed_before }
+    }
+}
+
+fn is_windowed(input: &[f64]) -> bool {
+    let rest = median(&mut input.to_vec());
+    let resting = input.iter().filter(|value| **value == rest).count();
+    resting as f64 >= WINDOWED * input.len() as f64 && resting < input.len()
+}
+
+/// A segment without its mean, under a Hann window.
+fn without_mean(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter().zip(hann(values.len(), 0.0)).map(|(value, window)| (value - mean) * window).collect()
+}
+
+/// Zero but for `reach` samples on either side of the largest one.
+fn clear_beyond(values: &mut [f64], reach: usize) {
+    let peak = (0..values.len()).max_by(|&a, &b| values[a].abs().total_cmp(&values[b].abs())).unwrap_or(0);
+    let (first, end) = (peak.saturating_sub(reach), (peak + reach + 1).min(values.len()));
+    values[..first].fill(0.0);
+    values[end..].fill(0.0);
+}

@@ -1,0 +1,11 @@
+//! Frequency responses from input and output that were both measured.
+//!
+//! [`frequency_response`] averages blocks: hits of a hammer, or the segments of a long record ([`hits`], [`segments`]).
+
+mod blocks;
+mod estimate;
+#[cfg(test)]
+mod tests;
+
+pub use blocks::{Block, BlockKind, hits, segments};
+pub use estimate::{Estimator, MeasuredResponse, ResponseSettings, frequency_response};

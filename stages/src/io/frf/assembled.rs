@@ -1,0 +1,236 @@
+//! From the responses of files to one array.
+
+use std::path::{Path, PathBuf};
+
+use afmid_pipeline::recording::{Degree, FileResponse};
+use afmid_pipeline::{Document, StageError};
+use serde_json::json;
+
+use super::stage::{Frf, Roving};
+use crate::artifacts::{NewFrf, Point, Quantity, ResponseOf};
+
+/// What frequencies of two responses may differ by, in steps: what is printed to seven digits.
+const SAME: f64 = 1e-3;
+
+/// All responses, and what the user should know of them.
+pub(super) struct Assembled {
+    pub frf: NewFrf,
+    pub remarks: Vec<String>,
+}
+
+impl Assembled {
+    /// Errors: see the stage.
+    pub fn new(wanted: &Frf, paths: &[PathBuf], read: Vec<Vec<FileResponse>>) -> Result<Self, StageError> {
+        let all = named(paths, read);
+        let frequency_hz = common_frequencies(&all)?;
+        check_lengths(wanted, all.len())?;
+        let (unit, quantity, mut remarks) = quantity(wanted, &all)?;
+        for remark in all.iter().flat_map(|named| &named.response.remarks) {
+            if !remarks.contains(remark) {
+                remarks.push(remark.clone());
+            }
+        }
+        let responses = points(wanted, &all);
+        let driving_point = wanted
+            .driving_point
+            .map(|number| number - 1)
+            .or_else(|| responses.iter().position(|response| response.output.is(&response.input)));
+        if driving_point.is_none() {
+            remarks.push("no driving point: mode shapes have no scale of mass; give `driving_point`".to_owned());
+        }
+        let kept = band(wanted, &frequency_hz)?;
+        let mut frf = Vec::with_capacity(all.len() * kept.len());
+        for (Named { response, .. }, of) in all.iter().zip(&responses) {
+            let sign = if of.output.turned != of.input.turned { -1.0 } else { 1.0 };
+            frf.extend(response.values[kept.clone()].iter().map(|value| value * sign));
+        }
+        let rows: Option<Vec<&Vec<f64>>> = all.iter().map(|named| named.response.coherence.as_ref()).collect();
+        let coherence = rows.map(|rows| rows.iter().flat_map(|row| row[kept.clone()].to_vec()).collect());
+        let frf = NewFrf {
+            frequency_hz: frequency_hz[kept].to_vec(),
+            responses,
+            frf,
+            coherence,
+            quantity,
+            unit,
+            driving_point,
+            ..NewFrf::default()
+        };
+        Ok(Self { frf, remarks })
+    }
+
+    /// What is shown of it.
+    pub fn summary(&self) -> Result<Document, StageError> {
+        let frf = &self.frf;
+        let name = |point: &Point| format!("{}{}", point.name, point.direction);
+        let row = |response: &ResponseOf| {
+            json!({ "output": name(&response.output), "input": name(&response.input),
+                    "position_m": response.input.position_m.or(response.output.position_m) })
+        };
+        Document::new(&json!({
+            "responses": frf.responses.len(),
+            "lines": frf.frequency_hz.len(),
+            "lowest_hz": frf.frequency_hz.first(),
+            "highest_hz": frf.frequency_hz.last(),
+            "quantity": frf.quantity,
+            "unit": frf.unit,
+            "driving_point": frf.driving_point.map(|row| row + 1),
+            "with_coherence": frf.coherence.is_some(),
+            "points": frf.responses.iter().map(row).collect::<Vec<_>>(),
+        }))
+    }
+}
+
+/// A response with the file that it is from and its name: the file's, and its own if the file has several.
+struct Named<'a> {
+    name: String,
+    path: &'a Path,
+    response: FileResponse,
+}
+
+fn named(paths: &[PathBuf], read: Vec<Vec<FileResponse>>) -> Vec<Named<'_>> {
+    let one_file = paths.len() == 1;
+    let mut all = Vec::new();
+    for (path, responses) in paths.iter().zip(read) {
+        let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let several = responses.len() > 1;
+        for response in responses {
+            let name = match (several, one_file) {
+                (false, _) => file.clone(),
+                (true, true) => response.location.clone(),
+                (true, false) => format!("{file}:{}", response.location),
+            };
+            all.push(Named { name, path, response });
+        }
+    }
+    all
+}
+
+/// The frequencies, which must be those of all. Errors: others.
+fn common_frequencies(all: &[Named<'_>]) -> Result<Vec<f64>, StageError> {
+    let Some(first) = all.first() else { return Err(StageError::new("the files have no response")) };
+    let wanted = &first.response.frequency_hz;
+    let step = match wanted[..] {
+        [low, .., high] => (high - low) / (wanted.len() - 1) as f64,
+        _ => return Err(StageError::new("a single frequency, wanted two or more").at(first.path)),
+    };
+    for other in all {
+        let found = &other.response.frequency_hz;
+        let apart = found.iter().zip(wanted).position(|(a, b)| (a - b).abs() > SAME * step);
+        let problem = match (found.len() == wanted.len(), apart) {
+            (true, None) => continue,
+            (true, Some(at)) => {
+                format!("line {} is at {} Hz, in {} at {} Hz", at + 1, found[at], first.name, wanted[at])
+            }
+            (false, _) => format!("{} lines, {} has {}", found.len(), first.name, wanted.len()),
+        };
+        return Err(StageError::new(format!("{}: {problem}; wanted the same frequencies", other.name))
+            .at(other.path)
+            .help("read responses of other frequencies in a stage of their own"));
+    }
+    Ok(wanted.clone())
+}
+
+/// Errors: a list of another length than the responses, a driving point that is none of them.
+fn check_lengths(wanted: &Frf, responses: usize) -> Result<(), StageError> {
+    let wrong = |name: &str, found: usize| {
+        Err(StageError::new(format!("`{name}` has {found}, there are {responses} responses")))
+    };
+    match (wanted.positions_m.len(), wanted.directions.len(), wanted.driving_point) {
+        (positions, ..) if positions != 0 && positions != responses => wrong("positions_m", positions),
+        (_, directions, _) if directions > 1 && directions != responses => wrong("directions", directions),
+        (.., Some(number)) if number > responses => {
+            Err(StageError::new(format!("`driving_point` is {number}, there are {responses} responses")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Unit and quantity, and what was taken for granted. Errors: units that differ, or are not the one that is given.
+fn quantity(wanted: &Frf, all: &[Named<'_>]) -> Result<(String, Quantity, Vec<String>), StageError> {
+    let mut unit = wanted.unit.clone().unwrap_or_default();
+    for Named { name, path, response } in all.iter().filter(|named| !named.response.unit.is_empty()) {
+        if unit.is_empty() {
+            unit.clone_from(&response.unit);
+        }
+        if response.unit != unit {
+            let problem = format!("{name} is in {}, wanted {unit}", response.unit);
+            return Err(StageError::new(problem).at(path).help("leave `unit` out: it is for files that state no unit"));
+        }
+    }
+    let mut remarks = Vec::new();
+    let quantity = wanted.quantity.unwrap_or_else(|| {
+        let found = quantity_of(&unit);
+        if found == Quantity::Transfer {
+            let unit = if unit.is_empty() { "no unit is stated" } else { &unit };
+            remarks.push(format!(
+                "taken as a plain transfer ({unit}): give `quantity` if it is a receptance, mobility or accelerance"
+            ));
+        }
+        found
+    });
+    Ok((unit, quantity, remarks))
+}
+
+/// What a unit says.
+fn quantity_of(unit: &str) -> Quantity {
+    let bare: String = unit.chars().filter(|c| !matches!(c, '(' | ')' | ' ' | '^' | '·' | '*')).collect();
+    let Some(output) = bare.strip_suffix("/N") else { return Quantity::Transfer };
+    match output {
+        "m" | "mm" | "um" | "µm" | "nm" => Quantity::Receptance,
+        "m/s" | "mm/s" => Quantity::Mobility,
+        "m/s²" | "m/s2" | "m/s/s" | "mm/s²" | "mm/s2" | "g" => Quantity::Accelerance,
+        _ => Quantity::Transfer,
+    }
+}
+
+/// Output and input of each response: as the files name them, or else one that stays and one that roves.
+fn points(wanted: &Frf, all: &[Named<'_>]) -> Vec<ResponseOf> {
+    let position = |row: usize| wanted.positions_m.get(row).copied();
+    let turned = |row: usize| wanted.directions.get(row).or(wanted.directions.first()) == Some(&-1.0);
+    let roving = |row: usize| Point {
+        name: all.get(row).map(|named| named.name.clone()).unwrap_or_default(),
+        position_m: position(row),
+        ..Point::default()
+    };
+    let what = if wanted.roving == Roving::Hammer { "sensor" } else { "hammer" };
+    let fixed = wanted
+        .driving_point
+        .map_or_else(|| Point { name: what.to_owned(), ..Point::default() }, |number| roving(number - 1));
+    let of = |(row, named): (usize, &Named<'_>)| {
+        let point = |degree: &Option<Degree>, otherwise: Point| degree.as_ref().map_or(otherwise, stated);
+        let (output, input) = match wanted.roving {
+            Roving::Hammer => (fixed.clone(), roving(row)),
+            Roving::Sensor => (roving(row), fixed.clone()),
+        };
+        let mut response =
+            ResponseOf { output: point(&named.response.output, output), input: point(&named.response.input, input) };
+        let roves = match wanted.roving {
+            Roving::Hammer => &mut response.input,
+            Roving::Sensor => &mut response.output,
+        };
+        roves.turned ^= turned(row);
+        roves.position_m = position(row);
+        response
+    };
+    all.iter().enumerate().map(of).collect()
+}
+
+/// A degree of freedom that a file states.
+fn stated(degree: &Degree) -> Point {
+    Point { name: degree.name.clone(), direction: degree.direction.clone(), turned: degree.against, position_m: None }
+}
+
+/// The lines within the band. Errors: fewer than two.
+fn band(wanted: &Frf, frequency_hz: &[f64]) -> Result<std::ops::Range<usize>, StageError> {
+    let Some([low, high]) = wanted.band_hz else { return Ok(0..frequency_hz.len()) };
+    let kept = frequency_hz.partition_point(|f| *f < low)..frequency_hz.partition_point(|f| *f <= high);
+    match kept.len() {
+        0 | 1 => {
+            let (first, last) = (frequency_hz.first(), frequency_hz.last());
+            let found = format!("from {} to {}", first.unwrap_or(&f64::NAN), last.unwrap_or(&f64::NAN));
+            Err(StageError::new(format!("`band_hz` is [{low}, {high}], the frequencies run {found}")))
+        }
+        _ => Ok(kept),
+    }
+}

@@ -1,0 +1,281 @@
+//! The stage `spectrum.measured_frf`.
+
+use afmid_pipeline::recording::unit_ratio;
+use afmid_pipeline::{Array, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError};
+use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf};
+use crate::io::FRF;
+use afmid_kernels::spectra::{
+    Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, frequency_response, hits, segments,
+};
+
+/// Frequency response from measured input and output, averaged over hits or segments.
+///
+/// # Model
+/// The system is linear; noise of the output (`h1`), of the input (`h2`) or of both (`hv`) is independent of the input.
+/// # Method
+/// Auto and cross spectra over blocks: half-overlapping Hann segments of the record, or hits of a hammer. `h1` is
+/// `Syu / Suu`, `h2` is `Syy / Suy`, `hv` their geometric mean; several inputs: `h1 = Syu Suu^-1`. Offsets are removed.
+/// The band in which the input has power is found and kept.
+/// # Shapes
+/// A row for each input of the pair over the bins of the band; zero hertz is left out.
+/// # Units
+/// Output over input, in the pair's units.
+/// # Accuracy
+/// `variance` is `(1 - g) abs(H)^2 / (g (n - 1))` for n independent blocks and the coherence g. A single hit has neither
+/// coherence nor variance. Segments bias responses whose resonances are narrower than about four bins.
+/// # Errors
+/// A record that is shorter than a block, samples that are missing, an input that is zero throughout, no hit.
+/// # Source
+/// J. S. Bendat, A. G. Piersol, Random Data, 2010, ch. 6, 7 and 9; D. J. Ewins, Modal Testing, 2000, section 3.8.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MeasuredFrf {
+    /// What is averaged: `segments` of a steady excitation, or `hits` of a hammer. Why: a record from columns is most
+    /// often of the first kind.
+    pub blocks: BlocksAre,
+    /// Samples of a block. Absent: an eighth of the record for segments (15 of them: a coherence good to a tenth), the
+    /// whole record for a hit.
+    #[schemars(range(min = 8))]
+    pub block_samples: Option<usize>,
+    /// Samples of a hit before the force comes to a tenth of its largest value. Why: a pulse has risen from nothing
+    /// within 32 samples at any rate that resolves it.
+    pub before_samples: usize,
+    /// `h1`, `h2` or `hv`. Why: the sensor of the output has the smaller signal, and so the larger share of noise.
+    pub estimator: EstimatorIs,
+    /// Time on either side of a hit's largest force beyond which the force is set to zero, in s. Absent: the force is left
+    /// as it is. Why: cutting what is no noise biases the estimate.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub force_window_s: Option<f64>,
+    /// Rate d of an exponential window `exp(-d t)` on force and response of hits, in 1/s. It adds d to the decay rate of
+    /// every mode, which is stated with the result so that fits subtract it. Why 0: only responses that ring beyond
+    /// their block need it.
+    #[schemars(range(min = 0.0))]
+    pub added_decay_per_s: f64,
+    /// Lowest and highest frequency that is kept, in Hz. Absent: the band in which each input has power.
+    pub band_hz: Option<[f64; 2]>,
+    /// Power of an input, as a share of its largest, down to which it counts as excited. Why 0.01: the error's variance
+    /// goes with one over the power, at 20 dB below the largest it is a hundredfold.
+    #[schemars(extend("exclusiveMinimum" = 0.0), extend("exclusiveMaximum" = 1.0))]
+    pub excited_share: f64,
+    /// What output over input is. Why `transfer`: columns do not say.
+    pub quantity: Quantity,
+    /// Number (from 1) of the input that acts where and as the output is measured. Absent: none.
+    #[schemars(range(min = 1))]
+    pub driving_point: Option<usize>,
+}
+
+/// What is averaged.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BlocksAre {
+    /// Half-overlapping segments under a Hann window.
+    #[default]
+    Segments,
+    /// Hits, each with what rings after it.
+    Hits,
+}
+
+/// Which noise the estimate is free of.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorIs {
+    /// That of the output.
+    #[default]
+    H1,
+    /// That of the input.
+    H2,
+    /// Both, in proportion to their signals.
+    Hv,
+}
+
+impl EstimatorIs {
+    fn kernel(self) -> Estimator {
+        match self {
+            Self::H1 => Estimator::H1,
+            Self::H2 => Estimator::H2,
+            Self::Hv => Estimator::Hv,
+        }
+    }
+}
+
+impl Default for MeasuredFrf {
+    fn default() -> Self {
+        Self {
+            blocks: BlocksAre::Segments,
+            block_samples: None,
+            before_samples: 32,
+            estimator: EstimatorIs::H1,
+            force_window_s: None,
+            added_decay_per_s: 0.0,
+            band_hz: None,
+            excited_share: 0.01,
+            quantity: Quantity::Transfer,
+            driving_point: None,
+        }
+    }
+}
+
+/// Share of the largest force from which a hit is one.
+const HIT: f64 = 0.1;
+/// Segments in a record, if they did not overlap: see `block_samples`.
+const EIGHTH: usize = 8;
+
+pub(super) const PAIR: Port<Array> = Port::new("pair", "pair", "measured inputs and output over time");
+pub(super) const SUMMARY: Port<Document> =
+    Port::new("summary", "summary", "blocks, the excited band, coherence, windows that were found or put on");
+
+impl Stage for MeasuredFrf {
+    const SPEC: Spec = Spec {
+        name: "spectrum.measured_frf",
+        version: 1,
+        summary: "estimates the frequency response from measured input and output with coherence and variance",
+        inputs: &[PAIR.spec()],
+        outputs: &[FRF.spec(), SUMMARY.spec()],
+        source: "J. S. Bendat, A. G. Piersol, Random Data, 2010",
+        ..Spec::STORED
+    };
+
+    fn check(&self, faults: &mut Faults) {
+        let of_hits = self.force_window_s.is_some() || self.added_decay_per_s != 0.0;
+        faults.require(self.blocks == BlocksAre::Hits || !of_hits, || {
+            "`force_window_s` and `added_decay_per_s` are for `blocks = \"hits\"`: segments are under a Hann window"
+                .to_owned()
+        });
+        if let Some([low, high]) = self.band_hz {
+            faults.require(low >= 0.0 && low < high, || {
+                format!("`band_hz` is [{low}, {high}], wanted the lowest and the highest frequency")
+            });
+        }
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let pair = Pair::new(inputs.get(&PAIR)?);
+        let series = pair.series(DataSet::All, 0)?;
+        let record =
+            Block { inputs: series.input.chunks_exact(series.output.len()).collect(), outputs: vec![&series.output] };
+        let blocks = self.cut(&record)?;
+        let found = frequency_response(&blocks, self.settings(series.rate)).map_err(StageError::from_error)?;
+        if found.coherence.is_none() {
+            cx.warn("a single block: neither coherence nor variance is known");
+        }
+        let band = self.band(&found)?;
+        let [force_unit, response_unit] = pair.units()?;
+        let unit = unit_ratio(response_unit, force_unit);
+        let summary = self.summary(&found, band, blocks.len(), series.rate)?;
+        let frf = self.frf(found, band, record.inputs.len(), unit, series.rate)?;
+        Ok(Ports::new().with(&FRF, frf.array()?).with(&SUMMARY, summary))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::measured_example::examples()
+    }
+}
+
+impl MeasuredFrf {
+    fn cut<'a>(&self, record: &Block<'a>) -> Result<Vec<Block<'a>>, StageError> {
+        let whole = record.outputs.first().map_or(0, |output| output.len());
+        let found = match (self.blocks, self.block_samples) {
+            (BlocksAre::Segments, samples) => segments(record, samples.unwrap_or(whole / EIGHTH)),
+            (BlocksAre::Hits, None) => Ok(vec![record.clone()]),
+            (BlocksAre::Hits, Some(samples)) => hits(record, samples, self.before_samples, HIT),
+        }
+        .map_err(StageError::from_error)?;
+        match found.is_empty() {
+            true => Err(StageError::new("no hit lies whole in the record: the force has none, or blocks are too long")),
+            false => Ok(found),
+        }
+    }
+
+    fn settings(&self, sample_rate_hz: f64) -> ResponseSettings {
+        let kind = match self.blocks {
+            BlocksAre::Segments => BlockKind::Segments,
+            BlocksAre::Hits => BlockKind::Hits {
+                force_window: self.force_window_s.map(|time| (time * sample_rate_hz).round() as usize),
+                added_decay_per_s: self.added_decay_per_s,
+            },
+        };
+        let (estimator, excited_share) = (self.estimator.kernel(), self.excited_share);
+        ResponseSettings { sample_rate_hz, estimator, kind, excited_share }
+    }
+
+    /// First bin that is kept, and one past the last. Errors: none is.
+    fn band(&self, found: &MeasuredResponse) -> Result<(usize, usize), StageError> {
+        let common = found
+            .excited_hz
+            .iter()
+            .fold([0.0, f64::INFINITY], |[low, high]: [f64; 2], band| [low.max(band[0]), high.min(band[1])]);
+        let [low, high] = self.band_hz.unwrap_or(common);
+        // zero hertz holds what is left of the offset
+        let first = found.frequency_hz.partition_point(|f| *f < low).max(1);
+        let end = found.frequency_hz.partition_point(|f| *f <= high);
+        match first + 1 < end {
+            true => Ok((first, end)),
+            false => Err(StageError::new(format!("no two bins lie between {low} and {high} Hz"))
+                .help("give `band_hz`, or longer blocks")),
+        }
+    }
+
+    fn frf(
+        &self,
+        found: MeasuredResponse,
+        (first, end): (usize, usize),
+        inputs: usize,
+        unit: String,
+        rate: f64,
+    ) -> Result<NewFrf, StageError> {
+        if let Some(number) = self.driving_point.filter(|number| *number == 0 || *number > inputs) {
+            return Err(StageError::new(format!("`driving_point` is {number}, there are {inputs} inputs")));
+        }
+        let point = |name: String| Point { name, ..Point::default() };
+        let output = self.driving_point.map_or_else(|| "output".to_owned(), |number| format!("input {number}"));
+        let row =
+            |input: usize| ResponseOf { output: point(output.clone()), input: point(format!("input {}", input + 1)) };
+        let kept = |rows: Vec<Vec<f64>>| rows.iter().flat_map(|row| row[first..end].to_vec()).collect::<Vec<f64>>();
+        let transfer: Vec<Complex64> = found.transfer.iter().flat_map(|row| row[first..end].to_vec()).collect();
+        // the multiple coherence is that of each input
+        let coherence = found.coherence.map(|rows| kept(rows).repeat(inputs));
+        Ok(NewFrf {
+            frequency_hz: found.frequency_hz[first..end].to_vec(),
+            responses: (0..inputs).map(row).collect(),
+            frf: transfer,
+            variance: found.variance.map(kept),
+            coherence,
+            quantity: self.quantity,
+            unit,
+            driving_point: self.driving_point.map(|number| number - 1),
+            sample_rate_hz: Some(rate),
+            averages: Some(found.averages),
+            added_decay_per_s: self.added_decay_per_s,
+        })
+    }
+
+    fn summary(
+        &self,
+        found: &MeasuredResponse,
+        (first, end): (usize, usize),
+        blocks: usize,
+        rate: f64,
+    ) -> Result<Document, StageError> {
+        let middle = found.coherence.as_ref().and_then(|rows| rows.first()).map(|row| {
+            let mut values: Vec<f64> = row[first..end].iter().copied().filter(|value| value.is_finite()).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied()
+        });
+        Document::new(&json!({
+            "blocks": blocks,
+            "averages": found.averages,
+            "bin_width_hz": rate / (2 * (found.frequency_hz.len() - 1)) as f64,
+            "lowest_hz": found.frequency_hz[first],
+            "highest_hz": found.frequency_hz[end - 1],
+            "excited_hz": found.excited_hz,
+            "median_coherence": middle.flatten(),
+            "force_window_found": found.windowed_before,
+            "added_decay_per_s": self.added_decay_per_s,
+        }))
+    }
+}
