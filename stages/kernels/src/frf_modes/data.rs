@@ -26,6 +26,16 @@ pub enum FrfQuantity {
 }
 
 impl FrfQuantity {
+    /// Its name in files and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Receptance => "receptance",
+            Self::Mobility => "mobility",
+            Self::Accelerance => "accelerance",
+            Self::Transfer => "transfer",
+        }
+    }
+
     /// Power of `i w` that a receptance is multiplied by.
     pub fn power(self) -> i32 {
         match self {

@@ -15,8 +15,8 @@
 //! gain: `t^T S^-1 t` (4), with its columns' products with the residual `t` and with each other `S`, those of the fit
 //! eliminated.
 //!
-//! In reading order: options, data (lines and weights), noise (variance by bands), polynomial (Eq. 2), candidates, model
-//! and projection (Eq. 1), fit (Eq. 3), lack (what a fit leaves), selection (how many modes), result.
+//! In reading order: options, data (lines and weights), noise (variance by bands), polynomial (Eq. 2), candidates,
+//! model and projection (Eq. 1), fit (Eq. 3), lack (what a fit leaves), selection (how many modes), result.
 //!
 //! ```
 //! use afmid_kernels::c64;
@@ -101,10 +101,11 @@ const FINE_SHARE: f64 = 0.03;
 /// stable in frequency and damping over four orders, and peaks of the residual. Of these the one with the largest gain
 /// (Eq. 4) joins the fit, as long as an F test finds its gain above chance; in the end poles are dropped whose share of
 /// the weighted squares is not above it, at the level of the residual around them and with its correlation counted;
-/// whose damping is not above three standard errors; and, where the fit does not reach the noise, those within the width
-/// of a mode with a hundred times their energy or within a line of a stronger one: responses that were measured one
-/// after the other on a structure that had changed in between leave such pairs. Last fit: maximum likelihood by variable projection (Eq. 3), the
-/// variance from its residual. Significant poles that are no modes of the band stay as terms for what lies beyond it.
+/// whose damping is not above three standard errors; and, where the fit does not reach the noise, those within the
+/// width of a mode with a hundred times their energy or within a line of a stronger one: responses that were measured
+/// one after the other on a structure that had changed in between leave such pairs. Last fit: maximum likelihood by
+/// variable projection (Eq. 3), the variance from its residual. Significant poles that are no modes of the band stay as
+/// terms for what lies beyond it.
 /// Of more than 4000 lines neighbours are merged where no pole is near. Cost per step: `R K (4 M + 2)^2` operations.
 /// # Shapes
 /// R responses, K lines, M poles.

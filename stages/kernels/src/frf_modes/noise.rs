@@ -29,7 +29,8 @@ const LEAST: f64 = 0.02;
 
 /// Weights of the noise that third differences of neighbouring lines show, and weights for the start.
 ///
-/// A smooth response leaves no third differences, and of the lines of a band the median counts, which peaks do not move.
+/// A smooth response leaves no third differences, and of the lines of a band the median counts, which peaks do not
+/// move.
 pub(super) fn from_neighbours(lines: &Lines) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let row = |transfer: &Vec<c64>, share: f64| {
         let difference = |k: usize| -> f64 {
