@@ -13,6 +13,7 @@
 //! | `power-density` | [`Density`] | [`NewDensity`] |
 //! | `model` | [`innovations`], [`further_inputs`] | [`state_space`] |
 //! | `modes`, `roots` | [`modes()`], [`roots()`] | [`mode_table`], [`root_table`] |
+//! | `decay-modes`, `mode-shapes` | | [`damped_mode_table`], [`shape_array`] |
 //! | `ringdown-poles` | [`ringing()`] | [`ringing_array`] |
 
 mod average;
@@ -27,6 +28,7 @@ mod modes;
 mod pair;
 mod ringing;
 mod roots;
+mod shapes;
 mod transfer;
 
 pub(crate) use average::{Average, AveragedSet, empty_average};
@@ -41,10 +43,11 @@ pub(crate) use model::{
     first_sample, further_inputs, innovations, nuisances, state_nuisances, state_space, state_t0_ambiguity,
     t0_ambiguity_s,
 };
-pub(crate) use modes::{mode_table, modes};
+pub(crate) use modes::{damped_mode_table, mode_table, modes};
 pub(crate) use pair::{NewPair, Pair, PairSeries, PairSet, with_counts};
 pub(crate) use ringing::{ringing, ringing_array};
 pub(crate) use roots::{RootRow, root_table, roots};
+pub(crate) use shapes::{mode_document, shape_array};
 pub(crate) use transfer::{NewTransfer, Transfer};
 
 use afmid_kernels::events::EventKind;

@@ -24,6 +24,16 @@ pub(crate) fn mode_table(modes: &[ModeEstimate]) -> Table {
         .table()
 }
 
+/// The same with damping ratios.
+pub(crate) fn damped_mode_table(modes: &[ModeEstimate]) -> Table {
+    let damping = Table::of(modes)
+        .with_std(["damping_ratio", "damping_ratio_std"], "1", "share of critical damping", ModeEstimate::damping_ratio)
+        .table();
+    let mut table = mode_table(modes);
+    table.columns.extend(damping.columns);
+    table
+}
+
 fn estimates(table: &Table, value: &str, std: &str) -> Result<Vec<Estimate>, StageError> {
     let (values, stds) = (table.real(value)?, table.real(std)?);
     Ok(values.iter().zip(stds).map(|(&value, &std)| Estimate { value, std }).collect())

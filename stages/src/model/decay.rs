@@ -8,9 +8,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::course::{Course, Followed, follow};
-use self::tables::{fit_array, hit_table, modes_with_damping, shape_array, summary};
+use self::tables::{fit_array, hit_table, summary};
 use super::count::Count;
-use crate::artifacts::Decays;
+use crate::artifacts::{Decays, damped_mode_table, shape_array};
 use crate::events::DECAYS;
 use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, ModesWanted};
 
@@ -80,7 +80,7 @@ impl Default for DecayFit {
 }
 
 pub(super) const MODES: Port<Table> = Port::new("modes", "decay-modes", "modes, ascending");
-const SHAPES: Port<Array> =
+pub(super) const SHAPES: Port<Array> =
     Port::new("shapes", "mode-shapes", "complex mode shapes over mode and channel, and how alike they are");
 const HITS: Port<Table> = Port::new("hits", "decay-hits", "amplitude of each mode in each hit");
 const COURSE: Port<Table> = Port::new("course", "decay-course", "modes of the first and the last part of the decays");
@@ -119,10 +119,11 @@ impl Stage for DecayFit {
                  both ends{more}"
             ));
         }
+        let channels: Vec<&str> = decays.sensors.iter().map(|sensor| sensor.name.as_str()).collect();
         let empty = || Course::EMPTY.table();
         Ok(Ports::new()
-            .with(&MODES, modes_with_damping(&fit))
-            .with(&SHAPES, shape_array(&fit, &decays.sensors))
+            .with(&MODES, damped_mode_table(&fit.modes()))
+            .with(&SHAPES, shape_array(&fit.shapes.iter().collect::<Vec<_>>(), &channels))
             .with(&HITS, hit_table(&fit))
             .with(&COURSE, course.as_ref().map_or_else(empty, Course::table))
             .with(&FIT, fit_array(&fit, &decays, from))

@@ -1,56 +1,11 @@
 //! What the stage hands on.
 
 use afmid_pipeline::{Array, Axis, Document, StageError, Table};
-use num_complex::Complex64;
 use serde_json::{Value, json};
 
 use super::course::Course;
-use crate::artifacts::{Decays, SAMPLE_RATE_HZ, Sensor, mode_table};
-use afmid_kernels::ringdown::{ChannelRingdown, ModeEstimate, ModeShape, RecordFit, RingdownNoise, ShapePoint};
-
-/// Frequencies, quality factors, damping ratios.
-pub(super) fn modes_with_damping(fit: &ChannelRingdown) -> Table {
-    let modes = fit.modes();
-    let damping = Table::of(&modes)
-        .with_std(["damping_ratio", "damping_ratio_std"], "1", "share of critical damping", ModeEstimate::damping_ratio)
-        .table();
-    let mut table = mode_table(&modes);
-    table.columns.extend(damping.columns);
-    table
-}
-
-/// Shapes relative to their largest channel, and the modal assurance criterion between them.
-pub(super) fn shape_array(fit: &ChannelRingdown, sensors: &[Sensor]) -> Array {
-    let numbers = |count: usize| (1..=count).map(|k| k as f64).collect();
-    let points = || fit.shapes.iter().flat_map(|shape| &shape.points);
-    let mac = fit.mac();
-    let (over, pairs) = (&["mode", "channel"], &["mode", "other_mode"]);
-    let names: Vec<&str> = sensors.iter().map(|sensor| sensor.name.as_str()).collect();
-    let mac: Vec<f64> =
-        (0..mac.nrows()).flat_map(|i| (0..mac.ncols()).map(move |j| (i, j))).map(|at| mac[at]).collect();
-    Array::over(vec![
-        Axis::new("mode", "1", "number of the mode", numbers(fit.shapes.len())),
-        Axis::new("channel", "1", "number of the channel", numbers(sensors.len())),
-        Axis::new("other_mode", "1", "number of the other mode", numbers(fit.shapes.len())),
-    ])
-    .with(
-        "shape",
-        "1",
-        "amplitude and phase relative to the largest channel",
-        over,
-        points().map(|point| Complex64::new(point.value.re, point.value.im)).collect::<Vec<_>>(),
-    )
-    .with("re_std", "1", "standard error of its real part", over, points().map(|p| p.re_std()).collect::<Vec<f64>>())
-    .with(
-        "im_std",
-        "1",
-        "standard error of its imaginary part",
-        over,
-        points().map(|p| p.im_std()).collect::<Vec<f64>>(),
-    )
-    .with("mac", "1", "modal assurance criterion: 1 for shapes that are alike", pairs, mac)
-    .attribute("channels", names.join("\n"))
-}
+use crate::artifacts::{Decays, SAMPLE_RATE_HZ, mode_document};
+use afmid_kernels::ringdown::{ChannelRingdown, ModeEstimate, ModeShape, RecordFit, RingdownNoise};
 
 /// A mode in a hit.
 struct HitRow<'a> {
@@ -134,31 +89,8 @@ pub(super) fn summary(
     from_s: f64,
 ) -> Result<Document, StageError> {
     let modes = fit.modes();
-    let several = decays.sensors.len() > 1;
-    let mode = |(mode, shape): (&ModeEstimate, &ModeShape)| {
-        let damping = mode.damping_ratio();
-        let mut document = json!({
-            "frequency_hz": mode.frequency_hz.value,
-            "frequency_std_hz": mode.frequency_hz.std,
-            "quality_factor": mode.quality_factor.value,
-            "quality_factor_std": mode.quality_factor.std,
-            "damping_ratio": damping.value,
-            "damping_ratio_std": damping.std,
-        });
-        if several {
-            let point = |(sensor, point): (&Sensor, &ShapePoint)| {
-                json!({
-                    "channel": sensor.name,
-                    "re": point.value.re,
-                    "im": point.value.im,
-                    "re_std": point.re_std(),
-                    "im_std": point.im_std(),
-                })
-            };
-            document["shape"] = decays.sensors.iter().zip(&shape.points).map(point).collect::<Vec<Value>>().into();
-        }
-        document
-    };
+    let channels: Vec<&str> = decays.sensors.iter().map(|sensor| sensor.name.as_str()).collect();
+    let mode = |(mode, shape): (&ModeEstimate, &ModeShape)| mode_document(mode, shape, &channels);
     let noise = |noise: &RingdownNoise| {
         json!({
             "white_std": noise.white.sqrt(),
