@@ -50,7 +50,7 @@ fn damping(mode: &Value) -> String {
     format!("{} %", with_error(percent("damping_ratio"), percent("damping_ratio_std")))
 }
 
-fn modes(found: &Found<'_, Document>) -> Option<TableView> {
+pub(super) fn modes(found: &Found<'_, Document>) -> Option<TableView> {
     let document = &found.value.0;
     let modes = document.get("modes")?.as_array()?;
     let heads = ["mode", "frequency", "damping ratio", "quality factor"].map(|name| Head::number(name, ""));
@@ -106,7 +106,7 @@ fn course(found: &Found<'_, Document>) -> Option<TableView> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-fn shapes(found: &Found<'_, Document>) -> Option<TableView> {
+pub(super) fn shapes(found: &Found<'_, Document>) -> Option<TableView> {
     let modes = found.value.0.get("modes")?.as_array()?;
     let first = modes.first()?.get("shape")?.as_array()?;
     let mut heads = vec![Head::text("channel")];

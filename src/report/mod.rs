@@ -14,6 +14,7 @@ mod decay;
 mod diagnosis;
 mod figure;
 mod find;
+mod frf_modes;
 mod generic;
 mod number;
 mod page;

@@ -14,6 +14,7 @@ use super::decay;
 use super::diagnosis;
 use super::figure::Figure;
 use super::find::all;
+use super::frf_modes;
 use super::generic::stage_view;
 use super::number::{bytes, duration, quantity, with_error};
 use super::palette;
@@ -119,7 +120,7 @@ fn shown_text(out: &mut Output, state: &mut State, value: &Text) -> Result<(), m
 /// A batch's own; or the diagnosis first, where there is one: it is what the run was for.
 fn sections(run: &RunResult, link: &Link<'_>) -> impl Iterator<Item = Drawn> {
     let batch = batch::sections(run, link);
-    let of_run = || decay::sections(run).unwrap_or_else(|| paper::sections(run));
+    let of_run = || decay::sections(run).or_else(|| frf_modes::sections(run)).unwrap_or_else(|| paper::sections(run));
     let of_run = if batch.is_empty() { of_run() } else { Vec::new() };
     batch.into_iter().chain(diagnosis::section(run)).chain(of_run)
 }

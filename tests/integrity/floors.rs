@@ -74,6 +74,7 @@ const CRATES: [Crate; 5] = [
             &["spectra", "modes", "ringdown", "subspace", "vector_fitting"],
             &["contact", "pem"],
             &["grey", "stabilisation", "validation"],
+            &["frf_modes"],
         ],
     },
     Crate {

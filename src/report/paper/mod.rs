@@ -14,3 +14,4 @@ mod stabilisation;
 pub(crate) use bode::{Bode, BodeCurve, bode_figure};
 pub(crate) use response::model_curve;
 pub(crate) use sections::{Drawn, sections};
+pub(crate) use stabilisation::pole_marks;

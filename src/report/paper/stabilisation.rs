@@ -18,12 +18,24 @@ pub(crate) fn figures(run: &RunResult) -> Vec<Figure> {
 }
 
 fn figure(stage: &str, table: &Table) -> Option<Figure> {
+    let panel = Panel::new("", Axis::frequency(), Axis::new("order", "1").whole());
+    let mut panel = pole_marks(panel, table)?;
+    if let Some(order) = table.attributes.get("proposed_order").and_then(afmid_pipeline::Attribute::as_f64) {
+        panel = panel.with(Mark::at_y(order, "proposed order"));
+    }
+    let id: String = stage.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    let caption = "A mode stands in a column from the order on that can hold it; a pole that noise needs wanders. \
+        Stable: frequency and damping as at the next lower order.";
+    Some(Figure::new(&format!("stabilisation-{id}"), "Stabilisation diagram", caption).row(Row::one(380.0, panel)))
+}
+
+/// The panel with the poles of a table; none without poles.
+pub(crate) fn pole_marks(mut panel: Panel, table: &Table) -> Option<Panel> {
     let (f, order) = (table.real("frequency_hz").ok()?, table.integer("order").ok()?);
     let (stable, mode) = (table.flag("damping_stable").ok()?, table.integer("mode").ok()?);
     if f.is_empty() {
         return None;
     }
-    let mut panel = Panel::new("", Axis::frequency(), Axis::new("order", "1").whole());
     for (class, (series, marker, colour)) in MARKS.into_iter().enumerate() {
         let own = |row: &usize| class == if mode[*row] > 0 { 2 } else { usize::from(stable[*row]) };
         let rows: Vec<usize> = (0..table.rows()).filter(own).collect();
@@ -37,11 +49,5 @@ fn figure(stage: &str, table: &Table) -> Option<Figure> {
             colour,
         }));
     }
-    if let Some(order) = table.attributes.get("proposed_order").and_then(afmid_pipeline::Attribute::as_f64) {
-        panel = panel.with(Mark::at_y(order, "proposed order"));
-    }
-    let id: String = stage.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-    let caption = "A mode stands in a column from the order on that can hold it; a pole that noise needs wanders. \
-        Stable: frequency and damping as at the next lower order.";
-    Some(Figure::new(&format!("stabilisation-{id}"), "Stabilisation diagram", caption).row(Row::one(380.0, panel)))
+    Some(panel)
 }

@@ -9,6 +9,7 @@
 //! | [`ringdown`] | free decays of one or many events | frequencies, quality factors, amplitudes; at the Cramer-Rao bound |
 //! | [`pem`] | input and output | the innovations form of Eq. 8 with its covariance |
 //! | [`subspace`] | input and output, or a decay | poles, without a start |
+//! | [`frf_modes`] | frequency responses of many channels | modes, shapes, a stabilisation diagram; at the Cramer-Rao bound |
 //! | [`grey`] | input and output, numbers that are known | modes with static shares, real poles, a delay |
 //! | [`spectra`] | records | ETFE, smoothed responses, power spectra, thermal fits |
 //! | [`contact`] | poles in contact and free | contact stiffness and damping |
@@ -20,7 +21,7 @@
 //! From the ground up, each using only those before it:
 //! [`linear_algebra`], [`signal`], [`statistics`], [`effects`], [`Monitor`] - [`optimise`] - [`events`] -
 //! [`calibration`], [`force`], [`harmonics`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`], [`subspace`],
-//! [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`]. Kernels that fit many times
+//! [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`] - [`frf_modes`]. Kernels that fit many times
 //! take a [`Monitor`]: [`ringdown::fit_counted_ringdowns`], [`validation::choose_order`], [`validation::bootstrap`].
 //!
 //! ```
@@ -38,6 +39,7 @@ pub mod contact;
 pub mod effects;
 pub mod events;
 pub mod force;
+pub mod frf_modes;
 pub mod grey;
 pub mod harmonics;
 pub mod linear_algebra;

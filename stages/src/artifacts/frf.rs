@@ -2,7 +2,6 @@
 
 use afmid_pipeline::{Array, Attribute, Axis, StageError};
 use num_complex::Complex64;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SAMPLE_RATE_HZ;
@@ -18,40 +17,15 @@ const DRIVING_POINT: &str = "driving_point";
 const AVERAGES: &str = "averages";
 const ADDED_DECAY_PER_S: &str = "added_decay_per_s";
 
-/// What output over input is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Quantity {
-    /// Displacement over force.
-    Receptance,
-    /// Velocity over force.
-    Mobility,
-    /// Acceleration over force.
-    Accelerance,
-    /// Any other ratio.
-    #[default]
-    Transfer,
-}
+pub use afmid_kernels::frf_modes::FrfQuantity as Quantity;
 
-impl Quantity {
-    /// As the artifact states it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Receptance => "receptance",
-            Self::Mobility => "mobility",
-            Self::Accelerance => "accelerance",
-            Self::Transfer => "transfer",
-        }
-    }
-
-    /// Errors: an artifact's text that is none of these.
-    fn from_name(name: &str) -> Result<Self, StageError> {
-        let all = [Self::Receptance, Self::Mobility, Self::Accelerance, Self::Transfer];
-        all.into_iter().find(|quantity| quantity.name() == name).ok_or_else(|| {
-            let wanted = all.map(Self::name).join(", ");
-            StageError::new(format!("attribute `{QUANTITY}` is `{name}`, wanted one of {wanted}"))
-        })
-    }
+/// Errors: an artifact's text that is no quantity.
+fn quantity_of(name: &str) -> Result<Quantity, StageError> {
+    let all = [Quantity::Receptance, Quantity::Mobility, Quantity::Accelerance, Quantity::Transfer];
+    all.into_iter().find(|quantity| quantity.name() == name).ok_or_else(|| {
+        let wanted = all.map(Quantity::name).join(", ");
+        StageError::new(format!("attribute `{QUANTITY}` is `{name}`, wanted one of {wanted}"))
+    })
 }
 
 /// A point with the direction in which it moves or is pushed.
@@ -72,6 +46,11 @@ pub(crate) struct Point {
 }
 
 impl Point {
+    /// Its name with its direction.
+    pub fn label(&self) -> String {
+        format!("{}{}", self.name, self.direction)
+    }
+
     /// Whether both are one point in one direction.
     pub fn is(&self, other: &Self) -> bool {
         self.name == other.name && self.direction == other.direction
@@ -144,7 +123,7 @@ impl<'a> Frf<'a> {
             frf,
             variance: real(VARIANCE)?,
             coherence: real(COHERENCE)?,
-            quantity: Quantity::from_name(text(QUANTITY))?,
+            quantity: quantity_of(text(QUANTITY))?,
             unit: &array.variable(FRF)?.unit,
             driving_point,
             sample_rate_hz: number(SAMPLE_RATE_HZ),

@@ -13,6 +13,7 @@
 //! | `power-density` | [`Density`] | [`NewDensity`] |
 //! | `model` | [`innovations`], [`further_inputs`] | [`state_space`] |
 //! | `modes`, `roots` | [`modes()`], [`roots()`] | [`mode_table`], [`root_table`] |
+//! | `decay-modes`, `mode-shapes` | | [`mode_table`], [`shape_array`] |
 //! | `ringdown-poles` | [`ringing()`] | [`ringing_array`] |
 
 mod average;
@@ -27,6 +28,7 @@ mod modes;
 mod pair;
 mod ringing;
 mod roots;
+mod shapes;
 mod transfer;
 
 pub(crate) use average::{Average, AveragedSet, empty_average};
@@ -45,6 +47,7 @@ pub(crate) use modes::{mode_document, mode_table, modes};
 pub(crate) use pair::{NewPair, Pair, PairSeries, PairSet, with_counts};
 pub(crate) use ringing::{ringing, ringing_array};
 pub(crate) use roots::{RootRow, root_table, roots};
+pub(crate) use shapes::{shape_array, shaped_mode};
 pub(crate) use transfer::{NewTransfer, Transfer};
 
 use afmid_kernels::events::EventKind;

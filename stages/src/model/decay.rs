@@ -8,9 +8,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::course::Parts;
-use self::tables::{fit_array, hit_table, modes_with_lack, shape_array, summary};
+use self::tables::{fit_array, hit_table, modes_with_lack, summary};
 use super::count::Count;
-use crate::artifacts::Decays;
+use crate::artifacts::{Decays, shape_array};
 use crate::events::DECAYS;
 use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, ModesWanted, follow_channels};
 
@@ -80,7 +80,7 @@ impl Default for DecayFit {
 }
 
 pub(super) const MODES: Port<Table> = Port::new("modes", "decay-modes", "modes, ascending");
-const SHAPES: Port<Array> =
+pub(super) const SHAPES: Port<Array> =
     Port::new("shapes", "mode-shapes", "complex mode shapes over mode and channel, and how alike they are");
 const HITS: Port<Table> = Port::new("hits", "decay-hits", "amplitude of each mode in each hit");
 const COURSE: Port<Table> = Port::new("course", "decay-course", "modes of the first and the last part of the decays");
@@ -116,10 +116,11 @@ impl Stage for DecayFit {
                  are left out: `summary` lists them under `dropped`"
             ));
         }
+        let channels: Vec<&str> = decays.sensors.iter().map(|sensor| sensor.name.as_str()).collect();
         parts.warnings(whole).into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new()
             .with(&MODES, modes_with_lack(fit))
-            .with(&SHAPES, shape_array(fit, &decays.sensors))
+            .with(&SHAPES, shape_array(&fit.shapes.iter().collect::<Vec<_>>(), &channels))
             .with(&HITS, hit_table(&followed.whole))
             .with(&COURSE, parts.table())
             .with(&FIT, fit_array(&followed.whole, &decays))

@@ -8,6 +8,8 @@ mod decay;
 mod decay_example;
 mod era;
 mod example;
+mod frf_modes;
+mod frf_modes_example;
 mod grey;
 mod harmonics;
 mod harmonics_example;
@@ -30,6 +32,7 @@ pub use contact::ContactFit;
 pub use count::Count;
 pub use decay::{DecayFit, DecayNoise};
 pub use era::EraEstimate;
+pub use frf_modes::FrfModeFit;
 pub use grey::GreyEstimate;
 pub use harmonics::Harmonics;
 pub use known::{KnownNumber, KnownQuantity};
@@ -58,6 +61,7 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<Zeros>(),
     Entry::of::<RingdownFit>(),
     Entry::of::<DecayFit>(),
+    Entry::of::<FrfModeFit>(),
     Entry::of::<Harmonics>(),
     Entry::of::<ContactFit>(),
 ];

@@ -100,7 +100,7 @@ impl Stage for StabilisationDiagram {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.stabilisation",
-        version: 4,
+        version: 5,
         summary: "shows which poles stay as the order grows, and names the modes and the order",
         inputs: &[PAIR.spec()],
         outputs: &[POLES.spec(), MODES.spec(), SUMMARY.spec()],
@@ -173,7 +173,8 @@ fn mode_document(mode: &PhysicalMode) -> Value {
     })
 }
 
-fn pole_table(found: &Stabilisation) -> Table {
+/// Poles by order.
+pub(super) fn pole_table(found: &Stabilisation) -> Table {
     let mut table = Table::of(&found.poles)
         .with("order", "1", "order of the model", |p| p.order)
         .with("frequency_hz", "Hz", "magnitude of s over 2 pi", |p| p.frequency_hz)

@@ -36,9 +36,10 @@ pub(super) fn conclude(
     };
     let inputs: Vec<InputGains> = (0..problem.inputs)
         .map(|input| {
-            let own = &theta[problem.input_column(input)..];
+            let own = &theta[gains_column(problem, input)..];
             let second = |i: usize| if section_order(n, i) == 2 { own[2 * i + 1] } else { 0.0 };
-            InputGains { b: (0..a.len()).map(|i| [own[2 * i], second(i)]).collect(), feedthrough: own[n] }
+            let feedthrough = theta[problem.input_column(input) + n];
+            InputGains { b: (0..a.len()).map(|i| [own[2 * i], second(i)]).collect(), feedthrough }
         })
         .collect();
     let section = |i: usize| Section { order: section_order(n, i), a: a[i], b: inputs[0].b[i], k: gains[i] };
@@ -92,6 +93,13 @@ pub(super) fn conclude(
     })
 }
 
+/// First of the columns whose coefficients are an input's b. Where nothing was put in, what rings began with the first
+/// sample: the first input is taken for a pulse one sample earlier, whose b is the first experiment's initial state.
+fn gains_column(problem: &Problem, input: usize) -> usize {
+    let silent = problem.experiments.iter().all(|(u, _)| u.iter().all(|u| *u == 0.0));
+    if silent && input == 0 { problem.nuisance_column(0) } else { problem.input_column(input) }
+}
+
 /// Gradient share below which an iteration counts as converged however it ended: a tenth of a standard error at 8192
 /// samples.
 const SMALL_GRADIENT: f64 = 1e-3;
@@ -109,7 +117,11 @@ fn parameter_covariance(
     let lengths: Vec<usize> = problem.experiments.iter().map(|(_, y)| y.len()).collect();
     let all = covariance(&jacobian.columns(), e, &lengths, colour)?;
     let linear = jacobian.nonlinear.count();
-    let kept: Vec<usize> = (0..n).chain(linear..linear + problem.input_column(problem.inputs)).collect();
+    let of_input = |input: usize| {
+        let first = linear + gains_column(problem, input);
+        (first..first + n).chain([linear + problem.input_column(input) + n])
+    };
+    let kept: Vec<usize> = (0..n).chain((0..problem.inputs).flat_map(of_input)).collect();
     // the prediction errors fall where a regressor's share grows
     let sign = |parameter: usize| if parameter < linear { 1.0 } else { -1.0 };
     Ok(Mat::from_fn(kept.len(), kept.len(), |i, j| sign(kept[i]) * sign(kept[j]) * all[(kept[i], kept[j])]))

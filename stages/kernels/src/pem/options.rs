@@ -127,7 +127,8 @@ pub struct Verdict {
 /// A model with everything that its estimate yields.
 #[derive(Debug, Clone)]
 pub struct Identified {
-    /// The model from the first input: A and A - K C stable.
+    /// The model from the first input: A and A - K C stable. Where nothing was put in, its b is the first experiment's
+    /// x0, as of a pulse one sample before: what a mode counts for is what rings.
     pub model: InnovationsModel,
     /// How the further inputs enter it.
     pub further_inputs: Vec<InputGains>,

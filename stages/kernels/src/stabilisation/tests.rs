@@ -55,6 +55,20 @@ fn the_levers_modes_are_found_and_no_others() {
 }
 
 #[test]
+fn modes_of_a_decay_that_nothing_drives_are_established_by_what_rings() {
+    let noise = white_noise(SAMPLES - T0, 2.5e-4, 3);
+    let release = lever(3).release(SAMPLES, T0 as f64, -0.8);
+    let y: Vec<f64> = release[T0..].iter().zip(noise).map(|(y, e)| y + e).collect();
+    let u = vec![0.0; y.len()];
+    let era = Subspace::of_decay(&y, 300).unwrap();
+    let candidates: Vec<(usize, Vec<c64>)> = (2..=40).map(|order| (order, era.poles(order).unwrap())).collect();
+    let found = stabilisation(&candidates, 2e-7, &StabilisationCriteria::default()).unwrap();
+    let found = found.established(Experiment { input: &u, output: &y }, 2e-7, 6.0).unwrap();
+    let near = |(mode, f): (&PhysicalMode, &f64)| (mode.frequency_hz / f - 1.0).abs() < 1e-3;
+    assert!(found.modes.len() == 3 && found.modes.iter().zip(&lever(3).frequency_hz).all(near), "{:?}", found.modes);
+}
+
+#[test]
 fn marks_and_clusters_are_what_the_criteria_say() {
     let pole = |f: f64, q: f64| {
         let w = std::f64::consts::TAU * f;

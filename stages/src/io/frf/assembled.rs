@@ -62,9 +62,8 @@ impl Assembled {
     /// What is shown of it.
     pub fn summary(&self) -> Result<Document, StageError> {
         let frf = &self.frf;
-        let name = |point: &Point| format!("{}{}", point.name, point.direction);
         let row = |response: &ResponseOf| {
-            json!({ "output": name(&response.output), "input": name(&response.input),
+            json!({ "output": response.output.label(), "input": response.input.label(),
                     "position_m": response.input.position_m.or(response.output.position_m) })
         };
         Document::new(&json!({

@@ -1,52 +1,16 @@
 //! What the stage hands on.
 
 use afmid_pipeline::{Array, Axis, Document, StageError, Table};
-use num_complex::Complex64;
 use serde_json::{Value, json};
 
 use super::course::{Parts, dropped_document};
-use crate::artifacts::{Decays, SAMPLE_RATE_HZ, Sensor, mode_document, mode_table};
-use afmid_kernels::ringdown::{
-    ChannelRingdown, FollowedDecay, ModeEstimate, ModeShape, RecordFit, RingdownNoise, ShapePoint,
-};
+use crate::artifacts::{Decays, SAMPLE_RATE_HZ, mode_table, shaped_mode};
+use afmid_kernels::ringdown::{ChannelRingdown, FollowedDecay, ModeEstimate, ModeShape, RecordFit, RingdownNoise};
 
 /// The modes, and how much more than noise the fit leaves round each.
 pub(super) fn modes_with_lack(fit: &ChannelRingdown) -> Table {
     let what = "factor of the variances for what the fit leaves round the mode; 1: noise";
     mode_table(&fit.modes()).with("lack_of_fit", "1", what, fit.lack_of_fit.clone())
-}
-
-/// Shapes relative to their largest channel, and the modal assurance criterion between them.
-pub(super) fn shape_array(fit: &ChannelRingdown, sensors: &[Sensor]) -> Array {
-    let numbers = |count: usize| (1..=count).map(|k| k as f64).collect();
-    let points = || fit.shapes.iter().flat_map(|shape| &shape.points);
-    let mac = fit.mac();
-    let (over, pairs) = (&["mode", "channel"], &["mode", "other_mode"]);
-    let names: Vec<&str> = sensors.iter().map(|sensor| sensor.name.as_str()).collect();
-    let mac: Vec<f64> =
-        (0..mac.nrows()).flat_map(|i| (0..mac.ncols()).map(move |j| (i, j))).map(|at| mac[at]).collect();
-    Array::over(vec![
-        Axis::new("mode", "1", "number of the mode", numbers(fit.shapes.len())),
-        Axis::new("channel", "1", "number of the channel", numbers(sensors.len())),
-        Axis::new("other_mode", "1", "number of the other mode", numbers(fit.shapes.len())),
-    ])
-    .with(
-        "shape",
-        "1",
-        "amplitude and phase relative to the largest channel",
-        over,
-        points().map(|point| Complex64::new(point.value.re, point.value.im)).collect::<Vec<_>>(),
-    )
-    .with("re_std", "1", "standard error of its real part", over, points().map(|p| p.re_std()).collect::<Vec<f64>>())
-    .with(
-        "im_std",
-        "1",
-        "standard error of its imaginary part",
-        over,
-        points().map(|p| p.im_std()).collect::<Vec<f64>>(),
-    )
-    .with("mac", "1", "modal assurance criterion: 1 for shapes that are alike", pairs, mac)
-    .attribute("channels", names.join("\n"))
 }
 
 /// A mode in a hit.
@@ -129,23 +93,8 @@ pub(super) fn summary(
 ) -> Result<Document, StageError> {
     let fit = &followed.fit;
     let modes = fit.modes();
-    let several = decays.sensors.len() > 1;
-    let mode = |(mode, shape): (&ModeEstimate, &ModeShape)| {
-        let mut document = mode_document(mode);
-        if several {
-            let point = |(sensor, point): (&Sensor, &ShapePoint)| {
-                json!({
-                    "channel": sensor.name,
-                    "re": point.value.re,
-                    "im": point.value.im,
-                    "re_std": point.re_std(),
-                    "im_std": point.im_std(),
-                })
-            };
-            document["shape"] = decays.sensors.iter().zip(&shape.points).map(point).collect::<Vec<Value>>().into();
-        }
-        document
-    };
+    let channels: Vec<&str> = decays.sensors.iter().map(|sensor| sensor.name.as_str()).collect();
+    let mode = |(mode, shape): (&ModeEstimate, &ModeShape)| shaped_mode(mode, shape, &channels);
     let noise = |noise: &RingdownNoise| {
         json!({
             "white_std": noise.white.sqrt(),

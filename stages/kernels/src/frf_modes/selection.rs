@@ -1,0 +1,251 @@
+//! How many modes there are: one more as long as it lowers the weighted squares by more than chance, one less where a
+//! mode is not established in the end.
+
+use faer::{Mat, c64};
+
+use super::FrfModesOptions;
+use super::candidates::{of_residual, same};
+use super::data::Lines;
+use super::fit::{COARSE, FINE, Fitted, fitted};
+use super::lack::{Lack, correlation};
+use super::model::width;
+use super::noise::from_residual;
+use super::projection::Projection;
+use crate::linear_algebra::symmetric_inverse;
+use crate::model::ModelError;
+use crate::ringdown::{ModesWanted, OrderTried};
+use crate::statistics::f_tail;
+
+/// Times that the variance is estimated from what a fit leaves. Why: the second changes it by less than its error.
+const ROUNDS: usize = 2;
+/// Candidates in a row that may fail before the search ends.
+const FAILURES: usize = 4;
+/// Pairs beside the modes of the band at most: they stand for what lies beyond it.
+const SPARE: usize = 4;
+/// Standard errors of its damping that a mode must have, and most of its half width that its frequency's error may be.
+const DETERMINED: (f64, f64) = (3.0, 1.0);
+/// Share of the energy of a stronger mode within whose width it lies below which a mode is that one's lack of fit,
+/// where the fit does not reach the noise there.
+const COMPANION: f64 = 0.01;
+
+/// Half widths from the band's ends within which a pole is not a mode of the band: its half-power points are not seen.
+const EDGE: f64 = 1.0;
+
+/// A search over numbers of modes.
+pub(super) struct Search<'a> {
+    /// The lines, weighted by what the last fit leaves where no variance was given.
+    pub lines: Lines,
+    pub options: &'a FrfModesOptions,
+    pub tried: Vec<OrderTried>,
+    /// What the fit with the most modes leaves, over its lines: how far neighbours are alike where no mode is missing.
+    most: Option<(Lines, Vec<Vec<c64>>)>,
+}
+
+impl<'a> Search<'a> {
+    /// From these poles. Errors: those of the fit.
+    pub fn new(lines: Lines, poles: &[c64], options: &'a FrfModesOptions) -> Result<(Self, Fitted), ModelError> {
+        let fit = fitted(&lines, poles, options, COARSE)?;
+        let mut search = Self { lines, options, tried: Vec::new(), most: None };
+        let fit = search.reweighted(fit, COARSE)?;
+        Ok((search, fit))
+    }
+
+    /// The same search over other lines, from its fit. Errors: those of the fit.
+    pub fn continued(self, lines: Lines, fit: &Fitted) -> Result<(Self, Fitted), ModelError> {
+        let (search, fit) = Self::new(lines, &fit.at.poles, self.options)?;
+        Ok((Self { tried: self.tried, most: self.most, ..search }, fit))
+    }
+
+    /// The fit with the variance of what it leaves, where none was given. Errors: those of the fit.
+    pub fn reweighted(&mut self, fit: Fitted, settled: f64) -> Result<Fitted, ModelError> {
+        if self.lines.known {
+            return Ok(fit);
+        }
+        let weight = from_residual(&self.lines, &fit.at, &fit.at.left(&self.lines, self.options));
+        self.lines = self.lines.weighted(weight);
+        fitted(&self.lines, &fit.at.poles, self.options, settled)
+    }
+
+    /// Adds candidates to a fit, the one with the largest gain first, then drops what is not established. Errors: those
+    /// of the fit.
+    pub fn run(&mut self, start: Fitted, candidates: &[c64]) -> Result<Fitted, ModelError> {
+        let mut fit = self.added(start, candidates.to_vec())?;
+        // what the diagram has missed is in the residual
+        loop {
+            let before = fit.at.poles.len();
+            let further = of_residual(&self.lines, &fit.at.left(&self.lines, self.options), self.options);
+            fit = self.added(fit, further)?;
+            if fit.at.poles.len() == before {
+                break;
+            }
+        }
+        match self.options.modes {
+            ModesWanted::Fixed(_) => Ok(fit),
+            ModesWanted::AtMost(_) => self.pruned(fit),
+        }
+    }
+
+    /// The last fit, the variance from what it leaves; what is not established then is dropped, too. Errors: those of
+    /// the fit.
+    pub fn finished(&mut self, mut fit: Fitted) -> Result<Fitted, ModelError> {
+        loop {
+            for _ in 0..ROUNDS {
+                fit = self.reweighted(fit, FINE)?;
+            }
+            fit = fitted(&self.lines, &fit.at.poles, self.options, FINE)?;
+            let weakest = match self.options.modes {
+                ModesWanted::Fixed(_) => None,
+                ModesWanted::AtMost(_) => self.weakest(&fit),
+            };
+            let Some(weakest) = weakest else { return Ok(fit) };
+            let mut poles = fit.at.poles;
+            poles.remove(weakest);
+            fit = fitted(&self.lines, &poles, self.options, COARSE)?;
+        }
+    }
+
+    /// Modes of the band among the poles.
+    fn count(&self, fit: &Fitted) -> usize {
+        fit.at.poles.iter().filter(|s| self.is_mode(**s)).count()
+    }
+
+    fn added(&mut self, mut fit: Fitted, mut candidates: Vec<c64>) -> Result<Fitted, ModelError> {
+        let mut failures = 0;
+        let most = self.options.largest() + SPARE;
+        while failures < FAILURES && self.count(&fit) < self.options.largest() && modes(&fit.at.poles) < most {
+            candidates.retain(|s| !fit.at.poles.iter().any(|t| same(*s, *t) && (s - t).norm() < 0.05 * t.re.abs()));
+            let gains = fit.at.gains(&self.lines, self.options, &candidates);
+            let Some(best) = (0..gains.len()).max_by(|&a, &b| gains[a].total_cmp(&gains[b])) else { break };
+            let s = candidates.swap_remove(best);
+            // a start that gains less than its parameters do by chance leads nowhere
+            let hopeless = gains[best] < self.parameters() * self.level(&fit, s).min(1.0);
+            match if hopeless { None } else { self.with(&fit, s)? } {
+                Some(next) => (fit, failures) = (self.reweighted(next, COARSE)?, 0),
+                None => {
+                    failures += 1;
+                    candidates.retain(|t| !same(s, *t));
+                }
+            }
+        }
+        Ok(fit)
+    }
+
+    /// Real parameters of a mode.
+    fn parameters(&self) -> f64 {
+        (2 * self.lines.responses() + 2) as f64
+    }
+
+    /// Level of the residual around a pole, at least one where the variance was given.
+    fn level(&self, fit: &Fitted, s: c64) -> f64 {
+        let left = fit.at.left(&self.lines, self.options);
+        let lack = Lack::around(&self.lines, &left, &fit.at.poles, s);
+        let least = if self.lines.known { 1.0 } else { 0.0 };
+        lack.level.max(least)
+    }
+
+    /// The fit with a further mode, if it is established.
+    fn with(&mut self, fit: &Fitted, s: c64) -> Result<Option<Fitted>, ModelError> {
+        let mut poles = fit.at.poles.clone();
+        poles.insert(modes(&poles), s);
+        let next = fitted(&self.lines, &poles, self.options, COARSE)?;
+        let gain = fit.at.energy() - next.at.energy();
+        let new = next.at.poles[modes(&poles) - 1];
+        let kept = match self.options.modes {
+            ModesWanted::Fixed(_) => gain > 0.0,
+            ModesWanted::AtMost(_) => self.significant(&next, gain, self.level(&next, new).min(1.0), 1.0),
+        };
+        self.tried.push(OrderTried { modes: modes(&poles), gain, kept });
+        Ok(kept.then_some(next))
+    }
+
+    /// F test of a mode that lowers the weighted squares by `gain`: its parameters against the `level` of the residual.
+    /// Each line may hold one, so the probability is divided by their number.
+    fn significant(&self, fit: &Fitted, gain: f64, level: f64, correlation: f64) -> bool {
+        let f = gain / self.parameters() / (level * correlation).max(f64::MIN_POSITIVE);
+        let degrees = self.lines.values().saturating_sub(fit.at.parameters()).max(1) as f64 / correlation;
+        f_tail(f, self.parameters(), degrees) * (self.lines.len() as f64) < self.options.false_alarm
+    }
+
+    /// Drops modes one by one that are not established, the least first.
+    fn pruned(&mut self, mut fit: Fitted) -> Result<Fitted, ModelError> {
+        self.most = Some((self.lines.clone(), fit.at.left(&self.lines, self.options)));
+        while let Some(weakest) = self.weakest(&fit) {
+            let mut poles = fit.at.poles.clone();
+            poles.remove(weakest);
+            let left = fitted(&self.lines, &poles, self.options, COARSE)?;
+            fit = self.reweighted(left, COARSE)?;
+        }
+        Ok(fit)
+    }
+
+    /// The mode that is least established, if one is not.
+    fn weakest(&self, fit: &Fitted) -> Option<usize> {
+        let count = modes(&fit.at.poles);
+        let left = fit.at.left(&self.lines, self.options);
+        let quiet = self.lines.weighted(self.lines.quiet.clone());
+        let energy = energies(&fit.at, &self.lines);
+        let (information, _) = fit.at.normal();
+        let covariance = symmetric_inverse(&information);
+        let mut worst: Option<(f64, usize)> = None;
+        for j in 0..count {
+            let s = fit.at.poles[j];
+            let lack = Lack::around(&self.lines, &left, &fit.at.poles, s);
+            let gain = fit.at.share(j);
+            let fails = match self.is_mode(s) {
+                true => {
+                    let known = self.determined(s, &covariance, 2 * j, lack.factor());
+                    let short = Lack::around(&quiet, &left, &fit.at.poles, s).shows();
+                    let companion = short && self.is_companion(&fit.at.poles[..count], &energy, j);
+                    let alike = self.most.as_ref().map_or(1.0, |(lines, left)| correlation(lines, left, s));
+                    !known || companion || !self.significant(fit, gain, self.level(fit, s), alike)
+                }
+                // what stands for modes beyond the band stays if it gains anything: without it all else fits less
+                false => !self.significant(fit, gain, self.level(fit, s).min(1.0), 1.0),
+            };
+            if fails && worst.is_none_or(|(least, _)| gain < least) {
+                worst = Some((gain, j));
+            }
+        }
+        worst.map(|(_, j)| j)
+    }
+
+    /// Whether a pole is a mode of the band: its half-power points lie in it, and it is
+    /// damped weakly enough. Others that are significant stay: they stand for what modes beyond the band leave in it.
+    pub fn is_mode(&self, s: c64) -> bool {
+        let (f, half) = (s.im / std::f64::consts::TAU, -s.re / std::f64::consts::TAU);
+        let (first, last) = (self.lines.frequency_hz[0], self.lines.frequency_hz[self.lines.len() - 1]);
+        let inside = f - EDGE * half > first && f + EDGE * half < last;
+        width(s) == 2 && inside && s.norm() >= 2.0 * self.options.least_quality_factor * -s.re
+    }
+
+    /// Whether damping and frequency are known.
+    fn determined(&self, s: c64, covariance: &Mat<f64>, first: usize, factor: f64) -> bool {
+        let std = |i: usize| (factor * covariance[(i, i)]).max(0.0).sqrt();
+        -s.re > DETERMINED.0 * std(first) && std(first + 1) < -DETERMINED.1 * s.re
+    }
+
+    /// Whether a stronger mode is so near that this one may be its lack of fit.
+    fn is_companion(&self, poles: &[c64], energy: &[f64], j: usize) -> bool {
+        let line = std::f64::consts::TAU * self.lines.resolution_hz;
+        let near = |k: usize| {
+            let distance = (poles[j].im - poles[k].im).abs();
+            let width = 2.0 * poles[j].re.abs().max(poles[k].re.abs());
+            let faint = energy[j] < COMPANION * energy[k];
+            energy[j] < energy[k] && distance < if faint { width.max(line) } else { line }
+        };
+        (0..poles.len()).any(near)
+    }
+}
+
+/// Oscillating poles; they come first.
+pub(super) fn modes(poles: &[c64]) -> usize {
+    poles.iter().filter(|s| width(**s) == 2).count()
+}
+
+/// Energy of each pole over all responses, each weighted by its mean weight.
+fn energies(at: &Projection, lines: &Lines) -> Vec<f64> {
+    let mean = |weight: &[f64]| weight.iter().sum::<f64>() / weight.len() as f64;
+    let of = |r: usize| at.residues(r).into_iter().map(|a| a.norm_sqr() * mean(&lines.weight[r])).collect::<Vec<f64>>();
+    let rows: Vec<Vec<f64>> = (0..lines.responses()).map(of).collect();
+    at.poles.iter().enumerate().map(|(j, s)| rows.iter().map(|row| row[j]).sum::<f64>() / -s.re).collect()
+}

@@ -1,0 +1,152 @@
+//! The stage `model.frf_modes`.
+
+mod tables;
+
+use afmid_pipeline::{Array, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
+use faer::c64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use self::tables::{channels, fit_array, summary};
+use super::count::Count;
+use super::decay::{MODES, SHAPES};
+use super::stabilisation::pole_table;
+use crate::artifacts::{Frf, mode_table, shape_array};
+use crate::io::FRF;
+use afmid_kernels::frf_modes::{FrfModes, FrfModesOptions, MeasuredResponses, frf_modes};
+use afmid_kernels::ringdown::{ModeEstimate, ModeShape, ModesWanted};
+
+/// Fits modes and mode shapes to measured frequency responses: one set of poles for all responses.
+///
+/// # Model
+/// `H_r = p^q ( sum_m A_rm / (p - s_m) + conj(A_rm) / (p - conj s_m) + L_r / p^2 + U_r )` plus noise, with `p = i w`
+/// and q 0, 1 or 2 for a receptance, mobility or accelerance: poles shared, residues of each response its own, real
+/// residual terms for modes below and above the band.
+/// # Method
+/// Starts from a common denominator over all orders (least-squares complex frequency domain); modes one by one, kept
+/// where an F test finds their gain above chance at the level and correlation of what is left; maximum likelihood by
+/// variable projection. Variances are those of the responses, or estimated by bands.
+/// # Shapes
+/// `modes` by row, ascending; `shapes` over mode and channel (a response's point that goes from response to response);
+/// `diagram` a row per order and pole; `fit` over response and frequency.
+/// # Units
+/// Hz; shapes relative to the response with the largest residue, and per root of a kilogram at unit modal mass where
+/// there is a driving point.
+/// # Accuracy
+/// docs/results/frf.md. Standard errors count what the fit leaves around a mode, neighbours that are alike, and
+/// responses that disagree on a pole. A decay that a window added is taken off.
+/// # Errors
+/// Fewer than 8 lines; no mode.
+/// # Source
+/// P. Guillaume et al., Proc. 21st IMAC (2003); G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct FrfModeFit {
+    /// Oscillating modes, 1 to 40, or `auto`: as many up to `max_modes` as the responses show.
+    pub modes: Count<40>,
+    /// Largest number that `auto` finds. Why: each takes a fit.
+    #[schemars(range(min = 1, max = 40))]
+    pub max_modes: usize,
+    /// How it is fitted.
+    #[serde(flatten)]
+    pub fit: FrfModesOptions,
+}
+
+impl Default for FrfModeFit {
+    fn default() -> Self {
+        Self { modes: Count::Auto, max_modes: 12, fit: FrfModesOptions::default() }
+    }
+}
+
+const DIAGRAM: Port<Table> = Port::new("diagram", "ordered-poles", "poles of every order, and whether they are stable");
+const FIT: Port<Array> =
+    Port::new("fit", "frf-fit", "responses as measured and as fitted, and all of them at once (mode indicator)");
+pub(super) const SUMMARY: Port<Document> =
+    Port::new("summary", "summary", "modes with damping and shapes, and what does not fit");
+
+impl Stage for FrfModeFit {
+    const HAS_KERNEL_OPTIONS: bool = true;
+    const SPEC: Spec = Spec {
+        name: "model.frf_modes",
+        version: 1,
+        summary: "fits modes and mode shapes to measured frequency responses of many channels",
+        inputs: &[FRF.spec()],
+        outputs: &[MODES.spec(), SHAPES.spec(), DIAGRAM.spec(), FIT.spec(), SUMMARY.spec()],
+        source: "P. Guillaume et al., Proc. 21st IMAC (2003)",
+        ..Spec::STORED
+    };
+
+    fn check(&self, faults: &mut Faults) {
+        if let (Some(from), Some(to)) = (self.fit.from_hz, self.fit.to_hz) {
+            faults.require(from < to, || format!("`from_hz` is {from}, wanted below `to_hz`, {to}"));
+        }
+    }
+
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
+        let frf = Frf::new(inputs.get(&FRF)?)?;
+        let found = self.fitted(&frf)?;
+        let names = channels(&frf);
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        self.warnings(&found).into_iter().for_each(|warning| cx.warn(warning));
+        let shapes: Vec<&ModeShape> = found.modes.iter().map(|mode| &mode.shape).collect();
+        let modes: Vec<ModeEstimate> = found.modes.iter().map(|mode| mode.estimate).collect();
+        Ok(Ports::new()
+            .with(&MODES, mode_table(&modes))
+            .with(&SHAPES, shape_array(&shapes, &names))
+            .with(&DIAGRAM, pole_table(&found.diagram))
+            .with(&FIT, fit_array(&found, &frf))
+            .with(&SUMMARY, summary(&found, &frf, &names)?))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::frf_modes_example::examples()
+    }
+}
+
+impl FrfModeFit {
+    fn fitted(&self, frf: &Frf<'_>) -> Result<FrfModes, StageError> {
+        let options = FrfModesOptions {
+            quantity: frf.quantity,
+            added_decay_per_s: frf.added_decay_per_s,
+            driving_point: frf.driving_point,
+            modes: match self.modes {
+                Count::Fixed(modes) => ModesWanted::Fixed(modes),
+                Count::Auto => ModesWanted::AtMost(self.max_modes),
+            },
+            ..self.fit.clone()
+        };
+        let count = 0..frf.responses.len();
+        let row = |r: usize| frf.row(r).iter().map(|h| c64::new(h.re, h.im)).collect();
+        let rows: Vec<Vec<c64>> = count.clone().map(row).collect();
+        let rows: Vec<&[c64]> = rows.iter().map(Vec::as_slice).collect();
+        let variance: Option<Vec<&[f64]>> = count.map(|r| frf.row_variance(r)).collect();
+        let measured =
+            MeasuredResponses { frequency_hz: frf.frequency_hz, transfer: &rows, variance: variance.as_deref() };
+        frf_modes(measured, &options).map_err(StageError::from_error)
+    }
+
+    /// What does not fit.
+    fn warnings(&self, found: &FrfModes) -> Vec<String> {
+        let mut all = Vec::new();
+        if !found.verdict.converged {
+            let distance = found.verdict.distance;
+            all.push(format!("no minimum: the last step promised {distance:.2} standard errors"));
+        }
+        if self.modes == Count::Auto && found.modes.len() == self.max_modes {
+            let most = self.max_modes;
+            all.push(format!("`modes = \"auto\"` found {most}, all that `max_modes` allows: there may be more"));
+        }
+        let alike = found.modes.iter().map(|mode| mode.correlation).fold(1.0, f64::max);
+        if alike > ALIKE {
+            all.push(format!(
+                "neighbouring lines have like residuals: some {alike:.0} of them count as one. Standard errors are \
+                 {:.1} times larger for it; windows, zero padding or modes that are missing leave such residuals",
+                alike.sqrt()
+            ));
+        }
+        all
+    }
+}
+
+/// Lines that count as one from which on it is said. Why: a Hann window makes two alike.
+const ALIKE: f64 = 3.0;

@@ -1,0 +1,78 @@
+//! What the stage hands on.
+
+use afmid_pipeline::{Array, Axis, Document, StageError};
+use num_complex::Complex64;
+use serde_json::{Value, json};
+
+use crate::artifacts::{Frf, shaped_mode};
+use afmid_kernels::frf_modes::{FrfMode, FrfModes};
+use afmid_kernels::ringdown::Estimate;
+
+/// Names of the responses: the point that goes from one to the next, both where both do.
+pub(super) fn channels(frf: &Frf<'_>) -> Vec<String> {
+    let fixed = |of: &dyn Fn(usize) -> String| (1..frf.responses.len()).all(|r| of(r) == of(0));
+    let output = |r: usize| frf.responses[r].output.label();
+    let input = |r: usize| frf.responses[r].input.label();
+    let name = |r: usize| match (fixed(&output), fixed(&input)) {
+        (true, false) => input(r),
+        (_, true) => output(r),
+        _ => format!("{} / {}", output(r), input(r)),
+    };
+    (0..frf.responses.len()).map(name).collect()
+}
+
+/// Responses as measured and as fitted over the lines of the fit, and the mode indicator.
+pub(super) fn fit_array(found: &FrfModes, frf: &Frf<'_>) -> Array {
+    let frequency_hz = &found.indicator.frequency_hz;
+    let first = frf.frequency_hz.partition_point(|f| *f < frequency_hz.first().copied().unwrap_or(0.0));
+    let lines = first..(first + frequency_hz.len()).min(frf.frequency_hz.len());
+    let rows = 0..frf.responses.len();
+    let measured: Vec<Complex64> =
+        rows.clone().flat_map(|r| frf.row(r).get(lines.clone()).unwrap_or_default().to_vec()).collect();
+    let fitted: Vec<Complex64> =
+        rows.clone().flat_map(|r| found.model.response(r, frequency_hz)).map(|h| Complex64::new(h.re, h.im)).collect();
+    let over = &["response", "frequency_hz"];
+    Array::over(vec![
+        Axis::new("response", "1", "number of the response", rows.map(|r| (r + 1) as f64).collect()),
+        Axis::new("frequency_hz", "Hz", "frequency", frequency_hz.clone()),
+    ])
+    .with("measured", frf.unit, "measured frequency response", over, measured)
+    .with("fitted", frf.unit, "the same as fitted", over, fitted)
+    .with(
+        "indicator",
+        "1",
+        "root of the sum of squares of all responses, each over its root mean square",
+        &["frequency_hz"],
+        found.indicator.value.clone(),
+    )
+    .attribute("channels", channels(frf).join("\n"))
+}
+
+/// The contract of `show --json`, and what does not fit.
+pub(super) fn summary(found: &FrfModes, frf: &Frf<'_>, names: &[&str]) -> Result<Document, StageError> {
+    let mode = |mode: &FrfMode| {
+        let mut document = shaped_mode(&mode.estimate, &mode.shape, names);
+        let point = |(name, phi): (&&str, &Estimate)| json!({ "channel": name, "value": phi.value, "std": phi.std });
+        let normalised = |all: &Vec<Estimate>| names.iter().zip(all).map(point).collect::<Vec<Value>>();
+        document["phase_collinearity"] = json!(mode.phase_collinearity);
+        document["lack_of_fit"] = json!(mode.lack_of_fit);
+        document["lines_that_count_as_one"] = json!(mode.correlation);
+        document["mass_normalised"] = json!(mode.mass_normalised.as_ref().map(normalised));
+        document
+    };
+    Document::new(&json!({
+        "modes": found.modes.iter().map(mode).collect::<Vec<Value>>(),
+        "responses": names.len(),
+        "quantity": frf.quantity.name(),
+        "unit": frf.unit,
+        "driving_point": frf.driving_point.map(|row| row + 1),
+        "added_decay_per_s": frf.added_decay_per_s,
+        "variance": if frf.variance.is_some() { "given" } else { "estimated" },
+        "reduced_chi_square": found.reduced_chi_square,
+        "converged": found.verdict.converged,
+        "from_hz": found.indicator.frequency_hz.first(),
+        "to_hz": found.indicator.frequency_hz.last(),
+        "tried": found.tried.iter().map(|tried| json!({ "modes": tried.modes, "gain": tried.gain, "kept": tried.kept }))
+            .collect::<Vec<Value>>(),
+    }))
+}
