@@ -63,8 +63,8 @@ pub struct NewPipelineArgs {
     /// an input, a drive].
     #[arg(long, value_name = "NAME")]
     pub input: Vec<String>,
-    /// What files and channels are, of decays: hits, or sensors that saw the same hits [default: files are hits, channels
-    /// are sensors, cells are hits].
+    /// What files and channels are, of decays: hits, or sensors that saw the same hits; of frequency responses: points
+    /// [default: files are hits, channels are sensors, cells are hits].
     #[arg(long = "as", value_enum, value_name = "WHAT")]
     pub records_are: Option<RecordsAre>,
     /// Samples per second in Hz, of files that state none.
@@ -89,6 +89,8 @@ pub enum RecordsAre {
     Hits,
     /// All files and channels saw the same hits.
     Sensors,
+    /// Each file is another point of the structure: of frequency responses.
+    Points,
 }
 
 /// What a pipeline is to find.
@@ -107,6 +109,8 @@ pub enum Goal {
     Coupled,
     /// Transfer function and modes from a measured input and output.
     InputOutput,
+    /// Modes and mode shapes from frequency responses: measured ones, or those of hits with a measured force.
+    Frf,
     /// Resonance, quality factor and noise floor of a resonator that nothing but noise drives.
     Thermal,
     /// Frequency and harmonics of an oscillation that does not decay.

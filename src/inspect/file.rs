@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::StageError;
-use afmid_pipeline::recording::{InputFiles, Reading, open_contents};
+use afmid_pipeline::recording::{InputFiles, Reading, open_unpacked};
 
 use super::channel::Channel;
 use super::config::stage;
@@ -64,18 +64,22 @@ fn refused(error: StageError) -> Outcome {
 }
 
 fn read(path: &Path) -> Result<Holdings, StageError> {
-    let (name, contents) = open_contents(&InputFiles::new(), path, &Reading::of("auto", None))?;
+    let opened = open_unpacked(&InputFiles::new(), path, &Reading::of("auto", None))?;
+    let contents = &opened.contents;
     let channels = contents.channels.iter().enumerate();
     let channels: Vec<Channel> =
         channels.map(|(index, found)| Channel::of(found, index < MOST_READ)).collect::<Result<_, _>>()?;
     let ringdown = of_file(&channels, &contents.channels);
     let best = ringdown.channel.and_then(|index| channels.get(index));
     Ok(Holdings {
-        format: if name == "native" { format!("native record ({})", contents.format) } else { contents.format },
-        started_at: contents.started_at,
+        format: match opened.format {
+            "native" => format!("native record ({})", contents.format),
+            _ => contents.format.clone(),
+        },
+        started_at: contents.started_at.clone(),
         stage: best.map(|channel| stage(path, channel)),
         channels,
-        remarks: contents.remarks,
+        remarks: contents.remarks.clone(),
         ringdown,
     })
 }

@@ -4,7 +4,8 @@ use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, FreeDecay, f
 use afmid_kernels::harmonics::{HarmonicOptions, fit_harmonics};
 use afmid_kernels::signal::{Detrend, Welch};
 use afmid_kernels::spectra::{AveragedDensity, SeenThrough, ThermalFitSettings, thermal_fit};
-use afmid_pipeline::recording::{InputFiles, Reading, open_contents};
+use afmid_kernels::statistics::median;
+use afmid_pipeline::recording::{InputFiles, Reading, open_unpacked, responses as responses_of};
 
 use super::channels::{drives, input_and_output, named, nothing, sensors, usable};
 use super::pipeline::{Wanted, segment_samples};
@@ -24,6 +25,8 @@ pub struct Choice<'a> {
     pub channels: Vec<&'a Channel>,
     /// The measured inputs; of input and output alone.
     pub inputs: Vec<&'a Channel>,
+    /// Whether the input is a hammer's: short against the record.
+    pub struck: bool,
     /// What files and channels are, where the stage's default is not meant.
     pub records_are: Option<RecordsAre>,
     /// Why, for a comment in the config; empty where the user chose.
@@ -40,9 +43,12 @@ const LEAST_QUALITY: f64 = std::f64::consts::FRAC_1_SQRT_2;
 pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     match wanted.goal {
         Some(Goal::Decay) => decay(source, wanted, false),
-        Some(Goal::InputOutput) => input_output(source, wanted),
+        Some(goal @ Goal::InputOutput) => input_output(source, wanted, Some(goal)),
+        Some(Goal::Frf) if wanted.inputs.is_empty() && has_responses(source, true) => Ok(responses(source)),
+        Some(goal @ Goal::Frf) => input_output(source, wanted, Some(goal)),
         Some(goal) => one_channel(source, wanted, goal, String::new()),
-        None if !wanted.inputs.is_empty() => input_output(source, wanted),
+        None if !wanted.inputs.is_empty() => input_output(source, wanted, None),
+        None if has_responses(source, false) => Ok(responses(source)),
         None if looks_like_a_lever(source) && !rings_without_a_step(source, wanted) => {
             let why = format!("snap-offs: {} is of a force microscope", source.format);
             one_channel(source, wanted, Goal::Modes, why)
@@ -50,18 +56,56 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
         None if wanted.channels.is_empty()
             && source.channels.iter().any(|channel| usable(&channel) && drives(channel)) =>
         {
-            input_output(source, wanted)
+            input_output(source, wanted, None)
         }
         None => decay(source, wanted, true),
     }
 }
 
-/// Measured input and output.
-fn input_output<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
+/// Whether the file holds frequency responses; `guessed`: even if nothing in it says so.
+fn has_responses(source: &Source, guessed: bool) -> bool {
+    let opened = open_unpacked(&InputFiles::new(), &source.file, &Reading::of("auto", None));
+    let found = opened.ok().and_then(|opened| responses_of(&opened.contents, None).ok()).unwrap_or_default();
+    !found.is_empty() && (guessed || found.iter().all(|response| !response.guessed))
+}
+
+fn responses(source: &Source) -> Choice<'_> {
+    let channels = source.channels.iter().take(1).collect();
+    let why = format!("frequency responses in {}", name(source));
+    Choice { goal: Goal::Frf, channels, inputs: Vec::new(), struck: false, records_are: None, why }
+}
+
+/// Measured input and output: of a hammer's hits the frequency response, else a transfer function.
+fn input_output<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Option<Goal>) -> Result<Choice<'a>, Question> {
     let (inputs, output) = input_and_output(source, wanted)?;
+    let struck = read_first(source, inputs[0]).is_ok_and(|force| is_struck(&force));
+    let goal = goal.unwrap_or(if struck { Goal::Frf } else { Goal::InputOutput });
     let names: Vec<&str> = inputs.iter().map(|input| input.location.as_str()).collect();
-    let why = format!("measured input {} and output {} in {}", names.join(", "), output.location, name(source));
-    Ok(Choice { goal: Goal::InputOutput, channels: vec![output], inputs, records_are: None, why })
+    let short = if struck { ", which is short as a hammer's," } else { "" };
+    let why = format!("measured input {}{short} and output {} in {}", names.join(", "), output.location, name(source));
+    Ok(Choice { goal, channels: vec![output], inputs, struck, records_are: None, why })
+}
+
+/// Share of the samples in which a hammer's force has half of its energy, at most.
+const SHORT: usize = 100;
+
+/// Whether half of a force's energy about its median lies within a hundredth of the samples.
+fn is_struck(force: &[f64]) -> bool {
+    let level = median(&mut force.to_vec());
+    let mut squares: Vec<f64> = force.iter().map(|f| (f - level).powi(2)).collect();
+    squares.sort_by(|a, b| b.total_cmp(a));
+    let largest: f64 = squares.iter().take(squares.len().div_ceil(SHORT)).sum();
+    2.0 * largest > squares.iter().sum()
+}
+
+/// A channel's first samples.
+fn read_first(source: &Source, channel: &Channel) -> Result<Vec<f64>, Question> {
+    let plain = |problem: String| (format!("{}: {problem}", source.file.display()), None);
+    let opened = open_unpacked(&InputFiles::new(), &source.file, &Reading::of("auto", None))
+        .map_err(|error| plain(error.to_string()))?;
+    let found = opened.contents.channels.iter().find(|found| found.location == channel.location);
+    let found = found.ok_or_else(|| plain(format!("there is no channel {}", channel.location)))?;
+    first_samples(found).map_err(|error| plain(error.to_string()))
 }
 
 fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
@@ -73,7 +117,7 @@ fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: Str
             return Err((format!("one channel was wanted, --channel {second} is another"), Some(help)));
         }
     };
-    Ok(Choice { goal, channels: vec![channel], inputs: Vec::new(), records_are: None, why })
+    Ok(Choice { goal, channels: vec![channel], inputs: Vec::new(), struck: false, records_are: None, why })
 }
 
 /// Formats of force microscopes, and afmid's own; or a channel that is named as a deflection.
@@ -103,6 +147,13 @@ fn rings_without_a_step(source: &Source, wanted: &Wanted<'_>) -> bool {
 }
 
 fn decay<'a>(source: &'a Source, wanted: &Wanted<'_>, guessed: bool) -> Result<Choice<'a>, Question> {
+    if wanted.records_are == Some(RecordsAre::Points) {
+        let help = "points go with frequency responses, --goal frf; free decays are of hits or sensors";
+        return Err((
+            "--as points: decays without a measured force have no common scale".to_owned(),
+            Some(help.to_owned()),
+        ));
+    }
     let channels = match wanted.channels {
         [] => sensors(source)?,
         names => names.iter().map(|name| named(source, name)).collect::<Result<Vec<_>, _>>()?,
@@ -115,7 +166,7 @@ fn decay<'a>(source: &'a Source, wanted: &Wanted<'_>, guessed: bool) -> Result<C
     let record = name(source);
     let other = |goal, why| {
         let channel = channels[0];
-        Ok(Choice { goal, channels: vec![channel], inputs: Vec::new(), records_are: None, why })
+        Ok(Choice { goal, channels: vec![channel], inputs: Vec::new(), struck: false, records_are: None, why })
     };
     let why = match (found.decays.first(), found.reason()) {
         (Some(_), _) if guessed && found.random => {
@@ -138,7 +189,7 @@ fn decay<'a>(source: &'a Source, wanted: &Wanted<'_>, guessed: bool) -> Result<C
         }
         (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };
-    Ok(Choice { goal: Goal::Decay, channels, inputs: Vec::new(), records_are, why })
+    Ok(Choice { goal: Goal::Decay, channels, inputs: Vec::new(), struck: false, records_are, why })
 }
 
 /// Whether one oscillation has most of the power: the narrow band of a resonance in noise has a phase that wanders.
@@ -193,14 +244,8 @@ fn search(
 ) -> Result<(Vec<Vec<f64>>, DecaySearch), Question> {
     let rate = rate(source, channels[0], wanted)?;
     let plain = |problem: String| (format!("{}: {problem}", source.file.display()), None);
-    let (_, contents) = open_contents(&InputFiles::new(), &source.file, &Reading::of("auto", None))
-        .map_err(|error| plain(error.to_string()))?;
-    let read = |channel: &&Channel| {
-        let found = contents.channels.iter().find(|found| found.location == channel.location);
-        let found = found.ok_or_else(|| plain(format!("there is no channel {}", channel.location)))?;
-        first_samples(found).map_err(|error| plain(error.to_string()))
-    };
-    let values: Vec<Vec<f64>> = channels.iter().map(read).collect::<Result<_, Question>>()?;
+    let values: Vec<Vec<f64>> =
+        channels.iter().map(|channel| read_first(source, channel)).collect::<Result<_, Question>>()?;
     let slices: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
     let found = find_decays(&slices, rate, &DecaySearchOptions::default());
     let found = found.map_err(|error| plain(error.to_string()))?;

@@ -33,6 +33,7 @@ impl Goal {
             Self::Diagnosis => include_str!("../../configs/diagnose.toml"),
             Self::Coupled => include_str!("../../configs/coupled-lever.toml"),
             Self::InputOutput => include_str!("../../configs/input-output.toml"),
+            Self::Frf => include_str!("../../configs/frf.toml"),
             Self::Thermal => include_str!("../../configs/thermal.toml"),
             Self::Steady => include_str!("../../configs/steady.toml"),
         }
@@ -47,36 +48,54 @@ impl Goal {
             Self::Diagnosis => "diagnosis",
             Self::Coupled => "coupled",
             Self::InputOutput => "input-output",
+            Self::Frf => "frf",
             Self::Thermal => "thermal",
             Self::Steady => "steady",
         }
     }
+}
 
-    /// The stage of that config that reads the recordings.
-    const fn reader(self) -> &'static str {
-        match self {
-            Self::InputOutput => "io.columns",
-            _ => "io.records",
+impl Choice<'_> {
+    /// The shipped config, and its stage that reads the recordings.
+    const fn template(&self) -> (&'static str, &'static str) {
+        match (self.goal, self.inputs.is_empty()) {
+            (Goal::Frf, false) => (include_str!("../../configs/hammer.toml"), "io.columns"),
+            (Goal::Frf, true) => (self.goal.config(), "io.frf"),
+            (Goal::InputOutput, _) => (self.goal.config(), "io.columns"),
+            _ => (self.goal.config(), "io.records"),
         }
+    }
+}
+
+/// What a response to a force is, by its unit.
+fn quantity(unit: &str) -> &'static str {
+    match unit {
+        "m/s^2" | "m/s2" | "g" => "accelerance",
+        "m/s" => "mobility",
+        "m" => "receptance",
+        _ => "transfer",
     }
 }
 
 /// The config for a file in `folder`. Errors: what is not known of the recordings, and how to say it.
 pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
-    let params = match choice.goal {
-        Goal::InputOutput => columns(source, choice, wanted, folder),
+    let (template, reader) = choice.template();
+    let params = match reader {
+        "io.columns" => columns(source, choice, wanted, folder),
+        "io.frf" => Ok(responses(source, wanted, folder)),
         _ => records(source, choice, wanted, folder),
     }?;
-    let reader = format!("\"{}\"", choice.goal.reader());
+    let reader = format!("\"{reader}\"");
     let mut text = String::new();
     let mut stage = "";
     let mut of_its_data = false;
-    for line in choice.goal.config().lines() {
+    for line in template.lines() {
         if let Some(uses) = line.strip_prefix("uses = ") {
             stage = uses;
         }
         // what the shipped config says of its own data, down to where the pipeline begins
-        of_its_data = line != "[pipeline]" && (of_its_data || line.starts_with("# Data: "));
+        let begins = ["# Data: ", "# Public copy: "].iter().any(|begin| line.starts_with(begin));
+        of_its_data = line != "[pipeline]" && (of_its_data || begins);
         if of_its_data || line.starts_with("#:schema") {
             continue;
         }
@@ -88,8 +107,15 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
                     None => "auto",
                     Some(RecordsAre::Hits) => "hits",
                     Some(RecordsAre::Sensors) => "sensors",
+                    // which the choice has refused
+                    Some(RecordsAre::Points) => "auto",
                 };
                 text.push_str(&format!("params = {{ as = \"{records_are}\" }}\n"));
+            }
+            Some(("params", _)) if stage == "\"spectrum.measured_frf\"" => {
+                let blocks = if choice.struck { "hits" } else { "segments" };
+                let quantity = quantity(wanted.unit.unwrap_or(&choice.channels[0].unit));
+                text.push_str(&format!("params = {{ blocks = \"{blocks}\", quantity = \"{quantity}\" }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
                 let samples = segment_samples(choice.channels[0].samples);
@@ -144,6 +170,18 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
 /// Samples of a segment of a spectrum: a power of two, at least 30 of them in a record, half overlapping.
 pub fn segment_samples(samples: usize) -> usize {
     (samples / 16).max(64).next_power_of_two().min(1 << 22) / 2
+}
+
+/// The `params` of the stage `frf`.
+fn responses(source: &Source, wanted: Wanted<'_>, folder: &Path) -> String {
+    let text = |text: &str| Value::String(text.to_owned());
+    let files = source.patterns.iter().map(|pattern| text(&relative(pattern, folder).to_string_lossy()));
+    let mut params = Table::new();
+    params.insert("files".to_owned(), Value::Array(files.collect()));
+    if let Some(unit) = wanted.unit {
+        params.insert("unit".to_owned(), text(unit));
+    }
+    format!("params = {}\n", Value::Table(params))
 }
 
 /// The `params` of the stage `data`.

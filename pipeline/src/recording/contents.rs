@@ -6,6 +6,7 @@ use afmid_formats::{Contents, formats, head_of, recognise};
 
 use super::foreign_hdf5;
 use super::how::{AUTO, HDF5, NATIVE, RAW, Reading};
+use super::inflated::Inflated;
 use super::input_files::InputFiles;
 use super::native::is_native;
 use crate::error::StageError;
@@ -32,6 +33,32 @@ pub fn open_contents(
         },
     };
     Ok((name, contents))
+}
+
+/// What a file holds, also one that is packed with gzip, as long as its channels may be read.
+#[derive(Debug)]
+pub struct UnpackedContents {
+    /// Name of the format that opened it.
+    pub format: &'static str,
+    /// Everything but the samples.
+    pub contents: Contents,
+    _inflated: Option<Inflated>,
+}
+
+/// As [`open_contents`], also of files that are packed with gzip.
+///
+/// Errors: as [`open_contents`]; it cannot be unpacked.
+pub fn open_unpacked(files: &InputFiles, path: &Path, reading: &Reading) -> Result<UnpackedContents, StageError> {
+    reading.check()?;
+    let Some(inflated) = Inflated::of(path)? else {
+        let (format, contents) = open_contents(files, path, reading)?;
+        return Ok(UnpackedContents { format, contents, _inflated: None });
+    };
+    let (format, mut contents) = open_contents(files, inflated.path(), reading).map_err(|error| error.at(path))?;
+    contents
+        .remarks
+        .push("packed with gzip: `io.columns` and `io.frf` read it, `io.records` once it is unpacked".to_owned());
+    Ok(UnpackedContents { format, contents, _inflated: Some(inflated) })
 }
 
 /// The name of the format that opens a file. Errors: it cannot be read; nobody recognises it.

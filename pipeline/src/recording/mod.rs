@@ -38,9 +38,10 @@ pub use series::{read_number_attribute, read_series};
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native, write_native_in};
 
 pub use afmid_formats::{
-    Contents, Degree, FormatError, FoundChannel, Parts, Raw, RawBinary, Source, formats, most_inflated, unit_ratio,
+    Contents, Degree, FormatError, FoundChannel, Parts, Raw, RawBinary, Source, formats, most_inflated, responses,
+    unit_ratio,
 };
-pub use contents::open_contents;
+pub use contents::{UnpackedContents, open_contents, open_unpacked};
 pub use how::{How, Reading};
 pub use open::{Opened, agreed_rate, open_records, recognised};
 pub use responses::{FileResponse, read_responses};
