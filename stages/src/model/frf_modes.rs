@@ -13,7 +13,7 @@ use super::decay::{MODES, SHAPES};
 use super::stabilisation::pole_table;
 use crate::artifacts::{Frf, mode_table, shape_array};
 use crate::io::FRF;
-use afmid_kernels::frf_modes::{FrfModes, FrfModesOptions, MeasuredResponses, frf_modes};
+use afmid_kernels::frf_modes::{FrfMode, FrfModes, FrfModesOptions, MeasuredResponses, frf_modes};
 use afmid_kernels::ringdown::{ModeEstimate, ModeShape, ModesWanted};
 
 /// Fits modes and mode shapes to measured frequency responses: one set of poles for all responses.
@@ -136,6 +136,16 @@ impl FrfModeFit {
             let most = self.max_modes;
             all.push(format!("`modes = \"auto\"` found {most}, all that `max_modes` allows: there may be more"));
         }
+        let turning = |(number, mode): (usize, &FrfMode)| (mode.phase_collinearity < TURNING).then_some(number + 1);
+        let numbers: Vec<String> =
+            found.modes.iter().enumerate().filter_map(turning).map(|number| number.to_string()).collect();
+        if !numbers.is_empty() {
+            all.push(format!(
+                "phase collinearity below {TURNING} of mode {}: points of a lightly damped structure move in phase or \
+                 against it; such shapes are of modes that are too close, or of no mode",
+                numbers.join(", ")
+            ));
+        }
         let alike = found.modes.iter().map(|mode| mode.correlation).fold(1.0, f64::max);
         if alike > ALIKE {
             all.push(format!(
@@ -148,5 +158,7 @@ impl FrfModeFit {
     }
 }
 
+/// Phase collinearity below which a shape is said to turn. Why: it is that of points whose phases scatter by 24 degrees.
+const TURNING: f64 = 0.5;
 /// Lines that count as one from which on it is said. Why: a Hann window makes two alike.
 const ALIKE: f64 = 3.0;

@@ -246,7 +246,8 @@ fn checked(measured: MeasuredResponses<'_>) -> Result<(), ModelError> {
     if measured.transfer.is_empty() {
         return Err(ModelError::NoExperiment);
     }
-    let bad = measured.frequency_hz.windows(2).find(|pair| !(pair[0] < pair[1]));
+    let bad =
+        measured.frequency_hz.windows(2).find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less));
     match bad {
         Some(pair) => {
             Err(ModelError::Parameter { name: "a frequency", found: pair[1], wanted: "above the one before" })

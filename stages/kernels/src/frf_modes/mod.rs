@@ -72,10 +72,11 @@ mod tests;
 
 use faer::c64;
 
-use self::candidates::stable;
+use self::candidates::{of_residual, stable};
 use self::data::Lines;
-use self::noise::bands;
+use self::noise::{bands, from_residual};
 use self::polynomial::diagram;
+use self::projection::Projection;
 use self::selection::Search;
 use crate::model::ModelError;
 
@@ -86,6 +87,8 @@ pub use self::result::{FrfMode, FrfModes};
 
 /// Lines from which on neighbours are merged where no pole is near. Why: a fit of more takes seconds.
 const MANY: usize = 4000;
+/// Times that all lines are searched for modes that means hide. Why: each finds up to six.
+const PASSES: usize = 3;
 /// Width of a merged stretch over its distance from the nearest pole while modes are sought: means are off by 4e-4.
 const COARSE_SHARE: f64 = 0.1;
 /// The same for the last fit: 4e-5 of what a pole gives there.
@@ -128,18 +131,35 @@ pub fn frf_modes(measured: MeasuredResponses<'_>, options: &FrfModesOptions) -> 
     let candidates = stable(&diagram, options);
     let seen = lines.seen();
     let many = lines.len() > MANY;
-    let merged = |poles: &[c64], share: f64| match many {
-        true => lines.thinned(poles, share, &bands(lines.len())),
-        false => lines.clone(),
-    };
     let reals = real_starts(&lines, options);
-    let (mut search, fit) = Search::new(merged(&candidates, COARSE_SHARE), &reals, options)?;
+    let start = if many { merged(&lines, &candidates, COARSE_SHARE) } else { lines.clone() };
+    let (mut search, fit) = Search::new(start, &reals, options)?;
     let mut fit = search.run(fit, &candidates)?;
-    if many {
-        (search, fit) = search.continued(merged(&fit.at.poles, FINE_SHARE), &fit)?;
+    for _ in 0..if many { PASSES } else { 0 } {
+        // narrow modes hide in means: they are sought in all lines
+        let further = missed(&lines, &fit.at.poles, options);
+        let places: Vec<c64> = fit.at.poles.iter().chain(&further).copied().collect();
+        (search, fit) = search.continued(merged(&lines, &places, FINE_SHARE), &fit)?;
+        let before = fit.at.poles.len();
+        fit = search.run(fit, &further)?;
+        if fit.at.poles.len() == before {
+            break;
+        }
     }
     let fit = search.finished(fit)?;
     FrfModes::of(search, &fit, diagram, seen)
+}
+
+fn merged(lines: &Lines, poles: &[c64], share: f64) -> Lines {
+    lines.thinned(poles, share, &bands(lines.len()))
+}
+
+/// Poles of what is left in all lines.
+fn missed(lines: &Lines, poles: &[c64], options: &FrfModesOptions) -> Vec<c64> {
+    let at = Projection::new(lines, poles, options);
+    let left = at.left(lines, options);
+    let lines = if lines.known { lines.clone() } else { lines.weighted(from_residual(lines, &at, &left)) };
+    of_residual(&lines, &left, options)
 }
 
 /// Real poles spread over the band.

@@ -57,10 +57,15 @@ pub(super) struct Solved {
     pub information: Mat<f64>,
 }
 
+/// Share of the information of a pole beyond the band that is added to it. Why: four decades above rounding.
+const RIDGE: f64 = 1e-8;
+
 /// All responses at given poles.
 #[derive(Debug, Clone)]
 pub(super) struct Projection {
     pub poles: Vec<c64>,
+    /// Whether each lies beyond the band.
+    pub beyond: Vec<bool>,
     pub solved: Vec<Solved>,
 }
 
@@ -69,7 +74,9 @@ impl Projection {
     pub fn new(lines: &Lines, poles: &[c64], options: &FrfModesOptions) -> Self {
         let columns = Columns::new(lines, poles, options);
         let solved = (0..lines.responses()).into_par_iter().map(|r| solve(lines, &columns, poles, r)).collect();
-        Self { poles: poles.to_vec(), solved }
+        let (first, last) = (lines.p[0].norm(), lines.p[lines.len() - 1].norm());
+        let beyond = poles.iter().map(|s| s.norm() < first || s.norm() > last).collect();
+        Self { poles: poles.to_vec(), beyond, solved }
     }
 
     /// Weighted squares that are left in all responses.
@@ -77,7 +84,8 @@ impl Projection {
         self.solved.iter().map(|solved| solved.energy).sum()
     }
 
-    /// Information of the poles and half the falling gradient.
+    /// Information of the poles and half the falling gradient; of poles beyond the band a little more, since of several
+    /// the band may know only a sum.
     pub fn normal(&self) -> (Mat<f64>, Vec<f64>) {
         let count: usize = self.poles.iter().map(|s| width(*s)).sum();
         let mut information = Mat::zeros(count, count);
@@ -86,6 +94,8 @@ impl Projection {
             information += &solved.information;
             gradient.iter_mut().zip(&solved.eliminated.score).for_each(|(sum, own)| *sum += own);
         }
+        let beyond = self.poles.iter().zip(&self.beyond).flat_map(|(s, beyond)| vec![*beyond; width(*s)]);
+        beyond.enumerate().filter(|(_, beyond)| *beyond).for_each(|(i, _)| information[(i, i)] *= 1.0 + RIDGE);
         (information, gradient)
     }
 

@@ -140,12 +140,13 @@ fn model(fitted: &Fitted, order: &[usize], options: &FrfModesOptions) -> FrfMode
     }
 }
 
-/// The diagram with its poles numbered by the modes of the fit: stable ones within a half width.
+/// The diagram with its poles numbered by the modes of the fit: stable ones within a half width of the frequency, theirs
+/// or the mode's.
 fn numbered(diagram: Diagram, poles: &[c64]) -> Stabilisation {
     let Diagram { mut found, poles: own } = diagram;
     for (pole, (_, s)) in found.poles.iter_mut().zip(own) {
-        let near = |j: &usize| (s - poles[*j]).norm() < poles[*j].re.abs();
-        let distance = |j: usize| (s - poles[j]).norm();
+        let distance = |j: usize| (s.im - poles[j].im).abs();
+        let near = |j: &usize| distance(*j) < poles[*j].re.abs().max(s.re.abs());
         let nearest = (0..poles.len()).filter(near).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
         pole.mode = nearest.filter(|_| pole.stable());
     }

@@ -20,8 +20,10 @@ use crate::statistics::f_tail;
 const ROUNDS: usize = 2;
 /// Candidates in a row that may fail before the search ends.
 const FAILURES: usize = 4;
+/// Widths that a mode at a line may have, as many as are told apart: a factor of two each, three decades.
+const WIDTHS: f64 = 10.0;
 /// Pairs beside the modes of the band at most: they stand for what lies beyond it.
-const SPARE: usize = 4;
+const SPARE: usize = 3;
 /// Standard errors of its damping that a mode must have, and most of its half width that its frequency's error may be.
 const DETERMINED: (f64, f64) = (3.0, 1.0);
 /// Share of the energy of a stronger mode within whose width it lies below which a mode is that one's lack of fit,
@@ -118,7 +120,7 @@ impl<'a> Search<'a> {
             let Some(best) = (0..gains.len()).max_by(|&a, &b| gains[a].total_cmp(&gains[b])) else { break };
             let s = candidates.swap_remove(best);
             // a start that gains less than its parameters do by chance leads nowhere
-            let hopeless = gains[best] < self.parameters() * self.level(&fit, s).min(1.0);
+            let hopeless = gains[best] < self.parameters();
             match if hopeless { None } else { self.with(&fit, s)? } {
                 Some(next) => (fit, failures) = (self.reweighted(next, COARSE)?, 0),
                 None => {
@@ -135,12 +137,11 @@ impl<'a> Search<'a> {
         (2 * self.lines.responses() + 2) as f64
     }
 
-    /// Level of the residual around a pole, at least one where the variance was given.
+    /// Level of the residual around a pole, at least that of the weights: chance that made it small there is no reason
+    /// to believe a mode.
     fn level(&self, fit: &Fitted, s: c64) -> f64 {
         let left = fit.at.left(&self.lines, self.options);
-        let lack = Lack::around(&self.lines, &left, &fit.at.poles, s);
-        let least = if self.lines.known { 1.0 } else { 0.0 };
-        lack.level.max(least)
+        Lack::around(&self.lines, &left, &fit.at.poles, s).level.max(1.0)
     }
 
     /// The fit with a further mode, if it is established.
@@ -149,21 +150,28 @@ impl<'a> Search<'a> {
         poles.insert(modes(&poles), s);
         let next = fitted(&self.lines, &poles, self.options, COARSE)?;
         let gain = fit.at.energy() - next.at.energy();
-        let new = next.at.poles[modes(&poles) - 1];
         let kept = match self.options.modes {
             ModesWanted::Fixed(_) => gain > 0.0,
-            ModesWanted::AtMost(_) => self.significant(&next, gain, self.level(&next, new).min(1.0), 1.0),
+            ModesWanted::AtMost(_) => self.significant(&next, gain, 1.0, 1.0),
         };
+        let kept = kept && self.one_on_each_side(&next.at.poles);
         self.tried.push(OrderTried { modes: modes(&poles), gain, kept });
         Ok(kept.then_some(next))
     }
 
+    /// Whether at most one pair lies below the band and one above: of two the band knows only a sum.
+    fn one_on_each_side(&self, poles: &[c64]) -> bool {
+        let (first, last) = (self.lines.p[0].norm(), self.lines.p[self.lines.len() - 1].norm());
+        let pairs = || poles.iter().filter(|s| width(**s) == 2);
+        pairs().filter(|s| s.norm() < first).count() <= 1 && pairs().filter(|s| s.norm() > last).count() <= 1
+    }
+
     /// F test of a mode that lowers the weighted squares by `gain`: its parameters against the `level` of the residual.
-    /// Each line may hold one, so the probability is divided by their number.
+    /// Each line may hold one of some widths, so the probability is divided by their number.
     fn significant(&self, fit: &Fitted, gain: f64, level: f64, correlation: f64) -> bool {
         let f = gain / self.parameters() / (level * correlation).max(f64::MIN_POSITIVE);
         let degrees = self.lines.values().saturating_sub(fit.at.parameters()).max(1) as f64 / correlation;
-        f_tail(f, self.parameters(), degrees) * (self.lines.len() as f64) < self.options.false_alarm
+        f_tail(f, self.parameters(), degrees) * WIDTHS * (self.lines.len() as f64) < self.options.false_alarm
     }
 
     /// Drops modes one by one that are not established, the least first.
@@ -200,7 +208,7 @@ impl<'a> Search<'a> {
                     !known || companion || !self.significant(fit, gain, self.level(fit, s), alike)
                 }
                 // what stands for modes beyond the band stays if it gains anything: without it all else fits less
-                false => !self.significant(fit, gain, self.level(fit, s).min(1.0), 1.0),
+                false => !self.significant(fit, gain, 1.0, 1.0),
             };
             if fails && worst.is_none_or(|(least, _)| gain < least) {
                 worst = Some((gain, j));
@@ -231,7 +239,7 @@ impl<'a> Search<'a> {
             let distance = (poles[j].im - poles[k].im).abs();
             let width = 2.0 * poles[j].re.abs().max(poles[k].re.abs());
             let faint = energy[j] < COMPANION * energy[k];
-            energy[j] < energy[k] && distance < if faint { width.max(line) } else { line }
+            self.is_mode(poles[k]) && energy[j] < energy[k] && distance < if faint { width.max(line) } else { line }
         };
         (0..poles.len()).any(near)
     }

@@ -106,7 +106,7 @@ fn modes_of_every_quantity_are_found_at_the_bound_and_errors_hold() {
 }
 
 fn part(z: c64, i: usize) -> f64 {
-    if i % 2 == 0 { z.re } else { z.im }
+    if i.is_multiple_of(2) { z.re } else { z.im }
 }
 
 /// Errors over stated errors: frequency, damping, shapes.
