@@ -266,6 +266,7 @@ mod tests {
             goal,
             channels: vec![&source.channels[0]],
             inputs: Vec::new(),
+            struck: false,
             records_are: None,
             why: String::new(),
         };
