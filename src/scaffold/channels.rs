@@ -12,12 +12,17 @@ const INPUTS: [&str; 8] = ["input", "force", "hammer", "excit", "drive", "stimul
 
 /// A channel by its name. Errors: there is none.
 pub fn named<'a>(source: &'a Source, name: &str) -> Result<&'a Channel, Question> {
-    let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
-    let found = source.channels.iter().find(|channel| bare(&channel.location) == bare(name));
+    let found = source.channels.iter().find(|channel| is_named(channel, name));
     found.ok_or_else(|| {
         let names: Vec<&str> = source.channels.iter().map(|channel| channel.location.as_str()).collect();
         (format!("{} has no channel `{name}`", source.file.display()), Some(format!("it has {}", names.join(", "))))
     })
+}
+
+/// Whether a channel has that name, with or without the stroke that it begins with.
+pub fn is_named(channel: &Channel, name: &str) -> bool {
+    let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
+    bare(&channel.location) == bare(name)
 }
 
 /// The channels with signals of the best one's length and unit. Errors: there is none.
@@ -56,6 +61,7 @@ pub fn input_and_output<'a>(
         .filter(|channel| channel.samples == inputs[0].samples)
         .filter(|channel| !inputs.iter().any(|input| input.location == channel.location))
         .collect();
+    let names = others.iter().map(|channel| channel.location.as_str()).collect::<Vec<_>>().join(", ");
     match (wanted.channels, &others[..]) {
         ([one], _) => Ok((inputs, named(source, one)?)),
         ([], [only]) => Ok((inputs, only)),
@@ -63,9 +69,13 @@ pub fn input_and_output<'a>(
             let problem = format!("{} has no further channel of that length", source.file.display());
             Err((problem, Some("--channel names the output, --input the input".to_owned())))
         }
-        _ => {
+        ([], _) => {
             let problem = format!("{} has several channels that could be the output", source.file.display());
-            Err((problem, Some(format!("say with --channel which one of {}", listed()))))
+            Err((problem, Some(format!("say with --channel which one of {names}"))))
+        }
+        ([_, second, ..], _) => {
+            let problem = format!("one output is fitted to a measured input, --channel {second} is another");
+            Err((problem, Some("write a config for each output".to_owned())))
         }
     }
 }

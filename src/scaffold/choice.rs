@@ -3,11 +3,11 @@
 use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, FreeDecay, find_decays};
 use afmid_kernels::harmonics::{HarmonicOptions, fit_harmonics};
 use afmid_kernels::signal::{Detrend, Welch};
-use afmid_kernels::spectra::{AveragedDensity, SeenThrough, ThermalFitSettings, thermal_fit};
+use afmid_kernels::spectra::{AveragedDensity, Fitted, SeenThrough, ThermalFitSettings, thermal_fit};
 use afmid_kernels::statistics::median;
 use afmid_pipeline::recording::{InputFiles, Reading, open_unpacked, responses as responses_of};
 
-use super::channels::{drives, input_and_output, named, nothing, sensors, usable};
+use super::channels::{drives, input_and_output, is_named, named, nothing, sensors, usable};
 use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
 use crate::cli::{Goal, RecordsAre};
@@ -27,6 +27,8 @@ pub struct Choice<'a> {
     pub inputs: Vec<&'a Channel>,
     /// Whether the input is a hammer's: short against the record.
     pub struck: bool,
+    /// Samples of a block of several hits.
+    pub block_samples: Option<usize>,
     /// What files and channels are, where the stage's default is not meant.
     pub records_are: Option<RecordsAre>,
     /// Why, for a comment in the config; empty where the user chose.
@@ -36,6 +38,9 @@ pub struct Choice<'a> {
 /// Least step of the level, in peaks of the ringing, that a snap-off has: it lets the whole load go.
 const STEP: f64 = 0.5;
 
+/// Standard errors that width and height of a resonance in noise have at least: noise alone has as much once in a thousand
+/// spectra.
+const KNOWN: f64 = 3.29;
 /// Least quality factor of a resonance: below it the density has no maximum.
 const LEAST_QUALITY: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
@@ -53,13 +58,15 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
             let why = format!("snap-offs: {} is of a force microscope", source.format);
             one_channel(source, wanted, Goal::Modes, why)
         }
-        None if wanted.channels.is_empty()
-            && source.channels.iter().any(|channel| usable(&channel) && drives(channel)) =>
-        {
-            input_output(source, wanted, None)
-        }
+        None if wanted.channels.len() < 2 && has_input(source, wanted) => input_output(source, wanted, None),
         None => decay(source, wanted, true),
     }
+}
+
+/// Whether a channel is named as an input and not wanted as the signal.
+fn has_input(source: &Source, wanted: &Wanted<'_>) -> bool {
+    let signal = |channel: &Channel| wanted.channels.iter().any(|name| is_named(channel, name));
+    source.channels.iter().any(|channel| usable(&channel) && drives(channel) && !signal(channel))
 }
 
 /// Whether the file holds frequency responses; `guessed`: even if nothing in it says so.
@@ -72,18 +79,40 @@ fn has_responses(source: &Source, guessed: bool) -> bool {
 fn responses(source: &Source) -> Choice<'_> {
     let channels = source.channels.iter().take(1).collect();
     let why = format!("frequency responses in {}", name(source));
-    Choice { goal: Goal::Frf, channels, inputs: Vec::new(), struck: false, records_are: None, why }
+    Choice { goal: Goal::Frf, channels, inputs: Vec::new(), struck: false, block_samples: None, records_are: None, why }
 }
 
 /// Measured input and output: of a hammer's hits the frequency response, else a transfer function.
 fn input_output<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Option<Goal>) -> Result<Choice<'a>, Question> {
     let (inputs, output) = input_and_output(source, wanted)?;
-    let struck = read_first(source, inputs[0]).is_ok_and(|force| is_struck(&force));
+    let force = read_first(source, inputs[0]).unwrap_or_default();
+    let struck = is_struck(&force);
+    let hits = if struck { hits(&force) } else { Vec::new() };
     let goal = goal.unwrap_or(if struck { Goal::Frf } else { Goal::InputOutput });
     let names: Vec<&str> = inputs.iter().map(|input| input.location.as_str()).collect();
     let short = if struck { ", which is short as a hammer's," } else { "" };
     let why = format!("measured input {}{short} and output {} in {}", names.join(", "), output.location, name(source));
-    Ok(Choice { goal, channels: vec![output], inputs, struck, records_are: None, why })
+    // a block is as long as the hits are apart, less a twentieth for those that come early
+    let apart = hits.windows(2).map(|pair| pair[1] - pair[0]).min().map(|samples| samples - samples / 20);
+    Ok(Choice { goal, channels: vec![output], inputs, struck, block_samples: apart, records_are: None, why })
+}
+
+/// Share of the largest force that is a hit's.
+const HIT: f64 = 0.3;
+/// Samples within which a hit is over, at most: what bounces within them is one hit.
+const OVER: usize = 256;
+
+/// Samples of the hits' first large forces.
+fn hits(force: &[f64]) -> Vec<usize> {
+    let level = median(&mut force.to_vec());
+    let largest = force.iter().map(|f| (f - level).abs()).fold(0.0, f64::max);
+    let mut found: Vec<usize> = Vec::new();
+    for (k, f) in force.iter().enumerate() {
+        if (f - level).abs() > HIT * largest && found.last().is_none_or(|last| k - last > OVER) {
+            found.push(k);
+        }
+    }
+    found
 }
 
 /// Share of the samples in which a hammer's force has half of its energy, at most.
@@ -117,7 +146,15 @@ fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: Str
             return Err((format!("one channel was wanted, --channel {second} is another"), Some(help)));
         }
     };
-    Ok(Choice { goal, channels: vec![channel], inputs: Vec::new(), struck: false, records_are: None, why })
+    Ok(Choice {
+        goal,
+        channels: vec![channel],
+        inputs: Vec::new(),
+        struck: false,
+        block_samples: None,
+        records_are: None,
+        why,
+    })
 }
 
 /// Formats of force microscopes, and afmid's own; or a channel that is named as a deflection.
@@ -166,7 +203,15 @@ fn decay<'a>(source: &'a Source, wanted: &Wanted<'_>, guessed: bool) -> Result<C
     let record = name(source);
     let other = |goal, why| {
         let channel = channels[0];
-        Ok(Choice { goal, channels: vec![channel], inputs: Vec::new(), struck: false, records_are: None, why })
+        Ok(Choice {
+            goal,
+            channels: vec![channel],
+            inputs: Vec::new(),
+            struck: false,
+            block_samples: None,
+            records_are: None,
+            why,
+        })
     };
     let why = match (found.decays.first(), found.reason()) {
         (Some(_), _) if guessed && found.random => {
@@ -189,15 +234,19 @@ fn decay<'a>(source: &'a Source, wanted: &Wanted<'_>, guessed: bool) -> Result<C
         }
         (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };
-    Ok(Choice { goal: Goal::Decay, channels, inputs: Vec::new(), struck: false, records_are, why })
+    Ok(Choice { goal: Goal::Decay, channels, inputs: Vec::new(), struck: false, block_samples: None, records_are, why })
 }
 
-/// Whether one oscillation has most of the power: the narrow band of a resonance in noise has a phase that wanders.
+/// Whether one oscillation has most of the power, of the signal or of its differences, in which drift has none: the narrow
+/// band of a resonance in noise has a phase that wanders.
 fn is_coherent(values: &[f64]) -> bool {
-    fit_harmonics(values, 1.0, &HarmonicOptions::default()).is_ok_and(|fit| {
-        let amplitude = fit.harmonics.first().map_or(0.0, |first| first.amplitude);
-        0.5 * amplitude.powi(2) > fit.residual_rms.powi(2)
-    })
+    let most = |values: &[f64]| {
+        fit_harmonics(values, 1.0, &HarmonicOptions::default()).is_ok_and(|fit| {
+            let amplitude = fit.harmonics.first().map_or(0.0, |first| first.amplitude);
+            0.5 * amplitude.powi(2) > fit.residual_rms.powi(2)
+        })
+    };
+    most(values) || most(&values.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<f64>>())
 }
 
 /// Whether the spectrum of noise has a resonance: it is fitted, and stands above the floor.
@@ -218,9 +267,12 @@ fn has_resonance(values: &[f64]) -> bool {
         through: Some(SeenThrough::Hann),
     };
     thermal_fit(density, ThermalFitSettings::default()).is_ok_and(|fit| {
+        // a fit to white noise has a width or a height that is within its error
+        let known = |fitted: Fitted| fitted.value > KNOWN * fitted.std.max(fitted.robust_std);
         let at_peak =
             std::f64::consts::FRAC_2_PI * fit.variance.value * fit.quality_factor.value / fit.frequency_hz.value;
-        at_peak > fit.white.value && fit.quality_factor.value > LEAST_QUALITY
+        let shown = at_peak > fit.white.value && fit.quality_factor.value > LEAST_QUALITY;
+        shown && known(fit.quality_factor) && known(fit.variance)
     })
 }
 

@@ -115,7 +115,9 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             Some(("params", _)) if stage == "\"spectrum.measured_frf\"" => {
                 let blocks = if choice.struck { "hits" } else { "segments" };
                 let quantity = quantity(wanted.unit.unwrap_or(&choice.channels[0].unit));
-                text.push_str(&format!("params = {{ blocks = \"{blocks}\", quantity = \"{quantity}\" }}\n"));
+                let apart = choice.block_samples.map(|samples| format!(", block_samples = {samples}"));
+                let apart = apart.unwrap_or_default();
+                text.push_str(&format!("params = {{ blocks = \"{blocks}\"{apart}, quantity = \"{quantity}\" }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
                 let samples = segment_samples(choice.channels[0].samples);
@@ -267,6 +269,7 @@ mod tests {
             channels: vec![&source.channels[0]],
             inputs: Vec::new(),
             struck: false,
+            block_samples: None,
             records_are: None,
             why: String::new(),
         };

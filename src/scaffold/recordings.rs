@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::recording::recognised;
 use afmid_stages::io::natural_order;
 
 use crate::inspect::{Channel, Outcome, inspect};
@@ -34,7 +35,7 @@ pub fn look(paths: &[PathBuf]) -> Result<Source, (String, Option<String>)> {
     for path in paths {
         if path.is_dir() {
             let (pattern, found) = kind(path)?;
-            patterns.push(pattern);
+            patterns.extend(pattern);
             files.extend(found);
         } else if path.exists() {
             patterns.push(path.clone());
@@ -64,8 +65,9 @@ pub fn look(paths: &[PathBuf]) -> Result<Source, (String, Option<String>)> {
     }
 }
 
-/// The files of a folder that share the commonest ending, in natural order, and their pattern.
-fn kind(folder: &Path) -> Result<(PathBuf, Vec<PathBuf>), (String, Option<String>)> {
+/// The files of a folder that share the commonest ending, in natural order, and what finds them: a pattern, or their names
+/// where others share the ending.
+fn kind(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), (String, Option<String>)> {
     let cannot = |error: std::io::Error| (format!("{} cannot be listed: {error}", folder.display()), None);
     let mut by_ending: BTreeMap<String, Vec<(String, PathBuf)>> = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(cannot)? {
@@ -83,6 +85,12 @@ fn kind(folder: &Path) -> Result<(PathBuf, Vec<PathBuf>), (String, Option<String
         return Err((format!("{} holds no files", folder.display()), Some(help)));
     };
     files.sort_by(|a, b| natural_order(&a.0, &b.0));
+    let all: Vec<PathBuf> = files.into_iter().map(|(_, path)| path).collect();
+    // what was written about recordings lies beside them
+    let readable: Vec<PathBuf> = all.iter().filter(|path| recognised(path)).cloned().collect();
+    if !readable.is_empty() && readable.len() < all.len() {
+        return Ok((readable.clone(), readable));
+    }
     let pattern = if ending.is_empty() { "*".to_owned() } else { format!("*.{ending}") };
-    Ok((folder.join(pattern), files.into_iter().map(|(_, path)| path).collect()))
+    Ok((vec![folder.join(pattern)], all))
 }
