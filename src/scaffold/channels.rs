@@ -40,7 +40,7 @@ pub fn sensors(source: &Source) -> Result<Vec<&Channel>, Question> {
     Ok(if found.is_empty() { vec![best] } else { found })
 }
 
-/// Inputs and output: as they were named, else by their names. Errors: what cannot be told, and how to say it.
+/// Inputs and output: as they were named, else by their names. Errors: what is not known, and how to say it.
 pub fn input_and_output<'a>(
     source: &'a Source,
     wanted: &Wanted<'_>,

@@ -25,7 +25,7 @@ const CRATES: [Crate; 5] = [
             &["fields", "inflating", "opened", "raw"],
             &["packed"],
             &["grid"],
-            &["archive", "axes", "joined", "listing"],
+            &["archive", "axes", "joined", "listing", "responses"],
             &[
                 "igor",
                 "jpk",
@@ -70,7 +70,7 @@ const CRATES: [Crate; 5] = [
             &["fixture", "linear_algebra", "signal", "statistics", "effects", "monitor"],
             &["optimise"],
             &["events"],
-            &["calibration", "force", "model", "simulate"],
+            &["calibration", "force", "harmonics", "model", "simulate"],
             &["spectra", "modes", "ringdown", "subspace", "vector_fitting"],
             &["contact", "pem"],
             &["grey", "stabilisation", "validation"],

@@ -20,7 +20,7 @@ use crate::statistics::f_tail;
 const ROUNDS: usize = 2;
 /// Candidates in a row that may fail before the search ends.
 const FAILURES: usize = 4;
-/// Widths that a mode at a line may have, as many as are told apart: a factor of two each, three decades.
+/// Widths that a mode at a line may have, as many as differ visibly: a factor of two each, three decades.
 const WIDTHS: f64 = 10.0;
 /// Pairs beside the modes of the band at most: they stand for what lies beyond it.
 const SPARE: usize = 3;
