@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use afmid_pipeline::recording::recognised;
 use afmid_stages::io::natural_order;
 
+use super::choice::Question;
 use crate::inspect::{Channel, Outcome, inspect};
 
 /// Recordings of one kind, by one of them.
@@ -29,7 +30,7 @@ pub struct Source {
 /// Looks at the recordings: of a folder at the first file of the kind that most of its files are of.
 ///
 /// Errors: what cannot be used, and what to do.
-pub fn look(paths: &[PathBuf]) -> Result<Source, (String, Option<String>)> {
+pub fn look(paths: &[PathBuf]) -> Result<Source, Question> {
     let mut patterns = Vec::new();
     let mut files: Vec<PathBuf> = Vec::new();
     for path in paths {
@@ -67,7 +68,7 @@ pub fn look(paths: &[PathBuf]) -> Result<Source, (String, Option<String>)> {
 
 /// The files of a folder that share the commonest ending, in natural order, and what finds them: a pattern, or their names
 /// where others share the ending.
-fn kind(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), (String, Option<String>)> {
+fn kind(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), Question> {
     let cannot = |error: std::io::Error| (format!("{} cannot be listed: {error}", folder.display()), None);
     let mut by_ending: BTreeMap<String, Vec<(String, PathBuf)>> = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(cannot)? {
