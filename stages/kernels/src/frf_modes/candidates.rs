@@ -55,10 +55,10 @@ fn thinned(all: impl Iterator<Item = c64>, most: usize) -> Vec<c64> {
 /// Poles that explain most of what is left, each by itself: a matched filter over half widths and frequencies.
 pub(super) fn of_residual(lines: &Lines, left: &[Vec<c64>], options: &FrfModesOptions) -> Vec<c64> {
     let (first, last) = (lines.frequency_hz[0], lines.frequency_hz[lines.len() - 1]);
+    let spacing = lines.spacing_hz();
     let widest = 0.5 * last / options.least_quality_factor.max(4.0);
-    let widths: Vec<f64> = std::iter::successors(Some(0.5 * lines.spacing_hz()), |w| Some(w * RATIO))
-        .take_while(|w| *w < widest)
-        .collect();
+    let widths: Vec<f64> =
+        std::iter::successors(Some(0.5 * spacing), |w| Some(w * RATIO)).take_while(|w| *w < widest).collect();
     let mut all: Vec<(f64, c64)> = widths
         .par_iter()
         .flat_map_iter(|&width| {
@@ -66,7 +66,7 @@ pub(super) fn of_residual(lines: &Lines, left: &[Vec<c64>], options: &FrfModesOp
             (0..=count).map(move |i| {
                 let f = first + width * i as f64;
                 let s = std::f64::consts::TAU * c64::new(-width, f);
-                (matched(lines, left, s, REACH * width), s)
+                (matched(lines, left, s, (REACH * width).max(2.0 * spacing)), s)
             })
         })
         .collect();
@@ -86,7 +86,7 @@ pub(super) fn of_residual(lines: &Lines, left: &[Vec<c64>], options: &FrfModesOp
 
 /// Weighted squares that `1/(p-s)` takes from what is left nearby.
 fn matched(lines: &Lines, left: &[Vec<c64>], s: c64, reach_hz: f64) -> f64 {
-    let range = lines.around(s.im / std::f64::consts::TAU, reach_hz.max(2.0 * lines.spacing_hz()));
+    let range = lines.around(s.im / std::f64::consts::TAU, reach_hz);
     let function: Vec<c64> = range.clone().map(|k| lines.factor[k] / (lines.p[k] - s)).collect();
     let own = |(left, weight): (&Vec<c64>, &Vec<f64>)| {
         let (left, weight) = (&left[range.clone()], &weight[range.clone()]);

@@ -10,13 +10,19 @@ use crate::model::ModelError;
 use crate::optimise::{Damping, Ending, Limits, Objective, Trial, damped_step, descend};
 use crate::ringdown::RingdownVerdict;
 
-/// Steps at most: ten are usual.
-const STEPS: usize = 60;
-/// Fall of the cost over its share of one degree of freedom that no step is taken for: no pole moves by more than a
-/// thousandth of its standard error.
-pub(super) const FINE: f64 = 1e-6;
-/// The same while modes are still added: a tenth of a standard error.
-pub(super) const COARSE: f64 = 1e-2;
+/// How far a fit goes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Effort {
+    /// Fall of the cost over its share of one degree of freedom that no step is taken for.
+    settled: f64,
+    /// Steps at most.
+    steps: usize,
+}
+
+/// No pole moves by more than a thousandth of its standard error; ten steps are usual.
+pub(super) const FINE: Effort = Effort { settled: 1e-6, steps: 60 };
+/// While modes are still added: a tenth of a standard error, and no creeping of poles that the lines hardly know.
+pub(super) const COARSE: Effort = Effort { settled: 1e-2, steps: 30 };
 /// Largest pole over the last line, and the first line over the least pole. Why: twice as far a pole is a residual term
 /// to a percent.
 const FAR: f64 = 5.0;
@@ -35,7 +41,7 @@ pub(super) fn fitted(
     lines: &Lines,
     start: &[c64],
     options: &FrfModesOptions,
-    settled: f64,
+    effort: Effort,
 ) -> Result<Fitted, ModelError> {
     let start = Projection::new(lines, start, options);
     if start.poles.is_empty() {
@@ -43,8 +49,8 @@ pub(super) fn fitted(
         return Ok(Fitted { at: start, verdict });
     }
     let total = lines.transfer.iter().zip(&lines.weight).map(|(row, w)| squares(row, w)).sum();
-    let mut objective = Fit { lines, options, total, settled, distance: f64::INFINITY };
-    let limits = Limits { steps: STEPS, ..Limits::NONE };
+    let mut objective = Fit { lines, options, total, settled: effort.settled, distance: f64::INFINITY };
+    let limits = Limits { steps: effort.steps, ..Limits::NONE };
     let found = descend(&mut objective, start, &mut 1e-6, Damping::STANDARD, limits)?;
     // where no step helps, rounding or a pole that the band hardly knows is in the way: 0.3 add 5 % to an error
     let converged = match found.ending {

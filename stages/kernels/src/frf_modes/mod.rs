@@ -141,7 +141,7 @@ pub fn frf_modes(measured: MeasuredResponses<'_>, options: &FrfModesOptions) -> 
         let places: Vec<c64> = fit.at.poles.iter().chain(&further).copied().collect();
         (search, fit) = search.continued(merged(&lines, &places, FINE_SHARE), &fit)?;
         let before = fit.at.poles.len();
-        fit = search.run(fit, &further)?;
+        fit = search.with_candidates(fit, &further)?;
         if fit.at.poles.len() == before {
             break;
         }

@@ -6,7 +6,7 @@ use faer::{Mat, c64};
 use super::FrfModesOptions;
 use super::candidates::{of_residual, same};
 use super::data::Lines;
-use super::fit::{COARSE, FINE, Fitted, fitted};
+use super::fit::{COARSE, Effort, FINE, Fitted, fitted};
 use super::lack::{Lack, correlation};
 use super::model::width;
 use super::noise::from_residual;
@@ -22,6 +22,9 @@ const ROUNDS: usize = 2;
 const FAILURES: usize = 4;
 /// Widths that a mode at a line may have, as many as differ visibly: a factor of two each, three decades.
 const WIDTHS: f64 = 10.0;
+/// Most that the fit of a start gains over what the start does by itself: half a width off it gains half, and the other
+/// poles give way.
+const HOPE: f64 = 4.0;
 /// Pairs beside the modes of the band at most: they stand for what lies beyond it.
 const SPARE: usize = 3;
 /// Standard errors of its damping that a mode must have, and most of its half width that its frequency's error may be.
@@ -59,17 +62,17 @@ impl<'a> Search<'a> {
     }
 
     /// The fit with the variance of what it leaves, where none was given. Errors: those of the fit.
-    pub fn reweighted(&mut self, fit: Fitted, settled: f64) -> Result<Fitted, ModelError> {
+    pub fn reweighted(&mut self, fit: Fitted, effort: Effort) -> Result<Fitted, ModelError> {
         if self.lines.known {
             return Ok(fit);
         }
         let weight = from_residual(&self.lines, &fit.at, &fit.at.left(&self.lines, self.options));
         self.lines = self.lines.weighted(weight);
-        fitted(&self.lines, &fit.at.poles, self.options, settled)
+        fitted(&self.lines, &fit.at.poles, self.options, effort)
     }
 
-    /// Adds candidates to a fit, the one with the largest gain first, then drops what is not established. Errors: those
-    /// of the fit.
+    /// Adds candidates to a fit, the one with the largest gain first, then what its residual shows, and drops what is not
+    /// established. Errors: those of the fit.
     pub fn run(&mut self, start: Fitted, candidates: &[c64]) -> Result<Fitted, ModelError> {
         let mut fit = self.added(start, candidates.to_vec())?;
         // what the diagram has missed is in the residual
@@ -78,13 +81,15 @@ impl<'a> Search<'a> {
             let further = of_residual(&self.lines, &fit.at.left(&self.lines, self.options), self.options);
             fit = self.added(fit, further)?;
             if fit.at.poles.len() == before {
-                break;
+                return self.pruned(fit);
             }
         }
-        match self.options.modes {
-            ModesWanted::Fixed(_) => Ok(fit),
-            ModesWanted::AtMost(_) => self.pruned(fit),
-        }
+    }
+
+    /// Adds candidates alone, and drops what is not established. Errors: those of the fit.
+    pub fn with_candidates(&mut self, start: Fitted, candidates: &[c64]) -> Result<Fitted, ModelError> {
+        let fit = self.added(start, candidates.to_vec())?;
+        self.pruned(fit)
     }
 
     /// The last fit, the variance from what it leaves; what is not established then is dropped, too. Errors: those of
@@ -119,8 +124,8 @@ impl<'a> Search<'a> {
             let gains = fit.at.gains(&self.lines, self.options, &candidates);
             let Some(best) = (0..gains.len()).max_by(|&a, &b| gains[a].total_cmp(&gains[b])) else { break };
             let s = candidates.swap_remove(best);
-            // a start that gains less than its parameters do by chance leads nowhere
-            let hopeless = gains[best] < self.parameters();
+            let hopeless = self.options.modes == ModesWanted::AtMost(self.options.largest())
+                && !self.significant(&fit, HOPE * gains[best], 1.0, 1.0);
             match if hopeless { None } else { self.with(&fit, s)? } {
                 Some(next) => (fit, failures) = (self.reweighted(next, COARSE)?, 0),
                 None => {
@@ -174,8 +179,11 @@ impl<'a> Search<'a> {
         f_tail(f, self.parameters(), degrees) * WIDTHS * (self.lines.len() as f64) < self.options.false_alarm
     }
 
-    /// Drops modes one by one that are not established, the least first.
+    /// Drops modes one by one that are not established, the least first; none where their number was given.
     fn pruned(&mut self, mut fit: Fitted) -> Result<Fitted, ModelError> {
+        if matches!(self.options.modes, ModesWanted::Fixed(_)) {
+            return Ok(fit);
+        }
         self.most = Some((self.lines.clone(), fit.at.left(&self.lines, self.options)));
         while let Some(weakest) = self.weakest(&fit) {
             let mut poles = fit.at.poles.clone();
