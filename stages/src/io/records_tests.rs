@@ -83,12 +83,12 @@ fn records_come_with_both_channels_and_a_summary() {
 fn a_slow_archive_is_refused_with_the_reason() {
     let folder = Folder::new("slow");
     folder.write("r1.h5", 10e3, 1000);
-    let error = folder.run(&all()).unwrap_err();
+    let error = folder.run(&Records { min_sample_rate_hz: 2e5, ..all() }).unwrap_err();
     assert!(
         error.to_string().contains("10000 samples per second, wanted at least 200000: too slow to carry a ringdown"),
         "{error}"
     );
-    assert!(folder.run(&Records { min_sample_rate_hz: 1e3, ..all() }).is_ok());
+    assert!(folder.run(&all()).is_ok());
 }
 
 #[test]
