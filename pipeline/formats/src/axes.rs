@@ -7,7 +7,7 @@
 //! a cell `{3}` of times to the cell `{3}` beside it; of the cells of one array the first of times to the first of
 //! signals. Nothing else gets that rate.
 
-use crate::rate::of_step;
+use crate::rate::{fewest_digits, of_step};
 use crate::{Contents, FoundChannel};
 use std::collections::HashMap;
 
@@ -337,14 +337,6 @@ fn seconds(unit: &str) -> Option<f64> {
         "ns" | "nanosecond" | "nanoseconds" => 1e-9,
         _ => return None,
     })
-}
-
-/// Of the numbers within an uncertainty (relative) of this one, that with the fewest digits: times that are rounded
-/// allow several rates.
-fn fewest_digits(number: f64, uncertainty: f64) -> f64 {
-    let rounded = (0..12).filter_map(|digits: usize| format!("{number:.digits$e}").parse::<f64>().ok());
-    let mut within = rounded.filter(|rounded| (rounded - number).abs() <= uncertainty * number.abs());
-    within.next().unwrap_or(number)
 }
 
 /// Times that run evenly: the first, the step, the largest deviation in steps, and the step's relative uncertainty.

@@ -51,6 +51,14 @@ pub(crate) fn of_step(step_s: f64) -> f64 {
     format!("{rate:.11e}").parse().unwrap_or(rate)
 }
 
+/// Of the numbers within an uncertainty (relative) of this one, that with the fewest digits: times that are rounded
+/// allow several rates.
+pub(crate) fn fewest_digits(number: f64, uncertainty: f64) -> f64 {
+    let rounded = (0..12).filter_map(|digits: usize| format!("{number:.digits$e}").parse::<f64>().ok());
+    let mut within = rounded.filter(|rounded| (rounded - number).abs() <= uncertainty * number.abs());
+    within.next().unwrap_or(number)
+}
+
 /// A step that is kept in single precision is the shortest decimal number that is rounded to it: instruments have steps
 /// of 1, 2 or 5 times a power of ten. One in double precision is taken as it is, unless it was widened from single.
 pub(crate) fn shortest(step: f64) -> f64 {

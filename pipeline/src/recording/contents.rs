@@ -50,15 +50,25 @@ pub struct UnpackedContents {
 /// Errors: as [`open_contents`]; it cannot be unpacked.
 pub fn open_unpacked(files: &InputFiles, path: &Path, reading: &Reading) -> Result<UnpackedContents, StageError> {
     reading.check()?;
-    let Some(inflated) = Inflated::of(path)? else {
+    let Some((inflated, format, mut contents)) = open_packed(files, path, reading)? else {
         let (format, contents) = open_contents(files, path, reading)?;
         return Ok(UnpackedContents { format, contents, _inflated: None });
     };
-    let (format, mut contents) = open_contents(files, inflated.path(), reading).map_err(|error| error.at(path))?;
     contents
         .remarks
         .push("packed with gzip: `io.columns` and `io.frf` read it, `io.records` once it is unpacked".to_owned());
     Ok(UnpackedContents { format, contents, _inflated: Some(inflated) })
+}
+
+/// Unpacks and opens a file; none if it is not packed. Errors: as [`open_unpacked`].
+pub(super) fn open_packed(
+    files: &InputFiles,
+    path: &Path,
+    reading: &Reading,
+) -> Result<Option<(Inflated, &'static str, Contents)>, StageError> {
+    let Some(inflated) = Inflated::of(path)? else { return Ok(None) };
+    let (format, contents) = open_contents(files, inflated.path(), reading).map_err(|error| error.at(path))?;
+    Ok(Some((inflated, format, contents)))
 }
 
 /// The name of the format that opens a file. Errors: it cannot be read; nobody recognises it.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::contents::{format_of, open_contents};
+use super::contents::{format_of, open_packed};
 use super::how::Reading;
 use super::inflated::Inflated;
 use super::input_files::{HashedFile, InputFiles};
@@ -25,8 +25,7 @@ impl WholeFile {
     pub fn open(files: &InputFiles, path: &Path, reading: &Reading) -> Result<Self, StageError> {
         reading.check()?;
         let hashed = files.hashed(path)?;
-        if let Some(inflated) = Inflated::of(path)? {
-            let (_, contents) = open_contents(files, inflated.path(), reading).map_err(|error| error.at(path))?;
+        if let Some((inflated, _, contents)) = open_packed(files, path, reading)? {
             return Ok(Self { hashed, contents: Arc::new(contents), _inflated: Some(inflated) });
         }
         let reading = Reading { format: format_of(files, path, reading)?.to_owned(), raw: reading.raw.clone() };
