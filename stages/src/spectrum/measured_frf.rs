@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf};
 use crate::io::FRF;
 use afmid_kernels::spectra::{
-    Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, frequency_response, hits, segments,
+    Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, frequency_response, hit_spacing, hits, segments,
 };
 
 /// Frequency response from measured input and output, averaged over hits or segments.
@@ -38,8 +38,8 @@ pub struct MeasuredFrf {
     /// What is averaged: `segments` of a steady excitation, or `hits` of a hammer. Why: a record from columns is most
     /// often of the first kind.
     pub blocks: BlocksAre,
-    /// Samples of a block. Absent: an eighth of the record for segments (15 of them: a coherence good to a tenth), the
-    /// whole record for a hit.
+    /// Samples of a block. Absent: an eighth of the record for segments (15 of them: a coherence good to a tenth), as many
+    /// as hits are apart at least, the whole record for a single hit.
     #[schemars(range(min = 8))]
     pub block_samples: Option<usize>,
     /// Samples of a hit before the force comes to a tenth of its largest value. Why: a pulse has risen from nothing
@@ -132,7 +132,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for MeasuredFrf {
     const SPEC: Spec = Spec {
         name: "spectrum.measured_frf",
-        version: 1,
+        version: 2,
         summary: "estimates the frequency response from measured input and output with coherence and variance",
         inputs: &[PAIR.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -181,8 +181,13 @@ impl MeasuredFrf {
         let whole = record.outputs.first().map_or(0, |output| output.len());
         let found = match (self.blocks, self.block_samples) {
             (BlocksAre::Segments, samples) => segments(record, samples.unwrap_or(whole / EIGHTH)),
-            (BlocksAre::Hits, None) => Ok(vec![record.clone()]),
-            (BlocksAre::Hits, Some(samples)) => hits(record, samples, self.before_samples, HIT),
+            (BlocksAre::Hits, samples) => {
+                let force = record.inputs.first().copied().unwrap_or_default();
+                match samples.or_else(|| hit_spacing(force, self.before_samples)) {
+                    None => Ok(vec![record.clone()]),
+                    Some(samples) => hits(record, samples, self.before_samples, HIT),
+                }
+            }
         }
         .map_err(StageError::from_error)?;
         match found.is_empty() {

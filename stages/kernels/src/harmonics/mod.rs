@@ -34,11 +34,13 @@ mod noise;
 mod steadiness;
 #[cfg(test)]
 mod tests;
+mod tone;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use fit::fit_harmonics;
+pub use tone::is_tone;
 
 /// How a steady oscillation is fitted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -105,3 +105,25 @@ fn what_cannot_be_fitted_is_refused() {
     assert!(fit(&tone, HarmonicOptions { parts: 2, ..default() }).contains("parts is 2"));
     assert!(fit(&tone, HarmonicOptions { near_hz: Some(0.6), ..default() }).contains("near_hz"));
 }
+
+#[test]
+fn a_tone_is_one_with_drift_too_and_a_resonance_in_noise_is_none() {
+    for seed in 0..50 {
+        let e = crate::fixture::white_noise(4000, 0.05, seed);
+        let drift = |k: usize| 5.0 * (k as f64 / 4000.0).powi(2);
+        let tone = |k: usize| (0.37 * k as f64).sin() + e[k];
+        let plain: Vec<f64> = (0..4000).map(tone).collect();
+        let drifting: Vec<f64> = (0..4000).map(|k| tone(k) + drift(k)).collect();
+        assert!(is_tone(&plain) && is_tone(&drifting), "{seed}");
+        // Q = 30 at 17 samples a period: 4000 samples are 25 decay times
+        let z = (faer::c64::new(-0.0062, 0.37)).exp();
+        let (mut last, mut before) = (0.0, 0.0);
+        let step = |force: &f64| {
+            let next = force + 2.0 * z.re * last - z.norm_sqr() * before;
+            (before, last) = (last, next);
+            next
+        };
+        assert!(!is_tone(&e.iter().map(step).collect::<Vec<f64>>()), "{seed}");
+        assert!(!is_tone(&e), "{seed}");
+    }
+}

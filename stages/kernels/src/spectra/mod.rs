@@ -58,6 +58,7 @@ mod neighbours;
 mod power;
 mod presence;
 mod ratio;
+mod resonance;
 mod seen_oscillator;
 mod thermal_fit;
 mod thermal_peak;
@@ -71,13 +72,15 @@ pub use intersample::{Intersample, response_frequencies};
 pub use local_polynomial::{PolynomialSettings, local_polynomial};
 pub use local_rational::{RationalSettings, local_rational};
 pub use measured_input::{
-    Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, frequency_response, hits, segments,
+    Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, frequency_response, half_energy_samples,
+    hit_spacing, hits, is_impulsive, segments,
 };
 pub use neighbour_scatter::neighbour_scatter;
 pub use neighbours::{Bins, Smoothed, SuppressedLine};
 pub use power::{PowerSpectrum, power_spectrum};
 pub use presence::Presence;
 pub use ratio::{EndTreatment, EtfeSettings, TransferEstimate, difference, etfe};
+pub use resonance::shows_resonance;
 pub use seen_oscillator::SeenThrough;
 pub use thermal_fit::{AveragedDensity, Fitted, FoundLine, ThermalFit, ThermalFitSettings, thermal_fit};
 pub use thermal_peak::{PeakSearch, thermal_peak};

@@ -40,23 +40,26 @@ pub(super) struct Prepared {
     pub windowed_before: bool,
 }
 
+/// Samples that a block has at least.
+const LEAST_SAMPLES: usize = 8;
+
 /// The segments of a record: as many samples each, every one beginning in the middle of that before.
 ///
 /// # Errors
 /// A length of less than eight samples, a record that is shorter, unequal series.
 pub fn segments<'a>(record: &Block<'a>, samples: usize) -> Result<Vec<Block<'a>>, SpectrumError> {
     let whole = check(record)?;
-    if samples < 8 || whole < samples {
-        return Err(SpectrumError::TooShort { got: whole.min(samples), wanted: samples.max(8) });
+    if samples < LEAST_SAMPLES || whole < samples {
+        return Err(SpectrumError::TooShort { got: whole.min(samples), wanted: samples.max(LEAST_SAMPLES) });
     }
     let cut = |series: &[&'a [f64]], from: usize| series.iter().map(|x| &x[from..from + samples]).collect();
     let block = |from| Block { inputs: cut(&record.inputs, from), outputs: cut(&record.outputs, from) };
     Ok((0..=whole - samples).step_by(samples / 2).map(block).collect())
 }
 
-/// The hits in a record: of `samples` each, the first `before` of them before the first input comes to the share `level`
-/// of its largest value; a hit within the samples of another is part of that. Those that the record cuts off are left
-/// out.
+/// The hits in a record: of `samples` each, the first `before` of them before the first input comes to the share
+/// `level` of its largest value; a hit within the samples of another is part of that. Those that the record cuts off
+/// are left out.
 ///
 /// # Errors
 /// Fewer than eight samples, more than the record has, not more than `before`; unequal series.
@@ -67,8 +70,11 @@ pub fn hits<'a>(
     level: f64,
 ) -> Result<Vec<Block<'a>>, SpectrumError> {
     let whole = check(record)?;
-    if samples < 8 || samples <= before || whole < samples {
-        return Err(SpectrumError::TooShort { got: whole.min(samples), wanted: samples.max(before + 1).max(8) });
+    if samples < LEAST_SAMPLES || samples <= before || whole < samples {
+        return Err(SpectrumError::TooShort {
+            got: whole.min(samples),
+            wanted: samples.max(before + 1).max(LEAST_SAMPLES),
+        });
     }
     let force = record.inputs.first().copied().unwrap_or_default();
     let offset = median(&mut force.to_vec());
@@ -85,11 +91,60 @@ pub fn hits<'a>(
     Ok(found)
 }
 
+/// Share of the largest force from which a pulse counts as a hit of its own: a hammer's bounce has less.
+const OWN_HIT: f64 = 0.3;
+/// Pulses that follow within this share of the usual distance are one hit.
+const ONE_HIT: f64 = 0.05;
+
+/// Samples between the hits of a force, the least; none where there is one hit. Pulses within `before` samples are one
+/// hit. The record's end counts as a further hit, unless it comes sooner than half of that after the last one.
+///
+/// A bounce of more than [`OWN_HIT`] of the largest force, later than [`ONE_HIT`] of the upper quartile of the
+/// distances, is taken for a hit.
+pub fn hit_spacing(force: &[f64], before: usize) -> Option<usize> {
+    let offset = median(&mut force.to_vec());
+    let largest = force.iter().map(|value| (value - offset).abs()).fold(0.0, f64::max);
+    let high: Vec<usize> =
+        (0..force.len()).filter(|&k| largest > 0.0 && (force[k] - offset).abs() >= OWN_HIT * largest).collect();
+    let within = before.max(LEAST_SAMPLES);
+    let mut gaps: Vec<usize> = high.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > within).collect();
+    gaps.sort_unstable();
+    let usual = gaps.get(gaps.len() * 3 / 4)?;
+    let apart = (ONE_HIT * *usual as f64).max(within as f64);
+    let mut starts: Vec<usize> = high.first().copied().into_iter().collect();
+    starts.extend(high.windows(2).filter(|pair| (pair[1] - pair[0]) as f64 > apart).map(|pair| pair[1]));
+    let least = starts.windows(2).map(|pair| pair[1] - pair[0]).min()?;
+    let rest = force.len() - starts.last()?;
+    Some(if 2 * rest > least { least.min(rest) } else { least })
+}
+
+/// Share of the samples in which a hammer's force has half of its energy, at most.
+const SHORT: f64 = 0.01;
+
+/// Whether an input is a hammer's: half of its energy about its median lies within a hundredth of its samples.
+pub fn is_impulsive(input: &[f64]) -> bool {
+    half_energy_samples(input) as f64 <= (SHORT * input.len() as f64).ceil()
+}
+
+/// How many of a signal's samples, the largest about its median, have half of its energy; all of a constant one.
+pub fn half_energy_samples(signal: &[f64]) -> usize {
+    let rest = median(&mut signal.to_vec());
+    let mut squares: Vec<f64> = signal.iter().map(|value| (value - rest).powi(2)).collect();
+    squares.sort_by(|a, b| b.total_cmp(a));
+    let half = 0.5 * squares.iter().sum::<f64>();
+    let mut sum = 0.0;
+    let enough = |square: &f64| {
+        sum += square;
+        sum > half
+    };
+    squares.iter().position(enough).map_or(signal.len(), |last| last + 1)
+}
+
 /// The length of all series. Errors: unequal, none, not finite.
 pub(super) fn check(block: &Block<'_>) -> Result<usize, SpectrumError> {
     let samples = block.inputs.first().map_or(0, |input| input.len());
-    let wanted = samples.max(8);
-    if samples < 8 || block.outputs.is_empty() {
+    let wanted = samples.max(LEAST_SAMPLES);
+    if samples < LEAST_SAMPLES || block.outputs.is_empty() {
         return Err(SpectrumError::TooShort { got: samples, wanted });
     }
     for (name, series) in [("an input", &block.inputs), ("an output", &block.outputs)] {

@@ -7,5 +7,5 @@ mod estimate;
 #[cfg(test)]
 mod tests;
 
-pub use blocks::{Block, BlockKind, hits, segments};
+pub use blocks::{Block, BlockKind, half_energy_samples, hit_spacing, hits, is_impulsive, segments};
 pub use estimate::{Estimator, MeasuredResponse, ResponseSettings, frequency_response};

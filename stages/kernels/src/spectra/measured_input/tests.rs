@@ -236,3 +236,40 @@ fn what_cannot_be_estimated_is_refused() {
     assert!(frequency_response(&[], settings(Estimator::H1)).is_err());
     assert!(segments(&Block { inputs: vec![&u], outputs: vec![&u] }, N + 1).is_err());
 }
+
+/// A force of pulses of five samples at these places, their heights from 0.6 to 1, in noise of a thousandth.
+fn pulses(places: &[usize], samples: usize, seed: u64) -> Vec<f64> {
+    let mut force = white_noise(samples, 1e-3, seed);
+    for (number, &place) in places.iter().enumerate() {
+        let height = 0.6 + 0.1 * (number % 5) as f64;
+        (0..5).for_each(|k| force[place + k] += height * [0.3, 0.8, 1.0, 0.8, 0.3][k]);
+    }
+    force
+}
+
+#[test]
+fn hits_are_as_far_apart_as_the_nearest_two_and_a_bounce_is_none() {
+    for seed in 0..50 {
+        let jitter = |k: usize| white_noise(20, 30.0, 100 + seed)[k].clamp(-100.0, 100.0) as isize;
+        let places: Vec<usize> = (0..20).map(|k| (500 + 1000 * k as isize + jitter(k)) as usize).collect();
+        let ends = places.iter().copied().chain([20_500]).collect::<Vec<usize>>();
+        let least = ends.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 500).min().unwrap();
+        let mut force = pulses(&places, 20_500, seed);
+        // a bounce of a quarter of the force, 40 samples after each
+        places.iter().for_each(|place| force[place + 40] += 0.15);
+        let found = hit_spacing(&force, 32).expect("hits");
+        // a weak hit comes to the level a sample later
+        assert!(found.abs_diff(least) <= 2, "{found} of {least}");
+        assert!(is_impulsive(&force));
+        // noise, a sine and a constant are no hammer's; a single hit is
+        assert_eq!(hit_spacing(&pulses(&[400], 4000, seed), 32), None);
+        assert!(is_impulsive(&pulses(&[400], 4000, seed)));
+        assert!(!is_impulsive(&white_noise(4000, 1.0, seed)));
+    }
+    // a pause between two groups; one broad hit where nothing is put before it
+    let groups: Vec<usize> = (0..5).map(|k| 100 + 500 * k).chain((0..5).map(|k| 15_000 + 500 * k)).collect();
+    assert!(hit_spacing(&pulses(&groups, 17_600, 1), 32).expect("hits").abs_diff(500) <= 2);
+    assert_eq!(hit_spacing(&pulses(&[400], 4000, 1), 0), None);
+    let sine: Vec<f64> = (0..4000).map(|k| (0.1 * f64::from(k)).sin()).collect();
+    assert!(!is_impulsive(&sine) && !is_impulsive(&[1.0; 500]));
+}
