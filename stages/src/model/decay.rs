@@ -92,7 +92,7 @@ impl Stage for DecayFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.decay",
-        version: 2,
+        version: 3,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), FIT.spec(), SUMMARY.spec()],
@@ -123,7 +123,7 @@ impl Stage for DecayFit {
             .with(&SHAPES, shape_array(&fit.shapes.iter().collect::<Vec<_>>(), &channels))
             .with(&HITS, hit_table(&followed.whole))
             .with(&COURSE, parts.table())
-            .with(&FIT, fit_array(&followed.whole, &decays))
+            .with(&FIT, fit_array(&followed.fitted, &decays))
             .with(&SUMMARY, summary(&followed, &parts, &decays)?))
     }
 
@@ -158,6 +158,17 @@ impl DecayFit {
         let found = fit.poles.len();
         if self.modes == Count::Auto && found == self.max_modes {
             cx.warn(format!("`modes = \"auto\"` found {found}, all that `max_modes` allows: there may be more"));
+        }
+        let same = |channel: &usize| {
+            let mut values = decays.hits.iter().filter_map(|hit| hit.get(*channel)).flat_map(|row| row.iter());
+            let first = values.next();
+            values.all(|value| Some(value) == first)
+        };
+        for sensor in (0..decays.sensors.len()).filter(same).filter_map(|channel| decays.sensors.get(channel)) {
+            cx.warn(format!(
+                "{} is the same number throughout: its zeros in the shapes say nothing, leave it out of `channels`",
+                sensor.name
+            ));
         }
         let lacking: Vec<String> = (1..)
             .zip(&fit.lack_of_fit)

@@ -17,12 +17,14 @@
 //! # Ok::<(), afmid_kernels::signal::SignalError>(())
 //! ```
 
+mod codes;
 mod error;
 mod fourier;
 mod periodogram;
 mod taper;
 mod welch;
 
+pub use codes::code_step;
 pub use error::SignalError;
 pub use fourier::RealTransform;
 pub use periodogram::{autocorrelation, mean_periodogram, summed_periodograms};

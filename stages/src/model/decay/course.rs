@@ -132,6 +132,7 @@ pub(super) fn dropped_document(dropped: &[DroppedMode]) -> Value {
         let (reason, of, mac) = match dropped.reason {
             Dropped::Steady => ("steady", None, None),
             Dropped::Broad => ("broad", None, None),
+            Dropped::Undetermined => ("undetermined", None, None),
             Dropped::Companion { of, mac } => ("companion", Some(of + 1), Some(mac)),
         };
         json!({

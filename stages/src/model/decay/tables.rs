@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::course::{Parts, dropped_document};
 use crate::artifacts::{Decays, SAMPLE_RATE_HZ, mode_table, shaped_mode};
-use afmid_kernels::ringdown::{ChannelRingdown, FollowedDecay, ModeEstimate, ModeShape, RecordFit, RingdownNoise};
+use afmid_kernels::ringdown::{ChannelRingdown, FollowedDecay, ModeEstimate, ModeShape, RingdownNoise};
 
 /// The modes, and how much more than noise the fit leaves round each.
 pub(super) fn modes_with_lack(fit: &ChannelRingdown) -> Table {
@@ -54,7 +54,7 @@ pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
     let samples = rows.first().map_or(0, |row| row.len());
     let measured: Vec<f64> = rows.iter().flat_map(|row| row.iter().copied()).collect();
     let own = fit.records.iter().filter(|record| record.event == largest);
-    let fitted: Vec<f64> = own.flat_map(|record| signal(fit, record, 1.0 / decays.sample_rate_hz, samples)).collect();
+    let fitted: Vec<f64> = own.flat_map(|record| fit.signal(record, 1.0 / decays.sample_rate_hz, samples)).collect();
     let rest: Vec<f64> = measured.iter().zip(&fitted).map(|(y, m)| y - m).collect();
     let unit = decays.sensors.first().map_or("", |sensor| &sensor.unit);
     let over = &["channel", "time"];
@@ -72,17 +72,6 @@ pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
     .with("residual", unit, "what is left", over, rest)
     .attribute("hit", largest + 1)
     .attribute(SAMPLE_RATE_HZ, decays.sample_rate_hz)
-}
-
-/// A record as fitted: the slope runs from -1 to 1 over it.
-fn signal(fit: &ChannelRingdown, record: &RecordFit, interval_s: f64, samples: usize) -> Vec<f64> {
-    let half = 0.5 * (samples.max(2) - 1) as f64;
-    let at = |k: usize| {
-        let ringing = |(pole, residue): (&faer::c64, &faer::c64)| (residue * (pole * interval_s * k as f64).exp()).re;
-        let sum: f64 = fit.poles.iter().zip(&record.residues).map(ringing).sum();
-        sum + record.offset + record.slope * (k as f64 / half - 1.0)
-    };
-    (0..samples).map(at).collect()
 }
 
 /// The contract of `show --json`, and what does not fit.

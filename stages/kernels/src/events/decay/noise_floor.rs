@@ -48,18 +48,3 @@ fn spectrum(values: &[f64]) -> (f64, f64) {
     // the median of an exponential variable is ln 2 of its mean
     (share, median(&mut power[1..]) / (std::f64::consts::LN_2 * gain))
 }
-
-/// Smallest step between values of a channel: one code of its converter; 0 where values are not codes.
-pub(super) fn code_step(values: &[f64]) -> f64 {
-    let mut sorted: Vec<f64> = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let range = sorted[sorted.len() - 1] - sorted[0];
-    sorted.dedup();
-    // as many values as samples: no codes
-    if sorted.len() * 4 > 3 * values.len() {
-        return 0.0;
-    }
-    let steps = sorted.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > 1e-9 * range);
-    let least = steps.fold(f64::INFINITY, f64::min);
-    if least.is_finite() { least } else { 0.0 }
-}

@@ -8,11 +8,12 @@ use super::envelope::{Envelope, Pitch, without_drift};
 use super::error::DecaySearchError;
 use super::extent::{Begin, begin, departure, end, quiet_before};
 use super::found::{ChannelDecay, DecayEnd, DecaySearch, Decline, DismissedDecay, DismissedReason, FreeDecay, Steady};
-use super::noise_floor::{code_step, noise_std};
+use super::noise_floor::noise_std;
 use super::onsets::onsets;
 use super::options::{DecaySearchOptions, DecayTrigger};
 use super::steadiness::oscillation;
 use crate::events::baseline;
+use crate::signal::code_step;
 
 /// Least samples of a record.
 const LEAST_SAMPLES: usize = 64;

@@ -2,7 +2,8 @@
 
 use faer::Mat;
 
-use super::result::ChannelRingdown;
+use super::result::{ChannelRingdown, RecordFit};
+use super::shape::ModeShape;
 use crate::ringdown::ModeEstimate;
 
 /// Why a fitted exponential is no mode.
@@ -13,6 +14,9 @@ pub enum Dropped {
     /// Its quality factor is not above `1/sqrt(2)` at the 0.1 % level: its response has no maximum. A drift, a coupling
     /// capacitor or what the model lacks, fitted along with the modes.
     Broad,
+    /// The fit leaves more than noise round it, and with errors that count that its damping is not above zero at the
+    /// 0.1 % level: what another mode lacks, or a mode of which nothing is known.
+    Undetermined,
     /// It lies within the line of another mode, has its shape and dies away twice as fast or faster: what that mode's
     /// motion leaves.
     Companion {
@@ -38,11 +42,11 @@ const DETERMINED: f64 = 3.09;
 /// lack of fit. Noise adds three times its own share.
 const ORTHOGONAL: (f64, f64) = (0.05, 3.0);
 
-/// Energy of each mode over all hits and channels, in units of their own.
+/// Energy of each mode over all hits and channels, each channel in units of its noise: channels may be of unlike units.
 pub(super) fn energies(fit: &ChannelRingdown) -> Vec<f64> {
     let energy = |(j, pole): (usize, &faer::c64)| {
-        let all: f64 = fit.records.iter().filter_map(|record| record.residues.get(j)).map(|r| r.norm_sqr()).sum();
-        all / -pole.re
+        let of = |record: &RecordFit| record.residues[j].norm_sqr() / fit.noise[record.channel].white;
+        fit.records.iter().map(of).sum::<f64>() / -pole.re
     };
     fit.poles.iter().enumerate().map(energy).collect()
 }
@@ -54,6 +58,13 @@ pub(super) fn steady(fit: &ChannelRingdown, duration_s: f64) -> Vec<usize> {
     let error = |j: usize| (fit.covariance[(2 * j, 2 * j)].max(0.0) / fit.lack_of_fit[j]).sqrt();
     let dies = |j: usize| rate(j) > DETERMINED * error(j);
     (0..fit.poles.len()).filter(|&j| rate(j) * duration_s < 1.0 && !dies(j)).collect()
+}
+
+/// Modes of whose damping nothing is known, for what the fit leaves round them, by number.
+pub(super) fn undetermined(fit: &ChannelRingdown) -> Vec<usize> {
+    let error = |j: usize| fit.covariance[(2 * j, 2 * j)].max(0.0).sqrt();
+    let known = |j: usize| fit.lack_of_fit[j] <= 1.0 || -fit.poles[j].re > DETERMINED * error(j);
+    (0..fit.poles.len()).filter(|&j| !known(j)).collect()
 }
 
 /// Modes whose response has no maximum, by number.
@@ -98,15 +109,24 @@ pub(super) fn companions(fit: &ChannelRingdown) -> Vec<(usize, usize, f64)> {
     found
 }
 
+/// Whether two shapes are one, each channel in units of its noise: the units of the channels then do not matter.
 fn one_shape(fit: &ChannelRingdown, i: usize, j: usize) -> bool {
-    let noise = |k: usize| {
-        let points = &fit.shapes[k].points;
-        let size: f64 = points.iter().map(|p| p.value.norm_sqr()).sum();
-        // of noise alone: with all that the model lacks any two shapes would be one
-        points.iter().map(|p| p.covariance[0] + p.covariance[2]).sum::<f64>() / size / fit.lack_of_fit[k]
+    let weighted = |k: usize| {
+        let mut shape = fit.shapes[k].clone();
+        for (point, noise) in shape.points.iter_mut().zip(&fit.noise) {
+            point.value /= noise.white.sqrt();
+            point.covariance.iter_mut().for_each(|entry| *entry /= noise.white);
+        }
+        shape
     };
-    let apart = 1.0 - fit.shapes[i].mac(&fit.shapes[j]);
-    apart < ORTHOGONAL.0 + ORTHOGONAL.1 * (noise(i) + noise(j))
+    let noise = |shape: &ModeShape, k: usize| {
+        let size: f64 = shape.points.iter().map(|p| p.value.norm_sqr()).sum();
+        // of noise alone: with all that the model lacks any two shapes would be one
+        shape.points.iter().map(|p| p.covariance[0] + p.covariance[2]).sum::<f64>() / size / fit.lack_of_fit[k]
+    };
+    let (one, other) = (weighted(i), weighted(j));
+    let apart = 1.0 - one.mac(&other);
+    apart < ORTHOGONAL.0 + ORTHOGONAL.1 * (noise(&one, i) + noise(&other, j))
 }
 
 impl ChannelRingdown {
@@ -124,6 +144,11 @@ impl ChannelRingdown {
             record.residue_covariance = keep.iter().map(|&j| full.residue_covariance[j]).collect();
         }
         out
+    }
+
+    /// The same with these modes alone.
+    pub(super) fn only(&self, modes: &[usize]) -> Self {
+        self.without(&(0..self.poles.len()).filter(|j| !modes.contains(j)).collect::<Vec<usize>>())
     }
 
     /// Takes over a mode of another fit of the same records.

@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use faer::c64;
 
-use super::companions::{Dropped, DroppedMode, broad, companions, energies, steady};
+use super::companions::{Dropped, DroppedMode, broad, companions, energies, steady, undetermined};
 use super::levels::density;
 use super::options::{ChannelOptions, ModesWanted};
 use super::order::fit_channels;
-use super::result::ChannelRingdown;
+use super::records::LEAST_SAMPLES;
+use super::result::{ChannelRingdown, RecordFit};
 use crate::model::ModelError;
 use crate::ringdown::{Estimate, ModeEstimate};
 use crate::statistics::chi_square_tail;
@@ -41,8 +42,10 @@ pub struct ModeCourse {
 pub struct FollowedDecay {
     /// Modes of all of the decays; those that have moved far have the poles and shapes of their last part.
     pub fit: ChannelRingdown,
-    /// The fit of all of the decays alone: what residues and residuals belong to.
+    /// The same modes by the fit of all of the decays alone.
     pub whole: ChannelRingdown,
+    /// The fit with all its exponentials.
+    pub fitted: ChannelRingdown,
     /// Fitted exponentials that are no modes.
     pub dropped: Vec<DroppedMode>,
     /// Modes that both of their parts have, ascending.
@@ -57,10 +60,14 @@ pub const MOVES: f64 = 1e-3;
 /// is `(1 - e^-u) (1 - u^2 e^-u / (1 - e^-u)^2)` of all and after `e^-u`; the sum of inverses is least at u = 1.8.
 /// What a frequency quadratic in the amplitude moves between the parts does not depend on the cut.
 const CUT: f64 = 0.9;
-/// Energy of a mode in a part, in variances of the noise, that a comparison needs: its damping is known to a fifth.
+/// Energy of a mode in a part, in variances of the noise, that a comparison needs: in the last part its damping is then
+/// known to `2/sqrt(50)`, 28 %.
 const KNOWN: f64 = 50.0;
-/// Decay rates that share a cut, the largest over the smallest: at half or twice its best place the error is a tenth
-/// more.
+/// The same of what is no mode and fitted along with a part: less is noise's, chi-square of four degrees at 0.1 %.
+const SEEN: f64 = 18.5;
+/// Decay rates that share a cut, the largest over the smallest. At a factor sqrt 2 from its best place the error of the
+/// difference is 16 % more than the least, at a factor 2 60 to 83 %: what that costs the weaker modes of a group saves
+/// two fits each.
 const ONE_CUT: f64 = 2.0;
 /// Phase in radian by which a linear mode may be wrong while the mode that it stands for dies away: a tenth, a shift of
 /// the frequency by a tenth of the half width; likewise of the damping.
@@ -75,7 +82,8 @@ const FAR: f64 = 0.1;
 /// # Method
 /// Exponentials in the line of a slower one, of its shape and at least twice as fast, are dropped ([`Dropped`]): their
 /// modes are fitted again without them, errors widened by what is then left round each line; of all other modes they
-/// stay nuisances; so do exponentials without a maximum in their response. Modes of like decay rate are fitted to the
+/// stay nuisances. So do lines, exponentials without a maximum in their response, and those of which nothing is known, in
+/// each part that they are seen in. Modes of like decay rate are fitted to the
 /// first and to the last part by themselves: for a linear system they are the same there (chi square of the difference of
 /// both poles at the level [`MOVES`] for all modes together). With one channel every shape is the same: there the line
 /// and the rate decide.
@@ -96,33 +104,24 @@ pub fn follow_channels(
     options: &ChannelOptions,
     whole: bool,
 ) -> Result<FollowedDecay, ModelError> {
-    let decays = Decays { events, free, interval_s, options };
     let all = fit_channels(events, free, interval_s, options)?;
     let fixed = matches!(options.modes, ModesWanted::Fixed(_)) || !options.start.is_empty();
     let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
-    let still = if fixed { Vec::new() } else { steady(&all, longest as f64 * interval_s) };
-    let wide = if fixed { Vec::new() } else { broad(&all) };
-    let mut dropped: Vec<DroppedMode> = Vec::new();
-    let modes = all.modes();
-    dropped.extend(still.iter().map(|&j| DroppedMode { mode: modes[j], reason: Dropped::Steady }));
-    dropped.extend(wide.iter().map(|&j| DroppedMode { mode: modes[j], reason: Dropped::Broad }));
-    let no_modes: Vec<usize> = still.iter().chain(&wide).copied().collect();
-    if no_modes.len() == all.poles.len() {
-        return Err(ModelError::Degenerate("no oscillation that dies away"));
-    }
-    let mut fit = all.without(&no_modes);
-    let lines: Vec<c64> = still.iter().map(|&j| all.poles[j]).collect();
+    let no_modes = if fixed { Vec::new() } else { no_modes(&all, longest as f64 * interval_s)? };
+    let mut dropped: Vec<DroppedMode> = no_modes.iter().map(|(_, mode)| *mode).collect();
+    let gone: Vec<usize> = no_modes.iter().map(|(j, _)| *j).collect();
+    let mut fit = all.without(&gone);
+    let mut decays = Decays { events, free, interval_s, options, others: all.only(&gone) };
     let found = if fixed { Vec::new() } else { companions(&fit) };
     let mut alone = fit.clone();
     if !found.is_empty() {
         let gone: Vec<usize> = found.iter().map(|pair| pair.0).collect();
         let modes = fit.modes();
         let mut left = fit.without(&gone);
-        let start: Vec<c64> = left.poles.iter().chain(&lines).copied().collect();
         let number = |j: usize| nearest(&left.poles, fit.poles[j]).unwrap_or(0);
         let reason = |of: usize, mac: f64| Dropped::Companion { of: number(of), mac };
         dropped.extend(found.iter().map(|&(i, of, mac)| DroppedMode { mode: modes[i], reason: reason(of, mac) }));
-        alone = without_lines(&decays.of_part(0..usize::MAX, &start)?, &lines);
+        alone = decays.of_part(0..usize::MAX, &left.poles)?;
         // companions stay as nuisances of all other modes
         for of in found.iter().map(|pair| number(pair.1)).collect::<std::collections::BTreeSet<usize>>() {
             if let Some(from) = nearest(&alone.poles, left.poles[of]) {
@@ -131,12 +130,39 @@ pub fn follow_channels(
         }
         fit = left;
     }
-    let (course, late) = decays.courses(&alone, &lines);
+    let unknown = if fixed { Vec::new() } else { undetermined(&fit) };
+    if !unknown.is_empty() && unknown.len() < fit.poles.len() {
+        let modes = fit.modes();
+        dropped.extend(unknown.iter().map(|&j| DroppedMode { mode: modes[j], reason: Dropped::Undetermined }));
+        let places = unknown.iter().map(|&j| fit.poles[j]);
+        let in_all = places.clone().filter_map(|pole| nearest(&all.poles, pole));
+        decays.others = all.only(&gone.iter().copied().chain(in_all).collect::<Vec<usize>>());
+        alone = alone.without(&places.filter_map(|pole| nearest(&alone.poles, pole)).collect::<Vec<usize>>());
+        fit = fit.without(&unknown);
+    }
+    let (course, late) = decays.courses(&alone);
     let whole_fit = fit.clone();
     for (mode, (last, number)) in course.iter().zip(&late).filter(|(mode, _)| mode.far && !whole) {
         fit.take_pole(mode.mode, last, *number);
     }
-    Ok(FollowedDecay { fit, whole: whole_fit, dropped, course })
+    Ok(FollowedDecay { fit, whole: whole_fit, fitted: all, dropped, course })
+}
+
+/// Fitted exponentials that are no modes, by number: lines that do not die away, what has no maximum in its response.
+/// Errors: all are.
+fn no_modes(all: &ChannelRingdown, duration_s: f64) -> Result<Vec<(usize, DroppedMode)>, ModelError> {
+    let (still, wide) = (steady(all, duration_s), broad(all));
+    let modes = all.modes();
+    let reason = |j: usize| match (still.contains(&j), wide.contains(&j)) {
+        (true, _) => Some(Dropped::Steady),
+        (false, true) => Some(Dropped::Broad),
+        _ => None,
+    };
+    let dropped = |j: usize| Some((j, DroppedMode { mode: modes[j], reason: reason(j)? }));
+    let found: Vec<(usize, DroppedMode)> = (0..modes.len()).filter_map(dropped).collect();
+    let why =
+        if still.is_empty() { "overdamped: no quality factor above 0.71" } else { "no oscillation that dies away" };
+    if found.len() == modes.len() { Err(ModelError::Degenerate(why)) } else { Ok(found) }
 }
 
 struct Decays<'a> {
@@ -144,34 +170,44 @@ struct Decays<'a> {
     free: &'a [Vec<&'a [f64]>],
     interval_s: f64,
     options: &'a ChannelOptions,
+    /// What is fitted along with the modes in each part that it is seen in.
+    others: ChannelRingdown,
 }
 
 impl Decays<'_> {
-    /// The fit of a part of all decays that reach into it, from these poles.
+    /// The fit of a part of all decays that reach into it, from these poles of modes; what is no mode is fitted along and
+    /// left out. Decays with too few samples there are passed over.
     fn of_part(&self, part: Range<usize>, start: &[c64]) -> Result<ChannelRingdown, ModelError> {
         let (mut events, mut missing) = (Vec::new(), Vec::new());
         for (number, event) in self.events.iter().enumerate() {
             let length = event.first().map_or(0, |row| row.len());
             let end = part.end.min(length);
-            if end <= part.start {
-                continue;
-            }
-            events.push(event.iter().map(|row| &row[part.start..end]).collect::<Vec<&[f64]>>());
             let inside = |gap: &Range<usize>| {
                 gap.start.clamp(part.start, end) - part.start..gap.end.clamp(part.start, end) - part.start
             };
             let row = |gaps: &Vec<Range<usize>>| gaps.iter().map(inside).filter(|gap| !gap.is_empty()).collect();
-            missing.extend(self.options.missing.get(number).map(|rows| rows.iter().map(row).collect()));
+            let gaps: Option<Vec<Vec<Range<usize>>>> =
+                self.options.missing.get(number).map(|rows| rows.iter().map(row).collect());
+            let most = gaps.iter().flatten().map(|row| row.iter().map(Range::len).sum::<usize>()).max().unwrap_or(0);
+            if end < part.start + LEAST_SAMPLES + most {
+                continue;
+            }
+            events.push(event.iter().map(|row| &row[part.start..end]).collect::<Vec<&[f64]>>());
+            missing.extend(gaps);
         }
-        let options = ChannelOptions { start: start.to_vec(), missing, ..self.options.clone() };
-        fit_channels(&events, self.free, self.interval_s, &options)
+        let others = seen(&self.others, self.interval_s, &part, SEEN);
+        let all: Vec<c64> = start.iter().chain(&others).copied().collect();
+        let options = ChannelOptions { start: all.clone(), missing, ..self.options.clone() };
+        let fit = fit_channels(&events, self.free, self.interval_s, &options)?;
+        let gone: Vec<usize> = matched(&all, &fit.poles).into_iter().skip(start.len()).flatten().collect();
+        Ok(fit.without(&gone))
     }
 
     /// The modes in both parts, and where the last is from: a fit and the mode's number in it.
-    fn courses(&self, fit: &ChannelRingdown, lines: &[c64]) -> (Vec<ModeCourse>, Vec<(ChannelRingdown, usize)>) {
+    fn courses(&self, fit: &ChannelRingdown) -> (Vec<ModeCourse>, Vec<(ChannelRingdown, usize)>) {
         let mut found: Vec<(ModeCourse, (ChannelRingdown, usize))> = Vec::new();
         for group in groups(fit) {
-            let Some((cut, first, last)) = self.parts(fit, &group, lines) else { continue };
+            let Some((cut, first, last)) = self.parts(fit, &group) else { continue };
             for (i, j) in pairs(&first, &last) {
                 let mode = nearest(&fit.poles, last.poles[j]).filter(|mode| group.contains(mode));
                 let known = found.iter().any(|(course, _)| Some(course.mode) == mode);
@@ -191,44 +227,47 @@ impl Decays<'_> {
 
     /// The cut for a group of modes, and the fits before and behind it, each with those modes of the whole that it can
     /// tell of.
-    fn parts(
-        &self,
-        fit: &ChannelRingdown,
-        group: &[usize],
-        lines: &[c64],
-    ) -> Option<(usize, ChannelRingdown, ChannelRingdown)> {
+    fn parts(&self, fit: &ChannelRingdown, group: &[usize]) -> Option<(usize, ChannelRingdown, ChannelRingdown)> {
         let energy = energies(fit);
         let strongest = *group.iter().max_by(|&&a, &&b| energy[a].total_cmp(&energy[b]))?;
         let longest = self.events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
         let cut = (CUT / (-fit.poles[strongest].re * self.interval_s)) as usize;
         let cut = cut.clamp(1, (longest / 2).max(1));
-        let (first, last): (Vec<c64>, Vec<c64>) = (self.known(fit, 0, cut), self.known(fit, cut, longest));
-        let part = |range, poles: &[c64]| {
-            let start: Vec<c64> = poles.iter().chain(lines).copied().collect();
-            if poles.is_empty() { None } else { self.of_part(range, &start).ok() }
+        let part = |range: Range<usize>| {
+            let known = seen(fit, self.interval_s, &range, KNOWN);
+            if known.is_empty() { None } else { self.of_part(range, &known).ok() }
         };
-        let (first, last) = (part(0..cut, &first)?, part(cut..longest, &last)?);
-        Some((cut, without_lines(&first, lines), without_lines(&last, lines)))
-    }
-
-    /// Poles whose mode has enough energy in a part.
-    fn known(&self, fit: &ChannelRingdown, from: usize, to: usize) -> Vec<c64> {
-        let energy = |j: usize| -> f64 {
-            let rate = -2.0 * fit.poles[j].re * self.interval_s;
-            let share = ((-rate * from as f64).exp() - (-rate * to as f64).exp()) / rate;
-            let turn = fit.poles[j].im * self.interval_s;
-            let of = |record: &super::result::RecordFit| {
-                0.5 * record.residues[j].norm_sqr() * share / density(&fit.noise[record.channel], self.interval_s, turn)
-            };
-            fit.records.iter().map(of).sum::<f64>() / fit.lack_of_fit[j]
-        };
-        (0..fit.poles.len()).filter(|&j| energy(j) > KNOWN).map(|j| fit.poles[j]).collect()
+        Some((cut, part(0..cut)?, part(cut..longest)?))
     }
 }
 
-fn without_lines(fit: &ChannelRingdown, lines: &[c64]) -> ChannelRingdown {
-    let gone: Vec<usize> = lines.iter().filter_map(|line| nearest(&fit.poles, *line)).collect();
-    fit.without(&gone)
+/// Poles whose exponential has at least that energy in a part, in variances of the noise.
+fn seen(fit: &ChannelRingdown, interval_s: f64, part: &Range<usize>, least: f64) -> Vec<c64> {
+    let energy = |j: usize| -> f64 {
+        let rate = -2.0 * fit.poles[j].re * interval_s;
+        let share = ((-rate * part.start as f64).exp() - (-rate * part.end as f64).exp()) / rate;
+        let turn = fit.poles[j].im * interval_s;
+        let of = |record: &RecordFit| {
+            0.5 * record.residues[j].norm_sqr() * share / density(&fit.noise[record.channel], interval_s, turn)
+        };
+        fit.records.iter().map(of).sum::<f64>() / fit.lack_of_fit[j]
+    };
+    (0..fit.poles.len()).filter(|&j| energy(j) > least).map(|j| fit.poles[j]).collect()
+}
+
+/// For each of the `start` poles the number of the fitted one that it has become: the nearest pair first.
+fn matched(start: &[c64], fitted: &[c64]) -> Vec<Option<usize>> {
+    let distance = |(i, j): &(usize, usize)| (start[*i] - fitted[*j]).norm();
+    let mut pairs: Vec<(usize, usize)> =
+        (0..start.len()).flat_map(|i| (0..fitted.len()).map(move |j| (i, j))).collect();
+    pairs.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let mut found = vec![None; start.len()];
+    for (i, j) in pairs {
+        if found[i].is_none() && !found.contains(&Some(j)) {
+            found[i] = Some(j);
+        }
+    }
+    found
 }
 
 fn nearest(poles: &[c64], to: c64) -> Option<usize> {

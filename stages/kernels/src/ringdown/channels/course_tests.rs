@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::*;
 use crate::fixture::white_noise;
+use crate::ringdown::ModeEstimate;
 
 const INTERVAL_S: f64 = 2e-4;
 const SAMPLES: usize = 6000;
@@ -179,14 +180,16 @@ fn a_weak_mode_far_from_a_strong_one_that_moves_survives() {
 #[test]
 fn a_relaxation_beside_the_modes_is_no_mode_and_does_not_bias_them() {
     let modes = [linear(120.0, 0.004, 1.0), linear(273.0, 0.006, 0.5)];
-    let (mut right, mut squares) = (0, 0.0);
+    let (mut right, mut squares, mut parts, mut moved) = (0, 0.0, 0.0, 0);
     for seed in 0..30 {
         let relaxes = |k: usize| 0.4 * (-(k as f64) * INTERVAL_S / (0.02 * 1.15_f64.powi(seed as i32))).exp();
         let mut y = records(&modes, 1, 0.005, 500 + seed);
         y[0].iter_mut().enumerate().for_each(|(k, y)| *y += relaxes(k));
         let rows = vec![vec![y[0].as_slice()]];
-        let found = follow_channels(&rows, &[], INTERVAL_S, &ChannelOptions::default(), true).expect("a fit").fit;
-        let estimates = found.modes();
+        let found = follow_channels(&rows, &[], INTERVAL_S, &ChannelOptions::default(), true).expect("a fit");
+        moved += found.course.iter().filter(|mode| mode.moves).count();
+        let firsts: Vec<ModeEstimate> = found.course.iter().map(|mode| mode.first).collect();
+        let estimates = found.fit.modes();
         if estimates.len() != 2 {
             println!("seed {seed}: {estimates:?}");
             continue;
@@ -196,11 +199,72 @@ fn a_relaxation_beside_the_modes_is_no_mode_and_does_not_bias_them() {
             // the simulated frequency is that of the damped oscillation
             let length = (1.0 + mode.damping.powi(2)).sqrt();
             let (frequency, damping) = (mode.frequency_hz * length, mode.damping / length);
-            squares += ((estimate.frequency_hz.value - frequency) / estimate.frequency_hz.std).powi(2);
-            squares += ((estimate.damping_ratio().value - damping) / estimate.damping_ratio().std).powi(2);
+            let square = |estimate: &ModeEstimate| {
+                let ratio = estimate.damping_ratio();
+                ((estimate.frequency_hz.value - frequency) / estimate.frequency_hz.std).powi(2)
+                    + ((ratio.value - damping) / ratio.std).powi(2)
+            };
+            squares += square(estimate);
+            let first = firsts.iter().find(|first| (first.frequency_hz.value / frequency - 1.0).abs() < 0.1);
+            parts += first.map_or(2.0, square);
         }
     }
     // 120 squares of normal deviates: 1 +- 0.13
-    let mean = squares / (4.0 * f64::from(right));
-    assert!(right >= 29 && (0.6..1.5).contains(&mean), "{right} of 30 right, {mean}");
+    let mean = |squares: f64| squares / (4.0 * f64::from(right));
+    let (whole, first) = (mean(squares), mean(parts));
+    assert!(right >= 29 && (0.6..1.5).contains(&whole), "{right} of 30 right, {whole}");
+    assert!(moved == 0 && (0.6..1.5).contains(&first), "{moved} move, {first} in the first parts");
+}
+
+/// The modes of all channels of one hit.
+fn modes_of(data: &[Vec<f64>]) -> Vec<ModeEstimate> {
+    followed(data).fit.modes()
+}
+
+#[test]
+fn a_channel_that_is_one_number_changes_nothing() {
+    let modes = [linear(90.0, 0.005, 1.0), linear(230.0, 0.003, 0.6)];
+    for seed in 0..12 {
+        let mut data = records(&modes, 1 + seed as usize % 2, 0.005, 900 + seed);
+        let alone = modes_of(&data);
+        data.push(vec![[0.0, 2.0, 5.0][seed as usize % 3]; SAMPLES]);
+        let beside = modes_of(&data);
+        assert_eq!((alone.len(), beside.len()), (2, 2), "{seed}: {beside:?}");
+        for (a, b) in alone.iter().zip(&beside) {
+            // the noise round the modes is another handful of bins: 2 % of the error
+            let off = (a.frequency_hz.value - b.frequency_hz.value).abs() / a.frequency_hz.std;
+            let wider = (b.frequency_hz.std / a.frequency_hz.std - 1.0).abs();
+            assert!(off < 0.05 && wider < 0.03, "{seed}: {a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn units_of_channels_do_not_matter() {
+    // two modes within a line, told apart by their shapes
+    let pair = [linear(110.0, 0.003, 1.0), linear(110.3, 0.008, 0.9)];
+    for seed in 0..12 {
+        let mut data = records(&pair, 3, 0.002, 950 + seed);
+        let same = modes_of(&data);
+        data[1].iter_mut().for_each(|y| *y *= 1000.0);
+        let scaled = modes_of(&data);
+        assert_eq!((same.len(), scaled.len()), (2, 2), "{seed}: {same:?} {scaled:?}");
+        for (a, b) in same.iter().zip(&scaled) {
+            // an end within a thousandth of an error each
+            assert!((a.frequency_hz.value - b.frequency_hz.value).abs() < 0.01 * a.frequency_hz.std, "{seed}");
+        }
+    }
+}
+
+#[test]
+fn a_hit_that_ends_soon_after_the_cut_leaves_the_course_of_the_others() {
+    let mover = Mode { frequency_hz: 120.0, damping: 0.003, amplitude: 1.0, shift: 0.003, more: 0.5 };
+    let first = records(&[mover], 1, 1e-3, 70);
+    let cut = followed(&first).course.first().expect("a course").cut;
+    for more in [1, 10, 23, 60] {
+        let second = records(&[mover], 1, 1e-3, 71);
+        let events = vec![vec![first[0].as_slice()], vec![&second[0][..cut + more]]];
+        let found = follow_channels(&events, &[], INTERVAL_S, &ChannelOptions::default(), false).expect("a fit");
+        assert!(found.course.first().is_some_and(|mode| mode.moves), "{more}: {:?}", found.course);
+    }
 }

@@ -19,6 +19,9 @@ pub(super) const ARRIVED: f64 = 1e-3;
 /// The same where another fit begins there.
 pub(super) const NEARLY: f64 = 3e-2;
 
+/// Share of the noise that was assumed below which what is left is rounding: a channel that is one number throughout.
+const LEAST_SCALE: f64 = 1e-9;
+
 /// A fit under one noise.
 pub(super) struct Fitted {
     pub poles: Poles,
@@ -59,12 +62,13 @@ impl Fitted {
         Self { poles, projection, verdict, unit_s, energy, log_variance }
     }
 
-    /// Minus twice the log-likelihood, each channel's noise scaled to its best, constants left out.
+    /// Minus twice the log-likelihood, each channel's noise scaled to its best (by [`LEAST_SCALE`] at least), constants
+    /// left out.
     pub fn deviance(&self, records: &Records<'_>) -> f64 {
         (0..records.channels)
             .map(|c| {
                 let count = records.observed(c) as f64;
-                count * (self.energy[c] / count).max(f64::MIN_POSITIVE).ln() + self.log_variance[c]
+                count * (self.energy[c] / count).max(LEAST_SCALE).ln() + self.log_variance[c]
             })
             .sum()
     }

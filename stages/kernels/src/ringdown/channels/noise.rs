@@ -34,7 +34,7 @@ pub(super) fn first_noise(records: &Records<'_>) -> Vec<RingdownNoise> {
                 }
             }
         }
-        RingdownNoise::white((sum / (6.0 * count.max(1) as f64)).max(f64::MIN_POSITIVE))
+        RingdownNoise::white((sum / (6.0 * count.max(1) as f64)).max(records.rounding[channel]))
     };
     (0..records.channels).map(of).collect()
 }
@@ -52,7 +52,8 @@ pub(super) fn estimated(
         ChannelNoise::Known(noise) => noise.clone(),
         ChannelNoise::White => rescaled(records, fitted, last),
         ChannelNoise::Estimated => {
-            (0..records.channels).into_par_iter().map(|c| of_channel(records, free, fitted, last, c)).collect()
+            let of = |c| at_least(of_channel(records, free, fitted, last, c), records.rounding[c]);
+            (0..records.channels).into_par_iter().map(of).collect()
         }
     }
 }
@@ -65,11 +66,14 @@ pub(super) fn rescaled(records: &Records<'_>, fitted: &Fitted, last: &[RingdownN
         .map(|(c, noise)| {
             let excess = (fitted.energy[c] / degrees[c]).max(1e-300);
             let scaled: Vec<f64> = noise.variances().iter().map(|v| (v * excess).max(0.0)).collect();
-            let mut noise = noise.with_variances(&scaled);
-            noise.white = noise.white.max(f64::MIN_POSITIVE);
-            noise
+            at_least(noise.with_variances(&scaled), records.rounding[c])
         })
         .collect()
+}
+
+fn at_least(mut noise: RingdownNoise, rounding: f64) -> RingdownNoise {
+    noise.white = noise.white.max(rounding);
+    noise
 }
 
 /// Degrees of freedom of each channel: samples less own amplitudes and its share of the poles.

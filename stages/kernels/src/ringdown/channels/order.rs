@@ -156,14 +156,15 @@ impl Ladder<'_> {
         if self.given_noise() {
             return (0..step.energy.len()).map(fall).sum();
         }
-        let usual: Vec<f64> =
-            degrees(self.records, &step.fitted).iter().zip(&step.energy).map(|(d, e)| (e / d).max(1e-300)).collect();
+        let rounding = &self.records.rounding;
+        let degrees = degrees(self.records, &step.fitted);
+        let usual: Vec<f64> = (0..degrees.len()).map(|c| (step.energy[c] / degrees[c]).max(rounding[c])).collect();
         let mut variance = usual.clone();
         if self.options.noise == ChannelNoise::Estimated {
             let left = residuals(self.records, &step.fitted);
             let local = |place: &c64| local_variances(self.records, &left, &step.fitted.poles, *place, &usual);
             let all: Vec<Vec<f64>> = places.iter().map(local).collect();
-            let most = |c: usize| all.iter().map(|own| own[c]).reduce(f64::max).unwrap_or(usual[c]);
+            let most = |c: usize| all.iter().map(|own| own[c]).reduce(f64::max).unwrap_or(usual[c]).max(rounding[c]);
             variance = (0..usual.len()).map(most).collect();
         }
         let gain = (0..usual.len()).map(|c| fall(c) / variance[c]).sum();
@@ -178,7 +179,10 @@ impl Ladder<'_> {
     fn by_chance(&self, gain: f64, modes: usize) -> bool {
         let places = self.records.longest as f64;
         let degrees = modes * (2 + 2 * self.records.all.len());
-        gain <= 0.0 || chi_square_tail(gain, degrees) * places.powi(modes as i32) > self.options.false_alarm
+        // of what is no number nothing can be said
+        gain.is_nan()
+            || gain <= 0.0
+            || chi_square_tail(gain, degrees) * places.powi(modes as i32) > self.options.false_alarm
     }
 
     /// The fit from the poles of the options.

@@ -9,6 +9,7 @@ use crate::ringdown::gaps::Gaps;
 use crate::ringdown::whitener::Whitener;
 
 use super::options::ChannelOptions;
+use crate::signal::code_step;
 
 /// One channel of one event.
 pub(super) struct Record<'a> {
@@ -40,6 +41,9 @@ pub(super) struct Records<'a> {
     /// Samples of the longest.
     pub longest: usize,
     pub drift: bool,
+    /// Variance of each channel's rounding, which its noise is not below: of its codes, or of numbers of 30 bits. A
+    /// channel that is one number throughout has that weight.
+    pub rounding: Vec<f64>,
 }
 
 impl<'a> Records<'a> {
@@ -84,7 +88,8 @@ impl<'a> Records<'a> {
             return Err(ModelError::ConstantOutput);
         }
         let longest = all.iter().map(|record| record.values.len()).max().unwrap_or(0);
-        Ok(Self { all, channels, events: events.len(), interval_s, longest, drift: options.drift })
+        let rounding = (0..channels).map(|c| rounding(&all, c)).collect();
+        Ok(Self { all, channels, events: events.len(), interval_s, longest, drift: options.drift, rounding })
     }
 
     /// Samples of a channel that are there.
@@ -94,7 +99,20 @@ impl<'a> Records<'a> {
 }
 
 /// Least samples of a record.
-const LEAST_SAMPLES: usize = 24;
+pub(super) const LEAST_SAMPLES: usize = 24;
+
+/// Share of a channel's mean square that is rounding at least: numbers of 30 bits.
+const ROUNDED: f64 = 1e-18;
+
+/// Variance of a channel's rounding: a twelfth of the square of its codes' step.
+fn rounding(all: &[Record<'_>], channel: usize) -> f64 {
+    let own = || all.iter().filter(|record| record.channel == channel);
+    let step = own().map(|record| code_step(&record.values)).filter(|step| *step > 0.0).reduce(f64::min);
+    let square: f64 = own().flat_map(|record| record.values.iter()).map(|y| y * y).sum();
+    let count = own().map(|record| record.values.len()).sum::<usize>().max(1) as f64;
+    let codes = step.unwrap_or(0.0).powi(2) / 12.0;
+    codes.max(ROUNDED * square / count).max(f64::MIN_POSITIVE.sqrt())
+}
 
 /// Records of one length, one pattern of gaps and one shape of noise: they share filter and basis.
 pub(super) struct Group {

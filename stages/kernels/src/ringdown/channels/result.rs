@@ -2,6 +2,7 @@
 
 use faer::{Mat, c64};
 
+use super::basis::{Poles, signal};
 use super::fit::Fitted;
 use super::levels::{lack_of_fit, residuals};
 use super::noise::degrees;
@@ -155,6 +156,13 @@ impl ChannelRingdown {
     /// that moved, or hits in another direction that excite a second mode of that frequency.
     pub fn shapes_that_differ(&self) -> Vec<usize> {
         (0..self.shapes.len()).filter(|&j| !self.shapes[j].rank_one.holds()).collect()
+    }
+
+    /// A record as fitted.
+    pub fn signal(&self, record: &RecordFit, interval_s: f64, samples: usize) -> Vec<f64> {
+        let ringing = record.residues.iter().flat_map(|residue| [residue.re, residue.im]);
+        let own: Vec<f64> = ringing.chain([record.offset, record.slope]).collect();
+        signal(&Poles(self.poles.clone()), &own, interval_s, samples, true)
     }
 
     /// Modal assurance criteria between the shapes: modes x modes, 1 on the diagonal.
