@@ -11,7 +11,7 @@ use super::target::require_folder;
 use crate::cli::{New, NewPipelineArgs, NewStageArgs};
 use crate::failure::Failure;
 use crate::output::print;
-use crate::printable::shown;
+use crate::printable::{one_line, shown};
 use crate::relative::folder_of;
 use crate::scaffold::{Wanted, choose, look, pipeline, python, rust};
 use crate::show::pretty;
@@ -57,10 +57,11 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
     }
     let files = if source.files == 1 { "1 file".to_owned() } else { format!("{} files", source.files) };
     let name = output.file_stem().unwrap_or_default().to_string_lossy();
+    let why = if choice.why.is_empty() { String::new() } else { format!("; {}", one_line(&choice.why)) };
     // the stage that all others lead to
     let last = plan.nodes.last().map_or("", |node| &node.id);
     print(&format!(
-        "{}: {files}\n  afmid run {0} -o {name}.h5\n  afmid show {name}.h5 {last}\n  afmid report {name}.h5\n",
+        "{}: {files}{why}\n  afmid run {0} -o {name}.h5\n  afmid show {name}.h5 {last}\n  afmid report {name}.h5\n",
         output.display()
     ))
 }

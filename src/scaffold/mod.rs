@@ -2,9 +2,11 @@
 
 mod channels;
 mod choice;
+mod first_file;
 mod pipeline;
 mod recordings;
 mod stage;
+mod stated;
 
 pub use choice::choose;
 pub use pipeline::{Wanted, pipeline};

@@ -6,8 +6,8 @@ use afmid_pipeline::toml::{Table, Value};
 
 use super::choice::{Choice, Question};
 use super::recordings::Source;
+use super::stated;
 use crate::cli::{Goal, RecordsAre};
-use crate::inspect::Channel;
 use crate::printable::one_line;
 use crate::relative::relative;
 
@@ -115,9 +115,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             Some(("params", _)) if stage == "\"spectrum.measured_frf\"" => {
                 let blocks = if choice.struck { "hits" } else { "segments" };
                 let quantity = quantity(wanted.unit.unwrap_or(&choice.channels[0].unit));
-                let apart = choice.block_samples.map(|samples| format!(", block_samples = {samples}"));
-                let apart = apart.unwrap_or_default();
-                text.push_str(&format!("params = {{ blocks = \"{blocks}\"{apart}, quantity = \"{quantity}\" }}\n"));
+                text.push_str(&format!("params = {{ blocks = \"{blocks}\", quantity = \"{quantity}\" }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
                 let samples = segment_samples(choice.channels[0].samples);
@@ -136,7 +134,6 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
 
 /// The `params` of the stage `records`.
 fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
-    let file = source.file.display();
     let text = |text: &str| Value::String(text.to_owned());
     let channel = choice.channels[0];
     let files = source.patterns.iter().map(|pattern| text(&relative(pattern, folder).to_string_lossy()));
@@ -150,21 +147,11 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     if matches!(choice.goal, Goal::Decay | Goal::Thermal | Goal::Steady) {
         params.insert("piezo_channel".to_owned(), text(""));
     }
-    if let Some(rate) = rate(channel, wanted, &file)? {
+    if let Some(rate) = stated::rate(source, channel, &wanted, true)? {
         params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
     }
-    match (channel.unit.as_str(), wanted.unit) {
-        ("", Some(unit)) => {
-            params.insert("unit".to_owned(), text(unit));
-        }
-        ("", None) => {
-            let help = "say the signal's unit with --unit, such as --unit V".to_owned();
-            return Err((format!("{file} states no unit"), Some(help)));
-        }
-        (stated, Some(unit)) if stated != unit => {
-            return Err((format!("{file} states the unit {stated}"), Some("leave --unit out".to_owned())));
-        }
-        _ => {}
+    if let Some(unit) = stated::unit(source, channel, &wanted)? {
+        params.insert("unit".to_owned(), text(unit));
     }
     Ok(format!("params = {}\n", Value::Table(params)))
 }
@@ -200,7 +187,7 @@ fn columns(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     let inputs = choice.inputs.iter().map(|input| text(&input.location)).collect();
     params.insert("inputs".to_owned(), Value::Array(inputs));
     params.insert("output".to_owned(), text(&output.location));
-    if let Some(rate) = rate(output, wanted, &source.file.display())? {
+    if let Some(rate) = stated::rate(source, output, &wanted, false)? {
         params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
     }
     if let Some(unit) = wanted.unit {
@@ -209,28 +196,13 @@ fn columns(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     Ok(format!("params = {}\n", Value::Table(params)))
 }
 
-/// The sample rate to be stated. Errors: the file states none and the user neither; both do, and differ.
-fn rate(channel: &Channel, wanted: Wanted<'_>, file: &dyn std::fmt::Display) -> Result<Option<f64>, Question> {
-    match (channel.sample_rate_hz, wanted.rate_hz) {
-        (Some(_), None) => Ok(None),
-        (None, Some(rate)) => Ok(Some(rate)),
-        (Some(rate), Some(other)) if rate == other => Ok(None),
-        (Some(rate), Some(_)) => {
-            Err((format!("{file} states {rate} samples per second"), Some("leave --rate out".to_owned())))
-        }
-        (None, None) => {
-            let help = "say how many samples a second with --rate HZ".to_owned();
-            Err((format!("{file} states no sample rate"), Some(help)))
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
 
     use super::super::choice::choose;
     use super::*;
+    use crate::inspect::Channel;
 
     fn source(rate: Option<f64>, unit: &str) -> Source {
         let channel = Channel {
@@ -250,6 +222,7 @@ mod tests {
             format: "native record".to_owned(),
             best: Some(0),
             reason: String::new(),
+            remarks: Vec::new(),
             files: 3,
         }
     }
@@ -264,15 +237,7 @@ mod tests {
     /// The config for the first channel.
     fn of_first(source: &Source, wanted: Wanted<'_>, folder: &str) -> Result<String, Question> {
         let goal = wanted.goal.expect("a goal");
-        let choice = Choice {
-            goal,
-            channels: vec![&source.channels[0]],
-            inputs: Vec::new(),
-            struck: false,
-            block_samples: None,
-            records_are: None,
-            why: String::new(),
-        };
+        let choice = Choice::of(goal, vec![&source.channels[0]], String::new());
         pipeline(source, &choice, wanted, Path::new(folder))
     }
 
@@ -295,6 +260,10 @@ mod tests {
         let ask = |source: Source, wanted: Wanted<'_>| of_first(&source, wanted, "/lab").expect_err("a question");
         let goal = wanted(Goal::Ringdown);
         assert!(ask(source(None, "V"), goal).1.expect("help").contains("--rate"));
+        let both = ask(source(None, ""), goal);
+        assert!(
+            both.0.contains("no sample rate and no unit") && both.1.expect("help").contains("--rate HZ --unit UNIT")
+        );
         assert!(ask(source(Some(5e6), ""), goal).1.expect("help").contains("--unit"));
         assert!(ask(source(Some(5e6), "V"), Wanted { rate_hz: Some(1e6), ..goal }).0.contains("5000000"));
         assert!(ask(source(Some(5e6), "V"), Wanted { unit: Some("nm"), ..goal }).0.contains("unit V"));

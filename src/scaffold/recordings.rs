@@ -23,8 +23,17 @@ pub struct Source {
     /// Which of them can best carry a ringdown, and why (not).
     pub best: Option<usize>,
     pub reason: String,
+    /// What its reader remarked.
+    pub remarks: Vec<String>,
     /// How many files there are of that kind.
     pub files: usize,
+}
+
+impl Source {
+    /// The first file's name.
+    pub fn name(&self) -> String {
+        self.file.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
 }
 
 /// Looks at the recordings: of a folder at the first file of the kind that most of its files are of.
@@ -54,6 +63,7 @@ pub fn look(paths: &[PathBuf]) -> Result<Source, Question> {
             format: holdings.format,
             best: holdings.ringdown.channel,
             reason: holdings.ringdown.reason,
+            remarks: holdings.remarks,
             channels: holdings.channels,
             files: files.len(),
             file: first,
@@ -66,8 +76,8 @@ pub fn look(paths: &[PathBuf]) -> Result<Source, Question> {
     }
 }
 
-/// The files of a folder that share the commonest ending, in natural order, and what finds them: a pattern, or their names
-/// where others share the ending.
+/// The files of a folder that share the commonest ending, in natural order, and what finds them: a pattern, or their
+/// names where others share the ending.
 fn kind(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), Question> {
     let cannot = |error: std::io::Error| (format!("{} cannot be listed: {error}", folder.display()), None);
     let mut by_ending: BTreeMap<String, Vec<(String, PathBuf)>> = BTreeMap::new();

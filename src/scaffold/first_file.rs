@@ -1,0 +1,93 @@
+//! The samples of the file that stands for all of its kind.
+
+use std::cell::OnceCell;
+
+use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, find_decays};
+use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
+use afmid_pipeline::recording::{InputFiles, Reading, UnpackedContents, open_unpacked, responses};
+
+use super::channels::usable;
+use super::choice::Question;
+use super::pipeline::Wanted;
+use super::recordings::Source;
+use super::stated::missing;
+use crate::inspect::{Channel, first_samples};
+
+/// How many times as long as the hammer's pulse a structure rings at least: the pulse is shorter than half a period of
+/// what it excites, and half of the energy takes a period or more.
+const RINGS: usize = 4;
+
+/// The first file, opened once it is asked for.
+#[derive(Debug)]
+pub struct FirstFile<'a> {
+    pub source: &'a Source,
+    opened: OnceCell<Result<UnpackedContents, String>>,
+}
+
+impl<'a> FirstFile<'a> {
+    pub const fn new(source: &'a Source) -> Self {
+        Self { source, opened: OnceCell::new() }
+    }
+
+    fn opened(&self) -> Result<&UnpackedContents, String> {
+        let open = || {
+            open_unpacked(&InputFiles::new(), &self.source.file, &Reading::of("auto", None))
+                .map_err(|error| error.to_string())
+        };
+        self.opened.get_or_init(open).as_ref().map_err(Clone::clone)
+    }
+
+    /// Whether it holds frequency responses; `guessed`: even if nothing in it says so.
+    pub fn has_responses(&self, guessed: bool) -> bool {
+        let found = self.opened().ok().and_then(|opened| responses(&opened.contents, None).ok()).unwrap_or_default();
+        !found.is_empty() && (guessed || found.iter().all(|response| !response.guessed))
+    }
+
+    /// A channel's first samples. Errors: they cannot be read.
+    pub fn samples(&self, channel: &Channel) -> Result<Vec<f64>, Question> {
+        let channels = &self.opened().map_err(|problem| self.plain(&problem))?.contents.channels;
+        let found = channels.iter().find(|found| found.location == channel.location);
+        let found = found.ok_or_else(|| self.plain(&format!("there is no channel {}", channel.location)))?;
+        first_samples(found).map_err(|error| self.plain(&error.to_string()))
+    }
+
+    /// The rate that the file states or the user. Errors: neither.
+    pub fn rate(&self, channel: &Channel, wanted: &Wanted<'_>) -> Result<f64, Question> {
+        let rate = channel.sample_rate_hz.or(wanted.rate_hz);
+        rate.ok_or_else(|| {
+            let (problem, help) = missing(self.source, channel, wanted, true);
+            (problem, Some(help.into_iter().chain(self.hammer()).collect::<Vec<_>>().join("; ")))
+        })
+    }
+
+    /// The channels' samples, and the decays in them. Errors: they cannot be read, or are of different lengths.
+    pub fn search(&self, channels: &[&Channel], wanted: &Wanted<'_>) -> Result<(Vec<Vec<f64>>, DecaySearch), Question> {
+        let rate = self.rate(channels[0], wanted)?;
+        let values: Vec<Vec<f64>> =
+            channels.iter().map(|channel| self.samples(channel)).collect::<Result<_, Question>>()?;
+        let slices: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+        let found = find_decays(&slices, rate, &DecaySearchOptions::default());
+        Ok((values, found.map_err(|error| self.plain(&error.to_string()))?))
+    }
+
+    /// That a channel is short as a hammer's force, and much shorter than all others.
+    pub fn hammer(&self) -> Option<String> {
+        let signals = self.source.channels.iter().filter(usable);
+        let read = |channel| Some((channel, self.samples(channel).ok()?));
+        let mut found: Vec<(&Channel, usize, bool)> = signals
+            .filter_map(read)
+            .map(|(channel, values)| (channel, half_energy_samples(&values), is_impulsive(&values)))
+            .collect();
+        found.sort_by_key(|(_, samples, _)| *samples);
+        match found[..] {
+            [(force, samples, true), (_, others, _), ..] if RINGS * samples <= others => {
+                Some(format!("{0} is short as a hammer's force: --input {0} if it is one", force.location))
+            }
+            _ => None,
+        }
+    }
+
+    fn plain(&self, problem: &str) -> Question {
+        (format!("{}: {problem}", self.source.file.display()), None)
+    }
+}

@@ -1,0 +1,58 @@
+//! What a file states of its samples, and what the user has to: sample rate and unit.
+
+use super::choice::Question;
+use super::pipeline::Wanted;
+use super::recordings::Source;
+use crate::inspect::Channel;
+
+/// The sample rate to be written; none where the file states it. Errors: neither states one; both do, and differ.
+pub fn rate(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool) -> Result<Option<f64>, Question> {
+    match (channel.sample_rate_hz, wanted.rate_hz) {
+        (Some(_), None) => Ok(None),
+        (None, Some(rate)) => Ok(Some(rate)),
+        (Some(rate), Some(other)) if rate == other => Ok(None),
+        (Some(rate), Some(_)) => {
+            let problem = format!("{} states {rate} samples per second", source.file.display());
+            Err((problem, Some("leave --rate out".to_owned())))
+        }
+        (None, None) => Err(question(source, channel, wanted, unit)),
+    }
+}
+
+/// The unit to be written; none where the file states it. Errors: as [`rate`].
+pub fn unit<'a>(source: &Source, channel: &Channel, wanted: &Wanted<'a>) -> Result<Option<&'a str>, Question> {
+    match (channel.unit.as_str(), wanted.unit) {
+        ("", Some(unit)) => Ok(Some(unit)),
+        ("", None) => Err(question(source, channel, wanted, true)),
+        (stated, Some(unit)) if stated != unit => {
+            let problem = format!("{} states the unit {stated}", source.file.display());
+            Err((problem, Some("leave --unit out".to_owned())))
+        }
+        _ => Ok(None),
+    }
+}
+
+fn question(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool) -> Question {
+    let (problem, help) = missing(source, channel, wanted, unit);
+    (problem, Some(help.join("; ")))
+}
+
+/// What neither the file states nor the user, and how to say it; of the unit if `unit`.
+pub fn missing(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool) -> (String, Vec<String>) {
+    let rate = channel.sample_rate_hz.or(wanted.rate_hz).is_none();
+    let unit = unit && channel.unit.is_empty() && wanted.unit.is_none();
+    let (what, how) = match (rate, unit) {
+        (true, true) => {
+            ("sample rate and no unit", "say them with --rate HZ --unit UNIT, such as --rate 5000 --unit V")
+        }
+        (true, false) => ("sample rate", "say how many samples a second with --rate HZ"),
+        (false, _) => ("unit", "say the signal's unit with --unit, such as --unit V"),
+    };
+    let axis = source.channels.iter().find(|channel| channel.is_axis).filter(|_| rate);
+    let says = |axis: &Channel| source.remarks.iter().find(|remark| remark.starts_with(&axis.location)).cloned();
+    let mut help = vec![how.to_owned()];
+    if let Some((axis, remark)) = axis.and_then(|axis| Some((axis, says(axis)?))) {
+        help.push(format!("{remark}; --goal frf if {} is a frequency", axis.location));
+    }
+    (format!("{} states no {what}", source.file.display()), help)
+}
