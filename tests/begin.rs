@@ -216,6 +216,14 @@ fn what_a_file_does_not_say_of_its_input_is_asked_for() {
     stdout(here, &["new", "pipeline", "t.csv", "--input", "force", "--channel", "b", "-o", "c.toml"]);
     let text = std::fs::read_to_string(here.join("c.toml")).expect("a config");
     assert!(text.contains("inputs = [\"force\"]") && text.contains("output = \"b\""), "{text}");
+    // no titles: a column of times, a hammer's pulse, what rings after it
+    let pulse: Vec<f64> = (0..2000).map(|k| if (300..304).contains(&k) { 5.0 } else { 1e-3 * first[k] }).collect();
+    table(here, "u.txt", "", &[&pulse, &resonance(&pulse)]);
+    let asked = refused(&["new", "pipeline", "u.txt"]);
+    assert!(asked.contains("no sample rate and no unit") && asked.contains("there are 1000 samples"), "{asked}");
+    assert!(asked.contains("--goal frf if column_1 is a frequency"), "{asked}");
+    let said = stdout(here, &["new", "pipeline", "u.txt", "--rate", "1000", "--unit", "m/s^2", "-o", "u.toml"]);
+    assert!(said.contains("column_2 is short as a hammer's force: --input column_2"), "{said}");
 }
 
 /// A measured recording: its file below the shared data, what has to be said, and what is known of its modes: frequency

@@ -13,9 +13,9 @@ use super::recordings::Source;
 use super::stated::missing;
 use crate::inspect::{Channel, first_samples};
 
-/// How many times as long as the hammer's pulse a structure rings at least: the pulse is shorter than half a period of
-/// what it excites, and half of the energy takes a period or more.
-const RINGS: usize = 4;
+/// How many times as many samples as a hammer's pulse ringing has half of its energy in, at least: the pulse takes half a
+/// period or less of what it excites, half of its energy a sixth; of ringing of Q = 5 or more it is a third or more.
+const RINGS: usize = 2;
 
 /// The first file, opened once it is asked for.
 #[derive(Debug)]
