@@ -1,15 +1,17 @@
 //! Kernels of afmid, for any program: slices in, plain structs out; no files, no pipeline, no clock, nothing that lives
 //! as long as the process.
 //!
+//! The paper that pages name is Stark et al. 2005, doi 10.1063/1.2137887.
+//!
 //! Front doors, each with its model, shapes, cost, source and an example from data to numbers, with errors where there
 //! are any:
 //!
 //! | module | from | to |
 //! |---|---|---|
-//! | [`ringdown`] | free decays of one or many events | frequencies, quality factors, amplitudes; at the Cramer-Rao bound |
-//! | [`pem`] | input and output | the innovations form of Eq. 8 with its covariance |
+//! | [`ringdown`] | free decays of one or many events | frequencies, quality factors, amplitudes, shapes |
+//! | [`pem`] | input and output | the innovations form of the paper's Eq. 8 with its covariance |
 //! | [`subspace`] | input and output, or a decay | poles, without a start |
-//! | [`frf_modes`] | frequency responses of many channels | modes, shapes, a stabilisation diagram; at the Cramer-Rao bound |
+//! | [`frf_modes`] | frequency responses of many channels | modes, shapes, a stabilisation diagram |
 //! | [`grey`] | input and output, numbers that are known | modes with static shares, real poles, a delay |
 //! | [`spectra`] | records | ETFE, smoothed responses, power spectra, thermal fits |
 //! | [`contact`] | poles in contact and free | contact stiffness and damping |
@@ -20,9 +22,10 @@
 //!
 //! From the ground up, each using only those before it:
 //! [`linear_algebra`], [`signal`], [`statistics`], [`effects`], [`Monitor`] - [`optimise`] - [`events`] -
-//! [`calibration`], [`force`], [`harmonics`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`], [`subspace`],
-//! [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`] - [`frf_modes`]. Kernels that fit many times
-//! take a [`Monitor`]: [`ringdown::fit_counted_ringdowns`], [`validation::choose_order`], [`validation::bootstrap`].
+//! [`calibration`], [`force`], [`harmonics`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`],
+//! [`subspace`], [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`] -
+//! [`frf_modes`]. Kernels that fit many times take a [`Monitor`]: [`ringdown::fit_counted_ringdowns`],
+//! [`validation::choose_order`], [`validation::bootstrap`].
 //!
 //! ```
 //! use afmid_kernels::statistics::{chi_square_tail, median_and_scale};

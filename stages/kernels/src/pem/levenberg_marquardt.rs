@@ -1,4 +1,4 @@
-//! Levenberg-Marquardt on the projected problem: [`minimise`] is the front door, [`descend`] the iteration.
+//! Levenberg-Marquardt on the projected problem: [`minimise`] here, its iteration in [`crate::optimise::descend`].
 //!
 //! Steps are scaled column by column; a coordinate at its limit that pulls outwards is held. The gradient is measured
 //! as the share of the residual that lies in the tangent space: `share * sqrt(N)` is the distance to the minimum in

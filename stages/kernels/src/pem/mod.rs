@@ -1,23 +1,25 @@
-//! Prediction error method: the innovations form of Eq. 8, fitted by minimum one-step prediction error.
+//! Prediction error method: the innovations form of the paper's Eq. 8, fitted by minimum one-step prediction error.
 //!
 //! # Model
-//! Eq. 8 of the paper: `x(t+1) = A x(t) + B u(t) + K e(t)`, `y(t) = C x(t) + D u(t) + e(t)`, e white. A is built of
-//! sections of order two ([`InnovationsModel`](crate::model::InnovationsModel)). Per experiment: x0, an offset and a
+//! Eq. 8: `x(t+1) = A x(t) + B u(t) + K e(t)`, `y(t) = C x(t) + D u(t) + e(t)`, e white. A is built of sections of
+//! order two ([`InnovationsModel`](crate::model::InnovationsModel)): `a_i` and `c_i` are the characteristic polynomials
+//! of the sections of A and of A - K C, and `model::kalman_gains` makes K of them. Per experiment: x0, an offset and a
 //! slope of y.
 //! # Method
-//! Starts from subspace estimates ([`crate::subspace`]; `starts`), then Levenberg-Marquardt steps on the one-step
-//! prediction errors (`levenberg_marquardt`, by [`crate::optimise::descend`]) with analytic derivatives (`jacobian`) and a secant
-//! estimate of the curvature that they leave out (`secant`); x0, offset, slope, B and D are eliminated in every step
-//! (variable projection, `projection`). [`identify`] minimises; [`refit`] starts from a model; [`with_poles`] keeps the
-//! poles.
+//! Minimises `V = sum_t e(t)^2`, `e = H^-1 (y - G u)` with `H^-1 = prod a_i / c_i` (`predictor`; V is the cost of
+//! `projection`). Starts from subspace estimates ([`crate::subspace`]; `starts`), then Levenberg-Marquardt steps on the
+//! one-step prediction errors (`levenberg_marquardt`, by [`crate::optimise::descend`]) with analytic derivatives
+//! (`jacobian`) and a secant estimate of the curvature that they leave out (`secant`); x0, offset, slope, B and D are
+//! eliminated in every step (variable projection, `projection`). By default poles and noise model move in turns
+//! (`alternating`). [`identify`] minimises; [`refit`] starts from a model; [`with_poles`] keeps the poles.
 //! # Shapes
 //! u and y: N samples per experiment, several inputs one after the other; covariance: (2n + 1) x (2n + 1) and n + 1
 //! more for each further input.
 //! # Cost
 //! Per iteration O(N n^2); the start O(N s + s^3) for s block rows.
 //! # Source
-//! L. Ljung, System Identification (1999), chapters 7 and 10; G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973)
-//! 413.
+//! Stark et al. 2005 (the paper, doi 10.1063/1.2137887), Eq. 8; L. Ljung, System Identification (1999), chapters 7 and
+//! 10; G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
 //!
 //! ```
 //! use afmid_kernels::pem::{Experiment, PemOptions, identify};

@@ -42,7 +42,7 @@ pub struct PemOptions {
     /// model holds.
     pub focus: Focus,
     /// Starts that are refined. Why: more than three also take subspace estimates with instruments, which records of
-    /// rich input need (8).
+    /// rich input need: take 8 there.
     #[schemars(range(min = 1, max = 100))]
     pub starts: usize,
     /// Prior variance of the response outside the excited band: as if white noise of this share of each input's energy

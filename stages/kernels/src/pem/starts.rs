@@ -1,8 +1,8 @@
 //! Where the iteration begins: several sets of poles, the most promising refined first.
 //!
-//! Strong modes come from the subspace estimate of every order from six below the wanted one on; what is missing is filled with
-//! real poles spread over the fast part of the unit interval, where detectors lie. A weak mode needs the high orders,
-//! detector poles the low ones.
+//! Strong modes come from the subspace estimate of every order from six below the wanted one on; what is missing is
+//! filled with real poles spread over the fast part of the unit interval, where detectors lie. A weak mode needs the
+//! high orders, detector poles the low ones.
 
 use crate::linear_algebra::{eigenvalues, least_squares};
 use faer::{Mat, c64};

@@ -115,7 +115,8 @@ pub fn fit_counted_ringdowns(
     Ok(CountedRingdown { fit, modes: chosen + 1, seen })
 }
 
-/// [`fit_ringdowns`] with as many modes, up to `most`, as lower the BIC under white noise: all that rings, whatever its reason. Errors: those of that.
+/// [`fit_ringdowns`] with as many modes, up to `most`, as lower the BIC under white noise: all that rings, whatever its
+/// reason. Errors: those of that.
 pub fn fit_all_that_rings(
     events: &[&[f64]],
     free: &[&[f64]],

@@ -22,8 +22,8 @@ const NOISE_ROUNDS: usize = 3;
 /// Fits one set of exponentials to several ringdowns at once.
 ///
 /// # Model
-/// `y_e(k) = a_e sum_j Re(rho_j exp(s_j (k T - t_e))) + c_e + d_e k + n(k)`: poles and residues shared, amplitude,
-/// sub-sample onset, offset and slope each event's own, `n` of a [`RingdownNoise`].
+/// `y_e(k) = a_e sum_j Re(rho_j exp(s_j (k T - t_e))) + offset_e + slope_e x_k + n(k)`, x from -1 to 1: poles and
+/// residues shared, amplitude, shift, offset and slope each event's own, `n` of a [`RingdownNoise`].
 /// # Method
 /// Maximum likelihood. Records are whitened exactly ([`RingdownNoise`]'s Kalman filter), projected on the three dozen
 /// directions that the shape can reach, and fitted there by Levenberg-Marquardt with the events' own parameters

@@ -19,7 +19,8 @@
 //! use afmid_kernels::ringdown::{DecayOptions, NoiseSource, RingdownOptions, fit_decay, fit_ringdowns};
 //! // one damped cosine, sampled at 1 MS/s: 50 kHz, Q = 40
 //! let (w, a) = (std::f64::consts::TAU * 50e3, std::f64::consts::PI * 50e3 / 40.0);
-//! let y: Vec<f64> = (0..4096).map(|k| (-a * 1e-6 * k as f64).exp() * (w * 1e-6 * k as f64).cos() + 1e-4 * ((k * k) as f64).sin()).collect();
+//! let wave = |k: f64| (-a * 1e-6 * k).exp() * (w * 1e-6 * k).cos() + 1e-4 * (k * k).sin();
+//! let y: Vec<f64> = (0..4096).map(|k| wave(f64::from(k))).collect();
 //! let options = RingdownOptions { modes: 1, real_poles: 0, noise: NoiseSource::White, ..RingdownOptions::default() };
 //! let fit = fit_ringdowns(&[&y], &[], 1e-6, &options)?;
 //! let mode = fit.modes()[0];

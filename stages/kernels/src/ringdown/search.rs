@@ -54,8 +54,8 @@ const VALLEY: f64 = 0.06;
 /// Minimises the cost from `point`, while the basis round `reference` holds.
 ///
 /// # Method
-/// [`descend`] with the events' own parameters eliminated by Schur complements. Steps that leave the stable half plane, or
-/// make the fit worse, are repeated shorter; parameters on a bound are held while they push beyond it. Ends when no
+/// [`descend`] with the events' own parameters eliminated by Schur complements. Steps that leave the stable half plane,
+/// or make the fit worse, are repeated shorter; parameters on a bound are held while they push beyond it. Ends when no
 /// parameter of a mode moves by `tolerance` of its standard error and all of them together by less than a quarter of
 /// one: real poles that nearly coincide make a long flat valley, along which nothing else changes.
 pub(super) fn search(

@@ -66,7 +66,7 @@ fn next_poles(points: &Points, poles: &Poles) -> Result<Poles, ModelError> {
         row.extend(values[k].iter().map(|value| -value * points.g[k]));
         row
     });
-    // the constraint weighs as much as the response does (Eq. 8)
+    // the constraint weighs as much as the response does (Gustavsen 2006, Eq. 8)
     let level =
         points.g.iter().zip(&points.weight).map(|(g, w)| w * w * g.norm_sqr()).sum::<f64>().sqrt() / count as f64;
     sums.iter().enumerate().for_each(|(j, sum)| stacked[(2 * count, first + j)] = level * sum);
