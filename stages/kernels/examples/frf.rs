@@ -25,9 +25,14 @@ struct Case {
     band: (f64, f64, f64),
     /// Whether a mode lies below the band and one above it.
     outside: bool,
+    /// Numbers of responses.
+    responses: &'static [usize],
 }
 
-const CASES: [Case; 6] = [
+/// Numbers of responses of most cases.
+const MANY: [usize; 3] = [2, 4, 12];
+
+const CASES: [Case; 7] = [
     Case {
         name: "Q 10, 3 modes",
         modes: 3,
@@ -35,6 +40,7 @@ const CASES: [Case; 6] = [
         close: false,
         band: (20.0, 500.0, 1.0),
         outside: false,
+        responses: &MANY,
     },
     Case {
         name: "Q 20 to 200, 4 modes",
@@ -43,6 +49,7 @@ const CASES: [Case; 6] = [
         close: false,
         band: (40.0, 600.0, 0.5),
         outside: false,
+        responses: &MANY,
     },
     Case {
         name: "Q 300 to 1000, 6 modes",
@@ -51,6 +58,7 @@ const CASES: [Case; 6] = [
         close: false,
         band: (40.0, 840.0, 0.2),
         outside: false,
+        responses: &MANY,
     },
     Case {
         name: "Q 1000, coarse",
@@ -59,6 +67,7 @@ const CASES: [Case; 6] = [
         close: false,
         band: (50.0, 450.0, 0.2),
         outside: false,
+        responses: &MANY,
     },
     Case {
         name: "close pair, Q 50 to 300",
@@ -67,6 +76,7 @@ const CASES: [Case; 6] = [
         close: true,
         band: (50.0, 450.0, 0.5),
         outside: false,
+        responses: &MANY,
     },
     Case {
         name: "modes outside the band",
@@ -75,6 +85,16 @@ const CASES: [Case; 6] = [
         close: false,
         band: (60.0, 500.0, 0.5),
         outside: true,
+        responses: &MANY,
+    },
+    Case {
+        name: "close pair in one response",
+        modes: 3,
+        quality: (50.0, 300.0),
+        close: true,
+        band: (50.0, 450.0, 0.5),
+        outside: false,
+        responses: &[1],
     },
 ];
 
@@ -326,7 +346,7 @@ fn main() {
     let mut all: Vec<Outcome> = Vec::new();
     for (number, case) in CASES.iter().enumerate().filter(|(i, _)| chosen.is_none_or(|c| c == *i)) {
         let mut own = Vec::new();
-        for responses in [2, 4, 12] {
+        for &responses in case.responses {
             for (place, noise) in [1e-3, 1e-2, 5e-2].into_iter().enumerate() {
                 let first = 1_000_000 * number as u64 + 10_000 * responses as u64 + 1_000 * place as u64;
                 let outcomes: Vec<Outcome> = (0..seeds)

@@ -7,18 +7,24 @@ use super::FrfModesOptions;
 use super::data::Lines;
 use super::polynomial::Diagram;
 
-/// Distance in half widths below which two starts are one.
+/// Distance in half widths below which two starts are one. Why: either explains 98 % of what the other does.
 const SAME: f64 = 0.3;
 /// Candidates at most. Why: of a mode several starts remain, and modes are tens.
 const MOST: usize = 60;
 /// Orders at which a pole must be stable. Why: as in `model.stabilisation`, noise seldom keeps a pole for four.
 const ORDERS: usize = 4;
-/// Half widths on either side over which a trial pole is compared with the residual.
+/// Half widths on either side over which a trial pole is compared with the residual: 89 % of its energy.
 const REACH: f64 = 6.0;
-/// Ratio of one trial half width to the next.
+/// Ratio of one trial half width to the next. Why: midway between two, either explains 98.6 % of a mode.
 const RATIO: f64 = 1.6;
-/// Trial poles of the residual at most.
+/// Trial poles of the residual at most. Why: the search comes back as long as one of them stays, and each that does not
+/// costs a fit.
 const FEW: usize = 6;
+/// Least half width of a trial pole over the distance of the lines about it. Why: a narrower one is seen at one line
+/// alone, whatever its width; less than a half, since frequencies may be rounded.
+const SEEN: f64 = 0.4;
+/// Least half width over the highest frequency: four decades above rounding.
+const NARROWEST: f64 = 1e-12;
 
 /// Stable poles, those of most orders first, each once.
 pub(super) fn stable(diagram: &Diagram, options: &FrfModesOptions) -> Vec<c64> {
@@ -54,19 +60,18 @@ fn thinned(all: impl Iterator<Item = c64>, most: usize) -> Vec<c64> {
 
 /// Poles that explain most of what is left, each by itself: a matched filter over half widths and frequencies.
 pub(super) fn of_residual(lines: &Lines, left: &[Vec<c64>], options: &FrfModesOptions) -> Vec<c64> {
-    let (first, last) = (lines.frequency_hz[0], lines.frequency_hz[lines.len() - 1]);
-    let spacing = lines.spacing_hz();
+    let last = lines.frequency_hz[lines.len() - 1];
     let widest = 0.5 * last / options.least_quality_factor.max(4.0);
-    let widths: Vec<f64> =
-        std::iter::successors(Some(0.5 * spacing), |w| Some(w * RATIO)).take_while(|w| *w < widest).collect();
+    let narrowest = lines.frequency_hz.windows(2).map(|pair| 0.5 * (pair[1] - pair[0])).fold(widest, f64::min);
+    let widths: Vec<f64> = std::iter::successors(Some(narrowest.max(NARROWEST * last)), |w| Some(w * RATIO))
+        .take_while(|w| *w < widest)
+        .collect();
     let mut all: Vec<(f64, c64)> = widths
         .par_iter()
         .flat_map_iter(|&width| {
-            let count = ((last - first) / width) as usize;
-            (0..=count).map(move |i| {
-                let f = first + width * i as f64;
+            places(&lines.frequency_hz, width).into_iter().map(move |f| {
                 let s = std::f64::consts::TAU * c64::new(-width, f);
-                (matched(lines, left, s, (REACH * width).max(2.0 * spacing)), s)
+                (matched(lines, left, s, REACH * width), s)
             })
         })
         .collect();
@@ -82,6 +87,22 @@ pub(super) fn of_residual(lines: &Lines, left: &[Vec<c64>], options: &FrfModesOp
         }
     }
     kept
+}
+
+/// Frequencies of trial poles, a half width apart; none between lines that are too far apart to see them.
+fn places(frequency_hz: &[f64], width: f64) -> Vec<f64> {
+    let mut all = Vec::new();
+    let mut next = frequency_hz[0];
+    for pair in frequency_hz.windows(2) {
+        if width < SEEN * (pair[1] - pair[0]) {
+            next = next.max(pair[1]);
+        }
+        while next < pair[1] {
+            all.push(next);
+            next += width;
+        }
+    }
+    all
 }
 
 /// Weighted squares that `1/(p-s)` takes from what is left nearby.

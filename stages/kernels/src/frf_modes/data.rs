@@ -53,7 +53,9 @@ pub struct MeasuredResponses<'a> {
     pub frequency_hz: &'a [f64],
     /// One row per response; values that are not finite are left out.
     pub transfer: &'a [&'a [c64]],
-    /// Expected squared error of each value; values without a positive, finite one are left out. None: unknown.
+    /// Expected squared error of each value; values without a positive, finite one are left out. None: unknown. Each
+    /// should be known from a hundred numbers: of v numbers the true variances of what is found are v / (v - 4) of those
+    /// stated.
     pub variance: Option<&'a [&'a [f64]]>,
 }
 
@@ -81,21 +83,21 @@ pub(super) struct Lines {
     pub weight: Vec<Vec<f64>>,
     /// The same for the noise that neighbouring lines show, or for the variance given.
     pub quiet: Vec<Vec<f64>>,
-    /// Median distance of neighbouring lines before any were merged, Hz.
-    pub resolution_hz: f64,
+    /// Distance of each line from the nearer neighbour before any were merged, Hz.
+    pub step_hz: Vec<f64>,
     /// How many lines each is the mean of.
     pub merged: Vec<f64>,
     /// Whether the variance was given.
     pub known: bool,
 }
 
-/// Most lines that are merged into one, less one.
+/// Most lines that are merged into one.
 const STRETCH: usize = 31;
-/// Least lines of a fit.
+/// Least lines of a fit, and least values of a response.
 const LEAST: usize = 8;
 
 impl Lines {
-    /// Errors: lengths, frequencies that do not ascend, too few lines.
+    /// Errors: lengths, frequencies that do not ascend, too few lines, a response without values.
     pub fn new(measured: MeasuredResponses<'_>, options: &FrfModesOptions) -> Result<Self, ModelError> {
         checked(measured)?;
         let frequency = measured.frequency_hz;
@@ -105,6 +107,7 @@ impl Lines {
         if kept.len() < LEAST {
             return Err(ModelError::TooFewPoints { found: kept.len(), wanted: LEAST });
         }
+        let frequency_hz: Vec<f64> = kept.iter().map(|&k| frequency[k]).collect();
         let variance = |r: usize, k: usize| measured.variance.map_or(2.0, |v| v[r][k]);
         let there = |r: usize, k: usize| {
             let v = variance(r, k);
@@ -119,36 +122,51 @@ impl Lines {
         let power = options.quantity.power();
         let weight: Vec<Vec<f64>> = rows.clone().map(|r| kept.iter().map(|&k| weight(r, k)).collect()).collect();
         let mut lines = Self {
-            frequency_hz: kept.iter().map(|&k| frequency[k]).collect(),
+            step_hz: steps(&frequency_hz),
+            frequency_hz,
             factor: p.iter().map(|p| p.powi(power)).collect(),
             p,
             power,
             transfer: rows.map(|r| kept.iter().map(|&k| value(r, k)).collect()).collect(),
             quiet: weight.clone(),
             weight,
-            resolution_hz: 0.0,
             merged: vec![1.0; kept.len()],
             known: measured.variance.is_some(),
         };
-        lines.resolution_hz = lines.spacing_hz();
+        lines.used()?;
         if !lines.known {
             (lines.quiet, lines.weight) = from_neighbours(&lines);
         }
         Ok(lines)
     }
 
+    /// Errors: a response with too few values; one that is zero, if its noise is to be estimated.
+    fn used(&self) -> Result<(), ModelError> {
+        for (r, (row, weight)) in self.transfer.iter().zip(&self.weight).enumerate() {
+            let refused = |problem| Err(ModelError::Response { number: r + 1, problem });
+            if weight.iter().filter(|w| **w > 0.0).count() < LEAST {
+                return refused("has fewer than 8 values in the band");
+            }
+            if !self.known && row.iter().all(|h| h.norm_sqr() == 0.0) {
+                return refused("is zero in the whole band");
+            }
+        }
+        Ok(())
+    }
+
     /// Means of neighbouring lines where no pole is near: a stretch is at most `share` of its distance from the nearest
-    /// pole, in the s plane, and within one of the `bands`.
+    /// pole, in the s plane, and within one of the `bands`; it ends where values are missing in a response.
     ///
     /// A mean of `1/(p-s)` over a stretch of that share differs from its value in the middle by `share^2 / 24` of it.
     pub fn thinned(&self, poles: &[c64], share: f64, bands: &[Range<usize>]) -> Self {
         let distance = |k: usize| poles.iter().map(|s| (self.p[k] - s).norm()).fold(f64::INFINITY, f64::min);
+        let other = |k: usize, first: usize| self.weight.iter().any(|row| (row[k] > 0.0) != (row[first] > 0.0));
         let mut stretches: Vec<Range<usize>> = Vec::new();
         for band in bands {
             let mut first = band.start;
             for k in band.clone() {
                 let long = (self.p[k] - self.p[first]).norm() > share * distance(first).min(distance(k));
-                if long || k - first == STRETCH {
+                if long || k - first == STRETCH || other(k, first) {
                     stretches.push(first..k);
                     first = k;
                 }
@@ -158,31 +176,29 @@ impl Lines {
         self.means(&stretches)
     }
 
+    /// Frequencies and values alike with equal weights: a mean belongs to the middle of its stretch.
     fn means(&self, stretches: &[Range<usize>]) -> Self {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let frequency_hz: Vec<f64> = stretches.iter().map(|own| mean(&self.frequency_hz[own.clone()])).collect();
         let p: Vec<c64> = frequency_hz.iter().map(|f| c64::new(self.p[0].re, std::f64::consts::TAU * f)).collect();
         let power = self.power;
-        let sum = |weight: &Vec<f64>| stretches.iter().map(|own| weight[own.clone()].iter().sum()).collect();
-        let weight: Vec<Vec<f64>> = self.weight.iter().map(sum).collect();
-        let transfer = |(row, weight): (&Vec<c64>, &Vec<f64>)| {
-            let of = |own: &Range<usize>| {
-                let (row, weight) = (&row[own.clone()], &weight[own.clone()]);
-                let size: f64 = weight.iter().sum();
-                let sum: c64 = row.iter().zip(weight).map(|(h, w)| h * *w).sum();
-                if size > 0.0 { sum / size } else { c64::new(0.0, 0.0) }
-            };
-            stretches.iter().map(of).collect()
+        // one over the variance of such a mean; zero where values are left out
+        let weight_of = |weight: &[f64]| {
+            let count = weight.len() as f64;
+            count * count / weight.iter().map(|w| w.recip()).sum::<f64>()
         };
+        let weight = |row: &Vec<f64>| stretches.iter().map(|own| weight_of(&row[own.clone()])).collect::<Vec<f64>>();
+        let middle = |row: &[c64]| row.iter().sum::<c64>() / row.len() as f64;
+        let transfer = |row: &Vec<c64>| stretches.iter().map(|own| middle(&row[own.clone()])).collect();
         Self {
+            step_hz: stretches.iter().map(|own| mean(&self.step_hz[own.clone()])).collect(),
             frequency_hz,
             factor: p.iter().map(|p| p.powi(power)).collect(),
             p,
             power,
-            transfer: self.transfer.iter().zip(&self.weight).map(transfer).collect(),
-            weight,
-            quiet: self.quiet.iter().map(sum).collect(),
-            resolution_hz: self.resolution_hz,
+            transfer: self.transfer.iter().map(transfer).collect(),
+            weight: self.weight.iter().map(weight).collect(),
+            quiet: self.quiet.iter().map(weight).collect(),
             merged: stretches.iter().map(|own| self.merged[own.clone()].iter().sum()).collect(),
             known: self.known,
         }
@@ -205,16 +221,13 @@ impl Lines {
 
     /// What is seen of all responses at once.
     pub fn seen(&self) -> Indicator {
-        let size = |row: &[c64]| row.iter().map(c64::norm_sqr).sum::<f64>() / row.len() as f64;
-        let sizes: Vec<f64> = self.transfer.iter().map(|row| size(row).max(f64::MIN_POSITIVE)).collect();
+        let count = |weight: &[f64]| weight.iter().filter(|w| **w > 0.0).count() as f64;
+        let size = |(row, weight): (&Vec<c64>, &Vec<f64>)| {
+            (row.iter().map(c64::norm_sqr).sum::<f64>() / count(weight)).max(f64::MIN_POSITIVE)
+        };
+        let sizes: Vec<f64> = self.transfer.iter().zip(&self.weight).map(size).collect();
         let at = |k: usize| self.transfer.iter().zip(&sizes).map(|(row, size)| row[k].norm_sqr() / size).sum::<f64>();
         Indicator { frequency_hz: self.frequency_hz.clone(), value: (0..self.len()).map(|k| at(k).sqrt()).collect() }
-    }
-
-    /// Median distance of neighbouring lines, Hz.
-    pub fn spacing_hz(&self) -> f64 {
-        let mut steps: Vec<f64> = self.frequency_hz.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        crate::statistics::median(&mut steps)
     }
 
     /// Lines within `half_hz` of a frequency.
@@ -248,10 +261,16 @@ fn checked(measured: MeasuredResponses<'_>) -> Result<(), ModelError> {
     }
     let bad =
         measured.frequency_hz.windows(2).find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less));
-    match bad {
-        Some(pair) => {
-            Err(ModelError::Parameter { name: "a frequency", found: pair[1], wanted: "above the one before" })
-        }
-        None => Ok(()),
+    let wrong = |found: f64, wanted| Err(ModelError::Parameter { name: "a frequency", found, wanted });
+    match (bad, measured.frequency_hz.iter().find(|f| !f.is_finite())) {
+        (_, Some(found)) => wrong(*found, "finite"),
+        (Some(pair), None) => wrong(pair[1], "above the one before"),
+        (None, None) => Ok(()),
     }
+}
+
+/// Distance of each frequency from the nearer neighbour.
+fn steps(frequency_hz: &[f64]) -> Vec<f64> {
+    let gap = |k: usize| frequency_hz.get(k + 1).map_or(f64::INFINITY, |next| next - frequency_hz[k]);
+    (0..frequency_hz.len()).map(|k| gap(k).min(if k > 0 { gap(k - 1) } else { f64::INFINITY })).collect()
 }

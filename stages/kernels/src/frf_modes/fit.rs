@@ -105,7 +105,7 @@ impl Fit<'_> {
 
     /// Largest move of a mode of the band, in its standard errors.
     fn distance(&self, at: &Projection, step: &[f64], inverse: &Mat<f64>) -> f64 {
-        let level = at.energy() / self.lines.values().saturating_sub(at.parameters()).max(1) as f64;
+        let level = at.energy() / at.freedom(self.lines);
         let mut first = 0;
         let mut most = 0.0_f64;
         for (s, beyond) in at.poles.iter().zip(&at.beyond) {
@@ -143,7 +143,7 @@ impl Objective for Fit<'_> {
             self.distance = f64::INFINITY;
             return Ok(None);
         }
-        let level = at.energy() / self.lines.values().saturating_sub(at.parameters()).max(1) as f64;
+        let level = at.energy() / at.freedom(self.lines);
         self.distance = self.distance(at, &step, &inverse);
         Ok((promise > self.settled * level).then_some((information, gradient)))
     }

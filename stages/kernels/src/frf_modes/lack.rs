@@ -7,10 +7,10 @@ use faer::c64;
 use super::data::Lines;
 use super::noise::BANDS;
 
-/// Half widths of the stretch around a mode that is looked at: 94 % of its energy.
+/// Half widths of the stretch around a mode that is looked at: 84 % of its energy.
 const HALF_WIDTHS: f64 = 4.0;
 /// Lines of that stretch at least, on either side.
-const LINES: f64 = 10.0;
+const LINES: usize = 10;
 /// Share of a stretch up to which neighbours may be alike: beyond, too few pairs are left.
 const LAGS: usize = 8;
 /// Standard errors that chance exceeds once in a hundred times.
@@ -30,10 +30,11 @@ pub(super) struct Lack {
 impl Lack {
     /// Around the mode of pole `s`; `modes` are all poles.
     pub fn around(lines: &Lines, left: &[Vec<c64>], modes: &[c64], s: c64) -> Self {
-        let half = (HALF_WIDTHS * -s.re / std::f64::consts::TAU).max(LINES * lines.spacing_hz());
-        let f = s.im / std::f64::consts::TAU;
-        let range = lines.around(f, half);
-        let near = modes.iter().filter(|m| (m.im / std::f64::consts::TAU - f).abs() < half).count();
+        let (f, half) = (s.im / std::f64::consts::TAU, HALF_WIDTHS * -s.re / std::f64::consts::TAU);
+        let (wide, few) = (lines.around(f, half), beside(lines, f, LINES));
+        let range = wide.start.min(few.start)..wide.end.max(few.end);
+        let place = |m: &&c64| lines.frequency_hz.partition_point(|f| *f < m.im / std::f64::consts::TAU);
+        let near = modes.iter().filter(|m| range.contains(&place(m))).count();
         let own = Correlated::of(left, &lines.weight, range);
         let parameters = (2 * lines.responses() + 2) * near;
         let degrees = (own.values - parameters as f64).max(1.0);
@@ -57,10 +58,14 @@ impl Lack {
 /// Variance of a sum of neighbouring residuals over that of independent ones, over a thirtieth of the lines on either
 /// side of a pole: enough of them to see how far neighbours are alike.
 pub(super) fn correlation(lines: &Lines, left: &[Vec<c64>], s: c64) -> f64 {
-    let centre = lines.frequency_hz.partition_point(|f| *f < s.im / std::f64::consts::TAU);
-    let half = (lines.len() / BANDS).max(LINES as usize);
-    let range = centre.saturating_sub(half)..(centre + half).min(lines.len());
+    let range = beside(lines, s.im / std::f64::consts::TAU, (lines.len() / BANDS).max(LINES));
     Correlated::of(left, &lines.weight, range).factor()
+}
+
+/// So many lines on either side of a frequency.
+fn beside(lines: &Lines, frequency_hz: f64, count: usize) -> Range<usize> {
+    let centre = lines.frequency_hz.partition_point(|f| *f < frequency_hz);
+    centre.saturating_sub(count)..(centre + count).min(lines.len())
 }
 
 /// Products of whitened residuals with later ones, over all responses.

@@ -16,7 +16,8 @@
 //! eliminated.
 //!
 //! In reading order: options, data (lines and weights), noise (variance by bands), polynomial (Eq. 2), candidates,
-//! model and projection (Eq. 1), fit (Eq. 3), lack (what a fit leaves), selection (how many modes), result.
+//! model and projection (Eq. 1), fit (Eq. 3), lack (what a fit leaves), selection (how many modes), scatter (responses
+//! that disagree), result.
 //!
 //! ```
 //! use afmid_kernels::c64;
@@ -62,10 +63,13 @@ mod fit;
 mod lack;
 mod model;
 mod noise;
+#[cfg(test)]
+mod noise_tests;
 mod options;
 mod polynomial;
 mod projection;
 mod result;
+mod scatter;
 mod selection;
 #[cfg(test)]
 mod tests;
@@ -115,11 +119,12 @@ const FINE_SHARE: f64 = 0.03;
 /// # Units
 /// Hertz, 1/s; residues in the responses' unit times 1/s for a receptance.
 /// # Accuracy
-/// docs/results/frf.md: rms errors at the Cramer-Rao bound, 95 % intervals that cover 94 to 96 %. Standard errors count
-/// what the fit leaves around each mode: a residual above the noise or one that neighbours share widens them, and
-/// so does a pole on which the responses disagree.
+/// docs/results/frf.md: rms errors at the Cramer-Rao bound, 95 % intervals that cover 94 to 96 %; with modes beyond the
+/// band that are as strong as those in it, damping at 1.16 of the bound and 92 %. Standard errors count what the fit
+/// leaves around each mode: a residual above the noise or one that neighbours share widens them, and so does a pole on
+/// which the responses disagree.
 /// # Errors
-/// Lengths; fewer than 8 lines; a number out of range; no mode.
+/// Lengths; fewer than 8 lines or values of a response; a response of zeros; a number out of range; no mode.
 /// # Source
 /// P. Guillaume et al., Proc. 21st IMAC (2003) (poly-reference least-squares complex frequency domain); H. Van der
 /// Auweraer et al., J. Dyn. Syst. Meas. Control 123 (2001) 651 (common denominator); P. Verboven, PhD thesis, Vrije

@@ -32,60 +32,76 @@ const LEAST: f64 = 0.02;
 /// A smooth response leaves no third differences, and of the lines of a band the median counts, which peaks do not
 /// move.
 pub(super) fn from_neighbours(lines: &Lines) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
-    let row = |transfer: &Vec<c64>, share: f64| {
-        let difference = |k: usize| -> f64 {
-            let first = k.saturating_sub(1).min(transfer.len() - 4);
-            let [a, b, c, d] = [0, 1, 2, 3].map(|i| transfer[first + i]);
-            // the weights' squares add up to 20
-            (d - c * 3.0 + b * 3.0 - a).norm_sqr() / 20.0
-        };
+    let row = |r: usize, share: f64| {
+        let there: Vec<usize> = (0..lines.len()).filter(|k| lines.weight[r][*k] > 0.0).collect();
         by_bands(lines.len(), |band| {
-            let size = transfer[band.clone()].iter().map(c64::norm_sqr).sum::<f64>() / band.len() as f64;
-            MEAN * median(&mut band.map(difference).collect::<Vec<f64>>()) + share * share * size
+            let own = there.partition_point(|k| *k < band.start)..there.partition_point(|k| *k < band.end);
+            let count = own.len().max(1) as f64;
+            let size = there[own.clone()].iter().map(|k| lines.transfer[r][*k].norm_sqr()).sum::<f64>() / count;
+            let mut differences: Vec<f64> = own.filter_map(|i| difference(lines, r, &there, i)).collect();
+            let noise = if differences.is_empty() { 0.0 } else { MEAN * median(&mut differences) };
+            noise + share * share * size
         })
     };
-    let of = |share: f64| kept(lines, lines.transfer.iter().map(|transfer| row(transfer, share)).collect());
+    let of = |share: f64| kept(lines, (0..lines.responses()).map(|r| row(r, share)).collect());
     (of(0.0), of(LEAST))
 }
 
-/// Weights from what a fit leaves, its parameters counted in the bands where its modes are.
-pub(super) fn from_residual(lines: &Lines, at: &Projection, left: &[Vec<c64>]) -> Vec<Vec<f64>> {
-    let responses = lines.responses() as f64;
-    let modal = |band: &Range<usize>| {
-        let inside = |s: &&c64| {
-            let f = s.im / std::f64::consts::TAU;
-            f >= lines.frequency_hz[band.start] && f < lines.frequency_hz[band.end - 1]
-        };
-        // two numbers for its residue, and the response's share of the pole's two
-        (2.0 + 2.0 / responses) * at.poles.iter().filter(inside).count() as f64
-    };
-    let row = |left: &Vec<c64>| {
-        let variance = |band: Range<usize>| {
-            // at least half of the numbers are the noise's
-            let degrees = (2.0 * band.len() as f64 - modal(&band)).max(band.len() as f64);
-            let size = 2.0 / degrees;
-            power_law(lines, left, band).into_iter().map(|v| size * v).collect::<Vec<f64>>()
-        };
-        bands(lines.len()).into_iter().flat_map(variance).collect()
-    };
-    kept(lines, left.iter().map(row).collect())
+/// Square of the third divided difference about place `i` of those where a response has values, of unit weight: lines
+/// need not be evenly spaced. None of fewer than four.
+fn difference(lines: &Lines, response: usize, there: &[usize], i: usize) -> Option<f64> {
+    let first = i.saturating_sub(1).min(there.len().checked_sub(4)?);
+    let own = there.get(first..first + 4)?;
+    let f = |a: usize| lines.frequency_hz[own[a]];
+    let weight = |a: usize| (0..4).filter(|b| *b != a).map(|b| (f(a) - f(b)).recip()).product::<f64>();
+    let weights = [0, 1, 2, 3].map(weight);
+    let sum: c64 = weights.iter().zip(own).map(|(w, k)| lines.transfer[response][*k] * *w).sum();
+    Some(sum.norm_sqr() / weights.iter().map(|w| w * w).sum::<f64>())
 }
 
-/// Sum of squares of a band spread over its lines as a power of the frequency: of white noise, or of noise that was
-/// integrated once or twice, the likeliest.
-fn power_law(lines: &Lines, left: &[c64], band: Range<usize>) -> Vec<f64> {
-    let frequency = &lines.frequency_hz[band.clone()];
-    let logarithms: f64 = frequency.iter().map(|f| f.ln()).sum();
+/// Weights from what a fit leaves, its parameters counted in the bands where its modes are, and what has no place in the
+/// band (residual terms, poles beyond it, real ones) in all bands alike.
+pub(super) fn from_residual(lines: &Lines, at: &Projection, left: &[Vec<c64>]) -> Vec<Vec<f64>> {
+    let responses = lines.responses() as f64;
+    let bands = bands(lines.len());
+    let inside = |band: &Range<usize>| {
+        let place = |s: &&c64| lines.frequency_hz.partition_point(|f| *f < s.im / std::f64::consts::TAU);
+        let own = at.poles.iter().filter(|s| s.im > 0.0 && band.contains(&place(s))).count();
+        // two numbers for its residue, and the response's share of the pole's two
+        (2.0 + 2.0 / responses) * own as f64
+    };
+    let parameters: Vec<f64> = bands.iter().map(inside).collect();
+    let elsewhere = at.parameters() as f64 / responses - parameters.iter().sum::<f64>();
+    let row = |(left, weight): (&Vec<c64>, &Vec<f64>)| {
+        let all = weight.iter().filter(|w| **w > 0.0).count() as f64;
+        let variance = |(band, inside): (&Range<usize>, &f64)| {
+            let there = weight[band.clone()].iter().filter(|w| **w > 0.0).count() as f64;
+            let taken = inside + elsewhere * there / all.max(1.0);
+            // at least half of the numbers are the noise's
+            let degrees = (2.0 * there - taken).max(there).max(1.0);
+            let size = 2.0 / degrees;
+            power_law(lines, left, weight, band.clone()).into_iter().map(|v| size * v).collect::<Vec<f64>>()
+        };
+        bands.iter().zip(&parameters).flat_map(variance).collect()
+    };
+    kept(lines, left.iter().zip(&lines.weight).map(row).collect())
+}
+
+/// Sum of squares of a band, where there are values, spread over its lines as a power of the frequency: of white noise,
+/// or of noise that was integrated once or twice, the likeliest.
+fn power_law(lines: &Lines, left: &[c64], weight: &[f64], band: Range<usize>) -> Vec<f64> {
+    let there: Vec<usize> = band.clone().filter(|k| weight[*k] > 0.0).collect();
+    let logarithms: f64 = there.iter().map(|k| lines.frequency_hz[*k].ln()).sum();
     let fitted = |power: i32| {
-        let own = left[band.clone()].iter().zip(&lines.merged[band.clone()]).zip(frequency);
-        let size: f64 = own.map(|((e, merged), f)| merged * e.norm_sqr() * f.powi(power)).sum();
+        let square = |k: &usize| lines.merged[*k] * left[*k].norm_sqr() * lines.frequency_hz[*k].powi(power);
+        let size: f64 = there.iter().map(square).sum();
         // twice the negative log-likelihood but for a constant: sum of ln v
-        let cost = band.len() as f64 * size.max(f64::MIN_POSITIVE).ln() - f64::from(power) * logarithms;
+        let cost = there.len() as f64 * size.max(f64::MIN_POSITIVE).ln() - f64::from(power) * logarithms;
         (cost, power, size)
     };
     let best = [0, 2, 4].map(fitted).into_iter().min_by(|x, y| x.0.total_cmp(&y.0));
     let (_, power, size) = best.unwrap_or((0.0, 0, 0.0));
-    frequency.iter().map(|f| size * f.powi(-power)).collect()
+    lines.frequency_hz[band].iter().map(|f| size * f.powi(-power)).collect()
 }
 
 fn by_bands(lines: usize, variance: impl Fn(Range<usize>) -> f64) -> Vec<f64> {

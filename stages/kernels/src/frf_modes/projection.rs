@@ -105,6 +105,11 @@ impl Projection {
         own + self.poles.iter().map(|s| width(*s)).sum::<usize>()
     }
 
+    /// Degrees of freedom; at least one, which the search for modes sees to.
+    pub fn freedom(&self, lines: &Lines) -> f64 {
+        lines.values().saturating_sub(self.parameters()).max(1) as f64
+    }
+
     /// Residue of each pole in a response.
     pub fn residues(&self, response: usize) -> Vec<c64> {
         let mut first = 0;

@@ -7,14 +7,14 @@ use super::fit::Fitted;
 use super::lack::Lack;
 use super::model::width;
 use super::polynomial::Diagram;
+use super::scatter::Scatter;
 use super::selection::Search;
-use super::{FrfModel, FrfModesOptions};
+use super::{FrfModel, FrfModesOptions, FrfQuantity};
 use crate::linear_algebra::symmetric_inverse;
 use crate::model::ModelError;
 use crate::ringdown::internals::mode;
 use crate::ringdown::{Estimate, ModeEstimate, ModeShape, OrderTried, RankOne, RingdownVerdict, ShapePoint};
 use crate::stabilisation::Stabilisation;
-use crate::statistics::chi_square_tail;
 
 /// One mode of the responses.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +29,8 @@ pub struct FrfMode {
     pub phase_collinearity: f64,
     /// Shape at unit modal mass, for a driving point of the quantities with a force; a real number per response.
     pub mass_normalised: Option<Vec<Estimate>>,
+    /// Square of that at the driving point, with the sign that the data give it: a passive structure's is positive.
+    pub modal_constant: Option<Estimate>,
     /// Weighted squares of the residual around the mode over degrees of freedom: 1 where the model holds.
     pub lack_of_fit: f64,
     /// Factor on variances for residuals of which neighbours are alike; 1 where they are independent.
@@ -91,7 +93,6 @@ impl FrfModes {
         let model = model(fitted, &order, options);
         let all = order[..count].iter().map(|&j| spread.mode(fitted, j, &lacks[j], options)).collect::<Vec<FrfMode>>();
         let place = |i: usize| 2 * order[i / 2] + i % 2;
-        let freedom = lines.values().saturating_sub(fitted.at.parameters()).max(1);
         Ok(Self {
             covariance: Mat::from_fn(2 * count, 2 * count, |i, j| spread.poles[(place(i), place(j))]),
             diagram: numbered(diagram, &model.poles[..count]),
@@ -99,7 +100,7 @@ impl FrfModes {
             modes: all,
             frequency_hz: lines.frequency_hz.clone(),
             variance: lines.weight.iter().map(|row| single(row, &lines.merged)).collect(),
-            reduced_chi_square: fitted.at.energy() / freedom as f64,
+            reduced_chi_square: fitted.at.energy() / fitted.at.freedom(lines),
             indicator: seen,
             verdict: fitted.verdict,
             tried: search.tried,
@@ -166,13 +167,13 @@ impl Spread {
         let (information, _) = fitted.at.normal();
         let plain = symmetric_inverse(&information);
         let n = plain.nrows();
-        let scatter = scatter(fitted, &plain);
+        let scatter = Scatter::new(&fitted.at, &plain);
         let mut first = 0;
         let mut wide = Vec::with_capacity(n);
         for (s, lack) in fitted.at.poles.iter().zip(lacks) {
             let own = first..first + width(*s);
             first = own.end;
-            let factor = disagreement(&scatter, &plain, own.clone(), lack.factor(), fitted.at.solved.len());
+            let factor = scatter.factor(own.clone(), lack.factor());
             wide.extend(vec![factor.sqrt(); own.len()]);
         }
         Self { poles: Mat::from_fn(n, n, |i, j| wide[i] * wide[j] * plain[(i, j)]), wide }
@@ -210,7 +211,12 @@ impl Spread {
             .collect();
         let points: Vec<ShapePoint> = (0..count).map(|r| self.relative(fitted, j, &values, r, reference)).collect();
         let shape: Vec<c64> = points.iter().map(|point| point.value).collect();
+        // a plain transfer has no mass
+        let driving = options.driving_point.filter(|_| options.quantity != FrfQuantity::Transfer);
+        // Re(2 i w A)
+        let constant = |a: &ShapePoint| Estimate { value: -2.0 * s.im * a.value.im, std: 2.0 * s.im * a.im_std() };
         FrfMode {
+            modal_constant: driving.map(|d| constant(&residues[d])),
             estimate: mode(s, &self.poles, 2 * j),
             shape: ModeShape {
                 reference,
@@ -220,7 +226,7 @@ impl Spread {
             },
             residues,
             phase_collinearity: collinearity(&shape),
-            mass_normalised: options.driving_point.map(|d| self.normalised(fitted, j, &values, d)),
+            mass_normalised: driving.map(|d| self.normalised(fitted, j, &values, d)),
             lack_of_fit: lack.level,
             correlation: lack.correlation,
         }
@@ -241,7 +247,8 @@ impl Spread {
         ShapePoint { value, covariance: [all[(0, 0)], all[(0, 1)], all[(1, 1)]] }
     }
 
-    /// Shape at unit modal mass: `A_r = phi_r phi_d / (2 i w_d)` of a normal mode, `phi_d` positive.
+    /// Shape at unit modal mass: `A_r = phi_r phi_d / (2 i w_d)` of a normal mode, `phi_d` positive, whatever the sign
+    /// of the modal constant.
     fn normalised(&self, fitted: &Fitted, j: usize, values: &[c64], driving: usize) -> Vec<Estimate> {
         let scale = c64::new(0.0, 2.0 * fitted.at.poles[j].im);
         let sign = if (values[driving] * scale).re < 0.0 { -1.0 } else { 1.0 };
@@ -261,29 +268,6 @@ impl Spread {
         };
         (0..values.len()).map(of).collect()
     }
-}
-
-/// Variance of each parameter of the poles from the scatter of the responses' own scores (sandwich).
-fn scatter(fitted: &Fitted, plain: &Mat<f64>) -> Vec<f64> {
-    let n = plain.nrows();
-    let responses = fitted.at.solved.len() as f64;
-    let step = |score: &[f64], i: usize| (0..n).map(|j| plain[(i, j)] * score[j]).sum::<f64>();
-    let of = |i: usize| fitted.at.solved.iter().map(|solved| step(&solved.eliminated.score, i).powi(2)).sum::<f64>();
-    (0..n).map(|i| of(i) * responses / (responses - 1.0).max(1.0)).collect()
-}
-
-/// Responses from which on their scatter counts.
-const SCATTER: usize = 4;
-/// Probability of a scatter by chance above which responses agree.
-const AGREE: f64 = 0.005;
-
-/// Factor on variances of a pole's parameters: that of the residual, and more where the responses disagree on the pole
-/// by more than chance: a structure that changed from one to the next.
-fn disagreement(scatter: &[f64], plain: &Mat<f64>, own: std::ops::Range<usize>, factor: f64, responses: usize) -> f64 {
-    let ratio = own.map(|i| scatter[i] / (factor * plain[(i, i)]).max(f64::MIN_POSITIVE)).fold(1.0, f64::max);
-    let degrees = responses.saturating_sub(1);
-    let by_chance = responses < SCATTER || chi_square_tail(ratio * degrees as f64, degrees) > AGREE;
-    if by_chance { factor } else { factor * ratio }
 }
 
 /// Multiplication by a complex number, as a matrix on real and imaginary part.

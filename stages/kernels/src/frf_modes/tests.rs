@@ -8,7 +8,7 @@ use crate::linear_algebra::symmetric_inverse;
 use crate::ringdown::ModesWanted;
 
 /// Three modes seen at four points, pushed at the first: quality factors 12, 60 and 900, peaks alike.
-fn structure(quantity: FrfQuantity) -> FrfModel {
+pub(super) fn structure(quantity: FrfQuantity) -> FrfModel {
     let pole = |f: f64, q: f64| TAU * f * c64::new(-0.5 / q, (1.0 - 0.25 / (q * q)).sqrt());
     let poles = vec![pole(90.0, 12.0), pole(210.0, 60.0), pole(330.0, 900.0)];
     let shapes = [[1.0, 0.9, -0.8], [0.7, -0.5, 0.6], [0.4, 0.8, -0.3], [-0.6, 0.3, 1.0]];
@@ -23,12 +23,12 @@ fn structure(quantity: FrfQuantity) -> FrfModel {
     }
 }
 
-fn lines(step: f64) -> Vec<f64> {
+pub(super) fn lines(step: f64) -> Vec<f64> {
     (0..((400.0 - 30.0) / step) as usize).map(|k| 30.0 + step * k as f64).collect()
 }
 
 /// Responses with complex noise of this standard deviation.
-fn measured(model: &FrfModel, frequency_hz: &[f64], noise: f64, seed: u64) -> Vec<Vec<c64>> {
+pub(super) fn measured(model: &FrfModel, frequency_hz: &[f64], noise: f64, seed: u64) -> Vec<Vec<c64>> {
     let count = frequency_hz.len();
     let part = white_noise(2 * count * model.residues.len(), noise / 2f64.sqrt(), seed);
     (0..model.residues.len())
@@ -40,7 +40,7 @@ fn measured(model: &FrfModel, frequency_hz: &[f64], noise: f64, seed: u64) -> Ve
         .collect()
 }
 
-fn found(
+pub(super) fn found(
     frequency_hz: &[f64],
     rows: &[Vec<c64>],
     variance: Option<f64>,
@@ -52,12 +52,12 @@ fn found(
     frf_modes(MeasuredResponses { frequency_hz, transfer: &rows, variance: variance.as_deref() }, options)
 }
 
-fn of(quantity: FrfQuantity) -> FrfModesOptions {
+pub(super) fn of(quantity: FrfQuantity) -> FrfModesOptions {
     FrfModesOptions { quantity, driving_point: Some(0), ..FrfModesOptions::default() }
 }
 
 /// Cramer-Rao bound of the poles' parts.
-fn bound(model: &FrfModel, frequency_hz: &[f64], noise: f64) -> Vec<f64> {
+pub(super) fn bound(model: &FrfModel, frequency_hz: &[f64], noise: f64) -> Vec<f64> {
     let rows = measured(model, frequency_hz, 0.0, 0);
     let rows: Vec<&[c64]> = rows.iter().map(Vec::as_slice).collect();
     let variance = vec![noise * noise; frequency_hz.len()];
@@ -105,12 +105,12 @@ fn modes_of_every_quantity_are_found_at_the_bound_and_errors_hold() {
     }
 }
 
-fn part(z: c64, i: usize) -> f64 {
+pub(super) fn part(z: c64, i: usize) -> f64 {
     if i.is_multiple_of(2) { z.re } else { z.im }
 }
 
 /// Errors over stated errors: frequency, damping, shapes.
-fn errors(fit: &FrfModes, truth: &FrfModel) -> Vec<f64> {
+pub(super) fn errors(fit: &FrfModes, truth: &FrfModel) -> Vec<f64> {
     let mut all = Vec::new();
     for (j, mode) in fit.modes.iter().enumerate() {
         let w = truth.poles[j].norm();

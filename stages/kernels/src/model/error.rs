@@ -60,6 +60,14 @@ pub enum ModelError {
         /// Its range.
         wanted: &'static str,
     },
+    /// One response of several cannot be used.
+    #[error("response {number} {problem}: leave it out")]
+    Response {
+        /// Which, from 1.
+        number: usize,
+        /// Why.
+        problem: &'static str,
+    },
     /// The output does not vary: there is nothing to identify.
     #[error("the output is constant: there is nothing to identify")]
     ConstantOutput,
