@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use afmid_pipeline::toml::{Table, Value};
+use afmid_stages::io::quantity_of_unit;
 
 use super::choice::{Choice, Question};
 use super::recordings::Source;
@@ -67,14 +68,10 @@ impl Choice<'_> {
     }
 }
 
-/// What a response to a force is, by its unit.
-fn quantity(unit: &str) -> &'static str {
-    match unit {
-        "m/s^2" | "m/s2" | "g" => "accelerance",
-        "m/s" => "mobility",
-        "m" => "receptance",
-        _ => "transfer",
-    }
+/// A parameter for what a response in that unit is to a force; empty where the unit does not say.
+fn quantity(unit: &str) -> String {
+    let known = quantity_of_unit(&format!("({unit})/N"));
+    known.map(|quantity| format!(", quantity = \"{}\"", quantity.name())).unwrap_or_default()
 }
 
 /// The config for a file in `folder`. Errors: what is not known of the recordings, and how to say it.
@@ -115,7 +112,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             Some(("params", _)) if stage == "\"spectrum.measured_frf\"" => {
                 let blocks = if choice.struck { "hits" } else { "segments" };
                 let quantity = quantity(wanted.unit.unwrap_or(&choice.channels[0].unit));
-                text.push_str(&format!("params = {{ blocks = \"{blocks}\", quantity = \"{quantity}\" }}\n"));
+                text.push_str(&format!("params = {{ blocks = \"{blocks}\"{quantity} }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
                 let samples = segment_samples(choice.channels[0].samples);
