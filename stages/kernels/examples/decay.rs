@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release -p afmid-kernels --example decay -- [SEEDS] [CASE]`
 
+mod scores;
+
 use std::f64::consts::{PI, TAU};
 
 use afmid_kernels::linear_algebra::{Qr, product, symmetric_inverse};
@@ -11,6 +13,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
+use scores::{Outcome, head, row};
 
 const RATE_HZ: f64 = 5e3;
 
@@ -168,22 +171,6 @@ impl Truth {
     }
 }
 
-/// Errors of one seed: per mode z of f, Q, damping over their stated errors, errors over the bound, shapes.
-#[derive(Default)]
-struct Outcome {
-    right: bool,
-    modes: usize,
-    channels: usize,
-    /// Error over bound of f and of damping (Q).
-    over_bound: Vec<[f64; 2]>,
-    /// Error over stated error of f, Q, damping ratio.
-    z: Vec<[f64; 3]>,
-    /// Of re and im of shape points.
-    shape: Vec<f64>,
-    rank_one: bool,
-    ms: f64,
-}
-
 fn outcome(case: &Case, channels: usize, noise: f64, seed: u64, colour: bool) -> Outcome {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let truth = Truth::drawn(case, channels, noise, &mut rng);
@@ -210,7 +197,7 @@ fn outcome(case: &Case, channels: usize, noise: f64, seed: u64, colour: bool) ->
     let begin = std::time::Instant::now();
     let fit = fit_channels(&events, &[], 1.0 / RATE_HZ, &options);
     let ms = begin.elapsed().as_secs_f64() * 1e3;
-    let mut out = Outcome { modes: case.modes, channels, ms, rank_one: true, ..Outcome::default() };
+    let mut out = Outcome::new(case.modes, channels, ms);
     let Ok(fit) = fit else {
         println!("    {} {channels} channels, seed {seed}: {:?}", case.name, fit.err());
         return out;
@@ -235,61 +222,16 @@ fn outcome(case: &Case, channels: usize, noise: f64, seed: u64, colour: bool) ->
 fn measure(truth: &Truth, fit: &ChannelRingdown, out: &mut Outcome) {
     let bound = truth.bound();
     for (j, mode) in fit.modes().iter().enumerate() {
-        let s = truth.poles[j];
-        let (f, q) = (s.norm() / TAU, -0.5 * s.norm() / s.re);
-        let variance = |g: [f64; 2]| {
-            let c = |a: usize, b: usize| bound[(2 * j + a, 2 * j + b)];
-            (g[0] * g[0] * c(0, 0) + 2.0 * g[0] * g[1] * c(0, 1) + g[1] * g[1] * c(1, 1)).sqrt()
-        };
-        let w = s.norm();
-        let bound_f = variance([s.re / w, s.im / w]) / TAU;
-        let zeta = -s.re / w;
-        let bound_zeta = variance([-1.0 / w + s.re * s.re / w.powi(3), s.re * s.im / w.powi(3)]);
-        let damping = mode.damping_ratio();
-        out.over_bound.push([(mode.frequency_hz.value - f) / bound_f, (damping.value - zeta) / bound_zeta]);
-        out.z.push([
-            (mode.frequency_hz.value - f) / mode.frequency_hz.std,
-            (mode.quality_factor.value - q) / mode.quality_factor.std,
-            (damping.value - zeta) / damping.std,
-        ]);
+        let (re, im) = (2 * j, 2 * j + 1);
+        out.take(truth.poles[j], [bound[(re, re)], bound[(re, im)], bound[(im, im)]], mode);
         let shape = &fit.shapes[j];
-        let wanted = |c: usize| truth.shapes[j][c] / truth.shapes[j][shape.reference];
         for (c, point) in shape.points.iter().enumerate().filter(|(c, _)| *c != shape.reference) {
-            let error = point.value - wanted(c);
-            out.shape.extend([error.re / point.re_std(), error.im / point.im_std()]);
+            out.take_point(point, truth.shapes[j][c] / truth.shapes[j][shape.reference]);
         }
-        out.rank_one &= shape.rank_one.holds();
+        if !shape.rank_one.holds() {
+            println!("    the hits do not share one shape: mode {}", j + 1);
+        }
     }
-}
-
-fn row(name: &str, outcomes: &[Outcome]) {
-    let seeds = outcomes.len();
-    let right = outcomes.iter().filter(|o| o.right).count();
-    let rms = |k: usize| {
-        let all: Vec<f64> = outcomes.iter().flat_map(|o| o.over_bound.iter().map(move |v| v[k])).collect();
-        (all.iter().map(|v| v * v).sum::<f64>() / all.len().max(1) as f64).sqrt()
-    };
-    let covered = |k: usize| {
-        let inside: usize = outcomes.iter().flat_map(|o| &o.z).filter(|z| z[k].abs() < 1.96).count();
-        let all: usize = outcomes.iter().map(|o| o.modes).sum();
-        100.0 * inside as f64 / all as f64
-    };
-    let shape_all: usize = outcomes.iter().map(|o| 2 * o.modes * (o.channels - 1)).sum();
-    let shape_in = outcomes.iter().flat_map(|o| &o.shape).filter(|z| z.abs() < 1.96).count();
-    let shape =
-        if shape_all == 0 { "-".to_owned() } else { format!("{:.1}", 100.0 * shape_in as f64 / shape_all as f64) };
-    let mut ms: Vec<f64> = outcomes.iter().map(|o| o.ms).collect();
-    ms.sort_by(f64::total_cmp);
-    let rank = outcomes.iter().filter(|o| !o.rank_one).count();
-    println!(
-        "| {name} | {seeds} | {right} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} | {shape} | {rank} | {:.0} |",
-        rms(0),
-        rms(1),
-        covered(0),
-        covered(1),
-        covered(2),
-        ms[ms.len() / 2]
-    );
 }
 
 fn main() {
@@ -297,10 +239,7 @@ fn main() {
     let seeds: u64 = arguments.first().and_then(|a| a.parse().ok()).unwrap_or(40);
     let chosen: Option<usize> = arguments.get(1).and_then(|a| a.parse().ok());
     let colour = !arguments.iter().any(|a| a == "white");
-    println!(
-        "| case, channels, noise | seeds | right number | rms f | rms damping | f | Q | damping | shape | not rank one | ms |"
-    );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    head("case, channels, noise");
     let mut all: Vec<Outcome> = Vec::new();
     for (number, case) in CASES.iter().enumerate().filter(|(i, _)| chosen.is_none_or(|c| c == *i)) {
         let mut own = Vec::new();

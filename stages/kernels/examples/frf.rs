@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release -p afmid-kernels --example frf -- [SEEDS] [CASE] [known]`
 
+mod scores;
+
 use std::f64::consts::TAU;
 
 use afmid_kernels::frf_modes::{FrfModel, FrfModes, FrfModesOptions, FrfQuantity, MeasuredResponses, frf_modes};
@@ -11,6 +13,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
+use scores::{Outcome, head, row};
 
 /// What a row of the table simulates.
 #[derive(Clone, Copy)]
@@ -222,19 +225,6 @@ impl Truth {
     }
 }
 
-/// Errors of one seed.
-#[derive(Default)]
-struct Outcome {
-    right: bool,
-    /// Error over bound of f and of damping.
-    over_bound: Vec<[f64; 2]>,
-    /// Error over stated error of f, Q, damping ratio.
-    z: Vec<[f64; 3]>,
-    /// Of re and im of shape points.
-    shape: Vec<f64>,
-    ms: f64,
-}
-
 fn outcome(case: &Case, responses: usize, noise: f64, seed: u64, known: bool) -> Outcome {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let truth = Truth::drawn(case, responses, noise, &mut rng);
@@ -258,7 +248,7 @@ fn outcome(case: &Case, responses: usize, noise: f64, seed: u64, known: bool) ->
     let begin = std::time::Instant::now();
     let fit = frf_modes(measured, &options);
     let ms = begin.elapsed().as_secs_f64() * 1e3;
-    let mut out = Outcome { ms, ..Outcome::default() };
+    let mut out = Outcome::new(truth.inside, responses, ms);
     let Ok(fit) = fit else {
         println!("    {} {responses} responses, seed {seed}: {:?}", case.name, fit.err());
         return out;
@@ -283,57 +273,13 @@ fn outcome(case: &Case, responses: usize, noise: f64, seed: u64, known: bool) ->
 fn measure(truth: &Truth, fit: &FrfModes, out: &mut Outcome) {
     let bound = truth.bound();
     for (j, mode) in fit.modes.iter().enumerate() {
-        let s = truth.model.poles[j];
-        let w = s.norm();
-        let (f, q, zeta) = (w / TAU, -0.5 * w / s.re, -s.re / w);
-        let deviation = |g: [f64; 2]| {
-            let c = |a: usize, b: usize| bound[(2 * j + a, 2 * j + b)];
-            (g[0] * g[0] * c(0, 0) + 2.0 * g[0] * g[1] * c(0, 1) + g[1] * g[1] * c(1, 1)).sqrt()
-        };
-        let bound_f = deviation([s.re / w, s.im / w]) / TAU;
-        let bound_zeta = deviation([-1.0 / w + s.re * s.re / w.powi(3), s.re * s.im / w.powi(3)]);
-        let (found, damping) = (mode.estimate, mode.estimate.damping_ratio());
-        out.over_bound.push([(found.frequency_hz.value - f) / bound_f, (damping.value - zeta) / bound_zeta]);
-        out.z.push([
-            (found.frequency_hz.value - f) / found.frequency_hz.std,
-            (found.quality_factor.value - q) / found.quality_factor.std,
-            (damping.value - zeta) / damping.std,
-        ]);
+        let (re, im) = (2 * j, 2 * j + 1);
+        out.take(truth.model.poles[j], [bound[(re, re)], bound[(re, im)], bound[(im, im)]], &mode.estimate);
         let reference = mode.shape.reference;
-        let wanted = |r: usize| truth.model.residues[r][j] / truth.model.residues[reference][j];
         for (r, point) in mode.shape.points.iter().enumerate().filter(|(r, _)| *r != reference) {
-            let error = point.value - wanted(r);
-            out.shape.extend([error.re / point.re_std(), error.im / point.im_std()]);
+            out.take_point(point, truth.model.residues[r][j] / truth.model.residues[reference][j]);
         }
     }
-}
-
-fn row(name: &str, outcomes: &[Outcome]) {
-    let seeds = outcomes.len();
-    let right = outcomes.iter().filter(|o| o.right).count();
-    let rms = |k: usize| {
-        let all: Vec<f64> = outcomes.iter().flat_map(|o| o.over_bound.iter().map(move |v| v[k])).collect();
-        (all.iter().map(|v| v * v).sum::<f64>() / all.len().max(1) as f64).sqrt()
-    };
-    let covered = |k: usize| {
-        let inside = outcomes.iter().flat_map(|o| &o.z).filter(|z| z[k].abs() < 1.96).count();
-        let all: usize = outcomes.iter().map(|o| o.z.len()).sum();
-        100.0 * inside as f64 / all as f64
-    };
-    let all: usize = outcomes.iter().map(|o| o.shape.len()).sum();
-    let inside = outcomes.iter().flat_map(|o| &o.shape).filter(|z| z.abs() < 1.96).count();
-    let shape = if all == 0 { "-".to_owned() } else { format!("{:.1}", 100.0 * inside as f64 / all as f64) };
-    let mut ms: Vec<f64> = outcomes.iter().map(|o| o.ms).collect();
-    ms.sort_by(f64::total_cmp);
-    println!(
-        "| {name} | {seeds} | {right} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} | {shape} | {:.0} |",
-        rms(0),
-        rms(1),
-        covered(0),
-        covered(1),
-        covered(2),
-        ms[ms.len() / 2]
-    );
 }
 
 fn main() {
@@ -341,8 +287,7 @@ fn main() {
     let seeds: u64 = arguments.first().and_then(|a| a.parse().ok()).unwrap_or(40);
     let chosen: Option<usize> = arguments.get(1).and_then(|a| a.parse().ok());
     let known = arguments.iter().any(|a| a == "known");
-    println!("| case, responses, noise | seeds | right number | rms f | rms damping | f | Q | damping | shape | ms |");
-    println!("|---|---|---|---|---|---|---|---|---|---|");
+    head("case, responses, noise");
     let mut all: Vec<Outcome> = Vec::new();
     for (number, case) in CASES.iter().enumerate().filter(|(i, _)| chosen.is_none_or(|c| c == *i)) {
         let mut own = Vec::new();
