@@ -13,7 +13,7 @@ use super::decay::{MODES, SHAPES};
 use super::stabilisation::pole_table;
 use crate::artifacts::{Frf, mode_table, shape_array};
 use crate::io::FRF;
-use afmid_kernels::frf_modes::{FrfMode, FrfModes, FrfModesOptions, MeasuredResponses, frf_modes};
+use afmid_kernels::frf_modes::{FrfMode, FrfModes, FrfModesOptions, MeasuredResponses, frf_modes, pooled_variance};
 use afmid_kernels::ringdown::{ModeEstimate, ModeShape, ModesWanted};
 
 /// Fits modes and mode shapes to measured frequency responses: one set of poles for all responses.
@@ -25,7 +25,8 @@ use afmid_kernels::ringdown::{ModeEstimate, ModeShape, ModesWanted};
 /// # Method
 /// Starts from a common denominator over all orders (least-squares complex frequency domain); modes one by one, kept
 /// where an F test finds their gain above chance at the level and correlation of what is left; maximum likelihood by
-/// variable projection. Variances are those of the responses, or estimated by bands.
+/// variable projection. Variances are those of the responses, of fewer than 41 averages drawn to the median of their
+/// neighbours, or estimated by bands.
 /// # Shapes
 /// `modes` by row, ascending; `shapes` over mode and channel (a response's point that goes from response to response);
 /// `diagram` a row per order and pole; `fit` over response and frequency.
@@ -68,7 +69,7 @@ impl Stage for FrfModeFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.frf_modes",
-        version: 1,
+        version: 2,
         summary: "fits modes and mode shapes to measured frequency responses of many channels",
         inputs: &[FRF.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), DIAGRAM.spec(), FIT.spec(), SUMMARY.spec()],
@@ -119,7 +120,10 @@ impl FrfModeFit {
         let row = |r: usize| frf.row(r).iter().map(|h| c64::new(h.re, h.im)).collect();
         let rows: Vec<Vec<c64>> = count.clone().map(row).collect();
         let rows: Vec<&[c64]> = rows.iter().map(Vec::as_slice).collect();
-        let variance: Option<Vec<&[f64]>> = count.map(|r| frf.row_variance(r)).collect();
+        let averages = frf.averages.unwrap_or(f64::INFINITY);
+        let row_variance = |r: usize| frf.row_variance(r).map(|variance| pooled_variance(variance, averages));
+        let variance: Option<Vec<Vec<f64>>> = count.map(row_variance).collect();
+        let variance: Option<Vec<&[f64]>> = variance.as_ref().map(|rows| rows.iter().map(Vec::as_slice).collect());
         let measured =
             MeasuredResponses { frequency_hz: frf.frequency_hz, transfer: &rows, variance: variance.as_deref() };
         frf_modes(measured, &options).map_err(StageError::from_error)

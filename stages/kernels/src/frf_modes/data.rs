@@ -53,7 +53,8 @@ pub struct MeasuredResponses<'a> {
     pub frequency_hz: &'a [f64],
     /// One row per response; values that are not finite are left out.
     pub transfer: &'a [&'a [c64]],
-    /// Expected squared error of each value; values without a positive, finite one are left out. None: unknown.
+    /// Expected squared error of each value; values without a positive, finite one are left out. None: unknown. Of few
+    /// averages see [`pooled_variance`](super::pooled_variance).
     pub variance: Option<&'a [&'a [f64]]>,
 }
 

@@ -15,8 +15,9 @@
 //! gain: `t^T S^-1 t` (4), with its columns' products with the residual `t` and with each other `S`, those of the fit
 //! eliminated.
 //!
-//! In reading order: options, data (lines and weights), noise (variance by bands), polynomial (Eq. 2), candidates,
-//! model and projection (Eq. 1), fit (Eq. 3), lack (what a fit leaves), selection (how many modes), result.
+//! In reading order: options, pooled (variances of few averages), data (lines and weights), noise (variance by bands),
+//! polynomial (Eq. 2), candidates, model and projection (Eq. 1), fit (Eq. 3), lack (what a fit leaves), selection (how
+//! many modes), result.
 //!
 //! ```
 //! use afmid_kernels::c64;
@@ -64,6 +65,7 @@ mod model;
 mod noise;
 mod options;
 mod polynomial;
+mod pooled;
 mod projection;
 mod result;
 mod selection;
@@ -83,6 +85,7 @@ use crate::model::ModelError;
 pub use self::data::{FrfQuantity, Indicator, MeasuredResponses};
 pub use self::model::FrfModel;
 pub use self::options::FrfModesOptions;
+pub use self::pooled::pooled_variance;
 pub use self::result::{FrfMode, FrfModes};
 
 /// Lines from which on neighbours are merged where no pole is near. Why: a fit of more takes seconds.

@@ -105,6 +105,39 @@ fn modes_of_every_quantity_are_found_at_the_bound_and_errors_hold() {
     }
 }
 
+#[test]
+fn variances_that_five_hits_have_estimated_cost_little() {
+    let truth = structure(FrfQuantity::Accelerance);
+    let (frequency_hz, noise, degrees) = (lines(0.5), 0.02, 8);
+    let bound = bound(&truth, &frequency_hz, noise);
+    let fits: Vec<FrfModes> = (0..40_u64)
+        .into_par_iter()
+        .map(|seed| {
+            let rows = measured(&truth, &frequency_hz, noise, seed);
+            let squares = white_noise(degrees * frequency_hz.len() * rows.len(), noise, 1000 + seed);
+            let sampled: Vec<f64> =
+                squares.chunks(degrees).map(|own| own.iter().map(|e| e * e).sum::<f64>() / degrees as f64).collect();
+            let variance: Vec<Vec<f64>> =
+                sampled.chunks(frequency_hz.len()).map(|own| pooled_variance(own, 5.0)).collect();
+            let variance: Vec<&[f64]> = variance.iter().map(Vec::as_slice).collect();
+            let transfer: Vec<&[c64]> = rows.iter().map(Vec::as_slice).collect();
+            let given =
+                MeasuredResponses { frequency_hz: &frequency_hz, transfer: &transfer, variance: Some(&variance) };
+            frf_modes(given, &of(FrfQuantity::Accelerance)).unwrap()
+        })
+        .collect();
+    let right: Vec<&FrfModes> = fits.iter().filter(|fit| fit.modes.len() == 3).collect();
+    // one in a thousand may gain a mode
+    assert!(right.len() >= 39, "{} of 40", right.len());
+    let square = |fit: &FrfModes, i: usize| (part(fit.model.poles[i / 2] - truth.poles[i / 2], i) / bound[i]).powi(2);
+    let mean = right.iter().flat_map(|fit| (0..6).map(move |i| square(fit, i))).sum::<f64>() / (6 * right.len()) as f64;
+    // 240 squares: a standard error of 0.09, three of them; weights of each line's own variance give 1.5
+    assert!(mean < 1.05 + 0.27, "{mean}");
+    let chi = right.iter().map(|fit| fit.reduced_chi_square).sum::<f64>() / right.len() as f64;
+    // known to 3 %: the level of 2960 lines, each response's from neighbours; each line's own variance would give 4/3
+    assert!((chi - 1.0).abs() < 0.1, "{chi}");
+}
+
 fn part(z: c64, i: usize) -> f64 {
     if i.is_multiple_of(2) { z.re } else { z.im }
 }
