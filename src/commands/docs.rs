@@ -65,13 +65,14 @@ const TUTORIALS: [(&str, &str); 5] = [
 ];
 
 /// What was measured: accuracy, performance, diagnosis.
-const RESULTS: [(&str, &str); 16] = [
+const RESULTS: [(&str, &str); 17] = [
     ("Modes from ringdowns", "ringdown.md"),
     ("Free decays in several channels", "decay.md"),
     ("Models from a frequency response", "frequency-response.md"),
     ("The grey modal form", "grey.md"),
     ("Contact stiffness", "contact.md"),
     ("Measured input-output data", "daisy.md"),
+    ("Simulated vibration records", "peers.md"),
     ("Spectra, responses, forces", "spectra.md"),
     ("Time per kernel, estimator and plugin call", "timings.md"),
     ("The main job", "main-job.md"),

@@ -66,7 +66,7 @@ impl Default for SubspaceEstimate {
 impl Stage for SubspaceEstimate {
     const SPEC: Spec = Spec {
         name: "model.subspace",
-        version: 5,
+        version: 6,
         summary: "estimates a state-space model by subspace methods: N4SID, MOESP, CVA weights",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],

@@ -12,7 +12,7 @@ use super::levenberg_marquardt::{Limits, minimise};
 use super::predictor::Problem;
 use super::state::State;
 use crate::model::{ModelError, coordinates, roots, section_order};
-use crate::subspace::{Subspace, Weight};
+use crate::subspace::{Instruments, Subspace, Weight};
 
 /// Real poles that fill up a start, fast and slow in turn.
 const FILL: [f64; 6] = [0.15, 0.5, 0.3, 0.7, 0.05, 0.85];
@@ -54,8 +54,9 @@ pub(crate) fn instrumental(u: &[f64], y: &[f64], order: usize, block_rows: usize
     let rows = if few < block_rows { vec![few, (few + block_rows) / 2, block_rows] } else { vec![block_rows] };
     let mut starts: Vec<Vec<c64>> = arx(u, y, order).into_iter().collect();
     for rows in rows {
+        let Ok(instruments) = Instruments::new(u, y, rows) else { continue };
         for weight in [Weight::Moesp, Weight::N4sid, Weight::Cva] {
-            let estimate = Subspace::with_instruments(u, y, rows, weight).and_then(|estimate| estimate.poles(order));
+            let estimate = instruments.subspace(weight).and_then(|estimate| estimate.poles(order));
             starts.extend(estimate.ok().filter(|poles| poles.len() == order));
         }
     }

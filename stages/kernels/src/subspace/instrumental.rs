@@ -1,5 +1,7 @@
 //! Subspace identification with past inputs and outputs as instruments: N4SID, MOESP and CVA weights.
 
+use std::ops::Range;
+
 use crate::linear_algebra::{Qr, Svd, product};
 use faer::Mat;
 
@@ -37,37 +39,72 @@ impl Subspace {
     ///
     /// `block_rows` rows of past and as many of future, at least 2.
     pub fn with_instruments(u: &[f64], y: &[f64], block_rows: usize, weight: Weight) -> Result<Self, ModelError> {
-        let (samples, s) = (y.len(), block_rows);
-        let inputs = u.len() / samples.max(1);
-        if inputs == 0 || u.len() != inputs * samples {
-            return Err(ModelError::Length { what: "input", found: u.len(), wanted: samples });
+        match weight {
+            Weight::Release => checked(u, y, block_rows).and_then(|_| Self::new(u, y, block_rows)),
+            _ => Instruments::new(u, y, block_rows)?.subspace(weight),
         }
-        if s < 2 {
-            return Err(ModelError::Parameter { name: "block_rows", found: s as f64, wanted: "at least 2" });
-        }
-        // as many windows as columns, at least
-        let wanted = (2 * inputs + 4) * s;
-        if samples < wanted {
-            return Err(ModelError::TooShort { found: samples, wanted });
-        }
-        finite("input", u)?;
-        finite("output", y)?;
-        let r = Qr::new(stacked(u, y, s)?).r();
-        let (all, past) = (r.ncols(), (inputs + 1) * s);
-        let future = all - past - s;
-        let block = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
-            Mat::from_fn(rows.len(), columns.len(), |i, j| r[(rows.start + i, columns.start + j)])
-        };
-        let (w, f) = (future..future + past, all - s..all);
-        let explained = Explained::new(&block(w.clone(), w.clone()), &block(w.clone(), f.clone()))?;
-        let (left, singular_values) = match weight {
-            Weight::Release => return Self::new(u, y, block_rows),
-            Weight::Moesp => decomposed(&explained.projected)?,
-            Weight::N4sid => decomposed(&product(block(0..w.end, w).as_ref(), explained.coefficients.as_ref()))?,
-            Weight::Cva => canonical(&explained.projected, &block(future..all, f))?,
-        };
-        Ok(Self { left, singular_values })
     }
+}
+
+/// What [`Subspace::with_instruments`] knows before it weights: the same for all weights but [`Weight::Release`], which
+/// has no instruments.
+pub(crate) struct Instruments {
+    /// Triangle of `[1; U_f]`, past and `Y_f`.
+    r: Mat<f64>,
+    /// Columns of the past in it.
+    past: Range<usize>,
+    explained: Explained,
+}
+
+impl Instruments {
+    /// Errors: those of [`Subspace::with_instruments`].
+    pub fn new(u: &[f64], y: &[f64], block_rows: usize) -> Result<Self, ModelError> {
+        let (inputs, s) = (checked(u, y, block_rows)?, block_rows);
+        let r = Qr::new(stacked(u, y, s)?).r();
+        let past = r.ncols() - (inputs + 2) * s..r.ncols() - s;
+        let explained =
+            Explained::new(&block(&r, past.clone(), past.clone()), &block(&r, past.clone(), past.end..r.ncols()))?;
+        Ok(Self { r, past, explained })
+    }
+
+    /// The estimate of one weight. Errors: no convergence of a decomposition; a weight without instruments.
+    pub fn subspace(&self, weight: Weight) -> Result<Subspace, ModelError> {
+        let Self { r, past, explained } = self;
+        let (left, singular_values) = match weight {
+            Weight::Release => return Err(ModelError::Degenerate("a release has no instruments")),
+            Weight::Moesp => decomposed(&explained.projected)?,
+            Weight::N4sid => {
+                let known = block(r, 0..past.end, past.clone());
+                decomposed(&product(known.as_ref(), explained.coefficients.as_ref()))?
+            }
+            Weight::Cva => canonical(&explained.projected, &block(r, past.start..r.ncols(), past.end..r.ncols()))?,
+        };
+        Ok(Subspace { left, singular_values })
+    }
+}
+
+/// Number of inputs. Errors: lengths, values that are not finite, too few samples.
+fn checked(u: &[f64], y: &[f64], block_rows: usize) -> Result<usize, ModelError> {
+    let (samples, s) = (y.len(), block_rows);
+    let inputs = u.len() / samples.max(1);
+    if inputs == 0 || u.len() != inputs * samples {
+        return Err(ModelError::Length { what: "input", found: u.len(), wanted: samples });
+    }
+    if s < 2 {
+        return Err(ModelError::Parameter { name: "block_rows", found: s as f64, wanted: "at least 2" });
+    }
+    // as many windows as columns, at least
+    let wanted = (2 * inputs + 4) * s;
+    if samples < wanted {
+        return Err(ModelError::TooShort { found: samples, wanted });
+    }
+    finite("input", u)?;
+    finite("output", y)?;
+    Ok(inputs)
+}
+
+fn block(r: &Mat<f64>, rows: Range<usize>, columns: Range<usize>) -> Mat<f64> {
+    Mat::from_fn(rows.len(), columns.len(), |i, j| r[(rows.start + i, columns.start + j)])
 }
 
 /// Future input directions, past, future output: windows x columns.

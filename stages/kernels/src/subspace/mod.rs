@@ -53,5 +53,6 @@ mod weight;
 #[cfg(test)]
 mod weight_tests;
 
+pub(crate) use instrumental::Instruments;
 pub use past_future::Subspace;
 pub use weight::Weight;

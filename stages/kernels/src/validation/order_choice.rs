@@ -13,7 +13,8 @@ use crate::subspace::Subspace;
 pub struct OrderCandidate {
     /// The order.
     pub order: usize,
-    /// `N ln(mean square of e) + k ln N` of the whole training record; NaN where no model could be had.
+    /// `N ln(mean square of e) + k ln N` of the whole training record; NaN where no model could be had, and where the
+    /// last third decides, so that nobody needs it.
     pub bic: f64,
     /// FIT % of the simulation of the record's last third, by a model of its first two thirds; NaN where this cannot be
     /// judged.
@@ -59,28 +60,48 @@ pub fn choose_order(
     monitor: &dyn Monitor,
 ) -> Result<OrderChoice, ModelError> {
     let parts = Parts::of(experiment);
-    monitor.expect(most);
-    let candidates: Vec<(OrderCandidate, Vec<f64>)> = (1..=most)
-        .into_par_iter()
-        .map(|order| {
-            if monitor.is_cancelled() {
-                return Err(ModelError::Cancelled);
-            }
-            let candidate = candidate(experiment, parts.as_ref(), sample_time_s, order, options);
-            monitor.tick();
-            Ok(candidate)
-        })
-        .collect::<Result<_, ModelError>>()?;
+    let judged = match &parts {
+        Some(parts) => each(most, monitor, |order| parts.judged(sample_time_s, order, options))?,
+        None => Vec::new(),
+    };
+    let held_out = smallest_within_error(&judged);
+    let candidates: Vec<OrderCandidate> = match held_out {
+        Some(_) => judged.into_iter().map(|(candidate, _)| candidate).collect(),
+        None => each(most, monitor, |order| {
+            let fit = identify(&[experiment], sample_time_s, &ranking(options, order));
+            let bic = fit.map_or(f64::NAN, |fit| bic(&fit, options.noise));
+            OrderCandidate { order, bic, held_out_percent: f64::NAN }
+        })?,
+    };
     let rows = options.block_rows.min(experiment.output.len() / 3);
     let gap = Subspace::new(experiment.input, experiment.output, rows)
         .map(|subspace| largest_gap(subspace.singular_values(), most))
         .unwrap_or(0);
-    let held_out = smallest_within_error(&candidates);
-    let by_bic = candidates.iter().map(|(c, _)| c).filter(|c| !c.bic.is_nan()).min_by(|x, y| x.bic.total_cmp(&y.bic));
+    let by_bic = candidates.iter().filter(|c| !c.bic.is_nan()).min_by(|x, y| x.bic.total_cmp(&y.bic));
     let order = held_out
         .or(by_bic.map(|c| c.order))
         .ok_or(ModelError::Degenerate("no order could be fitted: the record may be too short for `block_rows`"))?;
-    Ok(OrderChoice { order, gap, candidates: candidates.into_iter().map(|(candidate, _)| candidate).collect() })
+    Ok(OrderChoice { order, gap, candidates })
+}
+
+/// What `of` makes of the orders 1 to `most`. Errors: cancelled by the monitor.
+fn each<T: Send>(most: usize, monitor: &dyn Monitor, of: impl Fn(usize) -> T + Sync) -> Result<Vec<T>, ModelError> {
+    monitor.expect(most);
+    let watched = |order| {
+        if monitor.is_cancelled() {
+            return Err(ModelError::Cancelled);
+        }
+        let result = of(order);
+        monitor.tick();
+        Ok(result)
+    };
+    (1..=most).into_par_iter().map(watched).collect()
+}
+
+/// The options of a fit that is to be ranked.
+fn ranking(options: &PemOptions, order: usize) -> PemOptions {
+    let max_iterations = ITERATIONS.min(options.max_iterations);
+    PemOptions { order, block_rows: options.block_rows.max(order + 1), max_iterations, ..options.clone() }
 }
 
 /// First two thirds and the rest, inputs one after the other.
@@ -103,37 +124,24 @@ impl Parts {
         let complete = experiment.output.iter().all(|y| y.is_finite());
         (moves && complete).then_some(parts)
     }
-}
 
-/// A candidate and the squared errors of its simulation by block, over the rest's own variation.
-fn candidate(
-    experiment: Experiment<'_>,
-    parts: Option<&Parts>,
-    sample_time_s: f64,
-    order: usize,
-    options: &PemOptions,
-) -> (OrderCandidate, Vec<f64>) {
-    let options = PemOptions {
-        order,
-        block_rows: options.block_rows.max(order + 1),
-        max_iterations: ITERATIONS.min(options.max_iterations),
-        ..options.clone()
-    };
-    let bic = identify(&[experiment], sample_time_s, &options).map_or(f64::NAN, |fit| bic(&fit, options.noise));
-    let judged = parts.and_then(|parts| {
-        let rows = options.block_rows.min(parts.first.1.len() / 5).max(order + 1);
-        let options = PemOptions { block_rows: rows, ..options };
-        let first = Experiment { input: &parts.first.0, output: &parts.first.1 };
-        let fit = identify(&[first], sample_time_s, &options).ok()?;
+    /// A candidate and the squared errors of its simulation of the rest by block; no blocks where it cannot be judged.
+    fn judged(&self, sample_time_s: f64, order: usize, options: &PemOptions) -> (OrderCandidate, Vec<f64>) {
+        let rows = options.block_rows.max(order + 1).min(self.first.1.len() / 5).max(order + 1);
+        let options = PemOptions { block_rows: rows, ..ranking(options, order) };
+        let first = Experiment { input: &self.first.0, output: &self.first.1 };
+        let (input, output) = (&self.rest.0, &self.rest.1);
         let nuisances = Nuisances { offset: options.offset, slope: options.drift };
-        let simulation =
-            simulate_held_out(&fit.model, &fit.further_inputs, &parts.rest.0, &parts.rest.1, nuisances).ok()?;
-        let errors: Vec<f64> = simulation.response.iter().zip(&parts.rest.1).map(|(x, y)| (x - y).powi(2)).collect();
+        let simulated = identify(&[first], sample_time_s, &options)
+            .and_then(|fit| simulate_held_out(&fit.model, &fit.further_inputs, input, output, nuisances));
+        let Ok(simulation) = simulated else {
+            return (OrderCandidate { order, bic: f64::NAN, held_out_percent: f64::NAN }, Vec::new());
+        };
+        let errors: Vec<f64> = simulation.response.iter().zip(output).map(|(x, y)| (x - y).powi(2)).collect();
         let size = errors.len().div_ceil(BLOCKS).max(1);
-        Some((simulation.fit_percent, errors.chunks(size).map(|block| block.iter().sum()).collect()))
-    });
-    let (held_out_percent, blocks) = judged.unwrap_or((f64::NAN, Vec::new()));
-    (OrderCandidate { order, bic, held_out_percent }, blocks)
+        let blocks = errors.chunks(size).map(|block| block.iter().sum()).collect();
+        (OrderCandidate { order, bic: f64::NAN, held_out_percent: simulation.fit_percent }, blocks)
+    }
 }
 
 fn bic(fit: &Identified, noise: NoiseModel) -> f64 {
