@@ -103,4 +103,8 @@ fn the_shipped_config_reads_nine_points_of_a_beam() {
     let found = shown(here, "frf.h5", "frf");
     assert_eq!((number(&found, "/responses"), number(&found, "/driving_point")), (9.0, 4.0));
     assert_eq!(found["quantity"], "accelerance");
+    let read = common::shapes_read_by_pyuff(here, "frf.h5");
+    assert!(read.ends_with("modes over 9 nodes, positions known\n"), "{read}");
+    // what afmid wrote is replaced
+    common::shapes_read_by_pyuff(here, "frf.h5");
 }

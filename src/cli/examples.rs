@@ -79,6 +79,7 @@ faults, submit again: what is finished is not run again.",
         &[
             "afmid export paper.h5 --model mat",
             "afmid export paper.h5 --model json --stage model -o lever.json",
+            "afmid export beam.h5 --shapes uff -o beam.unv",
         ],
     ),
     help(
