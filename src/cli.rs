@@ -88,7 +88,7 @@ pub enum Command {
     Show {
         /// The result file.
         result: PathBuf,
-        /// The stage; without it, the run as a whole.
+        /// The stage, or STAGE.PORT, one of its artifacts; without it, the run as a whole.
         id: Option<String>,
         /// As JSON, alone on stdout.
         #[arg(long)]
