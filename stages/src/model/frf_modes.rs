@@ -1,6 +1,8 @@
 //! The stage `model.frf_modes`.
 
 mod tables;
+#[cfg(test)]
+mod tests;
 
 use afmid_pipeline::{Array, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
 use faer::c64;

@@ -55,6 +55,7 @@ fn pair(force: Vec<f64>, level: f64) -> Array {
     let set = PairSet {
         set: DataSet::All,
         dims: &["time"],
+        response_dims: &["time"],
         response,
         force,
         standard_error: None,
