@@ -16,7 +16,7 @@ mod submit;
 
 pub use batch::{BatchArgs, SetsArgs};
 pub use examples::command;
-pub use export::{ExportArgs, ModelFormat};
+pub use export::{ExportArgs, ExportFormat, ModelFormat, ShapeFormat};
 pub use new::{Goal, New, NewPipelineArgs, NewStageArgs, RecordsAre};
 pub use plugins::{AllowArgs, PluginCommand, TrustArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
@@ -88,7 +88,7 @@ pub enum Command {
     Show {
         /// The result file.
         result: PathBuf,
-        /// The stage; without it, the run as a whole.
+        /// The stage, or STAGE.PORT, one of its artifacts; without it, the run as a whole.
         id: Option<String>,
         /// As JSON, alone on stdout.
         #[arg(long)]
@@ -100,7 +100,8 @@ pub enum Command {
     Trace(TraceArgs),
     /// Repeat a run from its own result file and compare.
     Rerun(RerunArgs),
-    /// Write a model for MATLAB, Octave, Julia or any other program: A, B, C, D, K, covariance, sample time.
+    /// Write a model (A, B, C, D, K, covariance, sample time) or modes with their shapes for MATLAB, Octave, Julia,
+    /// programs of modal analysis or any other.
     Export(ExportArgs),
     /// Write a run as a Process Run RO-Crate, which other archives and tools read.
     ExportCrate(CrateArgs),

@@ -54,6 +54,25 @@ fn one_bad_set_stops_no_other_and_nothing_is_done_twice() {
 }
 
 #[test]
+fn where_a_set_fails_it_is_said_what_is_kept_of_it() {
+    let here = Here::new();
+    here.set("a", 0, 3000);
+    let config = std::fs::read_to_string(here.path("census.toml")).expect("a config");
+    let events = "[[stage]]\nid = \"events\"\nuses = \"events.correlation\"\ninputs = { records = \"records\" }\n\
+                  params = { kind = \"snap-off\", window_samples = 1024 }\n";
+    std::fs::write(here.path("events.toml"), config + "\n" + events).expect("a config");
+    let (code, output) = here.batch_json(&["events.toml", "a", "-o", "out", "--cache", "cache"]);
+    let error = output["failures"][0]["error"].as_str().unwrap_or_default();
+    let kept = "the stages that went through are in a.failed.h5, beside the results";
+    assert!(code == 3 && error.contains("no usable event") && error.ends_with(kept), "{output}");
+    let shown = common::afmid(here.path("out").as_path(), &["show", "a.failed.h5"]);
+    assert!(shown.contains("census") && shown.contains("incomplete"), "{shown}");
+    for table in ["out/summary.csv", "out/ledger/a.json"] {
+        assert!(std::fs::read_to_string(here.path(table)).expect(table).contains(kept), "{table}");
+    }
+}
+
+#[test]
 fn a_changed_parameter_of_the_last_stage_costs_that_stage_alone() {
     let here = Here::new();
     for seed in 0..4 {

@@ -103,4 +103,23 @@ fn the_shipped_config_reads_nine_points_of_a_beam() {
     let found = shown(here, "frf.h5", "frf");
     assert_eq!((number(&found, "/responses"), number(&found, "/driving_point")), (9.0, 4.0));
     assert_eq!(found["quantity"], "accelerance");
+    shown_in_order(here);
+    let read = common::shapes_read_by_pyuff(here, "frf.h5");
+    assert!(read.ends_with("modes over 9 nodes, positions known\n"), "{read}");
+    // what afmid wrote is replaced
+    common::shapes_read_by_pyuff(here, "frf.h5");
+}
+
+/// Modes and shapes come first; the stabilisation diagram is a line with the command that shows it.
+fn shown_in_order(here: &Path) {
+    let text = afmid(here, &["show", "frf.h5", "modes"]);
+    let place = |what: &str| text.find(what).unwrap_or_else(|| panic!("no {what}: {text}"));
+    assert!(place("\nmodes (table)") < place("\nsummary (document)") && place("shape:") < place("\nfit (array)"));
+    assert!(place("\nfit (array)") < place("\ndiagram (table)"), "{text}");
+    let (_, line) = text.split_once("\ndiagram (table)\n").expect("a diagram");
+    let command = line.trim_end().split_once("rows: afmid ").expect("a command").1;
+    let diagram = afmid(here, &command.split(' ').collect::<Vec<&str>>());
+    assert!(diagram.starts_with("modes.diagram (table)\norder  "), "{diagram}");
+    let rows = serde_json::from_str::<serde_json::Value>(&afmid(here, &["show", "frf.h5", "modes.diagram", "--json"]));
+    assert!(rows.expect("JSON").as_array().is_some_and(|rows| line.starts_with(&format!("{} rows", rows.len()))));
 }

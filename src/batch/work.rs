@@ -1,6 +1,6 @@
 //! The runs of a batch.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use afmid_pipeline::InputFiles;
 use afmid_pipeline::cache::Cache;
+use afmid_pipeline::error::StoreError;
 use afmid_pipeline::runner::{Failed, Options, RunError, RunKey, Surroundings, run_key, run_to_file};
 use afmid_pipeline::store::{FileKind, Written, written};
 use afmid_pipeline::{Plan, SourceFile};
@@ -128,7 +129,7 @@ impl Work<'_> {
             observer: &Silent,
         };
         let result = run_to_file(plan, &options, &path).map_err(|failed| match failed {
-            Failed::Stages { errors, .. } => errors_text(&errors),
+            Failed::Stages { errors, kept } => errors_text(&errors) + &kept_text(kept),
             Failed::File(error) => error.to_string(),
         })?;
         // the key was made before the run: it is the run's only if both read the same files
@@ -206,6 +207,18 @@ fn stated(key: &str, plan: &Plan) -> String {
         hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
     }
     hasher.finalize().to_hex().to_string()
+}
+
+/// Where the stages that went through are: beside the results of the others, whatever their folder is called.
+fn kept_text(kept: Option<Result<PathBuf, StoreError>>) -> String {
+    match kept {
+        Some(Ok(file)) => {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            format!("; the stages that went through are in {name}, beside the results")
+        }
+        Some(Err(error)) => format!("; the stages that went through are not kept: {error}"),
+        None => String::new(),
+    }
 }
 
 fn errors_text(errors: &[RunError]) -> String {

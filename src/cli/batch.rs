@@ -28,7 +28,8 @@ pub struct BatchArgs {
     /// What to run it on.
     #[command(flatten)]
     pub sets: SetsArgs,
-    /// Folder of the results, the ledger and the summary [default: the pipeline's name, in the working directory].
+    /// Folder of the results (NAME.h5; of a data set that fails NAME.failed.h5, with the stages that went through), the
+    /// ledger and the summary [default: the pipeline's name, in the working directory].
     #[arg(short, long, value_name = "FOLDER")]
     pub output: Option<PathBuf>,
     /// Data sets at once, and threads [default: one per processor]; results don't depend on it.

@@ -19,7 +19,7 @@ const CHAPTERS: [(&str, &str); 13] = [
     ("The paper, figure by figure", "paper.md"),
     ("Diagnosis", "diagnosis.md"),
     ("Archives", "archives.md"),
-    ("Models for other programs", "export.md"),
+    ("Models and mode shapes in other programs", "export.md"),
     ("Accuracy", "accuracy.md"),
     ("Performance", "performance.md"),
     ("Reliability", "reliability.md"),

@@ -4,27 +4,53 @@ use std::path::Path;
 
 use afmid_pipeline::Artifact;
 use afmid_pipeline::config::nearest;
-use afmid_pipeline::store::{ResultFile, StageSummary};
+use afmid_pipeline::store::{PortSummary, ResultFile, StageSummary};
 
 use super::open::require_result;
+use crate::batch::shell::quoted;
 use crate::failure::Failure;
 use crate::output::print;
 use crate::printable::one_line;
-use crate::show::{artifact_text, overview_json, overview_text, pretty, stage_head, stage_json};
+use crate::show::{artifact_json, artifact_text, overview_json, overview_text, pretty, stage_head, stage_json};
 
-/// Shows a result file, or one of its stages, as text or as JSON.
+/// Shows a result file, one of its stages, or one artifact of a stage, as text or as JSON.
 pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
     require_result(path)?;
     let file = ResultFile::open(path).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let text = match (id, json) {
         (None, false) => overview_text(&file),
         (None, true) => pretty(&overview_json(&file))?,
-        (Some(id), json) => {
-            let stage = find(&file, id)?;
-            if json { pretty(&stage_json(&file, stage)?)? } else { stage_text(&file, stage)? }
-        }
+        (Some(id), json) => match port(&file, id) {
+            Some((stage, name)) => port_text(&file, find(&file, stage)?, name, json)?,
+            None if json => pretty(&stage_json(&file, find(&file, id)?)?)?,
+            None => stage_text(&file, find(&file, id)?)?,
+        },
     };
     print(&text)
+}
+
+/// The parts of `STAGE.PORT`; none of a stage's id.
+fn port<'a>(file: &ResultFile, id: &'a str) -> Option<(&'a str, &'a str)> {
+    if file.stage(id).is_some() { None } else { id.split_once('.') }
+}
+
+/// One artifact of a stage, as text or as JSON. Errors: damaged; usage: none of this name.
+fn port_text(file: &ResultFile, stage: &StageSummary, name: &str, json: bool) -> Result<String, Failure> {
+    let id = &stage.record.id;
+    let Some(port) = stage.ports.iter().find(|port| port.name == name) else {
+        let names: Vec<String> = stage.ports.iter().map(|port| format!("{id}.{}", port.name)).collect();
+        let help = format!("there is: {}", names.join(", "));
+        return Err(Failure::usage(format!("`{id}` has no artifact `{name}`"), Some(help)));
+    };
+    let artifact = artifact(file, id, name)?;
+    if json {
+        return pretty(&artifact_json(&artifact));
+    }
+    Ok(titled(&format!("{id}.{name}"), port, &artifact_text(&artifact)))
+}
+
+fn titled(name: &str, port: &PortSummary, text: &str) -> String {
+    format!("{} ({})\n{text}", one_line(name), port.shape.name())
 }
 
 /// The stage with this id. Errors, usage: there is none.
@@ -52,12 +78,31 @@ fn artifact(file: &ResultFile, id: &str, port: &str) -> Result<Artifact, Failure
     file.artifact(id, port).map_err(|error| Failure::failed(&error, error.help.clone()))
 }
 
-/// A stage with all its artifacts. Errors: one is damaged.
+/// Rows of a table that a stage shows among its other artifacts: as many as most windows do. A longer one is shown alone.
+const ROWS: usize = 50;
+
+/// A stage with all its artifacts, first what is read: tables, documents, then what is shown by its ranges, long tables
+/// by their number of rows. Errors: one is damaged.
 pub fn stage_text(file: &ResultFile, stage: &StageSummary) -> Result<String, Failure> {
-    let mut text = stage_head(&stage.record);
+    let id = &stage.record.id;
+    let mut shown: Vec<(u8, String)> = Vec::new();
     for port in &stage.ports {
-        let artifact = artifact(file, &stage.record.id, &port.name)?;
-        text.push_str(&format!("\n{} ({})\n{}", one_line(&port.name), port.shape.name(), artifact_text(&artifact)));
+        let artifact = artifact(file, id, &port.name)?;
+        let (place, text) = match &artifact {
+            Artifact::Table(table) if table.rows() > ROWS => (3, elsewhere(file, id, port, table.rows())),
+            Artifact::Table(_) => (0, artifact_text(&artifact)),
+            Artifact::Document(_) => (1, artifact_text(&artifact)),
+            _ => (2, artifact_text(&artifact)),
+        };
+        shown.push((place, titled(&port.name, port, &text)));
     }
-    Ok(text)
+    shown.sort_by_key(|(place, _)| *place);
+    let head = stage_head(&stage.record);
+    Ok(shown.into_iter().fold(head, |text, (_, artifact)| text + "\n" + &artifact))
+}
+
+/// How to see a long table.
+fn elsewhere(file: &ResultFile, id: &str, port: &PortSummary, rows: usize) -> String {
+    let path = quoted(file.path());
+    format!("{rows} rows: afmid show {path} {}\n", one_line(&format!("{id}.{}", port.name)))
 }

@@ -23,15 +23,15 @@ pub enum Target {
     Result,
     /// A report's page.
     Page,
-    /// A model for other programs.
-    Model,
+    /// A model, or modes with their shapes, for other programs.
+    Export,
 }
 
 impl Target {
     /// Why what lies at the path must stay, in words that follow its name; none: it may be replaced. An empty file
     /// holds nothing that could be lost: a script may have made it to reserve the name.
     ///
-    /// Results, pages and models state the hash of what was written. Errors: it cannot be read.
+    /// Results, pages and exports state the hash of what was written. Errors: it cannot be read.
     fn in_the_way(self, path: &Path) -> std::io::Result<Option<String>> {
         let kind = file_kind(path)?;
         if kind == FileKind::Empty {
@@ -43,7 +43,7 @@ impl Target {
                 Written::Changed => (true, true),
                 Written::Other(_) => (false, false),
             },
-            Self::Page | Self::Model => {
+            Self::Page | Self::Export => {
                 let head = head(path)?;
                 let looks =
                     if self == Self::Page { kind == FileKind::Html && is_page(&head) } else { is_exported(&head) };
@@ -66,7 +66,7 @@ impl Target {
         match self {
             Self::Result => "a result of afmid's",
             Self::Page => "a page that `afmid report` wrote",
-            Self::Model => "a model that `afmid export` wrote",
+            Self::Export => "a file that `afmid export` wrote",
         }
     }
 }
@@ -149,7 +149,7 @@ fn existing(path: &Path, metadata: &Metadata, target: Target, inputs: &[Input]) 
     }
 }
 
-/// As much of a file as tells a page or an exported model.
+/// As much of a file as tells a page or an exported file.
 fn head(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
     open_regular(path)?.take(1 << 13).read_to_end(&mut head)?;

@@ -41,6 +41,22 @@ pub fn python_bin() -> PathBuf {
     tools.join("bin")
 }
 
+/// Exports the mode shapes of a result and compares them, as pyuff reads them, with what `show` states.
+pub fn shapes_read_by_pyuff(folder: &Path, result: &str) -> String {
+    let file = afmid(folder, &["export", result, "--shapes", "uff"]);
+    std::fs::write(folder.join("modes.json"), shown(folder, result, "modes").to_string()).expect("a summary");
+    let script = Path::new(ROOT).join("tests/uff_shapes.py");
+    let python = Command::new(python_bin().join("python"))
+        .arg(script)
+        .arg(file.trim())
+        .arg("modes.json")
+        .current_dir(folder)
+        .output();
+    let Output { status, stdout, stderr } = python.expect("python starts");
+    assert!(status.success(), "{}", String::from_utf8_lossy(&stderr));
+    String::from_utf8_lossy(&stdout).into_owned()
+}
+
 /// The search path of programs, with these folders first.
 pub fn path_with(first: &[PathBuf]) -> OsString {
     let path = std::env::var_os("PATH").unwrap_or_default();

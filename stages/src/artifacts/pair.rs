@@ -14,9 +14,10 @@ const T0_AMBIGUITY_S: &str = "t0_ambiguity_s";
 const DIFFERENCED: &str = "differenced";
 const NOISE_GAIN: &str = "noise_gain";
 const WINDOW_KIND: &str = "window_kind";
+const OUTPUTS: &str = "outputs";
 
-/// Inputs (`force`, over `input` too if there are several) and output (`response`) over time since sample `t0_sample`,
-/// of all events and of each half, with the output's standard error where it is known.
+/// Inputs (`force`, over `input` too if there are several) and output (`response`, over `output` likewise) over time since
+/// sample `t0_sample`, of all events and of each half, with the output's standard error where it is known.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pair<'a> {
     array: &'a Array,
@@ -53,9 +54,38 @@ impl<'a> Pair<'a> {
         self.array.real(&set.of(FORCE))
     }
 
-    /// Output.
+    /// Output. Errors: there are several.
     pub fn response(&self, set: DataSet) -> Result<&'a [f64], StageError> {
-        self.array.real(&set.of(RESPONSE))
+        let name = set.of(RESPONSE);
+        match self.array.variable(&name)?.dims.len() {
+            0 | 1 => self.array.real(&name),
+            _ => Err(StageError::new(format!("the pair has {} outputs, wanted one", self.output_names().len())).help(
+                "leave `outputs` of `io.columns` out and name one `output`; `spectrum.measured_frf` takes several",
+            )),
+        }
+    }
+
+    /// Names of several outputs; none of a single one.
+    pub fn output_names(&self) -> Vec<&'a str> {
+        self.array
+            .attributes
+            .get(OUTPUTS)
+            .and_then(Attribute::as_str)
+            .map_or_else(Vec::new, |names| names.lines().collect())
+    }
+
+    /// Inputs and outputs, each over time. Errors: the pair does not have them, or lengths that do not fit.
+    pub fn channels(&self, set: DataSet) -> Result<[Vec<&'a [f64]>; 2], StageError> {
+        let samples = self.own_time(set)?.len();
+        let rows = |name: &str| -> Result<Vec<&'a [f64]>, StageError> {
+            let values = self.array.real(&set.of(name))?;
+            if samples == 0 || values.is_empty() || !values.len().is_multiple_of(samples) {
+                let problem = format!("the {name} has {} samples, wanted {samples} a channel", values.len());
+                return Err(StageError::new(problem));
+            }
+            Ok(values.chunks_exact(samples).collect())
+        };
+        Ok([rows(FORCE)?, rows(RESPONSE)?])
     }
 
     /// Standard error of the output. Errors: it is not known.
@@ -212,8 +242,10 @@ impl NewPair {
 /// Force and response of some of the events, to be added to a pair.
 pub(crate) struct PairSet<'a> {
     pub set: DataSet,
-    /// Axes of the force, the time last: that of the response.
+    /// Axes of the force, the time last.
     pub dims: &'a [&'a str],
+    /// Axes of the response, the same time last.
+    pub response_dims: &'a [&'a str],
     pub response: Vec<f64>,
     pub force: Vec<f64>,
     /// Of the response, where it is known.
@@ -232,10 +264,10 @@ impl PairSet<'_> {
     /// Adds it.
     pub fn add(self, to: Array) -> Array {
         let [(response, response_unit), (force, force_unit)] = self.labels;
-        let time = &self.dims[self.dims.len().saturating_sub(1)..];
+        let over = self.response_dims;
         let newtons = self.newtons_per_volt.map(|scale| self.force.iter().map(|u| scale * u).collect::<Vec<f64>>());
         let name = |quantity: &str| self.set.of(quantity);
-        let mut to = to.with(&name(RESPONSE), response_unit, response, time, self.response).with(
+        let mut to = to.with(&name(RESPONSE), response_unit, response, over, self.response).with(
             &name(FORCE),
             force_unit,
             force,
@@ -243,13 +275,18 @@ impl PairSet<'_> {
             self.force,
         );
         if let Some(error) = self.standard_error {
-            to = to.with(&name(STANDARD_ERROR), response_unit, "standard error of the response", time, error);
+            to = to.with(&name(STANDARD_ERROR), response_unit, "standard error of the response", over, error);
         }
         match newtons {
-            Some(newtons) => to.with(&name(FORCE_NEWTON), "N", "force on the tip", time, newtons),
+            Some(newtons) => to.with(&name(FORCE_NEWTON), "N", "force on the tip", self.dims, newtons),
             None => to,
         }
     }
+}
+
+/// States the names of several outputs.
+pub(crate) fn with_output_names(array: Array, names: &[String]) -> Array {
+    array.attribute(OUTPUTS, names.join("\n"))
 }
 
 /// States how many events are in a set, and how wide the interval is in which t0 may lie.

@@ -61,6 +61,7 @@ pub(crate) fn pair_of(response: &[f64], standard_error: Option<f64>, sets: &[Dat
         PairSet {
             set,
             dims: &["time"],
+            response_dims: &["time"],
             response: response.to_vec(),
             force: (0..samples).map(|k| if k < T0 { LOAD_V } else { 0.0 }).collect(),
             standard_error: standard_error.map(|error| vec![error; samples]),

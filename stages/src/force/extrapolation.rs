@@ -133,6 +133,7 @@ impl Stage for Extrapolation {
             let own_set = PairSet {
                 set,
                 dims: &["time"],
+                response_dims: &["time"],
                 response: found.response,
                 force: found.force,
                 standard_error: Some(error.to_vec()),

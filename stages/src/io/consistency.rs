@@ -27,15 +27,15 @@ pub struct Consistency {
 /// Sample rates must agree to 1e-6, units of each channel exactly; lengths, scale factors and the presence of a piezo
 /// channel may differ and are remarked on. Channels of one record must be of one length.
 /// # Errors
-/// No record; a rate or unit that differs, with both files; an empty record; channels of different lengths.
+/// No record; rates that differ, with the files of each; a unit that differs, with both files; an empty record; channels of different lengths.
 pub fn check_consistency(records: &[Record]) -> Result<Consistency, StageError> {
     let first = records.first().ok_or_else(|| StageError::new("there is no record"))?;
     let known = deflection(first)?;
+    if records.iter().any(|record| !same_rate(record, first)) {
+        return Err(rates_differ(records));
+    }
     let (mut samples, mut shortest, mut longest) = (0, first, first);
     for record in records {
-        if (record.sample_rate_hz / first.sample_rate_hz - 1.0).abs() > 1e-6 {
-            return Err(differs(first, record, "samples per second", &first.sample_rate_hz, &record.sample_rate_hz));
-        }
         samples += checked_length(record)?;
         for channel in &record.channels {
             if let Ok(same) = first.channel(&channel.role)
@@ -81,6 +81,46 @@ pub fn check_consistency(records: &[Record]) -> Result<Consistency, StageError> 
         longest_samples: lengths[1],
         remarks,
     })
+}
+
+fn same_rate(a: &Record, b: &Record) -> bool {
+    (a.sample_rate_hz / b.sample_rate_hz - 1.0).abs() <= 1e-6
+}
+
+/// Sample rates, and names of each, that an error lists.
+const MOST_LISTED: [usize; 2] = [10, 3];
+
+/// All records by their sample rate, the rate of most records first.
+fn rates_differ(records: &[Record]) -> StageError {
+    let mut rates: Vec<(&Record, Vec<&str>)> = Vec::new();
+    for record in records {
+        match rates.iter_mut().find(|(first, _)| same_rate(record, first)) {
+            Some((_, names)) => names.push(&record.name),
+            None => rates.push((record, vec![record.name.as_str()])),
+        }
+    }
+    rates.sort_by_key(|(_, names)| std::cmp::Reverse(names.len()));
+    let [most_rates, most_names] = MOST_LISTED;
+    let listed = |(first, names): &(&Record, Vec<&str>)| {
+        let rate = seven_digits(first.sample_rate_hz);
+        let shown: Vec<&str> = names.iter().copied().take(most_names).collect();
+        let more = if names.len() > most_names { ", ..." } else { "" };
+        format!("{} at {rate} Hz ({}{more})", names.len(), shown.join(", "))
+    };
+    let mut list: Vec<String> = rates.iter().take(most_rates).map(listed).collect();
+    list.extend((rates.len() > most_rates).then(|| format!("{} more rates", rates.len() - most_rates)));
+    StageError::new(format!("the {} records have {} sample rates: {}", records.len(), rates.len(), list.join("; "))).help(
+        "records of one analysis share a rate: write a config for the files of each (`afmid new pipeline FILES... -o NAME.toml`), \
+         or run each file by itself, a line of a manifest each (`afmid batch CONFIG --manifest M.jsonl`); correct the \
+         attribute if a file states a wrong one",
+    )
+}
+
+/// A rate to the digits that must agree.
+fn seven_digits(rate_hz: f64) -> String {
+    let decimals = (6.0 - rate_hz.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    let text = format!("{rate_hz:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 fn checked_length(record: &Record) -> Result<usize, StageError> {
@@ -130,9 +170,23 @@ mod tests {
     }
 
     #[test]
-    fn other_rates_and_units_are_errors_that_name_both_files() {
-        let text = check_consistency(&[record("a.h5", 5e6, 9), record("b.h5", 2e6, 9)]).unwrap_err().to_string();
-        assert!(text.contains("a.h5 has 5000000 samples per second, b.h5 has 2000000"), "{text}");
+    fn other_rates_are_an_error_that_lists_the_files_of_each() {
+        let of = |records: &[(&str, f64)]| {
+            let records: Vec<Record> = records.iter().map(|(name, rate)| record(name, *rate, 9)).collect();
+            check_consistency(&records).unwrap_err().to_string()
+        };
+        let text =
+            of(&[("a", 1e6 / 3.3), ("b", 5e5), ("c", 5e5 * (1.0 + 5e-7)), ("d", 5e5), ("e", 5e5), ("f", 0.0125)]);
+        let expected = "the 6 records have 3 sample rates: 4 at 500000 Hz (b, c, d, ...); 1 at 303030.3 Hz (a); 1 at 0.0125 Hz (f)";
+        assert!(text.contains(expected), "{text}");
+        let many: Vec<(&str, f64)> = (1..=12).map(|k| ("a", f64::from(k))).collect();
+        assert!(
+            of(&many).contains("12 sample rates: 1 at 1 Hz (a); ") && of(&many).contains("10 Hz (a); 2 more rates")
+        );
+    }
+
+    #[test]
+    fn another_unit_is_an_error_that_names_both_files() {
         let mut other = record("b.h5", 5e6, 9);
         other.channels[0].unit = "nm".to_owned();
         let text = check_consistency(&[record("a.h5", 5e6, 9), other]).unwrap_err().to_string();

@@ -57,6 +57,7 @@ pub(super) fn pair(force: Vec<f64>, level: f64, labels: [(&str, &str); 2]) -> Ar
     let set = PairSet {
         set: DataSet::All,
         dims: &["time"],
+        response_dims: &["time"],
         response,
         force,
         standard_error: None,

@@ -22,7 +22,7 @@ use afmid_kernels::spectra::{
 /// `Syu / Suu`, `h2` is `Syy / Suy`, `hv` their geometric mean; several inputs: `h1 = Syu Suu^-1`. Offsets are removed.
 /// The band in which the input has power is found and kept.
 /// # Shapes
-/// A row for each input of the pair over the bins of the band; zero hertz is left out.
+/// A row for each input of the pair, output after output, over the bins of the band; zero hertz is left out.
 /// # Units
 /// Displacement, velocity and acceleration over force in m, m/s and m/s^2 per N; else output over input in the pair's
 /// units.
@@ -66,7 +66,8 @@ pub struct MeasuredFrf {
     pub excited_share: f64,
     /// What output over input is. Absent: what the units say, a `transfer` if they say nothing.
     pub quantity: Option<Quantity>,
-    /// Number (from 1) of the input that acts where and as the output is measured. Absent: none.
+    /// Number (from 1) of the response whose input acts where and as its output is measured: with one output the number
+    /// of the input, with one input that of the output. Absent: none.
     #[schemars(range(min = 1))]
     pub driving_point: Option<usize>,
 }
@@ -134,7 +135,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for MeasuredFrf {
     const SPEC: Spec = Spec {
         name: "spectrum.measured_frf",
-        version: 2,
+        version: 3,
         summary: "estimates the frequency response from measured input and output with coherence and variance",
         inputs: &[PAIR.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -157,11 +158,11 @@ impl Stage for MeasuredFrf {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let pair = Pair::new(inputs.get(&PAIR)?);
-        let series = pair.series(DataSet::All, 0)?;
-        let record =
-            Block { inputs: series.input.chunks_exact(series.output.len()).collect(), outputs: vec![&series.output] };
+        let rate = pair.sample_rate_hz()?;
+        let [inputs, outputs] = pair.channels(DataSet::All)?;
+        let record = Block { inputs, outputs };
         let blocks = self.cut(&record)?;
-        let found = frequency_response(&blocks, self.settings(series.rate)).map_err(StageError::from_error)?;
+        let found = frequency_response(&blocks, self.settings(rate)).map_err(StageError::from_error)?;
         if found.coherence.is_none() {
             cx.warn("a single block: neither coherence nor variance is known");
         }
@@ -170,7 +171,8 @@ impl Stage for MeasuredFrf {
         let understood = Understood::new(self.quantity, &unit_ratio(response_unit, force_unit))?;
         understood.remark.iter().for_each(|remark| cx.warn(remark));
         let summary = self.summary(&found, band, blocks.len())?;
-        let frf = self.frf(found, band, record.inputs.len(), understood, series.rate)?;
+        let responses = self.responses(&pair.output_names(), &record)?;
+        let frf = self.frf(found, band, responses, understood, rate)?;
         Ok(Ports::new().with(&FRF, frf.array()?).with(&SUMMARY, summary))
     }
 
@@ -228,31 +230,50 @@ impl MeasuredFrf {
         }
     }
 
+    /// What each response is from, output after output; the driving point has one name. Errors: there is no such.
+    fn responses(&self, names: &[&str], record: &Block<'_>) -> Result<Vec<ResponseOf>, StageError> {
+        let (inputs, outputs) = (record.inputs.len(), record.outputs.len());
+        let count = inputs * outputs;
+        let mut output: Vec<String> = match (names.len() == outputs, outputs) {
+            (true, _) => names.iter().map(|&name| name.to_owned()).collect(),
+            (false, 1) => vec!["output".to_owned()],
+            (false, _) => (1..=outputs).map(|number| format!("output {number}")).collect(),
+        };
+        let mut input: Vec<String> = (1..=inputs).map(|number| format!("input {number}")).collect();
+        match self.driving_point {
+            Some(number) if number == 0 || number > count => {
+                return Err(StageError::new(format!("`driving_point` is {number}, there are {count} responses")));
+            }
+            // one output may be named for the input, several have names of their own
+            Some(number) if outputs == 1 => output[0].clone_from(&input[number - 1]),
+            Some(number) => input[(number - 1) % inputs].clone_from(&output[(number - 1) / inputs]),
+            None => {}
+        }
+        let point = |name: &String| Point { name: name.clone(), ..Point::default() };
+        let of = |output| input.iter().map(move |input| ResponseOf { output: point(output), input: point(input) });
+        Ok(output.iter().flat_map(of).collect())
+    }
+
     fn frf(
         &self,
         found: MeasuredResponse,
         (first, end): (usize, usize),
-        inputs: usize,
+        responses: Vec<ResponseOf>,
         Understood { quantity, unit, factor, .. }: Understood,
         rate: f64,
     ) -> Result<NewFrf, StageError> {
-        if let Some(number) = self.driving_point.filter(|number| *number == 0 || *number > inputs) {
-            return Err(StageError::new(format!("`driving_point` is {number}, there are {inputs} inputs")));
-        }
-        let point = |name: String| Point { name, ..Point::default() };
-        let output = self.driving_point.map_or_else(|| "output".to_owned(), |number| format!("input {number}"));
-        let row =
-            |input: usize| ResponseOf { output: point(output.clone()), input: point(format!("input {}", input + 1)) };
         let kept = |rows: Vec<Vec<f64>>, factor: f64| -> Vec<f64> {
             rows.iter().flat_map(|row| row[first..end].iter().map(|value| value * factor)).collect()
         };
         let transfer: Vec<Complex64> =
             found.transfer.iter().flat_map(|row| row[first..end].iter().map(|value| value * factor)).collect();
-        // the multiple coherence is that of each input
-        let coherence = found.coherence.map(|rows| kept(rows, 1.0).repeat(inputs));
+        // the multiple coherence of an output is that of each input
+        let inputs = responses.len() / found.coherence.as_ref().map_or(1, |rows| rows.len().max(1));
+        let of_each = |row| std::iter::repeat_n(row, inputs);
+        let coherence = found.coherence.map(|rows| kept(rows.into_iter().flat_map(of_each).collect(), 1.0));
         Ok(NewFrf {
             frequency_hz: found.frequency_hz[first..end].to_vec(),
-            responses: (0..inputs).map(row).collect(),
+            responses,
             frf: transfer,
             variance: found.variance.map(|rows| kept(rows, factor * factor)),
             coherence,
@@ -271,8 +292,9 @@ impl MeasuredFrf {
         (first, end): (usize, usize),
         blocks: usize,
     ) -> Result<Document, StageError> {
-        let middle = found.coherence.as_ref().and_then(|rows| rows.first()).map(|row| {
-            let mut values: Vec<f64> = row[first..end].iter().copied().filter(|value| value.is_finite()).collect();
+        let middle = found.coherence.as_ref().map(|rows| {
+            let all = rows.iter().flat_map(|row| &row[first..end]);
+            let mut values: Vec<f64> = all.copied().filter(|value| value.is_finite()).collect();
             values.sort_by(f64::total_cmp);
             values.get(values.len() / 2).copied()
         });

@@ -7,12 +7,15 @@ use serde_json::{Value, json};
 use super::selection::Column;
 use super::stage::Columns;
 use super::stretch::{Stretch, Trend, halves};
-use crate::artifacts::{DataSet, NewPair, PairSet};
+use crate::artifacts::{DataSet, NewPair, PairSet, with_output_names};
 
-/// Inputs and output in their units, NaN where missing.
+/// Inputs and outputs in their units, NaN where missing.
 pub(super) struct Series {
     inputs: Vec<Vec<f64>>,
-    output: Vec<f64>,
+    outputs: Vec<Vec<f64>>,
+    /// Of the outputs, as the file names them.
+    names: Vec<String>,
+    samples: usize,
     input_unit: String,
     output_unit: String,
     rate: f64,
@@ -34,17 +37,20 @@ impl Series {
         };
         let inputs: Vec<Vec<f64>> =
             channels.inputs.iter().map(|channel| values(channel, wanted.input_scale)).collect::<Result<_, _>>()?;
-        let output = values(channels.output, wanted.output_scale)?;
-        let samples = output.len();
-        for (channel, input) in channels.inputs.iter().zip(&inputs) {
-            let name = &channel.location;
-            if input.len() != samples {
+        let outputs: Vec<Vec<f64>> =
+            channels.outputs.iter().map(|channel| values(channel, wanted.output_scale)).collect::<Result<_, _>>()?;
+        let samples = outputs.first().map_or(0, Vec::len);
+        for (channel, values) in channels.all().zip(inputs.iter().chain(&outputs)) {
+            if values.len() != samples {
+                let (name, output) = (&channel.location, channels.first_output());
                 return Err(StageError::new(format!(
-                    "input {name} has {} samples, the output {} has {samples}; wanted as many",
-                    input.len(),
-                    channels.output.location
+                    "{name} has {} samples, the output {output} has {samples}; wanted as many",
+                    values.len()
                 )));
             }
+        }
+        for (channel, input) in channels.inputs.iter().zip(&inputs) {
+            let name = &channel.location;
             if let Some(k) = input.iter().position(|value| !value.is_finite()) {
                 return Err(StageError::new(format!(
                     "input {name} misses sample {k}: the response to an unknown input is unknown"
@@ -52,8 +58,10 @@ impl Series {
                 .help("choose stretches without gaps in the input and cut the file to them"));
             }
         }
-        if output.iter().all(|value| !value.is_finite()) {
-            return Err(StageError::new(format!("output {} has no value at all", channels.output.location)));
+        for (channel, output) in channels.outputs.iter().zip(&outputs) {
+            if output.iter().all(|value| !value.is_finite()) {
+                return Err(StageError::new(format!("output {} has no value at all", channel.location)));
+            }
         }
         let (first, second) = halves(samples);
         let stretch = |given: Option<[usize; 2]>, default: Stretch, name: &str| {
@@ -69,10 +77,12 @@ impl Series {
             identification: stretch(wanted.identification, first, "identification")?,
             verification: stretch(wanted.verification, second, "verification")?,
             input_unit: unit(&channels.inputs, wanted.input_unit.as_deref(), wanted.input_scale, "input")?,
-            output_unit: unit(&[channels.output], wanted.output_unit.as_deref(), wanted.output_scale, "output")?,
+            output_unit: unit(&channels.outputs, wanted.output_unit.as_deref(), wanted.output_scale, "output")?,
+            names: channels.outputs.iter().map(|channel| channel.location.trim_start_matches('/').to_owned()).collect(),
             rate,
             inputs,
-            output,
+            outputs,
+            samples,
         })
     }
 
@@ -80,23 +90,28 @@ impl Series {
     pub fn split(&self, wanted: &Columns) -> Result<(Array, Document), StageError> {
         let trend = |values: &[f64]| Trend::of(values, self.identification, wanted.remove);
         let trends: Vec<Trend> = self.inputs.iter().map(|input| trend(input)).collect();
-        let level = trend(&self.output);
-        let inputs: Vec<Vec<f64>> = self.inputs.iter().zip(&trends).map(|(u, trend)| trend.removed(u)).collect();
-        let output = level.removed(&self.output);
-        let whole = Stretch { first: 0, end: output.len() };
-        let sets = DataSet::EACH.into_iter().zip([whole, self.identification, self.verification]);
+        let levels: Vec<Trend> = self.outputs.iter().map(|output| trend(output)).collect();
+        let removed = |all: &[Vec<f64>], trends: &[Trend]| {
+            all.iter().zip(trends).map(|(values, trend)| trend.removed(values)).collect::<Vec<Vec<f64>>>()
+        };
+        let (inputs, outputs) = (removed(&self.inputs, &trends), removed(&self.outputs, &levels));
+        let sets = DataSet::EACH.into_iter().zip([self.whole(), self.identification, self.verification]);
         let mut axes: Vec<Axis> = sets.clone().map(|(set, stretch)| self.axis(set, stretch)).collect();
-        if inputs.len() > 1 {
-            let numbers = (1..=inputs.len()).map(|i| i as f64).collect();
-            axes.push(Axis::new("input", "1", "number of the input", numbers));
+        for (name, count) in [("input", inputs.len()), ("output", outputs.len())].into_iter().filter(|(_, n)| *n > 1) {
+            let numbers = (1..=count).map(|i| i as f64).collect();
+            axes.push(Axis::new(name, "1", &format!("number of the {name}"), numbers));
         }
         let mut pair = NewPair { sample_rate_hz: self.rate, t0_sample: 0, kind: "columns" }.over(axes);
+        if outputs.len() > 1 {
+            pair = with_output_names(pair, &self.names);
+        }
         for (set, stretch) in sets {
             let time = set.of("time");
             let of_set = PairSet {
                 set,
                 dims: if inputs.len() > 1 { &["input", &time] } else { &[&time] },
-                response: stretch.of(&output).to_vec(),
+                response_dims: if outputs.len() > 1 { &["output", &time] } else { &[&time] },
+                response: outputs.iter().flat_map(|output| stretch.of(output).to_vec()).collect(),
                 force: inputs.iter().flat_map(|input| stretch.of(input).to_vec()).collect(),
                 standard_error: None,
                 newtons_per_volt: None,
@@ -104,7 +119,7 @@ impl Series {
             };
             pair = of_set.add(pair);
         }
-        Ok((pair, self.summary(wanted, &trends, level)?))
+        Ok((pair, self.summary(wanted, &trends, &levels)?))
     }
 
     fn axis(&self, set: DataSet, stretch: Stretch) -> Axis {
@@ -112,12 +127,16 @@ impl Series {
         Axis::new(&set.of("time"), "s", "time since the first sample", time)
     }
 
-    /// Missing outputs of a stretch.
-    fn missing(&self, stretch: Stretch) -> usize {
-        stretch.of(&self.output).iter().filter(|value| !value.is_finite()).count()
+    const fn whole(&self) -> Stretch {
+        Stretch { first: 0, end: self.samples }
     }
 
-    fn summary(&self, wanted: &Columns, trends: &[Trend], level: Trend) -> Result<Document, StageError> {
+    /// Missing outputs of a stretch.
+    fn missing(&self, stretch: Stretch) -> usize {
+        self.outputs.iter().flat_map(|output| stretch.of(output)).filter(|value| !value.is_finite()).count()
+    }
+
+    fn summary(&self, wanted: &Columns, trends: &[Trend], levels: &[Trend]) -> Result<Document, StageError> {
         let taken = |trend: &Trend, unit: &str| {
             json!({ "level": trend.level, "slope_per_s": trend.slope * self.rate, "unit": unit,
                     "at_s": trend.origin / self.rate })
@@ -127,17 +146,19 @@ impl Series {
                     "missing": self.missing(stretch) })
         };
         Document::new(&json!({
-            "samples": self.output.len(),
+            "samples": self.samples,
             "inputs": wanted.inputs,
-            "output": wanted.output,
+            "output": wanted.all_outputs().first(),
+            "outputs": wanted.all_outputs(),
             "sample_rate_hz": self.rate,
-            "missing": self.missing(Stretch { first: 0, end: self.output.len() }),
+            "missing": self.missing(self.whole()),
             "identification": part(self.identification),
             "verification": part(self.verification),
             "removed": {
                 "what": wanted.remove,
                 "inputs": trends.iter().map(|trend| taken(trend, &self.input_unit)).collect::<Vec<Value>>(),
-                "output": taken(&level, &self.output_unit),
+                "output": levels.first().map(|level| taken(level, &self.output_unit)),
+                "outputs": levels.iter().map(|level| taken(level, &self.output_unit)).collect::<Vec<Value>>(),
             },
         }))
     }
@@ -152,11 +173,11 @@ impl Series {
                 "identification and verification share {common} samples: the verification is not held out"
             ));
         }
-        let missing = self.missing(Stretch { first: 0, end: self.output.len() });
+        let missing = self.missing(self.whole());
         if missing > 0 {
             warnings.push(format!(
                 "{missing} of {} output samples are missing: a model without noise filter (`noise = \"white\"`) leaves them out, others refuse them",
-                self.output.len()
+                self.samples * self.outputs.len()
             ));
         }
         warnings
@@ -166,20 +187,31 @@ impl Series {
 /// The channels that are meant.
 struct Channels<'a> {
     inputs: Vec<&'a FoundChannel>,
-    output: &'a FoundChannel,
+    outputs: Vec<&'a FoundChannel>,
 }
 
 impl<'a> Channels<'a> {
     fn find(wanted: &Columns, file: &'a WholeFile) -> Result<Self, StageError> {
         let contents = file.contents();
-        let inputs = wanted.inputs.iter().map(|column| column.of(contents)).collect::<Result<_, _>>()?;
-        Ok(Self { inputs, output: wanted.output.of(contents)? })
+        let found = |columns: &[Column]| {
+            columns.iter().map(|column| column.of(contents)).collect::<Result<Vec<_>, StageError>>()
+        };
+        Ok(Self { inputs: found(&wanted.inputs)?, outputs: found(wanted.all_outputs())? })
+    }
+
+    fn all(&self) -> impl Iterator<Item = &'a FoundChannel> {
+        self.inputs.iter().chain(&self.outputs).copied()
+    }
+
+    /// Its place in the file.
+    fn first_output(&self) -> &'a str {
+        self.outputs.first().map_or("", |channel| &channel.location)
     }
 
     /// The one rate that all state, or that the user gives. Errors: none, or several.
     fn rate(&self, wanted: &Columns, file: &WholeFile) -> Result<f64, StageError> {
-        let stated = self.inputs.iter().chain([&self.output]).map(|channel| (channel, channel.sample_rate_hz));
-        let stated: Vec<(&&FoundChannel, f64)> =
+        let stated = self.all().map(|channel| (channel, channel.sample_rate_hz));
+        let stated: Vec<(&FoundChannel, f64)> =
             stated.filter_map(|(channel, rate)| rate.map(|rate| (channel, rate))).collect();
         let first = stated.first().map(|(_, rate)| *rate);
         for (channel, rate) in &stated {
@@ -188,7 +220,7 @@ impl<'a> Channels<'a> {
         if let (None, None, Some(column)) = (first, wanted.sample_rate_hz, &wanted.time) {
             return spaced_equally(column, file);
         }
-        agreed_rate(first, wanted.sample_rate_hz, &self.output.location).map_err(|error| match first {
+        agreed_rate(first, wanted.sample_rate_hz, self.first_output()).map_err(|error| match first {
             Some(_) => error,
             None => error.help("give `sample_rate_hz` (1 for cycles per sample) or the channel `time`"),
         })
@@ -196,10 +228,10 @@ impl<'a> Channels<'a> {
 
     /// A stretch, if no channel was interrupted within it.
     fn uninterrupted(&self, stretch: Stretch, name: &str) -> Result<Stretch, StageError> {
-        let within = |channel: &&FoundChannel| {
+        let within = |channel: &'a FoundChannel| {
             channel.gaps.iter().copied().find(|gap| *gap > stretch.first && *gap < stretch.end)
         };
-        match self.inputs.iter().chain([&self.output]).find_map(within) {
+        match self.all().find_map(within) {
             None => Ok(stretch),
             Some(gap) => Err(StageError::new(format!(
                 "the recording was interrupted before sample {gap}, within `{name}` from {} to {}",

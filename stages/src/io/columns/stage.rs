@@ -16,7 +16,7 @@ use crate::io::shared_data::moved;
 /// on.
 ///
 /// # Model
-/// Equally sampled inputs u and one output y, channels of a file of any format that `io.records` opens: columns of a
+/// Equally sampled inputs u and an output y, or several, channels of a file of any format that `io.records` opens: columns of a
 /// table, variables of a MATLAB file, datasets, channels of an oscilloscope or recorder (docs/archives.md).
 /// # Method
 /// Two stretches of time, identification and verification. Mean or line are taken off with the constants of the
@@ -24,7 +24,8 @@ use crate::io::shared_data::moved;
 /// codes) stay missing: nothing is interpolated.
 /// # Shapes
 /// `response`, `force` over `time`, the whole record; the same with `_identification` and `_verification` over axes of
-/// their own, which may differ in length. With several inputs `force` is over (`input`, time).
+/// their own, which may differ in length. With several inputs `force` is over (`input`, time), with several outputs
+/// `response` over (`output`, time).
 /// # Units
 /// Those of the file, times `input_scale` and `output_scale`.
 /// # Accuracy
@@ -45,6 +46,10 @@ pub struct Columns {
     pub inputs: Vec<Column>,
     /// Channel of the output. Default: the second.
     pub output: Column,
+    /// Channels of several outputs, instead of `output`: sensors of one unit that were recorded with the same inputs.
+    /// Default: none. Why: `spectrum.measured_frf` makes a response of each, and mode shapes are over them; other stages
+    /// take one output.
+    pub outputs: Vec<Column>,
     /// The file's format, as for `io.records`.
     pub format: String,
     /// What is in a file without a header, as for `io.records`.
@@ -83,6 +88,7 @@ impl Default for Columns {
             file: String::new(),
             inputs: vec![Column::Number(1)],
             output: Column::Number(2),
+            outputs: Vec::new(),
             format: "auto".to_owned(),
             raw: None,
             sample_rate_hz: None,
@@ -122,6 +128,12 @@ impl Stage for Columns {
         faults.require(!self.inputs.is_empty(), || "`inputs` is empty, wanted at least one channel".to_owned());
         self.inputs.iter().for_each(|column| faults.take(column.check("inputs")));
         faults.take(self.output.check("output"));
+        for (number, column) in self.outputs.iter().enumerate() {
+            faults.take(column.check("outputs"));
+            faults.require(!self.outputs[..number].contains(column), || {
+                format!("`outputs` has {column} twice, wanted each channel once")
+            });
+        }
         self.time.iter().for_each(|column| faults.take(column.check("time")));
         faults.take(Reading::of(&self.format, self.raw.clone()).check());
         for (name, scale) in [("input_scale", self.input_scale), ("output_scale", self.output_scale)] {
@@ -164,6 +176,11 @@ impl Stage for Columns {
 }
 
 impl Columns {
+    /// The channels of the outputs, one at least.
+    pub(super) fn all_outputs(&self) -> &[Column] {
+        if self.outputs.is_empty() { std::slice::from_ref(&self.output) } else { &self.outputs }
+    }
+
     fn path(&self, base: &Path) -> PathBuf {
         let root = std::env::var_os("AFMID_DATA");
         base.join(moved(&self.file, root.as_deref().map(Path::new)))

@@ -4,21 +4,41 @@ use afmid_pipeline::{Array, Axis, Document, StageError};
 use num_complex::Complex64;
 use serde_json::{Value, json};
 
-use crate::artifacts::{Frf, shaped_mode};
+use crate::artifacts::{Frf, Point, ResponseOf, shaped_mode};
 use afmid_kernels::frf_modes::{FrfMode, FrfModes};
 use afmid_kernels::ringdown::Estimate;
 
 /// Names of the responses: the point that goes from one to the next, both where both do.
 pub(super) fn channels(frf: &Frf<'_>) -> Vec<String> {
-    let fixed = |of: &dyn Fn(usize) -> String| (1..frf.responses.len()).all(|r| of(r) == of(0));
-    let output = |r: usize| frf.responses[r].output.label();
-    let input = |r: usize| frf.responses[r].input.label();
-    let name = |r: usize| match (fixed(&output), fixed(&input)) {
-        (true, false) => input(r),
-        (_, true) => output(r),
-        _ => format!("{} / {}", output(r), input(r)),
+    match roving(frf) {
+        Some(points) => points.iter().map(|point| point.label()).collect(),
+        None => frf.responses.iter().map(|of| format!("{} / {}", of.output.label(), of.input.label())).collect(),
+    }
+}
+
+/// The points of a shape: those that go from response to response; none where outputs and inputs both do.
+fn roving<'a>(frf: &'a Frf<'_>) -> Option<Vec<&'a Point>> {
+    let all = |of: fn(&ResponseOf) -> &Point| frf.responses.iter().map(of).collect::<Vec<&Point>>();
+    let (outputs, inputs) = (all(|of| &of.output), all(|of| &of.input));
+    let fixed = |points: &[&Point]| points.windows(2).all(|pair| pair[0].is(pair[1]));
+    match (fixed(&outputs), fixed(&inputs)) {
+        (true, false) => Some(inputs),
+        (_, true) => Some(outputs),
+        _ => None,
+    }
+}
+
+/// What is known of the points of a shape.
+fn points_document(points: &[&Point]) -> Value {
+    let row = |point: &&Point| {
+        json!({
+            "channel": point.label(),
+            "point": point.name,
+            "direction": point.direction,
+            "position_m": point.position_m,
+        })
     };
-    (0..frf.responses.len()).map(name).collect()
+    points.iter().map(row).collect::<Vec<Value>>().into()
 }
 
 /// Responses as measured and as fitted over the lines of the fit, and the mode indicator.
@@ -63,6 +83,7 @@ pub(super) fn summary(found: &FrfModes, frf: &Frf<'_>, names: &[&str]) -> Result
     Document::new(&json!({
         "modes": found.modes.iter().map(mode).collect::<Vec<Value>>(),
         "responses": names.len(),
+        "points": roving(frf).map(|points| points_document(&points)),
         "quantity": frf.quantity.name(),
         "unit": frf.unit,
         "driving_point": frf.driving_point.map(|row| row + 1),
