@@ -66,7 +66,12 @@ fn values(found: &FoundChannel) -> Result<Values, FormatError> {
         let samples = found.source.read(start, chunk.min(found.samples - start))?.widened();
         if codes.len() < MOST_CODES {
             let new = samples.iter().filter(|code| code.is_finite()).map(|code| code.to_bits());
-            new.take_while(|&code| codes.insert(code) || codes.len() < MOST_CODES).for_each(drop);
+            for code in new {
+                codes.insert(code);
+                if codes.len() == MOST_CODES {
+                    break;
+                }
+            }
         }
         census.push(samples);
     }

@@ -34,25 +34,39 @@ pub fn first_samples(found: &FoundChannel) -> Result<Vec<f64>, StageError> {
     Ok(stored.widened().into_iter().map(value).collect())
 }
 
-/// Whether a channel holds a ringdown, by its samples.
+/// Whether a channel holds a ringdown, by the samples of its longest stretch without a missing one.
 pub fn ringdown(found: &FoundChannel) -> (Answer, String) {
-    let rate = found.sample_rate_hz;
+    let samples = match first_samples(found) {
+        Ok(samples) => samples,
+        Err(error) => return (Answer::Unknown, error.problem),
+    };
+    // a missing sample is a stretch of its own
+    let missing = (0..samples.len()).filter(|&k| !samples[k].is_finite());
+    let edges: Vec<usize> = missing.flat_map(|k| [k, k + 1]).collect();
+    let present = longest_stretch(samples.len(), &edges);
+    let first = longest_stretch(found.samples, &found.gaps).start + present.start;
     // without a rate the search is in samples
-    let searched = first_samples(found).map_err(|error| error.problem).and_then(|y| {
-        find_decays(&[&y], rate.unwrap_or(1.0), &DecaySearchOptions::default()).map_err(|e| e.to_string())
-    });
-    match (searched, rate) {
-        (Ok(search), Some(rate)) => of_search(&search, rate),
-        (Ok(search), None) => without_rate(&search),
-        (Err(problem), _) => (Answer::No, problem),
+    let rate = found.sample_rate_hz;
+    let search = find_decays(&[&samples[present.clone()]], rate.unwrap_or(1.0), &DecaySearchOptions::default());
+    let (answer, reason) = match (search, rate) {
+        (Ok(search), Some(rate)) => of_search(&search, rate, first),
+        (Ok(search), None) => without_rate(&search, first),
+        (Err(problem), _) => (Answer::No, problem.to_string()),
+    };
+    if present.len() == found.samples || reason == RANDOM {
+        return (answer, reason);
     }
+    // of what was not searched nothing is known
+    let answer = if answer == Answer::No { Answer::Unknown } else { answer };
+    let (last, all) = ((first + present.len()).saturating_sub(1), found.samples);
+    (answer, format!("{reason}; of {all} samples those from {first} to {last} were searched"))
 }
 
-fn of_search(search: &DecaySearch, rate: f64) -> (Answer, String) {
+fn of_search(search: &DecaySearch, rate: f64, since: usize) -> (Answer, String) {
     match (search.decays.first(), search.reason()) {
         (Some(_), _) if search.random => (Answer::No, RANDOM.to_owned()),
         (Some(first), _) => {
-            let start_s = first.range.start as f64 / rate;
+            let start_s = (since + first.range.start) as f64 / rate;
             let (frequency, samples) = (first.frequency_hz, rate / first.frequency_hz);
             let at = format!("at {} Hz: {samples:.1} samples a period", number(frequency));
             let where_from = format!("from {} s on, {at}", number(start_s));
@@ -62,12 +76,12 @@ fn of_search(search: &DecaySearch, rate: f64) -> (Answer, String) {
     }
 }
 
-fn without_rate(search: &DecaySearch) -> (Answer, String) {
+fn without_rate(search: &DecaySearch, since: usize) -> (Answer, String) {
     let unknown = "the file states no sample rate: give `sample_rate_hz`";
     match (search.decays.first(), search.steady.first()) {
         (Some(_), _) if search.random => (Answer::No, RANDOM.to_owned()),
         (Some(first), _) => {
-            let (start, samples) = (first.range.start, 1.0 / first.frequency_hz);
+            let (start, samples) = (since + first.range.start, 1.0 / first.frequency_hz);
             let from = format!("from sample {start} on, {samples:.1} samples a period");
             (Answer::Unknown, format!("{} {from}; {unknown}", counted(search.decays.len())))
         }

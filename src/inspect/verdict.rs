@@ -63,7 +63,8 @@ pub fn of_file(channels: &[Channel], found: &[FoundChannel]) -> Verdict {
         if best.as_ref().is_none_or(|best| answer > best.answer) {
             best = Some(Verdict { answer, reason, channel: Some(index) });
         }
-        if answer > Answer::No {
+        // without a rate no other channel tells more
+        if answer == Answer::Yes || (answer == Answer::Unknown && found[index].sample_rate_hz.is_none()) {
             break;
         }
     }
@@ -146,6 +147,14 @@ mod tests {
         };
         let values = |codes, missing, saturated| Values { least: 0.0, largest: 1.0, codes, missing, saturated };
         let noise: Vec<f64> = rings(true)[..1000].to_vec();
+        let lacking = |k: usize, mut y: Vec<f64>| {
+            y[k] = f64::NAN;
+            y
+        };
+        let scattered = |mut y: Vec<f64>| {
+            (0..y.len()).step_by(40).for_each(|k| y[k] = f64::NAN);
+            y
+        };
         for (channel, answer, word) in [
             (good(Some(5e3)), Answer::Yes, "a free decay from 0.2"),
             (good(Some(5e3)), Answer::Yes, "at 249.98"),
@@ -153,6 +162,12 @@ mod tests {
             (channel("/a", Some(5e3), rings(false)), Answer::No, "steady oscillation at 250"),
             (channel("/a", None, rings(false)), Answer::No, "steady oscillation of 20.0 samples a period"),
             (channel("/a", Some(5e3), noise), Answer::No, "noise alone"),
+            (channel("/a", Some(5e3), lacking(30, rings(true))), Answer::Yes, "from 0.2"),
+            (channel("/a", Some(5e3), lacking(30, rings(true))), Answer::Yes, "3000 samples those from 31 to 2999"),
+            (channel("/a", Some(5e3), lacking(2900, rings(true))), Answer::Yes, "from 0.2"),
+            (channel("/a", None, lacking(30, rings(true))), Answer::Unknown, "20.0 samples a period"),
+            (channel("/a", Some(5e3), lacking(999, rings(true)[..1100].to_vec())), Answer::Unknown, "noise alone"),
+            (channel("/a", Some(5e3), scattered(rings(true))), Answer::Unknown, "39 samples, wanted at least 64"),
             (channel("/a", Some(5e3), vec![0.5; 60]), Answer::No, "60 samples without interruption"),
             (changed(&|c| c.is_axis = true), Answer::No, "an axis, no signal"),
             (changed(&|c| c.gaps = (0..3000).step_by(50).collect()), Answer::No, "50 samples"),

@@ -8,12 +8,15 @@ use serde::{Deserialize, Serialize};
 use super::SAMPLE_RATE_HZ;
 
 const SIGNAL: &str = "signal";
+const SAMPLE: &str = "sample";
+const SAMPLES: &str = "samples";
 const HIT: &str = "hit";
 const CHANNEL: &str = "channel";
 const CHANNELS: &str = "channels";
 const QUIET: &str = "quiet";
 const QUIET_ROW: &str = "quiet_row";
-const QUIET_TIME: &str = "quiet_time";
+const QUIET_SAMPLE: &str = "quiet_sample";
+const QUIET_SAMPLES: &str = "quiet_samples";
 
 /// A channel of all hits: a sensor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,14 +26,16 @@ pub(crate) struct Sensor {
     pub unit: String,
 }
 
-/// Free decays: `signal` over `row` and `time`, NaN where a sample is missing and behind a decay's end; `hit` and
-/// `channel` of each row, hit by hit. `quiet` likewise, where something was quiet before a hit.
+/// Free decays: `signal` row after row over `sample`, NaN where one is missing; `hit`, `channel` and number of `samples`
+/// of each row, hit by hit. `quiet` likewise, where something was quiet before a hit.
 #[derive(Debug, Clone)]
 pub(crate) struct Decays<'a> {
     pub sample_rate_hz: f64,
     pub sensors: Vec<Sensor>,
     /// Per hit a stretch of each sensor, of one length.
     pub hits: Vec<Vec<&'a [f64]>>,
+    /// Number of each hit, from 0.
+    pub numbers: Vec<usize>,
     /// The same of what was before hits.
     pub quiet: Vec<Vec<&'a [f64]>>,
 }
@@ -41,7 +46,7 @@ impl<'a> Decays<'a> {
         let text = array.attributes.get(CHANNELS).and_then(Attribute::as_str).unwrap_or_default();
         let sensors: Vec<Sensor> = serde_json::from_str(text)
             .map_err(|error| StageError::new(format!("attribute `{CHANNELS}` does not list channels: {error}")))?;
-        let hits = stretches(array, SIGNAL, "time", sensors.len())?;
+        let hits = stretches(array, SIGNAL, SAMPLES, sensors.len())?;
         let (hit, channel) = (whole(array, HIT)?, whole(array, CHANNEL)?);
         let place = |k: usize| (k / sensors.len(), k % sensors.len());
         let at = |k: usize| (hit[k] as usize, channel[k] as usize);
@@ -50,10 +55,28 @@ impl<'a> Decays<'a> {
             return Err(StageError::new(format!("`{HIT}` and `{CHANNEL}`: {wanted}")));
         }
         let quiet = match array.variable(QUIET) {
-            Ok(_) => stretches(array, QUIET, QUIET_TIME, sensors.len())?,
+            Ok(_) => stretches(array, QUIET, QUIET_SAMPLES, sensors.len())?,
             Err(_) => Vec::new(),
         };
-        Ok(Self { sample_rate_hz: array.number(SAMPLE_RATE_HZ)?, sensors, hits, quiet })
+        let numbers = (0..hits.len()).collect();
+        Ok(Self { sample_rate_hz: array.number(SAMPLE_RATE_HZ)?, sensors, hits, numbers, quiet })
+    }
+
+    /// Leaves out hits with fewer than `least` samples that are there in any channel; their numbers.
+    pub fn leave_out_short(&mut self, least: usize) -> Vec<usize> {
+        let present = |row: &&[f64]| row.iter().filter(|value| value.is_finite()).count();
+        let is_long = |hit: &Vec<&[f64]>| hit.iter().map(present).min().is_some_and(|samples| samples >= least);
+        let (mut kept, mut numbers, mut short) = (Vec::new(), Vec::new(), Vec::new());
+        for (hit, number) in std::mem::take(&mut self.hits).into_iter().zip(std::mem::take(&mut self.numbers)) {
+            if is_long(&hit) {
+                kept.push(hit);
+                numbers.push(number);
+            } else {
+                short.push(number);
+            }
+        }
+        (self.hits, self.numbers) = (kept, numbers);
+        short
     }
 
     /// The samples of each stretch that are missing.
@@ -63,16 +86,27 @@ impl<'a> Decays<'a> {
 }
 
 /// The rows of a variable, `channels` at a time, as far as any of these has a value.
-fn stretches<'a>(array: &'a Array, name: &str, time: &str, channels: usize) -> Result<Vec<Vec<&'a [f64]>>, StageError> {
-    let samples = array.axis(time)?.values.len();
-    let rows: Vec<&[f64]> = array.real(name)?.chunks_exact(samples.max(1)).collect();
-    if channels == 0 || !rows.len().is_multiple_of(channels) {
-        return Err(StageError::new(format!("`{name}` has {} rows, wanted {channels} for each hit", rows.len())));
+fn stretches<'a>(
+    array: &'a Array,
+    name: &str,
+    lengths: &str,
+    channels: usize,
+) -> Result<Vec<Vec<&'a [f64]>>, StageError> {
+    let (mut rest, lengths) = (array.real(name)?, whole(array, lengths)?);
+    if channels == 0 || !lengths.len().is_multiple_of(channels) {
+        return Err(StageError::new(format!("`{name}` has {} rows, wanted {channels} for each hit", lengths.len())));
+    }
+    let mut rows: Vec<&'a [f64]> = Vec::with_capacity(lengths.len());
+    for &length in lengths {
+        let row = usize::try_from(length).ok().and_then(|length| rest.split_at_checked(length));
+        let (row, more) = row.ok_or_else(|| StageError::new(format!("`{name}` ends before its rows do")))?;
+        rows.push(row);
+        rest = more;
     }
     let length = |row: &&[f64]| row.iter().rposition(|value| value.is_finite()).map_or(0, |last| last + 1);
     let stretch = |rows: &[&'a [f64]]| {
         let longest = rows.iter().map(length).max().unwrap_or(0);
-        rows.iter().map(|row| &row[..longest]).collect()
+        rows.iter().map(|&row| row.get(..longest).unwrap_or(row)).collect()
     };
     Ok(rows.chunks_exact(channels).map(stretch).collect())
 }
@@ -108,39 +142,40 @@ pub(crate) fn decay_array(
     let unit = if sensors.iter().all(|sensor| sensor.unit == unit) { unit } else { "" };
     let places = || hits.iter().enumerate().flat_map(|(hit, rows)| (0..rows.len()).map(move |channel| (hit, channel)));
     let (hit, channel): (Vec<i64>, Vec<i64>) = places().map(|(hit, channel)| (hit as i64, channel as i64)).unzip();
-    let seconds = |samples: usize| (0..samples).map(|k| k as f64 / sample_rate_hz).collect();
-    let numbers = |rows: usize| (0..rows).map(|k| k as f64).collect();
-    let (signal, samples) = padded(hits);
+    let numbers = |count: usize| (0..count).map(|k| k as f64).collect();
+    let (signal, samples) = joined(hits);
     let mut axes = vec![
         Axis::new("row", "1", "channel of a hit", numbers(hit.len())),
-        Axis::new("time", "s", "time since the first free sample", seconds(samples)),
+        Axis::new(SAMPLE, "1", "sample, row after row", numbers(signal.len())),
     ];
-    let (before, quiet_samples) = padded(quiet);
-    if quiet_samples > 0 {
-        axes.push(Axis::new(QUIET_ROW, "1", "channel before a hit", numbers(quiet.iter().map(Vec::len).sum())));
-        axes.push(Axis::new(QUIET_TIME, "s", "time since the stretch's first sample", seconds(quiet_samples)));
+    let (before, quiet_samples) = joined(quiet);
+    if !before.is_empty() {
+        axes.push(Axis::new(QUIET_ROW, "1", "channel before a hit", numbers(quiet_samples.len())));
+        axes.push(Axis::new(QUIET_SAMPLE, "1", "sample, row after row", numbers(before.len())));
     }
     let array = Array::over(axes)
-        .with(SIGNAL, unit, "free decay", &["row", "time"], signal)
+        .with(SIGNAL, unit, "free decay", &[SAMPLE], signal)
+        .with(SAMPLES, "1", "samples of the row", &["row"], samples)
         .with(HIT, "1", "number of the hit", &["row"], hit)
         .with(CHANNEL, "1", "number of the channel", &["row"], channel)
         .attribute(SAMPLE_RATE_HZ, sample_rate_hz)
         .attribute(CHANNELS, names);
-    Ok(match quiet_samples {
-        0 => array,
-        _ => array.with(QUIET, unit, "what was before a hit", &[QUIET_ROW, QUIET_TIME], before),
-    })
+    if before.is_empty() {
+        return Ok(array);
+    }
+    Ok(array.with(QUIET, unit, "what was before a hit", &[QUIET_SAMPLE], before).with(
+        QUIET_SAMPLES,
+        "1",
+        "samples of the row",
+        &[QUIET_ROW],
+        quiet_samples,
+    ))
 }
 
-/// All stretches one after the other, NaN behind the ends of those that are shorter than the longest; its length.
-fn padded(stretches: &[Vec<Vec<f64>>]) -> (Vec<f64>, usize) {
-    let longest = stretches.iter().flatten().map(Vec::len).max().unwrap_or(0);
-    let mut all = Vec::new();
-    for row in stretches.iter().flatten() {
-        all.extend_from_slice(row);
-        all.resize(all.len() + longest - row.len(), f64::NAN);
-    }
-    (all, longest)
+/// All stretches one after the other, and how many samples each has.
+fn joined(stretches: &[Vec<Vec<f64>>]) -> (Vec<f64>, Vec<i64>) {
+    let rows = || stretches.iter().flatten();
+    (rows().flatten().copied().collect(), rows().map(|row| row.len() as i64).collect())
 }
 
 #[cfg(test)]
@@ -165,5 +200,8 @@ mod tests {
         let missing: Vec<Vec<usize>> =
             read.missing().into_iter().flatten().map(|gaps| gaps.into_iter().flatten().collect()).collect();
         assert_eq!(missing, [vec![1], vec![], vec![], vec![1]]);
+        let mut read = read;
+        assert_eq!(read.leave_out_short(2), [1]);
+        assert_eq!((read.hits.len(), &read.numbers[..]), (1, &[0][..]));
     }
 }

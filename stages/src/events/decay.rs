@@ -1,5 +1,7 @@
 //! The stage `events.decay`.
 
+use std::ops::Range;
+
 use afmid_pipeline::{
     Array, Channel, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
@@ -20,11 +22,11 @@ use afmid_kernels::events::decay::{
 /// Method: the energy of all channels over a period against the noise's; starts refined to the first departure from the
 /// quiet line before; the end is where the ringing is smaller than the noise, or the next start; the first free sample is
 /// the one from which later samples foretell the earlier ones backwards. Clipped samples are missing.
-/// Shapes: `decays` has a row per hit and channel over time, of the longest decay, and likewise what was quiet before
-/// the hits; `events` a row per decay, steady oscillation and start that is neither.
+/// Shapes: `decays` has a row per hit and channel, whose samples follow each other, and likewise the last 16,384 that
+/// were quiet before each hit; `events` a row per decay, steady oscillation and start that is neither.
 /// Units: the channels' own; Hz; s.
-/// Accuracy: the first free sample lies on or after the true one in all but one of a hundred decays, late by less than
-/// half a period; the end within three quarters of the decay time or two periods (docs/results/decay.md).
+/// Accuracy: in all but one of a hundred decays the first free sample is no more than a sixteenth of a period early and
+/// half a period late, and the end within three quarters of the decay time (docs/results/decay.md).
 /// Errors: no free decay in any record; records of different rates or numbers of channels; samples that are missing.
 /// Source: R. V. Allen, Bull. Seismol. Soc. Am. 68 (1978) 1521; G. R. B. de Prony, J. Ec. Polytech. 1 (1795) 24.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -61,11 +63,14 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many hits, 
 /// Longest record that is searched: half a gigabyte a channel.
 const LONGEST: usize = 1 << 26;
 
+/// Samples of a quiet stretch that are kept, the nearest to the hit. Why: noise is known to half a per cent from them.
+const MOST_QUIET: usize = 1 << 14;
+
 impl Stage for Decay {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.decay",
-        version: 1,
+        version: 2,
         summary: "finds free decays in records: where they begin, where they drown in the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -224,7 +229,8 @@ impl Searched {
 
     /// What was before each hit, where it was quiet.
     fn quiet(&self) -> Vec<Vec<Vec<f64>>> {
-        let before = self.found.decays.iter().filter_map(|decay| decay.quiet.clone());
+        let nearest = |quiet: Range<usize>| quiet.start.max(quiet.end.saturating_sub(MOST_QUIET))..quiet.end;
+        let before = self.found.decays.iter().filter_map(|decay| decay.quiet.clone()).map(nearest);
         before
             .map(|range| {
                 self.found.channels.iter().map(|&channel| self.values[channel][range.clone()].to_vec()).collect()
@@ -356,5 +362,23 @@ fn nothing_found(rows: &[Row], groups: &[Group]) -> StageError {
             "record the ringing after the drive has ended, or give its end: trigger = { given = { times_s = [...] } }",
         ),
         false => error.help("check the channel; `trigger = { given = { times_s = [...] } }` says where decays begin"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::white_noise;
+
+    #[test]
+    fn a_long_quiet_stretch_is_kept_from_its_end() {
+        let ring =
+            |k: usize| if k < 60_000 { 0.0 } else { (-0.004 * (k - 60_000) as f64).exp() * (0.2 * k as f64).sin() };
+        let y: Vec<f64> = white_noise(64_000, 1e-3, 1).iter().enumerate().map(|(k, n)| ring(k) + n).collect();
+        let found = find_decays(&[&y], 1e4, &DecaySearchOptions::default()).expect("a record");
+        let quiet = found.decays[0].quiet.clone().expect("quiet");
+        assert!(quiet.len() > MOST_QUIET);
+        let searched = Searched { values: vec![y.clone()], found };
+        assert_eq!(searched.quiet(), [[&y[quiet.end - MOST_QUIET..quiet.end]]]);
     }
 }

@@ -27,7 +27,7 @@ use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Dro
 /// mode; `hits` a row per hit and mode; `course` a row per mode and part; `fit` over channel and time of the largest hit.
 /// Units: Hz; shapes relative to the channel with the largest amplitude; amplitudes in the channels' units.
 /// Accuracy: docs/results/decay.md. Standard errors count what the fit leaves round each mode (`lack_of_fit`).
-/// Errors: no decay; too few samples; no oscillation.
+/// Errors: no decay with 24 samples (shorter ones are left out with a warning); no oscillation.
 /// Source: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; R. J. Allemang, D. L. Brown, Proc. 1st IMAC (1982)
 /// 110.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -92,7 +92,7 @@ impl Stage for DecayFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.decay",
-        version: 3,
+        version: 4,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), FIT.spec(), SUMMARY.spec()],
@@ -101,7 +101,7 @@ impl Stage for DecayFit {
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let decays = Decays::new(inputs.get(&DECAYS)?)?;
+        let decays = long_enough(Decays::new(inputs.get(&DECAYS)?)?, cx)?;
         let whole = self.part == FittedPart::Whole;
         let options = ChannelOptions { missing: decays.missing(), ..self.options() };
         let followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, whole)
@@ -121,7 +121,7 @@ impl Stage for DecayFit {
         Ok(Ports::new()
             .with(&MODES, modes_with_lack(fit))
             .with(&SHAPES, shape_array(&fit.shapes.iter().collect::<Vec<_>>(), &channels))
-            .with(&HITS, hit_table(&followed.whole))
+            .with(&HITS, hit_table(&followed.whole, &decays))
             .with(&COURSE, parts.table())
             .with(&FIT, fit_array(&followed.fitted, &decays))
             .with(&SUMMARY, summary(&followed, &parts, &decays)?))
@@ -131,6 +131,35 @@ impl Stage for DecayFit {
         super::decay_example::examples()
     }
 }
+
+/// Samples of a decay that are fitted, at least: as the kernel wants them.
+const LEAST_SAMPLES: usize = 24;
+
+/// The decays without those that are too short to be fitted. Errors: none is left.
+fn long_enough<'a>(mut decays: Decays<'a>, cx: &Context) -> Result<Decays<'a>, StageError> {
+    let (all, longest) = (decays.hits.len(), decays.hits.iter().flatten().map(|row| row.len()).max().unwrap_or(0));
+    let short = decays.leave_out_short(LEAST_SAMPLES);
+    if decays.hits.is_empty() {
+        let problem = format!(
+            "none of {all} decays has {LEAST_SAMPLES} samples in every channel that are not clipped or missing: the \
+             longest has {longest} in all"
+        );
+        return Err(StageError::new(problem).help("record at a higher rate, or hit less often"));
+    }
+    if !short.is_empty() {
+        let named: Vec<String> = short.iter().take(MOST_NAMED).map(|number| (number + 1).to_string()).collect();
+        let more = if short.len() > MOST_NAMED { ", ..." } else { "" };
+        cx.warn(format!(
+            "{} of {all} decays have fewer than {LEAST_SAMPLES} samples in a channel and are left out: hits {}{more}",
+            short.len(),
+            named.join(", ")
+        ));
+    }
+    Ok(decays)
+}
+
+/// Hits that are named in a warning.
+const MOST_NAMED: usize = 10;
 
 impl DecayFit {
     fn options(&self) -> ChannelOptions {
@@ -191,5 +220,21 @@ impl DecayFit {
                 mode.rank_one.p_value
             ));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kernel_fits_what_is_long_enough() {
+        let noise = |k: usize| 1e-3 * ((k * k) as f64).sin();
+        let ring = |n: usize| (0..n).map(|k| (-0.02 * k as f64).exp() * (0.4 * k as f64).sin() + noise(k)).collect();
+        let follows = |samples: usize| {
+            let (long, short): (Vec<f64>, Vec<f64>) = (ring(200), ring(samples));
+            follow_channels(&[vec![&long[..]], vec![&short[..]]], &[], 1e-3, &ChannelOptions::default(), false)
+        };
+        assert!(follows(LEAST_SAMPLES).is_ok() && follows(LEAST_SAMPLES - 1).is_err());
     }
 }

@@ -98,7 +98,7 @@ impl Stage for GreyEstimate {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.grey",
-        version: 6,
+        version: 7,
         summary: "fits modes, real poles, delay and feedthrough: the grey modal form",
         inputs: &[PAIR.spec(), START.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec(), MODES.spec(), PARAMETERS.spec()],
@@ -304,11 +304,10 @@ impl GreyEstimate {
     }
 }
 
-/// Whiteness of what is left of the samples that count.
+/// Whiteness of what is left of the samples that count. Output error has no noise parameters.
 fn residual_test(fit: &Grey) -> Result<TestResult, ModelError> {
     let residual = fit.experiments.first().map_or(&[][..], |own| own.residual.as_slice());
-    let left: Vec<f64> = residual.iter().copied().filter(|e| e.is_finite()).collect();
-    whiteness(&left, 25 + fit.parameters.len(), fit.parameters.len())
+    whiteness(residual, 25, 0)
 }
 
 /// The inputs, later by the whole samples that the discrete model leaves out.
@@ -336,6 +335,7 @@ fn identified(fit: &Grey, series: &PairSeries) -> Result<Identified, StageError>
         offsets: vec![own.offset.value],
         slopes: vec![own.slope.value * series.rate / centre],
         residuals: vec![own.residual.clone()],
+        noise_parameters: 0,
         innovation_variance: fit.noise_variance,
         covariance: discrete.covariance.clone(),
         predictor_poles: Vec::new(),

@@ -50,7 +50,7 @@ impl Stage for Harmonics {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.harmonics",
-        version: 1,
+        version: 2,
         summary: "fits a steady oscillation: frequency, harmonics, and whether it is steady",
         inputs: &[RECORDS.spec()],
         outputs: &[HARMONICS.spec(), SUMMARY.spec()],

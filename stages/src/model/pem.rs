@@ -88,7 +88,7 @@ impl Stage for Pem {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.pem",
-        version: 10,
+        version: 11,
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],
@@ -177,9 +177,10 @@ impl Pem {
     /// Whiteness of the residual, and what of the first input is left in it.
     fn tests(&self, fit: &Identified, input: &[f64], output: &[f64]) -> (Tested, Tested) {
         let residual = fit.residuals.first().map_or(&[][..], Vec::as_slice);
-        let (order, first) = (fit.model.order(), input.get(..output.len()).unwrap_or(input));
-        let lags = self.test_lags + order;
-        (whiteness(residual, lags, order), input_dependence(first, residual, lags))
+        let first = input.get(..output.len()).unwrap_or(input);
+        let lags = self.test_lags + fit.noise_parameters;
+        let delays = self.test_lags + fit.model.order();
+        (whiteness(residual, lags, fit.noise_parameters), input_dependence(first, residual, delays))
     }
 
     /// What to do about a residual that is not white.

@@ -208,6 +208,7 @@ fn artifact(fit: VectorFit) -> Result<StateSpace, StageError> {
         offsets: Vec::new(),
         slopes: Vec::new(),
         residuals: Vec::new(),
+        noise_parameters: 0,
         innovation_variance: f64::NAN,
         covariance: fit.covariance,
         predictor_poles: poles,

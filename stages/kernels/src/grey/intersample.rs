@@ -40,8 +40,11 @@ pub struct IntersampleFit {
 /// Each is fitted by least squares from the held input's minimum; where the delay is estimated, linear and band-limited
 /// input begin half a sample later, which is what holding delays. `2 ln L = -N ln(variance of the innovations)`.
 /// # Accuracy
-/// A wrong kind is taken in at most 2.5 % of cases for each that is wrong ([`DISTINGUISHABLE`]) where the modes and the
-/// noise model hold. What the modes cannot follow counts as noise: see the whiteness of the residual.
+/// Where the modes and the noise model hold, a wrong kind is called distinguishable in at most 2.5 % of cases for each
+/// that is wrong ([`DISTINGUISHABLE`]), and one that is taken instead of a true held input in as few. Where held is out
+/// of the question and linear and band-limited are not distinguishable, the likelier is taken: up to half of the time the
+/// wrong one of these two, whose responses then differ by less than the noise lets see. What the modes cannot follow
+/// counts as noise: see the whiteness of the residual.
 /// # Source
 /// L. Ljung, System Identification (1999), section 16.4; Q. H. Vuong, Econometrica 57 (1989) 307 (models that do not
 /// contain each other).
@@ -52,7 +55,7 @@ pub struct IntersampleChoice {
     /// The one that the model is fitted with: the likeliest, unless its advantage over held is less than
     /// [`DISTINGUISHABLE`].
     pub chosen: Intersample,
-    /// Twice the log likelihood of the likeliest over that of the next.
+    /// Twice the log likelihood of the likeliest over that of the next; NaN where no other has a fit.
     pub lead: f64,
     /// Order of the noise model.
     pub noise_order: usize,
@@ -111,7 +114,7 @@ pub(super) fn choose(
     ranked.sort_by(|a, b| b.total_cmp(a));
     choice.lead = match ranked[..] {
         [first, second, ..] => first - second,
-        _ => f64::INFINITY,
+        _ => f64::NAN,
     };
     let likeliest = kinds.iter().position(|kind| *kind == choice.likeliest()).unwrap_or(0);
     if likeliest == 0 || choice.fits[likeliest].advantage < DISTINGUISHABLE {

@@ -78,6 +78,7 @@ pub(super) fn conclude(
         slopes: (0..count)
             .map(|i| if problem.slope { own(i, n + usize::from(problem.offset)) / half(i) } else { 0.0 })
             .collect(),
+        noise_parameters: noise_parameters(&state.point.noise, options.noise),
         innovation_variance: cost / freedom as f64,
         residuals,
         covariance,
@@ -91,6 +92,17 @@ pub(super) fn conclude(
             at_limit,
         },
     })
+}
+
+/// Parameters that whiten the errors.
+fn noise_parameters(noise: &Noise, model: NoiseModel) -> usize {
+    match (noise, model) {
+        (Noise::White, _) => 0,
+        // one autoregressive filter; a section of first order has no second coefficient
+        (Noise::Frozen(filter, _), NoiseModel::Coloured) => filter.iter().flatten().filter(|c| **c != 0.0).count(),
+        (Noise::Frozen(sections, _), _) => sections.len(),
+        (Noise::Free(c), _) => c.len(),
+    }
 }
 
 /// First of the columns whose coefficients are an input's b. Where nothing was put in, what rings began with the first

@@ -140,6 +140,9 @@ pub struct Identified {
     pub slopes: Vec<f64>,
     /// Prediction errors of each experiment.
     pub residuals: Vec<Vec<f64>>,
+    /// Parameters that whiten the errors, which a test of whiteness takes off its degrees of freedom: none of output
+    /// error, intensities of the sections' forces, coefficients of a free gain or of a noise filter.
+    pub noise_parameters: usize,
     /// Mean square of e, corrected for the number of parameters.
     pub innovation_variance: f64,
     /// Covariance of [`InnovationsModel::parameters`], then of b and D of each further input.

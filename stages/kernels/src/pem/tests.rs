@@ -222,6 +222,29 @@ fn orders_too_low_and_too_high_behave() {
 }
 
 #[test]
+fn what_each_noise_model_leaves_of_white_noise_is_white() {
+    let (samples, seeds) = (1500, 200);
+    let u = white_noise(samples, 1.0, 999);
+    let section =
+        |k: usize, z: f64| crate::pem::predictor::all_pole([-2.0 * 0.95 * z, 0.9025], u.iter().map(|u| u * k as f64));
+    let clean: Vec<f64> = section(1, 0.9).iter().zip(section(2, 0.2)).map(|(a, b)| a + b).collect();
+    for noise in [NoiseModel::White, NoiseModel::Coloured, NoiseModel::Thermal, NoiseModel::Free] {
+        let p_value = |seed: u64| {
+            let y: Vec<f64> = clean.iter().zip(white_noise(samples, 1.0, seed)).map(|(y, n)| y + n).collect();
+            let options = PemOptions { order: 4, block_rows: 20, noise, drift: false, ..PemOptions::default() };
+            let fit = identify(&[Experiment { input: &u, output: &y }], 1.0, &options).unwrap();
+            let fitted = fit.noise_parameters;
+            crate::validation::whiteness(&fit.residuals[0], 25 + fitted, fitted).unwrap().p_value
+        };
+        let all: Vec<f64> = (0..seeds).into_par_iter().map(p_value).collect();
+        let (low, mean) = (all.iter().filter(|p| **p < 0.02).count(), all.iter().sum::<f64>() / seeds as f64);
+        println!("{noise:?}: {low} of {seeds} below 0.02, mean {mean:.3}");
+        // 4 expected, standard deviation 2; the mean's standard error is 0.02
+        assert!(low <= 12 && (mean - 0.5).abs() < 0.1, "{noise:?}: {low}, {mean}");
+    }
+}
+
+#[test]
 fn two_experiments_share_a_model() {
     let (x, y, u) = (averaged(8), averaged(9), force());
     let half: Vec<f64> = y.iter().map(|y| 0.5 * y + 0.01).collect();

@@ -24,6 +24,30 @@ pub fn student_two_sided(t: f64, degrees: f64) -> f64 {
     incomplete_beta(0.5 * degrees, 0.5, degrees / (degrees + t * t))
 }
 
+/// What Student's t of that many degrees of freedom exceeds in absolute size with probability `p`; 0 for `p` of 1 and
+/// more, infinite for 0 and less.
+///
+/// # Method
+/// Bisection of [`student_two_sided`] in the logarithm, to 1e-12.
+///
+/// # Source
+/// NIST Digital Library of Mathematical Functions, 8.17.
+pub fn student_limit(p: f64, degrees: f64) -> f64 {
+    if p.is_nan() || p >= 1.0 || p <= 0.0 {
+        return if p <= 0.0 { f64::INFINITY } else { 0.0 };
+    }
+    // ln t: below, so small that all exceeds it; above, none of the tails of doubles does
+    let (mut below, mut above) = (-700.0_f64, 700.0_f64);
+    while above - below > 1e-12 {
+        let middle = 0.5 * (below + above);
+        if middle <= below || middle >= above {
+            break;
+        }
+        *(if student_two_sided(middle.exp(), degrees) > p { &mut below } else { &mut above }) = middle;
+    }
+    (0.5 * (below + above)).exp()
+}
+
 /// Probability of at least `hits` of `trials`, each with probability `p`.
 ///
 /// # Source
@@ -113,6 +137,11 @@ mod tests {
             let s = (2.0 + t * t).sqrt();
             assert!((student_two_sided(t, 2.0) * s * (s + t) / 2.0 - 1.0).abs() < 1e-11, "{t}");
         }
+        for (p, degrees) in [(0.05, 3.0), (6.3e-5, 4.0), (1e-9, 30.0), (0.9, 1.0)] {
+            let back = student_two_sided(student_limit(p, degrees), degrees);
+            assert!((back / p - 1.0).abs() < 1e-9, "{p} {degrees}: {back}");
+        }
+        assert_eq!((student_limit(1.0, 3.0), student_limit(0.0, 3.0)), (0.0, f64::INFINITY));
         // half of it lies on each side of the middle
         for a in [0.5, 7.0, 300.0] {
             assert!((incomplete_beta(a, a, 0.5) - 0.5).abs() < 1e-12, "{a}");

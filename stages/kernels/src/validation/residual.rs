@@ -28,9 +28,11 @@ impl TestResult {
 /// # Model
 /// e white: `N (N + 2) sum_l r_l^2 / (N - l)` is chi-square with `lags - fitted` degrees of freedom.
 /// # Method
-/// Autocorrelations of e, its mean removed.
+/// Autocorrelations of e, its mean removed. Noise parameters are those that whiten the errors: none of output error, the
+/// coefficients of an autoregressive filter. Of the missing samples' pairs there is none: `N - l` is how many pairs there
+/// are, N how many samples.
 /// # Shapes
-/// e: N samples, more than `lags`; `lags` more than `fitted`.
+/// e: N samples, more than `lags`, NaN where missing; `lags` more than `fitted`.
 /// # Units
 /// None.
 /// # Accuracy
@@ -40,7 +42,8 @@ impl TestResult {
 /// # Source
 /// G. Ljung and G. Box, Biometrika 65 (1978) 297.
 pub fn whiteness(e: &[f64], lags: usize, fitted: usize) -> Result<TestResult, ModelError> {
-    finite("residual", e)?;
+    let present: Vec<f64> = e.iter().copied().filter(|e| !e.is_nan()).collect();
+    finite("residual", &present)?;
     if lags <= fitted {
         return Err(ModelError::Parameter {
             name: "lags",
@@ -48,19 +51,21 @@ pub fn whiteness(e: &[f64], lags: usize, fitted: usize) -> Result<TestResult, Mo
             wanted: "more than the fitted noise parameters",
         });
     }
-    if e.len() <= lags {
-        return Err(ModelError::TooShort { found: e.len(), wanted: lags + 1 });
+    if present.len() <= lags {
+        return Err(ModelError::TooShort { found: present.len(), wanted: lags + 1 });
     }
-    let n = e.len() as f64;
-    let mean = e.iter().sum::<f64>() / n;
-    let power: f64 = e.iter().map(|e| (e - mean).powi(2)).sum();
+    let n = present.len() as f64;
+    let mean = present.iter().sum::<f64>() / n;
+    let power: f64 = present.iter().map(|e| (e - mean).powi(2)).sum();
     if power <= 0.0 {
         return Err(ModelError::ConstantOutput);
     }
     let statistic: f64 = (1..=lags)
         .map(|lag| {
-            let r: f64 = e.iter().zip(&e[lag..]).map(|(x, y)| (x - mean) * (y - mean)).sum::<f64>() / power;
-            r * r / (n - lag as f64)
+            let products = e.iter().zip(&e[lag..]).map(|(x, y)| (x - mean) * (y - mean)).filter(|p| !p.is_nan());
+            let (sum, pairs) = products.fold((0.0, 0.0), |(sum, pairs), product| (sum + product, pairs + 1.0));
+            let r = sum / power;
+            if pairs > 0.0 { r * r / pairs } else { 0.0 }
         })
         .sum();
     Ok(TestResult::new(n * (n + 2.0) * statistic, lags - fitted))
@@ -73,8 +78,9 @@ pub fn whiteness(e: &[f64], lags: usize, fitted: usize) -> Result<TestResult, Mo
 /// of freedom as the delays of u span.
 /// # Method
 /// QR and rank of the delayed inputs, their means removed: a step spans few directions, and only those are counted.
+/// Samples whose residual is missing are left out.
 /// # Shapes
-/// u, e: N samples, more than twice `lags`.
+/// u, e: N samples, more than twice `lags` of them present; e is NaN where missing.
 /// # Units
 /// None.
 /// # Accuracy
@@ -88,23 +94,24 @@ pub fn input_dependence(u: &[f64], e: &[f64], lags: usize) -> Result<TestResult,
         return Err(ModelError::Length { what: "input", found: u.len(), wanted: e.len() });
     }
     finite("input", u)?;
-    finite("residual", e)?;
-    if e.len() < 2 * lags + 2 {
-        return Err(ModelError::TooShort { found: e.len(), wanted: 2 * lags + 2 });
+    let kept: Vec<usize> = (lags.min(e.len())..e.len()).filter(|&k| !e[k].is_nan()).collect();
+    let rows = kept.len();
+    if rows < lags + 2 {
+        return Err(ModelError::TooShort { found: rows, wanted: lags + 2 });
     }
-    let rows = e.len() - lags;
-    let centred = |values: &[f64]| {
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        values.iter().map(|value| value - mean).collect::<Vec<f64>>()
+    let centred = |values: &[f64], delay: usize| {
+        let mean = kept.iter().map(|k| values[k - delay]).sum::<f64>() / rows as f64;
+        kept.iter().map(|k| values[k - delay] - mean).collect::<Vec<f64>>()
     };
-    let target = centred(&e[lags..]);
+    let target = centred(e, 0);
+    finite("residual", &target)?;
     let variance = target.iter().map(|e| e * e).sum::<f64>() / rows as f64;
     if variance <= 0.0 {
         return Err(ModelError::ConstantOutput);
     }
     let mut matrix = Mat::zeros(rows, lags + 2);
     for lag in 0..=lags {
-        let column = centred(&u[lags - lag..lags - lag + rows]);
+        let column = centred(u, lag);
         matrix.col_mut(lag).iter_mut().zip(&column).for_each(|(m, u)| *m = *u);
     }
     matrix.col_mut(lags + 1).iter_mut().zip(&target).for_each(|(m, e)| *m = *e);
@@ -137,6 +144,21 @@ mod tests {
             // uniform: standard error of the mean 0.029, four of them
             assert!((mean - 0.5).abs() < 0.12, "{mean}");
         }
+    }
+
+    #[test]
+    fn missing_samples_leave_p_values_uniform() {
+        let mut sum = 0.0;
+        for seed in 0..100 {
+            let mut e = white_noise(2000, 1e-3, seed);
+            e[300..500].fill(f64::NAN);
+            (0..2000).step_by(7).for_each(|k| e[k] = f64::NAN);
+            sum += whiteness(&e, 25, 0).unwrap().p_value;
+            let u: Vec<f64> = (0..2000).map(|k| if k < 600 { -1.0 } else { 0.0 }).collect();
+            assert!(input_dependence(&u, &e, 10).unwrap().p_value > 1e-4, "seed {seed}");
+        }
+        // as above
+        assert!((sum / 100.0 - 0.5).abs() < 0.12, "{sum}");
     }
 
     #[test]

@@ -21,7 +21,7 @@ struct HitRow<'a> {
 }
 
 /// Amplitude and phase of each mode in each hit, at the channel that its shape is relative to.
-pub(super) fn hit_table(fit: &ChannelRingdown) -> Table {
+pub(super) fn hit_table(fit: &ChannelRingdown, decays: &Decays<'_>) -> Table {
     let row = |(mode, shape): (usize, &'_ ModeShape)| (0..shape.amplitudes.len()).map(move |hit| (hit, mode));
     let mut rows: Vec<HitRow> = fit
         .shapes
@@ -31,7 +31,7 @@ pub(super) fn hit_table(fit: &ChannelRingdown) -> Table {
         .collect();
     rows.sort_by_key(|row| (row.hit, row.mode));
     Table::of(&rows)
-        .with("hit", "1", "number of the hit", |row| row.hit + 1)
+        .with("hit", "1", "number of the hit", |row| decays.numbers.get(row.hit).map_or(0, |number| number + 1))
         .with("mode", "1", "number of the mode", |row| row.mode + 1)
         .with("channel", "1", "channel of its largest amplitude", |row| row.shape.reference + 1)
         .with("amplitude", "", "amplitude there at the first free sample, in its unit", |row| {
@@ -70,7 +70,7 @@ pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
     .with("measured", unit, "free decay of the largest hit", over, measured)
     .with("fitted", unit, "the same as fitted", over, fitted)
     .with("residual", unit, "what is left", over, rest)
-    .attribute("hit", largest + 1)
+    .attribute("hit", decays.numbers.get(largest).map_or(0, |number| number + 1))
     .attribute(SAMPLE_RATE_HZ, decays.sample_rate_hz)
 }
 

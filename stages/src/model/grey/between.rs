@@ -41,6 +41,9 @@ fn verdict(choice: &IntersampleChoice) -> String {
     if choice.distinguishable() {
         return format!("{likeliest}: twice its log likelihood is {lead:.1} above that of the next");
     }
+    if lead.is_nan() {
+        return format!("not distinguishable: no other kind has a fit; {chosen} is kept");
+    }
     let kept = if choice.chosen == choice.likeliest() { "taken" } else { "kept" };
     format!(
         "not distinguishable: twice the log likelihood of {likeliest} is {lead:.1} above that of the next, less than {DISTINGUISHABLE:.2}; {chosen} is {kept}"

@@ -1,5 +1,8 @@
 //! Energy of all channels over a period, in units of the noise's.
 
+use std::collections::VecDeque;
+use std::ops::RangeInclusive;
+
 use crate::signal::RealTransform;
 use crate::statistics::median;
 
@@ -57,10 +60,9 @@ impl Pitch {
                 below
             })
             .collect();
-        let is_peak = |k: usize| {
-            let around = ((0.7 * k as f64) as usize).max(1)..=((1.4 * k as f64).ceil() as usize).min(last);
-            bands[k] > 0.0 && valley[k] < VALLEY * bands[k] && around.into_iter().all(|j| bands[j] <= bands[k])
-        };
+        let around = |k: usize| ((0.7 * k as f64) as usize).max(1)..=((1.4 * k as f64).ceil() as usize).min(last);
+        let largest = largest_of(&bands, (0..=last).map(around));
+        let is_peak = |k: usize| bands[k] > 0.0 && valley[k] < VALLEY * bands[k] && bands[k] >= largest[k];
         let peaks: Vec<usize> = (first..=last).filter(|&k| is_peak(k)).collect();
         // times the frequency: slow wander cannot win; then by power among those that are not far slower
         let weight = |k: usize| k as f64 * bands[k];
@@ -76,6 +78,27 @@ impl Pitch {
         };
         Self { strongest: line(strongest), slowest: line(slowest) }
     }
+}
+
+/// The largest value of each window, windows with ends that ascend; negative infinity of an empty one.
+///
+/// Method: a queue of the values that no later one exceeds, so that each enters and leaves once.
+fn largest_of(values: &[f64], windows: impl Iterator<Item = RangeInclusive<usize>>) -> Vec<f64> {
+    let (mut queue, mut seen) = (VecDeque::new(), 0);
+    let largest = |window: RangeInclusive<usize>| {
+        while seen <= *window.end() && seen < values.len() {
+            while queue.back().is_some_and(|&k: &usize| values[k] <= values[seen]) {
+                queue.pop_back();
+            }
+            queue.push_back(seen);
+            seen += 1;
+        }
+        while queue.front().is_some_and(|k| k < window.start()) {
+            queue.pop_front();
+        }
+        queue.front().map_or(f64::NEG_INFINITY, |&k| values[k])
+    };
+    windows.map(largest).collect()
 }
 
 /// A stretch less its least-squares line.
@@ -117,12 +140,16 @@ pub(super) struct Envelope {
     pub period: usize,
     /// Relative standard deviation of the noise's energy over a period.
     pub scatter: f64,
+    /// Channels that count.
+    pub channels: usize,
 }
 
 impl Envelope {
-    /// Of channels without their drift and the standard deviations of their noise; `period` in samples.
+    /// Of channels without their drift and the standard deviations of their noise; `period` in samples. Channels whose
+    /// noise is infinite do not count.
     pub fn new(swings: &[Vec<f64>], noise_std: &[f64], period: usize) -> Self {
-        let count = swings.len() as f64;
+        let channels = noise_std.iter().filter(|s| s.is_finite()).count().max(1);
+        let count = channels as f64;
         let samples = swings[0].len();
         let weights: Vec<f64> = noise_std.iter().map(|s| 1.0 / (s * s).max(f64::MIN_POSITIVE)).collect();
         let mut sums = Vec::with_capacity(samples + 1);
@@ -132,7 +159,7 @@ impl Envelope {
             sums.push(sums[k] + energy);
         }
         let period = period.max((18.0 / count).ceil() as usize);
-        Self { sums, period, scatter: (2.0 / (period as f64 * count)).sqrt() }
+        Self { sums, period, scatter: (2.0 / (period as f64 * count)).sqrt(), channels }
     }
 
     /// Samples of the record.
@@ -149,5 +176,24 @@ impl Envelope {
     /// Largest energy of a period that begins in the stretch.
     pub fn largest(&self, first: usize, end: usize) -> f64 {
         (first..end.max(first + 1)).map(|k| self.mean(k, k + self.period)).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::white_noise;
+
+    #[test]
+    fn the_largest_of_ascending_windows_are_those_of_a_plain_search() {
+        for seed in 0..50 {
+            // few different values: ties, too
+            let values: Vec<f64> = white_noise(300, 2.0, seed).iter().map(|y| y.round()).collect();
+            let windows = |k: usize| ((0.7 * k as f64) as usize).max(1)..=((1.4 * k as f64).ceil() as usize).min(299);
+            let plain = |k: usize| values[windows(k)].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let found = largest_of(&values, (0..300).map(windows));
+            assert_eq!(found[1..], (1..300).map(plain).collect::<Vec<f64>>());
+            assert_eq!(found[0], f64::NEG_INFINITY);
+        }
     }
 }

@@ -91,9 +91,9 @@ pub(super) fn begin(
 /// Energy of ringing and noise over 64 samples of a channel or two periods: the decay drowns where it falls below
 /// twice the noise's, which is where the rms of the ringing is the noise's. Gaps of half of what came before are
 /// beats. Cutting there costs a fit no more than 3 % of its errors at a peak of 20 times the noise.
-pub(super) fn end(envelope: &Envelope, channels: usize, onset: usize, next: usize) -> (usize, DecayEnd) {
+pub(super) fn end(envelope: &Envelope, onset: usize, next: usize) -> (usize, DecayEnd) {
     let (samples, period) = (envelope.samples(), envelope.period);
-    let span = (2 * period).max(DROWN_SAMPLES.div_ceil(channels));
+    let span = (2 * period).max(DROWN_SAMPLES.div_ceil(envelope.channels));
     let alive = |k: usize| envelope.mean(k, (k + span).min(next.max(k + 1))) > 2.0;
     let step = (period / 8).max(1);
     // end of the last run of live windows; a later run goes on with it if it is near, or as long as beats are

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::statistics::{normal_two_sided, student_limit};
+
 /// Why a decay ends where it does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DecayEnd {
@@ -20,6 +22,21 @@ pub struct Decline {
     pub rate_per_s: f64,
     /// Its standard error, from the scatter round the straight line; infinite where there are too few periods.
     pub std_per_s: f64,
+    /// Degrees of freedom of that error; 0 where it is infinite.
+    pub freedom: usize,
+}
+
+impl Decline {
+    /// The rate that a steady oscillation exceeds as rarely as a normal variable exceeds so many standard deviations: of
+    /// few segments the error is hardly known, and the rate over it has Student's distribution.
+    pub(super) fn limit_per_s(&self, deviations: f64) -> f64 {
+        if self.freedom == 0 {
+            return self.std_per_s;
+        }
+        // a number that is not 0: beyond 37 deviations there is none
+        let tail = normal_two_sided(deviations).max(f64::MIN_POSITIVE);
+        self.std_per_s * student_limit(tail, self.freedom as f64)
+    }
 }
 
 /// What one channel shows of a decay.
@@ -76,7 +93,7 @@ pub struct Steady {
 impl Steady {
     /// What it means.
     pub fn statement(&self) -> String {
-        let Decline { rate_per_s, std_per_s } = self.decline;
+        let Decline { rate_per_s, std_per_s, .. } = self.decline;
         let shape = if self.growing { "grows" } else { "does not decay" };
         // six digits
         let decimals = (5.0 - self.frequency_hz.abs().log10().floor()).clamp(0.0, 12.0) as usize;

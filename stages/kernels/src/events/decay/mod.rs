@@ -40,6 +40,8 @@ mod onsets;
 mod options;
 mod search;
 #[cfg(test)]
+mod search_tests;
+#[cfg(test)]
 mod simulated;
 mod steadiness;
 #[cfg(test)]

@@ -12,7 +12,7 @@ const SUDDEN: f64 = 0.5;
 /// # Method
 /// Energy of the period after a sample over that of the period before it, noise added to both: a local maximum above
 /// the least rise, with an energy that the noise does not reach. A rise counts if its first two periods hold half of
-/// the largest energy up to the next one: a beat rises slower.
+/// the largest energy before the next one: a beat rises slower.
 pub(super) fn rises(envelope: &Envelope, options: &DecaySearchOptions) -> Vec<usize> {
     let (samples, period) = (envelope.samples(), envelope.period);
     let loud = 1.0 + options.significance * envelope.scatter;
@@ -45,12 +45,16 @@ pub(super) fn rises(envelope: &Envelope, options: &DecaySearchOptions) -> Vec<us
 }
 
 /// Drops rises that go on rising for more than two periods, last ones first.
+///
+/// Windows that reach into the next rise, which may be a quarter of a period early, do not count: it may be a hit with a
+/// hundred times the energy.
 fn sudden(envelope: &Envelope, mut all: Vec<usize>) -> Vec<usize> {
+    let reach = envelope.period + envelope.period / 4;
     let mut next = envelope.samples();
     for place in (0..all.len()).rev() {
         let k = all[place];
         let at_once = envelope.largest(k, k + 2 * envelope.period);
-        if k > 0 && at_once < SUDDEN * envelope.largest(k, next) {
+        if k > 0 && at_once < SUDDEN * envelope.largest(k, next.saturating_sub(reach)) {
             all.remove(place);
         } else {
             next = k;
@@ -89,7 +93,6 @@ pub(super) fn onsets(
             let mut all: Vec<usize> = times_s.iter().map(|t| (t * rate_hz).round() as usize).collect();
             all.sort_unstable();
             all.dedup();
-            all.retain(|&k| k < envelope.samples());
             all
         }
         DecayTrigger::LargestRise | DecayTrigger::DriveEnd { .. } => rises(envelope, options),

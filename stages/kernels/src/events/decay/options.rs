@@ -44,12 +44,13 @@ pub struct DecaySearchOptions {
     /// stay below within a period.
     #[schemars(extend("exclusiveMinimum" = 1.0))]
     pub least_rise: f64,
-    /// Standard deviations of a period's noise energy by which a hit must exceed it. Why 8: noise reaches 5 in a
-    /// million periods.
+    /// Standard deviations of a period's noise energy by which a hit must exceed it. Why 8: a period has 18 samples of
+    /// noise at least, whose energy (chi-square) exceeds so much in one of five million.
     #[schemars(range(min = 1.0))]
     pub significance: f64,
-    /// Least decays of the envelope between a decay's two ends, in nepers over its standard error, for it not to be a
-    /// steady oscillation. Why 4: one steady record in ten thousand.
+    /// Least decay rate for an oscillation not to be steady, in standard errors of a slope that is known from many
+    /// segments; of few, the multiple that is exceeded as rarely (Student's distribution). Why 4: one steady record in
+    /// thirty thousand.
     #[schemars(range(min = 1.0))]
     pub decline_significance: f64,
     /// Most decays of a record: the largest are kept. Why 1000: a loop of a tapping machine for an hour.

@@ -23,10 +23,10 @@ const QUIET_PERIODS: usize = 4;
 const LEAST_PERIODS: usize = 2;
 /// Fall of the amplitude, nepers, that is a decay whatever its slope's error: two periods of a low Q have none.
 const CERTAIN_FALL: f64 = 1.5;
-/// Rises that may be those of a random vibration. Why: fewer do not know a fourth moment.
+/// Rises, steady ones among them, that may be those of a random vibration. Why: fewer do not know a fourth moment.
 const RANDOM_RISES: usize = 10;
 /// Departure of a random vibration's kurtosis from that of a normal distribution. Why: four standard errors of 1,500
-/// independent samples, of which ten rises have some.
+/// independent samples, of which ten rises have some; the narrower the band, the more.
 const RANDOM_KURTOSIS: f64 = 0.5;
 /// Fall of the amplitude, nepers, below which an instrument's own gain may have drifted.
 const LEAST_FALL: f64 = 1e-3;
@@ -49,9 +49,9 @@ const LEAST_FALL: f64 = 1e-3;
 /// # Units
 /// The channels' own; samples; Hz.
 /// # Accuracy
-/// First free sample: on or after the true one in all but one of a hundred decays, late by less than half a period;
-/// end: where amplitude and noise are equal, to three quarters of the decay time or two periods
-/// (docs/results/decay.md). Cost: some `100 N C` operations.
+/// In all but one of a hundred decays: first free sample no more than a sixteenth of a period early and half a period
+/// late; end: where amplitude and noise are equal, to three quarters of the decay time (docs/results/decay.md). Cost:
+/// some `100 N C` operations.
 /// # Errors
 /// No channel, unequal lengths, fewer than 64 samples, values that are not finite, options out of range.
 /// # Source
@@ -65,12 +65,14 @@ pub fn find_decays(
     check(channels, sample_rate_hz, options)?;
     let record = Record::of(channels, sample_rate_hz, options);
     let starts = record.starts(options);
+    // a channel that never changes has no noise
+    let noise_std = record.noise_std.iter().map(|&s| if s.is_finite() { s } else { 0.0 }).collect();
     let mut found = DecaySearch {
         decays: Vec::new(),
         steady: Vec::new(),
         dismissed: Vec::new(),
         largest_energy: record.envelope.largest(0, record.envelope.samples()),
-        noise_std: record.noise_std.clone(),
+        noise_std,
         channels: record.numbers.clone(),
         random: false,
     };
@@ -80,12 +82,7 @@ pub fn find_decays(
         since = record.judge(onset, since, next, options, &mut found);
     }
     found.random = record.is_random(&found);
-    while found.decays.len() > options.most {
-        let size = |d: &FreeDecay| d.channels.iter().zip(&record.noise_std).map(|(c, s)| (c.peak / s).powi(2)).sum();
-        let sizes: Vec<f64> = found.decays.iter().map(size).collect();
-        let least = (0..sizes.len()).min_by(|&a, &b| sizes[a].total_cmp(&sizes[b])).unwrap_or(0);
-        found.decays.remove(least);
-    }
+    record.keep_largest(&mut found.decays, options.most);
     Ok(found)
 }
 
@@ -97,9 +94,12 @@ struct Record<'a> {
     drive: Option<&'a [f64]>,
     /// Channels without their drift.
     swings: Vec<Vec<f64>>,
+    /// Infinite for a channel that never changes: it takes no part.
     noise_std: Vec<f64>,
     clipped: Vec<Vec<Range<usize>>>,
     envelope: Envelope,
+    /// Where a steady response begins to die.
+    response_ends: Vec<usize>,
     /// Strongest oscillation, cycles per sample.
     frequency: f64,
     rate_hz: f64,
@@ -114,11 +114,17 @@ impl<'a> Record<'a> {
         };
         let numbers: Vec<usize> = (0..all.len()).filter(|&c| Some(c) != drive).collect();
         let channels: Vec<&[f64]> = numbers.iter().map(|&c| all[c]).collect();
-        let pitch = Pitch::of(&channels);
+        let changes = |y: &&[f64]| y.iter().any(|value| *value != y[0]);
+        let live: Vec<&[f64]> = channels.iter().copied().filter(changes).collect();
+        let pitch = Pitch::of(if live.is_empty() { &channels } else { &live });
         let period = ((1.0 / pitch.slowest).round() as usize).max(2);
         let swings: Vec<Vec<f64>> = channels.iter().map(|y| without_drift(y, (2 * period) | 1)).collect();
         let steps: Vec<f64> = channels.iter().map(|y| code_step(y)).collect();
-        let noise_std: Vec<f64> = swings.iter().zip(&steps).map(|(y, &step)| noise_std(y, period, step)).collect();
+        let noise = |c: usize| match changes(&channels[c]) {
+            true => noise_std(&swings[c], period, steps[c]),
+            false => f64::INFINITY,
+        };
+        let noise_std: Vec<f64> = (0..channels.len()).map(noise).collect();
         let envelope = Envelope::new(&swings, &noise_std, period);
         let clipped = channels.iter().zip(&steps).map(|(y, &step)| clipped(y, step)).collect();
         let drive = drive.map(|c| all[c]);
@@ -129,6 +135,7 @@ impl<'a> Record<'a> {
             swings,
             noise_std,
             clipped,
+            response_ends: ends_of_response(&envelope),
             envelope,
             frequency: pitch.strongest,
             rate_hz,
@@ -141,12 +148,11 @@ impl<'a> Record<'a> {
             (DecayTrigger::DriveEnd { .. }, Some(drive)) => {
                 let ends = ends_of_drive(drive, self.envelope.period);
                 // a response that outlasts its drive's command: the later of the two
-                let response = ends_of_response(&self.envelope);
-                let later = |end: usize| response.iter().copied().find(|&k| k > end);
+                let later = |end: usize| self.response_ends.iter().copied().find(|&k| k > end);
                 let next = |place: usize| ends.get(place + 1).copied().unwrap_or(usize::MAX);
                 ends.iter().enumerate().map(|(i, &end)| later(end).filter(|&k| k < next(i)).unwrap_or(end)).collect()
             }
-            (DecayTrigger::DriveEnd { .. }, None) => ends_of_response(&self.envelope),
+            (DecayTrigger::DriveEnd { .. }, None) => self.response_ends.clone(),
             (DecayTrigger::LargestRise, _) => {
                 self.without_beats(onsets(&self.all, &self.envelope, self.rate_hz, options))
             }
@@ -164,14 +170,23 @@ impl<'a> Record<'a> {
             let before = start.saturating_sub(period / 4);
             let quiet = start < QUIET_PERIODS * period
                 || self.envelope.mean(before - before.min(QUIET_PERIODS * period), before) < 2.0;
-            let (end, _) = end(&self.envelope, self.channels.len(), start, next);
-            if !quiet && self.begin(start, end).foretold {
+            let (end, _) = end(&self.envelope, start, next);
+            if !quiet && (self.begin(start, end).foretold || self.is_late_beat(&starts[..=place])) {
                 starts.remove(place);
             } else {
                 next = start;
             }
         }
         starts
+    }
+
+    /// Whether the last of the starts is too late in the record for what follows to foretell anything, and no higher
+    /// than the one before it: a beat rises no higher than its decay began.
+    fn is_late_beat(&self, starts: &[usize]) -> bool {
+        let [.., before, last] = *starts else { return false };
+        let span = LEAST_PERIODS * self.envelope.period;
+        let height = |start: usize| self.envelope.largest(start, start + span);
+        last + span > self.envelope.samples() && height(last) < height(before)
     }
 
     fn begin(&self, onset: usize, end: usize) -> Begin {
@@ -194,7 +209,7 @@ impl<'a> Record<'a> {
             Some(quiet) if !given => departure(&self.channels, &self.noise_std, start, quiet.start, period),
             _ => start,
         };
-        let (end, why) = end(&self.envelope, self.channels.len(), onset, next);
+        let (end, why) = end(&self.envelope, onset, next);
         let driven = if given { None } else { self.driven_until(onset, end, options, found) };
         let onset = driven.unwrap_or(onset);
         let first = match options.trigger {
@@ -217,8 +232,7 @@ impl<'a> Record<'a> {
         }
         let frequency_hz = tone.frequency * self.rate_hz;
         if self.is_steady(&tone.decline, &range, why, options) {
-            let Decline { rate_per_s, std_per_s } = tone.decline;
-            let growing = rate_per_s < -options.decline_significance * std_per_s;
+            let growing = tone.decline.rate_per_s < -tone.decline.limit_per_s(options.decline_significance);
             let (decline, amplitude) = (tone.decline, tone.amplitude);
             found.steady.push(Steady { range, frequency_hz, amplitude, decline, growing });
             return end;
@@ -238,7 +252,7 @@ impl<'a> Record<'a> {
     ) -> Option<usize> {
         let period = self.envelope.period;
         let inside = |k: &usize| *k > onset + 8 * period && k + LEAST_PERIODS * period < end;
-        let last = ends_of_response(&self.envelope).into_iter().find(inside)?;
+        let last = self.response_ends.iter().copied().find(inside)?;
         // the switch-on and the last period are not steady
         let range = onset + period..last - period;
         let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
@@ -264,7 +278,7 @@ impl<'a> Record<'a> {
         if short {
             return why != DecayEnd::Noise && fall < 0.5;
         }
-        decline.rate_per_s < options.decline_significance * decline.std_per_s || total < LEAST_FALL
+        decline.rate_per_s < decline.limit_per_s(options.decline_significance) || total < LEAST_FALL
     }
 
     /// Whether the decays may be those of a random vibration, which is normally distributed.
@@ -277,7 +291,21 @@ impl<'a> Record<'a> {
             moment(4) / moment(2).powi(2).max(f64::MIN_POSITIVE)
         };
         let normal = |swing: &Vec<f64>| (kurtosis(swing) - 3.0).abs() < RANDOM_KURTOSIS;
-        found.decays.len() >= RANDOM_RISES && self.swings.iter().all(normal)
+        let live = self.swings.iter().zip(&self.noise_std).filter(|(_, noise)| noise.is_finite());
+        let rises = found.decays.len() + found.steady.len();
+        !found.decays.is_empty() && rises >= RANDOM_RISES && live.map(|(swing, _)| swing).all(normal)
+    }
+
+    /// Leaves the `most` decays with the largest peaks over their noise, in order of time.
+    fn keep_largest(&self, decays: &mut Vec<FreeDecay>, most: usize) {
+        let size = |d: &FreeDecay| d.channels.iter().zip(&self.noise_std).map(|(c, s)| (c.peak / s).powi(2)).sum();
+        let sizes: Vec<f64> = decays.iter().map(size).collect();
+        let mut ascending: Vec<usize> = (0..sizes.len()).collect();
+        ascending.sort_by(|&a, &b| sizes[a].total_cmp(&sizes[b]));
+        let mut kept = vec![true; sizes.len()];
+        ascending.iter().take(sizes.len().saturating_sub(most)).for_each(|&k| kept[k] = false);
+        let mut kept = kept.into_iter();
+        decays.retain(|_| kept.next().unwrap_or(true));
     }
 
     fn channels_of(&self, range: &Range<usize>, quiet: Option<&Range<usize>>, next: usize) -> Vec<ChannelDecay> {
@@ -326,5 +354,10 @@ fn check(channels: &[&[f64]], rate_hz: f64, options: &DecaySearchOptions) -> Res
         let wanted = "above 0";
         return Err(DecaySearchError::Parameter { name: "sample_rate_hz", found: rate_hz, wanted });
     }
-    options.check(channels.len())
+    options.check(channels.len())?;
+    let DecayTrigger::Given { times_s } = &options.trigger else { return Ok(()) };
+    match times_s.iter().find(|t| (**t * rate_hz).round() >= wanted as f64) {
+        Some(&found) => Err(DecaySearchError::Parameter { name: "times_s", found, wanted: "times within the record" }),
+        None => Ok(()),
+    }
 }

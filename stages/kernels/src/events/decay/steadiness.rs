@@ -72,7 +72,11 @@ struct Tone {
 }
 
 impl Tone {
+    /// Cosine and sine differ where the frequency is a quarter of a turn in the segment off zero and off half the sample
+    /// rate; closer ones are taken for such.
     fn new(frequency: f64, taper: &[f64]) -> Self {
+        let margin = (0.25 / taper.len() as f64).min(0.25);
+        let frequency = frequency.clamp(margin, 0.5 - margin);
         let angle = |k: usize| std::f64::consts::TAU * frequency * k as f64;
         let of = |f: &dyn Fn(usize) -> f64| (0..taper.len()).map(f).collect::<Vec<f64>>();
         let columns = [of(&|k| angle(k).cos()), of(&|k| angle(k).sin()), of(&|_| 1.0)];
@@ -121,7 +125,8 @@ fn refined(values: &[f64], frequency: f64, length: usize, taper: &[f64]) -> f64 
         found = (whole + turned) / distance as f64;
         distance *= 2;
     }
-    found
+    // the line of its mirror image at half the sample rate may draw it beyond
+    (found - found.round()).abs()
 }
 
 /// Least-squares slope of logarithms `interval_s` apart, falling counted positive.
@@ -135,10 +140,11 @@ fn slope(logs: &[f64], interval_s: f64) -> Decline {
             (Some(first), Some(last)) if logs.len() > 1 => (first - last) / ((n - 1.0) * interval_s),
             _ => 0.0,
         };
-        return Decline { rate_per_s, std_per_s: f64::INFINITY };
+        return Decline { rate_per_s, std_per_s: f64::INFINITY, freedom: 0 };
     }
     let by: f64 = logs.iter().enumerate().map(|(k, y)| (k as f64 - centre) * (y - mean)).sum::<f64>() / spread;
     let rest: f64 = logs.iter().enumerate().map(|(k, y)| (y - mean - by * (k as f64 - centre)).powi(2)).sum();
     let std = (rest / ((n - 2.0) * spread)).sqrt();
-    Decline { rate_per_s: -by / interval_s, std_per_s: std.max(f64::EPSILON) / interval_s }
+    let std_per_s = std.max(f64::EPSILON) / interval_s;
+    Decline { rate_per_s: -by / interval_s, std_per_s, freedom: logs.len() - 2 }
 }

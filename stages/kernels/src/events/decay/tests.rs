@@ -12,6 +12,7 @@ fn search(plan: &Plan) -> DecaySearch {
 #[test]
 fn one_hit_is_found_with_its_start_and_its_end() {
     let (mut early, mut late, mut end, mut missed) = (0, 0, 0, 0);
+    let mut worst = [0.0_f64; 2];
     let seeds = 200;
     for seed in 0..seeds {
         let plan = Plan::drawn(seed);
@@ -25,6 +26,7 @@ fn one_hit_is_found_with_its_start_and_its_end() {
         };
         let (first, last) =
             (decay.range.start as f64 - record.free[0] as f64, decay.range.end as f64 - record.drowned[0] as f64);
+        worst = [worst[0].max(-first / record.period), worst[1].max(last.abs() / record.decay_time)];
         // the edge of a contact is smooth: what is left of it is within the noise
         if first < -record.period / 16.0 - 1.0 {
             println!(
@@ -40,11 +42,12 @@ fn one_hit_is_found_with_its_start_and_its_end() {
             );
             late += 1;
         }
-        if last.abs() > 0.75 * record.decay_time + 3.0 * record.period + 64.0 {
+        if last.abs() > 0.75 * record.decay_time {
             println!("{about}: end off by {last}: {} {:?} of {}", decay.range.end, decay.end, plan.samples);
             end += 1;
         }
     }
+    println!("earliest {:.3} periods, end off by {:.2} decay times at most", worst[0], worst[1]);
     println!("of {seeds}: early {early}, late {late}, end {end}, missed {missed}");
     assert!(missed == 0 && early <= 2 && late <= 2 && end <= 2, "{missed} {early} {late} {end}");
 }
@@ -281,7 +284,7 @@ fn options_are_read_as_they_are_written() {
 }
 
 /// White noise through a resonance of `period` samples.
-fn vibration(seed: u64, quality: f64, period: f64, samples: usize) -> Vec<f64> {
+pub(super) fn vibration(seed: u64, quality: f64, period: f64, samples: usize) -> Vec<f64> {
     let s = num_complex::Complex64::new(-std::f64::consts::PI / (quality * period), std::f64::consts::TAU / period);
     let z = s.exp();
     let (mut last, mut before) = (0.0, 0.0);
@@ -303,7 +306,11 @@ fn a_random_vibration_is_said_to_be_one_and_hits_are_not() {
     let (mut missed, mut false_ones) = (0, 0);
     for (seed, quality) in (0..40).zip([1.5, 3.0, 6.0, 12.0].into_iter().cycle()) {
         let found = find_decays(&[&vibration(seed, quality, 14.3, 60_000)], 1e3, &DecaySearchOptions::default());
-        missed += usize::from(!found.unwrap().random);
+        let found = found.unwrap();
+        if !found.random {
+            println!("seed {seed}, Q {quality}: {} decays, {} steady", found.decays.len(), found.steady.len());
+        }
+        missed += usize::from(!found.random);
         // a dozen hits, four decay times apart: no quiet between them
         let mut plan = Plan { contact_s: 0.0, modes: vec![(100.0, 30.0)], ..Plan::drawn(seed) };
         let apart = 4.0 * 30.0 / (std::f64::consts::PI * 100.0);
