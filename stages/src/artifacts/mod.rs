@@ -44,7 +44,7 @@ pub(crate) use model::{
     t0_ambiguity_s,
 };
 pub(crate) use modes::{mode_document, mode_table, modes};
-pub(crate) use pair::{NewPair, Pair, PairSeries, PairSet, with_counts};
+pub(crate) use pair::{NewPair, Pair, PairSeries, PairSet, with_channels, with_counts};
 pub(crate) use ringing::{ringing, ringing_array};
 pub(crate) use roots::{RootRow, root_table, roots};
 pub(crate) use shapes::{shape_array, shaped_mode};

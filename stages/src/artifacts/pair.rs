@@ -14,6 +14,8 @@ const T0_AMBIGUITY_S: &str = "t0_ambiguity_s";
 const DIFFERENCED: &str = "differenced";
 const NOISE_GAIN: &str = "noise_gain";
 const WINDOW_KIND: &str = "window_kind";
+const INPUTS: &str = "inputs";
+const OUTPUT: &str = "output";
 
 /// Inputs (`force`, over `input` too if there are several) and output (`response`) over time since sample `t0_sample`,
 /// of all events and of each half, with the output's standard error where it is known.
@@ -71,6 +73,15 @@ impl<'a> Pair<'a> {
     /// Units of force and response.
     pub fn units(&self) -> Result<[&'a str; 2], StageError> {
         Ok([&self.array.variable(FORCE)?.unit, &self.array.variable(RESPONSE)?.unit])
+    }
+
+    /// Names of the inputs' channels and of the output's; numbered where no file names them.
+    pub fn channels(&self, inputs: usize) -> (Vec<String>, String) {
+        let text = |name: &str| self.array.attributes.get(name).and_then(Attribute::as_str);
+        let named: Vec<String> = text(INPUTS).into_iter().flat_map(str::lines).map(str::to_owned).collect();
+        let numbered = || (1..=inputs).map(|number| format!("input {number}")).collect();
+        let of_inputs = if named.len() == inputs { named } else { numbered() };
+        (of_inputs, text(OUTPUT).unwrap_or("output").to_owned())
     }
 
     /// Whether it has these events apart.
@@ -250,6 +261,11 @@ impl PairSet<'_> {
             None => to,
         }
     }
+}
+
+/// States the names of the channels: inputs and output.
+pub(crate) fn with_channels(pair: Array, inputs: &[String], output: &str) -> Array {
+    pair.attribute(INPUTS, inputs.join("\n")).attribute(OUTPUT, output)
 }
 
 /// States how many events are in a set, and how wide the interval is in which t0 may lie.

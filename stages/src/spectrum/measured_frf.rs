@@ -22,7 +22,7 @@ use afmid_kernels::spectra::{
 /// `Syu / Suu`, `h2` is `Syy / Suy`, `hv` their geometric mean; several inputs: `h1 = Syu Suu^-1`. Offsets are removed.
 /// The band in which the input has power is found and kept.
 /// # Shapes
-/// A row for each input of the pair over the bins of the band; zero hertz is left out.
+/// A row for each input of the pair over the bins of the band, under the names of the channels; zero hertz is left out.
 /// # Units
 /// Output over input, in the pair's units.
 /// # Accuracy
@@ -132,7 +132,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for MeasuredFrf {
     const SPEC: Spec = Spec {
         name: "spectrum.measured_frf",
-        version: 1,
+        version: 2,
         summary: "estimates the frequency response from measured input and output with coherence and variance",
         inputs: &[PAIR.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -167,7 +167,7 @@ impl Stage for MeasuredFrf {
         let [force_unit, response_unit] = pair.units()?;
         let unit = unit_ratio(response_unit, force_unit);
         let summary = self.summary(&found, band, blocks.len(), series.rate)?;
-        let frf = self.frf(found, band, record.inputs.len(), unit, series.rate)?;
+        let frf = self.frf(found, band, pair.channels(record.inputs.len()), unit, series.rate)?;
         Ok(Ports::new().with(&FRF, frf.array()?).with(&SUMMARY, summary))
     }
 
@@ -224,24 +224,23 @@ impl MeasuredFrf {
         &self,
         found: MeasuredResponse,
         (first, end): (usize, usize),
-        inputs: usize,
+        (inputs, output): (Vec<String>, String),
         unit: String,
         rate: f64,
     ) -> Result<NewFrf, StageError> {
-        if let Some(number) = self.driving_point.filter(|number| *number == 0 || *number > inputs) {
-            return Err(StageError::new(format!("`driving_point` is {number}, there are {inputs} inputs")));
+        let count = inputs.len();
+        if let Some(number) = self.driving_point.filter(|number| *number == 0 || *number > count) {
+            return Err(StageError::new(format!("`driving_point` is {number}, there are {count} inputs")));
         }
         let point = |name: String| Point { name, ..Point::default() };
-        let output = self.driving_point.map_or_else(|| "output".to_owned(), |number| format!("input {number}"));
-        let row =
-            |input: usize| ResponseOf { output: point(output.clone()), input: point(format!("input {}", input + 1)) };
+        let row = |input: String| ResponseOf { output: point(output.clone()), input: point(input) };
         let kept = |rows: Vec<Vec<f64>>| rows.iter().flat_map(|row| row[first..end].to_vec()).collect::<Vec<f64>>();
         let transfer: Vec<Complex64> = found.transfer.iter().flat_map(|row| row[first..end].to_vec()).collect();
         // the multiple coherence is that of each input
-        let coherence = found.coherence.map(|rows| kept(rows).repeat(inputs));
+        let coherence = found.coherence.map(|rows| kept(rows).repeat(count));
         Ok(NewFrf {
             frequency_hz: found.frequency_hz[first..end].to_vec(),
-            responses: (0..inputs).map(row).collect(),
+            responses: inputs.into_iter().map(row).collect(),
             frf: transfer,
             variance: found.variance.map(kept),
             coherence,

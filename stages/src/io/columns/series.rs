@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::selection::Column;
 use super::stage::Columns;
 use super::stretch::{Stretch, Trend, halves};
-use crate::artifacts::{DataSet, NewPair, PairSet};
+use crate::artifacts::{DataSet, NewPair, PairSet, with_channels};
 
 /// Inputs and output in their units, NaN where missing.
 pub(super) struct Series {
@@ -15,6 +15,9 @@ pub(super) struct Series {
     output: Vec<f64>,
     input_unit: String,
     output_unit: String,
+    /// As the file names the channels.
+    input_names: Vec<String>,
+    output_name: String,
     rate: f64,
     identification: Stretch,
     verification: Stretch,
@@ -70,6 +73,8 @@ impl Series {
             verification: stretch(wanted.verification, second, "verification")?,
             input_unit: unit(&channels.inputs, wanted.input_unit.as_deref(), wanted.input_scale, "input")?,
             output_unit: unit(&[channels.output], wanted.output_unit.as_deref(), wanted.output_scale, "output")?,
+            input_names: channels.inputs.iter().map(|channel| channel.location.clone()).collect(),
+            output_name: channels.output.location.clone(),
             rate,
             inputs,
             output,
@@ -104,6 +109,7 @@ impl Series {
             };
             pair = of_set.add(pair);
         }
+        let pair = with_channels(pair, &self.input_names, &self.output_name);
         Ok((pair, self.summary(wanted, &trends, level)?))
     }
 
