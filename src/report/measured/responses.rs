@@ -1,111 +1,178 @@
-//! What a run found in frequency responses: modes with damping, shapes, responses and their fit, poles by order.
+//! Measured frequency responses with their fit: magnitude, phase and coherence over frequency.
 
-use afmid_pipeline::{Array, Attribute, Document, RunResult, Table};
+use afmid_pipeline::{Array, Attribute, RunResult};
 use num_complex::Complex64;
+use serde::Deserialize;
 
-use super::decay;
-use super::figure::{Axis, Colour, Figure, Mark, Panel, Row, Stroke};
-use super::find::{Found, all};
-use super::number::with_error;
-use super::paper::{Drawn, pole_marks};
-use super::view::{Head, TableView};
-
-const USES: &str = "model.frf_modes";
-
-/// Sections of a run whose modes are from frequency responses; none otherwise.
-pub(crate) fn sections(run: &RunResult) -> Option<Vec<Drawn>> {
-    let summaries: Vec<Found<'_, Document>> =
-        all::<Document>(run).filter(|found| found.stage.uses == USES && found.port == "summary").collect();
-    if summaries.is_empty() {
-        return None;
-    }
-    let tables =
-        |of: fn(&Found<'_, Document>) -> Option<TableView>| summaries.iter().filter_map(of).collect::<Vec<_>>();
-    let fits = || all::<Array>(run).filter(|found| found.stage.uses == USES && found.port == "fit");
-    let poles = |stage: &str| {
-        all::<Table>(run).find(|found| found.stage.id == stage && found.port == "diagram").map(|found| found.value)
-    };
-    let diagrams = fits().filter_map(|fit| diagram(fit.value, poles(&fit.stage.id)?)).collect();
-    Some(
-        vec![
-            Drawn { id: "modes", title: "Modes", tables: tables(decay::modes), ..Drawn::default() },
-            Drawn { id: "shapes", title: "Mode shapes", tables: tables(decay::shapes), ..Drawn::default() },
-            Drawn { id: "mass", title: "Shapes at unit modal mass", tables: tables(normalised), ..Drawn::default() },
-            Drawn {
-                id: "responses",
-                title: "Frequency responses",
-                figures: fits().filter_map(|fit| responses(fit.value)).collect(),
-                ..Drawn::default()
-            },
-            Drawn { id: "stabilisation", title: "Stabilisation diagram", figures: diagrams, ..Drawn::default() },
-        ]
-        .into_iter()
-        .filter(|section| !section.is_empty())
-        .collect(),
-    )
-}
-
-/// A row for each response, a column for each mode.
-fn normalised(found: &Found<'_, Document>) -> Option<TableView> {
-    let modes = found.value.0.get("modes")?.as_array()?;
-    let first = modes.first()?.get("mass_normalised")?.as_array()?;
-    let mut heads = vec![Head::text("channel")];
-    heads.extend((1..=modes.len()).map(|mode| Head::number(&format!("mode {mode}"), "")));
-    let caption = "Real shapes that the driving point scales to a modal mass of 1 kg, in 1/sqrt(kg).";
-    let mut table = TableView::new(caption, heads);
-    for (index, channel) in first.iter().enumerate() {
-        let mut row = vec![channel.get("channel").and_then(|name| name.as_str()).unwrap_or_default().to_owned()];
-        row.extend(modes.iter().map(|mode| {
-            let point = mode.pointer(&format!("/mass_normalised/{index}"));
-            let of = |name: &str| point.and_then(|p| p.get(name)).and_then(|v| v.as_f64()).unwrap_or(f64::NAN);
-            with_error(of("value"), of("std"))
-        }));
-        table.rows.push(row);
-    }
-    Some(table)
-}
-
-/// A panel for each response: amplitudes as measured and as fitted.
-fn responses(array: &Array) -> Option<Figure> {
-    let frequency = &array.axis("frequency_hz").ok()?.values;
-    let names = array.attributes.get("channels").and_then(Attribute::as_str).unwrap_or_default();
-    let rows = |name: &str| array.complex(name).ok().map(|values| values.chunks_exact(frequency.len().max(1)));
-    let (measured, fitted) = (rows("measured")?, rows("fitted")?);
-    let unit = array.variable("measured").map_or("", |variable| &variable.unit);
-    let mut figure = Figure::new("responses", "Frequency responses and their fit", "Amplitudes.");
-    for ((measured, fitted), name) in measured.zip(fitted).zip(names.lines()).take(MOST_PANELS) {
-        let panel = Panel::new(name, Axis::new("Frequency", "Hz"), Axis::new("Amplitude", unit).log())
-            .with(Mark::line("measured", frequency, &sizes(measured), Stroke::solid(Colour::Blue, 1.1)))
-            .with(Mark::line("fitted", frequency, &sizes(fitted), Stroke::dashed(Colour::Vermillion, 1.1)));
-        figure = figure.row(Row::one(200.0, panel));
-    }
-    (!figure.rows.is_empty()).then_some(figure)
-}
-
-fn sizes(values: &[Complex64]) -> Vec<f64> {
-    values.iter().map(|h| h.norm()).collect()
-}
-
-/// Poles by order, all responses at once behind them: their logarithm from the lowest to the highest order.
-fn diagram(fit: &Array, poles: &Table) -> Option<Figure> {
-    let frequency = &fit.axis("frequency_hz").ok()?.values;
-    let indicator = fit.real("indicator").ok()?;
-    let most = poles.integer("order").ok()?.iter().copied().max()? as f64;
-    let logarithm: Vec<f64> = indicator.iter().map(|value| value.max(f64::MIN_POSITIVE).log10()).collect();
-    let (low, high) = logarithm.iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
-    let scaled: Vec<f64> = logarithm.iter().map(|x| most * (x - low) / (high - low).max(f64::MIN_POSITIVE)).collect();
-    let axis = Axis::new("Frequency", "Hz").limits(*frequency.first()?, *frequency.last()?);
-    let panel = Panel::new("", axis, Axis::new("order", "1").whole().limits(0.0, most + 1.0)).with(Mark::line(
-        "all responses",
-        frequency,
-        &scaled,
-        Stroke::solid(Colour::Muted, 0.9),
-    ));
-    let panel = pole_marks(panel, poles)?;
-    let caption = "Starting poles of every order over all responses at once (logarithm, no scale). Stable: frequency and \
-        damping as at the next lower order.";
-    Some(Figure::new("frf-stabilisation", "Stabilisation diagram", caption).row(Row::one(380.0, panel)))
-}
+use crate::report::estimates::{Bode, BodeCurve, Smoothness, bode_panels, mode_rules};
+use crate::report::figure::{Axis, Colour, Figure, Mark, Panel, Row, Stroke, slug};
+use crate::report::find::{Found, all, depends_on, unit_of};
+use crate::report::origin::Origin;
 
 /// Responses that are drawn; the result file holds all.
-const MOST_PANELS: usize = 9;
+const MOST_RESPONSES: usize = 9;
+
+/// A point of the structure, or a channel.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Point {
+    name: String,
+    #[serde(default)]
+    direction: String,
+    #[serde(default)]
+    position_m: Option<f64>,
+}
+
+impl Point {
+    fn label(&self) -> String {
+        format!("{}{}", self.name, self.direction)
+    }
+}
+
+/// What a response is from.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct ResponseOf {
+    output: Point,
+    input: Point,
+}
+
+impl ResponseOf {
+    /// Output over input.
+    fn title(&self) -> String {
+        format!("{} / {}", self.output.label(), self.input.label())
+    }
+}
+
+/// Measured responses by row, and their fit.
+pub(super) struct Responses<'a> {
+    found: Found<'a, Array>,
+    frequency_hz: &'a [f64],
+    of: Vec<ResponseOf>,
+    frf: &'a [Complex64],
+    fit: Option<Found<'a, Array>>,
+}
+
+/// All sets of measured responses of a run.
+pub(super) fn sets(run: &RunResult) -> Vec<Responses<'_>> {
+    all::<Array>(run).filter_map(|found| Responses::of(run, found)).collect()
+}
+
+impl<'a> Responses<'a> {
+    fn of(run: &'a RunResult, found: Found<'a, Array>) -> Option<Self> {
+        let list = found.value.attributes.get("responses").and_then(Attribute::as_str)?;
+        let fits =
+            |fit: &Found<'a, Array>| fit.value.complex("fitted").is_ok() && depends_on(run, fit.stage, &found.stage.id);
+        Some(Self {
+            found,
+            frequency_hz: &found.value.axis("frequency_hz").ok()?.values,
+            of: serde_json::from_str(list).ok()?,
+            frf: found.value.complex("frf").ok()?,
+            fit: all::<Array>(run).find(fits),
+        })
+    }
+
+    /// Whether a stage was given these responses.
+    pub fn are_of(&self, run: &RunResult, stage: &str) -> bool {
+        run.stage(stage).is_some_and(|stage| depends_on(run, stage, &self.found.stage.id))
+    }
+
+    /// Where the point of each row lies that goes from row to row. None where a row does not say.
+    pub fn positions_m(&self) -> Option<Vec<f64>> {
+        let outputs_stay = self.of.iter().all(|row| self.of.first().is_some_and(|first| row.output == first.output));
+        self.of.iter().map(|row| if outputs_stay { row.input.position_m } else { row.output.position_m }).collect()
+    }
+
+    fn row<T>(values: &'a [T], number: usize, length: usize) -> Option<&'a [T]> {
+        values.get(number * length..(number + 1) * length)
+    }
+
+    /// The row of a real variable over the measured frequencies.
+    fn real(&self, name: &str, number: usize) -> Option<&'a [f64]> {
+        Self::row(self.found.value.real(name).ok()?, number, self.frequency_hz.len())
+    }
+
+    fn curves(&self, number: usize) -> Option<Vec<BodeCurve>> {
+        let measured = Self::row(self.frf, number, self.frequency_hz.len())?;
+        let curve = BodeCurve::new("measured", self.frequency_hz, measured, Stroke::solid(Colour::Blue, 1.1))
+            .measured(Smoothness::Noisy);
+        let mut curves = vec![match self.real("variance", number) {
+            Some(variance) => curve.with_variance(self.frequency_hz, measured, variance),
+            None => curve,
+        }];
+        curves.extend(self.fit.and_then(|fit| {
+            let frequency_hz = &fit.value.axis("frequency_hz").ok()?.values;
+            let fitted = Self::row(fit.value.complex("fitted").ok()?, number, frequency_hz.len())?;
+            Some(BodeCurve::new("fitted", frequency_hz, fitted, Stroke::dashed(Colour::Vermillion, 1.3)))
+        }));
+        Some(curves)
+    }
+
+    /// Magnitude, phase and, where it is known, coherence.
+    fn panels(&self, number: usize, rules: &[(f64, String)]) -> Option<Vec<Panel>> {
+        let bode = Bode {
+            rules: rules.to_vec(),
+            frequency: Axis::new("Frequency", "Hz"),
+            magnitude: Axis::new(&self.quantity(), unit_of(self.found.value, "frf")).log(),
+            ..Bode::new(self.curves(number)?)
+        };
+        let (mut magnitude, mut phase) = bode_panels(&bode);
+        let driving = self.found.value.attributes.get("driving_point").and_then(Attribute::as_f64);
+        let point = if driving == Some(number as f64) { " · driving point" } else { "" };
+        magnitude.title = format!("{}{point}", self.of.get(number)?.title());
+        let Some(coherence) = self.real("coherence", number) else { return Some(vec![magnitude, phase]) };
+        let below = Panel::new("", phase.x.clone(), Axis::new("Coherence", "1").limits(0.0, 1.02)).with(Mark::line(
+            "coherence",
+            self.frequency_hz,
+            coherence,
+            Stroke::solid(Colour::Green, 1.0),
+        ));
+        phase.x = phase.x.bare();
+        Some(vec![magnitude, phase, below])
+    }
+
+    /// The quantity as a label: `Accelerance`.
+    fn quantity(&self) -> String {
+        let name = self.found.value.attributes.get("quantity").and_then(Attribute::as_str).unwrap_or_default();
+        let mut letters = name.chars();
+        match letters.next() {
+            Some(first) if name != "transfer" => first.to_uppercase().chain(letters).collect(),
+            _ => "Magnitude".to_owned(),
+        }
+    }
+
+    fn figure(&self, run: &RunResult) -> Option<Figure> {
+        let drawn = self.of.len().min(MOST_RESPONSES);
+        // several panels are too narrow for words at the rules
+        let mut rules = self.fit.map_or_else(Vec::new, |fit| mode_rules(run, Origin::of(run, fit.stage)));
+        if drawn > 1 {
+            rules.iter_mut().for_each(|(_, word)| word.clear());
+        }
+        let panels: Vec<Vec<Panel>> = (0..drawn).filter_map(|number| self.panels(number, &rules)).collect();
+        let id = format!("responses-{}", slug(&self.found.stage.id));
+        let mut figure = Figure::new(&id, "Frequency responses and their fit", &self.caption(drawn));
+        let heights = if drawn > 1 { [170.0, 100.0, 60.0] } else { [320.0, 170.0, 80.0] };
+        for side_by_side in panels.chunks(2) {
+            for (part, height) in heights.into_iter().enumerate() {
+                let panels: Vec<(f64, Panel)> =
+                    side_by_side.iter().filter_map(|parts| Some((1.0, parts.get(part)?.clone()))).collect();
+                if !panels.is_empty() {
+                    figure = figure.row(Row { height, panels });
+                }
+            }
+        }
+        (!figure.rows.is_empty()).then_some(Figure { column_px: 1.0, ..figure })
+    }
+
+    fn caption(&self, drawn: usize) -> String {
+        let rules = if self.fit.is_some() { " Dotted: the modes." } else { "" };
+        let more = match self.of.len() - drawn {
+            0 => String::new(),
+            _ => format!(" {drawn} of {} responses are drawn; the result file holds all.", self.of.len()),
+        };
+        format!("Each response over its input.{rules}{more}")
+    }
+}
+
+/// A figure for each set of responses.
+pub(super) fn figures(run: &RunResult) -> Vec<Figure> {
+    sets(run).iter().filter_map(|set| set.figure(run)).collect()
+}
