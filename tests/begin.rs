@@ -5,6 +5,7 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use common::measured_page;
 use common::sets::write_set;
 use serde_json::Value;
 
@@ -181,6 +182,7 @@ fn the_data_choose_the_pipeline_and_its_numbers_hold() {
             serde_json::from_str(&stdout(here, &["new", "pipeline", file, "-o", &config, "--json"])).expect("JSON");
         assert_eq!(new["goal"], goal, "{new}");
         stdout(here, &["run", &config, "-o", &result, "--cache", "cache"]);
+        measured_page(here, &result);
         serde_json::from_str(&stdout(here, &["show", &result, id, "--json"])).expect("JSON")
     };
     // within four standard errors
@@ -196,6 +198,35 @@ fn the_data_choose_the_pipeline_and_its_numbers_hold() {
     let modes = &shown("both.csv", "input-output", "modes")["modes"];
     near(&modes[0]["frequency_hz"], &modes[0]["frequency_std_hz"], 50.0);
     near(&modes[0]["damping_ratio"], &modes[0]["damping_ratio_std"], 0.1);
+    let page = measured_page(here, "both.csv.h5");
+    for words in ["<h2>Transfer function</h2>", ">Magnitude (m/N)<", ">force (N)<", ">motion (m)<", ">damping ratio<"] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(measured_page(here, "hum.csv.h5").contains("<h2>Oscillation</h2>"));
+    assert!(measured_page(here, "noise.csv.h5").contains("<h2>Resonance</h2>"));
+    stdout(here, &["new", "pipeline", "both.csv", "--goal", "frf", "-o", "frf.toml"]);
+    stdout(here, &["run", "frf.toml", "-o", "frf.h5", "--cache", "cache"]);
+    let page = measured_page(here, "frf.h5");
+    for words in [">motion / force<", ">Phase (°)<", ">Coherence<", ">measured<", ">fitted<", ">damping ratio<"] {
+        assert!(page.contains(words), "{words}");
+    }
+}
+
+#[test]
+fn a_decay_s_page_names_its_channels() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    // the response to one sample of force, and noise of a thousandth
+    let [mut hit, noise] = [vec![0.0; 4000], white(5, 4000)];
+    hit[500] = 1.0;
+    let moved: Vec<f64> = resonance(&hit).iter().zip(&noise).map(|(y, e)| y + 1e-3 * e).collect();
+    table(here, "hit.csv", "Time (s),rib (m/s^2)", &[&moved]);
+    stdout(here, &["new", "pipeline", "hit.csv", "--goal", "decay", "-o", "hit.toml"]);
+    stdout(here, &["run", "hit.toml", "-o", "hit.h5", "--cache", "cache"]);
+    let page = measured_page(here, "hit.h5");
+    for words in [">rib (m/s²)<", ">measured<", ">fitted<", ">damping ratio<"] {
+        assert!(page.contains(words), "{words}");
+    }
 }
 
 #[test]

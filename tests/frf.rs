@@ -5,7 +5,7 @@ mod common;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use common::{afmid, config, number, shown};
+use common::{afmid, config, measured_page, number, shown};
 
 /// A pole driven by noise in a table, with noise on the output.
 fn columns(folder: &Path) {
@@ -67,6 +67,10 @@ fn columns_without_a_standard_error_give_an_etfe_and_an_averaged_response() {
     // 31 half-overlapping segments: 31^2 / (31 + 30 / 18)
     assert!((number(&averaged, "/averages") - 29.418).abs() < 0.001, "{averaged}");
     assert!(averaged["force_window_found"] == false && number(&averaged, "/median_coherence") > 0.8);
+    let page = measured_page(here, "out.h5");
+    for words in ["<h2>Transfer function</h2>", ">y / u<", ">Coherence<"] {
+        assert!(page.contains(words), "{words}");
+    }
 }
 
 /// The folder of measured responses, or none.
@@ -103,6 +107,13 @@ fn the_shipped_config_reads_nine_points_of_a_beam() {
     let found = shown(here, "frf.h5", "frf");
     assert_eq!((number(&found, "/responses"), number(&found, "/driving_point")), (9.0, 4.0));
     assert_eq!(found["quantity"], "accelerance");
+    let page = measured_page(here, "frf.h5");
+    // nine responses with magnitude and phase each, and the shapes over the beam
+    assert_eq!(page.matches(">Accelerance ((m/s²)/N)<").count(), 9);
+    assert_eq!(page.matches(">Phase (°)<").count(), 9);
+    assert!(
+        page.contains(">fitted<") && page.contains("magnitude of the responses") && page.contains(">Position (m)<")
+    );
     shown_in_order(here);
     let read = common::shapes_read_by_pyuff(here, "frf.h5");
     assert!(read.ends_with("modes over 9 nodes, positions known\n"), "{read}");

@@ -1,8 +1,6 @@
 //! Finding artifacts by what they are: shapes, variables and the stages that they came from.
 
-use afmid_kernels::events::EventKind;
-use afmid_pipeline::{Array, Attribute, Axis, RunResult, Shaped, StageRecord};
-use serde_json::Value;
+use afmid_pipeline::{Array, Axis, RunResult, Shaped, StageRecord};
 
 /// An artifact with the stage and port that it came from.
 #[derive(Debug)]
@@ -29,40 +27,6 @@ pub(crate) fn all<T: Shaped>(run: &RunResult) -> impl Iterator<Item = Found<'_, 
             .iter()
             .filter_map(move |(port, artifact)| T::peek(artifact).map(|value| Found { stage, port, value }))
     })
-}
-
-/// The kind of event at the head of a stage's inputs: the nearest stage upstream whose parameter `kind` names one.
-pub(crate) fn event_kind(run: &RunResult, stage: &StageRecord) -> EventKind {
-    let mut seen: Vec<&str> = Vec::new();
-    let mut next = vec![stage];
-    while !next.is_empty() {
-        if let Some(kind) = next.iter().find_map(|stage| named_kind(stage)) {
-            return kind;
-        }
-        let mut upstream = Vec::new();
-        for stage in next {
-            for (_, source, _) in &stage.wires {
-                if !seen.contains(&source.as_str()) {
-                    seen.push(source);
-                    upstream.extend(run.stage(source));
-                }
-            }
-        }
-        next = upstream;
-    }
-    EventKind::SnapOff
-}
-
-fn named_kind(stage: &StageRecord) -> Option<EventKind> {
-    EventKind::from_name(stage.params.get("kind").and_then(Value::as_str)?)
-}
-
-impl Found<'_, Array> {
-    /// The kind of event that the array says it came from, or that its stage's inputs did.
-    pub fn event_kind(&self, run: &RunResult) -> EventKind {
-        let said = self.value.attributes.get("kind").and_then(Attribute::as_str).and_then(EventKind::from_name);
-        said.unwrap_or_else(|| event_kind(run, self.stage))
-    }
 }
 
 /// Whether `stage` reads, directly or not, what `source` made.
@@ -103,4 +67,10 @@ pub(crate) fn real_over<'a>(array: &'a Array, name: &str, axis: &Axis) -> Option
 /// The unit of a variable; `1` if there is no such variable.
 pub(crate) fn unit_of<'a>(array: &'a Array, name: &str) -> &'a str {
     array.variables.iter().find(|variable| variable.name == name).map_or("1", |variable| &variable.unit)
+}
+
+/// Whether this is aligned events over event and time.
+pub(crate) fn is_ensemble(found: &Found<'_, Array>) -> bool {
+    found.value.variable("signal").is_ok_and(|signal| signal.dims == ["event", "time"])
+        && time_axis(found.value).is_some()
 }

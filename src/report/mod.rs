@@ -1,22 +1,24 @@
-//! The report: one self-contained HTML page about a run, with the paper's figures where the run has what they show.
+//! The report: one self-contained HTML page about a run, in the words of what was measured.
 //!
 //! ```text
 //! RunResult
-//!     -> batch/ (of many data sets) + diagnosis/ (its story) + paper/ (figures found by what artifacts mean)
-//!        + generic/ (every stage)
+//!     -> batch/ (of many data sets) + diagnosis/ (its story) + paper/ (of a lever's events) or measured/ (of anything
+//!        else), with the words of origin + generic/ (every stage)
 //!     -> page -> template.html
 //! ```
 //!
 //! The page loads nothing, follows the reader's colour scheme and prints. The same run gives the same bytes.
 
 mod batch;
-mod decay;
 mod diagnosis;
+mod drawn;
+mod estimates;
 mod figure;
 mod find;
-mod frf_modes;
 mod generic;
+mod measured;
 mod number;
+mod origin;
 mod page;
 mod palette;
 mod paper;

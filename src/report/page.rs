@@ -10,15 +10,16 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::batch::{self, Link};
-use super::decay;
 use super::diagnosis;
+use super::drawn::Drawn;
 use super::figure::Figure;
 use super::find::all;
-use super::frf_modes;
 use super::generic::stage_view;
+use super::measured;
 use super::number::{bytes, duration, quantity, with_error};
+use super::origin::{Origin, of_a_lever};
 use super::palette;
-use super::paper::{self, Drawn};
+use super::paper;
 use super::view::{Fact, Head, Picture, Section, StageView, TableView, Tile};
 use crate::printable::printable;
 
@@ -117,11 +118,15 @@ fn shown_text(out: &mut Output, state: &mut State, value: &Text) -> Result<(), m
     }
 }
 
-/// A batch's own; or the diagnosis first, where there is one: it is what the run was for.
+/// A batch's own; or the diagnosis first, where there is one: it is what the run was for. The others are those of what
+/// was measured.
 fn sections(run: &RunResult, link: &Link<'_>) -> impl Iterator<Item = Drawn> {
     let batch = batch::sections(run, link);
-    let of_run = || decay::sections(run).or_else(|| frf_modes::sections(run)).unwrap_or_else(|| paper::sections(run));
-    let of_run = if batch.is_empty() { of_run() } else { Vec::new() };
+    let of_run = match (batch.is_empty(), of_a_lever(run)) {
+        (true, true) => paper::sections(run),
+        (true, false) => measured::sections(run),
+        (false, _) => Vec::new(),
+    };
     batch.into_iter().chain(diagnosis::section(run)).chain(of_run)
 }
 
@@ -211,8 +216,9 @@ fn tiles(run: &RunResult) -> Vec<Tile> {
             let at = |name: &str| fit.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
             let held_out = at("held_out");
             if held_out.is_finite() {
-                let note = format!("noise allows {}", percent(at("noise_ceiling")));
-                tiles.push(tile("fit on held-out events", percent(held_out), note));
+                let ceiling = Some(at("noise_ceiling")).filter(|ceiling| ceiling.is_finite());
+                let note = ceiling.map_or_else(String::new, |ceiling| format!("noise allows {}", percent(ceiling)));
+                tiles.push(tile(Origin::of(run, found.stage).words().held_out, percent(held_out), note));
             }
         }
     }

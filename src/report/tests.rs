@@ -13,7 +13,7 @@ pub(in crate::report) fn alone(run: &RunResult) -> Result<String, ReportError> {
     report(run, &|_| String::new())
 }
 
-fn bare(stages: Vec<afmid_pipeline::StageRecord>) -> RunResult {
+pub(in crate::report) fn bare(stages: Vec<afmid_pipeline::StageRecord>) -> RunResult {
     RunResult {
         name: "bare".to_owned(),
         seed: 0,
@@ -91,10 +91,24 @@ fn ids_are_unique() {
 }
 
 #[test]
-fn a_run_without_stages_says_what_is_missing() {
-    let page = alone(&bare(Vec::new())).expect("a page");
+fn a_run_of_a_lever_says_what_is_missing_and_a_run_of_anything_else_shows_what_it_has() {
+    let events = stage("events", "events.correlation", &[], json!({"kind": "snap-off"}), vec![]);
+    let page = alone(&bare(vec![events])).expect("a page");
     assert_page(&page);
     assert!(page.contains("Not in this run") && page.contains("no frequency response of a snap-off"));
+    let page = alone(&bare(Vec::new())).expect("a page");
+    assert_page(&page);
+    assert!(!page.contains("Not in this run"));
+}
+
+#[test]
+fn parameters_that_are_empty_are_left_out() {
+    let params = json!({"files": ["a.h5"], "channels": [], "monitor": "", "rate": null, "order": 0, "fast": false});
+    let page = alone(&bare(vec![stage("records", "io.records", &[], params, vec![])])).expect("a page");
+    let (_, rest) = page.split_once("empty ones left out</h4>").expect("parameters");
+    let shown = rest.split("</pre>").next().expect("their end");
+    assert!(["files", "order", "fast"].iter().all(|name| shown.contains(name)), "{shown}");
+    assert!(!["channels", "monitor", "rate"].iter().any(|name| shown.contains(name)), "{shown}");
 }
 
 #[test]

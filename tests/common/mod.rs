@@ -87,6 +87,35 @@ pub fn shown(folder: &Path, result: &str, id: &str) -> Value {
     serde_json::from_str(&afmid(folder, &["show", result, id, "--json"])).expect("JSON on stdout")
 }
 
+/// Words of the paper's lever, in small letters: pages of other measurements have none.
+const OF_THE_LEVER: [&str; 10] = [
+    "lever",
+    "rupture",
+    "deflection",
+    "static share",
+    "one at rest",
+    "fig. ",
+    "not in this run",
+    "piezo",
+    "snap",
+    "t₀",
+];
+
+/// The page of a result that is no lever's, without style, script and config; it must have no word of the lever.
+pub fn measured_page(folder: &Path, result: &str) -> String {
+    afmid(folder, &["report", result, "-o", "measured.html"]);
+    let page = std::fs::read_to_string(folder.join("measured.html")).expect("a page");
+    let (_, rest) = page.split_once("</style>").expect("the end of the style");
+    let (shown, _) = rest.split_once("<section id=\"config\">").expect("the config");
+    let small = shown.to_lowercase();
+    for word in OF_THE_LEVER {
+        let near = small.split_once(word).map(|(before, _)| before.chars().rev().take(80).collect::<String>());
+        let near = near.map(|near| near.chars().rev().collect::<String>());
+        assert_eq!(near, None, "{result}: `{word}` on the page, after this");
+    }
+    shown.to_owned()
+}
+
 /// `records.files` set to the HDF5 files of a folder.
 pub fn files(folder: &Path) -> String {
     format!("records.files=['{}/*.h5']", folder.display())

@@ -5,8 +5,8 @@ mod trends;
 
 use afmid_pipeline::{RunResult, StageRecord};
 
-use super::paper::Drawn;
 use crate::batch::summary::BATCH;
+use crate::report::drawn::Drawn;
 
 /// Where the result of a data set lies, as seen from the page; empty: not known.
 pub(crate) type Link<'a> = dyn Fn(&str) -> String + 'a;

@@ -1,8 +1,10 @@
 //! Modes before and after: how far the linear model's numbers were off.
 
+use afmid_kernels::ringdown::{Estimate, ModeEstimate};
 use afmid_stages::diagnosis::{DiagnosedMode, Diagnosis};
 
 use super::words::or_nan;
+use crate::report::estimates::with_percent;
 use crate::report::number::{UNKNOWN, quantity, with_error};
 use crate::report::view::{Head, TableView};
 
@@ -18,6 +20,10 @@ pub(super) fn modes(answer: &Diagnosis) -> Option<TableView> {
     let mut heads = vec![Head::number("mode", ""), Head::number("frequency", "")];
     if extended {
         heads.extend([Head::number("extended", ""), Head::number("moved", "σ")]);
+    }
+    heads.push(Head::number("damping ratio", ""));
+    if extended {
+        heads.push(Head::number("extended", ""));
     }
     heads.push(Head::number("quality factor", ""));
     if extended {
@@ -35,6 +41,10 @@ pub(super) fn modes(answer: &Diagnosis) -> Option<TableView> {
         if extended {
             let moved = after.map(|after| (after.frequency_hz - before.frequency_hz) / or_nan(before.frequency_std_hz));
             row.extend([frequency(after), sigmas(moved)]);
+        }
+        row.push(damping(Some(before)));
+        if extended {
+            row.push(damping(after));
         }
         row.push(quality(Some(before)));
         if extended {
@@ -54,6 +64,16 @@ fn partner<'a>(mode: &DiagnosedMode, others: &'a [DiagnosedMode]) -> Option<&'a 
 
 fn frequency(mode: Option<&DiagnosedMode>) -> String {
     mode.map_or_else(|| UNKNOWN.to_owned(), |mode| quantity(mode.frequency_hz, or_nan(mode.frequency_std_hz), "Hz"))
+}
+
+fn damping(mode: Option<&DiagnosedMode>) -> String {
+    let estimate = |value: f64, std: Option<f64>| Estimate { value, std: or_nan(std) };
+    let mode = mode.map(|mode| ModeEstimate {
+        frequency_hz: estimate(mode.frequency_hz, mode.frequency_std_hz),
+        quality_factor: estimate(mode.quality_factor, mode.quality_factor_std),
+    });
+    let ratio = mode.map(|mode| mode.damping_ratio());
+    ratio.map_or_else(|| UNKNOWN.to_owned(), |ratio| with_percent(ratio.value, ratio.std))
 }
 
 fn quality(mode: Option<&DiagnosedMode>) -> String {

@@ -4,7 +4,7 @@ use afmid_pipeline::RunResult;
 
 use super::told::{Told, told};
 use super::{ladder, modes, overlay, telling, tiles, words};
-use crate::report::paper::Drawn;
+use crate::report::drawn::Drawn;
 
 /// All diagnoses of a run; none where no stage diagnoses.
 pub(crate) fn section(run: &RunResult) -> Option<Drawn> {

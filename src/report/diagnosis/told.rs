@@ -3,6 +3,7 @@
 use afmid_pipeline::{Array, Document, RunResult, Shaped, StageRecord, Table};
 use afmid_stages::diagnosis::Diagnosis;
 
+use crate::report::figure::slug;
 use crate::report::find::{all, real_over};
 
 /// A diagnosis with the stage that made it.
@@ -45,7 +46,7 @@ impl<'a> Told<'a> {
 
     /// The stage's id as part of the ids of figures.
     pub fn slug(&self) -> String {
-        self.stage.id.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
+        slug(&self.stage.id)
     }
 
     fn outputs<T: Shaped>(&self) -> impl Iterator<Item = &'a T> + use<'a, T> {

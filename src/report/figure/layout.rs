@@ -71,6 +71,11 @@ pub(crate) struct Figure {
     pub column_px: f64,
 }
 
+/// A name as part of a figure's id: what is not a letter, digit or hyphen becomes a hyphen.
+pub(crate) fn slug(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
+}
+
 impl Figure {
     /// A figure without panels.
     pub fn new(id: &str, title: &str, caption: &str) -> Self {

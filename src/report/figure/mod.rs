@@ -13,7 +13,7 @@ mod svg;
 mod ticks;
 
 pub(crate) use axis::{Axis, pretty_unit};
-pub(crate) use layout::{Figure, Panel, Row};
+pub(crate) use layout::{Figure, Panel, Row, slug};
 pub(crate) use mark::{Band, Colour, Ellipse, Line, Mark, Marker, Points, Stroke};
 pub(crate) use svg::superscript;
 

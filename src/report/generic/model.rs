@@ -3,9 +3,9 @@
 use afmid_pipeline::StateSpace;
 
 use super::attribute_facts;
+use crate::report::estimates::{Bode, BodeCurve, bode_figure, model_curve};
 use crate::report::figure::{Colour, Figure, Stroke};
 use crate::report::number::{number, quantity};
-use crate::report::paper::{Bode, BodeCurve, bode_figure, model_curve};
 use crate::report::view::{ArtifactView, Fact};
 
 pub(super) fn model_view(id: &str, model: &StateSpace) -> (ArtifactView, Option<Figure>) {
@@ -20,10 +20,7 @@ pub(super) fn model_view(id: &str, model: &StateSpace) -> (ArtifactView, Option<
     let figure = model_curve(model, None).map(|(frequency_hz, transfer)| {
         let curve =
             BodeCurve::new("first input to first output", &frequency_hz, &transfer, Stroke::solid(Colour::Ink, 1.4));
-        Figure {
-            column_px: 1.0,
-            ..bode_figure(id, "Frequency response", "", &Bode { curves: vec![curve], rules: Vec::new() })
-        }
+        Figure { column_px: 1.0, ..bode_figure(id, "Frequency response", "", &Bode::new(vec![curve])) }
     });
     (ArtifactView { facts, ..ArtifactView::default() }, figure)
 }

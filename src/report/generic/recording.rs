@@ -17,11 +17,9 @@ pub(super) fn recording_view(recording: &Recording) -> ArtifactView {
     ];
     let mut table = TableView::new("Records", heads);
     for record in recording.records.iter().take(ROWS) {
-        let channels: Vec<String> = record
-            .channels
-            .iter()
-            .map(|channel| format!("{} ({}, {})", channel.role, channel.location, channel.unit))
-            .collect();
+        // as the file names them; what part each plays, the parameters say
+        let channels: Vec<String> =
+            record.channels.iter().map(|channel| format!("{} ({})", channel.location, channel.unit)).collect();
         let samples = record.channels.iter().map(|channel| channel.samples).max().unwrap_or(0);
         table.rows.push(vec![
             record.name.clone(),

@@ -1,6 +1,7 @@
 //! One stage: provenance and what it made.
 
 use afmid_pipeline::{Artifact, RunResult, StageRecord};
+use serde_json::Value;
 
 use super::array::array_view;
 use super::attribute_facts;
@@ -8,7 +9,7 @@ use super::document::document_view;
 use super::model::model_view;
 use super::recording::recording_view;
 use super::table::{ROWS, table_view};
-use crate::report::figure::Figure;
+use crate::report::figure::{Figure, slug};
 use crate::report::number::{bytes, duration};
 use crate::report::view::{ArtifactView, Fact, Head, StageView, TableView};
 
@@ -24,7 +25,7 @@ pub(crate) fn stage_view(run: &RunResult, stage: &StageRecord) -> (StageView, Ve
     }
     let (mut artifacts, mut figures) = (Vec::new(), Vec::new());
     for (port, artifact) in stage.result.outputs.iter() {
-        let (view, figure) = artifact_view(&figure_id(&stage.id, port), artifact);
+        let (view, figure) = artifact_view(&format!("stage-{}--{}", slug(&stage.id), slug(port)), artifact);
         artifacts.push(ArtifactView { port: port.to_owned(), shape: artifact.shape().name().to_owned(), ..view });
         figures.push(figure);
     }
@@ -35,7 +36,7 @@ pub(crate) fn stage_view(run: &RunResult, stage: &StageRecord) -> (StageView, Ve
         seconds: timing.map(|(_, seconds, _)| duration(*seconds)).unwrap_or_default(),
         cached: timing.is_some_and(|(_, _, cached)| *cached),
         facts,
-        params: serde_json::to_string_pretty(&stage.params).unwrap_or_default(),
+        params: serde_json::to_string_pretty(&stated(&stage.params)).unwrap_or_default(),
         warnings: stage.result.warnings.clone(),
         sources: sources(stage),
         artifacts,
@@ -43,12 +44,20 @@ pub(crate) fn stage_view(run: &RunResult, stage: &StageRecord) -> (StageView, Ve
     (view, figures)
 }
 
-/// A name for files and fragments: what is not a letter, digit or hyphen becomes a hyphen.
-fn figure_id(stage: &str, port: &str) -> String {
-    let clean = |text: &str| -> String {
-        text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '-' }).collect()
+/// Parameters without those that are empty.
+fn stated(params: &Value) -> Value {
+    let empty = |value: &Value| match value {
+        Value::Null => true,
+        Value::String(text) => text.is_empty(),
+        Value::Array(list) => list.is_empty(),
+        _ => false,
     };
-    format!("stage-{}--{}", clean(stage), clean(port))
+    match params {
+        Value::Object(all) => {
+            all.iter().filter(|(_, value)| !empty(value)).map(|(k, v)| (k.clone(), v.clone())).collect()
+        }
+        other => other.clone(),
+    }
 }
 
 fn artifact_view(id: &str, artifact: &Artifact) -> (ArtifactView, Option<Figure>) {

@@ -3,8 +3,8 @@
 use afmid_pipeline::{Array, RunResult};
 
 use crate::report::figure::{Axis, Colour, Figure, Mark, Panel, Row, Stroke};
-use crate::report::find::{Found, all, real_over, time_axis, unit_of};
-use afmid_kernels::events::EventKind;
+use crate::report::find::{all, is_ensemble, real_over, time_axis, unit_of};
+use crate::report::origin::{COUPLED, FREE, Origin};
 
 /// Fig. 2 with the panels that the run has data for.
 pub(crate) fn figure(run: &RunResult) -> Option<Figure> {
@@ -16,11 +16,10 @@ pub(crate) fn figure(run: &RunResult) -> Option<Figure> {
     if let Some(panel) = overview(run) {
         figure = figure.row(Row::one(200.0, titled(letter(), "The entire force curve", panel)));
     }
-    let details: Vec<(f64, Panel)> =
-        [(EventKind::SnapIn, "One event: the snap to contact"), (EventKind::SnapOff, "One event: the snap-off")]
-            .into_iter()
-            .filter_map(|(kind, title)| Some((1.0, titled(letter(), title, single_event(run, kind)?))))
-            .collect();
+    let details: Vec<(f64, Panel)> = [(COUPLED, "One event: the snap to contact"), (FREE, "One event: the snap-off")]
+        .into_iter()
+        .filter_map(|(origin, title)| Some((1.0, titled(letter(), title, single_event(run, origin)?))))
+        .collect();
     if !details.is_empty() {
         figure = figure.row(Row { height: 220.0, panels: details });
     }
@@ -54,19 +53,13 @@ fn overview(run: &RunResult) -> Option<Panel> {
 }
 
 /// The first event of an ensemble.
-fn single_event(run: &RunResult, kind: EventKind) -> Option<Panel> {
-    let found = all::<Array>(run).find(|found| is_ensemble(found) && found.event_kind(run) == kind)?;
+fn single_event(run: &RunResult, origin: Origin) -> Option<Panel> {
+    let found = all::<Array>(run).find(|found| is_ensemble(found) && found.origin(run) == origin)?;
     let time = time_axis(found.value)?;
     let signal = found.value.real("signal").ok()?.get(..time.values.len())?;
     let y = Axis::new("Deflection", unit_of(found.value, "signal"));
     let line = Mark::line("one event", &time.values, signal, Stroke::solid(Colour::Blue, 1.0));
     Some(Panel::new("", Axis::new("Time after the onset", "s"), y).with(line))
-}
-
-/// Whether this is aligned events over event and time.
-pub(super) fn is_ensemble(found: &Found<'_, Array>) -> bool {
-    found.value.variable("signal").is_ok_and(|signal| signal.dims == ["event", "time"])
-        && time_axis(found.value).is_some()
 }
 
 /// The averaged response with the force: the whole window, and the rupture enlarged.
@@ -75,7 +68,7 @@ fn averaged(run: &RunResult) -> Option<(Panel, Panel)> {
         all::<Array>(run)
             .filter(|found| found.value.variable("force").is_ok() && found.value.variable("response").is_ok())
     };
-    let found = pairs().find(|found| found.event_kind(run) == EventKind::SnapOff).or_else(|| pairs().next())?;
+    let found = pairs().find(|found| found.origin(run) == FREE).or_else(|| pairs().next())?;
     let time = time_axis(found.value)?;
     let response = real_over(found.value, "response", time)?;
     let force = real_over(found.value, "force", time)?;

@@ -1,31 +1,18 @@
-//! Figs. 3 and 4: Bode plots of ETFE, smoothed ETFE and parametric estimate.
+//! Figs. 3 and 4: Bode plots of the free and of the surface-coupled lever.
 
-use afmid_pipeline::{Array, Document, RunResult, StageRecord, StateSpace};
-use num_complex::Complex64;
-use serde_json::Value;
+use afmid_pipeline::RunResult;
 
-use super::bode::{Bode, BodeCurve, Smoothness, bode_figure};
-use super::response::model_curve;
+use crate::report::estimates::{Bode, bode_figure, curves, mode_rules};
 use crate::report::figure::{Colour, Figure, Stroke};
-use crate::report::find::{Found, all, depends_on, event_kind, frequency_axis, real_over};
-use crate::report::number::rounded;
-use afmid_kernels::events::EventKind;
-
-/// What an estimate is, from the stage that made it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Role {
-    Raw,
-    Parametric,
-    Smoothed,
-}
+use crate::report::origin::{COUPLED, FREE};
 
 /// Fig. 3: the free lever.
 pub(crate) fn free(run: &RunResult) -> Option<Figure> {
-    let curves = curves(run, EventKind::SnapOff, false);
+    let curves = curves(run, FREE, "");
     if curves.is_empty() {
         return None;
     }
-    let bode = Bode { curves, rules: mode_rules(run) };
+    let bode = Bode { rules: mode_rules(run, FREE), ..Bode::new(curves) };
     let caption =
         "Magnitude is one at rest. Bands: 95 % of the estimate's own error. Dotted: resonances of the modal table.";
     Some(bode_figure("figure-3", "Bode plot of the free lever", caption, &bode))
@@ -33,13 +20,13 @@ pub(crate) fn free(run: &RunResult) -> Option<Figure> {
 
 /// Fig. 4: the coupled lever, with the free one for comparison.
 pub(crate) fn coupled(run: &RunResult) -> Option<Figure> {
-    let own = curves(run, EventKind::SnapIn, true);
+    let own = curves(run, COUPLED, COUPLED.words().prefix);
     if own.is_empty() {
         return None;
     }
     let mut all = vec![];
     // the free lever's best curve: parametric if there is one
-    let mut free = curves(run, EventKind::SnapOff, true);
+    let mut free = curves(run, FREE, FREE.words().prefix);
     if let Some(best) = free.iter().position(|curve| curve.series.contains("parametric")).or(free.len().checked_sub(1))
     {
         let mut best = free.swap_remove(best);
@@ -49,96 +36,5 @@ pub(crate) fn coupled(run: &RunResult) -> Option<Figure> {
     all.extend(own);
     let caption =
         "Contact shifts the resonances up; the antiresonances belong to lever and detector and stay where they are.";
-    Some(bode_figure("figure-4", "Bode plot of the coupled lever", caption, &Bode { curves: all, rules: Vec::new() }))
-}
-
-/// All estimates from one kind of event, in drawing order.
-fn curves(run: &RunResult, kind: EventKind, with_kind: bool) -> Vec<BodeCurve> {
-    let prefix = match (with_kind, kind) {
-        (false, _) => "",
-        (true, EventKind::SnapOff) => "free, ",
-        (true, EventKind::SnapIn) => "coupled, ",
-    };
-    let mut found: Vec<(Role, &StageRecord, BodeCurve)> = Vec::new();
-    for estimate in all::<Array>(run).filter(|estimate| estimate.event_kind(run) == kind) {
-        if let Some((role, curve)) = array_curve(&estimate, kind, prefix) {
-            found.push((role, estimate.stage, curve));
-        }
-    }
-    if !found.iter().any(|(role, _, _)| *role == Role::Parametric) {
-        found.extend(state_space_curve(run, kind, prefix).map(|(stage, curve)| (Role::Parametric, stage, curve)));
-    }
-    // several of one role (a plugin's beside a built-in one): the stage's id tells them apart
-    for role in [Role::Raw, Role::Parametric, Role::Smoothed] {
-        if found.iter().filter(|(have, _, _)| *have == role).count() > 1 {
-            let same = found.iter_mut().filter(|(have, _, _)| *have == role);
-            for (index, (_, stage, curve)) in same.enumerate() {
-                curve.series = format!("{} ({})", curve.series, stage.id);
-                if index > 0 {
-                    curve.stroke.colour = Colour::cycle(index + 1);
-                }
-            }
-        }
-    }
-    found.sort_by_key(|(role, _, _)| *role);
-    found.into_iter().map(|(_, _, curve)| curve).collect()
-}
-
-fn style(role: Role, kind: EventKind, prefix: &str) -> (String, Stroke) {
-    let (name, stroke) = match (role, kind) {
-        (Role::Raw, _) => ("ETFE", Stroke::solid(Colour::Vermillion, 0.8)),
-        (Role::Smoothed, EventKind::SnapOff) => ("smoothed ETFE", Stroke::dashed(Colour::Sky, 1.6)),
-        (Role::Smoothed, EventKind::SnapIn) => ("smoothed ETFE", Stroke::solid(Colour::Blue, 1.6)),
-        (Role::Parametric, _) => ("parametric", Stroke::solid(Colour::Ink, 1.5)),
-    };
-    (format!("{prefix}{name}"), stroke)
-}
-
-/// A curve from an array with a complex `transfer` over frequency.
-fn array_curve(found: &Found<'_, Array>, kind: EventKind, prefix: &str) -> Option<(Role, BodeCurve)> {
-    let axis = frequency_axis(found.value)?;
-    let transfer: &[Complex64] = found.value.complex("transfer").ok().filter(|h| h.len() == axis.values.len())?;
-    let role = match found.stage.uses.as_str() {
-        uses if uses.starts_with("model.") => Role::Parametric,
-        uses if uses.contains("etfe") => Role::Raw,
-        _ => Role::Smoothed,
-    };
-    let (name, stroke) = style(role, kind, prefix);
-    let curve = BodeCurve::new(&name, &axis.values, transfer, stroke);
-    let curve = match role {
-        Role::Raw => curve.measured(Smoothness::Noisy),
-        Role::Smoothed => curve.measured(Smoothness::Smoothed),
-        Role::Parametric => curve,
-    };
-    let over = |name: &str| real_over(found.value, name, axis);
-    let curve = match (over("variance"), over("magnitude_std"), over("phase_std")) {
-        (_, Some(magnitude), Some(phase)) => curve.with_errors(&axis.values, magnitude, phase),
-        (Some(variance), _, _) => curve.with_variance(&axis.values, transfer, variance),
-        _ => curve,
-    };
-    Some((role, curve))
-}
-
-/// A curve computed from the model that the modes were taken from, else from the last model.
-fn state_space_curve<'a>(run: &'a RunResult, kind: EventKind, prefix: &str) -> Option<(&'a StageRecord, BodeCurve)> {
-    let models: Vec<Found<'a, StateSpace>> =
-        all::<StateSpace>(run).filter(|model| event_kind(run, model.stage) == kind).collect();
-    let modes: Vec<&StageRecord> = run.stages.iter().filter(|stage| stage.uses == "model.modes").collect();
-    let read = |model: &&Found<'_, StateSpace>| modes.iter().any(|stage| depends_on(run, stage, &model.stage.id));
-    let chosen = models.iter().rev().find(read).or(models.last())?;
-    let lowest = all::<Array>(run)
-        .filter_map(|array| frequency_axis(array.value)?.values.iter().copied().find(|f| *f > 0.0))
-        .fold(f64::INFINITY, f64::min);
-    let (frequency_hz, transfer) = model_curve(chosen.value, Some(lowest))?;
-    let (name, stroke) = style(Role::Parametric, kind, prefix);
-    Some((chosen.stage, BodeCurve::new(&name, &frequency_hz, &transfer, stroke)))
-}
-
-/// Rules at the free lever's resonances.
-fn mode_rules(run: &RunResult) -> Vec<(f64, String)> {
-    let documents = all::<Document>(run).filter(|found| event_kind(run, found.stage) == EventKind::SnapOff);
-    let modes =
-        documents.filter_map(|found| found.value.0.get("modes")?.as_array().cloned()).next().unwrap_or_default();
-    let frequency = |mode: &Value| mode.get("frequency_hz").and_then(Value::as_f64).filter(|f| *f > 0.0);
-    modes.iter().filter_map(frequency).map(|f| (f, rounded(f, 4, "Hz"))).collect()
+    Some(bode_figure("figure-4", "Bode plot of the coupled lever", caption, &Bode::new(all)))
 }

@@ -2,31 +2,10 @@
 
 use afmid_pipeline::RunResult;
 
-use super::{checks, coupling, force_curve, frequency_response, modal_table, pole_zero, stabilisation};
-use crate::report::figure::Figure;
-use crate::report::view::{Fact, StoryView, TableView};
-
-/// A section before its figures are drawn.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Drawn {
-    pub id: &'static str,
-    pub title: &'static str,
-    /// What it says in words, above everything else.
-    pub stories: Vec<StoryView>,
-    pub figures: Vec<Figure>,
-    pub tables: Vec<TableView>,
-    /// Numbers under a name.
-    pub groups: Vec<(String, Vec<Fact>)>,
-    /// What the run lacks, if the section is empty.
-    pub missing: &'static str,
-}
-
-impl Drawn {
-    /// Whether there is anything to show.
-    pub fn is_empty(&self) -> bool {
-        self.stories.is_empty() && self.figures.is_empty() && self.tables.is_empty() && self.groups.is_empty()
-    }
-}
+use super::{coupling, force_curve, frequency_response};
+use crate::report::drawn::Drawn;
+use crate::report::estimates::{checks, modal_tables, pole_zero_figure, stabilisation_figures};
+use crate::report::origin::{COUPLED, FREE};
 
 /// The sections of the paper's figures and checks; empty ones say what is missing.
 pub(crate) fn sections(run: &RunResult) -> Vec<Drawn> {
@@ -34,7 +13,7 @@ pub(crate) fn sections(run: &RunResult) -> Vec<Drawn> {
         Drawn {
             id: "modes",
             title: "Modes",
-            tables: modal_table::tables(run),
+            tables: modal_tables(run),
             missing: "no stage lists modes",
             ..Drawn::default()
         },
@@ -63,7 +42,7 @@ pub(crate) fn sections(run: &RunResult) -> Vec<Drawn> {
         Drawn {
             id: "fig-5",
             title: "Fig. 5 · Poles and zeros",
-            figures: pole_zero::figures(run),
+            figures: [FREE, COUPLED].into_iter().filter_map(|origin| pole_zero_figure(run, origin)).collect(),
             missing: "no stage lists poles and zeros",
             ..Drawn::default()
         },
@@ -74,7 +53,7 @@ pub(crate) fn sections(run: &RunResult) -> Vec<Drawn> {
         checks::calibration(run),
     ];
     // the paper has none: a run without one lacks nothing
-    let figures = stabilisation::figures(run);
+    let figures = stabilisation_figures(run);
     if !figures.is_empty() {
         sections.push(Drawn { id: "stabilisation", title: "Stabilisation diagram", figures, ..Drawn::default() });
     }

@@ -14,6 +14,7 @@ const T0_AMBIGUITY_S: &str = "t0_ambiguity_s";
 const DIFFERENCED: &str = "differenced";
 const NOISE_GAIN: &str = "noise_gain";
 const WINDOW_KIND: &str = "window_kind";
+const INPUTS: &str = "inputs";
 const OUTPUTS: &str = "outputs";
 
 /// Inputs (`force`, over `input` too if there are several) and output (`response`, over `output` likewise) over time since
@@ -59,19 +60,10 @@ impl<'a> Pair<'a> {
         let name = set.of(RESPONSE);
         match self.array.variable(&name)?.dims.len() {
             0 | 1 => self.array.real(&name),
-            _ => Err(StageError::new(format!("the pair has {} outputs, wanted one", self.output_names().len())).help(
+            _ => Err(StageError::new("the pair has several outputs, wanted one").help(
                 "leave `outputs` of `io.columns` out and name one `output`; `spectrum.measured_frf` takes several",
             )),
         }
-    }
-
-    /// Names of several outputs; none of a single one.
-    pub fn output_names(&self) -> Vec<&'a str> {
-        self.array
-            .attributes
-            .get(OUTPUTS)
-            .and_then(Attribute::as_str)
-            .map_or_else(Vec::new, |names| names.lines().collect())
     }
 
     /// Inputs and outputs, each over time. Errors: the pair does not have them, or lengths that do not fit.
@@ -101,6 +93,20 @@ impl<'a> Pair<'a> {
     /// Units of force and response.
     pub fn units(&self) -> Result<[&'a str; 2], StageError> {
         Ok([&self.array.variable(FORCE)?.unit, &self.array.variable(RESPONSE)?.unit])
+    }
+
+    /// Names of the channels of so many inputs and outputs; numbered where no file names them.
+    pub fn channel_names(&self, inputs: usize, outputs: usize) -> [Vec<String>; 2] {
+        let names = |attribute: &str, count: usize, what: &str| -> Vec<String> {
+            let text = self.array.attributes.get(attribute).and_then(Attribute::as_str).unwrap_or_default();
+            let named: Vec<String> = text.lines().map(str::to_owned).collect();
+            match (named.len() == count, count) {
+                (true, _) => named,
+                (false, 1) => vec![what.to_owned()],
+                (false, _) => (1..=count).map(|number| format!("{what} {number}")).collect(),
+            }
+        };
+        [names(INPUTS, inputs, "input"), names(OUTPUTS, outputs, "output")]
     }
 
     /// Whether it has these events apart.
@@ -284,9 +290,9 @@ impl PairSet<'_> {
     }
 }
 
-/// States the names of several outputs.
-pub(crate) fn with_output_names(array: Array, names: &[String]) -> Array {
-    array.attribute(OUTPUTS, names.join("\n"))
+/// States the names of the channels.
+pub(crate) fn with_channel_names(pair: Array, inputs: &[String], outputs: &[String]) -> Array {
+    pair.attribute(INPUTS, inputs.join("\n")).attribute(OUTPUTS, outputs.join("\n"))
 }
 
 /// States how many events are in a set, and how wide the interval is in which t0 may lie.

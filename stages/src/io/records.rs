@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::consistency::{Consistency, check_consistency};
 use super::file_patterns::{Match, matching_files};
 use super::shared_data::moved;
-use crate::artifacts::{DEFLECTION, PIEZO, SENSOR, piezo};
+use crate::artifacts::{DEFLECTION, PIEZO, SENSOR};
 
 /// Opens records of any format by pattern.
 ///
@@ -94,7 +94,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many record
 impl Stage for Records {
     const SPEC: Spec = Spec {
         name: "io.records",
-        version: 2,
+        version: 3,
         summary: "opens records of any format by pattern and checks that they belong together",
         inputs: &[],
         outputs: &[RECORDS.spec(), SUMMARY.spec()],
@@ -278,6 +278,28 @@ fn too_slow(records: &[Record], found_hz: f64, wanted_hz: f64) -> StageError {
     }
 }
 
+/// A channel, and how many records have it.
+#[derive(Serialize)]
+struct ChannelFound {
+    channel: String,
+    unit: String,
+    records: usize,
+}
+
+/// All channels in the order in which records first have them.
+fn channels_of(records: &[Record]) -> Vec<ChannelFound> {
+    let mut all: Vec<ChannelFound> = Vec::new();
+    for channel in records.iter().flat_map(|record| &record.channels) {
+        match all.iter_mut().find(|known| known.channel == channel.location) {
+            Some(known) => known.records += 1,
+            None => {
+                all.push(ChannelFound { channel: channel.location.clone(), unit: channel.unit.clone(), records: 1 })
+            }
+        }
+    }
+    all
+}
+
 #[derive(Serialize)]
 struct Summary {
     records: usize,
@@ -287,7 +309,7 @@ struct Summary {
     duration_s: f64,
     shortest_samples: usize,
     longest_samples: usize,
-    with_piezo: usize,
+    channels: Vec<ChannelFound>,
     bytes: u64,
     first: String,
     last: String,
@@ -305,7 +327,7 @@ impl Summary {
             duration_s: consistency.samples as f64 / consistency.sample_rate_hz,
             shortest_samples: consistency.shortest_samples,
             longest_samples: consistency.longest_samples,
-            with_piezo: records.iter().filter(|record| piezo(record).is_some()).count(),
+            channels: channels_of(records),
             bytes,
             first: name(records.first()),
             last: name(records.last()),

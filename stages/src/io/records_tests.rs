@@ -76,7 +76,8 @@ fn records_come_with_both_channels_and_a_summary() {
     assert!(warnings[0].contains("from 50000 samples (r10.h5) to 70000 (r2.h5)"), "{warnings:?}");
     let Some(Artifact::Document(summary)) = ports.artifact("summary") else { panic!("no summary") };
     assert_eq!(summary.0["samples"], 120_000);
-    assert_eq!(summary.0["with_piezo"], 2);
+    let seen = |channel: &str| serde_json::json!({ "channel": channel, "unit": "V", "records": 2 });
+    assert_eq!(summary.0["channels"], serde_json::json!([seen("/deflection"), seen("/piezo")]));
 }
 
 #[test]

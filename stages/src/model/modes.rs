@@ -52,9 +52,10 @@ pub struct Modes {
     /// Points of the frequency response, logarithmic from `response_from_hz` to half the sample rate.
     #[schemars(range(min = 2, max = 100_000))]
     pub response_points: usize,
-    /// Lowest frequency of the response in Hz.
+    /// Lowest frequency of the response in Hz. Absent: 1000, or a thousandth of half the sample rate where that is
+    /// lower. Why: three decades show the modes of a record of any rate.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub response_from_hz: f64,
+    pub response_from_hz: Option<f64>,
     /// What the force does between samples, for `response`: `held` (half a sample's lag and droop are taken out, as in
     /// `spectrum.etfe`) or `sampled`. Why: it is exact for a step at a sample.
     pub intersample: Intersample,
@@ -71,7 +72,7 @@ impl Default for Modes {
         Self {
             criteria: ModeCriteria::default(),
             response_points: 2000,
-            response_from_hz: 1000.0,
+            response_from_hz: None,
             intersample: Intersample::Held,
             reference_frequency_hz: Vec::new(),
             reference_quality_factor: Vec::new(),
@@ -92,7 +93,7 @@ impl Stage for Modes {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 7,
+        version: 8,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -134,7 +135,7 @@ impl Stage for Modes {
         let points = response(
             &model,
             &covariance,
-            &response_frequencies(self.response_from_hz, model.sample_time_s, self.response_points),
+            &response_frequencies(self.lowest_hz(model.sample_time_s), model.sample_time_s, self.response_points),
         )
         .map_err(StageError::from_error)?;
         let summary = Document::new(&json!({
@@ -161,6 +162,10 @@ impl Stage for Modes {
 }
 
 impl Modes {
+    fn lowest_hz(&self, sample_time_s: f64) -> f64 {
+        self.response_from_hz.unwrap_or_else(|| 1000_f64.min(5e-4 / sample_time_s))
+    }
+
     /// Gain and delay with their intervals.
     fn at_rest(&self, model: &InnovationsModel, covariance: &Mat<f64>) -> Result<Value, StageError> {
         let rest = at_rest(model, covariance).map_err(StageError::from_error)?;

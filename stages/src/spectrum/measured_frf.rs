@@ -22,7 +22,8 @@ use afmid_kernels::spectra::{
 /// `Syu / Suu`, `h2` is `Syy / Suy`, `hv` their geometric mean; several inputs: `h1 = Syu Suu^-1`. Offsets are removed.
 /// The band in which the input has power is found and kept.
 /// # Shapes
-/// A row for each input of the pair, output after output, over the bins of the band; zero hertz is left out.
+/// A row for each input of the pair, output after output, over the bins of the band, under the names of the channels; zero
+/// hertz is left out.
 /// # Units
 /// Displacement, velocity and acceleration over force in m, m/s and m/s^2 per N; else output over input in the pair's
 /// units.
@@ -171,7 +172,7 @@ impl Stage for MeasuredFrf {
         let understood = Understood::new(self.quantity, &unit_ratio(response_unit, force_unit))?;
         understood.remark.iter().for_each(|remark| cx.warn(remark));
         let summary = self.summary(&found, band, blocks.len())?;
-        let responses = self.responses(&pair.output_names(), &record)?;
+        let responses = self.responses(pair.channel_names(record.inputs.len(), record.outputs.len()))?;
         let frf = self.frf(found, band, responses, understood, rate)?;
         Ok(Ports::new().with(&FRF, frf.array()?).with(&SUMMARY, summary))
     }
@@ -230,28 +231,15 @@ impl MeasuredFrf {
         }
     }
 
-    /// What each response is from, output after output; the driving point has one name. Errors: there is no such.
-    fn responses(&self, names: &[&str], record: &Block<'_>) -> Result<Vec<ResponseOf>, StageError> {
-        let (inputs, outputs) = (record.inputs.len(), record.outputs.len());
-        let count = inputs * outputs;
-        let mut output: Vec<String> = match (names.len() == outputs, outputs) {
-            (true, _) => names.iter().map(|&name| name.to_owned()).collect(),
-            (false, 1) => vec!["output".to_owned()],
-            (false, _) => (1..=outputs).map(|number| format!("output {number}")).collect(),
-        };
-        let mut input: Vec<String> = (1..=inputs).map(|number| format!("input {number}")).collect();
-        match self.driving_point {
-            Some(number) if number == 0 || number > count => {
-                return Err(StageError::new(format!("`driving_point` is {number}, there are {count} responses")));
-            }
-            // one output may be named for the input, several have names of their own
-            Some(number) if outputs == 1 => output[0].clone_from(&input[number - 1]),
-            Some(number) => input[(number - 1) % inputs].clone_from(&output[(number - 1) / inputs]),
-            None => {}
+    /// What each response is from, output after output. Errors: there is no such driving point.
+    fn responses(&self, [inputs, outputs]: [Vec<String>; 2]) -> Result<Vec<ResponseOf>, StageError> {
+        let count = inputs.len() * outputs.len();
+        if let Some(number) = self.driving_point.filter(|number| *number == 0 || *number > count) {
+            return Err(StageError::new(format!("`driving_point` is {number}, there are {count} responses")));
         }
         let point = |name: &String| Point { name: name.clone(), ..Point::default() };
-        let of = |output| input.iter().map(move |input| ResponseOf { output: point(output), input: point(input) });
-        Ok(output.iter().flat_map(of).collect())
+        let of = |output| inputs.iter().map(move |input| ResponseOf { output: point(output), input: point(input) });
+        Ok(outputs.iter().flat_map(of).collect())
     }
 
     fn frf(

@@ -7,17 +7,18 @@ use serde_json::{Value, json};
 use super::selection::Column;
 use super::stage::Columns;
 use super::stretch::{Stretch, Trend, halves};
-use crate::artifacts::{DataSet, NewPair, PairSet, with_output_names};
+use crate::artifacts::{DataSet, NewPair, PairSet, with_channel_names};
 
 /// Inputs and outputs in their units, NaN where missing.
 pub(super) struct Series {
     inputs: Vec<Vec<f64>>,
     outputs: Vec<Vec<f64>>,
-    /// Of the outputs, as the file names them.
-    names: Vec<String>,
     samples: usize,
     input_unit: String,
     output_unit: String,
+    /// As the file names the channels.
+    input_names: Vec<String>,
+    output_names: Vec<String>,
     rate: f64,
     identification: Stretch,
     verification: Stretch,
@@ -78,7 +79,8 @@ impl Series {
             verification: stretch(wanted.verification, second, "verification")?,
             input_unit: unit(&channels.inputs, wanted.input_unit.as_deref(), wanted.input_scale, "input")?,
             output_unit: unit(&channels.outputs, wanted.output_unit.as_deref(), wanted.output_scale, "output")?,
-            names: channels.outputs.iter().map(|channel| channel.location.trim_start_matches('/').to_owned()).collect(),
+            input_names: names(&channels.inputs),
+            output_names: names(&channels.outputs),
             rate,
             inputs,
             outputs,
@@ -102,9 +104,6 @@ impl Series {
             axes.push(Axis::new(name, "1", &format!("number of the {name}"), numbers));
         }
         let mut pair = NewPair { sample_rate_hz: self.rate, t0_sample: 0, kind: "columns" }.over(axes);
-        if outputs.len() > 1 {
-            pair = with_output_names(pair, &self.names);
-        }
         for (set, stretch) in sets {
             let time = set.of("time");
             let of_set = PairSet {
@@ -119,6 +118,7 @@ impl Series {
             };
             pair = of_set.add(pair);
         }
+        let pair = with_channel_names(pair, &self.input_names, &self.output_names);
         Ok((pair, self.summary(wanted, &trends, &levels)?))
     }
 
@@ -259,6 +259,11 @@ fn unit(channels: &[&FoundChannel], given: Option<&str>, scale: f64, what: &str)
             _ => Ok(Some(given.unwrap_or(stated)).filter(|unit| !unit.is_empty()).unwrap_or("1").to_owned()),
         },
     }
+}
+
+/// As the file names channels.
+fn names(channels: &[&FoundChannel]) -> Vec<String> {
+    channels.iter().map(|channel| channel.location.trim_start_matches('/').to_owned()).collect()
 }
 
 /// The rate of a channel of times. Errors: there is none; they are not equally spaced.

@@ -25,7 +25,7 @@ use crate::io::shared_data::moved;
 /// # Shapes
 /// `response`, `force` over `time`, the whole record; the same with `_identification` and `_verification` over axes of
 /// their own, which may differ in length. With several inputs `force` is over (`input`, time), with several outputs
-/// `response` over (`output`, time).
+/// `response` over (`output`, time). The attributes `inputs` and `outputs` name the channels.
 /// # Units
 /// Those of the file, times `input_scale` and `output_scale`.
 /// # Accuracy
@@ -113,7 +113,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Columns {
     const SPEC: Spec = Spec {
         name: "io.columns",
-        version: 2,
+        version: 3,
         summary: "reads measured input and output from the channels of a file of any format",
         inputs: &[],
         outputs: &[PAIR.spec(), SUMMARY.spec()],

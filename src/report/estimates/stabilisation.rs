@@ -2,7 +2,7 @@
 
 use afmid_pipeline::{RunResult, Table};
 
-use crate::report::figure::{Axis, Colour, Figure, Mark, Marker, Panel, Points, Row};
+use crate::report::figure::{Axis, Colour, Figure, Mark, Marker, Panel, Points, Row, slug};
 use crate::report::find::all;
 
 /// What a pole is marked as: its series, and how it is drawn.
@@ -13,7 +13,7 @@ const MARKS: [(&str, Marker, Colour); 3] = [
 ];
 
 /// One figure for each stage that lists poles by order.
-pub(crate) fn figures(run: &RunResult) -> Vec<Figure> {
+pub(crate) fn stabilisation_figures(run: &RunResult) -> Vec<Figure> {
     all::<Table>(run).filter_map(|found| figure(&found.stage.id, found.value)).collect()
 }
 
@@ -23,10 +23,12 @@ fn figure(stage: &str, table: &Table) -> Option<Figure> {
     if let Some(order) = table.attributes.get("proposed_order").and_then(afmid_pipeline::Attribute::as_f64) {
         panel = panel.with(Mark::at_y(order, "proposed order"));
     }
-    let id: String = stage.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
     let caption = "A mode stands in a column from the order on that can hold it; a pole that noise needs wanders. \
         Stable: frequency and damping as at the next lower order.";
-    Some(Figure::new(&format!("stabilisation-{id}"), "Stabilisation diagram", caption).row(Row::one(380.0, panel)))
+    Some(
+        Figure::new(&format!("stabilisation-{}", slug(stage)), "Stabilisation diagram", caption)
+            .row(Row::one(380.0, panel)),
+    )
 }
 
 /// The panel with the poles of a table; none without poles.

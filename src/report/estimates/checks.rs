@@ -1,13 +1,12 @@
-//! What the paper checks beside its figures: alignment, drift, periodograms, residuals, calibration.
+//! Checks of the estimates: alignment, drift, periodograms, residuals, calibration.
 
 use afmid_pipeline::{Array, Axis as Coordinates, Document, RunResult, Table};
 
-use super::force_curve::is_ensemble;
-use super::sections::Drawn;
+use crate::report::drawn::Drawn;
 use crate::report::figure::{Axis, Band, Colour, Figure, Line, Mark, Marker, Panel, Points, Row, Stroke};
-use crate::report::find::{Found, all, event_kind, frequency_axis, real_over, time_axis, unit_of};
+use crate::report::find::{Found, all, frequency_axis, is_ensemble, real_over, time_axis, unit_of};
 use crate::report::generic::document_view;
-use afmid_kernels::events::EventKind;
+use crate::report::origin::Origin;
 
 /// Aligned events on top of each other, and the list of what was seen.
 pub(crate) fn alignment(run: &RunResult) -> Drawn {
@@ -34,17 +33,14 @@ fn aligned(run: &RunResult, found: &Found<'_, Array>) -> Option<Figure> {
     let (first, last) = (onset.saturating_sub(count / 64), (onset + count / 16).min(count));
     let x = time.values.get(first..last)?;
     let rows: Vec<&[f64]> = signal.chunks_exact(count.max(1)).filter_map(|row| row.get(first..last)).collect();
-    let (kind, event) = match found.event_kind(run) {
-        EventKind::SnapOff => ("snap-off", "Snap-off"),
-        EventKind::SnapIn => ("snap-in", "Snap to contact"),
-    };
+    let words = found.origin(run).words();
     let series = |rows: usize| format!("{rows} of the events");
     let step = rows.len().div_ceil(MOST_EVENTS).max(1);
     let drawn: Vec<&&[f64]> = rows.iter().step_by(step).collect();
     let mut panel = Panel::new(
-        &format!("{event}: {} aligned events", rows.len()),
+        &format!("{}: {} aligned events", words.event, rows.len()),
         Axis::new("Time after the onset", "s"),
-        Axis::new("Deflection", unit_of(found.value, "signal")),
+        Axis::new(words.signal, unit_of(found.value, "signal")),
     );
     let (low, high) = envelope(&rows, x.len());
     panel = panel.with(Mark::Band(Band {
@@ -64,9 +60,8 @@ fn aligned(run: &RunResult, found: &Found<'_, Array>) -> Option<Figure> {
         };
         panel = panel.with(Mark::Line(line));
     }
-    let figure =
-        Figure::new(&format!("alignment-{kind}-{}", found.stage.id), "Aligned events", "").row(Row::one(220.0, panel));
-    Some(figure)
+    let id = format!("alignment-{}-{}", words.slug, found.stage.id);
+    Some(Figure::new(&id, "Aligned events", "").row(Row::one(220.0, panel)))
 }
 
 fn envelope(rows: &[&[f64]], count: usize) -> (Vec<f64>, Vec<f64>) {
@@ -101,16 +96,13 @@ fn sub_ensembles(run: &RunResult, found: &Found<'_, Table>) -> Option<Panel> {
     let order = found.value.text("order").ok()?;
     let (group, correlation) = (found.value.integer("group").ok()?, found.value.real("correlation").ok()?);
     let groups = group.iter().copied().max()? as f64 + 1.0;
-    let event = match event_kind(run, found.stage) {
-        EventKind::SnapOff => "Snap-offs",
-        EventKind::SnapIn => "Snaps to contact",
-    };
+    let events = Origin::of(run, found.stage).words().events;
     let p_value = summary_number(run, &found.stage.id, "p_value")
         .map_or_else(String::new, |p| format!(": p = {p:.2} for no drift"));
     let x = Axis::new("Sub-ensemble", "1").limits(0.5, groups + 0.5).whole();
     let worst = correlation.iter().map(|c| 1.0 - c).filter(|value| value.is_finite()).fold(0.0, f64::max);
     let y = Axis::new("1 − correlation", "1").limits(0.0, 1.12 * worst);
-    let mut panel = Panel::new(&format!("{event}{p_value}"), x, y);
+    let mut panel = Panel::new(&format!("{events}{p_value}"), x, y);
     for (word, series, colour, marker, aside) in [
         ("random", "at random", Colour::Blue, Marker::Ring, 0.06),
         ("ordered", "in order of the archive", Colour::Vermillion, Marker::Dot, -0.06),
@@ -151,15 +143,18 @@ pub(crate) fn spectra(run: &RunResult) -> Drawn {
             .value
             .variables
             .iter()
-            .filter(|variable| variable.unit.ends_with("/Hz"))
+            .filter(|variable| variable.unit.ends_with("/Hz") && !variable.name.ends_with("_error"))
             .filter_map(|variable| Some((variable.name.as_str(), real_over(found.value, &variable.name, axis)?)))
             .collect();
-        let Some((first, _)) = densities.first() else {
+        let Some((first, density)) = densities.first() else {
             section.figures.extend(several_spectra(&found, axis));
             continue;
         };
         let y = Axis::new("Power spectral density", unit_of(found.value, first)).log();
         let mut panel = Panel::new(&format!("Stage {}", found.stage.id), Axis::frequency(), y);
+        if let Some(error) = real_over(found.value, "standard_error", axis) {
+            panel = panel.with(band_of_errors(first, &axis.values, density, error));
+        }
         for (index, (name, values)) in densities.iter().enumerate().take(8) {
             panel = panel.with(Mark::line(name, &axis.values, values, Stroke::solid(Colour::cycle(index), 1.1)));
         }
@@ -167,6 +162,13 @@ pub(crate) fn spectra(run: &RunResult) -> Drawn {
         section.figures.push(Figure::new(&id, "Power spectra", "").row(Row::one(260.0, panel)));
     }
     section
+}
+
+/// 95 % of the error of a density on either side.
+fn band_of_errors(series: &str, x: &[f64], density: &[f64], error: &[f64]) -> Mark {
+    let at = |sign: f64| density.iter().zip(error).map(|(p, e)| p + sign * 1.96 * e).collect();
+    let (low, high) = (at(-1.0), at(1.0));
+    Mark::Band(Band { series: series.to_owned(), x: x.to_vec(), low, high, colour: Colour::cycle(0), fits: false })
 }
 
 /// Spectra of many records: their range and mean.
@@ -206,7 +208,7 @@ fn several_spectra(found: &Found<'_, Array>, axis: &Coordinates) -> Option<Figur
 /// What the models leave, one panel each.
 pub(crate) fn residuals(run: &RunResult) -> Drawn {
     let rows: Vec<Row> =
-        all::<Array>(run).filter_map(|found| Some(Row::one(130.0, residual(&found)?))).take(8).collect();
+        all::<Array>(run).filter_map(|found| Some(Row::one(130.0, residual(run, &found)?))).take(8).collect();
     let caption = "One-step prediction errors over the window of the fit. What is white was noise; what is left of a \
         shape is not in the model.";
     let figure = Figure { rows, ..Figure::new("residuals", "Residuals", caption) };
@@ -214,7 +216,7 @@ pub(crate) fn residuals(run: &RunResult) -> Drawn {
     Drawn { id: "what-is-left", title: "Residuals", figures, missing: "no stage gives residuals", ..Drawn::default() }
 }
 
-fn residual(found: &Found<'_, Array>) -> Option<Panel> {
+fn residual(run: &RunResult, found: &Found<'_, Array>) -> Option<Panel> {
     let time = time_axis(found.value)?;
     let values = real_over(found.value, "residual", time)?;
     let fitted = found
@@ -223,7 +225,8 @@ fn residual(found: &Found<'_, Array>) -> Option<Panel> {
         .get("set")
         .and_then(serde_json::Value::as_str)
         .map_or_else(String::new, |set| format!(", fitted to: {set}"));
-    let label = if time.long_name.is_empty() { "time" } else { &time.long_name };
+    let own = if time.long_name.is_empty() { "time" } else { &time.long_name };
+    let label = found.origin(run).words().time.unwrap_or(own);
     let y = Axis::new("Residual", unit_of(found.value, "residual"));
     let panel = Panel::new(&format!("Stage {}{fitted}", found.stage.id), Axis::new(label, "s"), y);
     Some(panel.with(Mark::line("residual", &time.values, values, Stroke::solid(Colour::Blue, 0.8))))

@@ -1,11 +1,11 @@
-//! Fig. 5: pole-zero map in the z plane, and the strip along the unit circle where the lever's poles and zeros lie.
+//! Pole-zero map in the z plane, and the strip along the unit circle where weakly damped poles and zeros lie.
 
 use afmid_pipeline::{RunResult, Table};
 
 use crate::report::figure::{Axis, Colour, Ellipse, Figure, Mark, Marker, Panel, Points, Row};
-use crate::report::find::{all, event_kind};
+use crate::report::find::all;
 use crate::report::number::{quantity, with_error};
-use afmid_kernels::events::EventKind;
+use crate::report::origin::Origin;
 
 /// Poles or zeros of one model; of a complex pair the upper one.
 #[derive(Debug, Clone, Default)]
@@ -18,20 +18,10 @@ struct Roots {
     covariance: Vec<(f64, f64, f64)>,
 }
 
-/// One figure for each kind of event that has poles or zeros listed.
-pub(crate) fn figures(run: &RunResult) -> Vec<Figure> {
-    [
-        (EventKind::SnapOff, "figure-5", "Pole-zero map of the free lever"),
-        (EventKind::SnapIn, "figure-5-coupled", "Pole-zero map of the coupled lever"),
-    ]
-    .into_iter()
-    .filter_map(|(kind, id, title)| figure(run, kind, id, title))
-    .collect()
-}
-
-fn figure(run: &RunResult, kind: EventKind, id: &str, title: &str) -> Option<Figure> {
+/// The figure of what has this origin; none without poles or zeros.
+pub(crate) fn pole_zero_figure(run: &RunResult, origin: Origin) -> Option<Figure> {
     let tables =
-        || all::<Table>(run).filter(|found| event_kind(run, found.stage) == kind && found.value.real("z_re").is_ok());
+        || all::<Table>(run).filter(|found| Origin::of(run, found.stage) == origin && found.value.real("z_re").is_ok());
     // the stage that the modal table is read from first: others may list fits of a half
     let found = tables().find(|found| found.stage.id == "modes").or_else(|| tables().last())?;
     let (poles, zeros) = (roots(found.value, "pole")?, roots(found.value, "zero")?);
@@ -42,9 +32,7 @@ fn figure(run: &RunResult, kind: EventKind, id: &str, title: &str) -> Option<Fig
         all::<afmid_pipeline::StateSpace>(run).map(|found| found.value.sample_time_s).find(|t| *t > 0.0);
     let mut panels = vec![(1.0, whole(&poles, &zeros))];
     panels.extend(strip(&poles, &zeros, sample_time_s).map(|panel| (1.15, panel)));
-    let caption = "Weakly damped poles and zeros, close to the unit circle, belong to the lever; the others to \
-        detector and electronics. The strip enlarges the distance from the circle, as far as the lever's poles \
-                   lie; bars: one standard error.";
+    let [id, title, caption] = origin.words().poles;
     Some(Figure::new(id, title, caption).row(Row { height: 400.0, panels }))
 }
 

@@ -8,13 +8,23 @@ use crate::report::figure::{Axis, Band, Figure, Mark, Panel, Row, Stroke};
 /// Standard errors that a band spans on either side: 95 % of a normal distribution.
 const BAND: f64 = 1.96;
 
-/// Curves of a Bode plot and the frequencies marked in it.
-#[derive(Debug, Clone, Default)]
+/// Curves of a Bode plot, its axes and the frequencies marked in it.
+#[derive(Debug, Clone)]
 pub(crate) struct Bode {
     /// The first lies lowest. Phases follow the turn of the smoothest curve, the last of several.
     pub curves: Vec<BodeCurve>,
     /// Frequencies in Hz with their words.
     pub rules: Vec<(f64, String)>,
+    pub frequency: Axis,
+    pub magnitude: Axis,
+}
+
+impl Bode {
+    /// Curves of a response without unit, over decades of frequency.
+    pub fn new(curves: Vec<BodeCurve>) -> Self {
+        let magnitude = Axis::new("Magnitude", "1").log();
+        Self { curves, rules: Vec::new(), frequency: Axis::frequency(), magnitude }
+    }
 }
 
 /// A curve of a Bode plot, ascending in frequency.
@@ -88,18 +98,24 @@ impl BodeCurve {
     }
 }
 
-/// Magnitude above phase; bands where a curve has errors.
+/// Magnitude above phase.
 pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> Figure {
+    let (magnitude, phase) = bode_panels(bode);
+    Figure::new(id, title, caption).row(Row::one(340.0, magnitude)).row(Row::one(200.0, phase))
+}
+
+/// The panels of magnitude and phase; bands where a curve has errors. The frequencies are written under the phase.
+pub(crate) fn bode_panels(bode: &Bode) -> (Panel, Panel) {
     let reference: Option<(Vec<f64>, Vec<f64>)> =
         bode.curves.iter().max_by_key(|curve| curve.smoothness).map(|curve| {
             let phases = unwrapped_degrees(&curve.transfer, &curve.phase_std_rad);
             curve.frequency_hz.iter().zip(phases).filter(|(_, phase)| phase.is_finite()).unzip()
         });
     let axis = match shown_range(&bode.curves) {
-        Some((low, high)) => Axis::frequency().limits(low, high),
-        None => Axis::frequency(),
+        Some((low, high)) => bode.frequency.clone().limits(low, high),
+        None => bode.frequency.clone(),
     };
-    let mut magnitude = Panel::new("", axis.clone().bare(), Axis::new("Magnitude", "1").log());
+    let mut magnitude = Panel::new("", axis.clone().bare(), bode.magnitude.clone());
     let mut phase = Panel::new("", axis, Axis::phase());
     for curve in &bode.curves {
         let size: Vec<f64> = curve.transfer.iter().map(|h| h.norm()).collect();
@@ -127,7 +143,7 @@ pub(crate) fn bode_figure(id: &str, title: &str, caption: &str, bode: &Bode) -> 
         magnitude = magnitude.with(Mark::at_x(*at, label));
         phase = phase.with(Mark::at_x(*at, ""));
     }
-    Figure::new(id, title, caption).row(Row::one(340.0, magnitude)).row(Row::one(200.0, phase))
+    (magnitude, phase)
 }
 
 /// The range in which there are data, and a fifth beyond it; a model alone is shown whole.
