@@ -41,7 +41,7 @@ pub(super) fn role(channel: &FoundChannel) -> (Option<Role>, String) {
     let by_unit = match unit.as_str() {
         "db" => Some(Role::Decibels),
         "deg" | "°" | "rad" | "degree" | "degrees" => Some(Role::Phase),
-        _ if hertz(&unit).is_some() => Some(Role::Frequency),
+        _ if hertz(&channel.unit).is_some() => Some(Role::Frequency),
         _ => None,
     };
     let found = match (titled, by_unit) {
@@ -64,14 +64,29 @@ pub(super) fn degrees(channel: &FoundChannel) -> Option<bool> {
     }
 }
 
-/// Hertz in the unit of a frequency; none if it is no such unit.
+/// Hertz in the unit of a frequency; none if it is no such unit. Small and capital letters are alike but for the prefix
+/// that is milli or mega.
 pub fn hertz(unit: &str) -> Option<f64> {
     Some(match unit.to_lowercase().as_str() {
         "hz" | "1/s" => 1.0,
         "khz" => 1e3,
-        "mhz" => 1e6,
+        "mhz" if unit.starts_with('M') => 1e6,
+        "mhz" if unit == "mHz" => 1e-3,
         "ghz" => 1e9,
         "rad/s" => std::f64::consts::TAU.recip(),
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::hertz;
+
+    #[test]
+    fn milli_and_mega_are_two_prefixes() {
+        assert_eq!((hertz("mHz"), hertz("MHz"), hertz("MHZ")), (Some(1e-3), Some(1e6), Some(1e6)));
+        // which of both is meant, nobody knows
+        assert_eq!(hertz("mhz"), None);
+        assert_eq!((hertz("khz"), hertz("kHz"), hertz("HZ"), hertz("V")), (Some(1e3), Some(1e3), Some(1.0), None));
+    }
 }
