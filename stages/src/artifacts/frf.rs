@@ -183,7 +183,8 @@ impl NewFrf {
             array = array.with(VARIANCE, &squared(&self.unit), "expected squared error", over, variance);
         }
         if let Some(coherence) = self.coherence {
-            array = array.with(COHERENCE, "1", "ordinary coherence of output and input", over, coherence);
+            let what = "share of the output's power that all inputs explain: of one the ordinary coherence";
+            array = array.with(COHERENCE, "1", what, over, coherence);
         }
         if let Some(row) = self.driving_point {
             array = array.attribute(DRIVING_POINT, row);

@@ -26,6 +26,7 @@ mod frf;
 mod model;
 mod modes;
 mod pair;
+mod quantity;
 mod ringing;
 mod roots;
 mod shapes;
@@ -45,6 +46,8 @@ pub(crate) use model::{
 };
 pub(crate) use modes::{mode_document, mode_table, modes};
 pub(crate) use pair::{NewPair, Pair, PairSeries, PairSet, with_counts};
+pub(crate) use quantity::Understood;
+pub use quantity::quantity_of_unit;
 pub(crate) use ringing::{ringing, ringing_array};
 pub(crate) use roots::{RootRow, root_table, roots};
 pub(crate) use shapes::{shape_array, shaped_mode};

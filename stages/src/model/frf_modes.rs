@@ -1,19 +1,24 @@
 //! The stage `model.frf_modes`.
 
+mod remarks;
 mod tables;
+#[cfg(test)]
+mod tests;
 
 use afmid_pipeline::{Array, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, Table};
 use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use self::remarks::{Remarks, driving_point};
 use self::tables::{channels, fit_array, summary};
 use super::count::Count;
 use super::decay::{MODES, SHAPES};
 use super::stabilisation::pole_table;
 use crate::artifacts::{Frf, mode_table, shape_array};
 use crate::io::FRF;
-use afmid_kernels::frf_modes::{FrfMode, FrfModes, FrfModesOptions, MeasuredResponses, frf_modes};
+use afmid_kernels::frf_modes::{FrfModes, FrfModesOptions, MeasuredResponses, frf_modes};
+use afmid_kernels::model::ModelError;
 use afmid_kernels::ringdown::{ModeEstimate, ModeShape, ModesWanted};
 
 /// Fits modes and mode shapes to measured frequency responses: one set of poles for all responses.
@@ -31,12 +36,12 @@ use afmid_kernels::ringdown::{ModeEstimate, ModeShape, ModesWanted};
 /// `diagram` a row per order and pole; `fit` over response and frequency.
 /// # Units
 /// Hz; shapes relative to the response with the largest residue, and per root of a kilogram at unit modal mass where
-/// there is a driving point.
+/// there is a driving point and the responses are displacement, velocity or acceleration per newton.
 /// # Accuracy
 /// docs/results/frf.md. Standard errors count what the fit leaves around a mode, neighbours that are alike, and
 /// responses that disagree on a pole. A decay that a window added is taken off.
 /// # Errors
-/// Fewer than 8 lines; no mode.
+/// Fewer than 8 lines, or values of a response; no mode.
 /// # Source
 /// P. Guillaume et al., Proc. 21st IMAC (2003); G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -68,7 +73,7 @@ impl Stage for FrfModeFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.frf_modes",
-        version: 1,
+        version: 2,
         summary: "fits modes and mode shapes to measured frequency responses of many channels",
         inputs: &[FRF.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), DIAGRAM.spec(), FIT.spec(), SUMMARY.spec()],
@@ -84,10 +89,10 @@ impl Stage for FrfModeFit {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let frf = Frf::new(inputs.get(&FRF)?)?;
-        let found = self.fitted(&frf)?;
         let names = channels(&frf);
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        self.warnings(&found).into_iter().for_each(|warning| cx.warn(warning));
+        let found = self.fitted(&frf, &names)?;
+        Remarks { fit: self, found: &found, frf: &frf }.all().into_iter().for_each(|remark| cx.warn(remark));
         let shapes: Vec<&ModeShape> = found.modes.iter().map(|mode| &mode.shape).collect();
         let modes: Vec<ModeEstimate> = found.modes.iter().map(|mode| mode.estimate).collect();
         Ok(Ports::new()
@@ -104,11 +109,12 @@ impl Stage for FrfModeFit {
 }
 
 impl FrfModeFit {
-    fn fitted(&self, frf: &Frf<'_>) -> Result<FrfModes, StageError> {
+    /// Errors: those of the fit, a response that cannot be used by its name.
+    fn fitted(&self, frf: &Frf<'_>, names: &[&str]) -> Result<FrfModes, StageError> {
         let options = FrfModesOptions {
             quantity: frf.quantity,
             added_decay_per_s: frf.added_decay_per_s,
-            driving_point: frf.driving_point,
+            driving_point: driving_point(frf),
             modes: match self.modes {
                 Count::Fixed(modes) => ModesWanted::Fixed(modes),
                 Count::Auto => ModesWanted::AtMost(self.max_modes),
@@ -122,43 +128,12 @@ impl FrfModeFit {
         let variance: Option<Vec<&[f64]>> = count.map(|r| frf.row_variance(r)).collect();
         let measured =
             MeasuredResponses { frequency_hz: frf.frequency_hz, transfer: &rows, variance: variance.as_deref() };
-        frf_modes(measured, &options).map_err(StageError::from_error)
-    }
-
-    /// What does not fit.
-    fn warnings(&self, found: &FrfModes) -> Vec<String> {
-        let mut all = Vec::new();
-        if !found.verdict.converged {
-            let distance = found.verdict.distance;
-            all.push(format!("no minimum: the last step promised {distance:.2} standard errors"));
-        }
-        if self.modes == Count::Auto && found.modes.len() == self.max_modes {
-            let most = self.max_modes;
-            all.push(format!("`modes = \"auto\"` found {most}, all that `max_modes` allows: there may be more"));
-        }
-        let turning = |(number, mode): (usize, &FrfMode)| (mode.phase_collinearity < TURNING).then_some(number + 1);
-        let numbers: Vec<String> =
-            found.modes.iter().enumerate().filter_map(turning).map(|number| number.to_string()).collect();
-        if !numbers.is_empty() {
-            all.push(format!(
-                "phase collinearity below {TURNING} of mode {}: points of a lightly damped structure move in phase or \
-                 against it; such shapes are of modes that are too close, or of no mode",
-                numbers.join(", ")
-            ));
-        }
-        let alike = found.modes.iter().map(|mode| mode.correlation).fold(1.0, f64::max);
-        if alike > ALIKE {
-            all.push(format!(
-                "neighbouring lines have like residuals: some {alike:.0} of them count as one. Standard errors are \
-                 {:.1} times larger for it; windows, zero padding or modes that are missing leave such residuals",
-                alike.sqrt()
-            ));
-        }
-        all
+        frf_modes(measured, &options).map_err(|error| match error {
+            ModelError::Response { number, problem } => {
+                let name = names.get(number - 1).copied().unwrap_or_default();
+                StageError::new(format!("response {number} ({name}) {problem}")).help("leave it out")
+            }
+            other => StageError::from_error(other),
+        })
     }
 }
-
-/// Phase collinearity below which a shape is said to turn. Why: it is that of points whose phases scatter by 24 degrees.
-const TURNING: f64 = 0.5;
-/// Lines that count as one from which on it is said. Why: a Hann window makes two alike.
-const ALIKE: f64 = 3.0;

@@ -1,6 +1,6 @@
 //! The example of `model.frf_modes`: two modes of a beam at three points, struck at the first.
 
-use afmid_pipeline::{Array, Example, Ports, StageError};
+use afmid_pipeline::{Example, Ports, StageError};
 use num_complex::Complex64;
 
 use super::decay::MODES;
@@ -18,7 +18,7 @@ pub(super) fn examples() -> Vec<Example> {
     vec![Example {
         title: "Two modes of a beam, accelerances of three points",
         params: "max_modes = 4",
-        inputs: || Ok(Ports::new().with(&FRF, responses()?)),
+        inputs: || Ok(Ports::new().with(&FRF, responses().array()?)),
         expect: |outputs| {
             let text = |error: StageError| error.to_string();
             let table = outputs.get(&MODES).map_err(text)?;
@@ -47,7 +47,8 @@ pub(super) fn examples() -> Vec<Example> {
     }]
 }
 
-fn responses() -> Result<Array, StageError> {
+/// Their responses, with noise.
+pub(super) fn responses() -> NewFrf {
     let frequency_hz: Vec<f64> = (40..800).map(|k| 0.5 * f64::from(k)).collect();
     let point = |number: usize| Point { name: number.to_string(), ..Point::default() };
     let row = |r: usize| {
@@ -64,7 +65,6 @@ fn responses() -> Result<Array, StageError> {
         driving_point: Some(0),
         ..NewFrf::default()
     }
-    .array()
 }
 
 fn accelerance(response: usize, frequency_hz: f64) -> Complex64 {

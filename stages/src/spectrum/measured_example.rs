@@ -10,6 +10,7 @@ use crate::artifacts::{DataSet, Frf, NewPair, PairSet};
 use crate::io::FRF;
 
 const RATE: f64 = 1000.0;
+const LABELS: [(&str, &str); 2] = [("velocity", "m/s"), ("force", "N")];
 
 pub(super) fn examples() -> Vec<Example> {
     vec![
@@ -37,7 +38,7 @@ fn response(frequency_hz: f64, added_decay_per_s: f64) -> Complex64 {
 }
 
 /// A linear congruential generator (Numerical Recipes): noise enough to excite.
-fn noise(samples: usize, mut state: u32) -> Vec<f64> {
+pub(super) fn noise(samples: usize, mut state: u32) -> Vec<f64> {
     let mut next = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         f64::from(state) / f64::from(u32::MAX) - 0.5
@@ -45,7 +46,8 @@ fn noise(samples: usize, mut state: u32) -> Vec<f64> {
     (0..samples).map(|_| next()).collect()
 }
 
-fn pair(force: Vec<f64>, level: f64) -> Array {
+/// The pole's response to a force, with noise of this level; names and units of response and force.
+pub(super) fn pair(force: Vec<f64>, level: f64, labels: [(&str, &str); 2]) -> Array {
     let mut response = vec![0.0; force.len()];
     for k in 0..force.len() {
         response[k] = force[k] + if k > 0 { POLE * response[k - 1] } else { 0.0 };
@@ -59,14 +61,14 @@ fn pair(force: Vec<f64>, level: f64) -> Array {
         force,
         standard_error: None,
         newtons_per_volt: None,
-        labels: [("velocity", "m/s"), ("force", "N")],
+        labels,
     };
     let samples = set.force.len();
     set.add(NewPair { sample_rate_hz: RATE, t0_sample: 0, kind: "columns" }.samples(samples))
 }
 
 fn steady() -> Array {
-    pair(noise(8192, 1), 0.5)
+    pair(noise(8192, 1), 0.5, LABELS)
 }
 
 fn struck() -> Array {
@@ -74,7 +76,7 @@ fn struck() -> Array {
         j @ 40..=45 => (std::f64::consts::PI * (j as f64 - 39.0) / 7.0).sin() * (1.0 + (k / 700) as f64),
         _ => 0.0,
     };
-    pair((0..2100).map(pulse).collect(), 1e-3)
+    pair((0..2100).map(pulse).collect(), 1e-3, LABELS)
 }
 
 fn near_truth(outputs: &Ports, added_decay_per_s: f64) -> Result<String, String> {

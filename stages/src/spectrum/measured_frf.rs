@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf};
+use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf, Understood};
 use crate::io::FRF;
 use afmid_kernels::spectra::{
     Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, frequency_response, hits, segments,
@@ -24,10 +24,12 @@ use afmid_kernels::spectra::{
 /// # Shapes
 /// A row for each input of the pair over the bins of the band; zero hertz is left out.
 /// # Units
-/// Output over input, in the pair's units.
+/// Displacement, velocity and acceleration over force in m, m/s and m/s^2 per N; else output over input in the pair's
+/// units.
 /// # Accuracy
-/// `variance` is `(1 - g) abs(H)^2 / (g (n - 1))` for n independent blocks and the coherence g. A single hit has neither
-/// coherence nor variance. Segments bias responses whose resonances are narrower than about four bins.
+/// `variance` is that of `(1 - g) abs(H)^2 / (g (n - 1))` for n independent blocks and the coherence g, its noise a mean
+/// over as many neighbouring bins as give 160 degrees of freedom. A single hit has neither coherence nor variance.
+/// Segments bias responses whose resonances are narrower than about four bins.
 /// # Errors
 /// A record that is shorter than a block, samples that are missing, an input that is zero throughout, no hit.
 /// # Source
@@ -62,8 +64,8 @@ pub struct MeasuredFrf {
     /// goes with one over the power, at 20 dB below the largest it is a hundredfold.
     #[schemars(extend("exclusiveMinimum" = 0.0), extend("exclusiveMaximum" = 1.0))]
     pub excited_share: f64,
-    /// What output over input is. Why `transfer`: columns do not say.
-    pub quantity: Quantity,
+    /// What output over input is. Absent: what the units say, a `transfer` if they say nothing.
+    pub quantity: Option<Quantity>,
     /// Number (from 1) of the input that acts where and as the output is measured. Absent: none.
     #[schemars(range(min = 1))]
     pub driving_point: Option<usize>,
@@ -114,7 +116,7 @@ impl Default for MeasuredFrf {
             added_decay_per_s: 0.0,
             band_hz: None,
             excited_share: 0.01,
-            quantity: Quantity::Transfer,
+            quantity: None,
             driving_point: None,
         }
     }
@@ -132,7 +134,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for MeasuredFrf {
     const SPEC: Spec = Spec {
         name: "spectrum.measured_frf",
-        version: 1,
+        version: 2,
         summary: "estimates the frequency response from measured input and output with coherence and variance",
         inputs: &[PAIR.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -165,9 +167,10 @@ impl Stage for MeasuredFrf {
         }
         let band = self.band(&found)?;
         let [force_unit, response_unit] = pair.units()?;
-        let unit = unit_ratio(response_unit, force_unit);
-        let summary = self.summary(&found, band, blocks.len(), series.rate)?;
-        let frf = self.frf(found, band, record.inputs.len(), unit, series.rate)?;
+        let understood = Understood::new(self.quantity, &unit_ratio(response_unit, force_unit))?;
+        understood.remark.iter().for_each(|remark| cx.warn(remark));
+        let summary = self.summary(&found, band, blocks.len())?;
+        let frf = self.frf(found, band, record.inputs.len(), understood, series.rate)?;
         Ok(Ports::new().with(&FRF, frf.array()?).with(&SUMMARY, summary))
     }
 
@@ -225,7 +228,7 @@ impl MeasuredFrf {
         found: MeasuredResponse,
         (first, end): (usize, usize),
         inputs: usize,
-        unit: String,
+        Understood { quantity, unit, factor, .. }: Understood,
         rate: f64,
     ) -> Result<NewFrf, StageError> {
         if let Some(number) = self.driving_point.filter(|number| *number == 0 || *number > inputs) {
@@ -235,17 +238,20 @@ impl MeasuredFrf {
         let output = self.driving_point.map_or_else(|| "output".to_owned(), |number| format!("input {number}"));
         let row =
             |input: usize| ResponseOf { output: point(output.clone()), input: point(format!("input {}", input + 1)) };
-        let kept = |rows: Vec<Vec<f64>>| rows.iter().flat_map(|row| row[first..end].to_vec()).collect::<Vec<f64>>();
-        let transfer: Vec<Complex64> = found.transfer.iter().flat_map(|row| row[first..end].to_vec()).collect();
+        let kept = |rows: Vec<Vec<f64>>, factor: f64| -> Vec<f64> {
+            rows.iter().flat_map(|row| row[first..end].iter().map(|value| value * factor)).collect()
+        };
+        let transfer: Vec<Complex64> =
+            found.transfer.iter().flat_map(|row| row[first..end].iter().map(|value| value * factor)).collect();
         // the multiple coherence is that of each input
-        let coherence = found.coherence.map(|rows| kept(rows).repeat(inputs));
+        let coherence = found.coherence.map(|rows| kept(rows, 1.0).repeat(inputs));
         Ok(NewFrf {
             frequency_hz: found.frequency_hz[first..end].to_vec(),
             responses: (0..inputs).map(row).collect(),
             frf: transfer,
-            variance: found.variance.map(kept),
+            variance: found.variance.map(|rows| kept(rows, factor * factor)),
             coherence,
-            quantity: self.quantity,
+            quantity,
             unit,
             driving_point: self.driving_point.map(|number| number - 1),
             sample_rate_hz: Some(rate),
@@ -259,7 +265,6 @@ impl MeasuredFrf {
         found: &MeasuredResponse,
         (first, end): (usize, usize),
         blocks: usize,
-        rate: f64,
     ) -> Result<Document, StageError> {
         let middle = found.coherence.as_ref().and_then(|rows| rows.first()).map(|row| {
             let mut values: Vec<f64> = row[first..end].iter().copied().filter(|value| value.is_finite()).collect();
@@ -269,7 +274,8 @@ impl MeasuredFrf {
         Document::new(&json!({
             "blocks": blocks,
             "averages": found.averages,
-            "bin_width_hz": rate / (2 * (found.frequency_hz.len() - 1)) as f64,
+            // bins begin at zero hertz
+            "bin_width_hz": found.frequency_hz.get(1),
             "lowest_hz": found.frequency_hz[first],
             "highest_hz": found.frequency_hz[end - 1],
             "excited_hz": found.excited_hz,

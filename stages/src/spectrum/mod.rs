@@ -17,6 +17,8 @@ mod window;
 mod chain_tests;
 #[cfg(test)]
 mod columns_tests;
+#[cfg(test)]
+mod measured_frf_tests;
 pub use etfe::Etfe;
 pub use frf::Frf;
 pub use measured_frf::{BlocksAre, EstimatorIs, MeasuredFrf};

@@ -7,7 +7,7 @@ use afmid_pipeline::{Document, StageError};
 use serde_json::json;
 
 use super::stage::{Frf, Roving};
-use crate::artifacts::{NewFrf, Point, Quantity, ResponseOf};
+use crate::artifacts::{NewFrf, Point, ResponseOf, Understood};
 
 /// What frequencies of two responses may differ by, in steps: what is printed to seven digits.
 const SAME: f64 = 1e-3;
@@ -24,13 +24,15 @@ impl Assembled {
         let all = named(paths, read);
         let frequency_hz = common_frequencies(&all)?;
         check_lengths(wanted, all.len())?;
-        let (unit, quantity, mut remarks) = quantity(wanted, &all)?;
+        let Understood { quantity, unit, factor, remark } = Understood::new(wanted.quantity, &unit(wanted, &all)?)?;
+        let mut remarks: Vec<String> = remark.into_iter().collect();
         for remark in all.iter().flat_map(|named| &named.response.remarks) {
             if !remarks.contains(remark) {
                 remarks.push(remark.clone());
             }
         }
         let responses = points(wanted, &all);
+        remarks.extend(repeated(&responses));
         let driving_point = wanted
             .driving_point
             .map(|number| number - 1)
@@ -42,7 +44,7 @@ impl Assembled {
         let mut frf = Vec::with_capacity(all.len() * kept.len());
         for (Named { response, .. }, of) in all.iter().zip(&responses) {
             let sign = if of.output.turned != of.input.turned { -1.0 } else { 1.0 };
-            frf.extend(response.values[kept.clone()].iter().map(|value| value * sign));
+            frf.extend(response.values[kept.clone()].iter().map(|value| value * (sign * factor)));
         }
         let rows: Option<Vec<&Vec<f64>>> = all.iter().map(|named| named.response.coherence.as_ref()).collect();
         let coherence = rows.map(|rows| rows.iter().flat_map(|row| row[kept.clone()].to_vec()).collect());
@@ -145,8 +147,8 @@ fn check_lengths(wanted: &Frf, responses: usize) -> Result<(), StageError> {
     }
 }
 
-/// Unit and quantity, and what was taken for granted. Errors: units that differ, or are not the one that is given.
-fn quantity(wanted: &Frf, all: &[Named<'_>]) -> Result<(String, Quantity, Vec<String>), StageError> {
+/// The unit of all. Errors: units that differ, or are not the one that is given.
+fn unit(wanted: &Frf, all: &[Named<'_>]) -> Result<String, StageError> {
     let mut unit = wanted.unit.clone().unwrap_or_default();
     for Named { name, path, response } in all.iter().filter(|named| !named.response.unit.is_empty()) {
         if unit.is_empty() {
@@ -157,30 +159,22 @@ fn quantity(wanted: &Frf, all: &[Named<'_>]) -> Result<(String, Quantity, Vec<St
             return Err(StageError::new(problem).at(path).help("leave `unit` out: it is for files that state no unit"));
         }
     }
-    let mut remarks = Vec::new();
-    let quantity = wanted.quantity.unwrap_or_else(|| {
-        let found = quantity_of(&unit);
-        if found == Quantity::Transfer {
-            let unit = if unit.is_empty() { "no unit is stated" } else { &unit };
-            remarks.push(format!(
-                "taken as a plain transfer ({unit}): give `quantity` if it is a receptance, mobility or accelerance"
-            ));
-        }
-        found
-    });
-    Ok((unit, quantity, remarks))
+    Ok(unit)
 }
 
-/// What a unit says.
-fn quantity_of(unit: &str) -> Quantity {
-    let bare: String = unit.chars().filter(|c| !matches!(c, '(' | ')' | ' ' | '^' | '·' | '*')).collect();
-    let Some(output) = bare.strip_suffix("/N") else { return Quantity::Transfer };
-    match output {
-        "m" | "mm" | "um" | "µm" | "nm" => Quantity::Receptance,
-        "m/s" | "mm/s" => Quantity::Mobility,
-        "m/s²" | "m/s2" | "m/s/s" | "mm/s²" | "mm/s2" | "g" => Quantity::Accelerance,
-        _ => Quantity::Transfer,
-    }
+/// Responses that are of the points of an earlier one: a fit counts them as independent points.
+fn repeated(responses: &[ResponseOf]) -> Option<String> {
+    let same = |a: &ResponseOf, b: &ResponseOf| a.output.is(&b.output) && a.input.is(&b.input);
+    let (row, first) = responses
+        .iter()
+        .enumerate()
+        .find_map(|(row, of)| Some((row, responses[..row].iter().position(|earlier| same(of, earlier))?)))?;
+    let (output, input) = (responses[row].output.label(), responses[row].input.label());
+    Some(format!(
+        "responses {} and {} are both of output {output} and input {input}: they count as two points",
+        first + 1,
+        row + 1
+    ))
 }
 
 /// Output and input of each response: as the files name them, or else one that stays and one that roves.
@@ -231,5 +225,19 @@ fn band(wanted: &Frf, frequency_hz: &[f64]) -> Result<std::ops::Range<usize>, St
             Err(StageError::new(format!("`band_hz` is [{low}, {high}], the frequencies run {found}")))
         }
         _ => Ok(kept),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_responses_of_the_same_points_are_found() {
+        let point = |name: &str| Point { name: name.to_owned(), ..Point::default() };
+        let of = |output: &str| ResponseOf { output: point(output), input: point("1") };
+        assert_eq!(repeated(&[of("1"), of("2"), of("3")]), None);
+        let remark = repeated(&[of("1"), of("2"), of("3"), of("2")]).unwrap();
+        assert!(remark.contains("responses 2 and 4 are both of output 2 and input 1"), "{remark}");
     }
 }

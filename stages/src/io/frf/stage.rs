@@ -26,7 +26,8 @@ use crate::io::shared_data::moved;
 /// # Shapes
 /// A row for each response, files in natural order and responses in each file's order, over the frequencies in `band_hz`.
 /// # Units
-/// Hz; values in the files' unit of output over input.
+/// Hz; displacement, velocity and acceleration over force in m, m/s and m/s^2 per N whatever the files' unit (`mm/N`,
+/// `g/N`); other values in the files' unit of output over input.
 /// # Accuracy
 /// Values as stored; coherence where the files have it. No errors of the values are known: files do not state them.
 /// # Errors
@@ -133,7 +134,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Frf {
     const SPEC: Spec = Spec {
         name: "io.frf",
-        version: 1,
+        version: 2,
         summary: "reads measured frequency responses from files of any format",
         inputs: &[],
         outputs: &[FRF.spec(), SUMMARY.spec()],

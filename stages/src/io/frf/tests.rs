@@ -69,6 +69,26 @@ fn a_file_a_point_packed_or_not_gives_a_row_each_with_the_points_that_are_given(
 }
 
 #[test]
+fn motion_over_force_comes_in_si_whatever_the_unit_and_a_quantity_that_is_none_of_it_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("p1.txt"), lines(1)).unwrap();
+    let stage = |quantity, unit: &str| Frf {
+        files: vec!["p1.txt".to_owned()],
+        unit: Some(unit.to_owned()),
+        quantity,
+        driving_point: Some(1),
+        ..Frf::default()
+    };
+    let (ports, _) = run(&stage(None, "g/N"), folder.path()).unwrap();
+    let frf = artifacts::Frf::new(ports.get(&FRF).unwrap()).unwrap();
+    assert_eq!((frf.quantity, frf.unit), (Quantity::Accelerance, "(m/s^2)/N"));
+    // to rounding
+    assert!((frf.row(0)[4] / (9.806_65 * value(5.0, 1)) - 1.0).norm() < 1e-12);
+    let error = run(&stage(Some(Quantity::Mobility), "mm/N"), folder.path()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("mm/N is the unit of a `receptance`"), "{error}");
+}
+
+#[test]
 fn what_does_not_belong_together_is_refused_with_place_found_and_wanted() {
     let folder = tempfile::tempdir().unwrap();
     let titled = |lines: &str| format!("frequency (Hz)\tre\tim\n{lines}");
