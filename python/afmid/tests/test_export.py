@@ -108,7 +108,7 @@ def test_what_cannot_be_exported_is_refused_with_what_to_do(refused, result, tmp
     (tmp_path / "mine.json").write_text('{"modes": []}')
     for name in ("mine.mat", "mine.json"):
         before = (tmp_path / name).read_bytes()
-        assert "only a model that `afmid export` wrote is replaced" in refused(result, "--model", "mat", "-o", name)
+        assert "only a file that `afmid export` wrote is replaced" in refused(result, "--model", "mat", "-o", name)
         assert (tmp_path / name).read_bytes() == before
     assert "is an input of this command" in refused(result, "--model", "mat", "-o", result)
 

@@ -241,7 +241,7 @@ fn a_channel_that_is_one_number_changes_nothing() {
 
 #[test]
 fn units_of_channels_do_not_matter() {
-    // two modes within a line, told apart by their shapes
+    // two modes within a line, kept apart by their shapes
     let pair = [linear(110.0, 0.003, 1.0), linear(110.3, 0.008, 0.9)];
     for seed in 0..12 {
         let mut data = records(&pair, 3, 0.002, 950 + seed);
