@@ -249,6 +249,11 @@ fn what_a_file_does_not_say_of_its_input_is_asked_for() {
     assert!(text.contains("inputs = [\"force\"]") && text.contains("output = \"b\""), "{text}");
     // no titles: a column of times, a hammer's pulse, what rings after it
     let pulse: Vec<f64> = (0..2000).map(|k| if (300..304).contains(&k) { 5.0 } else { 1e-3 * first[k] }).collect();
+    table(here, "h.csv", "Time (s),force (N),a (m),b (m)", &[&pulse, &resonance(&pulse), &resonance(&pulse)]);
+    stdout(here, &["new", "pipeline", "h.csv", "-o", "h.toml"]);
+    let text = std::fs::read_to_string(here.join("h.toml")).expect("a config");
+    assert!(text.contains("outputs = [\"a\", \"b\"]") && text.contains("blocks = \"hits\""), "{text}");
+    stdout(here, &["check", "h.toml"]);
     table(here, "u.txt", "", &[&pulse, &resonance(&pulse)]);
     let asked = refused(&["new", "pipeline", "u.txt"]);
     assert!(asked.contains("no sample rate and no unit") && asked.contains("there are 1000 samples"), "{asked}");

@@ -55,8 +55,9 @@ pub struct NewPipelineArgs {
     /// What to find [default: what the recordings look like].
     #[arg(long, value_enum)]
     pub goal: Option<Goal>,
-    /// The signal, as `afmid inspect` names it; of decays several, one for each sensor [default: the channel that can
-    /// carry a ringdown and is named most like a deflection; of decays all channels of that length and unit].
+    /// The signal, as `afmid inspect` names it; of decays and of a hammer's responses several, one for each sensor
+    /// [default: the channel that can carry a ringdown and is named most like a deflection; of decays all channels of
+    /// that length and unit].
     #[arg(long, value_name = "NAME")]
     pub channel: Vec<String>,
     /// The measured input, as `afmid inspect` names it; several of several inputs [default: channels named as a force,

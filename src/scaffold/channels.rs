@@ -40,44 +40,60 @@ pub fn sensors(source: &Source) -> Result<Vec<&Channel>, Question> {
     Ok(if found.is_empty() { vec![best] } else { found })
 }
 
-/// Inputs and output: as they were named, else by their names. Errors: what is not known, and how to say it.
-pub fn input_and_output<'a>(
-    source: &'a Source,
-    wanted: &Wanted<'_>,
-) -> Result<(Vec<&'a Channel>, &'a Channel), Question> {
+/// Inputs: as they were named, else by their names. Errors: what is not known, and how to say it.
+pub fn inputs<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Vec<&'a Channel>, Question> {
     let signals: Vec<&Channel> = source.channels.iter().filter(usable).collect();
-    let inputs: Vec<&Channel> = match wanted.inputs {
+    let found: Vec<&Channel> = match wanted.inputs {
         [] => signals.iter().copied().filter(|channel| drives(channel)).collect(),
         names => names.iter().map(|name| named(source, name)).collect::<Result<_, _>>()?,
     };
-    let listed = || signals.iter().map(|channel| channel.location.as_str()).collect::<Vec<_>>().join(", ");
-    if inputs.is_empty() {
-        let help = format!("say with --input which of {} drives the others", listed());
-        return Err((format!("{} does not say which channel is the input", source.file.display()), Some(help)));
+    match found.is_empty() {
+        false => Ok(found),
+        true => {
+            let help = format!("say with --input which of {} drives the others", listed(&signals));
+            Err((format!("{} does not say which channel is the input", source.file.display()), Some(help)))
+        }
     }
+}
+
+/// Outputs: as they were named, else all further channels of that length; `several` of one unit if so. Errors: what is
+/// not known, and how to say it.
+pub fn outputs<'a>(
+    source: &'a Source,
+    wanted: &Wanted<'_>,
+    inputs: &[&Channel],
+    several: bool,
+) -> Result<Vec<&'a Channel>, Question> {
+    let signals = source.channels.iter().filter(usable);
     let others: Vec<&Channel> = signals
-        .iter()
-        .copied()
-        .filter(|channel| channel.samples == inputs[0].samples)
-        .filter(|channel| !inputs.iter().any(|input| input.location == channel.location))
+        .filter(|channel| inputs.iter().all(|input| input.location != channel.location))
+        .filter(|channel| inputs.first().is_none_or(|input| input.samples == channel.samples))
         .collect();
-    let names = others.iter().map(|channel| channel.location.as_str()).collect::<Vec<_>>().join(", ");
-    match (wanted.channels, &others[..]) {
-        ([one], _) => Ok((inputs, named(source, one)?)),
-        ([], [only]) => Ok((inputs, only)),
-        ([], []) => {
+    let found = match wanted.channels {
+        [] => others.clone(),
+        names => names.iter().map(|name| named(source, name)).collect::<Result<Vec<&Channel>, _>>()?,
+    };
+    let of_one_unit = found.iter().all(|channel| channel.unit == found[0].unit);
+    match (&found[..], wanted.channels) {
+        ([], _) => {
             let problem = format!("{} has no further channel of that length", source.file.display());
             Err((problem, Some("--channel names the output, --input the input".to_owned())))
         }
-        ([], _) => {
+        ([_], _) => Ok(found),
+        _ if several && of_one_unit => Ok(found),
+        (_, []) => {
             let problem = format!("{} has several channels that could be the output", source.file.display());
-            Err((problem, Some(format!("say with --channel which one of {names}"))))
+            Err((problem, Some(format!("say with --channel which one of {}", listed(&others)))))
         }
-        ([_, second, ..], _) => {
-            let problem = format!("one output is fitted to a measured input, --channel {second} is another");
-            Err((problem, Some("write a config for each output".to_owned())))
+        (_, names) => {
+            let problem = format!("one output is fitted to a measured input, --channel {} is another", names[1]);
+            Err((problem, Some("write a config for each output; several of one unit go with --goal frf".to_owned())))
         }
     }
+}
+
+fn listed(channels: &[&Channel]) -> String {
+    channels.iter().map(|channel| channel.location.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 /// Whether a channel is named as an input: force, hammer, drive, `u`, `u2`, `uBenchMark`.

@@ -4,7 +4,7 @@ use afmid_kernels::events::decay::FreeDecay;
 use afmid_kernels::harmonics::is_tone;
 use afmid_kernels::spectra::{is_impulsive, shows_resonance};
 
-use super::channels::{drives, input_and_output, is_named, named, nothing, sensors, usable};
+use super::channels::{drives, inputs, is_named, named, nothing, outputs, sensors, usable};
 use super::first_file::FirstFile;
 use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
@@ -19,7 +19,7 @@ pub type Question = (String, Option<String>);
 #[derive(Debug)]
 pub struct Choice<'a> {
     pub goal: Goal,
-    /// The signals; of all goals but decays one.
+    /// The signals; of decays and of responses to a force several.
     pub channels: Vec<&'a Channel>,
     /// The measured inputs; of input and output alone.
     pub inputs: Vec<&'a Channel>,
@@ -74,14 +74,15 @@ fn responses(source: &Source) -> Choice<'_> {
 
 /// Measured input and output: of a hammer's hits the frequency response, else a transfer function.
 fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal>) -> Result<Choice<'a>, Question> {
-    let (inputs, output) = input_and_output(file.source, wanted)?;
+    let inputs = inputs(file.source, wanted)?;
     let struck = file.samples(inputs[0]).is_ok_and(|force| is_impulsive(&force));
     let goal = goal.unwrap_or(if struck { Goal::Frf } else { Goal::InputOutput });
-    let names: Vec<&str> = inputs.iter().map(|input| input.location.as_str()).collect();
+    let outputs = outputs(file.source, wanted, &inputs, goal == Goal::Frf)?;
+    let names = |all: &[&Channel]| all.iter().map(|one| one.location.as_str()).collect::<Vec<&str>>().join(", ");
     let short = if struck { ", which is short as a hammer's," } else { "" };
-    let (names, file) = (names.join(", "), file.source.name());
-    let why = format!("measured input {names}{short} and output {} in {file}", output.location);
-    Ok(Choice { inputs, struck, ..Choice::of(goal, vec![output], why) })
+    let (input, output, file) = (names(&inputs), names(&outputs), file.source.name());
+    let why = format!("measured input {input}{short} and output {output} in {file}");
+    Ok(Choice { inputs, struck, ..Choice::of(goal, outputs, why) })
 }
 
 fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {

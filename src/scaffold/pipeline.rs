@@ -9,6 +9,7 @@ use super::choice::{Choice, Question};
 use super::recordings::Source;
 use super::stated;
 use crate::cli::{Goal, RecordsAre};
+use crate::inspect::Channel;
 use crate::printable::one_line;
 use crate::relative::relative;
 
@@ -173,17 +174,19 @@ fn responses(source: &Source, wanted: Wanted<'_>, folder: &Path) -> String {
 /// The `params` of the stage `data`.
 fn columns(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
     let text = |text: &str| Value::String(text.to_owned());
-    let output = choice.channels[0];
+    let (output, location) = (choice.channels[0], |channel: &&Channel| text(&channel.location));
     if source.files > 1 {
-        let help = "give one file; several hits or runs in one go with --goal decay or frf";
+        let help = "give one file with all hits, or a config for each; --goal decay takes several without the force";
         let problem = format!("{} files, wanted one record of input and output", source.files);
         return Err((problem, Some(help.to_owned())));
     }
     let mut params = Table::new();
     params.insert("file".to_owned(), text(&relative(&source.file, folder).to_string_lossy()));
-    let inputs = choice.inputs.iter().map(|input| text(&input.location)).collect();
-    params.insert("inputs".to_owned(), Value::Array(inputs));
-    params.insert("output".to_owned(), text(&output.location));
+    params.insert("inputs".to_owned(), Value::Array(choice.inputs.iter().map(location).collect()));
+    match choice.channels.len() {
+        1 => params.insert("output".to_owned(), text(&output.location)),
+        _ => params.insert("outputs".to_owned(), Value::Array(choice.channels.iter().map(location).collect())),
+    };
     if let Some(rate) = stated::rate(source, output, &wanted, false)? {
         params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
     }
@@ -199,7 +202,6 @@ mod tests {
 
     use super::super::choice::choose;
     use super::*;
-    use crate::inspect::Channel;
 
     fn source(rate: Option<f64>, unit: &str) -> Source {
         let channel = Channel {

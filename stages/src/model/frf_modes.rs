@@ -75,7 +75,7 @@ impl Stage for FrfModeFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.frf_modes",
-        version: 3,
+        version: 4,
         summary: "fits modes and mode shapes to measured frequency responses of many channels",
         inputs: &[FRF.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), DIAGRAM.spec(), FIT.spec(), SUMMARY.spec()],

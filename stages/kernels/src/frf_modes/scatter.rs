@@ -57,10 +57,19 @@ impl Spread {
     ///
     /// Scores that sum to zero have the covariance `diag(s) - s s^T`, in units of the variance: of the sum of squares
     /// the mean is its trace, and the degrees of freedom (Satterthwaite) are the trace's square over that of its square.
+    /// As sums of products of shares: what one response alone knows is zero, not a rounding.
     fn of(moved: &[f64], shares: &[f64], variance: f64) -> Self {
-        let sum = |power: i32| shares.iter().map(|s| s.powi(power)).sum::<f64>();
-        let mean = sum(1) - sum(2);
-        let square = sum(2) - 2.0 * sum(3) + sum(2).powi(2);
+        let total: f64 = shares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let others = |i: usize| {
+            let all = shares.iter().enumerate();
+            all.filter(|(j, _)| *j != i).map(|(_, s)| s).sum::<f64>() / total
+        };
+        let products: Vec<f64> = shares.iter().enumerate().map(|(i, s)| s / total * others(i)).collect();
+        let squares: f64 = shares.iter().map(|s| (s / total).powi(2)).sum();
+        let mean: f64 = products.iter().sum();
+        let across = |s: &f64| (s / total).powi(2) * (squares - (s / total).powi(2)).max(0.0);
+        let square = products.iter().map(|p| p * p).sum::<f64>()
+            + if shares.len() > 1 { shares.iter().map(across).sum::<f64>() } else { 0.0 };
         let size: f64 = moved.iter().map(|m| m * m).sum();
         Self {
             ratio: size / (variance * mean).max(f64::MIN_POSITIVE),
@@ -103,6 +112,15 @@ mod tests {
         {
             let found = alarms(&shares, 1.0);
             assert!((0.002..0.01).contains(&found), "{shares:?}: {found}");
+        }
+    }
+
+    #[test]
+    fn what_one_response_alone_knows_does_not_scatter() {
+        for shares in [vec![1.0], vec![1.0 - 1e-16], vec![0.3], vec![1.0 - 1e-9, 1e-9], vec![1.0, 1e-17, 1e-18]] {
+            let moved: Vec<f64> = shares.iter().map(|s| 1e-3 * s).collect();
+            let spread = Spread::of(&moved, &shares, 1.0);
+            assert_eq!(spread.tail(1.0), 1.0, "{shares:?}: {spread:?}");
         }
     }
 
