@@ -99,8 +99,8 @@ const ONE_HIT: f64 = 0.05;
 /// Samples between the hits of a force, the least; none where there is one hit. Pulses within `before` samples are one
 /// hit. The record's end counts as a further hit, unless it comes sooner than half of that after the last one.
 ///
-/// A bounce of more than [`OWN_HIT`] of the largest force, later than [`ONE_HIT`] of the upper quartile of the
-/// distances, is taken for a hit.
+/// A bounce of more than 0.3 of the largest force, later than a twentieth of the upper quartile of the distances, is taken
+/// for a hit.
 pub fn hit_spacing(force: &[f64], before: usize) -> Option<usize> {
     let offset = median(&mut force.to_vec());
     let largest = force.iter().map(|value| (value - offset).abs()).fold(0.0, f64::max);
