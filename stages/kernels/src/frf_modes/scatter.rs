@@ -60,16 +60,12 @@ impl Spread {
     /// As sums of products of shares: what one response alone knows is zero, not a rounding.
     fn of(moved: &[f64], shares: &[f64], variance: f64) -> Self {
         let total: f64 = shares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let others = |i: usize| {
-            let all = shares.iter().enumerate();
-            all.filter(|(j, _)| *j != i).map(|(_, s)| s).sum::<f64>() / total
-        };
-        let products: Vec<f64> = shares.iter().enumerate().map(|(i, s)| s / total * others(i)).collect();
-        let squares: f64 = shares.iter().map(|s| (s / total).powi(2)).sum();
-        let mean: f64 = products.iter().sum();
-        let across = |s: &f64| (s / total).powi(2) * (squares - (s / total).powi(2)).max(0.0);
-        let square = products.iter().map(|p| p * p).sum::<f64>()
-            + if shares.len() > 1 { shares.iter().map(across).sum::<f64>() } else { 0.0 };
+        let share = |i: usize| shares[i] / total;
+        let others =
+            |i: usize, power: i32| (0..shares.len()).filter(|j| *j != i).map(|j| share(j).powi(power)).sum::<f64>();
+        let mean: f64 = (0..shares.len()).map(|i| share(i) * others(i, 1)).sum();
+        let row = |i: usize| share(i).powi(2) * (others(i, 1).powi(2) + others(i, 2));
+        let square: f64 = (0..shares.len()).map(row).sum();
         let size: f64 = moved.iter().map(|m| m * m).sum();
         Self {
             ratio: size / (variance * mean).max(f64::MIN_POSITIVE),

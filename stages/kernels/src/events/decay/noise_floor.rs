@@ -9,8 +9,8 @@ const RINGS: f64 = 0.5;
 const BESIDE: usize = 2;
 /// Bins beside a line from which on, and up to which, what is around it is seen.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=8;
-/// Power of a line's largest bin over the lower quartile around it. Why: within three bins the taper has a line down to a
-/// 500th; noise of a resonance some bins wide reaches a hundred times that quartile in one of fifty windows.
+/// Power of a line's largest bin over the lower quartile around it. Why: within three bins the taper has a line down to
+/// a 500th; noise of a resonance some bins wide reaches a hundred times that quartile in one of fifty windows.
 const LINE: f64 = 100.0;
 /// Windows per record.
 const WINDOWS: usize = 64;
@@ -22,8 +22,9 @@ const LEAST_WINDOW: usize = 128;
 /// # Method
 /// Mean squares of windows of a 64th of the record, eight periods at least. Windows within six of their own standard
 /// deviations of the least belong to the noise; their median is its variance. Where the quietest window still rings
-/// (lines hold half of its power: the strongest one, or all that stand out of what is around them) the variance is the median of its periodogram over ln 2: that of white noise beneath
-/// the lines. Floor: rounding of the codes, `1e-9` of the channel's rms.
+/// (lines hold half of its power: the strongest one, or all that stand out of what is around them) the variance is the
+/// median of its periodogram over ln 2: that of white noise beneath the lines. Floor: rounding of the codes, `1e-9` of
+/// the channel's rms.
 pub(super) fn noise_std(swing: &[f64], period: usize, step: f64) -> f64 {
     let samples = swing.len();
     let length = (samples / WINDOWS).max(8 * period).max(LEAST_WINDOW).min(samples);
