@@ -197,13 +197,18 @@ fn fold(block: &mut [f64], triangle: &mut [f64], products: &mut [Product], colum
                 let beside = &mut triangle[first + k + (first + k + 1 + j) * padded];
                 let weight = tau * (dot(own, column) + *beside);
                 *beside -= weight;
-                column.iter_mut().zip(own.iter()).for_each(|(c, x)| *c = (-weight).mul_add(*x, *c));
+                for (c, x) in column.iter_mut().zip(own.iter()) {
+                    *c = (-weight).mul_add(*x, *c);
+                }
             }
         }
         for k in 1..width {
             let (before, own) = panel[..(k + 1) * BLOCK].split_at(k * BLOCK);
             let mut inner = [0.0; PANEL];
-            inner.iter_mut().zip(before.chunks_exact(BLOCK)).for_each(|(z, v)| *z = -product[k][k] * dot(v, own));
+            // loops, no closures: a closure is compiled apart, without the vector units
+            for (z, v) in inner.iter_mut().zip(before.chunks_exact(BLOCK)) {
+                *z = -product[k][k] * dot(v, own);
+            }
             for (i, row) in product.iter_mut().enumerate().take(k) {
                 row[k] = (i..k).map(|m| row[m] * inner[m]).sum();
             }

@@ -5,7 +5,7 @@ use super::modal_form::{Exponential, columns, weights};
 use super::normal::Freedom;
 use super::records::Records;
 use crate::linear_algebra::cholesky;
-use crate::signal::summed_periodograms;
+use crate::signal::{RealTransform, summed_periodograms};
 
 impl Fitted {
     /// Mean tapered periodogram of what the fit has absorbed of the noise, per event.
@@ -67,6 +67,6 @@ impl Fitted {
                 signal
             })
             .collect();
-        summed_periodograms(&signals, taper)
+        summed_periodograms(&RealTransform::new(taper.len()), &signals, taper)
     }
 }

@@ -1,6 +1,7 @@
 //! The Fourier transform of real signals of one length.
 
-use std::sync::{Arc, OnceLock};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
@@ -63,6 +64,18 @@ impl RealTransform {
         let mut time = inverse.make_output_vec();
         let _ = inverse.process(&mut bins, &mut time);
         time
+    }
+}
+
+/// Plans of several lengths, each made when it is first asked for.
+#[derive(Default)]
+pub struct TransformPlans(Mutex<BTreeMap<usize, RealTransform>>);
+
+impl TransformPlans {
+    /// For signals of `samples`.
+    pub fn of(&self, samples: usize) -> RealTransform {
+        let mut plans = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        plans.entry(samples).or_insert_with(|| RealTransform::new(samples)).clone()
     }
 }
 

@@ -26,7 +26,7 @@ mod welch;
 
 pub use codes::code_step;
 pub use error::SignalError;
-pub use fourier::RealTransform;
+pub use fourier::{RealTransform, TransformPlans};
 pub use periodogram::{autocorrelation, mean_periodogram, summed_periodograms};
 pub use taper::{Taper, TaperGains, hann, taper, taper_gains};
 pub use welch::{AveragedPeriodogram, Detrend, Welch};

@@ -7,15 +7,14 @@ use super::fourier::RealTransform;
 
 /// Mean of the tapered periodograms `|FFT|^2 / N` of several signals, bins 0 to N/2.
 pub fn mean_periodogram(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f64> {
-    let mut sum = summed_periodograms(signals, taper);
+    let mut sum = summed_periodograms(&RealTransform::new(taper.len()), signals, taper);
     sum.iter_mut().for_each(|p| *p /= signals.len().max(1) as f64);
     sum
 }
 
-/// Sum of the tapered periodograms, in the signals' order.
-pub fn summed_periodograms(signals: &[Vec<f64>], taper: &[f64]) -> Vec<f64> {
+/// Sum of the tapered periodograms, in the signals' order; `plan`: of the taper's length.
+pub fn summed_periodograms(plan: &RealTransform, signals: &[Vec<f64>], taper: &[f64]) -> Vec<f64> {
     let n = taper.len();
-    let plan = RealTransform::new(n);
     let all: Vec<Vec<f64>> =
         signals.par_iter().map(|signal| plan.power(signal.iter().zip(taper).map(|(v, w)| v * w))).collect();
     let mut sum = vec![0.0; n / 2 + 1];

@@ -7,7 +7,7 @@ use crate::statistics::{normal_two_sided, student_limit};
 /// Why a decay ends where it does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DecayEnd {
-    /// The ringing of a period is smaller than the noise.
+    /// The ringing of a period is smaller than the noise; half as long again, to the next event at most, is taken along.
     Noise,
     /// The next event begins.
     NextEvent,

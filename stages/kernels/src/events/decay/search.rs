@@ -6,7 +6,7 @@ use super::clipping::{clipped, touches};
 use super::drive::{ends_of_drive, ends_of_response};
 use super::envelope::{Envelope, Pitch, without_drift};
 use super::error::DecaySearchError;
-use super::extent::{Begin, begin, departure, end, quiet_before};
+use super::extent::{Begin, begin, beyond, departure, end, quiet_before};
 use super::found::{ChannelDecay, DecayEnd, DecaySearch, Decline, DismissedDecay, DismissedReason, FreeDecay, Steady};
 use super::noise_floor::noise_std;
 use super::onsets::onsets;
@@ -237,6 +237,7 @@ impl<'a> Record<'a> {
             found.steady.push(Steady { range, frequency_hz, amplitude, decline, growing });
             return end;
         }
+        let range = first..if why == DecayEnd::Noise { beyond(onset, end, next - period.min(next - end)) } else { end };
         let channels = self.channels_of(&range, quiet.as_ref(), next);
         found.decays.push(FreeDecay { onset, range, end: why, quiet, frequency_hz, decline: tone.decline, channels });
         end

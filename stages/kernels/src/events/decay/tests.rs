@@ -24,8 +24,9 @@ fn one_hit_is_found_with_its_start_and_its_end() {
             missed += 1;
             continue;
         };
-        let (first, last) =
-            (decay.range.start as f64 - record.free[0] as f64, decay.range.end as f64 - record.drowned[0] as f64);
+        // half as long again as to where it drowns
+        let taken = (record.drowned[0] as f64 * 1.5 - record.onset[0] as f64 * 0.5).min(plan.samples as f64);
+        let (first, last) = (decay.range.start as f64 - record.free[0] as f64, decay.range.end as f64 - taken);
         worst = [worst[0].max(-first / record.period), worst[1].max(last.abs() / record.decay_time)];
         // the edge of a contact is smooth: what is left of it is within the noise
         if first < -record.period / 16.0 - 1.0 {
@@ -42,7 +43,7 @@ fn one_hit_is_found_with_its_start_and_its_end() {
             );
             late += 1;
         }
-        if last.abs() > 0.75 * record.decay_time {
+        if last.abs() > 1.5 * 0.75 * record.decay_time {
             println!("{about}: end off by {last}: {} {:?} of {}", decay.range.end, decay.end, plan.samples);
             end += 1;
         }

@@ -7,8 +7,7 @@ use super::basis::Poles;
 use super::fit::Fitted;
 use super::noise::residual;
 use super::records::Records;
-use crate::ringdown::RingdownNoise;
-use crate::signal::RealTransform;
+use crate::ringdown::noise::{RingdownNoise, Wander};
 use crate::statistics::chi_square_tail;
 
 /// Half the band round a line, in its half widths: six independent values for each record, of which it takes up one.
@@ -18,14 +17,33 @@ const GONE: f64 = 8.0;
 /// Probability with which noise alone is called a lack of fit: one error in a thousand is widened for nothing.
 const LEVEL: f64 = 1e-3;
 
-/// Variance per sample that white noise of the same density would have, at `turn` rad per sample.
+/// Density of noise, as the variance per sample that white noise of the same density would have.
+pub(super) struct Density {
+    white: f64,
+    /// Of each part of the wander: power of what drives it, and its decay over a sample.
+    wander: Vec<(f64, f64)>,
+}
+
+impl Density {
+    pub fn of(noise: &RingdownNoise, interval_s: f64) -> Self {
+        let driven = |part: &Wander| {
+            let decay = (-part.rate_per_s * interval_s).exp();
+            (part.variance * (1.0 - decay * decay), decay)
+        };
+        Self { white: noise.white, wander: noise.wander.iter().map(driven).collect() }
+    }
+
+    /// At `turn` rad per sample.
+    pub fn at(&self, turn: f64) -> f64 {
+        let cos = turn.cos();
+        let part = |&(power, decay): &(f64, f64)| power / (1.0 - 2.0 * decay * cos + decay * decay).max(1e-300);
+        (self.white + self.wander.iter().map(part).sum::<f64>()).max(f64::MIN_POSITIVE)
+    }
+}
+
+/// [`Density::at`] of one place.
 pub(super) fn density(noise: &RingdownNoise, interval_s: f64, turn: f64) -> f64 {
-    let cos = turn.cos();
-    let wander = noise.wander.iter().map(|part| {
-        let decay = (-part.rate_per_s * interval_s).exp();
-        part.variance * (1.0 - decay * decay) / (1.0 - 2.0 * decay * cos + decay * decay).max(1e-300)
-    });
-    (noise.white + wander.sum::<f64>()).max(f64::MIN_POSITIVE)
+    Density::of(noise, interval_s).at(turn)
 }
 
 /// What is left of a record round a pole.
@@ -39,10 +57,11 @@ struct Around {
 impl Around {
     /// Method: periodogram of the residual times the line's own envelope, so that what counts is what the line's
     /// amplitude and pole are estimated from.
-    fn of(left: &[f64], pole: c64, interval_s: f64) -> Self {
+    fn of(left: &[f64], pole: c64, records: &Records<'_>) -> Self {
+        let interval_s = records.interval_s;
         let rate = (-pole.re * interval_s).max(1e-300);
         let samples = left.len().min((GONE / rate).ceil().max(16.0) as usize);
-        let plan = RealTransform::new((2 * samples).next_power_of_two());
+        let plan = records.plans.of((2 * samples).next_power_of_two());
         let (mut square, mut fourth) = (0.0, 0.0);
         let damped: Vec<f64> = (left[..samples].iter().enumerate())
             .map(|(k, y)| {
@@ -88,7 +107,7 @@ fn excess(
 ) -> Option<(f64, f64)> {
     let (mut sum, mut cells, mut members, mut absorbed) = (0.0, 0.0, 0.0, 0.0);
     for (r, record) in records.all.iter().enumerate().filter(|(r, _)| chosen(*r)) {
-        let around = Around::of(&left[r], pole, records.interval_s);
+        let around = Around::of(&left[r], pole, records);
         let share = record.observed() as f64 / record.values.len() as f64;
         sum += around.power / share / expected(record.channel) * around.cells;
         cells += around.cells;

@@ -1,5 +1,8 @@
 //! Noise of each channel: from what the fit leaves, and from stretches without an event.
 
+use std::sync::OnceLock;
+
+use faer::Mat;
 use rayon::prelude::*;
 
 use super::basis::{columns, own_count, signal};
@@ -10,7 +13,7 @@ use crate::ringdown::RingdownNoise;
 use crate::ringdown::gaps::Gaps;
 use crate::ringdown::noise_estimate::parts_of;
 use crate::ringdown::whittle::{expected_parts, hann, variances};
-use crate::signal::{autocorrelation, summed_periodograms};
+use crate::signal::{RealTransform, summed_periodograms};
 
 /// Gain of twice the log-likelihood that wander needs: what a handful of variances that are not there yield once in a
 /// thousand times.
@@ -18,6 +21,8 @@ const WANDER_GAIN: f64 = 18.0;
 /// Bins of a Hann periodogram per independent one.
 const CORRELATED: f64 = 1.94;
 
+/// Samples of a quiet stretch that says anything of the noise.
+const LEAST_STRETCH: usize = 64;
 /// Amplitudes per sample below which what they absorb changes no variance by more than that.
 const NEGLIGIBLE: f64 = 1e-3;
 
@@ -39,22 +44,167 @@ pub(super) fn first_noise(records: &Records<'_>) -> Vec<RingdownNoise> {
     (0..records.channels).map(of).collect()
 }
 
-/// Noise of each channel under which its residuals are likeliest, what the fit has absorbed added back; scaled so that
-/// the whitened energy is the degrees of freedom.
-pub(super) fn estimated(
-    records: &Records<'_>,
-    free: &[Vec<&[f64]>],
-    fitted: &Fitted,
-    last: &[RingdownNoise],
-    source: &ChannelNoise,
-) -> Vec<RingdownNoise> {
-    match source {
-        ChannelNoise::Known(noise) => noise.clone(),
-        ChannelNoise::White => rescaled(records, fitted, last),
-        ChannelNoise::Estimated => {
-            let of = |c| at_least(of_channel(records, free, fitted, last, c), records.rounding[c]);
-            (0..records.channels).into_par_iter().map(of).collect()
+/// How each channel's noise is estimated.
+pub(super) struct NoiseModel<'a> {
+    records: &'a Records<'a>,
+    /// Per quiet stretch a record of each channel.
+    free: &'a [Vec<&'a [f64]>],
+    source: &'a ChannelNoise,
+    /// Parts of the noise, of unit variance.
+    parts: RingdownNoise,
+    /// What is expected of each pattern, once it has been asked for: the channels share it.
+    expected: OnceLock<Vec<Expected>>,
+}
+
+/// Records of one length and pattern of gaps, and what is expected of their periodograms.
+struct Expected {
+    samples: usize,
+    mask: Vec<bool>,
+    plan: RealTransform,
+    taper: Vec<f64>,
+    /// Parts x bins, unit variances.
+    parts: Vec<Vec<f64>>,
+}
+
+impl Expected {
+    fn has(&self, record: &Record<'_>) -> bool {
+        record.values.len() == self.samples && record.mask == self.mask
+    }
+
+    /// Sum of the tapered periodograms.
+    fn periodograms(&self, signals: &[Vec<f64>]) -> Vec<f64> {
+        summed_periodograms(&self.plan, signals, &self.taper)
+    }
+}
+
+impl<'a> NoiseModel<'a> {
+    pub fn new(records: &'a Records<'a>, free: &'a [Vec<&'a [f64]>], source: &'a ChannelNoise) -> Self {
+        let parts = parts_of(&[], 1.0, records.interval_s, records.longest);
+        Self { records, free, source, parts, expected: OnceLock::new() }
+    }
+
+    /// Noise of each channel under which its residuals are likeliest, what the fit has absorbed added back; scaled so
+    /// that the whitened energy is the degrees of freedom.
+    pub fn estimated(&self, fitted: &Fitted, last: &[RingdownNoise]) -> Vec<RingdownNoise> {
+        match self.source {
+            ChannelNoise::Known(noise) => noise.clone(),
+            ChannelNoise::White => rescaled(self.records, fitted, last),
+            ChannelNoise::Estimated => {
+                let expected = self.expected.get_or_init(|| self.expectations());
+                let shared: Vec<Vec<f64>> =
+                    expected.par_iter().map(|pattern| self.absorbed_of_white(fitted, pattern, last)).collect();
+                let of = |c| {
+                    let noise = self.of_channel(fitted, &last[c], expected, &shared, c);
+                    at_least(noise, self.records.rounding[c])
+                };
+                (0..self.records.channels).into_par_iter().map(of).collect()
+            }
         }
+    }
+
+    /// One per pattern of records and length of quiet stretches.
+    fn expectations(&self) -> Vec<Expected> {
+        let records = self.records.all.iter().map(|record| (record.values.len(), &record.mask[..]));
+        let stretches = self.free.iter().flatten().map(|stretch| (stretch.len(), &[][..]));
+        let mut patterns: Vec<(usize, &[bool])> = Vec::new();
+        for pattern in records.chain(stretches.filter(|(samples, _)| *samples >= LEAST_STRETCH)) {
+            if !patterns.contains(&pattern) {
+                patterns.push(pattern);
+            }
+        }
+        let of = |(samples, mask): (usize, &[bool])| {
+            let taper = hann(samples);
+            let lags = Gaps::of_mask(mask).lag_weights(&taper);
+            let parts = expected_parts(&self.parts, self.records.interval_s, &lags);
+            Expected { samples, mask: mask.to_vec(), plan: self.records.plans.of(samples), taper, parts }
+        };
+        patterns.into_par_iter().map(of).collect()
+    }
+
+    /// `shared`: what the fit has absorbed of white noise of unit variance, per pattern.
+    fn of_channel(
+        &self,
+        fitted: &Fitted,
+        last: &RingdownNoise,
+        expected: &[Expected],
+        shared: &[Vec<f64>],
+        channel: usize,
+    ) -> RingdownNoise {
+        let mut bins: Vec<Bins<'_>> = Vec::new();
+        for (pattern, shared) in expected.iter().zip(shared) {
+            let own = |i: &usize| pattern.has(&self.records.all[*i]) && self.records.all[*i].channel == channel;
+            let members: Vec<usize> = (0..self.records.all.len()).filter(own).collect();
+            let Some(&first) = members.first() else { continue };
+            let mut own = self.of_pattern(fitted, pattern, &members);
+            if last.is_white() {
+                own.observed.iter_mut().zip(shared).for_each(|(o, a)| *o += last.white * a);
+            } else if self.absorbs(fitted, pattern) {
+                let absorbed = self.absorbed(fitted, pattern, &fitted.projection.solved[first].root);
+                own.observed.iter_mut().zip(absorbed).for_each(|(o, a)| *o += a);
+            }
+            bins.push(own);
+        }
+        for stretch in self.free.iter().filter_map(|channels| channels.get(channel)) {
+            let own = |pattern: &&Expected| pattern.samples == stretch.len() && pattern.mask.is_empty();
+            let Some(pattern) = expected.iter().find(own) else { continue };
+            let mean = stretch.iter().sum::<f64>() / stretch.len() as f64;
+            let observed = pattern.periodograms(&[stretch.iter().map(|y| y - mean).collect()]);
+            bins.push(Bins { observed, parts: &pattern.parts, count: 1.0 });
+        }
+        likeliest(&bins, &self.parts, last.white)
+    }
+
+    fn of_pattern<'b>(&self, fitted: &Fitted, pattern: &'b Expected, members: &[usize]) -> Bins<'b> {
+        let records = self.records;
+        let gaps = Gaps::of_mask(&pattern.mask);
+        let residuals: Vec<Vec<f64>> = members
+            .iter()
+            .map(|&i| {
+                let mut left = residual(&records.all[i], fitted, &fitted.projection.solved[i].own, records);
+                gaps.apply(0, &mut left, &pattern.taper);
+                left
+            })
+            .collect();
+        let mut observed = pattern.periodograms(&residuals);
+        let count = members.len() as f64;
+        observed.iter_mut().for_each(|o| *o /= count);
+        Bins { observed, parts: &pattern.parts, count }
+    }
+
+    /// Whether what the own amplitudes absorb counts.
+    fn absorbs(&self, fitted: &Fitted, pattern: &Expected) -> bool {
+        own_count(fitted.poles.0.len(), self.records.drift) as f64 >= NEGLIGIBLE * pattern.samples as f64
+    }
+
+    /// What they absorb of white noise of unit variance, the same in all channels; nothing where it does not count.
+    fn absorbed_of_white(&self, fitted: &Fitted, pattern: &Expected, last: &[RingdownNoise]) -> Vec<f64> {
+        let white = |i: &usize| pattern.has(&self.records.all[*i]) && last[self.records.all[*i].channel].is_white();
+        match (0..self.records.all.len()).find(white) {
+            Some(first) if self.absorbs(fitted, pattern) => {
+                let scale = last[self.records.all[first].channel].white;
+                let absorbed = self.absorbed(fitted, pattern, &fitted.projection.solved[first].root);
+                absorbed.into_iter().map(|a| a / scale).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// What the own amplitudes have absorbed: their columns times the root of their covariance.
+    fn absorbed(&self, fitted: &Fitted, pattern: &Expected, root: &Mat<f64>) -> Vec<f64> {
+        let (samples, drift) = (pattern.samples, self.records.drift);
+        let gaps = Gaps::of_mask(&pattern.mask);
+        let all = columns(&fitted.poles, self.records.interval_s, fitted.unit_s, samples, drift);
+        let directions: Vec<Vec<f64>> = (0..own_count(fitted.poles.0.len(), drift))
+            .map(|j| {
+                let mut direction = vec![0.0; samples];
+                for (i, column) in all.iter().enumerate().take(j + 1) {
+                    direction.iter_mut().zip(column).for_each(|(d, v)| *d += root[(i, j)] * v);
+                }
+                gaps.apply(0, &mut direction, &pattern.taper);
+                direction
+            })
+            .collect();
+        pattern.periodograms(&directions)
     }
 }
 
@@ -98,95 +248,22 @@ pub(super) fn residual(record: &Record<'_>, fitted: &Fitted, own: &[f64], record
 }
 
 /// Periodograms of one length and pattern of gaps, and what is expected of them.
-struct Bins {
+struct Bins<'a> {
     observed: Vec<f64>,
-    parts: Vec<Vec<f64>>,
+    parts: &'a [Vec<f64>],
     count: f64,
 }
 
-fn of_channel(
-    records: &Records<'_>,
-    free: &[Vec<&[f64]>],
-    fitted: &Fitted,
-    last: &[RingdownNoise],
-    channel: usize,
-) -> RingdownNoise {
-    let shape = parts_of(&[], last[channel].white, records.interval_s, records.longest);
-    let mut own: Vec<(usize, &Record<'_>)> = Vec::new();
-    own.extend(records.all.iter().enumerate().filter(|(_, record)| record.channel == channel));
-    let mut bins: Vec<Bins> = Vec::new();
-    let mut taken = vec![false; own.len()];
-    for first in 0..own.len() {
-        if taken[first] {
-            continue;
-        }
-        let pattern = own[first].1;
-        let members: Vec<usize> = (first..own.len())
-            .filter(|&i| own[i].1.values.len() == pattern.values.len() && own[i].1.mask == pattern.mask)
-            .collect();
-        members.iter().for_each(|&i| taken[i] = true);
-        let chosen: Vec<(usize, &Record<'_>)> = members.iter().map(|&i| own[i]).collect();
-        bins.push(of_pattern(records, fitted, &chosen, &shape));
-    }
-    for stretch in free.iter().filter_map(|channels| channels.get(channel)).filter(|s| s.len() >= 64) {
-        let samples = stretch.len();
-        let mean = stretch.iter().sum::<f64>() / samples as f64;
-        let taper = hann(samples);
-        let observed = summed_periodograms(&[stretch.iter().map(|y| y - mean).collect()], &taper);
-        let parts = expected_parts(&shape, records.interval_s, &autocorrelation(&taper));
-        bins.push(Bins { observed, parts, count: 1.0 });
-    }
-    likeliest(&bins, &shape)
-}
-
-fn of_pattern(records: &Records<'_>, fitted: &Fitted, members: &[(usize, &Record<'_>)], shape: &RingdownNoise) -> Bins {
-    let pattern = members[0].1;
-    let samples = pattern.values.len();
-    let gaps = Gaps::of_mask(&pattern.mask);
-    let taper = hann(samples);
-    let residuals: Vec<Vec<f64>> = members
-        .iter()
-        .map(|&(i, record)| {
-            let mut left = residual(record, fitted, &fitted.projection.solved[i].own, records);
-            gaps.apply(0, &mut left, &taper);
-            left
-        })
-        .collect();
-    let mut observed = summed_periodograms(&residuals, &taper);
-    let own = own_count(fitted.poles.0.len(), records.drift);
-    let count = members.len() as f64;
-    if (own as f64) < NEGLIGIBLE * samples as f64 {
-        observed.iter_mut().for_each(|o| *o /= count);
-        let parts = expected_parts(shape, records.interval_s, &gaps.lag_weights(&taper));
-        return Bins { observed, parts, count };
-    }
-    // what the own amplitudes have absorbed: their columns times the root of their covariance
-    let all = columns(&fitted.poles, records.interval_s, fitted.unit_s, samples, records.drift);
-    let root = &fitted.projection.solved[members[0].0].root;
-    let directions: Vec<Vec<f64>> = (0..own)
-        .map(|j| {
-            let mut direction = vec![0.0; samples];
-            for (i, column) in all.iter().enumerate().take(j + 1) {
-                direction.iter_mut().zip(column).for_each(|(d, v)| *d += root[(i, j)] * v);
-            }
-            gaps.apply(0, &mut direction, &taper);
-            direction
-        })
-        .collect();
-    let absorbed = summed_periodograms(&directions, &taper);
-    observed.iter_mut().zip(absorbed).for_each(|(o, a)| *o = *o / count + a);
-    let parts = expected_parts(shape, records.interval_s, &gaps.lag_weights(&taper));
-    Bins { observed, parts, count }
-}
-
 /// Variances under which all bins are likeliest; white noise alone where wander does not raise the likelihood enough.
-fn likeliest(bins: &[Bins], shape: &RingdownNoise) -> RingdownNoise {
+///
+/// `last`: the white part to start from.
+fn likeliest(bins: &[Bins<'_>], shape: &RingdownNoise, last: f64) -> RingdownNoise {
     // bin 0 is each record's own offset: `variances` leaves the first out, a dummy here
     let mut observed = vec![0.0];
     let mut unit = vec![vec![0.0]; shape.parts()];
     for group in bins {
         observed.extend_from_slice(&group.observed[1..]);
-        unit.iter_mut().zip(&group.parts).for_each(|(all, part)| all.extend_from_slice(&part[1..]));
+        unit.iter_mut().zip(group.parts).for_each(|(all, part)| all.extend_from_slice(&part[1..]));
     }
     let mean = (observed.iter().sum::<f64>() / (observed.len() - 1) as f64).max(f64::MIN_POSITIVE);
     let white = observed.iter().zip(&unit[0]).skip(1).map(|(o, u)| o / u.max(1e-300)).sum::<f64>()
@@ -196,7 +273,7 @@ fn likeliest(bins: &[Bins], shape: &RingdownNoise) -> RingdownNoise {
         .enumerate()
         .map(|(i, part)| {
             let peak = part.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-            if i == 0 { shape.white.min(mean) } else { 0.1 * mean / peak }
+            if i == 0 { last.min(mean) } else { 0.1 * mean / peak }
         })
         .collect();
     let mut values = variances(&observed, &unit, &start);

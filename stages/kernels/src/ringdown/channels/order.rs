@@ -1,10 +1,10 @@
 //! How many modes there are: one after the other, each judged by what it explains.
 
-use super::bank::candidates;
+use super::bank::Bank;
 use super::basis::{Poles, own_count};
 use super::fit::{ARRIVED, Fitted, NEARLY};
 use super::levels::{density, flat, local_variances, residuals};
-use super::noise::{degrees, estimated, first_noise, rescaled};
+use super::noise::{NoiseModel, degrees, first_noise, rescaled};
 use super::options::{ChannelNoise, ChannelOptions, ModesWanted};
 use super::records::Records;
 use super::result::{ChannelRingdown, OrderTried};
@@ -12,6 +12,7 @@ use crate::model::{ModelError, finite};
 use crate::ringdown::RingdownNoise;
 use crate::statistics::chi_square_tail;
 use faer::c64;
+use std::cell::OnceCell;
 
 /// Candidates of the bank that are tried for each further mode.
 const CANDIDATES: usize = 2;
@@ -24,6 +25,8 @@ const CERTAIN: f64 = 10.0;
 /// Operations of a step up to which noise is whitened that is not flat over a mode's line: a tenth of a second. Beyond,
 /// least squares stay unbiased and lose a little.
 const WHITENED: f64 = 5e7;
+/// Share of the gain under white noise to which that under coloured noise is known.
+const PRECISION: f64 = 3e-3;
 /// Turns of noise and fit at the end.
 const NOISE_ROUNDS: usize = 2;
 
@@ -63,7 +66,7 @@ pub fn fit_channels(
         finite("free stretch", stretch)?;
     }
     let records = Records::of(events, interval_s, options)?;
-    let ladder = Ladder { records: &records, free, options };
+    let ladder = Ladder { records: &records, noise: NoiseModel::new(&records, free, &options.noise), options };
     let (step, seen) = if options.start.is_empty() { ladder.climb()? } else { (ladder.given(), Vec::new()) };
     ChannelRingdown::of(&records, ladder.refined(step), seen)
 }
@@ -77,27 +80,25 @@ struct Step {
     noise: Vec<RingdownNoise>,
     /// Energy that each channel leaves, in its own unit; of given noise the whitened one.
     energy: Vec<f64>,
+    /// Minus twice the log-likelihood under its noise, where it was asked for.
+    coloured: OnceCell<f64>,
 }
 
 /// What later steps are compared with.
 #[derive(Clone)]
 struct Mark {
     poles: Poles,
-    weights: Vec<RingdownNoise>,
     noise: Vec<RingdownNoise>,
     energy: Vec<f64>,
-}
-
-impl Step {
-    fn mark(&self) -> Mark {
-        let (poles, weights) = (self.fitted.poles.clone(), self.weights.clone());
-        Mark { poles, weights, noise: self.noise.clone(), energy: self.energy.clone() }
-    }
+    /// Minus twice the log-likelihood under the weights of its fit.
+    plain: f64,
+    /// The same under its noise, where it was asked for.
+    coloured: OnceCell<f64>,
 }
 
 struct Ladder<'a> {
     records: &'a Records<'a>,
-    free: &'a [Vec<&'a [f64]>],
+    noise: NoiseModel<'a>,
     options: &'a ChannelOptions,
 }
 
@@ -115,7 +116,13 @@ impl Ladder<'_> {
         let fitted = self.fit(start, weights, NEARLY);
         let unit = |c: usize| if self.given_noise() { 1.0 } else { weights[c].white };
         let energy = fitted.energy.iter().enumerate().map(|(c, energy)| energy * unit(c)).collect();
-        Step { fitted, weights: weights.to_vec(), noise: weights.to_vec(), energy }
+        Step { fitted, weights: weights.to_vec(), noise: weights.to_vec(), energy, coloured: OnceCell::new() }
+    }
+
+    fn mark(&self, step: &Step) -> Mark {
+        let plain = step.fitted.deviance(self.records);
+        let (poles, noise) = (step.fitted.poles.clone(), step.noise.clone());
+        Mark { poles, noise, energy: step.energy.clone(), plain, coloured: step.coloured.clone() }
     }
 
     /// The same with each channel's weight from what it leaves, and its noise.
@@ -125,14 +132,26 @@ impl Ladder<'_> {
         }
         let weights = rescaled(self.records, &step.fitted, &step.weights);
         let mut step = self.weighed(&step.fitted.poles, &weights);
-        step.noise = estimated(self.records, self.free, &step.fitted, &step.weights, &self.options.noise);
+        step.noise = self.noise.estimated(&step.fitted, &step.weights);
         step
     }
 
-    /// Minus twice the log-likelihood under white or under coloured noise, whichever is likelier.
-    fn deviance(&self, mark: &Mark) -> f64 {
-        let of = |noise: &[RingdownNoise]| self.fit(&mark.poles, noise, NEARLY).deviance(self.records);
-        of(&mark.weights).min(of(&mark.noise))
+    /// Minus twice the log-likelihood of a fit from these poles under this noise, to so much.
+    fn deviance(&self, poles: &Poles, noise: &[RingdownNoise], precision: f64) -> f64 {
+        self.fit(poles, noise, precision.sqrt()).deviance(self.records)
+    }
+
+    /// Gain of twice the log-likelihood, each step under white or under coloured noise, whichever is likelier; a lower
+    /// bound of it where that is more than chance.
+    fn likelihood_gain(&self, before: &Mark, step: &Step, modes: usize) -> f64 {
+        let plain = step.fitted.deviance(self.records);
+        let precision = (PRECISION * (before.plain - plain)).max(NEARLY * NEARLY);
+        let of = |poles: &Poles, noise: &[RingdownNoise]| self.deviance(poles, noise, precision);
+        let least = before.coloured.get_or_init(|| of(&before.poles, &before.noise)).min(before.plain);
+        if !self.by_chance(least - plain, modes) {
+            return least - plain;
+        }
+        least - plain.min(*step.coloured.get_or_init(|| of(&step.fitted.poles, &step.noise)))
     }
 
     /// Operations of a step of the fit under coloured noise.
@@ -172,7 +191,7 @@ impl Ladder<'_> {
         if !coloured || self.by_chance(gain, places.len()) || self.operations(&step.fitted.poles) > WHITENED {
             return gain;
         }
-        gain.min(self.deviance(before) - self.deviance(&step.mark()))
+        gain.min(self.likelihood_gain(before, step, places.len()))
     }
 
     /// Whether noise alone would gain that much with `modes` further ones.
@@ -203,7 +222,7 @@ impl Ladder<'_> {
             ModesWanted::AtMost(count) => (0, count),
         };
         let mut current = self.weighed(&Poles(Vec::new()), &self.first_noise());
-        let mut needed = current.mark();
+        let mut needed = self.mark(&current);
         // without a mode all is noise: what that explains needs none
         needed.noise = self.settled(self.weighed(&Poles(Vec::new()), &self.first_noise())).noise;
         let mut all_noise = Some(needed.noise.clone());
@@ -216,7 +235,7 @@ impl Ladder<'_> {
             let kept = modes <= least || !self.by_chance(gain, modes - place);
             seen.push(OrderTried { modes, gain, kept });
             if kept {
-                (needed, place) = (next.mark(), modes);
+                (needed, place) = (self.mark(&next), modes);
                 best = None;
             } else if modes > place + BEYOND {
                 break;
@@ -241,14 +260,15 @@ impl Ladder<'_> {
     /// gain no more than noise may. `other`: one more noise under which places are looked for.
     fn next(&self, current: &Step, other: Option<&[RingdownNoise]>, wanted: bool) -> Option<Step> {
         let least_q = self.options.least_quality_factor;
-        let places = |noise: &[RingdownNoise]| candidates(self.records, noise, &current.fitted, least_q, CANDIDATES);
+        let bank = Bank::of(self.records, &current.fitted, least_q);
+        let places = |noise: &[RingdownNoise]| bank.candidates(noise, &current.fitted.poles, CANDIDATES);
         let plain: Vec<RingdownNoise> = current.noise.iter().map(|noise| RingdownNoise::white(noise.white)).collect();
         let mut banks = vec![places(&current.noise)];
         if current.noise != plain {
             banks.push(places(&plain));
         }
         banks.extend(other.map(places));
-        let before = current.mark();
+        let before = self.mark(current);
         let mut found: Option<Step> = None;
         let mut tried: Vec<Poles> = Vec::new();
         let cost = |step: &Step| -> f64 { step.fitted.energy.iter().sum() };
@@ -284,7 +304,7 @@ impl Ladder<'_> {
                 let mut poles = step.fitted.poles.clone();
                 let place = poles.0.remove(j);
                 let smaller = self.weighed(&poles, &step.weights);
-                (self.gain(&self.settled(smaller).mark(), &step, &[place]), poles)
+                (self.gain(&self.mark(&self.settled(smaller)), &step, &[place]), poles)
             };
             let doubtful = |j: &usize| self.by_chance(step.fitted.projection.strength(*j) / CERTAIN, 1);
             let least = (0..count).filter(doubtful).map(without).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -315,7 +335,7 @@ impl Ladder<'_> {
                 fitted = self.fit(&fitted.poles, &white, if round + 1 == NOISE_ROUNDS { ARRIVED } else { NEARLY });
                 noise = match noise.iter().all(RingdownNoise::is_white) {
                     true => rescaled(self.records, &fitted, &white),
-                    false => estimated(self.records, self.free, &fitted, &white, &self.options.noise),
+                    false => self.noise.estimated(&fitted, &white),
                 };
             }
             let white: Vec<RingdownNoise> = noise.iter().map(|noise| RingdownNoise::white(mean(noise))).collect();
@@ -331,7 +351,7 @@ impl Ladder<'_> {
             fitted = self.fit(&fitted.poles, &noise, NEARLY);
         }
         for _ in 0..NOISE_ROUNDS {
-            noise = estimated(self.records, self.free, &fitted, &noise, &self.options.noise);
+            noise = self.noise.estimated(&fitted, &noise);
             fitted = self.fit(&fitted.poles, &noise, ARRIVED);
         }
         if !self.given_noise() {

@@ -9,7 +9,7 @@ use crate::ringdown::gaps::Gaps;
 use crate::ringdown::whitener::Whitener;
 
 use super::options::ChannelOptions;
-use crate::signal::code_step;
+use crate::signal::{TransformPlans, code_step};
 
 /// One channel of one event.
 pub(super) struct Record<'a> {
@@ -44,6 +44,7 @@ pub(super) struct Records<'a> {
     /// Variance of each channel's rounding, which its noise is not below: of its codes, or of numbers of 30 bits. A
     /// channel that is one number throughout has that weight.
     pub rounding: Vec<f64>,
+    pub plans: TransformPlans,
 }
 
 impl<'a> Records<'a> {
@@ -89,7 +90,8 @@ impl<'a> Records<'a> {
         }
         let longest = all.iter().map(|record| record.values.len()).max().unwrap_or(0);
         let rounding = (0..channels).map(|c| rounding(&all, c)).collect();
-        Ok(Self { all, channels, events: events.len(), interval_s, longest, drift: options.drift, rounding })
+        let plans = TransformPlans::default();
+        Ok(Self { all, channels, events: events.len(), interval_s, longest, drift: options.drift, rounding, plans })
     }
 
     /// Samples of a channel that are there.

@@ -203,10 +203,14 @@ impl<'a> Recursion<'a> {
         let plain = Mat::from_fn(BLOCK, one + 2, |i, j| self.block[(i, if j <= one { j } else { number })]);
         let fitted = product(plain.as_ref(), shares.as_ref());
         let rows = self.rows();
-        let head = (0..self.head)
-            .map(|k| signal[k] - amplitudes.iter().enumerate().map(|(j, a)| a * rows[(k, j)]).sum::<f64>());
-        let blocks = (0..tail.ncols()).flat_map(|b| (0..BLOCK).map(move |k| (k, b)));
-        head.chain(blocks.map(|(k, b)| tail[(k, b)] - fitted[(k, b)])).collect()
+        let mut left = signal.to_vec();
+        for (j, a) in amplitudes.iter().enumerate() {
+            left.iter_mut().take(self.head).enumerate().for_each(|(k, y)| *y -= a * rows[(k, j)]);
+        }
+        for (own, fitted) in left[self.head..].chunks_exact_mut(BLOCK).zip(fitted.col_iter()) {
+            own.iter_mut().zip(fitted.iter()).for_each(|(y, f)| *y -= f);
+        }
+        left
     }
 
     /// Solves with the transposed triangle; a column of rounding alone gets nothing.
