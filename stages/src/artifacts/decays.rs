@@ -66,17 +66,19 @@ impl<'a> Decays<'a> {
     pub fn leave_out_short(&mut self, least: usize) -> Vec<usize> {
         let present = |row: &&[f64]| row.iter().filter(|value| value.is_finite()).count();
         let is_long = |hit: &Vec<&[f64]>| hit.iter().map(present).min().is_some_and(|samples| samples >= least);
-        let (mut kept, mut numbers, mut short) = (Vec::new(), Vec::new(), Vec::new());
-        for (hit, number) in std::mem::take(&mut self.hits).into_iter().zip(std::mem::take(&mut self.numbers)) {
-            if is_long(&hit) {
-                kept.push(hit);
-                numbers.push(number);
-            } else {
-                short.push(number);
-            }
-        }
-        (self.hits, self.numbers) = (kept, numbers);
+        let (kept, short): (Vec<usize>, Vec<usize>) =
+            (0..self.hits.len()).partition(|&place| self.hits.get(place).is_some_and(is_long));
+        let short = short.into_iter().filter_map(|place| self.numbers.get(place).copied()).collect();
+        self.keep(&kept);
         short
+    }
+
+    /// Leaves these hits, by their places, ascending.
+    pub fn keep(&mut self, places: &[usize]) {
+        let mut place = 0..;
+        self.hits.retain(|_| place.next().is_some_and(|place| places.contains(&place)));
+        let mut place = 0..;
+        self.numbers.retain(|_| place.next().is_some_and(|place| places.contains(&place)));
     }
 
     /// The samples of each stretch that are missing.

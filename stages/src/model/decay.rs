@@ -1,6 +1,7 @@
 //! The stage `model.decay`.
 
 mod course;
+mod systems;
 mod tables;
 
 use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Spec, Stage, StageError, Table};
@@ -8,6 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::course::Parts;
+use self::systems::Systems;
 use self::tables::{fit_array, hit_table, modes_with_lack, summary};
 use super::count::Count;
 use crate::artifacts::{Decays, shape_array};
@@ -23,8 +25,10 @@ use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Dro
 /// probability below `false_alarm`. Exponentials that a mode leaves because it moves with its amplitude (in its line,
 /// of its shape, twice as fast) and lines that do not die away are left out. The first and the last part of the decays are
 /// fitted too and their difference is tested: where a mode moves and none has died away, the last part counts.
+/// Of several hits each is fitted by itself first: hits without a mode in common are of unlike systems, and those of one
+/// of them (`system`) are fitted.
 /// Shapes: `modes` by row, ascending; `shapes` over mode and channel with the modal assurance criterion over mode and
-/// mode; `hits` a row per hit and mode; `course` a row per mode and part; `fit` over channel and time of the largest hit.
+/// mode; `hits` a row per hit and mode; `course` a row per mode and part; `systems` a row per hit; `fit` over channel and time of the largest hit.
 /// Units: Hz; shapes relative to the channel with the largest amplitude; amplitudes in the channels' units.
 /// Accuracy: docs/results/decay.md. Standard errors count what the fit leaves round each mode (`lack_of_fit`).
 /// Errors: no decay with 24 samples (shorter ones are left out with a warning); no oscillation.
@@ -40,6 +44,10 @@ pub struct DecayFit {
     pub max_modes: usize,
     /// Noise beside the ringing: `estimated` (white and wander, per channel) or `white`.
     pub noise: DecayNoise,
+    /// Of which system the hits are fitted, where they are of several: 1 is that of most hits, `systems` lists them. Default
+    /// 1. Why: hits of one structure are of one system, whatever it is hit with and where.
+    #[schemars(range(min = 1))]
+    pub system: usize,
     /// What counts of a mode that moves far while it dies away: `auto`, its last part, or `whole`, all.
     pub part: FittedPart,
     /// How it is fitted.
@@ -73,6 +81,7 @@ impl Default for DecayFit {
             modes: Count::Auto,
             max_modes: 12,
             noise: DecayNoise::Estimated,
+            system: 1,
             part: FittedPart::Auto,
             fit: ChannelOptions::default(),
         }
@@ -84,6 +93,8 @@ pub(super) const SHAPES: Port<Array> =
     Port::new("shapes", "mode-shapes", "complex mode shapes over mode and channel, and how alike they are");
 const HITS: Port<Table> = Port::new("hits", "decay-hits", "amplitude of each mode in each hit");
 const COURSE: Port<Table> = Port::new("course", "decay-course", "modes of the first and the last part of the decays");
+pub(super) const SYSTEMS: Port<Table> =
+    Port::new("systems", "decay-systems", "strongest mode of each hit by itself, and its system");
 const FIT: Port<Array> = Port::new("fit", "decay-fit", "the largest hit as measured, as fitted, and what is left");
 pub(super) const SUMMARY: Port<Document> =
     Port::new("summary", "summary", "modes with damping and shapes, noise, what does not fit");
@@ -95,13 +106,17 @@ impl Stage for DecayFit {
         version: 5,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
-        outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), FIT.spec(), SUMMARY.spec()],
+        outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), SYSTEMS.spec(), FIT.spec(), SUMMARY.spec()],
         source: "G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413",
         ..Spec::STORED
     };
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let decays = long_enough(Decays::new(inputs.get(&DECAYS)?)?, cx)?;
+        let mut decays = long_enough(Decays::new(inputs.get(&DECAYS)?)?, cx)?;
+        let systems = Systems::of(&decays, &self.options());
+        systems.choose(self.system, &mut decays)?;
+        systems.warning(self.system).into_iter().for_each(|warning| cx.warn(warning));
+        let decays = decays;
         let whole = self.part == FittedPart::Whole;
         let options = ChannelOptions { missing: decays.missing(), ..self.options() };
         let followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, whole)
@@ -123,8 +138,9 @@ impl Stage for DecayFit {
             .with(&SHAPES, shape_array(&fit.shapes.iter().collect::<Vec<_>>(), &channels))
             .with(&HITS, hit_table(&followed.whole, &decays))
             .with(&COURSE, parts.table())
+            .with(&SYSTEMS, systems.table())
             .with(&FIT, fit_array(&followed.fitted, &decays))
-            .with(&SUMMARY, summary(&followed, &parts, &decays)?))
+            .with(&SUMMARY, summary(&followed, &parts, &systems, &decays)?))
     }
 
     fn examples() -> Vec<Example> {

@@ -121,7 +121,7 @@ impl<'a> Parts<'a> {
 }
 
 /// A value times a factor, to a tenth of its standard error.
-fn digits(estimate: Estimate, factor: f64) -> String {
+pub(super) fn digits(estimate: Estimate, factor: f64) -> String {
     let decimals = (1.0 - (factor * estimate.std).abs().log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{:.decimals$}", factor * estimate.value)
 }

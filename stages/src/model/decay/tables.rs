@@ -4,6 +4,7 @@ use afmid_pipeline::{Array, Axis, Document, StageError, Table};
 use serde_json::{Value, json};
 
 use super::course::{Parts, dropped_document};
+use super::systems::Systems;
 use crate::artifacts::{Decays, SAMPLE_RATE_HZ, mode_table, shaped_mode};
 use afmid_kernels::ringdown::{ChannelRingdown, FollowedDecay, ModeEstimate, ModeShape, RingdownNoise};
 
@@ -78,6 +79,7 @@ pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
 pub(super) fn summary(
     followed: &FollowedDecay,
     parts: &Parts<'_>,
+    systems: &Systems,
     decays: &Decays<'_>,
 ) -> Result<Document, StageError> {
     let fit = &followed.fit;
@@ -93,6 +95,7 @@ pub(super) fn summary(
     Document::new(&json!({
         "modes": modes.iter().zip(&fit.shapes).map(mode).collect::<Vec<Value>>(),
         "hits": decays.hits.len(),
+        "systems": systems.document(),
         "channels": decays.sensors,
         "converged": fit.verdict.converged,
         "noise": fit.noise.iter().map(noise).collect::<Vec<Value>>(),

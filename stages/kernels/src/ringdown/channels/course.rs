@@ -71,7 +71,7 @@ const SEEN: f64 = 18.5;
 const ONE_CUT: f64 = 2.0;
 /// Phase in radian by which a linear mode may be wrong while the mode that it stands for dies away: a tenth, a shift of
 /// the frequency by a tenth of the half width; likewise of the damping.
-const FAR: f64 = 0.1;
+pub(super) const FAR: f64 = 0.1;
 
 /// Fits decays as [`fit_channels`] does, looks whether their modes move with their amplitude, and leaves out what is no
 /// mode.

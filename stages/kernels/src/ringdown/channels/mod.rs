@@ -4,7 +4,8 @@
 //! projection (amplitudes solved for), fit (the search on poles), noise (of each channel), levels (of what
 //! is left round a line), bank (where another mode may be), order
 //! (how many there are), shape (rank-one residues), result,
-//! companions (what is no mode), course (whether modes move: [`follow_channels`]).
+//! companions (what is no mode), course (whether modes move: [`follow_channels`]), systems (whether all hits are of one:
+//! [`hit_systems`]).
 
 mod bank;
 mod basis;
@@ -22,6 +23,9 @@ mod records;
 mod recursion;
 mod result;
 mod shape;
+mod systems;
+#[cfg(test)]
+mod systems_tests;
 #[cfg(test)]
 mod tests;
 
@@ -31,3 +35,4 @@ pub use options::{ChannelNoise, ChannelOptions, ModesWanted};
 pub use order::fit_channels;
 pub use result::{ChannelRingdown, OrderTried, RecordFit};
 pub use shape::{ModeShape, RankOne, ShapePoint};
+pub use systems::{HitSystems, hit_systems};

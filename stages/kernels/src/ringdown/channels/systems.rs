@@ -1,0 +1,136 @@
+//! Whether all hits are of one linear system.
+
+use faer::c64;
+use rayon::prelude::*;
+
+use super::companions::energies;
+use super::course::{FAR, MOVES, follow_channels};
+use super::options::{ChannelOptions, ModesWanted};
+use super::result::ChannelRingdown;
+use crate::ringdown::ModeEstimate;
+use crate::statistics::chi_square_tail;
+
+/// Modes of a hit by itself that are looked for at most: two hits of one structure at different places share one of
+/// their six strongest.
+const MODES: usize = 6;
+/// Motion of a mode between the parts of a hit that another hit may be away. A frequency that goes with the square of
+/// the amplitude moves 0.83 of what is left to zero between the mean of a hit's energy and its last part.
+const MOTION: f64 = 3.0;
+
+/// Hits by the linear systems that they are of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HitSystems {
+    /// Strongest mode of each hit, fitted by itself; none where it shows none.
+    pub strongest: Vec<Option<ModeEstimate>>,
+    /// Numbers of the hits of each system, ascending; the system with the most hits first.
+    pub systems: Vec<Vec<usize>>,
+}
+
+/// A hit's modes by itself.
+struct Alone {
+    fit: ChannelRingdown,
+    modes: Vec<ModeEstimate>,
+    /// Distance between each mode's poles of the first and the last part; 0 where it does not move.
+    motion: Vec<f64>,
+    strongest: usize,
+    energy: f64,
+}
+
+/// Groups hits by whether one set of poles can describe them.
+///
+/// # Model
+/// As [`fit_channels`](super::fit_channels), for the hits of each system; a system has modes of its own.
+/// # Method
+/// Each hit is fitted by itself, six modes at most. From the one with the most energy on, each joins the first system
+/// with whose first hit it has a mode in common: the strongest of either is one of the other's. Two poles are of one
+/// mode unless their difference has a probability below 0.001 over the number of hits, and exceeds what one linear mode
+/// can stand for (a tenth of the half width to either side) and what the mode's motion with its amplitude explains.
+/// Hits without a mode by themselves are of the first system.
+/// # Shapes
+/// `events` and `free`: as [`fit_channels`](super::fit_channels).
+/// # Units
+/// As [`fit_channels`](super::fit_channels).
+/// # Accuracy
+/// docs/results/decay.md.
+pub fn hit_systems(
+    events: &[Vec<&[f64]>],
+    free: &[Vec<&[f64]>],
+    interval_s: f64,
+    options: &ChannelOptions,
+) -> HitSystems {
+    let alone: Vec<Option<Alone>> =
+        (0..events.len()).into_par_iter().map(|hit| Alone::of(&events[hit], hit, free, interval_s, options)).collect();
+    let mut order: Vec<(usize, &Alone)> =
+        alone.iter().enumerate().filter_map(|(hit, own)| own.as_ref().map(|own| (hit, own))).collect();
+    order.sort_by(|a, b| b.1.energy.total_cmp(&a.1.energy).then(a.0.cmp(&b.0)));
+    let mut systems: Vec<(&Alone, Vec<usize>)> = Vec::new();
+    for (hit, own) in order {
+        match systems.iter_mut().find(|(first, _)| first.shares_mode(own, events.len())) {
+            Some((_, hits)) => hits.push(hit),
+            None => systems.push((own, vec![hit])),
+        }
+    }
+    let mut systems: Vec<Vec<usize>> = systems.into_iter().map(|(_, hits)| hits).collect();
+    systems.sort_by_key(|hits| std::cmp::Reverse(hits.len()));
+    let silent = (0..events.len()).filter(|&hit| alone[hit].is_none());
+    match systems.first_mut() {
+        Some(first) => first.extend(silent),
+        None => systems.push(silent.collect()),
+    }
+    systems.iter_mut().for_each(|hits| hits.sort_unstable());
+    let strongest = alone.iter().map(|own| own.as_ref().map(|own| own.modes[own.strongest])).collect();
+    HitSystems { strongest, systems }
+}
+
+impl Alone {
+    fn of(
+        event: &[&[f64]],
+        hit: usize,
+        free: &[Vec<&[f64]>],
+        interval_s: f64,
+        options: &ChannelOptions,
+    ) -> Option<Self> {
+        let missing = options.missing.get(hit).map(|gaps| vec![gaps.clone()]).unwrap_or_default();
+        let options = ChannelOptions { modes: ModesWanted::AtMost(MODES), missing, ..options.clone() };
+        let followed = follow_channels(&[event.to_vec()], free, interval_s, &options, true).ok()?;
+        let fit = followed.whole;
+        let modes = fit.modes();
+        let mut motion = vec![0.0; modes.len()];
+        for course in followed.course.iter().filter(|course| course.moves) {
+            motion[course.mode] = (pole(&course.last) - pole(&course.first)).norm();
+        }
+        let energies = energies(&fit);
+        let strongest = (0..energies.len()).max_by(|&a, &b| energies[a].total_cmp(&energies[b]))?;
+        Some(Self { energy: energies[strongest], fit, modes, motion, strongest })
+    }
+
+    fn shares_mode(&self, other: &Self, hits: usize) -> bool {
+        let one =
+            |own: &Self, other: &Self| (0..other.modes.len()).any(|j| own.is_mode_of(own.strongest, other, j, hits));
+        one(self, other) || one(other, self)
+    }
+
+    /// Whether two poles are of one mode.
+    fn is_mode_of(&self, i: usize, other: &Self, j: usize, hits: usize) -> bool {
+        let (one, two) = (self.fit.poles[i], other.fit.poles[j]);
+        let d = one - two;
+        let motion = MOTION * (self.motion[i] + other.motion[j]);
+        if d.norm() <= 2.0 * FAR * one.re.abs().min(two.re.abs()) + motion {
+            return true;
+        }
+        let sum = |a: usize, b: usize| {
+            self.fit.covariance[(2 * i + a, 2 * i + b)] + other.fit.covariance[(2 * j + a, 2 * j + b)]
+        };
+        let (rr, ri, ii) = (sum(0, 0), sum(0, 1), sum(1, 1));
+        let square = (ii * d.re * d.re - 2.0 * ri * d.re * d.im + rr * d.im * d.im) / (rr * ii - ri * ri);
+        // a pole without a finite error is no evidence
+        !square.is_finite() || chi_square_tail(square.max(0.0), 2) * hits as f64 >= MOVES
+    }
+}
+
+/// Pole of a mode, rad/s.
+fn pole(mode: &ModeEstimate) -> c64 {
+    let w = std::f64::consts::TAU * mode.frequency_hz.value;
+    let damping = mode.damping_ratio().value;
+    c64::new(-damping * w, w * (1.0 - damping * damping).max(0.0).sqrt())
+}

@@ -1,0 +1,87 @@
+//! Known truth: hits of one structure, linear or not, and of several.
+
+use std::f64::consts::TAU;
+
+use super::*;
+use crate::fixture::white_noise;
+
+const INTERVAL_S: f64 = 2e-4;
+const SAMPLES: usize = 3000;
+
+/// Frequency, damping ratio and amplitude of a mode, and what its frequency gains at unit amplitude, relative to itself.
+#[derive(Clone, Copy)]
+struct Mode(f64, f64, f64, f64);
+
+/// A hit of a structure whose frequencies go with the square of their amplitude: of `A exp(-a t)` the phase has the
+/// further part `w shift A^2 (1 - exp(-2 a t)) / 2 a`.
+fn hit(modes: &[Mode], noise: f64, seed: u64) -> Vec<f64> {
+    let mut out = white_noise(SAMPLES, noise, seed);
+    for Mode(frequency_hz, damping, amplitude, shift) in modes {
+        let (w, rate) = (TAU * frequency_hz, TAU * frequency_hz * damping);
+        for (k, y) in out.iter_mut().enumerate() {
+            let t = k as f64 * INTERVAL_S;
+            let late = w * shift * amplitude * amplitude * (1.0 - (-2.0 * rate * t).exp()) / (2.0 * rate);
+            *y += amplitude * (-rate * t).exp() * (w * (1.0 - damping * damping).sqrt() * t + late).cos();
+        }
+    }
+    out
+}
+
+fn found(hits: &[Vec<f64>]) -> Vec<Vec<usize>> {
+    let events: Vec<Vec<&[f64]>> = hits.iter().map(|hit| vec![&hit[..]]).collect();
+    hit_systems(&events, &[], INTERVAL_S, &ChannelOptions::default()).systems
+}
+
+/// Numbers between 0 and 1 that look drawn.
+fn share(seed: u64, k: u64) -> f64 {
+    ((seed * 37 + k * 101 + 13) as f64 * 0.618_033_988_75).fract()
+}
+
+#[test]
+fn hits_of_a_linear_structure_are_of_one_system() {
+    for seed in 0..20 {
+        let hits: Vec<Vec<f64>> = (0..5)
+            .map(|h| {
+                // at another place each mode has another amplitude, down to a hundredth
+                let size = |j: u64| 10f64.powf(-2.0 * share(seed, 3 * h + j));
+                let modes = [(90.0, 0.006), (131.0, 0.003), (240.0, 0.01)];
+                let all: Vec<Mode> = (0..3).map(|j| Mode(modes[j].0, modes[j].1, size(j as u64), 0.0)).collect();
+                hit(&all, 0.002, 50 * seed + h)
+            })
+            .collect();
+        assert_eq!(found(&hits).len(), 1, "seed {seed}: {:?}", found(&hits));
+    }
+}
+
+#[test]
+fn hits_of_unlike_size_of_a_structure_that_stiffens_are_of_one_system() {
+    for seed in 0..12 {
+        let sizes = [1.0, 0.6, 0.3, 0.1];
+        // the largest hit's shift is half the half width and more
+        let shift = 0.002 + 0.004 * share(seed, 1);
+        let hits: Vec<Vec<f64>> =
+            (0..4).map(|h| hit(&[Mode(120.0, 0.004, sizes[h], shift)], 0.001, 9 * seed + h as u64)).collect();
+        assert_eq!(found(&hits).len(), 1, "seed {seed}: {:?}", found(&hits));
+    }
+}
+
+#[test]
+fn hits_of_unlike_systems_are_parted() {
+    for seed in 0..12 {
+        // frequencies two half widths apart, and one whose damping alone differs by a half
+        let systems = [Mode(120.0, 0.004, 1.0, 0.0), Mode(121.0, 0.004, 1.0, 0.0), Mode(120.0, 0.006, 1.0, 0.0)];
+        let which = [0, 1, 0, 2, 0, 1];
+        let hits: Vec<Vec<f64>> = (0..6).map(|h| hit(&[systems[which[h]]], 0.01, 17 * seed + h as u64)).collect();
+        assert_eq!(found(&hits), [vec![0, 2, 4], vec![1, 5], vec![3]], "seed {seed}");
+    }
+}
+
+#[test]
+fn a_hit_without_ringing_is_of_the_first_system() {
+    let ring = |seed| hit(&[Mode(120.0, 0.004, 1.0, 0.0)], 0.01, seed);
+    let hits = [ring(1), white_noise(SAMPLES, 0.01, 5), ring(2)];
+    let events: Vec<Vec<&[f64]>> = hits.iter().map(|hit| vec![&hit[..]]).collect();
+    let found = hit_systems(&events, &[], INTERVAL_S, &ChannelOptions::default());
+    assert_eq!(found.systems, [vec![0, 1, 2]]);
+    assert!(found.strongest[0].is_some() && found.strongest[1].is_none());
+}
