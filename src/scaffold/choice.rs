@@ -4,10 +4,11 @@ use afmid_kernels::events::decay::FreeDecay;
 use afmid_kernels::harmonics::is_tone;
 use afmid_kernels::spectra::{is_impulsive, shows_resonance};
 
-use super::channels::{drives, inputs, is_named, named, nothing, outputs, sensors, usable};
+use super::channels::{drives, inputs, is_named, named, nothing, outputs, usable};
 use super::first_file::FirstFile;
 use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
+use super::sensors::{Sensors, left_out, sensors};
 use crate::cli::{Goal, RecordsAre};
 use crate::inspect::{Channel, counted};
 use crate::show::number;
@@ -29,12 +30,14 @@ pub struct Choice<'a> {
     pub records_are: Option<RecordsAre>,
     /// Why, for a comment in the config; empty where the user chose.
     pub why: String,
+    /// What is left out, for comments and for the user.
+    pub notes: Vec<String>,
 }
 
 impl<'a> Choice<'a> {
     /// Without a measured input.
     pub fn of(goal: Goal, channels: Vec<&'a Channel>, why: String) -> Self {
-        Self { goal, channels, inputs: Vec::new(), struck: false, records_are: None, why }
+        Self { goal, channels, inputs: Vec::new(), struck: false, records_are: None, why, notes: Vec::new() }
     }
 }
 
@@ -80,9 +83,11 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     let outputs = outputs(file.source, wanted, &inputs, goal == Goal::Frf)?;
     let names = |all: &[&Channel]| all.iter().map(|one| one.location.as_str()).collect::<Vec<&str>>().join(", ");
     let short = if struck { ", which is short as a hammer's," } else { "" };
-    let (input, output, file) = (names(&inputs), names(&outputs), file.source.name());
-    let why = format!("measured input {input}{short} and output {output} in {file}");
-    Ok(Choice { inputs, struck, ..Choice::of(goal, outputs, why) })
+    let (input, output, source) = (names(&inputs), names(&outputs), file.source);
+    let why = format!("measured input {input}{short} and output {output} in {}", source.name());
+    let taken: Vec<&Channel> = outputs.iter().chain(&inputs).copied().collect();
+    let notes = left_out(&source.channels, &taken).filter(|_| wanted.channels.is_empty()).into_iter().collect();
+    Ok(Choice { inputs, struck, notes, ..Choice::of(goal, outputs, why) })
 }
 
 fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
@@ -130,17 +135,21 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
         return Err(("--as points: decays without a measured force have no common scale".to_owned(), Some(help)));
     }
     let source = file.source;
-    let channels = match wanted.channels {
-        [] => sensors(source)?,
-        names => names.iter().map(|name| named(source, name)).collect::<Result<Vec<_>, _>>()?,
+    let Sensors { channels, left_out } = match wanted.channels {
+        [] => sensors(file)?,
+        names => {
+            let channels = names.iter().map(|name| named(source, name)).collect::<Result<Vec<_>, _>>()?;
+            Sensors { channels, left_out: None }
+        }
     };
+    let notes: Vec<String> = left_out.into_iter().collect();
     let cells = channels.len() > 1 && channels.iter().all(|channel| channel.location.ends_with('}'));
     let records_are = wanted.records_are.or(cells.then_some(RecordsAre::Hits));
     // cells are hits of their own: one is enough to see what they are
     let seen = if records_are == Some(RecordsAre::Hits) { &channels[..1] } else { &channels[..] };
     let (values, found) = file.search(seen, wanted)?;
     let record = source.name();
-    let other = |goal, why| Ok(Choice::of(goal, vec![channels[0]], why));
+    let other = |goal, why| Ok(Choice { notes: notes.clone(), ..Choice::of(goal, vec![channels[0]], why) });
     let why = match (found.decays.first(), found.reason()) {
         (Some(_), _) if guessed && found.random => {
             return other(Goal::Thermal, format!("{record}: rises and falls of a random vibration, no free decays"));
@@ -163,5 +172,5 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
         (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };
     let hammer = file.hammer().filter(|_| guessed).map(|hammer| format!("; {hammer}")).unwrap_or_default();
-    Ok(Choice { records_are, ..Choice::of(Goal::Decay, channels, why + &hammer) })
+    Ok(Choice { records_are, notes, ..Choice::of(Goal::Decay, channels, why + &hammer) })
 }

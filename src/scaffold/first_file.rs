@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 
 use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, find_decays};
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
-use afmid_pipeline::recording::{InputFiles, Reading, UnpackedContents, open_unpacked, responses};
+use afmid_pipeline::recording::{Contents, InputFiles, Reading, UnpackedContents, open_unpacked, responses};
 
 use super::channels::usable;
 use super::choice::Question;
@@ -39,8 +39,15 @@ impl<'a> FirstFile<'a> {
 
     /// Whether it holds frequency responses; `guessed`: even if nothing in it says so.
     pub fn has_responses(&self, guessed: bool) -> bool {
-        let found = self.opened().ok().and_then(|opened| responses(&opened.contents, None).ok()).unwrap_or_default();
-        !found.is_empty() && (guessed || found.iter().all(|response| !response.guessed))
+        self.opened().is_ok_and(|opened| holds_responses(&opened.contents, guessed))
+    }
+
+    /// Whether free decays are in a channel, each of its samples taken as one of time.
+    pub fn rings(&self, channel: &Channel) -> bool {
+        let Ok(values) = self.samples(channel) else { return false };
+        let rate = channel.sample_rate_hz.unwrap_or(1.0);
+        let found = find_decays(&[&values], rate, &DecaySearchOptions::default());
+        found.is_ok_and(|found| !found.random && !found.decays.is_empty())
     }
 
     /// A channel's first samples. Errors: they cannot be read.
@@ -90,4 +97,10 @@ impl<'a> FirstFile<'a> {
     fn plain(&self, problem: &str) -> Question {
         (format!("{}: {problem}", self.source.file.display()), None)
     }
+}
+
+/// Whether a file holds frequency responses; `guessed`: even if nothing in it says so.
+pub fn holds_responses(contents: &Contents, guessed: bool) -> bool {
+    let found = responses(contents, None).unwrap_or_default();
+    !found.is_empty() && (guessed || found.iter().all(|response| !response.guessed))
 }

@@ -123,6 +123,9 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
                 if line == "[pipeline]" && !choice.why.is_empty() {
                     text.push_str(&format!("# chosen: {}\n", one_line(&choice.why)));
                 }
+                for note in choice.notes.iter().filter(|_| line == "[pipeline]") {
+                    text.push_str(&format!("# {}\n", one_line(note)));
+                }
                 text.push_str(&format!("{line}\n"));
             }
         }
@@ -175,9 +178,9 @@ fn responses(source: &Source, wanted: Wanted<'_>, folder: &Path) -> String {
 fn columns(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
     let text = |text: &str| Value::String(text.to_owned());
     let (output, location) = (choice.channels[0], |channel: &&Channel| text(&channel.location));
-    if source.files > 1 {
+    if source.files.len() > 1 {
         let help = "give one file with all hits, or a config for each; --goal decay takes several without the force";
-        let problem = format!("{} files, wanted one record of input and output", source.files);
+        let problem = format!("{} files, wanted one record of input and output", source.files.len());
         return Err((problem, Some(help.to_owned())));
     }
     let mut params = Table::new();
@@ -222,7 +225,10 @@ mod tests {
             best: Some(0),
             reason: String::new(),
             remarks: Vec::new(),
-            files: 3,
+            files: vec![PathBuf::from("/lab/years/2004/a.tdms"); 3],
+            rate_hz: rate,
+            others: Vec::new(),
+            skipped: Vec::new(),
         }
     }
 

@@ -10,13 +10,18 @@ pub fn rate(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool)
     match (channel.sample_rate_hz, wanted.rate_hz) {
         (Some(_), None) => Ok(None),
         (None, Some(rate)) => Ok(Some(rate)),
-        (Some(rate), Some(other)) if rate == other => Ok(None),
+        (Some(rate), Some(other)) if same_rate(rate, other) => Ok(None),
         (Some(rate), Some(_)) => {
             let problem = format!("{} states {rate} samples per second", source.file.display());
             Err((problem, Some("leave --rate out".to_owned())))
         }
         (None, None) => Err(question(source, channel, wanted, unit)),
     }
+}
+
+/// Whether two rates are one: `io.records` takes them for the same within a millionth.
+pub fn same_rate(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
 }
 
 /// The unit to be written; none where the file states it. Errors: as [`rate`].

@@ -1,0 +1,153 @@
+//! Configs for files that do not all go together, and for channels that do not.
+
+mod common;
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn afmid(here: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_afmid")).current_dir(here).args(arguments).output().expect("afmid starts")
+}
+
+/// What it says on stdout and on stderr.
+fn said(here: &Path, arguments: &[&str]) -> [String; 2] {
+    let output = afmid(here, arguments);
+    let [stdout, stderr] = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    [stdout, stderr]
+}
+
+/// A decay of 0.05 cycles a sample and Q = 20 from sample 300 on, of this amplitude, with noise of a hundredth of 1.
+fn decay(amplitude: f64, seed: u32) -> Vec<f64> {
+    let w = std::f64::consts::TAU * 0.05;
+    let ring = |k: f64| if k < 0.0 { 0.0 } else { amplitude * (-w * k / 40.0).exp() * (w * k).sin() };
+    noise(seed).iter().enumerate().map(|(k, e)| ring(k as f64 - 300.0) + 0.01 * e).collect()
+}
+
+/// Noise of variance 1: sums of twelve uniform numbers.
+fn noise(seed: u32) -> Vec<f64> {
+    let mut state = u64::from(seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..2000).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+}
+
+/// A table with a column of times.
+fn table(here: &Path, name: &str, step_s: f64, header: &str, columns: &[Vec<f64>]) {
+    let row = |k: usize| {
+        let values: Vec<String> = columns.iter().map(|column| format!("{:.9}", column[k])).collect();
+        format!("{:.6},{}\n", k as f64 * step_s, values.join(","))
+    };
+    let rows: String = (0..columns[0].len()).map(row).collect();
+    std::fs::write(here.join(name), format!("{header}\n{rows}")).expect("a table");
+}
+
+/// The modes' frequencies of a config that runs.
+fn frequencies(here: &Path, config: &str) -> Vec<f64> {
+    let result = format!("{config}.h5");
+    said(here, &["run", config, "-o", &result, "--cache", "cache"]);
+    let [shown, _] = said(here, &["show", &result, "modes", "--json"]);
+    let shown: Value = serde_json::from_str(&shown).expect("JSON");
+    let modes = shown["modes"].as_array().expect("modes");
+    modes.iter().map(|mode| mode["frequency_hz"].as_f64().expect("a number")).collect()
+}
+
+/// Three files of 1 kHz, two of 2 kHz, one of other channels, and what else lies in such a folder.
+fn of_several_kinds(folder: &Path) {
+    std::fs::create_dir(folder).expect("a folder");
+    for (number, step_s) in [(1, 1e-3), (2, 5e-4), (3, 1e-3), (4, 1e-3), (5, 5e-4)] {
+        table(folder, &format!("hit {number}.csv"), step_s, "Time (s),tip (m)", &[decay(1.0, number)]);
+    }
+    table(folder, "other.csv", 1e-3, "Time (s),root (m)", &[decay(1.0, 6)]);
+    for (name, text) in [("README.md", "Hits of a beam."), ("LICENSE", "MIT"), ("PROVENANCE.txt", "name: hits\n")] {
+        std::fs::write(folder.join(name), text).expect("a file");
+    }
+    table(folder, "short.csv", 1e-3, "Time (s),tip (m)", &[decay(1.0, 7)[..20].to_vec()]);
+}
+
+#[test]
+fn of_files_of_several_rates_the_most_are_taken_and_the_commands_for_the_others_work() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    of_several_kinds(&here.join("hits"));
+    let [stdout, stderr] = said(here, &["new", "pipeline", "hits", "-o", "c.toml"]);
+    assert!(stdout.contains("3 files"), "{stdout}");
+    for words in [
+        "left out: 2 files at 2000 Hz (tip); for a config of them: afmid new pipeline hits --rate 2000 -o c-2.toml",
+        "left out: 1 file at 1000 Hz (root); for a config of them: afmid new pipeline hits/other.csv -o c-3.toml",
+        "skipped: LICENSE, PROVENANCE.txt, README.md: of no format that is known",
+        "skipped: short.csv: no channel of 64 samples",
+    ] {
+        assert!(stderr.contains(words), "{words} in {stderr}");
+        let config = std::fs::read_to_string(here.join("c.toml")).expect("a config");
+        assert!(config.contains(&format!("# {words}\n")), "{words} in {config}");
+    }
+    for command in stderr.lines().filter_map(|line| line.split_once("of them: afmid ")) {
+        said(here, &command.1.split(' ').collect::<Vec<&str>>());
+    }
+    // as many hertz as samples a second times 0.05, to a thousandth: 20 standard errors
+    for (config, frequency) in [("c.toml", 50.0), ("c-2.toml", 100.0), ("c-3.toml", 50.0)] {
+        let found = frequencies(here, config);
+        assert!(found.len() == 1 && (found[0] / frequency - 1.0).abs() < 1e-3, "{config}: {found:?}");
+    }
+    let config = std::fs::read_to_string(here.join("c-2.toml")).expect("a config");
+    assert!(config.contains("files = [\"hits/hit 2.csv\", \"hits/hit 5.csv\"]"), "{config}");
+}
+
+#[test]
+fn files_that_were_given_by_name_are_grouped_too_and_one_that_is_none_is_an_error() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    of_several_kinds(&here.join("hits"));
+    let all: Vec<String> = (1..=5).map(|number| format!("hits/hit {number}.csv")).collect();
+    let mut arguments = vec!["new", "pipeline", "-o", "c.toml"];
+    arguments.extend(all.iter().map(String::as_str));
+    let [stdout, stderr] = said(here, &arguments);
+    assert!(stdout.contains("3 files"), "{stdout}");
+    assert!(stderr.contains("afmid new pipeline 'hits/hit 2.csv' 'hits/hit 5.csv' -o c-2.toml"), "{stderr}");
+    arguments[3] = "other.toml";
+    arguments.push("hits/LICENSE");
+    let output = afmid(here, &arguments);
+    let refused = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(2) && refused.contains("hits/LICENSE: "), "{refused}");
+    // a config that names all of them says how to make one that does not
+    let config = std::fs::read_to_string(here.join("c.toml")).expect("a config");
+    let from = config.find("files = [").expect("files");
+    let to = from + config[from..].find(']').expect("an end");
+    let mixed = format!("{}files = [\"hits/hit*.csv\"{}", &config[..from], &config[to..]);
+    std::fs::write(here.join("mixed.toml"), mixed).expect("a config");
+    let output = afmid(here, &["run", "mixed.toml", "-o", "m.h5", "--cache", "cache"]);
+    let refused = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success(), "{refused}");
+    for words in ["2 sample rates: 3 at 1000 Hz", "takes the files of the rate that most have"] {
+        assert!(refused.contains(words), "{words} in {refused}");
+    }
+}
+
+#[test]
+fn like_channels_that_ring_go_before_one_that_drives_and_the_others_are_named_with_the_reason() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let constant = vec![0.5; 2000];
+    let columns = [decay(1.0, 1), decay(1.0, 2), decay(-0.4, 3), constant.clone(), noise(5), constant];
+    let header = "Time (s),monitor (V),gauge_0 (Strain),gauge_1 (Strain),gauge_2 (Strain),room (K),Drive (V)";
+    table(here, "units.csv", 1e-3, header, &columns);
+    let [_, stderr] = said(here, &["new", "pipeline", "units.csv", "-o", "u.toml"]);
+    let config = std::fs::read_to_string(here.join("u.toml")).expect("a config");
+    assert!(config.contains("channels = [\"gauge_0\", \"gauge_1\"]"), "{config}");
+    let words = "channels left out: monitor (in V); gauge_2, Drive (constant); room (in K); --channel NAME takes";
+    assert!(stderr.contains(words) && config.contains(words), "{stderr}");
+    let found = frequencies(here, "u.toml");
+    assert!(found.len() == 1 && (found[0] / 50.0 - 1.0).abs() < 1e-3, "{found:?}");
+    said(here, &["new", "pipeline", "units.csv", "--channel", "monitor", "-o", "m.toml"]);
+    // no units: names that differ in their number alone
+    table(here, "names.csv", 1e-3, "Time (s),volt,acc 1,acc 2", &columns[..3]);
+    let [_, stderr] = said(here, &["new", "pipeline", "names.csv", "--unit", "g", "-o", "n.toml"]);
+    let config = std::fs::read_to_string(here.join("n.toml")).expect("a config");
+    assert!(config.contains("channels = [\"acc 1\", \"acc 2\"]"), "{config}");
+    assert!(stderr.contains("volt (of another name)"), "{stderr}");
+}
