@@ -151,3 +151,59 @@ fn like_channels_that_ring_go_before_one_that_drives_and_the_others_are_named_wi
     assert!(config.contains("channels = [\"acc 1\", \"acc 2\"]"), "{config}");
     assert!(stderr.contains("volt (of another name)"), "{stderr}");
 }
+
+/// Frequencies and the receptance of a mode at 200 Hz of 1 % damping, and what somebody's Python wrote of it.
+const SPECTRA: &str = "
+import sys, h5py, numpy as np, scipy.io
+here = sys.argv[1]
+f = np.arange(1, 2001) * 0.5
+s = 2j * np.pi * f
+h = 1 / (s**2 + 2 * 0.01 * 400 * np.pi * s + (400 * np.pi)**2)
+for name in ['f', 'freq', 'Hz', 'frequencies_hz']:
+    np.savez(f'{here}/density_{name}.npz', **{name: f, 'psd': abs(h)**2})
+    np.savez(f'{here}/complex_{name}.npz', **{name: f, 'H': h})
+    scipy.io.savemat(f'{here}/density_{name}.mat', {name: f, 'psd': abs(h)**2})
+    scipy.io.savemat(f'{here}/complex_{name}.mat', {name: f, 'H': h})
+    with h5py.File(f'{here}/density_{name}.h5', 'w') as file:
+        file[name], file['psd'] = f, abs(h)**2
+    with h5py.File(f'{here}/complex_{name}.h5', 'w') as file:
+        file[name], file['H'] = f, h
+with h5py.File(f'{here}/density_x.h5', 'w') as file:
+    file['x'], file['y'] = f, abs(h)**2
+    file['x'].attrs['units'] = 'Hz'
+np.savez(f'{here}/complex_kHz.npz', freq_kHz=f / 1000, H=h)
+np.savez(f'{here}/complex_alone.npz', H=h)
+t = np.arange(2000) / 1000
+y = np.where(t < 0.3, 0, np.exp(-8 * (t - 0.3)) * np.sin(314 * (t - 0.3))) + 0.01 * np.random.default_rng(1).normal(size=2000)
+np.savez(f'{here}/record.npz', t=t, f=y)
+";
+
+#[test]
+fn what_lies_over_frequencies_is_no_record() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let python = Command::new(common::python_bin().join("python")).args(["-c", SPECTRA]).arg(here).output();
+    let python = python.expect("python starts");
+    assert!(python.status.success(), "{}", String::from_utf8_lossy(&python.stderr));
+    let mut seen = 0;
+    for entry in std::fs::read_dir(here).expect("a folder") {
+        let name = entry.expect("a file").file_name().to_string_lossy().into_owned();
+        let config = format!("{name}.toml");
+        let output = afmid(here, &["new", "pipeline", &name, "--unit", "m", "-o", &config]);
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        if name.starts_with("density") {
+            assert_eq!(output.status.code(), Some(2), "{name}: {stderr}");
+            assert!(stderr.contains("a spectrum, no record over time"), "{name}: {stderr}");
+            let of_density = stderr.contains("io.spectrum") == name.ends_with(".h5");
+            assert!(of_density && stderr.contains("--goal frf"), "{name}: {stderr}");
+        } else if name == "complex_alone.npz" {
+            assert!(stderr.contains("no frequencies as many are in the file"), "{stderr}");
+        } else {
+            assert!(output.status.success(), "{name}: {stderr}");
+            let (found, truth) = (frequencies(here, &config), if name == "record.npz" { 49.97 } else { 200.0 });
+            assert!(found.len() == 1 && (found[0] / truth - 1.0).abs() < 1e-3, "{name}: {found:?}");
+        }
+        seen += 1;
+    }
+    assert_eq!(seen, 4 * 6 + 4);
+}

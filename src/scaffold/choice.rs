@@ -47,6 +47,10 @@ const STEP: f64 = 0.5;
 /// Chooses by what the first file holds, as far as the user has not. Errors: what is not known, and how to say it.
 pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     let file = FirstFile::new(source);
+    let of_time = wanted.rate_hz.is_some() || wanted.goal == Some(Goal::Frf) || file.has_responses(false);
+    if let Some(question) = file.spectrum().filter(|_| !of_time) {
+        return Err(question);
+    }
     match wanted.goal {
         Some(Goal::Decay) => decay(&file, wanted, false),
         Some(goal @ Goal::InputOutput) => input_output(&file, wanted, Some(goal)),

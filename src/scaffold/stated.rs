@@ -57,7 +57,10 @@ pub fn missing(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bo
     let says = |axis: &Channel| source.remarks.iter().find(|remark| remark.starts_with(&axis.location)).cloned();
     let mut help = vec![how.to_owned()];
     if let Some((axis, remark)) = axis.and_then(|axis| Some((axis, says(axis)?))) {
-        help.push(format!("{remark}; --goal frf if {} is a frequency", axis.location));
+        help.push(format!(
+            "{remark}; --goal frf if {} is a frequency, `io.spectrum` for a power density",
+            axis.location
+        ));
     }
     (format!("{} states no {what}", source.file.display()), help)
 }
