@@ -207,3 +207,117 @@ fn what_lies_over_frequencies_is_no_record() {
     }
     assert_eq!(seen, 4 * 6 + 4);
 }
+
+/// Points of a beam that is struck, and where the sensor is, as shares of its length.
+const POINTS: [f64; 5] = [0.1, 0.25, 0.4, 0.65, 0.8];
+const SENSOR: f64 = 0.25;
+/// Frequency in Hz and damping ratio of the modes sin(pi x), sin(2 pi x).
+const MODES: [[f64; 2]; 2] = [[40.0, 0.02], [130.0, 0.01]];
+
+fn mode_shape(mode: usize, x: f64) -> f64 {
+    (std::f64::consts::PI * (mode + 1) as f64 * x).sin()
+}
+
+/// What a sensor sees of a force of 1000 samples a second at `x`, with noise.
+fn moved(force: &[f64], x: f64, seed: u32) -> Vec<f64> {
+    let mut sum: Vec<f64> = noise(seed).iter().cycle().take(force.len()).map(|e| 1e-3 * e).collect();
+    for (mode, [frequency, damping]) in MODES.iter().enumerate() {
+        let w = std::f64::consts::TAU * frequency / 1e3;
+        let (decay, turn) = ((-damping * w).exp(), w * (1.0 - damping * damping).sqrt());
+        let gain = mode_shape(mode, x) * mode_shape(mode, SENSOR);
+        let (mut last, mut before, mut force_before) = (0.0, 0.0, 0.0);
+        for (sum, force) in sum.iter_mut().zip(force) {
+            let next = 2.0 * decay * turn.cos() * last - decay * decay * before + force_before;
+            (before, last, force_before) = (last, next, *force);
+            *sum += gain * next;
+        }
+    }
+    sum
+}
+
+/// Hits of a hammer, three in a record, not at the same times in each.
+fn hits(number: u32) -> Vec<f64> {
+    let mut force = vec![0.0; 6000];
+    for (hit, start) in [200_usize, 2100, 4050].iter().enumerate() {
+        let start = start + (number as usize * 37 + hit * 11) % 90;
+        for (k, value) in [0.4, 1.0, 0.5].iter().enumerate() {
+            force[start + k] = value * (1.0 + 0.2 * hit as f64);
+        }
+    }
+    let added = noise(50 + number);
+    force.iter().zip(added.iter().cycle()).map(|(f, e)| f + 1e-4 * e).collect()
+}
+
+/// The modes that `show` states, and that they have the shapes of the beam at its points.
+fn of_the_beam(here: &Path, config: &str, within: f64) {
+    let result = format!("{config}.h5");
+    said(here, &["run", config, "-o", &result, "--cache", "cache"]);
+    let [shown, _] = said(here, &["show", &result, "modes", "--json"]);
+    let shown: Value = serde_json::from_str(&shown).expect("JSON");
+    let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("{shown}"));
+    let modes = shown["modes"].as_array().expect("modes");
+    assert_eq!(modes.len(), MODES.len(), "{shown}");
+    for (mode, [frequency, _]) in MODES.iter().enumerate() {
+        let found = number(&modes[mode]["frequency_hz"]);
+        assert!((found / frequency - 1.0).abs() < 0.1 * within, "{found} Hz: {shown}");
+        let shape = modes[mode]["shape"].as_array().expect("a shape");
+        assert_eq!(shape.len(), POINTS.len(), "{shown}");
+        let largest =
+            POINTS.iter().map(|x| mode_shape(mode, *x)).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        for (at, x) in POINTS.iter().enumerate() {
+            assert_eq!(shape[at]["channel"], format!("p{}", at + 1), "{shown}");
+            let truth = mode_shape(mode, *x) / largest;
+            assert!((number(&shape[at]["re"]) - truth).abs() < within, "mode {mode}, point {at}: {truth}, {shown}");
+        }
+    }
+}
+
+#[test]
+fn a_structure_that_was_struck_point_by_point_gives_common_modes_and_shapes_over_the_points() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let (mut struck, mut shaken) = (Vec::new(), Vec::new());
+    for (number, x) in (1..).zip(POINTS) {
+        let force = hits(number);
+        struck.push(format!("p{number}.csv"));
+        table(
+            here,
+            &struck[struck.len() - 1],
+            1e-3,
+            "Time (s),force (N),tip (m/s^2)",
+            &[force.clone(), moved(&force, x, number)],
+        );
+        // driven throughout: 40,000 samples of noise
+        let force: Vec<f64> = (0..20).flat_map(|piece| noise(1000 * number + piece)).collect();
+        std::fs::create_dir_all(here.join("shaken")).expect("a folder");
+        shaken.push(format!("shaken/p{number}.csv"));
+        table(
+            here,
+            &shaken[shaken.len() - 1],
+            1e-3,
+            "Time (s),force (N),tip (m/s^2)",
+            &[force.clone(), moved(&force, x, number)],
+        );
+    }
+    let new = |files: &[String], more: &[&'static str]| -> Vec<String> {
+        let words = ["new", "pipeline"].into_iter().chain(more.iter().copied()).map(str::to_owned);
+        words.chain(files.iter().cloned()).collect()
+    };
+    let words = |all: &[String]| -> Vec<String> { all.to_vec() };
+    let run = |all: Vec<String>| afmid(here, &words(&all).iter().map(String::as_str).collect::<Vec<&str>>());
+    let output = run(new(&struck, &["-o", "none.toml"]));
+    let refused = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.code() == Some(2) && refused.contains("--as points if each is of another point"),
+        "{refused}"
+    );
+    assert!(run(new(&struck, &["--as", "points", "-o", "struck.toml"])).status.success());
+    let config = std::fs::read_to_string(here.join("struck.toml")).expect("a config");
+    assert!(config.contains("blocks = \"hits\"") && config.contains("quantity = \"accelerance\""), "{config}");
+    assert!(config.contains("before = \"frf_4.frf\""), "{config}");
+    // noise of a thousandth in blocks that the slow mode has not quite left
+    of_the_beam(here, "struck.toml", 0.02);
+    assert!(run(new(&["shaken".to_owned()], &["--as", "points", "-o", "shaken.toml"])).status.success());
+    // the same seen through Hann windows of 5000 samples, a fifth of whose bins is the width of the slow mode
+    of_the_beam(here, "shaken.toml", 0.05);
+}

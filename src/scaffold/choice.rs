@@ -83,7 +83,9 @@ fn responses(source: &Source) -> Choice<'_> {
 fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal>) -> Result<Choice<'a>, Question> {
     let inputs = inputs(file.source, wanted)?;
     let struck = file.samples(inputs[0]).is_ok_and(|force| is_impulsive(&force));
-    let goal = goal.unwrap_or(if struck { Goal::Frf } else { Goal::InputOutput });
+    let records_are = wanted.records_are.filter(|what| *what == RecordsAre::Points);
+    let responses = struck || records_are.is_some();
+    let goal = goal.unwrap_or(if responses { Goal::Frf } else { Goal::InputOutput });
     let outputs = outputs(file.source, wanted, &inputs, goal == Goal::Frf)?;
     let names = |all: &[&Channel]| all.iter().map(|one| one.location.as_str()).collect::<Vec<&str>>().join(", ");
     let short = if struck { ", which is short as a hammer's," } else { "" };
@@ -91,7 +93,7 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     let why = format!("measured input {input}{short} and output {output} in {}", source.name());
     let taken: Vec<&Channel> = outputs.iter().chain(&inputs).copied().collect();
     let notes = left_out(&source.channels, &taken).filter(|_| wanted.channels.is_empty()).into_iter().collect();
-    Ok(Choice { inputs, struck, notes, ..Choice::of(goal, outputs, why) })
+    Ok(Choice { inputs, struck, records_are, notes, ..Choice::of(goal, outputs, why) })
 }
 
 fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
@@ -135,7 +137,10 @@ fn rings_without_a_step(file: &FirstFile<'_>, wanted: &Wanted<'_>) -> bool {
 
 fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result<Choice<'a>, Question> {
     if wanted.records_are == Some(RecordsAre::Points) {
-        let help = "points go with frequency responses, --goal frf; free decays are of hits or sensors".to_owned();
+        let help =
+            "--input names the force of each file; files of frequency responses go with --goal frf; free decays are \
+                    of hits or sensors"
+                .to_owned();
         return Err(("--as points: decays without a measured force have no common scale".to_owned(), Some(help)));
     }
     let source = file.source;

@@ -6,6 +6,7 @@ mod first_file;
 mod groups;
 mod left_out;
 mod pipeline;
+mod points;
 mod recordings;
 mod sensors;
 mod stage;

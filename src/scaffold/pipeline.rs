@@ -6,6 +6,7 @@ use afmid_pipeline::toml::{Table, Value};
 use afmid_stages::io::quantity_of_unit;
 
 use super::choice::{Choice, Question};
+use super::points;
 use super::recordings::Source;
 use super::stated;
 use crate::cli::{Goal, RecordsAre};
@@ -69,17 +70,23 @@ impl Choice<'_> {
     }
 }
 
-/// A parameter for what a response in that unit is to a force; empty where the unit does not say.
-fn quantity(unit: &str) -> String {
-    let known = quantity_of_unit(&format!("({unit})/N"));
-    known.map(|quantity| format!(", quantity = \"{}\"", quantity.name())).unwrap_or_default()
+/// What a response in that unit is to a force; none where the unit does not say.
+pub fn quantity(unit: &str) -> Option<&'static str> {
+    quantity_of_unit(&format!("({unit})/N")).map(|quantity| quantity.name())
 }
 
 /// The config for a file in `folder`. Errors: what is not known of the recordings, and how to say it.
 pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
     let (template, reader) = choice.template();
+    let points = choice.records_are == Some(RecordsAre::Points) && reader == "io.columns";
+    if reader == "io.columns" && source.files.len() > 1 && !points {
+        let help = "--as points if each is of another point of the structure; else give one file with all hits, or a \
+                    config for each; --goal decay takes several without the force";
+        let problem = format!("{} files, wanted one record of input and output", source.files.len());
+        return Err((problem, Some(help.to_owned())));
+    }
     let params = match reader {
-        "io.columns" => columns(source, choice, wanted, folder),
+        "io.columns" => columns(source, &source.file, choice, wanted, folder),
         "io.frf" => Ok(responses(source, wanted, folder)),
         _ => records(source, choice, wanted, folder),
     }?;
@@ -113,6 +120,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             Some(("params", _)) if stage == "\"spectrum.measured_frf\"" => {
                 let blocks = if choice.struck { "hits" } else { "segments" };
                 let quantity = quantity(wanted.unit.unwrap_or(&choice.channels[0].unit));
+                let quantity = quantity.map(|quantity| format!(", quantity = \"{quantity}\"")).unwrap_or_default();
                 text.push_str(&format!("params = {{ blocks = \"{blocks}\"{quantity} }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
@@ -130,7 +138,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             }
         }
     }
-    Ok(text)
+    if points { points::in_place_of_one(&text, source, choice, wanted, folder) } else { Ok(text) }
 }
 
 /// The `params` of the stage `records`.
@@ -175,16 +183,17 @@ fn responses(source: &Source, wanted: Wanted<'_>, folder: &Path) -> String {
 }
 
 /// The `params` of the stage `data`.
-fn columns(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
+pub fn columns(
+    source: &Source,
+    file: &Path,
+    choice: &Choice<'_>,
+    wanted: Wanted<'_>,
+    folder: &Path,
+) -> Result<String, Question> {
     let text = |text: &str| Value::String(text.to_owned());
     let (output, location) = (choice.channels[0], |channel: &&Channel| text(&channel.location));
-    if source.files.len() > 1 {
-        let help = "give one file with all hits, or a config for each; --goal decay takes several without the force";
-        let problem = format!("{} files, wanted one record of input and output", source.files.len());
-        return Err((problem, Some(help.to_owned())));
-    }
     let mut params = Table::new();
-    params.insert("file".to_owned(), text(&relative(&source.file, folder).to_string_lossy()));
+    params.insert("file".to_owned(), text(&relative(file, folder).to_string_lossy()));
     params.insert("inputs".to_owned(), Value::Array(choice.inputs.iter().map(location).collect()));
     match choice.channels.len() {
         1 => params.insert("output".to_owned(), text(&output.location)),
