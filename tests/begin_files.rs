@@ -150,6 +150,15 @@ fn like_channels_that_ring_go_before_one_that_drives_and_the_others_are_named_wi
     let config = std::fs::read_to_string(here.join("n.toml")).expect("a config");
     assert!(config.contains("channels = [\"acc 1\", \"acc 2\"]"), "{config}");
     assert!(stderr.contains("volt (of another name)"), "{stderr}");
+    // a unit scales the amplitudes alone; modes are whatever the data have
+    for (goal, config) in [(&[][..], "w.toml"), (&["--goal", "modes"], "g.toml")] {
+        let [_, stderr] = said(here, &[&["new", "pipeline", "names.csv", "-o", config], goal].concat());
+        assert!(stderr.contains("no unit is stated") && stderr.contains("--unit UNIT"), "{stderr}");
+        assert_eq!(frequencies(here, config), frequencies(here, "n.toml"));
+    }
+    let [overview, _] = said(here, &["show", "n.toml.h5"]);
+    let place = |what: &str| overview.find(what).unwrap_or_else(|| panic!("no {what}: {overview}"));
+    assert!(place("modes.modes (table)\nfrequency_hz [Hz]") < place("\nstage "), "{overview}");
 }
 
 /// Frequencies and the receptance of a mode at 200 Hz of 1 % damping, and what somebody's Python wrote of it.

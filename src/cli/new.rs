@@ -100,9 +100,10 @@ pub enum RecordsAre {
 pub enum Goal {
     /// Modes, damping and mode shapes from free decays: after a hit, a release, a pulse, the end of a drive.
     Decay,
-    /// Transfer function and modes of the free lever, from averaged snap-offs, as in the paper.
-    #[value(alias = "snap-off")]
+    /// Modes by what the recordings look like: snap-offs of a lever, decays, responses, input and output.
     Modes,
+    /// Transfer function and modes of the free lever, from averaged snap-offs, as in the paper.
+    SnapOff,
     /// Frequencies and quality factors from all snap-offs jointly, no average: the best errors.
     Ringdown,
     /// What a linear simulation gets wrong, by name.

@@ -9,6 +9,7 @@ use super::first_file::FirstFile;
 use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
 use super::sensors::{Sensors, left_out, sensors};
+use super::stated::does_without_unit;
 use crate::cli::{Goal, RecordsAre};
 use crate::inspect::{Channel, counted};
 use crate::show::number;
@@ -51,20 +52,44 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
     if let Some(question) = file.spectrum().filter(|_| !of_time) {
         return Err(question);
     }
+    let mut choice = by_goal(&file, wanted)?;
+    if choice.channels.first().is_some_and(|channel| does_without_unit(choice.goal, channel, wanted)) {
+        choice.notes.push("no unit is stated: amplitudes are as in the file; --unit UNIT says theirs".to_owned());
+    }
+    Ok(choice)
+}
+
+fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
+    let source = file.source;
     match wanted.goal {
-        Some(Goal::Decay) => decay(&file, wanted, false),
-        Some(goal @ Goal::InputOutput) => input_output(&file, wanted, Some(goal)),
-        Some(Goal::Frf) if wanted.inputs.is_empty() && file.has_responses(true) => Ok(responses(source)),
-        Some(goal @ Goal::Frf) => input_output(&file, wanted, Some(goal)),
-        Some(goal) => one_channel(source, wanted, goal, String::new()),
-        None if !wanted.inputs.is_empty() => input_output(&file, wanted, None),
-        None if file.has_responses(false) => Ok(responses(source)),
-        None if looks_like_a_lever(source) && !rings_without_a_step(&file, wanted) => {
-            let why = format!("snap-offs: {} is of a force microscope", source.format);
-            one_channel(source, wanted, Goal::Modes, why)
+        Some(Goal::Modes) if looks_like_a_lever(source) => {
+            one_channel(source, wanted, Goal::SnapOff, format!("snap-offs: {} is of a force microscope", source.format))
         }
-        None if wanted.channels.len() < 2 && has_input(source, wanted) => input_output(&file, wanted, None),
-        None => decay(&file, wanted, true),
+        None | Some(Goal::Modes) => by_looks(file, wanted),
+        Some(Goal::Decay) => decay(file, wanted, false),
+        Some(goal @ Goal::InputOutput) => input_output(file, wanted, Some(goal)),
+        Some(Goal::Frf) if wanted.inputs.is_empty() && file.has_responses(true) => Ok(responses(source)),
+        Some(goal @ Goal::Frf) => input_output(file, wanted, Some(goal)),
+        Some(goal) => one_channel(source, wanted, goal, String::new()),
+    }
+}
+
+/// Without a goal.
+fn by_looks<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
+    let source = file.source;
+    if !wanted.inputs.is_empty() {
+        return input_output(file, wanted, None);
+    }
+    if file.has_responses(false) {
+        return Ok(responses(source));
+    }
+    if looks_like_a_lever(source) && !rings_without_a_step(file, wanted) {
+        let why = format!("snap-offs: {} is of a force microscope", source.format);
+        return one_channel(source, wanted, Goal::SnapOff, why);
+    }
+    match wanted.channels.len() < 2 && has_input(source, wanted) {
+        true => input_output(file, wanted, None),
+        false => decay(file, wanted, true),
     }
 }
 

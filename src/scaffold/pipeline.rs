@@ -31,7 +31,7 @@ impl Goal {
     const fn config(self) -> &'static str {
         match self {
             Self::Decay => include_str!("../../configs/decay.toml"),
-            Self::Modes => include_str!("../../configs/free-lever.toml"),
+            Self::Modes | Self::SnapOff => include_str!("../../configs/free-lever.toml"),
             Self::Ringdown => include_str!("../../configs/ringdown.toml"),
             Self::Diagnosis => include_str!("../../configs/diagnose.toml"),
             Self::Coupled => include_str!("../../configs/coupled-lever.toml"),
@@ -46,7 +46,7 @@ impl Goal {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Decay => "decay",
-            Self::Modes => "modes",
+            Self::Modes | Self::SnapOff => "modes",
             Self::Ringdown => "ringdown",
             Self::Diagnosis => "diagnosis",
             Self::Coupled => "coupled",
@@ -159,7 +159,7 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     if let Some(rate) = stated::rate(source, channel, &wanted, true)? {
         params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
     }
-    if let Some(unit) = stated::unit(source, channel, &wanted)? {
+    if let Some(unit) = stated::unit(source, choice.goal, channel, &wanted)? {
         params.insert("unit".to_owned(), text(unit));
     }
     Ok(format!("params = {}\n", Value::Table(params)))
@@ -242,7 +242,7 @@ mod tests {
     }
 
     const GOALS: [Goal; 7] =
-        [Goal::Decay, Goal::Modes, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled, Goal::Thermal, Goal::Steady];
+        [Goal::Decay, Goal::SnapOff, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled, Goal::Thermal, Goal::Steady];
 
     fn wanted(goal: Goal) -> Wanted<'static> {
         Wanted { goal: Some(goal), channels: &[], inputs: &[], records_are: None, rate_hz: None, unit: None }

@@ -3,6 +3,7 @@
 use super::choice::Question;
 use super::pipeline::Wanted;
 use super::recordings::Source;
+use crate::cli::Goal;
 use crate::inspect::Channel;
 
 /// The sample rate to be written; none where the file states it. Errors: neither states one; both do, and differ.
@@ -24,10 +25,22 @@ pub fn same_rate(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
 }
 
+/// Whether a config does without a unit that nobody states: of decays and noise it scales the amplitudes alone.
+pub fn does_without_unit(goal: Goal, channel: &Channel, wanted: &Wanted<'_>) -> bool {
+    let scales_alone = matches!(goal, Goal::Decay | Goal::Thermal | Goal::Steady);
+    scales_alone && channel.unit.is_empty() && wanted.unit.is_none()
+}
+
 /// The unit to be written; none where the file states it. Errors: as [`rate`].
-pub fn unit<'a>(source: &Source, channel: &Channel, wanted: &Wanted<'a>) -> Result<Option<&'a str>, Question> {
+pub fn unit<'a>(
+    source: &Source,
+    goal: Goal,
+    channel: &Channel,
+    wanted: &Wanted<'a>,
+) -> Result<Option<&'a str>, Question> {
     match (channel.unit.as_str(), wanted.unit) {
         ("", Some(unit)) => Ok(Some(unit)),
+        ("", None) if does_without_unit(goal, channel, wanted) => Ok(Some("1")),
         ("", None) => Err(question(source, channel, wanted, true)),
         (stated, Some(unit)) if stated != unit => {
             let problem = format!("{} states the unit {stated}", source.file.display());
