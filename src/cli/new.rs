@@ -49,7 +49,7 @@ fn stage_name(text: &str) -> Result<String, String> {
 /// For which recordings, and to find what.
 #[derive(Debug, Args)]
 pub struct NewPipelineArgs {
-    /// Recordings: a folder of files of one kind, or files.
+    /// Recordings: a folder, or files; of several rates or channels those that most are of.
     #[arg(required = true, value_name = "RECORDINGS")]
     pub recordings: Vec<PathBuf>,
     /// What to find [default: what the recordings look like].
@@ -64,11 +64,12 @@ pub struct NewPipelineArgs {
     /// an input, a drive].
     #[arg(long, value_name = "NAME")]
     pub input: Vec<String>,
-    /// What files and channels are, of decays: hits, or sensors that saw the same hits; of frequency responses: points
-    /// [default: files are hits, channels are sensors, cells are hits].
+    /// What files and channels are, of decays: hits, or sensors that saw the same hits; of frequency responses, or of a
+    /// force and what moves: points [default: files are hits, channels are sensors, cells are hits].
     #[arg(long = "as", value_enum, value_name = "WHAT")]
     pub records_are: Option<RecordsAre>,
-    /// Samples per second in Hz, of files that state none.
+    /// Samples per second in Hz, of files that state none; of files of several rates, which to take [default: of which
+    /// there are most].
     #[arg(long, value_name = "HZ")]
     pub rate: Option<f64>,
     /// Unit of the signal, of files that state none.
@@ -90,7 +91,7 @@ pub enum RecordsAre {
     Hits,
     /// All files and channels saw the same hits.
     Sensors,
-    /// Each file is another point of the structure: of frequency responses.
+    /// Each file is another point of the structure: of frequency responses, or of a force and what moves.
     Points,
 }
 
@@ -99,9 +100,10 @@ pub enum RecordsAre {
 pub enum Goal {
     /// Modes, damping and mode shapes from free decays: after a hit, a release, a pulse, the end of a drive.
     Decay,
-    /// Transfer function and modes of the free lever, from averaged snap-offs, as in the paper.
-    #[value(alias = "snap-off")]
+    /// Modes by what the recordings look like: snap-offs of a lever, decays, responses, input and output.
     Modes,
+    /// Transfer function and modes of the free lever, from averaged snap-offs, as in the paper.
+    SnapOff,
     /// Frequencies and quality factors from all snap-offs jointly, no average: the best errors.
     Ringdown,
     /// What a linear simulation gets wrong, by name.

@@ -49,7 +49,7 @@ pub fn say_of_recording(path: &Path) -> String {
 /// All that `show`, `trace`, `report` and `diff` (with `other`) say of a result file. Errors: it is none, or damaged.
 pub fn say_of_result(path: &Path, other: &Path) -> Result<String, String> {
     let file = ResultFile::open(path).map_err(|error| error.to_string())?;
-    let mut said = overview_text(&file) + &pretty(&overview_json(&file)).map_err(message)?;
+    let mut said = overview_text(&file, "") + &pretty(&overview_json(&file)).map_err(message)?;
     let finder = Finder::new(&file.run().info, &[]);
     for stage in file.stages() {
         let id = &stage.record.id;

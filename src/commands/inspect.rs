@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_stages::io::natural_order;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
-use crate::inspect::{Inspected, Outcome, file_text, folder_text, inspect, inspected_json};
+use crate::inspect::{Inspected, Outcome, file_text, files_of, folder_text, inspect, inspected_json};
 use crate::output::print;
 use crate::show::pretty;
 
@@ -15,7 +14,9 @@ use crate::show::pretty;
 pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
     let mut looked = Vec::new();
     for path in paths {
-        let files = if path.is_dir() { files_of(path)? } else { vec![path.clone()] };
+        let cannot =
+            |error: std::io::Error| Failure::failed(format!("{} cannot be listed: {error}", path.display()), None);
+        let files = if path.is_dir() { files_of(path).map_err(cannot)? } else { vec![path.clone()] };
         // in parallel, printed in their order
         let inspected: Vec<Inspected> = files.par_iter().map(|file| inspect(file)).collect();
         if !as_json {
@@ -36,20 +37,4 @@ pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
 
 fn text(path: &Path, inspected: &[Inspected]) -> String {
     if path.is_dir() { folder_text(path, inspected) } else { inspected.iter().map(file_text).collect() }
-}
-
-/// The files of a folder, in natural order; hidden ones and folders in it are passed over. Errors: it cannot be listed.
-fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let cannot =
-        |error: std::io::Error| Failure::failed(format!("{} cannot be listed: {error}", folder.display()), None);
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(cannot)? {
-        let entry = entry.map_err(cannot)?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if !name.starts_with('.') && entry.path().is_file() {
-            names.push((name, entry.path()));
-        }
-    }
-    names.sort_by(|a, b| natural_order(&a.0, &b.0));
-    Ok(names.into_iter().map(|(_, path)| path).collect())
 }

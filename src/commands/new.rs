@@ -10,10 +10,10 @@ use super::load::plan_text;
 use super::target::require_folder;
 use crate::cli::{New, NewPipelineArgs, NewStageArgs};
 use crate::failure::Failure;
-use crate::output::print;
+use crate::output::{print, say};
 use crate::printable::{one_line, shown};
 use crate::relative::folder_of;
-use crate::scaffold::{Wanted, choose, look, pipeline, python, rust};
+use crate::scaffold::{Wanted, choose, left_out, look, pipeline, python, rust};
 use crate::show::pretty;
 
 /// Writes what was asked for.
@@ -26,7 +26,6 @@ pub fn run(what: &New, registry: &Registry) -> Result<(), Failure> {
 
 fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failure> {
     let usage = |(problem, help): (String, Option<String>)| Failure::usage(problem, help);
-    let source = look(&args.recordings).map_err(usage)?;
     let wanted = Wanted {
         goal: args.goal,
         channels: &args.channel,
@@ -35,7 +34,8 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
         rate_hz: args.rate,
         unit: args.unit.as_deref(),
     };
-    let choice = choose(&source, &wanted).map_err(usage)?;
+    let source = look(&args.recordings, &wanted).map_err(usage)?;
+    let mut choice = choose(&source, &wanted).map_err(usage)?;
     let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", choice.goal.name())));
     // also a link to nothing
     if output.symlink_metadata().is_ok() {
@@ -43,19 +43,22 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
         return Err(Failure::usage(format!("{} is there already", output.display()), Some(help)));
     }
     require_folder(folder_of(&output))?;
+    choice.notes.extend(left_out(&source, args, &output));
     let text = pipeline(&source, &choice, wanted, folder_of(&output)).map_err(usage)?;
     let plan = plan_text(&output.display().to_string(), &text, &[], registry)?;
     replace_with(&output, |file| std::fs::write(file, &text))
         .map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    choice.notes.iter().for_each(|note| say(&format!("{}\n", one_line(note))));
     if args.json {
         return print(&pretty(&json!({
             "config": output.display().to_string(),
-            "recordings": source.files,
+            "recordings": source.files.len(),
             "goal": choice.goal.name(),
             "chosen": choice.why,
+            "notes": choice.notes,
         }))?);
     }
-    let files = if source.files == 1 { "1 file".to_owned() } else { format!("{} files", source.files) };
+    let files = if source.files.len() == 1 { "1 file".to_owned() } else { format!("{} files", source.files.len()) };
     let name = output.file_stem().unwrap_or_default().to_string_lossy();
     let why = if choice.why.is_empty() { String::new() } else { format!("; {}", one_line(&choice.why)) };
     // the stage that all others lead to

@@ -18,7 +18,7 @@ pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
     require_result(path)?;
     let file = ResultFile::open(path).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let text = match (id, json) {
-        (None, false) => overview_text(&file),
+        (None, false) => overview_text(&file, &modes(&file)?),
         (None, true) => pretty(&overview_json(&file))?,
         (Some(id), json) => match port(&file, id) {
             Some((stage, name)) => port_text(&file, find(&file, stage)?, name, json)?,
@@ -27,6 +27,24 @@ pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
         },
     };
     print(&text)
+}
+
+/// The tables of modes that are no longer than a window, each under its name. Errors: one is damaged.
+fn modes(file: &ResultFile) -> Result<String, Failure> {
+    let mut text = String::new();
+    for stage in file.stages() {
+        for port in stage.ports.iter().filter(|port| port.name == "modes") {
+            let id = &stage.record.id;
+            match &artifact(file, id, &port.name)? {
+                table @ Artifact::Table(rows) if rows.rows() <= ROWS => {
+                    text += &titled(&format!("{id}.{}", port.name), port, &artifact_text(table));
+                    text.push('\n');
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(text)
 }
 
 /// The parts of `STAGE.PORT`; none of a stage's id.

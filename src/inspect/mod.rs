@@ -3,6 +3,7 @@
 mod channel;
 mod config;
 mod file;
+mod folder;
 mod json;
 mod ringing;
 mod text;
@@ -10,6 +11,8 @@ mod verdict;
 
 pub use channel::{Channel, Values};
 pub use file::{Inspected, Outcome, inspect};
+pub use folder::files_of;
 pub use json::inspected_json;
 pub use ringing::{counted, first_samples};
 pub use text::{file_text, folder_text};
+pub use verdict::{LEAST_CODES, LEAST_SAMPLES};

@@ -6,10 +6,10 @@ use super::channel::{Channel, MOST_CODES, Values};
 use super::ringing::{longest_stretch, ringdown};
 
 /// Fewer samples hold no two periods and the noise to tell them from.
-const LEAST_SAMPLES: usize = 64;
+pub const LEAST_SAMPLES: usize = 64;
 
 /// Fewer distinct codes are those of a switch or a counter.
-const LEAST_CODES: usize = 16;
+pub const LEAST_CODES: usize = 16;
 
 /// More samples at the ends of the range than this share: what rang is cut off.
 const MOST_SATURATED: f64 = 0.5;

@@ -3,10 +3,8 @@
 use super::choice::Question;
 use super::pipeline::Wanted;
 use super::recordings::Source;
-use crate::inspect::{Channel, Values};
+use crate::inspect::{Channel, LEAST_CODES, Values};
 
-/// Fewer distinct codes are those of a switch or a counter.
-const LEAST_CODES: usize = 16;
 /// How names of inputs begin.
 const INPUTS: [&str; 8] = ["input", "force", "hammer", "excit", "drive", "stimul", "torque", "actuat"];
 
@@ -19,25 +17,15 @@ pub fn named<'a>(source: &'a Source, name: &str) -> Result<&'a Channel, Question
     })
 }
 
-/// Whether a channel has that name, with or without the stroke that it begins with.
+/// Whether a channel has that name.
 pub fn is_named(channel: &Channel, name: &str) -> bool {
-    let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
-    bare(&channel.location) == bare(name)
+    same_name(&channel.location, name)
 }
 
-/// The channels with signals of the best one's length and unit. Errors: there is none.
-pub fn sensors(source: &Source) -> Result<Vec<&Channel>, Question> {
-    let best = source.best.and_then(|index| source.channels.get(index)).filter(usable);
-    let longest = || source.channels.iter().filter(usable).max_by_key(|channel| channel.samples);
-    let best = best.or_else(longest).ok_or_else(|| nothing(source))?;
-    let alike = |channel: &&Channel| {
-        usable(channel)
-            && !drives(channel)
-            && (channel.samples, &channel.unit, channel.sample_rate_hz)
-                == (best.samples, &best.unit, best.sample_rate_hz)
-    };
-    let found: Vec<&Channel> = source.channels.iter().filter(alike).collect();
-    Ok(if found.is_empty() { vec![best] } else { found })
+/// Whether a location is that name, with or without the stroke that it begins with.
+pub fn same_name(location: &str, name: &str) -> bool {
+    let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
+    bare(location) == bare(name)
 }
 
 /// Inputs: as they were named, else by their names. Errors: what is not known, and how to say it.
@@ -92,13 +80,26 @@ pub fn outputs<'a>(
     }
 }
 
+/// The first names; more are counted.
+pub fn some_of<T: AsRef<str>>(names: &[T]) -> String {
+    const MOST: usize = 8;
+    let shown: Vec<&str> = names.iter().take(MOST).map(AsRef::as_ref).collect();
+    let more = if names.len() > MOST { format!(" and {} more", names.len() - MOST) } else { String::new() };
+    shown.join(", ") + &more
+}
+
 fn listed(channels: &[&Channel]) -> String {
     channels.iter().map(|channel| channel.location.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// Whether a channel is named as an input: force, hammer, drive, `u`, `u2`, `uBenchMark`.
+/// Whether a channel is named as an input.
 pub fn drives(channel: &Channel) -> bool {
-    let name = channel.location.rsplit(['/', '.']).next().unwrap_or_default();
+    is_input(&channel.location)
+}
+
+/// Whether a location is that of an input by its name: force, hammer, drive, `u`, `u2`, `uBenchMark`.
+pub fn is_input(location: &str) -> bool {
+    let name = location.rsplit(['/', '.']).next().unwrap_or_default();
     let lower = name.to_lowercase();
     let after_u = name.strip_prefix('u').and_then(|rest| rest.chars().next());
     let u =

@@ -4,10 +4,12 @@ use afmid_kernels::events::decay::FreeDecay;
 use afmid_kernels::harmonics::is_tone;
 use afmid_kernels::spectra::{is_impulsive, shows_resonance};
 
-use super::channels::{drives, inputs, is_named, named, nothing, outputs, sensors, usable};
+use super::channels::{drives, inputs, is_named, named, nothing, outputs, usable};
 use super::first_file::FirstFile;
 use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
+use super::sensors::{Sensors, left_out, sensors};
+use super::stated::does_without_unit;
 use crate::cli::{Goal, RecordsAre};
 use crate::inspect::{Channel, counted};
 use crate::show::number;
@@ -29,12 +31,14 @@ pub struct Choice<'a> {
     pub records_are: Option<RecordsAre>,
     /// Why, for a comment in the config; empty where the user chose.
     pub why: String,
+    /// What is left out, for comments and for the user.
+    pub notes: Vec<String>,
 }
 
 impl<'a> Choice<'a> {
     /// Without a measured input.
     pub fn of(goal: Goal, channels: Vec<&'a Channel>, why: String) -> Self {
-        Self { goal, channels, inputs: Vec::new(), struck: false, records_are: None, why }
+        Self { goal, channels, inputs: Vec::new(), struck: false, records_are: None, why, notes: Vec::new() }
     }
 }
 
@@ -44,20 +48,48 @@ const STEP: f64 = 0.5;
 /// Chooses by what the first file holds, as far as the user has not. Errors: what is not known, and how to say it.
 pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     let file = FirstFile::new(source);
+    let of_time = wanted.rate_hz.is_some() || wanted.goal == Some(Goal::Frf) || file.has_responses(false);
+    if let Some(question) = file.spectrum().filter(|_| !of_time) {
+        return Err(question);
+    }
+    let mut choice = by_goal(&file, wanted)?;
+    if choice.channels.first().is_some_and(|channel| does_without_unit(choice.goal, channel, wanted)) {
+        choice.notes.push("no unit is stated: amplitudes are as in the file; --unit UNIT says theirs".to_owned());
+    }
+    Ok(choice)
+}
+
+fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
+    let source = file.source;
     match wanted.goal {
-        Some(Goal::Decay) => decay(&file, wanted, false),
-        Some(goal @ Goal::InputOutput) => input_output(&file, wanted, Some(goal)),
-        Some(Goal::Frf) if wanted.inputs.is_empty() && file.has_responses(true) => Ok(responses(source)),
-        Some(goal @ Goal::Frf) => input_output(&file, wanted, Some(goal)),
-        Some(goal) => one_channel(source, wanted, goal, String::new()),
-        None if !wanted.inputs.is_empty() => input_output(&file, wanted, None),
-        None if file.has_responses(false) => Ok(responses(source)),
-        None if looks_like_a_lever(source) && !rings_without_a_step(&file, wanted) => {
-            let why = format!("snap-offs: {} is of a force microscope", source.format);
-            one_channel(source, wanted, Goal::Modes, why)
+        Some(Goal::Modes) if looks_like_a_lever(source) => {
+            one_channel(source, wanted, Goal::SnapOff, format!("snap-offs: {} is of a force microscope", source.format))
         }
-        None if wanted.channels.len() < 2 && has_input(source, wanted) => input_output(&file, wanted, None),
-        None => decay(&file, wanted, true),
+        None | Some(Goal::Modes) => by_looks(file, wanted),
+        Some(Goal::Decay) => decay(file, wanted, false),
+        Some(goal @ Goal::InputOutput) => input_output(file, wanted, Some(goal)),
+        Some(Goal::Frf) if wanted.inputs.is_empty() && file.has_responses(true) => Ok(responses(source)),
+        Some(goal @ Goal::Frf) => input_output(file, wanted, Some(goal)),
+        Some(goal) => one_channel(source, wanted, goal, String::new()),
+    }
+}
+
+/// Without a goal.
+fn by_looks<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
+    let source = file.source;
+    if !wanted.inputs.is_empty() {
+        return input_output(file, wanted, None);
+    }
+    if file.has_responses(false) {
+        return Ok(responses(source));
+    }
+    if looks_like_a_lever(source) && !rings_without_a_step(file, wanted) {
+        let why = format!("snap-offs: {} is of a force microscope", source.format);
+        return one_channel(source, wanted, Goal::SnapOff, why);
+    }
+    match wanted.channels.len() < 2 && has_input(source, wanted) {
+        true => input_output(file, wanted, None),
+        false => decay(file, wanted, true),
     }
 }
 
@@ -76,13 +108,17 @@ fn responses(source: &Source) -> Choice<'_> {
 fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal>) -> Result<Choice<'a>, Question> {
     let inputs = inputs(file.source, wanted)?;
     let struck = file.samples(inputs[0]).is_ok_and(|force| is_impulsive(&force));
-    let goal = goal.unwrap_or(if struck { Goal::Frf } else { Goal::InputOutput });
+    let records_are = wanted.records_are.filter(|what| *what == RecordsAre::Points);
+    let responses = struck || records_are.is_some();
+    let goal = goal.unwrap_or(if responses { Goal::Frf } else { Goal::InputOutput });
     let outputs = outputs(file.source, wanted, &inputs, goal == Goal::Frf)?;
     let names = |all: &[&Channel]| all.iter().map(|one| one.location.as_str()).collect::<Vec<&str>>().join(", ");
     let short = if struck { ", which is short as a hammer's," } else { "" };
-    let (input, output, file) = (names(&inputs), names(&outputs), file.source.name());
-    let why = format!("measured input {input}{short} and output {output} in {file}");
-    Ok(Choice { inputs, struck, ..Choice::of(goal, outputs, why) })
+    let (input, output, source) = (names(&inputs), names(&outputs), file.source);
+    let why = format!("measured input {input}{short} and output {output} in {}", source.name());
+    let taken: Vec<&Channel> = outputs.iter().chain(&inputs).copied().collect();
+    let notes = left_out(&source.channels, &taken).filter(|_| wanted.channels.is_empty()).into_iter().collect();
+    Ok(Choice { inputs, struck, records_are, notes, ..Choice::of(goal, outputs, why) })
 }
 
 fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
@@ -126,21 +162,28 @@ fn rings_without_a_step(file: &FirstFile<'_>, wanted: &Wanted<'_>) -> bool {
 
 fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result<Choice<'a>, Question> {
     if wanted.records_are == Some(RecordsAre::Points) {
-        let help = "points go with frequency responses, --goal frf; free decays are of hits or sensors".to_owned();
+        let help =
+            "--input names the force of each file; files of frequency responses go with --goal frf; free decays are \
+                    of hits or sensors"
+                .to_owned();
         return Err(("--as points: decays without a measured force have no common scale".to_owned(), Some(help)));
     }
     let source = file.source;
-    let channels = match wanted.channels {
-        [] => sensors(source)?,
-        names => names.iter().map(|name| named(source, name)).collect::<Result<Vec<_>, _>>()?,
+    let Sensors { channels, left_out } = match wanted.channels {
+        [] => sensors(file)?,
+        names => {
+            let channels = names.iter().map(|name| named(source, name)).collect::<Result<Vec<_>, _>>()?;
+            Sensors { channels, left_out: None }
+        }
     };
+    let notes: Vec<String> = left_out.into_iter().collect();
     let cells = channels.len() > 1 && channels.iter().all(|channel| channel.location.ends_with('}'));
     let records_are = wanted.records_are.or(cells.then_some(RecordsAre::Hits));
     // cells are hits of their own: one is enough to see what they are
     let seen = if records_are == Some(RecordsAre::Hits) { &channels[..1] } else { &channels[..] };
     let (values, found) = file.search(seen, wanted)?;
     let record = source.name();
-    let other = |goal, why| Ok(Choice::of(goal, vec![channels[0]], why));
+    let other = |goal, why| Ok(Choice { notes: notes.clone(), ..Choice::of(goal, vec![channels[0]], why) });
     let why = match (found.decays.first(), found.reason()) {
         (Some(_), _) if guessed && found.random => {
             return other(Goal::Thermal, format!("{record}: rises and falls of a random vibration, no free decays"));
@@ -163,5 +206,5 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
         (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };
     let hammer = file.hammer().filter(|_| guessed).map(|hammer| format!("; {hammer}")).unwrap_or_default();
-    Ok(Choice { records_are, ..Choice::of(Goal::Decay, channels, why + &hammer) })
+    Ok(Choice { records_are, notes, ..Choice::of(Goal::Decay, channels, why + &hammer) })
 }

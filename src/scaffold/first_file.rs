@@ -4,9 +4,12 @@ use std::cell::OnceCell;
 
 use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, find_decays};
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
-use afmid_pipeline::recording::{InputFiles, Reading, UnpackedContents, open_unpacked, responses};
+use afmid_pipeline::recording::{
+    Contents, FoundChannel, FoundResponse, InputFiles, Reading, UnpackedContents, open_unpacked, responses,
+    says_frequencies,
+};
 
-use super::channels::usable;
+use super::channels::{some_of, usable};
 use super::choice::Question;
 use super::pipeline::Wanted;
 use super::recordings::Source;
@@ -39,8 +42,44 @@ impl<'a> FirstFile<'a> {
 
     /// Whether it holds frequency responses; `guessed`: even if nothing in it says so.
     pub fn has_responses(&self, guessed: bool) -> bool {
-        let found = self.opened().ok().and_then(|opened| responses(&opened.contents, None).ok()).unwrap_or_default();
-        !found.is_empty() && (guessed || found.iter().all(|response| !response.guessed))
+        self.opened().is_ok_and(|opened| holds_responses(&opened.contents, guessed))
+    }
+
+    /// That the file holds spectra and no record over time, and what reads them; none where it holds a record.
+    pub fn spectrum(&self) -> Option<Question> {
+        let contents = &self.opened().ok()?.contents;
+        if let Some(Err(error)) =
+            contents.responses.first().map(|response| response.frequency_channel(&contents.channels))
+        {
+            return Some((format!("{}: {}", self.source.file.display(), error.problem), error.help));
+        }
+        let axis = contents.channels.iter().find(|channel| says_frequencies(channel))?;
+        let over = |channel: &&FoundChannel| !channel.is_axis && channel.sample_rate_hz.is_none();
+        let of_length = |channel: &&FoundChannel| over(channel) && channel.samples == axis.samples;
+        let spectra: Vec<&str> = contents.channels.iter().filter(of_length).map(|c| c.location.as_str()).collect();
+        let timed = contents.channels.iter().any(|channel| !channel.is_axis && channel.sample_rate_hz.is_some());
+        if timed || spectra.is_empty() {
+            return None;
+        }
+        let problem = format!(
+            "{}: {} over the frequencies {}: a spectrum, no record over time",
+            self.source.file.display(),
+            some_of(&spectra),
+            axis.location
+        );
+        let responses = "--goal frf reads complex numbers, real and imaginary part, amplitude and phase of responses";
+        let density = spectra.first().filter(|_| self.source.format.contains("HDF5")).map(|density| {
+            format!("; `io.spectrum` a power density: frequency = \"{}\", density = \"{density}\"", axis.location)
+        });
+        Some((problem, Some(responses.to_owned() + &density.unwrap_or_default())))
+    }
+
+    /// Whether free decays are in a channel, each of its samples taken as one of time.
+    pub fn rings(&self, channel: &Channel) -> bool {
+        let Ok(values) = self.samples(channel) else { return false };
+        let rate = channel.sample_rate_hz.unwrap_or(1.0);
+        let found = find_decays(&[&values], rate, &DecaySearchOptions::default());
+        found.is_ok_and(|found| !found.random && !found.decays.is_empty())
     }
 
     /// A channel's first samples. Errors: they cannot be read.
@@ -90,4 +129,13 @@ impl<'a> FirstFile<'a> {
     fn plain(&self, problem: &str) -> Question {
         (format!("{}: {problem}", self.source.file.display()), None)
     }
+}
+
+/// Whether a file holds frequency responses; `guessed`: even if nothing in it says so.
+pub fn holds_responses(contents: &Contents, guessed: bool) -> bool {
+    let found = responses(contents, None).unwrap_or_default();
+    let has_frequencies = |response: &FoundResponse| response.frequency_channel(&contents.channels).is_ok();
+    !found.is_empty()
+        && found.iter().all(has_frequencies)
+        && (guessed || found.iter().all(|response| !response.guessed))
 }

@@ -3,12 +3,17 @@
 mod channels;
 mod choice;
 mod first_file;
+mod groups;
+mod left_out;
 mod pipeline;
+mod points;
 mod recordings;
+mod sensors;
 mod stage;
 mod stated;
 
 pub use choice::choose;
+pub use left_out::left_out;
 pub use pipeline::{Wanted, pipeline};
 pub use recordings::look;
 pub use stage::{python, rust};

@@ -6,6 +6,7 @@ use afmid_pipeline::toml::{Table, Value};
 use afmid_stages::io::quantity_of_unit;
 
 use super::choice::{Choice, Question};
+use super::points;
 use super::recordings::Source;
 use super::stated;
 use crate::cli::{Goal, RecordsAre};
@@ -30,7 +31,7 @@ impl Goal {
     const fn config(self) -> &'static str {
         match self {
             Self::Decay => include_str!("../../configs/decay.toml"),
-            Self::Modes => include_str!("../../configs/free-lever.toml"),
+            Self::Modes | Self::SnapOff => include_str!("../../configs/free-lever.toml"),
             Self::Ringdown => include_str!("../../configs/ringdown.toml"),
             Self::Diagnosis => include_str!("../../configs/diagnose.toml"),
             Self::Coupled => include_str!("../../configs/coupled-lever.toml"),
@@ -45,7 +46,7 @@ impl Goal {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Decay => "decay",
-            Self::Modes => "modes",
+            Self::Modes | Self::SnapOff => "modes",
             Self::Ringdown => "ringdown",
             Self::Diagnosis => "diagnosis",
             Self::Coupled => "coupled",
@@ -69,17 +70,23 @@ impl Choice<'_> {
     }
 }
 
-/// A parameter for what a response in that unit is to a force; empty where the unit does not say.
-fn quantity(unit: &str) -> String {
-    let known = quantity_of_unit(&format!("({unit})/N"));
-    known.map(|quantity| format!(", quantity = \"{}\"", quantity.name())).unwrap_or_default()
+/// What a response in that unit is to a force; none where the unit does not say.
+pub fn quantity(unit: &str) -> Option<&'static str> {
+    quantity_of_unit(&format!("({unit})/N")).map(|quantity| quantity.name())
 }
 
 /// The config for a file in `folder`. Errors: what is not known of the recordings, and how to say it.
 pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
     let (template, reader) = choice.template();
+    let points = choice.records_are == Some(RecordsAre::Points) && reader == "io.columns";
+    if reader == "io.columns" && source.files.len() > 1 && !points {
+        let help = "--as points if each is of another point of the structure; else give one file with all hits, or a \
+                    config for each; --goal decay takes several without the force";
+        let problem = format!("{} files, wanted one record of input and output", source.files.len());
+        return Err((problem, Some(help.to_owned())));
+    }
     let params = match reader {
-        "io.columns" => columns(source, choice, wanted, folder),
+        "io.columns" => columns(source, &source.file, choice, wanted, folder),
         "io.frf" => Ok(responses(source, wanted, folder)),
         _ => records(source, choice, wanted, folder),
     }?;
@@ -113,6 +120,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             Some(("params", _)) if stage == "\"spectrum.measured_frf\"" => {
                 let blocks = if choice.struck { "hits" } else { "segments" };
                 let quantity = quantity(wanted.unit.unwrap_or(&choice.channels[0].unit));
+                let quantity = quantity.map(|quantity| format!(", quantity = \"{quantity}\"")).unwrap_or_default();
                 text.push_str(&format!("params = {{ blocks = \"{blocks}\"{quantity} }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
@@ -123,11 +131,14 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
                 if line == "[pipeline]" && !choice.why.is_empty() {
                     text.push_str(&format!("# chosen: {}\n", one_line(&choice.why)));
                 }
+                for note in choice.notes.iter().filter(|_| line == "[pipeline]") {
+                    text.push_str(&format!("# {}\n", one_line(note)));
+                }
                 text.push_str(&format!("{line}\n"));
             }
         }
     }
-    Ok(text)
+    if points { points::in_place_of_one(&text, source, choice, wanted, folder) } else { Ok(text) }
 }
 
 /// The `params` of the stage `records`.
@@ -148,7 +159,7 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     if let Some(rate) = stated::rate(source, channel, &wanted, true)? {
         params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
     }
-    if let Some(unit) = stated::unit(source, channel, &wanted)? {
+    if let Some(unit) = stated::unit(source, choice.goal, channel, &wanted)? {
         params.insert("unit".to_owned(), text(unit));
     }
     Ok(format!("params = {}\n", Value::Table(params)))
@@ -172,16 +183,17 @@ fn responses(source: &Source, wanted: Wanted<'_>, folder: &Path) -> String {
 }
 
 /// The `params` of the stage `data`.
-fn columns(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
+pub fn columns(
+    source: &Source,
+    file: &Path,
+    choice: &Choice<'_>,
+    wanted: Wanted<'_>,
+    folder: &Path,
+) -> Result<String, Question> {
     let text = |text: &str| Value::String(text.to_owned());
     let (output, location) = (choice.channels[0], |channel: &&Channel| text(&channel.location));
-    if source.files > 1 {
-        let help = "give one file with all hits, or a config for each; --goal decay takes several without the force";
-        let problem = format!("{} files, wanted one record of input and output", source.files);
-        return Err((problem, Some(help.to_owned())));
-    }
     let mut params = Table::new();
-    params.insert("file".to_owned(), text(&relative(&source.file, folder).to_string_lossy()));
+    params.insert("file".to_owned(), text(&relative(file, folder).to_string_lossy()));
     params.insert("inputs".to_owned(), Value::Array(choice.inputs.iter().map(location).collect()));
     match choice.channels.len() {
         1 => params.insert("output".to_owned(), text(&output.location)),
@@ -222,12 +234,15 @@ mod tests {
             best: Some(0),
             reason: String::new(),
             remarks: Vec::new(),
-            files: 3,
+            files: vec![PathBuf::from("/lab/years/2004/a.tdms"); 3],
+            rate_hz: rate,
+            others: Vec::new(),
+            skipped: Vec::new(),
         }
     }
 
     const GOALS: [Goal; 7] =
-        [Goal::Decay, Goal::Modes, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled, Goal::Thermal, Goal::Steady];
+        [Goal::Decay, Goal::SnapOff, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled, Goal::Thermal, Goal::Steady];
 
     fn wanted(goal: Goal) -> Wanted<'static> {
         Wanted { goal: Some(goal), channels: &[], inputs: &[], records_are: None, rate_hz: None, unit: None }

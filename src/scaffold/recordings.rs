@@ -1,13 +1,11 @@
 //! What a new config must state of recordings.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::recognised;
-use afmid_stages::io::natural_order;
-
 use super::choice::Question;
-use crate::inspect::{Channel, Outcome, inspect};
+use super::groups::{Group, Groups, Listed};
+use super::pipeline::Wanted;
+use crate::inspect::{Channel, Outcome, files_of, inspect};
 
 /// Recordings of one kind, by one of them.
 #[derive(Debug)]
@@ -25,8 +23,14 @@ pub struct Source {
     pub reason: String,
     /// What its reader remarked.
     pub remarks: Vec<String>,
-    /// How many files there are of that kind.
-    pub files: usize,
+    /// All files of that kind, in the order in which they were given.
+    pub files: Vec<PathBuf>,
+    /// The rate that they share, where they state one and others were given with them.
+    pub rate_hz: Option<f64>,
+    /// Recordings of other kinds, which are left out.
+    pub others: Vec<Group>,
+    /// What is no recording, and why.
+    pub skipped: Vec<(PathBuf, String)>,
 }
 
 impl Source {
@@ -36,25 +40,78 @@ impl Source {
     }
 }
 
-/// Looks at the recordings: of a folder at the first file of the kind that most of its files are of.
+/// Looks at the recordings: of files of several kinds at the first file of the kind that most are of.
 ///
 /// Errors: what cannot be used, and what to do.
-pub fn look(paths: &[PathBuf]) -> Result<Source, Question> {
-    let mut patterns = Vec::new();
-    let mut files: Vec<PathBuf> = Vec::new();
+pub fn look(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<Source, Question> {
+    let listed = listed(paths)?;
+    if let [(only, true)] = &listed[..] {
+        return source(Groups::default(), vec![only.clone()], vec![only.clone()], None);
+    }
+    let mut groups = Groups::of(&listed, wanted)?;
+    let Some(number) = groups.best(wanted.rate_hz) else { return Err(none(paths, &groups)) };
+    let chosen = groups.all.remove(number);
+    groups.all.sort_by_key(|group| std::cmp::Reverse(group.files.len()));
+    let (rate_hz, files) = (chosen.rate_hz(), chosen.files);
+    let patterns = paths.iter().flat_map(|path| patterns(path, &files, &groups.own)).collect();
+    source(groups, files, patterns, rate_hz)
+}
+
+/// All files. Errors: a path that is not there, a folder without files.
+fn listed(paths: &[PathBuf]) -> Result<Vec<Listed>, Question> {
+    let mut files = Vec::new();
     for path in paths {
         if path.is_dir() {
-            let (pattern, found) = kind(path)?;
-            patterns.extend(pattern);
-            files.extend(found);
+            let cannot = |error: std::io::Error| (format!("{} cannot be listed: {error}", path.display()), None);
+            let found = files_of(path).map_err(cannot)?;
+            if found.is_empty() {
+                let help = "give the folder that holds the files themselves".to_owned();
+                return Err((format!("{} holds no files", path.display()), Some(help)));
+            }
+            files.extend(found.into_iter().map(|file| (file, false)));
         } else if path.exists() {
-            patterns.push(path.clone());
-            files.push(path.clone());
+            files.push((path.clone(), true));
         } else {
             let help = "give the folder of the recordings, or the files".to_owned();
             return Err((format!("there is no file or folder {}", path.display()), Some(help)));
         }
     }
+    Ok(files)
+}
+
+/// That there is no recording among the files, with the first reasons.
+fn none(paths: &[PathBuf], groups: &Groups) -> Question {
+    const MOST: usize = 5;
+    let reason =
+        |(path, why): &(PathBuf, String)| format!("{}: {why}", path.file_name().unwrap_or_default().to_string_lossy());
+    let own = (!groups.own.is_empty()).then(|| format!("{} are results of afmid's", groups.own.len()));
+    let reasons: Vec<String> = groups.skipped.iter().take(MOST).map(reason).chain(own).collect();
+    let names: Vec<String> = paths.iter().take(MOST).map(|path| path.display().to_string()).collect();
+    let help = "give the folder that holds the recordings, or the files".to_owned();
+    (format!("there are no recordings in {} ({})", names.join(", "), reasons.join("; ")), Some(help))
+}
+
+/// What finds those of the files that lie at a path: of a folder a pattern, or their names where others share the
+/// ending.
+fn patterns(path: &Path, files: &[PathBuf], own: &[PathBuf]) -> Vec<PathBuf> {
+    if !path.is_dir() {
+        return files.iter().filter(|file| *file == path).take(1).cloned().collect();
+    }
+    let here: Vec<PathBuf> = files.iter().filter(|file| file.parent() == Some(path)).cloned().collect();
+    let Some(ending) = here.first().and_then(|file| file.extension()) else { return here };
+    let alike = files_of(path).unwrap_or_default().into_iter().filter(|file| file.extension() == Some(ending));
+    match alike.into_iter().all(|file| here.contains(&file) || own.contains(&file)) {
+        true => vec![path.join(format!("*.{}", ending.to_string_lossy()))],
+        false => here,
+    }
+}
+
+fn source(
+    groups: Groups,
+    files: Vec<PathBuf>,
+    patterns: Vec<PathBuf>,
+    rate_hz: Option<f64>,
+) -> Result<Source, Question> {
     let first = files.first().cloned().ok_or_else(|| ("there are no recordings".to_owned(), None))?;
     let inspected = inspect(&first);
     match inspected.outcome {
@@ -65,7 +122,10 @@ pub fn look(paths: &[PathBuf]) -> Result<Source, Question> {
             reason: holdings.ringdown.reason,
             remarks: holdings.remarks,
             channels: holdings.channels,
-            files: files.len(),
+            files,
+            rate_hz,
+            others: groups.all,
+            skipped: groups.skipped,
             file: first,
         }),
         Outcome::Own => Err((
@@ -74,34 +134,4 @@ pub fn look(paths: &[PathBuf]) -> Result<Source, Question> {
         )),
         Outcome::Refused { problem, help } => Err((format!("{}: {problem}", first.display()), help)),
     }
-}
-
-/// The files of a folder that share the commonest ending, in natural order, and what finds them: a pattern, or their
-/// names where others share the ending.
-fn kind(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), Question> {
-    let cannot = |error: std::io::Error| (format!("{} cannot be listed: {error}", folder.display()), None);
-    let mut by_ending: BTreeMap<String, Vec<(String, PathBuf)>> = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).map_err(cannot)? {
-        let entry = entry.map_err(cannot)?;
-        let (name, path) = (entry.file_name().to_string_lossy().into_owned(), entry.path());
-        if !name.starts_with('.') && path.is_file() {
-            let ending = path.extension().map(|ending| ending.to_string_lossy().into_owned()).unwrap_or_default();
-            by_ending.entry(ending).or_default().push((name, path));
-        }
-    }
-    // of equally many the first ending of the alphabet
-    let commonest = by_ending.into_iter().rev().max_by_key(|(_, files)| files.len());
-    let Some((ending, mut files)) = commonest else {
-        let help = "give the folder that holds the files themselves".to_owned();
-        return Err((format!("{} holds no files", folder.display()), Some(help)));
-    };
-    files.sort_by(|a, b| natural_order(&a.0, &b.0));
-    let all: Vec<PathBuf> = files.into_iter().map(|(_, path)| path).collect();
-    // what was written about recordings lies beside them
-    let readable: Vec<PathBuf> = all.iter().filter(|path| recognised(path)).cloned().collect();
-    if !readable.is_empty() && readable.len() < all.len() {
-        return Ok((readable.clone(), readable));
-    }
-    let pattern = if ending.is_empty() { "*".to_owned() } else { format!("*.{ending}") };
-    Ok((vec![folder.join(pattern)], all))
 }

@@ -3,6 +3,7 @@
 use super::choice::Question;
 use super::pipeline::Wanted;
 use super::recordings::Source;
+use crate::cli::Goal;
 use crate::inspect::Channel;
 
 /// The sample rate to be written; none where the file states it. Errors: neither states one; both do, and differ.
@@ -10,7 +11,7 @@ pub fn rate(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool)
     match (channel.sample_rate_hz, wanted.rate_hz) {
         (Some(_), None) => Ok(None),
         (None, Some(rate)) => Ok(Some(rate)),
-        (Some(rate), Some(other)) if rate == other => Ok(None),
+        (Some(rate), Some(other)) if same_rate(rate, other) => Ok(None),
         (Some(rate), Some(_)) => {
             let problem = format!("{} states {rate} samples per second", source.file.display());
             Err((problem, Some("leave --rate out".to_owned())))
@@ -19,10 +20,27 @@ pub fn rate(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool)
     }
 }
 
+/// Whether two rates are one: `io.records` takes them for the same within a millionth.
+pub fn same_rate(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
+}
+
+/// Whether a config does without a unit that nobody states: of decays and noise it scales the amplitudes alone.
+pub fn does_without_unit(goal: Goal, channel: &Channel, wanted: &Wanted<'_>) -> bool {
+    let scales_alone = matches!(goal, Goal::Decay | Goal::Thermal | Goal::Steady);
+    scales_alone && channel.unit.is_empty() && wanted.unit.is_none()
+}
+
 /// The unit to be written; none where the file states it. Errors: as [`rate`].
-pub fn unit<'a>(source: &Source, channel: &Channel, wanted: &Wanted<'a>) -> Result<Option<&'a str>, Question> {
+pub fn unit<'a>(
+    source: &Source,
+    goal: Goal,
+    channel: &Channel,
+    wanted: &Wanted<'a>,
+) -> Result<Option<&'a str>, Question> {
     match (channel.unit.as_str(), wanted.unit) {
         ("", Some(unit)) => Ok(Some(unit)),
+        ("", None) if does_without_unit(goal, channel, wanted) => Ok(Some("1")),
         ("", None) => Err(question(source, channel, wanted, true)),
         (stated, Some(unit)) if stated != unit => {
             let problem = format!("{} states the unit {stated}", source.file.display());
@@ -52,7 +70,10 @@ pub fn missing(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bo
     let says = |axis: &Channel| source.remarks.iter().find(|remark| remark.starts_with(&axis.location)).cloned();
     let mut help = vec![how.to_owned()];
     if let Some((axis, remark)) = axis.and_then(|axis| Some((axis, says(axis)?))) {
-        help.push(format!("{remark}; --goal frf if {} is a frequency", axis.location));
+        help.push(format!(
+            "{remark}; --goal frf if {} is a frequency, `io.spectrum` for a power density",
+            axis.location
+        ));
     }
     (format!("{} states no {what}", source.file.display()), help)
 }

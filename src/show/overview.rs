@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use super::grid::grid;
 use crate::printable::one_line;
 
-/// The run, its stages with their artifacts, and all warnings.
-pub fn overview_text(file: &ResultFile) -> String {
+/// The run, its stages with their artifacts, and all warnings; before these `found`, what the run is about.
+pub fn overview_text(file: &ResultFile, found: &str) -> String {
     let run = file.run();
     let info = &run.info;
     let mut text = format!("{} (seed {}), {}", one_line(&run.name), run.seed, one_line(&run.program));
@@ -18,6 +18,7 @@ pub fn overview_text(file: &ResultFile) -> String {
         text.push_str(&format!(", {when}, {seconds:.2} s on {threads} threads of {host}"));
     }
     text.push_str("\n\n");
+    text.push_str(found);
     let mut rows = vec![["stage", "uses", "artifacts"].map(str::to_owned).to_vec()];
     for stage in file.stages() {
         let ports: Vec<String> =

@@ -2,13 +2,14 @@
 //!
 //! Programs that save arrays save times as one more array. By its name it is an axis: `time`, `t`, `/group/time`,
 //! `Out.Time`, `frequency`; or `xData` beside a `yData` of the same length, or cells beside cells of the same length, if
-//! it rises evenly (a cell from zero on). It is never a signal.
+//! it rises evenly (a cell from zero on). What is named `f` or is in hertz is an axis if it rises throughout: a force, a
+//! frequency over time do not. It is never a signal.
 //! Times that run evenly give their rate to the arrays of their length that lie in the same group or struct, or deeper:
 //! a cell `{3}` of times to the cell `{3}` beside it; of the cells of one array the first of times to the first of
 //! signals. Nothing else gets that rate.
 
 use crate::rate::{fewest_digits, of_step};
-use crate::{Contents, FoundChannel};
+use crate::{Contents, FoundChannel, hertz};
 use std::collections::HashMap;
 
 /// Names of arrays of times, in lower case. A capital `T` is a temperature or a period.
@@ -28,8 +29,12 @@ const TIMES: [&str; 11] = [
 ];
 /// Ends of such names that state the unit.
 const UNITS: [(&str, f64); 5] = [("_s", 1.0), ("_ms", 1e-3), ("_us", 1e-6), ("_ns", 1e-9), ("_sec", 1.0)];
-/// Names of arrays of frequencies, in lower case.
-const FREQUENCIES: [&str; 6] = ["frequency", "frequencies", "freq", "freqs", "frequency_hz", "freq_hz"];
+/// Names of arrays of frequencies, in lower case, but for the unit at their ends.
+const FREQUENCIES: [&str; 4] = ["frequency", "frequencies", "freq", "freqs"];
+/// The same of names that others may have, too.
+const PERHAPS_FREQUENCIES: [&str; 5] = ["f", "hz", "fvec", "faxis", "f_axis"];
+/// Ends of such names that state the unit, in lower case, and the unit.
+const HERTZ: [(&str, &str); 4] = [("_hz", "Hz"), ("_khz", "kHz"), ("_mhz", "MHz"), ("_ghz", "GHz")];
 
 /// Largest deviation from evenness, in steps. Times are often saved in few digits; a missing sample is a whole step.
 const TOLERANCE: f64 = 1e-2;
@@ -114,6 +119,10 @@ pub fn settle(contents: &mut Contents) {
         if let Some(channel) = channels.get_mut(axis.at) {
             channel.is_axis = true;
             channel.sample_rate_hz = None;
+            let lower = channel.location.to_lowercase();
+            if let Some((_, unit)) = HERTZ.iter().find(|(end, _)| lower.ends_with(end) && channel.unit.is_empty()) {
+                channel.unit = (*unit).to_owned();
+            }
         }
     }
     let mut at = 0;
@@ -239,7 +248,7 @@ pub fn names_times(name: &str) -> bool {
 /// What kind of axis a channel is by its name and those beside it.
 fn kind(channel: &FoundChannel, place: &Place, places: &HashMap<Key, usize>) -> Option<Kind> {
     let lower = place.name.to_lowercase();
-    if FREQUENCIES.contains(&lower.as_str()) {
+    if is_of_frequencies(channel, &lower) {
         return Some(Kind::Frequency);
     }
     let is_time = |name: &str| TIMES.contains(&name) || (name == "t" && place.name.starts_with('t'));
@@ -259,6 +268,27 @@ fn kind(channel: &FoundChannel, place: &Place, places: &HashMap<Key, usize>) -> 
     }
     let beside = || places.get(&place.key(place.name, "", channel.samples)).is_some_and(|cells| *cells > 1);
     (!place.cell.is_empty() && beside()).then_some(Kind::Cell)
+}
+
+/// Whether an array of this name holds frequencies if it is an axis.
+pub(crate) fn perhaps_frequencies(name: &str) -> bool {
+    PERHAPS_FREQUENCIES.contains(&name.to_lowercase().as_str())
+}
+
+/// Whether a channel of this name in lower case holds the frequencies of a spectrum.
+fn is_of_frequencies(channel: &FoundChannel, lower: &str) -> bool {
+    let bare = HERTZ.iter().find_map(|(end, _)| lower.strip_suffix(end)).unwrap_or(lower);
+    let perhaps = || perhaps_frequencies(bare) || hertz(&channel.unit).is_some();
+    FREQUENCIES.contains(&bare) || (perhaps() && rises(channel))
+}
+
+/// Whether values rise throughout, as far as they are read.
+fn rises(channel: &FoundChannel) -> bool {
+    let mut last = f64::NEG_INFINITY;
+    let mut rising = |value: f64| std::mem::replace(&mut last, value) < value;
+    let samples = channel.samples.min(READ);
+    let mut pieces = (0..samples).step_by(PIECE).map(|start| channel.source.read(start, PIECE.min(samples - start)));
+    samples >= 3 && pieces.all(|piece| piece.is_ok_and(|raw| raw.widened().into_iter().all(&mut rising)))
 }
 
 /// The name of the y to an x: `xData` has `yData`.
@@ -312,6 +342,13 @@ fn axis(at: usize, kind: Kind, channel: &FoundChannel, remarks: &mut Vec<String>
     // What has no name is an axis only if it begins at zero as recordings do: a ramp begins anywhere.
     if kind == Kind::Cell && first.abs() > step {
         return None;
+    }
+    // a stretch that is cut from a record may begin anywhere, but a spectrum's band begins far from zero
+    if kind == Kind::Abscissa && stated.is_none() && first.abs() > step * channel.samples as f64 {
+        remarks.push(format!(
+            "{location} is an axis, evenly by {step} from {first}, of times or of frequencies: it gives no sample rate"
+        ));
+        return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
     }
     let unknown = stated.is_none() && !channel.unit.is_empty();
     // Without a unit, whole numbers count samples, or ticks of a clock.
@@ -519,6 +556,20 @@ mod tests {
             channel("/df/y", noise(50)),
         ];
         assert_eq!(settled(both), [axis("/df/index"), is("/df/y", Some(10.0))]);
+        let hertz = |location: &str, unit: &str, values: Vec<f64>| {
+            let mut channel = channel(location, values);
+            channel.unit = unit.to_owned();
+            channel
+        };
+        for (name, unit) in [("/f", ""), ("/Hz", ""), ("/freq_kHz", ""), ("/x", "kHz"), ("/band", "Hz"), ("/f", "Hz")] {
+            let found = settled(vec![hertz(name, unit, times(50, 0.5)), channel("/psd", noise(50))]);
+            assert_eq!(found, [axis(name), is("/psd", None)], "{name} {unit}");
+            let over_time = vec![hertz(name, unit, noise(50)), channel("/time", times(50, 0.1))];
+            let wanted = if name == "/freq_kHz" { None } else { Some(is(name, Some(10.0))) };
+            assert!(wanted.is_none_or(|wanted| settled(over_time) == [wanted]), "{name} {unit}");
+        }
+        let band: Vec<f64> = times(50, 0.25).iter().map(|f| f + 65_000.0).collect();
+        assert_eq!(settled(vec![channel("/x", band), channel("/y", noise(50))]), [axis("/x"), is("/y", None)]);
         let temperature = settled(vec![channel("/T", times(50, 0.1)), channel("/y", noise(50))]);
         assert_eq!(temperature, [is("/T", None), is("/y", None)]);
     }

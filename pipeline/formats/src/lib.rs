@@ -52,7 +52,7 @@ pub use raw::Raw;
 pub use raw_binary::{RawBinary, SampleType};
 pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};
 pub use regular::{open_regular, read_regular};
-pub use responses::{Degree, FoundResponse, Frequencies, Parts, hertz, responses, unit_ratio};
+pub use responses::{Degree, FoundResponse, Frequencies, Parts, hertz, responses, says_frequencies, unit_ratio};
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
 ///

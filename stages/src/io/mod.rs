@@ -25,7 +25,7 @@ pub use columns::Columns;
 pub use consistency::{Consistency, check_consistency};
 pub use file_patterns::{Match, matching_files};
 pub(crate) use frf::FRF;
-pub use frf::Frf;
+pub use frf::{Frf, Roving};
 pub use memory::{MemorySource, memory_channel, memory_record};
 pub use natural_order::natural_order;
 pub use overview::Overview;

@@ -1,11 +1,14 @@
 //! Examples of `spectrum.measured_frf`: a pole driven by a steady signal, and a hammer's hits.
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
-use afmid_pipeline::{Array, Example, Ports, StageError};
+use afmid_pipeline::stage::NoProgress;
+use afmid_pipeline::{Array, Context, Example, Ports, Stage, StageError};
 use num_complex::Complex64;
 
-use super::measured_frf::{PAIR, SUMMARY};
+use super::MeasuredFrf;
+use super::measured_frf::{BEFORE, PAIR, SUMMARY};
 use crate::artifacts::{DataSet, Frf, NewPair, PairSet};
 use crate::io::FRF;
 
@@ -25,6 +28,12 @@ pub(super) fn examples() -> Vec<Example> {
             params: "blocks = \"hits\"\nblock_samples = 600\nadded_decay_per_s = 5.0\nquantity = \"mobility\"\ndriving_point = 1",
             inputs: || Ok(Ports::new().with(&PAIR, struck())),
             expect: |outputs| near_truth(outputs, 5.0),
+        },
+        Example {
+            title: "a second point joins the first",
+            params: "point = \"tip\"",
+            inputs: || Ok(Ports::new().with(&PAIR, steady()).with(&BEFORE, first_point()?)),
+            expect: two_points,
         },
     ]
 }
@@ -70,6 +79,23 @@ pub(super) fn pair(force: Vec<f64>, level: f64, labels: [(&str, &str); 2]) -> Ar
 
 fn steady() -> Array {
     pair(noise(8192, 1), 0.5, LABELS)
+}
+
+/// Two responses, of one record twice.
+fn two_points(outputs: &Ports) -> Result<String, String> {
+    let frf = outputs.get(&FRF).and_then(Frf::new).map_err(|error| error.to_string())?;
+    let names: Vec<&str> = frf.responses.iter().map(|of| of.input.name.as_str()).collect();
+    match names == ["root", "tip"] && frf.row(0) == frf.row(1) {
+        true => Ok("a response of each point".to_owned()),
+        false => Err(format!("the responses of {names:?} are not those of one record twice")),
+    }
+}
+
+/// The responses of another point: of the same record.
+fn first_point() -> Result<Array, StageError> {
+    let stage = MeasuredFrf { block_samples: Some(256), point: Some("root".to_owned()), ..MeasuredFrf::default() };
+    let outputs = stage.run(&Ports::new().with(&PAIR, steady()), &Context::new(Path::new("."), 1, &NoProgress))?;
+    outputs.get(&FRF).cloned()
 }
 
 fn struck() -> Array {

@@ -7,8 +7,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use super::joined::Joining;
 use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf, Understood};
-use crate::io::FRF;
+use crate::io::{FRF, Roving};
 use afmid_kernels::spectra::{
     Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, frequency_response, hit_spacing, hits, segments,
 };
@@ -23,7 +24,8 @@ use afmid_kernels::spectra::{
 /// The band in which the input has power is found and kept.
 /// # Shapes
 /// A row for each input of the pair, output after output, over the bins of the band, under the names of the channels; zero
-/// hertz is left out.
+/// hertz is left out. Rows of `before` come first, over the bins that both have: responses of a structure that was
+/// measured point by point, a file each.
 /// # Units
 /// Displacement, velocity and acceleration over force in m, m/s and m/s^2 per N; else output over input in the pair's
 /// units.
@@ -32,7 +34,8 @@ use afmid_kernels::spectra::{
 /// over as many neighbouring bins as give 160 degrees of freedom. A single hit has neither coherence nor variance.
 /// Segments bias responses whose resonances are narrower than about four bins.
 /// # Errors
-/// A record that is shorter than a block, samples that are missing, an input that is zero throughout, no hit.
+/// A record that is shorter than a block, samples that are missing, an input that is zero throughout, no hit; another
+/// rate, block, quantity, unit or added decay than that of `before`.
 /// # Source
 /// J. S. Bendat, A. G. Piersol, Random Data, 2010, ch. 6, 7 and 9; D. J. Ewins, Modal Testing, 2000, section 3.8.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -42,7 +45,7 @@ pub struct MeasuredFrf {
     /// often of the first kind.
     pub blocks: BlocksAre,
     /// Samples of a block. Absent: an eighth of the record for segments (15 of them: a coherence good to a tenth), as many
-    /// as hits are apart at least, the whole record for a single hit.
+    /// as hits are apart at least, the whole record for a single hit. With `before`, as many as its blocks have.
     #[schemars(range(min = 8))]
     pub block_samples: Option<usize>,
     /// Samples of a hit before the force comes to a tenth of its largest value. Why: a pulse has risen from nothing
@@ -68,9 +71,15 @@ pub struct MeasuredFrf {
     /// What output over input is. Absent: what the units say, a `transfer` if they say nothing.
     pub quantity: Option<Quantity>,
     /// Number (from 1) of the response whose input acts where and as its output is measured: with one output the number
-    /// of the input, with one input that of the output. Absent: none.
+    /// of the input, with one input that of the output. Absent: none, or that of `before`.
     #[schemars(range(min = 1))]
     pub driving_point: Option<usize>,
+    /// Name of the point that was struck, or where the sensor was, by `roving`. Absent: the channel's name. Why: files of
+    /// one point each name their channels alike.
+    pub point: Option<String>,
+    /// What is at `point`: the `hammer` (the sensor stays) or the `sensor`. Why: with one sensor it is the hammer that is
+    /// easier to move.
+    pub roving: Roving,
 }
 
 /// What is averaged.
@@ -120,6 +129,8 @@ impl Default for MeasuredFrf {
             excited_share: 0.01,
             quantity: None,
             driving_point: None,
+            point: None,
+            roving: Roving::Hammer,
         }
     }
 }
@@ -130,15 +141,16 @@ const HIT: f64 = 0.1;
 const EIGHTH: usize = 8;
 
 pub(super) const PAIR: Port<Array> = Port::new("pair", "pair", "measured inputs and output over time");
+pub(super) const BEFORE: Port<Array> = Port::optional("before", "frf", "responses of other points, measured alike");
 pub(super) const SUMMARY: Port<Document> =
     Port::new("summary", "summary", "blocks, the excited band, coherence, windows that were found or put on");
 
 impl Stage for MeasuredFrf {
     const SPEC: Spec = Spec {
         name: "spectrum.measured_frf",
-        version: 3,
+        version: 4,
         summary: "estimates the frequency response from measured input and output with coherence and variance",
-        inputs: &[PAIR.spec()],
+        inputs: &[PAIR.spec(), BEFORE.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
         source: "J. S. Bendat, A. G. Piersol, Random Data, 2010",
         ..Spec::STORED
@@ -160,9 +172,10 @@ impl Stage for MeasuredFrf {
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let pair = Pair::new(inputs.get(&PAIR)?);
         let rate = pair.sample_rate_hz()?;
+        let before = inputs.find(&BEFORE)?.map(|array| Joining::new(array, rate)).transpose()?;
         let [inputs, outputs] = pair.channels(DataSet::All)?;
         let record = Block { inputs, outputs };
-        let blocks = self.cut(&record)?;
+        let blocks = self.cut(&record, self.block_samples.or(before.as_ref().map(Joining::block_samples)))?;
         let found = frequency_response(&blocks, self.settings(rate)).map_err(StageError::from_error)?;
         if found.coherence.is_none() {
             cx.warn("a single block: neither coherence nor variance is known");
@@ -173,7 +186,11 @@ impl Stage for MeasuredFrf {
         understood.remark.iter().for_each(|remark| cx.warn(remark));
         let summary = self.summary(&found, band, blocks.len())?;
         let responses = self.responses(pair.channel_names(record.inputs.len(), record.outputs.len()))?;
-        let frf = self.frf(found, band, responses, understood, rate)?;
+        let mut frf = self.frf(found, band, responses, understood, rate)?;
+        if let Some(before) = before {
+            frf = before.join(frf)?;
+            before.remark(&frf).into_iter().for_each(|remark| cx.warn(remark));
+        }
         Ok(Ports::new().with(&FRF, frf.array()?).with(&SUMMARY, summary))
     }
 
@@ -183,9 +200,9 @@ impl Stage for MeasuredFrf {
 }
 
 impl MeasuredFrf {
-    fn cut<'a>(&self, record: &Block<'a>) -> Result<Vec<Block<'a>>, StageError> {
+    fn cut<'a>(&self, record: &Block<'a>, samples: Option<usize>) -> Result<Vec<Block<'a>>, StageError> {
         let whole = record.outputs.first().map_or(0, |output| output.len());
-        let found = match (self.blocks, self.block_samples) {
+        let found = match (self.blocks, samples) {
             (BlocksAre::Segments, samples) => segments(record, samples.unwrap_or(whole / EIGHTH)),
             (BlocksAre::Hits, samples) => {
                 let force = record.inputs.first().copied().unwrap_or_default();
@@ -237,8 +254,15 @@ impl MeasuredFrf {
         if let Some(number) = self.driving_point.filter(|number| *number == 0 || *number > count) {
             return Err(StageError::new(format!("`driving_point` is {number}, there are {count} responses")));
         }
-        let point = |name: &String| Point { name: name.clone(), ..Point::default() };
-        let of = |output| inputs.iter().map(move |input| ResponseOf { output: point(output), input: point(input) });
+        let named = |name: &String, roving: Roving| {
+            let point = self.point.as_ref().filter(|_| self.roving == roving);
+            Point { name: point.unwrap_or(name).clone(), ..Point::default() }
+        };
+        let of = |output| {
+            let response =
+                move |input| ResponseOf { output: named(output, Roving::Sensor), input: named(input, Roving::Hammer) };
+            inputs.iter().map(response)
+        };
         Ok(outputs.iter().flat_map(of).collect())
     }
 

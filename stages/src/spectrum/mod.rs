@@ -4,6 +4,7 @@ mod etfe;
 mod example;
 mod frf;
 mod frf_example;
+mod joined;
 mod measured_example;
 mod measured_frf;
 mod periodogram;

@@ -30,6 +30,8 @@ pub(super) struct Field {
 pub(super) enum Part {
     /// A number, in big-endian order or not.
     Number(Number, bool),
+    /// Real and imaginary part, one behind the other, likewise.
+    Complex(Number, bool),
     /// Anything else, in words.
     Other(String),
 }
@@ -140,6 +142,8 @@ fn simple(code: &str) -> Result<(Part, u64), String> {
         ('u', 8) => Number::U64,
         ('f', 4) => Number::F32,
         ('f', 8) => Number::F64,
+        ('c', 8) => return Ok((Part::Complex(Number::F32, order == '>'), size)),
+        ('c', 16) => return Ok((Part::Complex(Number::F64, order == '>'), size)),
         _ => return other(kind, size).map(|(what, bytes)| (Part::Other(what), bytes)).ok_or_else(wrong),
     };
     Ok((Part::Number(number, order == '>'), size))
@@ -148,7 +152,7 @@ fn simple(code: &str) -> Result<(Part, u64), String> {
 fn other(kind: char, size: u64) -> Option<(String, u64)> {
     Some(match kind {
         'f' => (format!("{}-bit floating point numbers", size.saturating_mul(8)), size),
-        'c' => ("complex numbers: real and imaginary part would be two channels".to_owned(), size),
+        'c' => (format!("{}-bit complex numbers", size.saturating_mul(8)), size),
         'S' | 'a' => (format!("byte strings of {size}"), size),
         'U' => (format!("texts of {size} characters"), size.checked_mul(4)?),
         'V' => (format!("{size} bytes without a type"), size),

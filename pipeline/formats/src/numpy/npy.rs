@@ -1,7 +1,7 @@
 //! A file of one array.
 
 use super::array::Named;
-use super::dtype::Part;
+use super::dtype::{Field, Part};
 use super::header::{self, Header, LEAD_BYTES, MAGIC};
 use crate::axes::settle;
 use crate::fail;
@@ -30,6 +30,10 @@ impl Format for Npy {
                 header.shape, header.data_bytes
             );
             return Err(fail::at(header.bytes, problem, fail::COPY_AGAIN));
+        }
+        if let [Field { what: Part::Complex(..), .. }] = header.fields.as_slice() {
+            let help = "save them with their frequencies in one NPZ: numpy.savez(file, frequency=..., response=...)";
+            return Err(fail::at(0, "the array holds complex numbers, and no frequencies lie beside it", help));
         }
         if let [field] = header.fields.as_slice()
             && let Part::Other(what) = &field.what

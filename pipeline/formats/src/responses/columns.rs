@@ -55,6 +55,12 @@ fn is_frequency(channel: &FoundChannel) -> bool {
     }
 }
 
+/// Whether a channel holds frequencies and says so: by title, name or unit.
+pub fn says_frequencies(channel: &FoundChannel) -> bool {
+    let name = channel.location.rsplit(['/', '.']).next().unwrap_or_default();
+    channel.is_axis && (role(channel).0 == Some(Role::Frequency) || crate::axes::perhaps_frequencies(name))
+}
+
 impl<'a> Column<'a> {
     fn of(channel: &'a FoundChannel) -> Self {
         let (role, name) = role(channel);

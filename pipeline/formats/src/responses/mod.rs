@@ -9,7 +9,7 @@
 mod columns;
 mod role;
 
-pub use columns::responses;
+pub use columns::{responses, says_frequencies};
 pub use role::hertz;
 
 use crate::{FormatError, FoundChannel, Raw, Source, fail};
