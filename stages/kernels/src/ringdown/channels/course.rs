@@ -195,12 +195,22 @@ impl Decays<'_> {
             events.push(event.iter().map(|row| &row[part.start..end]).collect::<Vec<&[f64]>>());
             missing.extend(gaps);
         }
-        let others = seen(&self.others, self.interval_s, &part, SEEN);
-        let all: Vec<c64> = start.iter().chain(&others).copied().collect();
-        let options = ChannelOptions { start: all.clone(), missing, ..self.options.clone() };
-        let fit = fit_channels(&events, self.free, self.interval_s, &options)?;
-        let gone: Vec<usize> = matched(&all, &fit.poles).into_iter().skip(start.len()).flatten().collect();
-        Ok(fit.without(&gone))
+        let mut others = seen(&self.others, self.interval_s, &part, SEEN);
+        loop {
+            let all: Vec<c64> = start.iter().chain(&others).copied().collect();
+            let options = ChannelOptions { start: all.clone(), missing: missing.clone(), ..self.options.clone() };
+            let fit = fit_channels(&events, self.free, self.interval_s, &options)?;
+            let gone: Vec<Option<usize>> = matched(&all, &fit.poles).split_off(start.len());
+            // one that leaves its line stands for what the modes lack
+            let stays = |(other, place): (&c64, &Option<usize>)| {
+                place.is_some_and(|place| (fit.poles[place] - other).norm() <= other.re.abs())
+            };
+            let kept: Vec<c64> = others.iter().zip(&gone).filter(|pair| stays(*pair)).map(|pair| *pair.0).collect();
+            if kept.len() == others.len() {
+                return Ok(fit.without(&gone.into_iter().flatten().collect::<Vec<usize>>()));
+            }
+            others = kept;
+        }
     }
 
     /// The modes in both parts, and where the last is from: a fit and the mode's number in it.

@@ -17,6 +17,9 @@ const MODES: usize = 6;
 /// the amplitude moves 0.83 of what is left to zero between the mean of a hit's energy and its last part.
 const MOTION: f64 = 3.0;
 
+/// Share of a frequency by which hits of one structure may differ: temperature, wear, how it is held.
+const REPEATS: f64 = 2e-3;
+
 /// Hits by the linear systems that they are of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HitSystems {
@@ -44,7 +47,8 @@ struct Alone {
 /// Each hit is fitted by itself, six modes at most. From the one with the most energy on, each joins the first system
 /// with whose first hit it has a mode in common: the strongest of either is one of the other's. Two poles are of one
 /// mode unless their difference has a probability below 0.001 over the number of hits, and exceeds what one linear mode
-/// can stand for (a tenth of the half width to either side) and what the mode's motion with its amplitude explains.
+/// can stand for (a tenth of the half width to either side, of damped modes two thousandths of the frequency at most) and
+/// what the mode's motion with its amplitude explains.
 /// Hits without a mode by themselves are of the first system.
 /// # Shapes
 /// `events` and `free`: as [`fit_channels`](super::fit_channels).
@@ -115,7 +119,8 @@ impl Alone {
         let (one, two) = (self.fit.poles[i], other.fit.poles[j]);
         let d = one - two;
         let motion = MOTION * (self.motion[i] + other.motion[j]);
-        if d.norm() <= 2.0 * FAR * one.re.abs().min(two.re.abs()) + motion {
+        let one_mode = (2.0 * FAR * one.re.abs().min(two.re.abs())).min(REPEATS * one.norm());
+        if d.norm() <= one_mode + motion {
             return true;
         }
         let sum = |a: usize, b: usize| {
