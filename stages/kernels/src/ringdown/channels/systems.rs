@@ -47,7 +47,7 @@ struct Alone {
 /// Each hit is fitted by itself, six modes at most. From the one with the most energy on, each joins the first system
 /// with whose first hit it has a mode in common: the strongest of either is one of the other's. Two poles are of one
 /// mode unless their difference has a probability below 0.001 over the number of hits, and exceeds what one linear mode
-/// can stand for (a tenth of the half width to either side, of damped modes two thousandths of the frequency at most) and
+/// can stand for (a tenth of the half width to either side, of damped modes two thousandths of the frequency at most), or
 /// what the mode's motion with its amplitude explains.
 /// Hits without a mode by themselves are of the first system.
 /// # Shapes
@@ -118,9 +118,9 @@ impl Alone {
     fn is_mode_of(&self, i: usize, other: &Self, j: usize, hits: usize) -> bool {
         let (one, two) = (self.fit.poles[i], other.fit.poles[j]);
         let d = one - two;
-        let motion = MOTION * (self.motion[i] + other.motion[j]);
+        let motion = MOTION * self.motion[i].max(other.motion[j]);
         let one_mode = (2.0 * FAR * one.re.abs().min(two.re.abs())).min(REPEATS * one.norm());
-        if d.norm() <= one_mode + motion {
+        if d.norm() <= one_mode.max(motion) {
             return true;
         }
         let sum = |a: usize, b: usize| {
