@@ -23,6 +23,8 @@ const FILL: [f64; 6] = [0.15, 0.5, 0.3, 0.7, 0.05, 0.85];
 const FEWEST: usize = 12;
 
 /// Subspace estimates of a record, each made when it is first wanted: it serves all orders.
+///
+/// Each is made by one thread alone. Were it shared out, a thread that waits for it could hold up the one that makes it.
 pub(crate) struct Estimates<'a> {
     input: Cow<'a, [f64]>,
     output: &'a [f64],

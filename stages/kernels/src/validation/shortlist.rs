@@ -85,22 +85,22 @@ mod tests {
         assert_eq!((exact.least_information(), exact.up_to(4)), (2, vec![2, 3, 4]));
     }
 
+    /// Of 50 records, those whose errors leave nothing: made of an input and of white noise.
+    fn sufficient(errors: impl Fn(&[f64], &[f64]) -> Vec<f64>) -> usize {
+        let suffices = |seed: u64| {
+            let (u, e) = (white_noise(2000, 1.0, seed), white_noise(2000, 1.0, 1000 + seed));
+            nothing_left(&u, &errors(&u, &e), 4)
+        };
+        (0..50).filter(|seed| suffices(*seed)).count()
+    }
+
     #[test]
     fn errors_of_a_missing_mode_and_of_a_colour_are_not_by_chance() {
-        let seeds = 50;
-        let count = |of: &dyn Fn(&[f64], &[f64]) -> Vec<f64>| {
-            (0..seeds)
-                .filter(|seed| {
-                    let (u, e) = (white_noise(2000, 1.0, *seed), white_noise(2000, 1.0, 1000 + seed));
-                    nothing_left(&u, &of(&u, &e), 4)
-                })
-                .count()
-        };
         // one in fifty is refused by chance: five or more of fifty in one run of 300
-        assert!(count(&|_, e| e.to_vec()) > 45);
+        assert!(sufficient(|_, e| e.to_vec()) > 45);
         // 0.2 of the input is nine standard errors of such a correlation, 0.3 of the sample before twelve
-        let missing = count(&|u, e| e.iter().zip(u).map(|(e, u)| e + 0.2 * u).collect());
-        let coloured = count(&|_, e| (1..2000).map(|k| e[k] + 0.3 * e[k - 1]).chain([0.0]).collect());
+        let missing = sufficient(|u, e| e.iter().zip(u).map(|(e, u)| e + 0.2 * u).collect());
+        let coloured = sufficient(|_, e| (1..2000).map(|k| e[k] + 0.3 * e[k - 1]).chain([0.0]).collect());
         assert_eq!((missing, coloured), (0, 0));
     }
 }
