@@ -98,7 +98,7 @@ impl Stage for GreyEstimate {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.grey",
-        version: 7,
+        version: 8,
         summary: "fits modes, real poles, delay and feedthrough: the grey modal form",
         inputs: &[PAIR.spec(), START.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec(), MODES.spec(), PARAMETERS.spec()],

@@ -43,10 +43,11 @@ type Tested = Result<TestResult, ModelError>;
 #[serde(default)]
 pub struct Pem {
     /// Number of states, 1 to 40, or `auto`: the smallest up to `max_order` whose simulation of the last third of the
-    /// data, fitted on the rest, is within a standard error of the best; after a release the least BIC. Why: as in the
-    /// paper: four modes and three detector poles.
+    /// data, fitted on the rest, is within a standard error of the best; after a release the least BIC. Not fitted are
+    /// orders whose start lacks a mode, and those above one whose errors are white and independent of the input. Why: as
+    /// in the paper: four modes and three detector poles.
     pub order: Order,
-    /// Largest order that `auto` tries. Why: each takes a fit.
+    /// Largest order that `auto` tries. Why: each may take a fit.
     #[schemars(range(min = 1, max = 40))]
     pub max_order: usize,
     /// Which events: `all`, or one half (`identification`, `verification`).
@@ -88,7 +89,7 @@ impl Stage for Pem {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.pem",
-        version: 11,
+        version: 12,
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],

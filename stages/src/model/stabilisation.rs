@@ -100,7 +100,7 @@ impl Stage for StabilisationDiagram {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.stabilisation",
-        version: 5,
+        version: 6,
         summary: "shows which poles stay as the order grows, and names the modes and the order",
         inputs: &[PAIR.spec()],
         outputs: &[POLES.spec(), MODES.spec(), SUMMARY.spec()],

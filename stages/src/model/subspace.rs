@@ -32,7 +32,7 @@ use afmid_kernels::validation::{OrderChoice, choose_order};
 pub struct SubspaceEstimate {
     /// Number of states, 1 to 40, or `auto`: as in `model.pem`, by output error. Why: as in the paper.
     pub order: Order,
-    /// Largest order that `auto` tries. Why: each takes a fit.
+    /// Largest order that `auto` tries. Why: each may take a fit.
     #[schemars(range(min = 1, max = 40))]
     pub max_order: usize,
     /// Which data: `all`, `identification` or `verification`.
@@ -66,7 +66,7 @@ impl Default for SubspaceEstimate {
 impl Stage for SubspaceEstimate {
     const SPEC: Spec = Spec {
         name: "model.subspace",
-        version: 6,
+        version: 7,
         summary: "estimates a state-space model by subspace methods: N4SID, MOESP, CVA weights",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],

@@ -29,5 +29,6 @@ pub use error::NoConvergence;
 pub(crate) use gram::{combined, cross_of, gram, gram_of};
 pub use hankel::{hankel_products, hankel_row_sums, remaining_row_space};
 pub use orthogonal::{Qr, Svd, Symmetric, eigenvalues, least_squares, product, solve};
+pub(crate) use positive::clear_factor;
 pub use positive::{cholesky, definite_inverse, symmetric_inverse};
 pub use tall::TallQr;

@@ -35,6 +35,15 @@ pub fn definite_inverse(matrix: &Mat<f64>) -> Option<Mat<f64>> {
     (factor.least_pivot > 1e-13).then(|| factor.inverse())
 }
 
+/// Lower Cholesky factor; none where a direction keeps less than the share `least_kept` of its variance beside those
+/// before it, or a value is not finite.
+pub(crate) fn clear_factor(matrix: &Mat<f64>, least_kept: f64) -> Option<Mat<f64>> {
+    let ScaledFactor { scale, lower, least_pivot } = ScaledFactor::of(matrix);
+    let n = scale.len();
+    let entry = |i: usize, j: usize| if j <= i { lower[i * n + j] / scale[i] } else { 0.0 };
+    (least_pivot >= least_kept).then(|| Mat::from_fn(n, n, entry))
+}
+
 /// `L L^T = S M S` with the diagonal scale `S` that makes `M`'s diagonal one.
 struct ScaledFactor {
     scale: Vec<f64>,
@@ -126,14 +135,18 @@ mod tests {
     }
 
     #[test]
-    fn the_factor_reproduces_its_matrix() {
+    fn the_factors_reproduce_their_matrix() {
         let m = matrix();
-        let lower = cholesky(&m);
-        let again = product(lower.as_ref(), lower.transpose());
-        for i in 0..4 {
-            for j in 0..4 {
-                assert!((again[(i, j)] - m[(i, j)]).abs() <= 1e-14 * (m[(i, i)] * m[(j, j)]).sqrt()); // rounding
+        for lower in [cholesky(&m), clear_factor(&m, 1e-3).expect("clear")] {
+            let again = product(lower.as_ref(), lower.transpose());
+            for i in 0..4 {
+                for j in 0..4 {
+                    assert!((again[(i, j)] - m[(i, j)]).abs() <= 1e-14 * (m[(i, i)] * m[(j, j)]).sqrt()); // rounding
+                }
             }
         }
+        // of unit variances and a correlation of 0.8 a share of 0.36 is left
+        let correlated = Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 0.8 });
+        assert!(clear_factor(&correlated, 0.35).is_some() && clear_factor(&correlated, 0.37).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! Poles and noise in turns, and the output error after them.
+//! Poles and noise in turns.
 
 use faer::c64;
 
@@ -8,7 +8,7 @@ use super::levenberg_marquardt::{Limits, minimise};
 use super::noise::{Seen, gain, intensities};
 use super::options::NoiseModel;
 use super::predictor::Problem;
-use super::starts::{lowest, refined};
+use super::starts::refined;
 use super::state::State;
 use super::tangent::{Tangent, Transform, periodogram, remaining};
 use crate::model::{ModelError, coordinates, roots, section_order, sections};
@@ -18,7 +18,7 @@ use crate::optimise::Ending;
 pub(super) fn thermal_or_free(
     problem: &Problem,
     short: &Problem,
-    starts: Vec<State>,
+    starts: Vec<Point>,
     limits: Limits,
     noise: NoiseModel,
 ) -> Result<State, ModelError> {
@@ -32,24 +32,6 @@ pub(super) fn thermal_or_free(
     minimise(problem, State { iterations: state.iterations, ..next }, limits)
 }
 
-/// Output error from the prediction model's poles as well.
-pub(super) fn simulation(
-    problem: &Problem,
-    starts: Vec<State>,
-    prediction: impl Fn(Vec<State>) -> Result<State, ModelError>,
-    count: usize,
-    limits: Limits,
-) -> Result<State, ModelError> {
-    let white = |poles: Vec<f64>| Point { poles, noise: Noise::White };
-    let mut points: Vec<Point> = starts.iter().map(|state| state.point.clone()).collect();
-    if problem.missing.is_empty()
-        && let Ok(state) = prediction(starts)
-    {
-        points.push(white(state.point.poles));
-    }
-    lowest(problem, points, count + 1, limits)
-}
-
 /// Rounds of noise, then poles, after the starts' competition: the first changes either by a fraction of its error, the
 /// second by less than a hundredth.
 const THERMAL_ROUNDS: usize = 2;
@@ -58,16 +40,16 @@ const THERMAL_ROUNDS: usize = 2;
 ///
 /// The noise comes first from the best start alone; under its whitening all starts compete: unwhitened, a spare pole
 /// would rather fit the thermal noise of a strong mode than the detector.
-fn thermal(problem: &Problem, short: &Problem, starts: Vec<State>, limits: Limits) -> Result<State, ModelError> {
-    let mut poles: Vec<Vec<f64>> = starts.iter().map(|state| state.point.poles.clone()).collect();
-    let first = refined(short, starts.into_iter().take(1).collect(), limits)?;
+fn thermal(problem: &Problem, short: &Problem, starts: Vec<Point>, limits: Limits) -> Result<State, ModelError> {
+    let mut poles: Vec<Vec<f64>> = starts.iter().map(|start| start.poles.clone()).collect();
+    let first = refined(short, starts.into_iter().take(1), limits)?;
     if first.ending == Ending::Exact {
         return minimise(problem, State::carried(problem, first.point.clone(), &first)?, limits);
     }
     let noise = thermal_noise(short, &first, &shares_left(short, &first)?)?;
     poles.push(first.point.poles);
-    let whitened = poles.into_iter().map(|poles| State::new(short, Point { poles, noise: noise.clone() }));
-    let best = refined(short, whitened.filter_map(Result::ok).collect(), limits)?;
+    let whitened = poles.into_iter().map(|poles| Point { poles, noise: noise.clone() });
+    let best = refined(short, whitened, limits)?;
     let mut state = State::carried(problem, best.point.clone(), &best)?;
     // a round moves poles by a fraction of their errors: what a fit absorbs stays the same
     let shares = shares_left(problem, &state)?;

@@ -1,6 +1,6 @@
 //! Noise of a colour of its own: an autoregressive filter that whitens what the simulation leaves.
 
-use crate::linear_algebra::eigenvalues;
+use crate::linear_algebra::{dot_in_lanes, eigenvalues};
 use faer::{Mat, c64};
 
 use super::jacobian::{Noise, Point, residual};
@@ -28,10 +28,13 @@ pub(crate) fn largest_order(samples: usize) -> usize {
 /// filter, in turn.
 /// Source: L. Ljung, System Identification (1999), section 10.4; G. Box and G. Jenkins, Time Series Analysis (1970).
 pub(crate) fn whitened(problem: &Problem, mut state: State, limits: Limits) -> Result<State, ModelError> {
+    let plain = Whitened::new(&problem.experiments, (Vec::new(), Vec::new()));
     for _ in 0..ROUNDS {
-        let plain = Whitened::new(&problem.experiments, (Vec::new(), Vec::new()));
-        let errors = problem.regressors(&state.point.a(), &plain);
-        let filter = autoregression(problem, &residual(&errors.slices(), &state.projection.theta))?;
+        let errors = match state.point.noise {
+            Noise::White => state.residual(),
+            _ => residual(&problem.regressors(&state.point.a(), &plain).slices(), &state.projection.theta),
+        };
+        let filter = autoregression(problem, &errors)?;
         let rest = vec![[0.0; 2]; filter.len()];
         let point = Point { poles: state.point.poles.clone(), noise: Noise::Frozen(filter, rest) };
         let next = State { iterations: state.iterations, ..State::new(problem, point)? };
@@ -63,7 +66,7 @@ fn autocovariance(problem: &Problem, e: &[f64], most: usize) -> Vec<f64> {
         let (own, more) = rest.split_at(y.len());
         rest = more;
         for (lag, sum) in sums.iter_mut().enumerate() {
-            *sum += own.iter().zip(own.iter().skip(lag)).map(|(x, y)| x * y).sum::<f64>();
+            *sum += dot_in_lanes(&own[..own.len().saturating_sub(lag)], own.get(lag..).unwrap_or_default());
         }
     }
     sums

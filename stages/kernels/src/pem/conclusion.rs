@@ -10,7 +10,8 @@ use super::predictor::Problem;
 use super::projection::{Present, present};
 use super::state::State;
 use crate::model::{
-    InnovationsModel, InputGains, LIMIT, ModelError, Section, kalman_gains, roots, section_order, sections,
+    Coefficients, InnovationsModel, InputGains, LIMIT, ModelError, Section, kalman_gains, roots, section_order,
+    sections,
 };
 use crate::optimise::Ending;
 
@@ -23,31 +24,7 @@ pub(super) fn conclude(
 ) -> Result<Identified, ModelError> {
     let n = problem.order;
     let theta = &state.projection.theta;
-    let a = state.point.a();
-    let c = match &state.point.noise {
-        Noise::White => a.clone(),
-        Noise::Frozen(..) if options.noise == NoiseModel::Coloured => a.clone(),
-        Noise::Frozen(_, c) => c.clone(),
-        Noise::Free(c) => sections(c),
-    };
-    let gains = match (&state.point.noise, options.noise) {
-        (Noise::White, _) | (_, NoiseModel::Coloured) => vec![[0.0; 2]; a.len()],
-        _ => kalman_gains(n, &a, &c)?,
-    };
-    let inputs: Vec<InputGains> = (0..problem.inputs)
-        .map(|input| {
-            let own = &theta[gains_column(problem, input)..];
-            let second = |i: usize| if section_order(n, i) == 2 { own[2 * i + 1] } else { 0.0 };
-            let feedthrough = theta[problem.input_column(input) + n];
-            InputGains { b: (0..a.len()).map(|i| [own[2 * i], second(i)]).collect(), feedthrough }
-        })
-        .collect();
-    let section = |i: usize| Section { order: section_order(n, i), a: a[i], b: inputs[0].b[i], k: gains[i] };
-    let model = InnovationsModel {
-        sections: (0..a.len()).map(section).collect(),
-        feedthrough: inputs[0].feedthrough,
-        sample_time_s,
-    };
+    let Realised { model, further_inputs, predictor: c } = realised(problem, state, sample_time_s, options.noise)?;
     let mut e = state.residual();
     problem.missing.iter().for_each(|&row| e[row] = 0.0);
     let covariance = parameter_covariance(problem, state, &e, options.colour)?;
@@ -72,7 +49,7 @@ pub(super) fn conclude(
     let at_limit = state.point.coordinates().iter().filter(|p| p.abs() >= LIMIT).count();
     Ok(Identified {
         model,
-        further_inputs: inputs.into_iter().skip(1).collect(),
+        further_inputs,
         initial_states: (0..count).map(|i| (0..n).map(|j| own(i, j)).collect()).collect(),
         offsets: (0..count).map(|i| if problem.offset { own(i, n) } else { 0.0 }).collect(),
         slopes: (0..count)
@@ -92,6 +69,51 @@ pub(super) fn conclude(
             at_limit,
         },
     })
+}
+
+/// A point's model.
+pub(crate) struct Realised {
+    pub model: InnovationsModel,
+    pub further_inputs: Vec<InputGains>,
+    /// Sections of the predictor's poles.
+    predictor: Vec<Coefficients>,
+}
+
+/// The model of a point. Errors: no gain of these poles.
+pub(super) fn realised(
+    problem: &Problem,
+    state: &State,
+    sample_time_s: f64,
+    noise: NoiseModel,
+) -> Result<Realised, ModelError> {
+    let n = problem.order;
+    let theta = &state.projection.theta;
+    let a = state.point.a();
+    let c = match &state.point.noise {
+        Noise::White => a.clone(),
+        Noise::Frozen(..) if noise == NoiseModel::Coloured => a.clone(),
+        Noise::Frozen(_, c) => c.clone(),
+        Noise::Free(c) => sections(c),
+    };
+    let gains = match (&state.point.noise, noise) {
+        (Noise::White, _) | (_, NoiseModel::Coloured) => vec![[0.0; 2]; a.len()],
+        _ => kalman_gains(n, &a, &c)?,
+    };
+    let inputs: Vec<InputGains> = (0..problem.inputs)
+        .map(|input| {
+            let own = &theta[gains_column(problem, input)..];
+            let second = |i: usize| if section_order(n, i) == 2 { own[2 * i + 1] } else { 0.0 };
+            let feedthrough = theta[problem.input_column(input) + n];
+            InputGains { b: (0..a.len()).map(|i| [own[2 * i], second(i)]).collect(), feedthrough }
+        })
+        .collect();
+    let section = |i: usize| Section { order: section_order(n, i), a: a[i], b: inputs[0].b[i], k: gains[i] };
+    let model = InnovationsModel {
+        sections: (0..a.len()).map(section).collect(),
+        feedthrough: inputs[0].feedthrough,
+        sample_time_s,
+    };
+    Ok(Realised { model, further_inputs: inputs.into_iter().skip(1).collect(), predictor: c })
 }
 
 /// Parameters that whiten the errors.

@@ -10,11 +10,7 @@ pub(super) type Record = (Vec<f64>, Vec<f64>);
 
 /// Input and output of each input's prior: an impulse of the share's energy, and silence. Errors: a share that is
 /// negative or not finite.
-pub(super) fn prior_records(
-    experiments: &[Experiment<'_>],
-    inputs: usize,
-    options: &PemOptions,
-) -> Result<Vec<Record>, ModelError> {
+pub(super) fn prior_records(experiments: &[Experiment<'_>], options: &PemOptions) -> Result<Vec<Record>, ModelError> {
     if !(options.prior >= 0.0 && options.prior.is_finite()) {
         return Err(ModelError::Parameter { name: "prior", found: options.prior, wanted: "0 or more" });
     }
@@ -22,6 +18,7 @@ pub(super) fn prior_records(
         return Ok(Vec::new());
     }
     let samples = experiments.iter().map(|experiment| experiment.output.len()).max().unwrap_or(0);
+    let inputs = inputs(experiments);
     let energy = |input: usize| -> f64 {
         let own = |e: &Experiment<'_>| {
             let n = e.output.len();
@@ -35,6 +32,11 @@ pub(super) fn prior_records(
         (impulse, vec![0.0; samples])
     };
     Ok((0..inputs).map(record).collect())
+}
+
+/// How many, at least one.
+fn inputs(experiments: &[Experiment<'_>]) -> usize {
+    experiments.first().map_or(0, |first| first.input.len() / first.output.len().max(1)).max(1)
 }
 
 /// The longest stretch of an experiment without a missing output, its inputs one after the other. Errors: it is too
@@ -81,7 +83,7 @@ pub(super) fn checked<'a>(
     if experiments.is_empty() {
         return Err(ModelError::NoExperiment);
     }
-    let inputs = experiments.first().map_or(0, |first| first.input.len() / first.output.len().max(1)).max(1);
+    let inputs = inputs(experiments);
     let (mut missing, mut top) = (Vec::new(), 0);
     for Experiment { input, output } in experiments {
         if input.len() != inputs * output.len() {

@@ -2,17 +2,18 @@
 
 use faer::c64;
 
-use super::alternating::{simulation, thermal_or_free};
+use super::alternating::thermal_or_free;
 use super::autoregression::whitened;
 use super::conclusion::conclude;
-use super::data::{checked, complete, prior_records};
+use super::data::{checked, prior_records};
+use super::estimates::Estimates;
 use super::jacobian::{Noise, Point};
 use super::levenberg_marquardt::{Limits, minimise};
 use super::options::{Experiment, Focus, Identified, NoiseModel, PemOptions};
-use super::starts::{candidates, instrumental, lowest, predictors, ranked, refined};
+use super::predictor::Problem;
+use super::starts::{Start, lowest, output_errors, predictors, ranked, refined};
 use super::state::State;
 use crate::model::{ModelError, coordinates};
-use crate::subspace::Subspace;
 
 /// Identifies a model in innovations form by minimising its one-step prediction errors.
 ///
@@ -45,41 +46,52 @@ pub fn identify(
     sample_time_s: f64,
     options: &PemOptions,
 ) -> Result<Identified, ModelError> {
-    let mut problem = checked(experiments, sample_time_s, options)?;
-    let prior = prior_records(experiments, problem.inputs, options)?;
-    problem.experiments.extend(prior.iter().map(|(input, output)| (input.as_slice(), output.as_slice())));
-    problem.priors = prior.len();
+    let prior = prior_records(experiments, options)?;
+    let problem = checked(experiments, sample_time_s, options)?.with_priors(&prior);
+    let estimates = Estimates::new(experiments, std::slice::from_ref(options))?;
+    let state = minimum(&problem, &estimates, options)?;
+    let singular_values = estimates.plain(options.block_rows)?.singular_values().to_vec();
+    conclude(&problem, &state, sample_time_s, options, singular_values)
+}
+
+/// The lowest minimum from the estimates' poles. Errors: no finite fit.
+pub(super) fn minimum(problem: &Problem, estimates: &Estimates, options: &PemOptions) -> Result<State, ModelError> {
     let shortened = problem.shortened();
-    let short = shortened.as_ref().unwrap_or(&problem);
-    let longest =
-        experiments.iter().max_by_key(|experiment| experiment.output.len()).ok_or(ModelError::NoExperiment)?;
-    let (input, output) = complete(longest, options)?;
-    let subspace = Subspace::new(&input, output, options.block_rows)?;
-    let limits = Limits { iterations: options.max_iterations, gradient: options.gradient_tolerance };
-    let mut poles = candidates(&subspace, options.order)?;
-    let many = options.starts > PemOptions::default().starts;
-    if many {
-        poles.extend(instrumental(&input, output, options.order, options.block_rows));
-    }
-    let starts = ranked(short, &poles, options.starts)?;
-    let many = options.starts > PemOptions::default().starts;
-    let prediction = |starts: Vec<State>| match options.noise {
+    let short = shortened.as_ref().unwrap_or(problem);
+    let limits = Limits::of(options);
+    let poles = estimates.poles(options)?;
+    let starts = ranked(short, output_errors(&poles), options.starts)?;
+    let points = |starts: Vec<Start>| starts.into_iter().map(|start| start.point);
+    let prediction = |starts: Vec<Start>| match options.noise {
         NoiseModel::White => {
-            let state = refined(short, starts, limits)?;
-            minimise(&problem, State::carried(&problem, state.point.clone(), &state)?, limits)
+            let state = refined(short, points(starts), limits)?;
+            minimise(problem, State::carried(problem, state.point.clone(), &state)?, limits)
         }
-        NoiseModel::Free if many => lowest(&problem, predictors(&problem, &poles, &starts), options.starts, limits),
+        NoiseModel::Free if options.many_starts() => {
+            let points = predictors(problem, &poles, &starts).into_iter();
+            lowest(problem, ranked(problem, points, options.starts)?, limits)
+        }
         NoiseModel::Coloured => {
-            let points = starts.into_iter().map(|state| state.point).collect();
-            whitened(&problem, lowest(&problem, points, options.starts, limits)?, limits)
+            let starts = match shortened {
+                Some(_) => ranked(problem, points(starts), options.starts)?,
+                None => starts,
+            };
+            whitened(problem, lowest(problem, starts, limits)?, limits)
         }
-        noise => thermal_or_free(&problem, short, starts, limits, noise),
+        noise => thermal_or_free(problem, short, points(starts).collect(), limits, noise),
     };
-    let state = match options.focus {
-        Focus::Prediction => prediction(starts)?,
-        Focus::Simulation => simulation(&problem, starts, prediction, options.starts, limits)?,
-    };
-    conclude(&problem, &state, sample_time_s, options, subspace.singular_values().to_vec())
+    match options.focus {
+        Focus::Prediction => prediction(starts),
+        Focus::Simulation => {
+            let mut all: Vec<Point> = starts.iter().map(|start| start.point.clone()).collect();
+            if problem.missing.is_empty()
+                && let Ok(state) = prediction(starts)
+            {
+                all.push(Point { poles: state.point.poles, noise: Noise::White });
+            }
+            lowest(problem, ranked(problem, all.into_iter(), options.starts + 1)?, limits)
+        }
+    }
 }
 
 /// The model of these poles (order many) whose simulation is closest: b, D, x0, offset and slope by least squares, no
@@ -111,7 +123,7 @@ pub fn refit(
 ) -> Result<Identified, ModelError> {
     let options = PemOptions { order: poles.len(), noise: NoiseModel::White, ..options.clone() };
     let problem = checked(experiments, sample_time_s, &options)?;
-    let limits = Limits { iterations: options.max_iterations, gradient: options.gradient_tolerance };
+    let limits = Limits::of(&options);
     let start = State::new(&problem, Point { poles: coordinates(poles), noise: Noise::White })?;
     conclude(&problem, &minimise(&problem, start, limits)?, sample_time_s, &options, Vec::new())
 }

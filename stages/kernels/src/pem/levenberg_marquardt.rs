@@ -8,6 +8,7 @@ use faer::c64;
 
 use super::jacobian::{Noise, Point};
 use super::linearised::{Linearised, Quadratic, unscaled};
+use super::options::PemOptions;
 use super::predictor::Problem;
 use super::secant::{Secant, Taken};
 use super::state::{Memory, State};
@@ -20,6 +21,13 @@ pub(crate) struct Limits {
     pub iterations: usize,
     /// Gradient share that counts as zero.
     pub gradient: f64,
+}
+
+impl Limits {
+    /// Those of a fit to its end.
+    pub fn of(options: &PemOptions) -> Self {
+        Self { iterations: options.max_iterations, gradient: options.gradient_tolerance }
+    }
 }
 
 /// Damping parameter of the first step.

@@ -43,16 +43,19 @@
 
 mod alternating;
 mod autoregression;
+mod basin;
 mod columns;
 mod conclusion;
 mod covariance;
 mod data;
+mod estimates;
 mod identify;
 mod jacobian;
 mod levenberg_marquardt;
 mod linearised;
 mod noise;
 mod options;
+mod orders;
 mod predictor;
 mod products;
 mod projection;
@@ -73,4 +76,5 @@ pub(crate) use covariance::covariance as time_domain_covariance;
 pub(crate) use data::complete as longest_complete;
 pub use identify::{identify, refit, with_poles};
 pub use options::{Experiment, Focus, Identified, NoiseModel, PemOptions, Verdict};
+pub(crate) use orders::Orders;
 pub(crate) use predictor::all_pole;

@@ -81,6 +81,13 @@ impl Default for PemOptions {
     }
 }
 
+impl PemOptions {
+    /// Whether estimates with instruments are among the starts.
+    pub(crate) fn many_starts(&self) -> bool {
+        self.starts > Self::default().starts
+    }
+}
+
 /// How the Kalman gain is parametrised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

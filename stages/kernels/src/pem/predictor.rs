@@ -4,6 +4,7 @@
 //! linear in all the rest, and the filtered regressors are the columns of a least-squares problem.
 
 use super::columns::{BufferPool, Columns, Part, Place, SIDE_BY_SIDE};
+use super::data::Record;
 use super::whitening::{IMPULSE, INPUT, LANES, ONE, OUTPUT, RAMP, Signals, Whitened};
 use crate::model::Coefficients;
 
@@ -29,6 +30,12 @@ const SHORTENED_SHARE: f64 = 0.99;
 const SHORTENED_LEAST: usize = 40;
 
 impl<'a> Problem<'a> {
+    /// The same with records of priors.
+    pub fn with_priors(mut self, priors: &'a [Record]) -> Self {
+        self.experiments.extend(priors.iter().map(|(input, output)| (input.as_slice(), output.as_slice())));
+        Self { priors: priors.len(), ..self }
+    }
+
     /// The experiments without the prior's.
     pub fn measured(&self) -> &[(&[f64], &[f64])] {
         &self.experiments[..self.experiments.len() - self.priors]

@@ -1,26 +1,24 @@
-//! Where the iteration begins: several sets of poles, the most promising refined first.
-//!
-//! Strong modes come from the subspace estimate of every order from six below the wanted one on; what is missing is
-//! filled with real poles spread over the fast part of the unit interval, where detectors lie. A weak mode needs the
-//! high orders, detector poles the low ones.
+//! Where the iteration begins: several sets of poles ([`Estimates`](super::estimates::Estimates)), the most promising
+//! refined first.
 
-use crate::linear_algebra::{eigenvalues, least_squares};
-use faer::{Mat, c64};
+use std::sync::Arc;
 
+use faer::c64;
+
+use super::basin::Basin;
 use super::jacobian::{Noise, Point};
 use super::levenberg_marquardt::{Limits, minimise};
 use super::predictor::Problem;
 use super::state::State;
+use super::whitening::Whitened;
 use crate::model::{ModelError, coordinates, roots, section_order};
-use crate::subspace::{Instruments, Subspace, Weight};
+use crate::optimise::Ending;
 
-/// Real poles that fill up a start, fast and slow in turn.
-const FILL: [f64; 6] = [0.15, 0.5, 0.3, 0.7, 0.05, 0.85];
 /// Iterations for each, at most: enough to tell basins apart.
 const TRIAL_ITERATIONS: usize = 8;
 /// Twice the log-likelihood that the rest of the way to the minimum may still be worth: less than any choice between
 /// starts turns on.
-const TRIAL_REST: f64 = 0.5;
+pub(super) const TRIAL_REST: f64 = 0.5;
 
 /// How far a start is followed before it is compared with the others.
 fn trial(problem: &Problem, limits: Limits) -> Limits {
@@ -28,63 +26,78 @@ fn trial(problem: &Problem, limits: Limits) -> Limits {
     Limits { iterations: limits.iterations.min(TRIAL_ITERATIONS), gradient }
 }
 
-/// The poles of all starts.
-pub(crate) fn candidates(subspace: &Subspace, order: usize) -> Result<Vec<Vec<c64>>, ModelError> {
-    let least = order.saturating_sub(FILL.len()).max(1);
-    let mut starts = Vec::new();
-    for k in (least..=order.min(subspace.max_order())).rev() {
-        let mut poles = subspace.poles(k)?;
-        poles.extend(FILL.iter().take(order - k).map(|&z| c64::new(z, 0.0)));
-        if poles.len() == order {
-            starts.push(poles);
-        }
-    }
-    if starts.is_empty() {
-        starts.push((0..order).map(|i| c64::new((i as f64 + 0.5) / order as f64, 0.0)).collect());
-    }
-    Ok(starts)
+/// A point where a search may begin, and `sum e^2` there.
+pub(crate) struct Start {
+    pub point: Point,
+    pub cost: f64,
 }
 
-/// The poles of an ARX model and of instrumental subspace estimates, every weight, few and many block rows; none where
-/// these cannot be had.
-///
-/// They need an input that excites throughout, and see noise that is not white.
-pub(crate) fn instrumental(u: &[f64], y: &[f64], order: usize, block_rows: usize) -> Vec<Vec<c64>> {
-    let few = (order + 2).max(12).min(block_rows);
-    let rows = if few < block_rows { vec![few, (few + block_rows) / 2, block_rows] } else { vec![block_rows] };
-    let mut starts: Vec<Vec<c64>> = arx(u, y, order).into_iter().collect();
-    for rows in rows {
-        let Ok(instruments) = Instruments::new(u, y, rows) else { continue };
-        for weight in [Weight::Moesp, Weight::N4sid, Weight::Cva] {
-            let estimate = instruments.subspace(weight).and_then(|estimate| estimate.poles(order));
-            starts.extend(estimate.ok().filter(|poles| poles.len() == order));
-        }
-    }
-    starts
+/// Points of one whitening share its signals.
+struct Evaluation<'a, 'b> {
+    problem: &'a Problem<'b>,
+    known: Option<Arc<Whitened>>,
 }
 
-/// Output-error states at the `count` most promising starts, the best first. Errors: none can be evaluated.
-pub(crate) fn ranked(problem: &Problem, starts: &[Vec<c64>], count: usize) -> Result<Vec<State>, ModelError> {
-    let points = starts.iter().map(|poles| Point { poles: coordinates(poles), noise: Noise::White });
-    let mut states = Vec::new();
+impl<'a, 'b> Evaluation<'a, 'b> {
+    fn of(problem: &'a Problem<'b>) -> Self {
+        Self { problem, known: None }
+    }
+
+    /// Errors: no finite prediction errors there.
+    fn state(&mut self, point: Point) -> Result<State, ModelError> {
+        let signals = match self.known.take() {
+            Some(known) => State::whitened(self.problem, &point, known),
+            None => State::whitening(self.problem, &point),
+        };
+        self.known = Some(Arc::clone(&signals));
+        State::through(self.problem, point, signals)
+    }
+}
+
+/// Output errors with these poles.
+pub(crate) fn output_errors(poles: &[Vec<c64>]) -> impl Iterator<Item = Point> {
+    poles.iter().map(|poles| Point { poles: coordinates(poles), noise: Noise::White })
+}
+
+/// The `count` points of least cost, ascending. Errors: none can be evaluated.
+pub(crate) fn ranked(
+    problem: &Problem,
+    points: impl Iterator<Item = Point>,
+    count: usize,
+) -> Result<Vec<Start>, ModelError> {
+    let mut evaluation = Evaluation::of(problem);
+    // a state is dropped at once: the next one's columns take its place
+    let starts = points.map(|point| {
+        evaluation.state(point).map(|State { point, projection, .. }| Start { point, cost: projection.cost })
+    });
+    least(starts, count, |start| start.cost)
+}
+
+/// The `count` of least cost, ascending. Errors: the last failure, where there is none.
+fn least<T>(
+    results: impl IntoIterator<Item = Result<T, ModelError>>,
+    count: usize,
+    cost: impl Fn(&T) -> f64,
+) -> Result<Vec<T>, ModelError> {
     let mut failure = ModelError::Degenerate("no start could be evaluated");
-    for point in points {
-        match State::new(problem, point) {
-            Ok(state) => states.push(state),
+    let mut found = Vec::new();
+    for result in results {
+        match result {
+            Ok(own) => found.push(own),
             Err(error) => failure = error,
         }
     }
-    states.sort_by(|x, y| x.projection.cost.total_cmp(&y.projection.cost));
-    states.truncate(count.max(1));
-    if states.is_empty() { Err(failure) } else { Ok(states) }
+    found.sort_by(|x, y| cost(x).total_cmp(&cost(y)));
+    found.truncate(count.max(1));
+    if found.is_empty() { Err(failure) } else { Ok(found) }
 }
 
 /// Points with a free noise filter: all poles, each with predictor poles at rest (an ARX model), half way and near, and
 /// those of the output error.
-pub(crate) fn predictors(problem: &Problem, poles: &[Vec<c64>], states: &[State]) -> Vec<Point> {
+pub(crate) fn predictors(problem: &Problem, poles: &[Vec<c64>], starts: &[Start]) -> Vec<Point> {
     let order = problem.order;
-    let refined = states.iter().map(|state| {
-        let a = state.point.a();
+    let refined = starts.iter().map(|start| {
+        let a = start.point.a();
         a.iter().enumerate().flat_map(|(i, &a)| roots(a, section_order(order, i))).collect::<Vec<c64>>()
     });
     let all: Vec<Vec<c64>> = poles.iter().cloned().chain(refined).collect();
@@ -104,62 +117,53 @@ const SHRUNK: [f64; 3] = [0.0, 0.5, 0.9];
 /// Starts that are followed to their minimum.
 const FOLLOWED: usize = 3;
 
-/// The lowest minimum from these points: the `count` lowest are refined by a few iterations, the best of these followed
-/// to the end.
+/// The lowest minimum from these starts (ascending): each is refined by a few iterations, unless it lies in the basin of
+/// a better one's minimum; the best are followed to the end, unless they have come to the same minimum.
 ///
-/// Errors: no point can be evaluated.
-pub(crate) fn lowest(problem: &Problem, points: Vec<Point>, count: usize, limits: Limits) -> Result<State, ModelError> {
-    let mut failure = ModelError::Degenerate("no start could be evaluated");
-    let mut kept = |results: Vec<Result<State, ModelError>>, count: usize| {
-        let mut states = Vec::new();
-        for result in results {
-            match result {
-                Ok(state) => states.push(state),
-                Err(error) => failure = error,
-            }
+/// Errors: no start can be evaluated.
+pub(crate) fn lowest(problem: &Problem, starts: Vec<Start>, limits: Limits) -> Result<State, ModelError> {
+    let cost = |state: &State| state.projection.cost;
+    let mut evaluation = Evaluation::of(problem);
+    let (mut basins, mut tried): (Vec<Basin>, Vec<_>) = (Vec::new(), Vec::new());
+    for start in starts {
+        if basins.iter().any(|basin| basin.holds(&start)) {
+            continue;
         }
-        states.sort_by(|x, y| x.projection.cost.total_cmp(&y.projection.cost));
-        states.truncate(count.max(1));
-        states
-    };
-    let trial = trial(problem, limits);
-    let states = kept(points.into_iter().map(|point| State::new(problem, point)).collect(), count);
-    let states = kept(states.into_iter().map(|state| minimise(problem, state, trial)).collect(), FOLLOWED);
-    let states = kept(states.into_iter().map(|state| minimise(problem, state, limits)).collect(), 1);
-    states.into_iter().next().ok_or(failure)
-}
-
-/// The poles of an ARX model of this order, by least squares; several inputs one after the other.
-fn arx(u: &[f64], y: &[f64], order: usize) -> Result<Vec<c64>, ModelError> {
-    let (samples, inputs) = (y.len(), u.len() / y.len().max(1));
-    let rows = samples.saturating_sub(order);
-    let columns = order + inputs * (order + 1);
-    if rows <= columns {
-        return Err(ModelError::TooShort { found: samples, wanted: columns + order + 1 });
+        let state = evaluation.state(start.point).and_then(|state| minimise(problem, state, trial(problem, limits)));
+        basins.extend(state.as_ref().ok().and_then(|state| Basin::of(problem, state)));
+        tried.push(state);
     }
-    let past = |t: usize, j: usize| match j.checked_sub(order) {
-        None => y[t + order - 1 - j],
-        Some(j) => u[j / (order + 1) * samples + t + order - j % (order + 1)],
-    };
-    let matrix = Mat::from_fn(rows, columns, past);
-    let target = Mat::from_fn(rows, 1, |t, _| y[t + order]);
-    let theta = least_squares(&matrix, &target, f64::EPSILON * rows as f64)?;
-    let companion =
-        Mat::from_fn(order, order, |i, j| if i == 0 { theta[(j, 0)] } else { f64::from(u8::from(i == j + 1)) });
-    Ok(eigenvalues(&companion)?)
+    let rows = problem.rows() as f64;
+    let mut distinct: Vec<State> = Vec::new();
+    for state in least(tried, FOLLOWED, cost)? {
+        let same = |other: &State| {
+            let both = state.ending == Ending::Minimum && other.ending == Ending::Minimum;
+            both && rows * (cost(&state) / cost(other) - 1.0) < TRIAL_REST
+        };
+        if !distinct.iter().any(same) {
+            distinct.push(state);
+        }
+    }
+    let followed = distinct.into_iter().map(|state| minimise(problem, state, limits));
+    least(followed, 1, cost)?.pop().ok_or(ModelError::Degenerate("no start could be evaluated"))
 }
 
-/// Refines each state by a few iterations and takes the best: least cost over its variance, plus `2 ln N` for every
+/// Refines each point by a few iterations and takes the best: least cost over its variance, plus `2 ln N` for every
 /// complex pair.
 ///
-/// A resonance may lie at any of N frequencies: it must gain more than the best of so many by chance. Errors: no state
+/// A resonance may lie at any of N frequencies: it must gain more than the best of so many by chance. Errors: no point
 /// can be refined.
-pub(crate) fn refined(problem: &Problem, states: Vec<State>, limits: Limits) -> Result<State, ModelError> {
+pub(crate) fn refined(
+    problem: &Problem,
+    points: impl Iterator<Item = Point>,
+    limits: Limits,
+) -> Result<State, ModelError> {
     let trial = trial(problem, limits);
     let mut failure = ModelError::Degenerate("no start could be refined");
     let mut refined = Vec::new();
-    for state in states {
-        match minimise(problem, state, trial) {
+    let mut evaluation = Evaluation::of(problem);
+    for point in points {
+        match evaluation.state(point).and_then(|state| minimise(problem, state, trial)) {
             Ok(state) => refined.push(state),
             Err(error) => failure = error,
         }

@@ -16,7 +16,7 @@ use crate::optimise::Ending;
 pub(crate) struct State {
     pub point: Point,
     /// The records through the point's whitening.
-    pub whitened: Arc<Whitened>,
+    pub signals: Arc<Whitened>,
     pub regressors: Columns,
     pub projection: Projection,
     pub gradient: f64,
@@ -35,28 +35,35 @@ pub(crate) struct Memory {
 impl State {
     /// Evaluates a point. Errors: no finite prediction errors there.
     pub fn new(problem: &Problem, point: Point) -> Result<Self, ModelError> {
-        let whitened = Arc::new(Whitened::new(&problem.experiments, point.whitening()));
+        let whitened = Self::whitening(problem, &point);
         Self::through(problem, point, whitened)
+    }
+
+    /// The records through a point's whitening.
+    pub fn whitening(problem: &Problem, point: &Point) -> Arc<Whitened> {
+        Arc::new(Whitened::new(&problem.experiments, point.whitening()))
+    }
+
+    /// The same, `known` where it is that: a whitening that stays is not computed again.
+    pub fn whitened(problem: &Problem, point: &Point, known: Arc<Whitened>) -> Arc<Whitened> {
+        if known.filter == point.whitening() { known } else { Self::whitening(problem, point) }
     }
 
     /// The point with other coordinates. Errors: no finite prediction errors there.
     pub fn moved(&self, problem: &Problem, coordinates: &[f64]) -> Result<Self, ModelError> {
         let point = self.point.at(coordinates);
-        // a whitening that stays is not computed again
-        if self.whitened.filter == point.whitening() {
-            Self::through(problem, point, Arc::clone(&self.whitened))
-        } else {
-            Self::new(problem, point)
-        }
+        let whitened = Self::whitened(problem, &point, Arc::clone(&self.signals));
+        Self::through(problem, point, whitened)
     }
 
-    fn through(problem: &Problem, point: Point, whitened: Arc<Whitened>) -> Result<Self, ModelError> {
-        let regressors = problem.regressors(&point.a(), &whitened);
+    /// Evaluates a point whose whitening the records have passed. Errors: no finite prediction errors there.
+    pub fn through(problem: &Problem, point: Point, signals: Arc<Whitened>) -> Result<Self, ModelError> {
+        let regressors = problem.regressors(&point.a(), &signals);
         let projection = Projection::new(problem, &regressors)?;
         let memory = Memory { damping: FIRST_DAMPING, secant: Secant::new(point.len()) };
         Ok(Self {
             point,
-            whitened,
+            signals,
             regressors,
             projection,
             gradient: f64::NAN,

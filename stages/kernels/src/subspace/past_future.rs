@@ -135,11 +135,10 @@ fn several_inputs_basis(u: &[f64], samples: usize, block_rows: usize) -> Result<
     let mut stacked = Mat::zeros(windows, 1 + u.len() / samples * block_rows);
     stacked.col_mut(0).iter_mut().for_each(|one| *one = 1.0);
     for (i, u) in u.chunks_exact(samples).enumerate() {
-        let peak = u.iter().fold(0.0_f64, |peak, u| peak.max(u.abs()));
-        let level = if peak > 0.0 { peak } else { 1.0 };
+        let u = scaled(u);
         for j in 0..block_rows {
             let column = stacked.col_mut(1 + i * block_rows + j);
-            column.iter_mut().zip(&u[j..]).for_each(|(h, u)| *h = u / level);
+            column.iter_mut().zip(&u[j..]).for_each(|(h, u)| *h = *u);
         }
     }
     let svd = Svd::new(&stacked)?;
@@ -147,11 +146,11 @@ fn several_inputs_basis(u: &[f64], samples: usize, block_rows: usize) -> Result<
     Ok(svd.u.get(.., ..svd.rank(INPUT_TOLERANCE.sqrt())).to_owned())
 }
 
-/// The input over its peak.
-fn scaled(u: &[f64]) -> Vec<f64> {
-    let peak = u.iter().fold(0.0_f64, |peak, u| peak.max(u.abs()));
+/// A signal over its peak.
+pub(super) fn scaled(signal: &[f64]) -> Vec<f64> {
+    let peak = signal.iter().fold(0.0_f64, |peak, x| peak.max(x.abs()));
     let level = if peak > 0.0 { peak } else { 1.0 };
-    u.iter().map(|u| u / level).collect()
+    signal.iter().map(|x| x / level).collect()
 }
 
 /// `[1; U_f] [1; U_f]^T`.

@@ -36,6 +36,7 @@ mod fit;
 mod order_choice;
 mod resampled;
 mod residual;
+mod shortlist;
 
 pub use bootstrap::{BootstrapSettings, Bootstrapped, bootstrap};
 pub use comparison::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};

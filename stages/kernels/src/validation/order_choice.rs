@@ -3,9 +3,10 @@
 use rayon::prelude::*;
 
 use super::fit::{Nuisances, simulate_held_out};
-use crate::model::ModelError;
+use super::shortlist::{Shortlist, nothing_left};
+use crate::model::{InnovationsModel, InputGains, ModelError};
 use crate::monitor::Monitor;
-use crate::pem::{Experiment, Identified, NoiseModel, PemOptions, identify};
+use crate::pem::{Experiment, Identified, NoiseModel, Orders, PemOptions, identify};
 use crate::subspace::Subspace;
 
 /// What an order's model made of the data.
@@ -17,7 +18,7 @@ pub struct OrderCandidate {
     /// last third decides, so that nobody needs it.
     pub bic: f64,
     /// FIT % of the simulation of the record's last third, by a model of its first two thirds; NaN where this cannot be
-    /// judged.
+    /// judged, and of orders that are not fitted.
     pub held_out_percent: f64,
 }
 
@@ -42,12 +43,18 @@ const BLOCKS: usize = 10;
 /// # Model
 /// That of [`identify`] with `options`, its order replaced.
 /// # Method
-/// Each order is fitted to the first two thirds and simulated over the last: the smallest order whose squared error is
+/// Orders are fitted to the first two thirds and simulated over the last: the smallest order whose squared error is
 /// within one standard error (over ten blocks) of the least. Where the last third has no input of its own (a release),
 /// the least Bayesian information criterion instead.
+///
+/// Not all orders are fitted. The poles of a subspace estimate with the linear part by least squares give each order's
+/// squared error on the first two thirds before any iteration. An order with ten times the least is left out. So are
+/// those above the order of the least information criterion, where this one's errors are white and do not depend on the
+/// input: nothing is left that a larger order could explain.
 /// # Accuracy
-/// The true order or one of the next two in most of 20 records with output noise of standard deviation 0.05 (test); no
-/// more than the data need, not the truth.
+/// Of 480 simulated records (one to five modes, 300 to 8000 samples, noise of 2 to 30 %) the true order in 231 of 240
+/// where noise is white, less in 6; in 134 of 240 where it is coloured, less in 5. If all orders are fitted these are
+/// 171, 2, 132 and 6. No more than the data need, not the truth.
 /// # Errors
 /// No order can be fitted; cancelled by the monitor.
 /// # Source
@@ -61,13 +68,13 @@ pub fn choose_order(
 ) -> Result<OrderChoice, ModelError> {
     let parts = Parts::of(experiment);
     let judged = match &parts {
-        Some(parts) => each(most, monitor, |order| parts.judged(sample_time_s, order, options))?,
+        Some(parts) => parts.judged(sample_time_s, most, options, monitor)?,
         None => Vec::new(),
     };
     let held_out = smallest_within_error(&judged);
     let candidates: Vec<OrderCandidate> = match held_out {
         Some(_) => judged.into_iter().map(|(candidate, _)| candidate).collect(),
-        None => each(most, monitor, |order| {
+        None => each((1..=most).collect(), monitor, |order| {
             let fit = identify(&[experiment], sample_time_s, &ranking(options, order));
             let bic = fit.map_or(f64::NAN, |fit| bic(&fit, options.noise));
             OrderCandidate { order, bic, held_out_percent: f64::NAN }
@@ -84,9 +91,13 @@ pub fn choose_order(
     Ok(OrderChoice { order, gap, candidates })
 }
 
-/// What `of` makes of the orders 1 to `most`. Errors: cancelled by the monitor.
-fn each<T: Send>(most: usize, monitor: &dyn Monitor, of: impl Fn(usize) -> T + Sync) -> Result<Vec<T>, ModelError> {
-    monitor.expect(most);
+/// What `of` makes of the orders. Errors: cancelled by the monitor.
+fn each<T: Send>(
+    orders: Vec<usize>,
+    monitor: &dyn Monitor,
+    of: impl Fn(usize) -> T + Sync,
+) -> Result<Vec<T>, ModelError> {
+    monitor.expect(orders.len());
     let watched = |order| {
         if monitor.is_cancelled() {
             return Err(ModelError::Cancelled);
@@ -95,7 +106,7 @@ fn each<T: Send>(most: usize, monitor: &dyn Monitor, of: impl Fn(usize) -> T + S
         monitor.tick();
         Ok(result)
     };
-    (1..=most).into_par_iter().map(watched).collect()
+    orders.into_par_iter().map(watched).collect()
 }
 
 /// The options of a fit that is to be ranked.
@@ -125,22 +136,60 @@ impl Parts {
         (moves && complete).then_some(parts)
     }
 
-    /// A candidate and the squared errors of its simulation of the rest by block; no blocks where it cannot be judged.
-    fn judged(&self, sample_time_s: f64, order: usize, options: &PemOptions) -> (OrderCandidate, Vec<f64>) {
-        let rows = options.block_rows.max(order + 1).min(self.first.1.len() / 5).max(order + 1);
-        let options = PemOptions { block_rows: rows, ..ranking(options, order) };
+    /// Candidates of the orders 1 to `most` and the squared errors of their simulations of the rest by block; no blocks
+    /// where an order is not judged.
+    fn judged(
+        &self,
+        sample_time_s: f64,
+        most: usize,
+        options: &PemOptions,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<(OrderCandidate, Vec<f64>)>, ModelError> {
+        let rows = |order: usize| options.block_rows.max(order + 1).min(self.first.1.len() / 5).max(order + 1);
+        let fit = |order| PemOptions { block_rows: rows(order), ..ranking(options, order) };
         let first = Experiment { input: &self.first.0, output: &self.first.1 };
+        let unjudged = |order| (OrderCandidate { order, bic: f64::NAN, held_out_percent: f64::NAN }, Vec::new());
+        let mut candidates: Vec<_> = (1..=most).map(unjudged).collect();
+        let Ok(orders) = Orders::new(first, sample_time_s, (1..=most).map(fit).collect()) else {
+            return Ok(candidates);
+        };
+        let promising = self.promising(&orders, most);
+        let simulated = each(promising.clone(), monitor, |order| {
+            let model = orders.model(order - 1).ok()?;
+            self.simulated(&model.model, &model.further_inputs, options)
+        })?;
+        for (order, simulated) in promising.into_iter().zip(simulated) {
+            if let (Some(candidate), Some((held_out_percent, blocks))) = (candidates.get_mut(order - 1), simulated) {
+                *candidate = (OrderCandidate { held_out_percent, ..candidate.0 }, blocks);
+            }
+        }
+        Ok(candidates)
+    }
+
+    /// The orders whose fits may be the choice, by their starts.
+    fn promising(&self, orders: &Orders, most: usize) -> Vec<usize> {
+        let (input, output) = &self.first;
+        let costs = (1..=most).into_par_iter().map(|order| orders.cost_of_start(order - 1).ok()).collect();
+        let shortlist = Shortlist::new(costs, input, output);
+        let enough = shortlist.least_information();
+        let errors = orders.errors_of_start(enough - 1);
+        let suffices = errors.is_ok_and(|errors| nothing_left(input, &errors, enough));
+        shortlist.up_to(if suffices { enough } else { most })
+    }
+
+    /// FIT % of a model's simulation of the rest, and its squared errors by block.
+    fn simulated(
+        &self,
+        model: &InnovationsModel,
+        further: &[InputGains],
+        options: &PemOptions,
+    ) -> Option<(f64, Vec<f64>)> {
         let (input, output) = (&self.rest.0, &self.rest.1);
         let nuisances = Nuisances { offset: options.offset, slope: options.drift };
-        let simulated = identify(&[first], sample_time_s, &options)
-            .and_then(|fit| simulate_held_out(&fit.model, &fit.further_inputs, input, output, nuisances));
-        let Ok(simulation) = simulated else {
-            return (OrderCandidate { order, bic: f64::NAN, held_out_percent: f64::NAN }, Vec::new());
-        };
+        let simulation = simulate_held_out(model, further, input, output, nuisances).ok()?;
         let errors: Vec<f64> = simulation.response.iter().zip(output).map(|(x, y)| (x - y).powi(2)).collect();
         let size = errors.len().div_ceil(BLOCKS).max(1);
-        let blocks = errors.chunks(size).map(|block| block.iter().sum()).collect();
-        (OrderCandidate { order, bic: f64::NAN, held_out_percent: simulation.fit_percent }, blocks)
+        Some((simulation.fit_percent, errors.chunks(size).map(|block| block.iter().sum()).collect()))
     }
 }
 
@@ -206,6 +255,32 @@ mod tests {
         // never too low: an order less leaves a resonance out; a one-standard-error rule errs upwards in one of six
         assert!(found.iter().all(|order| *order >= 4), "{found:?}");
         assert!(found.iter().filter(|order| **order == 4).count() >= 12, "{found:?}");
+    }
+
+    #[test]
+    fn orders_that_cannot_be_the_choice_are_not_fitted() {
+        let section = |a: [f64; 2], b: [f64; 2]| Section { order: 2, a, b, k: [0.0; 2] };
+        let truth = InnovationsModel {
+            sections: vec![section([-1.7, 0.9], [0.3, 0.1]), section([-0.5, 0.85], [0.4, -0.2])],
+            feedthrough: 0.1,
+            sample_time_s: 1.0,
+        };
+        let (u, e) = (white_noise(900, 1.0, 1), white_noise(900, 0.05, 2));
+        let clean = truth.simulate(&u, &[0.0; 4]).unwrap();
+        let coloured = |k: usize| e[k] + 0.8 * if k > 0 { e[k - 1] } else { 0.0 };
+        let options = PemOptions { block_rows: 15, starts: 8, drift: false, ..PemOptions::default() };
+        let judged = |noise, y: Vec<f64>| {
+            let options = PemOptions { noise, ..options.clone() };
+            let choice = choose_order(Experiment { input: &u, output: &y }, 1.0, 7, &options, &Unwatched).unwrap();
+            let fitted = choice.candidates.iter().filter(|c| !c.held_out_percent.is_nan()).map(|c| c.order);
+            (choice.order, fitted.collect::<Vec<usize>>())
+        };
+        let white = clean.iter().zip(&e).map(|(y, e)| y + e).collect();
+        assert_eq!(judged(NoiseModel::White, white), (4, vec![4]));
+        // errors of a colour prove nothing: all orders that have both resonances are fitted
+        let (_, fitted) =
+            judged(NoiseModel::Coloured, clean.iter().enumerate().map(|(k, y)| y + coloured(k)).collect());
+        assert_eq!(fitted, [4, 5, 6, 7]);
     }
 
     #[test]

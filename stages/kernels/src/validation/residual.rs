@@ -1,6 +1,6 @@
 //! Residual tests: is anything left that the model should have explained?
 
-use crate::linear_algebra::{Svd, TallQr};
+use crate::linear_algebra::{Svd, TallQr, clear_factor, gram_of};
 use faer::Mat;
 
 use crate::model::{ModelError, finite};
@@ -77,7 +77,8 @@ pub fn whiteness(e: &[f64], lags: usize, fitted: usize) -> Result<TestResult, Mo
 /// e white and independent of u: the energy of the projection over the variance of e is chi-square with as many degrees
 /// of freedom as the delays of u span.
 /// # Method
-/// QR and rank of the delayed inputs, their means removed: a step spans few directions, and only those are counted.
+/// Products of the delayed inputs, their means removed, where these keep enough digits; QR and rank elsewhere: a step
+/// spans few directions, and only those are counted.
 /// Samples whose residual is missing are left out.
 /// # Shapes
 /// u, e: N samples, more than twice `lags` of them present; e is NaN where missing.
@@ -109,20 +110,36 @@ pub fn input_dependence(u: &[f64], e: &[f64], lags: usize) -> Result<TestResult,
     if variance <= 0.0 {
         return Err(ModelError::ConstantOutput);
     }
-    let mut matrix = Mat::zeros(rows, lags + 2);
-    for lag in 0..=lags {
-        let column = centred(u, lag);
-        matrix.col_mut(lag).iter_mut().zip(&column).for_each(|(m, u)| *m = *u);
-    }
-    matrix.col_mut(lags + 1).iter_mut().zip(&target).for_each(|(m, e)| *m = *e);
+    let mut columns: Vec<Vec<f64>> = (0..=lags).map(|lag| centred(u, lag)).collect();
+    columns.push(target);
+    let (energy, rank) = match explained(&columns) {
+        Some(energy) => (energy, lags + 1),
+        None => explained_by_rotation(&columns)?,
+    };
+    Ok(TestResult::new(energy / variance, rank))
+}
+
+/// Least share of its energy that a column keeps beside those before it where products serve.
+const LEAST_KEPT: f64 = 1e-8;
+
+/// Energy of the last column along the others, by products. None: too ill-conditioned for these.
+fn explained(columns: &[Vec<f64>]) -> Option<f64> {
+    let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let lower = clear_factor(&gram_of(&slices), LEAST_KEPT)?;
+    let last = columns.len() - 1;
+    Some((0..last).map(|j| lower[(last, j)].powi(2)).sum())
+}
+
+/// The same by rotations, and the rank of the others. Errors: no convergence.
+fn explained_by_rotation(columns: &[Vec<f64>]) -> Result<(f64, usize), ModelError> {
+    let (rows, last) = (columns.first().map_or(0, Vec::len), columns.len() - 1);
+    let matrix = Mat::from_fn(rows, last + 1, |i, j| columns[j][i]);
     let r = TallQr::triangle(matrix.as_ref());
-    let svd = Svd::new(&r.as_ref().get(..lags + 1, ..lags + 1).to_owned())?;
+    let svd = Svd::new(&r.as_ref().get(..last, ..last).to_owned())?;
     // directions 1e9 times weaker than the strongest are rounding of the means
     let rank = if svd.s.first().is_some_and(|s| *s > 0.0) { svd.rank(1e-9) } else { 0 };
-    let statistic: f64 =
-        (0..rank).map(|k| (0..=lags).map(|i| svd.u[(i, k)] * r[(i, lags + 1)]).sum::<f64>().powi(2)).sum::<f64>()
-            / variance;
-    Ok(TestResult::new(statistic, rank))
+    let along = (0..rank).map(|k| (0..last).map(|i| svd.u[(i, k)] * r[(i, last)]).sum::<f64>().powi(2));
+    Ok((along.sum(), rank))
 }
 
 #[cfg(test)]
@@ -144,6 +161,20 @@ mod tests {
             // uniform: standard error of the mean 0.029, four of them
             assert!((mean - 0.5).abs() < 0.12, "{mean}");
         }
+    }
+
+    #[test]
+    fn products_give_what_rotations_give() {
+        let (u, e) = (white_noise(500, 1.0, 1), white_noise(500, 1.0, 2));
+        let mut columns: Vec<Vec<f64>> = (0..20).map(|lag| u[20 - lag..480 - lag].to_vec()).collect();
+        columns.push(e[20..480].to_vec());
+        let (slow, rank) = explained_by_rotation(&columns).unwrap();
+        // a hundred roundings
+        assert!(rank == 20 && (explained(&columns).unwrap() / slow - 1.0).abs() < 1e-13);
+        // a step has two directions here, before it and after
+        (0..20).for_each(|lag| columns[lag] = (0..460).map(|k| if k < 10 + lag / 10 { 1.0 } else { 0.0 }).collect());
+        assert!(explained(&columns).is_none());
+        assert_eq!(explained_by_rotation(&columns).unwrap().1, 2);
     }
 
     #[test]
