@@ -326,6 +326,9 @@ fn a_structure_that_was_struck_point_by_point_gives_common_modes_and_shapes_over
     assert!(config.contains("before = \"frf_4.frf\""), "{config}");
     // noise of a thousandth in blocks that the slow mode has not quite left
     of_the_beam(here, "struck.toml", 0.02);
+    let page = common::measured_page(here, "struck.toml.h5");
+    assert_eq!(page.matches(">Phase (°)<").count(), POINTS.len(), "each response once");
+    assert!(page.contains("<h1>frf: p1.csv, p2.csv and 3 more</h1>"));
     assert!(run(new(&["shaken".to_owned()], &["--as", "points", "-o", "shaken.toml"])).status.success());
     // the same seen through Hann windows of 5000 samples, a fifth of whose bins is the width of the slow mode
     of_the_beam(here, "shaken.toml", 0.05);
