@@ -241,7 +241,11 @@ fn what_a_file_does_not_say_of_its_input_is_asked_for() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
         String::from_utf8_lossy(&output.stderr).into_owned()
     };
-    assert!(refused(&["new", "pipeline", "t.csv"]).contains("say with --channel which one of a, b"));
+    let one = refused(&["new", "pipeline", "t.csv", "--goal", "input-output"]);
+    assert!(one.contains("say with --channel which one of a, b"), "{one}");
+    stdout(here, &["new", "pipeline", "t.csv", "-o", "t.toml"]);
+    let text = std::fs::read_to_string(here.join("t.toml")).expect("a config");
+    assert!(text.contains("outputs = [\"a\", \"b\"]") && text.contains("blocks = \"segments\""), "{text}");
     let named = refused(&["new", "pipeline", "t.csv", "--input", "c"]);
     assert!(named.contains("no channel `c`") && named.contains("force, a, b"), "{named}");
     stdout(here, &["new", "pipeline", "t.csv", "--input", "force", "--channel", "b", "-o", "c.toml"]);

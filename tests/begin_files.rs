@@ -326,7 +326,36 @@ fn a_structure_that_was_struck_point_by_point_gives_common_modes_and_shapes_over
     assert!(config.contains("before = \"frf_4.frf\""), "{config}");
     // noise of a thousandth in blocks that the slow mode has not quite left
     of_the_beam(here, "struck.toml", 0.02);
+    let page = common::measured_page(here, "struck.toml.h5");
+    assert_eq!(page.matches(">Phase (°)<").count(), POINTS.len(), "each response once");
+    assert!(page.contains("<h1>frf: p1.csv, p2.csv and 3 more</h1>"));
     assert!(run(new(&["shaken".to_owned()], &["--as", "points", "-o", "shaken.toml"])).status.success());
     // the same seen through Hann windows of 5000 samples, a fifth of whose bins is the width of the slow mode
     of_the_beam(here, "shaken.toml", 0.05);
+}
+
+#[test]
+fn a_force_is_the_input_by_its_name_or_unit_and_one_set_of_like_sensors_the_outputs() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let force = hits(1);
+    let [near, far] = [(0.4, 3), (0.8, 4)].map(|(x, seed)| moved(&force, x, seed));
+    let room: Vec<f64> = noise(9).into_iter().cycle().take(force.len()).collect();
+    let columns = [room.clone(), force.clone(), near.clone(), far.clone(), room];
+    let header = "Time (s),Drive (V),F (N),acc 1 (g),acc 2 (g),room (K)";
+    table(here, "units.csv", 1e-3, header, &columns);
+    let [stdout, stderr] = said(here, &["new", "pipeline", "units.csv", "-o", "u.toml"]);
+    assert!(stdout.contains("measured input F, which is short as a hammer's, and output acc 1, acc 2"), "{stdout}");
+    assert!(stderr.contains("Drive (an excitation by its name or unit: --input Drive); room (in K)"), "{stderr}");
+    let found = frequencies(here, "u.toml");
+    assert!(found.len() == 2 && (found[0] / MODES[0][0] - 1.0).abs() < 2e-3, "{found:?}");
+    // a binary sequence drives; one output gives a transfer function
+    let binary: Vec<f64> = noise(4).iter().cycle().take(6000).map(|e| if *e > 0.0 { 1.0 } else { -1.0 }).collect();
+    table(here, "binary.csv", 1e-3, "Time (s),u,y", &[binary.clone(), moved(&binary, 0.4, 5)]);
+    let [stdout, _] = said(here, &["new", "pipeline", "binary.csv", "-o", "b.toml"]);
+    assert!(stdout.contains("measured input u and output y"), "{stdout}");
+    // a load cell alone is the signal
+    table(here, "cell.csv", 1e-3, "Time (s),load (N)", &[decay(1.0, 8)]);
+    said(here, &["new", "pipeline", "cell.csv", "-o", "l.toml"]);
+    assert_eq!(frequencies(here, "l.toml").len(), 1);
 }

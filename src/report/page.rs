@@ -39,6 +39,8 @@ pub(crate) enum ReportError {
 #[derive(Serialize)]
 struct Page<'a> {
     name: &'a str,
+    /// The name, and of what data.
+    title: String,
     program: &'a str,
     facts: Vec<Fact>,
     tiles: Vec<Tile>,
@@ -77,6 +79,7 @@ pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportE
     environment.add_template("report.html", include_str!("template.html"))?;
     let page = Page {
         name: &run.name,
+        title: title(run),
         program: &run.program,
         facts: facts(run),
         tiles: tiles(run),
@@ -166,6 +169,24 @@ fn section(drawn: Drawn, room: &mut usize) -> Section {
 
 fn picture(figure: &Figure) -> Picture {
     Picture { id: figure.id.clone(), title: figure.title.clone(), caption: figure.caption.clone(), svg: figure.svg() }
+}
+
+/// The pipeline's name, and the names of the first files that it read.
+fn title(run: &RunResult) -> String {
+    const MOST: usize = 2;
+    let mut names: Vec<&str> = Vec::new();
+    for source in run.stages.iter().flat_map(|stage| &stage.sources) {
+        let name = source.path.rsplit('/').next().unwrap_or_default();
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let shown = names.iter().take(MOST).copied().collect::<Vec<_>>().join(", ");
+    match names.len() {
+        0 => run.name.clone(),
+        1..=MOST => format!("{}: {shown}", run.name),
+        more => format!("{}: {shown} and {} more", run.name, more - MOST),
+    }
 }
 
 fn facts(run: &RunResult) -> Vec<Fact> {

@@ -28,55 +28,55 @@ pub fn same_name(location: &str, name: &str) -> bool {
     bare(location) == bare(name)
 }
 
-/// Inputs: as they were named, else by their names. Errors: what is not known, and how to say it.
+/// Inputs: as they were named, else those that drive, of these the forces if there are some. Errors: what is not known, and
+/// how to say it.
 pub fn inputs<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Vec<&'a Channel>, Question> {
-    let signals: Vec<&Channel> = source.channels.iter().filter(usable).collect();
     let found: Vec<&Channel> = match wanted.inputs {
-        [] => signals.iter().copied().filter(|channel| drives(channel)).collect(),
+        [] => {
+            let all = driving(source);
+            let forces: Vec<&Channel> = all.iter().copied().filter(|channel| is_force(channel)).collect();
+            if forces.is_empty() { all } else { forces }
+        }
         names => names.iter().map(|name| named(source, name)).collect::<Result<_, _>>()?,
     };
     match found.is_empty() {
         false => Ok(found),
         true => {
+            let signals: Vec<&Channel> = source.channels.iter().filter(usable).collect();
             let help = format!("say with --input which of {} drives the others", listed(&signals));
             Err((format!("{} does not say which channel is the input", source.file.display()), Some(help)))
         }
     }
 }
 
-/// Outputs: as they were named, else all further channels of that length; `several` of one unit if so. Errors: what is
-/// not known, and how to say it.
-pub fn outputs<'a>(
-    source: &'a Source,
-    wanted: &Wanted<'_>,
-    inputs: &[&Channel],
-    several: bool,
-) -> Result<Vec<&'a Channel>, Question> {
-    let signals = source.channels.iter().filter(usable);
-    let others: Vec<&Channel> = signals
-        .filter(|channel| inputs.iter().all(|input| input.location != channel.location))
-        .filter(|channel| inputs.first().is_none_or(|input| input.samples == channel.samples))
-        .collect();
+/// What may be an output: as they were named, else all signals of the inputs' length that drive nothing, or if there are
+/// none, all that are no inputs. Errors: there is none; named ones of several units.
+pub fn outputs<'a>(source: &'a Source, wanted: &Wanted<'_>, inputs: &[&Channel]) -> Result<Vec<&'a Channel>, Question> {
+    let of = |channels: &[&Channel], channel: &Channel| channels.iter().any(|one| one.location == channel.location);
     let found = match wanted.channels {
-        [] => others.clone(),
+        [] => {
+            let signals = source.channels.iter().filter(usable);
+            let others: Vec<&Channel> = signals
+                .filter(|channel| !of(inputs, channel))
+                .filter(|channel| inputs.first().is_none_or(|input| input.samples == channel.samples))
+                .collect();
+            let driving = driving(source);
+            let moved: Vec<&Channel> = others.iter().copied().filter(|channel| !of(&driving, channel)).collect();
+            if moved.is_empty() { others } else { moved }
+        }
         names => names.iter().map(|name| named(source, name)).collect::<Result<Vec<&Channel>, _>>()?,
     };
-    let of_one_unit = found.iter().all(|channel| channel.unit == found[0].unit);
-    match (&found[..], wanted.channels) {
-        ([], _) => {
+    let unlike = found.iter().find(|channel| found.first().is_some_and(|first| first.unit != channel.unit));
+    match (found.first(), unlike) {
+        (None, _) => {
             let problem = format!("{} has no further channel of that length", source.file.display());
             Err((problem, Some("--channel names the output, --input the input".to_owned())))
         }
-        ([_], _) => Ok(found),
-        _ if several && of_one_unit => Ok(found),
-        (_, []) => {
-            let problem = format!("{} has several channels that could be the output", source.file.display());
-            Err((problem, Some(format!("say with --channel which one of {}", listed(&others)))))
+        (Some(first), Some(other)) if !wanted.channels.is_empty() => {
+            let problem = format!("--channel {} and {} are of different units", first.location, other.location);
+            Err((problem, Some("write a config for each unit".to_owned())))
         }
-        (_, names) => {
-            let problem = format!("one output is fitted to a measured input, --channel {} is another", names[1]);
-            Err((problem, Some("write a config for each output; several of one unit go with --goal frf".to_owned())))
-        }
+        _ => Ok(found),
     }
 }
 
@@ -92,19 +92,41 @@ fn listed(channels: &[&Channel]) -> String {
     channels.iter().map(|channel| channel.location.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// Whether a channel is named as an input.
-pub fn drives(channel: &Channel) -> bool {
-    is_input(&channel.location)
+/// The channels that drive others: named as an input, or in a unit of force beside what is in another. None where
+/// nothing else is a signal. Two values are enough: binary sequences drive.
+pub fn driving(source: &Source) -> Vec<&Channel> {
+    let varies = |values: &Values| values.least < values.largest && values.missing == 0;
+    let drives = |channel: &&Channel| {
+        let known = !channel.is_axis && channel.values.as_ref().is_some_and(varies);
+        known && is_input(&channel.location, &channel.unit)
+    };
+    let found: Vec<&Channel> = source.channels.iter().filter(drives).collect();
+    let moved = |channel: &Channel| {
+        usable(&channel) && !drives(&channel) && found.iter().any(|input| input.samples == channel.samples)
+    };
+    if source.channels.iter().any(moved) { found } else { Vec::new() }
 }
 
-/// Whether a location is that of an input by its name: force, hammer, drive, `u`, `u2`, `uBenchMark`.
-pub fn is_input(location: &str) -> bool {
-    let name = location.rsplit(['/', '.']).next().unwrap_or_default();
+/// Units of force, in lower case.
+const FORCES: [&str; 7] = ["n", "kn", "mn", "newton", "newtons", "lbf", "kgf"];
+
+fn is_force(channel: &Channel) -> bool {
+    let name = last_name(&channel.location).to_lowercase();
+    FORCES.contains(&channel.unit.to_lowercase().as_str()) || ["force", "hammer"].iter().any(|f| name.starts_with(f))
+}
+
+/// Whether a channel is an input by its name (force, hammer, drive, `u`, `u2`, `uBenchMark`) or in a unit of force.
+pub fn is_input(location: &str, unit: &str) -> bool {
+    let name = last_name(location);
     let lower = name.to_lowercase();
     let after_u = name.strip_prefix('u').and_then(|rest| rest.chars().next());
     let u =
         name == "u" || after_u.is_some_and(|next| next.is_ascii_digit() || next.is_ascii_uppercase() || next == '_');
-    u || INPUTS.iter().any(|begin| lower.starts_with(begin))
+    u || INPUTS.iter().any(|begin| lower.starts_with(begin)) || FORCES.contains(&unit.to_lowercase().as_str())
+}
+
+fn last_name(location: &str) -> &str {
+    location.rsplit(['/', '.']).next().unwrap_or_default()
 }
 
 /// Whether a channel holds a signal.

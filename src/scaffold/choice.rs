@@ -4,11 +4,11 @@ use afmid_kernels::events::decay::FreeDecay;
 use afmid_kernels::harmonics::is_tone;
 use afmid_kernels::spectra::{is_impulsive, shows_resonance};
 
-use super::channels::{drives, inputs, is_named, named, nothing, outputs, usable};
+use super::channels::{driving, inputs, is_named, named, nothing, outputs};
 use super::first_file::FirstFile;
 use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
-use super::sensors::{Sensors, left_out, sensors};
+use super::sensors::{Sensors, left_out, like, sensors};
 use super::stated::does_without_unit;
 use crate::cli::{Goal, RecordsAre};
 use crate::inspect::{Channel, counted};
@@ -96,7 +96,7 @@ fn by_looks<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>,
 /// Whether a channel is named as an input and not wanted as the signal.
 fn has_input(source: &Source, wanted: &Wanted<'_>) -> bool {
     let signal = |channel: &Channel| wanted.channels.iter().any(|name| is_named(channel, name));
-    source.channels.iter().any(|channel| usable(&channel) && drives(channel) && !signal(channel))
+    driving(source).into_iter().any(|channel| !signal(channel))
 }
 
 fn responses(source: &Source) -> Choice<'_> {
@@ -104,20 +104,30 @@ fn responses(source: &Source) -> Choice<'_> {
     Choice::of(Goal::Frf, channels, format!("frequency responses in {}", source.name()))
 }
 
-/// Measured input and output: of a hammer's hits the frequency response, else a transfer function.
+/// Measured input and output: of a hammer's hits, of points and of several sensors frequency responses, else a transfer
+/// function.
 fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal>) -> Result<Choice<'a>, Question> {
-    let inputs = inputs(file.source, wanted)?;
+    let source = file.source;
+    let inputs = inputs(source, wanted)?;
     let struck = file.samples(inputs[0]).is_ok_and(|force| is_impulsive(&force));
     let records_are = wanted.records_are.filter(|what| *what == RecordsAre::Points);
-    let responses = struck || records_are.is_some();
-    let goal = goal.unwrap_or(if responses { Goal::Frf } else { Goal::InputOutput });
-    let outputs = outputs(file.source, wanted, &inputs, goal == Goal::Frf)?;
+    let found = outputs(source, wanted, &inputs)?;
+    let best = source.best.and_then(|index| source.channels.get(index));
+    let best = best.filter(|best| found.iter().any(|channel| channel.location == best.location));
+    let outputs = if wanted.channels.is_empty() { like(&found, best.unwrap_or(found[0]), file) } else { found };
+    let several = struck || records_are.is_some() || outputs.len() > 1;
+    let goal = goal.unwrap_or(if several { Goal::Frf } else { Goal::InputOutput });
     let names = |all: &[&Channel]| all.iter().map(|one| one.location.as_str()).collect::<Vec<&str>>().join(", ");
+    if goal == Goal::InputOutput && outputs.len() > 1 {
+        let problem = format!("{} has several channels that could be the output", source.file.display());
+        let help = format!("say with --channel which one of {}; --goal frf takes all", names(&outputs));
+        return Err((problem, Some(help)));
+    }
     let short = if struck { ", which is short as a hammer's," } else { "" };
-    let (input, output, source) = (names(&inputs), names(&outputs), file.source);
+    let (input, output) = (names(&inputs), names(&outputs));
     let why = format!("measured input {input}{short} and output {output} in {}", source.name());
     let taken: Vec<&Channel> = outputs.iter().chain(&inputs).copied().collect();
-    let notes = left_out(&source.channels, &taken).filter(|_| wanted.channels.is_empty()).into_iter().collect();
+    let notes = left_out(source, &taken).filter(|_| wanted.channels.is_empty()).into_iter().collect();
     Ok(Choice { inputs, struck, records_are, notes, ..Choice::of(goal, outputs, why) })
 }
 

@@ -156,7 +156,9 @@ impl Layout {
             let other_input = wanted.inputs.is_empty() && wanted.goal != Some(Goal::Decay);
             match wanted.channels {
                 [] => !channel.location.to_lowercase().contains("piezo"),
-                names => named(names) || named(wanted.inputs) || (other_input && is_input(&channel.location)),
+                names => {
+                    named(names) || named(wanted.inputs) || (other_input && is_input(&channel.location, &channel.unit))
+                }
             }
         };
         let mut found: Vec<Signal> = Vec::new();

@@ -1,8 +1,9 @@
 //! Which channels of a file are sensors of one motion, and why the others are none.
 
-use super::channels::{drives, nothing, some_of, usable};
+use super::channels::{driving, nothing, some_of, usable};
 use super::choice::Question;
 use super::first_file::FirstFile;
+use super::recordings::Source;
 use crate::inspect::{Channel, LEAST_CODES};
 use crate::show::number;
 
@@ -30,11 +31,18 @@ pub fn sensors<'a>(file: &FirstFile<'a>) -> Result<Sensors<'a>, Question> {
     let best = source.best.and_then(|index| source.channels.get(index)).filter(usable);
     let longest = || source.channels.iter().filter(usable).max_by_key(|channel| channel.samples);
     let best = best.or_else(longest).ok_or_else(|| nothing(source))?;
+    let driving = driving(source);
+    let drives = |channel: &&Channel| driving.iter().any(|one| one.location == channel.location);
     let signals: Vec<&Channel> = source.channels.iter().filter(|c| usable(c) && !drives(c)).collect();
-    let found = chosen(sets(&signals), best, file);
-    let channels = if found.is_empty() { vec![best] } else { found };
-    let left_out = left_out(&source.channels, &channels);
+    let channels = like(&signals, best, file);
+    let left_out = left_out(source, &channels);
     Ok(Sensors { channels, left_out })
+}
+
+/// Those of the signals that are like the best one, or a larger set of like ones that rings.
+pub fn like<'a>(signals: &[&'a Channel], best: &'a Channel, file: &FirstFile<'a>) -> Vec<&'a Channel> {
+    let found = chosen(sets(signals), best, file);
+    if found.is_empty() { vec![best] } else { found }
 }
 
 /// Sets of like channels, in the order of their first ones.
@@ -93,12 +101,13 @@ fn chosen<'a>(sets: Vec<Likes<'a>>, best: &Channel, file: &FirstFile<'a>) -> Vec
 }
 
 /// What is said of the channels that are not taken, by why; none where all are.
-pub fn left_out(all: &[Channel], taken: &[&Channel]) -> Option<String> {
-    let first = *taken.first()?;
+pub fn left_out(source: &Source, taken: &[&Channel]) -> Option<String> {
+    let (first, driving) = (*taken.first()?, driving(source));
     let mut by_reason: Vec<(String, Vec<&str>)> = Vec::new();
-    let others = all.iter().filter(|channel| !channel.is_axis);
+    let others = source.channels.iter().filter(|channel| !channel.is_axis);
     for channel in others.filter(|channel| taken.iter().all(|one| one.location != channel.location)) {
-        let why = why(channel, first);
+        let drives = driving.iter().any(|one| one.location == channel.location);
+        let why = why(channel, first, drives);
         match by_reason.iter_mut().find(|(known, _)| *known == why) {
             Some((_, names)) => names.push(&channel.location),
             None => by_reason.push((why, vec![&channel.location])),
@@ -111,13 +120,15 @@ pub fn left_out(all: &[Channel], taken: &[&Channel]) -> Option<String> {
 }
 
 /// Why a channel is not taken with the first of those that are.
-fn why(channel: &Channel, first: &Channel) -> String {
+fn why(channel: &Channel, first: &Channel, drives: bool) -> String {
     let Some(values) = &channel.values else { return "listed only".to_owned() };
     let unit = |channel: &Channel| match channel.unit.is_empty() {
         true => "without a unit".to_owned(),
         false => format!("in {}", channel.unit),
     };
-    if channel.samples != first.samples {
+    if drives {
+        format!("an excitation by its name or unit: --input {}", channel.location)
+    } else if channel.samples != first.samples {
         format!("{} samples, not {}", channel.samples, first.samples)
     } else if channel.sample_rate_hz != first.sample_rate_hz {
         channel.sample_rate_hz.map_or_else(|| "without a rate".to_owned(), |rate| format!("at {} Hz", number(rate)))
@@ -127,8 +138,6 @@ fn why(channel: &Channel, first: &Channel) -> String {
         format!("only {} different values", values.codes)
     } else if values.missing > 0 {
         format!("{} samples missing", values.missing)
-    } else if drives(channel) {
-        format!("an excitation by its name: --input {}", channel.location)
     } else if channel.unit != first.unit {
         unit(channel)
     } else {

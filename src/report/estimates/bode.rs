@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::response::{degrees_near, unwrapped_degrees};
+use super::response::{broken_at_jumps, degrees_near, unwrapped_degrees, within_a_turn};
 use crate::report::figure::{Axis, Band, Figure, Mark, Panel, Row, Stroke};
 
 /// Standard errors that a band spans on either side: 95 % of a normal distribution.
@@ -17,13 +17,15 @@ pub(crate) struct Bode {
     pub rules: Vec<(f64, String)>,
     pub frequency: Axis,
     pub magnitude: Axis,
+    /// Whether phases stay within about half a turn of zero, with breaks in their lines.
+    pub within_a_turn: bool,
 }
 
 impl Bode {
     /// Curves of a response without unit, over decades of frequency.
     pub fn new(curves: Vec<BodeCurve>) -> Self {
         let magnitude = Axis::new("Magnitude", "1").log();
-        Self { curves, rules: Vec::new(), frequency: Axis::frequency(), magnitude }
+        Self { curves, rules: Vec::new(), frequency: Axis::frequency(), magnitude, within_a_turn: false }
     }
 }
 
@@ -109,6 +111,7 @@ pub(crate) fn bode_panels(bode: &Bode) -> (Panel, Panel) {
     let reference: Option<(Vec<f64>, Vec<f64>)> =
         bode.curves.iter().max_by_key(|curve| curve.smoothness).map(|curve| {
             let phases = unwrapped_degrees(&curve.transfer, &curve.phase_std_rad);
+            let phases = if bode.within_a_turn { within_a_turn(&phases) } else { phases };
             curve.frequency_hz.iter().zip(phases).filter(|(_, phase)| phase.is_finite()).unzip()
         });
     let axis = match shown_range(&bode.curves) {
@@ -123,6 +126,7 @@ pub(crate) fn bode_panels(bode: &Bode) -> (Panel, Panel) {
             Some((f, phases)) => degrees_near(&curve.frequency_hz, &curve.transfer, (f, phases)),
             None => unwrapped_degrees(&curve.transfer, &curve.phase_std_rad),
         };
+        let angle = if bode.within_a_turn { broken_at_jumps(angle) } else { angle };
         let times = |std: &[f64], factor: f64| -> Vec<f64> { std.iter().map(|std| factor * std).collect() };
         if curve.smoothness > Smoothness::Noisy
             && curve.magnitude_std.len() == size.len()

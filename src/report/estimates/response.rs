@@ -154,6 +154,33 @@ pub(super) fn degrees_near(frequency_hz: &[f64], transfer: &[Complex64], referen
         .collect()
 }
 
+/// How far beyond half a turn a phase may go before it is drawn a turn further up or down: noise about half a turn does
+/// not make it jump to and fro.
+const BEYOND_DEG: f64 = 45.0;
+
+/// Phases without jumps, put back by whole turns into about half a turn on either side of zero: five modes in a row fall by
+/// two and a half turns, which tells no more than the frequencies do.
+pub(super) fn within_a_turn(phases: &[f64]) -> Vec<f64> {
+    let mut turns = 0.0;
+    let mut put = |phase: &f64| {
+        if (phase + 360.0 * turns).abs() > 180.0 + BEYOND_DEG {
+            turns = -(phase / 360.0).round();
+        }
+        phase + 360.0 * turns
+    };
+    phases.iter().map(&mut put).collect()
+}
+
+/// The same without a line across each jump by a turn.
+pub(super) fn broken_at_jumps(mut phases: Vec<f64>) -> Vec<f64> {
+    for k in (1..phases.len()).rev() {
+        if (phases[k] - phases[k - 1]).abs() > 180.0 + BEYOND_DEG {
+            phases[k] = f64::NAN;
+        }
+    }
+    phases
+}
+
 fn degrees(h: Complex64) -> f64 {
     if h.is_finite() && h.norm() > 0.0 { h.arg().to_degrees() } else { f64::NAN }
 }
@@ -165,6 +192,19 @@ fn near(phase: f64, reference: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_phase_that_falls_by_many_turns_stays_near_zero_and_its_line_breaks_where_it_jumps() {
+        let fall: Vec<f64> = (0..=1080).map(|k| -f64::from(k)).collect();
+        let within = within_a_turn(&fall);
+        assert!(within.iter().all(|phase| (-225.0..=180.0).contains(phase)), "{within:?}");
+        assert!(within.iter().zip(&fall).all(|(a, b)| ((a - b) / 360.0).fract() == 0.0));
+        let broken = broken_at_jumps(within);
+        assert_eq!(broken.iter().filter(|phase| phase.is_nan()).count(), 3);
+        // noise about half a turn
+        let flat: Vec<f64> = (0..50).map(|k| 180.0 + 30.0 * f64::from(k).sin()).collect();
+        assert_eq!(broken_at_jumps(within_a_turn(&flat)), flat);
+    }
 
     /// One resonance, as a rotation by `angle` shrunk to radius `r`: poles r exp(+-i angle).
     fn resonator(r: f64, angle: f64) -> StateSpace {

@@ -51,9 +51,16 @@ pub(super) struct Responses<'a> {
     fit: Option<Found<'a, Array>>,
 }
 
-/// All sets of measured responses of a run.
+/// All sets of measured responses of a run, but those that others are joined to.
 pub(super) fn sets(run: &RunResult) -> Vec<Responses<'_>> {
-    all::<Array>(run).filter_map(|found| Responses::of(run, found)).collect()
+    let all: Vec<Responses<'_>> = all::<Array>(run).filter_map(|found| Responses::of(run, found)).collect();
+    let ids: Vec<&str> = all.iter().map(|set| set.found.stage.id.as_str()).collect();
+    let joined = |set: &Responses| {
+        let takes = |id: &&str| *id != set.found.stage.id && set.are_of(run, id);
+        ids.iter().any(takes)
+    };
+    let joined: Vec<bool> = all.iter().map(joined).collect();
+    all.into_iter().zip(joined).filter(|(_, joined)| !joined).map(|(set, _)| set).collect()
 }
 
 impl<'a> Responses<'a> {
@@ -112,6 +119,7 @@ impl<'a> Responses<'a> {
             rules: rules.to_vec(),
             frequency: Axis::new("Frequency", "Hz"),
             magnitude: Axis::new(&self.quantity(), unit_of(self.found.value, "frf")).log(),
+            within_a_turn: true,
             ..Bode::new(self.curves(number)?)
         };
         let (mut magnitude, mut phase) = bode_panels(&bode);
