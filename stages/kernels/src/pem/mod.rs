@@ -7,11 +7,12 @@
 //! slope of y.
 //! # Method
 //! Minimises `V = sum_t e(t)^2`, `e = H^-1 (y - G u)` with `H^-1 = prod a_i / c_i` (`predictor`; V is the cost of
-//! `projection`). Starts from subspace estimates ([`crate::subspace`]; `starts`), then Levenberg-Marquardt steps on the
-//! one-step prediction errors (`levenberg_marquardt`, by [`crate::optimise::descend`]) with analytic derivatives
-//! (`jacobian`) and a secant estimate of the curvature that they leave out (`secant`); x0, offset, slope, B and D are
-//! eliminated in every step (variable projection, `projection`). By default poles and noise model move in turns
-//! (`alternating`). [`identify`] minimises; [`refit`] starts from a model; [`with_poles`] keeps the poles.
+//! `projection`). Starts from subspace estimates ([`crate::subspace`]; `estimates`, `starts`), those in the basin of a
+//! known minimum left out (`basin`), then Levenberg-Marquardt steps on the one-step prediction errors
+//! (`levenberg_marquardt`, by [`crate::optimise::descend`]) with analytic derivatives (`jacobian`) and a secant
+//! estimate of the curvature that they leave out (`secant`); x0, offset, slope, B and D are eliminated in every step
+//! (variable projection, `projection`). By default poles and noise model move in turns (`alternating`). [`identify`]
+//! minimises; [`refit`] starts from a model; [`with_poles`] keeps the poles.
 //! # Shapes
 //! u and y: N samples per experiment, several inputs one after the other; covariance: (2n + 1) x (2n + 1) and n + 1
 //! more for each further input.

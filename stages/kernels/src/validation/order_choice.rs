@@ -235,20 +235,24 @@ mod tests {
     use crate::fixture::white_noise;
     use crate::model::{InnovationsModel, Section};
 
-    #[test]
-    fn the_order_of_two_resonances_is_found() {
+    /// The response of two resonances to an input.
+    fn response(u: &[f64]) -> Vec<f64> {
         let section = |a: [f64; 2], b: [f64; 2]| Section { order: 2, a, b, k: [0.0; 2] };
         let truth = InnovationsModel {
             sections: vec![section([-1.7, 0.9], [0.3, 0.1]), section([-0.5, 0.85], [0.4, -0.2])],
             feedthrough: 0.1,
             sample_time_s: 1.0,
         };
+        truth.simulate(u, &[0.0; 4]).unwrap()
+    }
+
+    #[test]
+    fn the_order_of_two_resonances_is_found() {
         let options = PemOptions { block_rows: 15, noise: NoiseModel::White, drift: false, ..PemOptions::default() };
         let found: Vec<usize> = (0..20)
             .map(|seed| {
                 let (u, e) = (white_noise(450, 1.0, seed), white_noise(450, 0.05, 1000 + seed));
-                let y = truth.simulate(&u, &[0.0; 4]).unwrap();
-                let y: Vec<f64> = y.iter().zip(&e).map(|(y, e)| y + e).collect();
+                let y: Vec<f64> = response(&u).iter().zip(&e).map(|(y, e)| y + e).collect();
                 choose_order(Experiment { input: &u, output: &y }, 1.0, 7, &options, &Unwatched).unwrap().order
             })
             .collect();
@@ -259,14 +263,8 @@ mod tests {
 
     #[test]
     fn orders_that_cannot_be_the_choice_are_not_fitted() {
-        let section = |a: [f64; 2], b: [f64; 2]| Section { order: 2, a, b, k: [0.0; 2] };
-        let truth = InnovationsModel {
-            sections: vec![section([-1.7, 0.9], [0.3, 0.1]), section([-0.5, 0.85], [0.4, -0.2])],
-            feedthrough: 0.1,
-            sample_time_s: 1.0,
-        };
         let (u, e) = (white_noise(900, 1.0, 1), white_noise(900, 0.05, 2));
-        let clean = truth.simulate(&u, &[0.0; 4]).unwrap();
+        let clean = response(&u);
         let coloured = |k: usize| e[k] + 0.8 * if k > 0 { e[k - 1] } else { 0.0 };
         let options = PemOptions { block_rows: 15, starts: 8, drift: false, ..PemOptions::default() };
         let judged = |noise, y: Vec<f64>| {
