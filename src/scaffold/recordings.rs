@@ -87,7 +87,11 @@ fn none(paths: &[PathBuf], groups: &Groups) -> Question {
     let own = (!groups.own.is_empty()).then(|| format!("{} are results of afmid's", groups.own.len()));
     let reasons: Vec<String> = groups.skipped.iter().take(MOST).map(reason).chain(own).collect();
     let names: Vec<String> = paths.iter().take(MOST).map(|path| path.display().to_string()).collect();
-    let help = "give the folder that holds the recordings, or the files".to_owned();
+    let known = groups.skipped.first().and_then(|(path, _)| match inspect(path).outcome {
+        Outcome::Refused { help, .. } => help,
+        _ => None,
+    });
+    let help = known.unwrap_or_else(|| "give the folder that holds the recordings, or the files".to_owned());
     (format!("there are no recordings in {} ({})", names.join(", "), reasons.join("; ")), Some(help))
 }
 

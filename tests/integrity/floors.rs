@@ -20,7 +20,7 @@ const CRATES: [Crate; 5] = [
         name: "afmid-formats",
         src: "pipeline/formats/src",
         floors: &[
-            &["budget", "fail", "number", "text", "calendar", "rate", "lanes", "regular"],
+            &["budget", "fail", "frequency", "number", "text", "calendar", "rate", "lanes", "regular"],
             &["pinned"],
             &["fields", "inflating", "opened", "raw"],
             &["packed"],

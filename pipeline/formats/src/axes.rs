@@ -8,8 +8,9 @@
 //! a cell `{3}` of times to the cell `{3}` beside it; of the cells of one array the first of times to the first of
 //! signals. Nothing else gets that rate.
 
+use crate::frequency::{hertz, perhaps_frequencies};
 use crate::rate::{fewest_digits, of_step};
-use crate::{Contents, FoundChannel, hertz};
+use crate::{Contents, FoundChannel};
 use std::collections::HashMap;
 
 /// Names of arrays of times, in lower case. A capital `T` is a temperature or a period.
@@ -31,8 +32,6 @@ const TIMES: [&str; 11] = [
 const UNITS: [(&str, f64); 5] = [("_s", 1.0), ("_ms", 1e-3), ("_us", 1e-6), ("_ns", 1e-9), ("_sec", 1.0)];
 /// Names of arrays of frequencies, in lower case, but for the unit at their ends.
 const FREQUENCIES: [&str; 4] = ["frequency", "frequencies", "freq", "freqs"];
-/// The same of names that others may have, too.
-const PERHAPS_FREQUENCIES: [&str; 5] = ["f", "hz", "fvec", "faxis", "f_axis"];
 /// Ends of such names that state the unit, in lower case, and the unit.
 const HERTZ: [(&str, &str); 4] = [("_hz", "Hz"), ("_khz", "kHz"), ("_mhz", "MHz"), ("_ghz", "GHz")];
 
@@ -268,11 +267,6 @@ fn kind(channel: &FoundChannel, place: &Place, places: &HashMap<Key, usize>) -> 
     }
     let beside = || places.get(&place.key(place.name, "", channel.samples)).is_some_and(|cells| *cells > 1);
     (!place.cell.is_empty() && beside()).then_some(Kind::Cell)
-}
-
-/// Whether an array of this name holds frequencies if it is an axis.
-pub(crate) fn perhaps_frequencies(name: &str) -> bool {
-    PERHAPS_FREQUENCIES.contains(&name.to_lowercase().as_str())
 }
 
 /// Whether a channel of this name in lower case holds the frequencies of a spectrum.

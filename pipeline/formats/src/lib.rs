@@ -10,6 +10,7 @@ mod budget;
 mod calendar;
 mod fail;
 mod fields;
+mod frequency;
 mod grid;
 pub mod igor;
 mod inflating;
@@ -44,6 +45,7 @@ use std::sync::Arc;
 
 pub use axes::{names_times, settle as settle_axes};
 pub use budget::most_inflated;
+pub use frequency::hertz;
 pub use grid::numbers_in_file;
 pub use lanes::Lanes;
 pub use number::Number;
@@ -52,7 +54,7 @@ pub use raw::Raw;
 pub use raw_binary::{RawBinary, SampleType};
 pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};
 pub use regular::{open_regular, read_regular};
-pub use responses::{Degree, FoundResponse, Frequencies, Parts, hertz, responses, says_frequencies, unit_ratio};
+pub use responses::{Degree, FoundResponse, Frequencies, Parts, responses, says_frequencies, unit_ratio};
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
 ///

@@ -2,6 +2,7 @@
 
 use super::role::{Role, degrees, role};
 use super::{FoundResponse, Frequencies, Parts};
+use crate::frequency::perhaps_frequencies;
 use crate::{Contents, FormatError, FoundChannel, fail};
 
 /// A column that is no axis.
@@ -58,7 +59,7 @@ fn is_frequency(channel: &FoundChannel) -> bool {
 /// Whether a channel holds frequencies and says so: by title, name or unit.
 pub fn says_frequencies(channel: &FoundChannel) -> bool {
     let name = channel.location.rsplit(['/', '.']).next().unwrap_or_default();
-    channel.is_axis && (role(channel).0 == Some(Role::Frequency) || crate::axes::perhaps_frequencies(name))
+    channel.is_axis && (role(channel).0 == Some(Role::Frequency) || perhaps_frequencies(name))
 }
 
 impl<'a> Column<'a> {

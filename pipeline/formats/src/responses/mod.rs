@@ -10,7 +10,6 @@ mod columns;
 mod role;
 
 pub use columns::{responses, says_frequencies};
-pub use role::hertz;
 
 use crate::{FormatError, FoundChannel, Raw, Source, fail};
 

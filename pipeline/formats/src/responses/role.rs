@@ -1,6 +1,7 @@
 //! What a column's title says that it is.
 
 use crate::FoundChannel;
+use crate::frequency::hertz;
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,32 +62,5 @@ pub(super) fn degrees(channel: &FoundChannel) -> Option<bool> {
         (true, false) => Some(true),
         (false, true) => Some(false),
         _ => None,
-    }
-}
-
-/// Hertz in the unit of a frequency; none if it is no such unit. Small and capital letters are alike but for the prefix
-/// that is milli or mega.
-pub fn hertz(unit: &str) -> Option<f64> {
-    Some(match unit.to_lowercase().as_str() {
-        "hz" | "1/s" => 1.0,
-        "khz" => 1e3,
-        "mhz" if unit.starts_with('M') => 1e6,
-        "mhz" if unit == "mHz" => 1e-3,
-        "ghz" => 1e9,
-        "rad/s" => std::f64::consts::TAU.recip(),
-        _ => return None,
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::hertz;
-
-    #[test]
-    fn milli_and_mega_are_two_prefixes() {
-        assert_eq!((hertz("mHz"), hertz("MHz"), hertz("MHZ")), (Some(1e-3), Some(1e6), Some(1e6)));
-        // which of both is meant, nobody knows
-        assert_eq!(hertz("mhz"), None);
-        assert_eq!((hertz("khz"), hertz("kHz"), hertz("HZ"), hertz("V")), (Some(1e3), Some(1e3), Some(1.0), None));
     }
 }
