@@ -354,6 +354,12 @@ fn a_force_is_the_input_by_its_name_or_unit_and_one_set_of_like_sensors_the_outp
     table(here, "binary.csv", 1e-3, "Time (s),u,y", &[binary.clone(), moved(&binary, 0.4, 5)]);
     let [stdout, _] = said(here, &["new", "pipeline", "binary.csv", "-o", "b.toml"]);
     assert!(stdout.contains("measured input u and output y"), "{stdout}");
+    // a step or two leave what follows to ring freely
+    let once = decay(1.0, 8);
+    let step: Vec<f64> = (0..2 * once.len()).map(|k| if k < once.len() { 0.0 } else { 1.0 }).collect();
+    table(here, "steps.csv", 1e-3, "Time (s),u,y", &[step, [once.clone(), once].concat()]);
+    let [stdout, stderr] = said(here, &["new", "pipeline", "steps.csv", "-o", "s.toml"]);
+    assert!(stdout.contains("2 free decays") && stderr.contains("u (only 2 different values)"), "{stdout} {stderr}");
     // a load cell alone is the signal
     table(here, "cell.csv", 1e-3, "Time (s),load (N)", &[decay(1.0, 8)]);
     said(here, &["new", "pipeline", "cell.csv", "-o", "l.toml"]);

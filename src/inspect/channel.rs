@@ -33,6 +33,8 @@ pub struct Values {
     pub largest: f64,
     /// Distinct codes, at most [`MOST_CODES`].
     pub codes: usize,
+    /// Samples that differ from the one before.
+    pub changes: usize,
     /// NaN, infinities and the declared fill code.
     pub missing: usize,
     /// Samples piled up at either end of the range.
@@ -61,6 +63,7 @@ fn values(found: &FoundChannel) -> Result<Values, FormatError> {
     let settings = CensusSettings { fill_code: found.fill_code, sentinels: Vec::new(), sample_rate_hz };
     let mut census = ChannelCensus::new(settings);
     let mut codes = BTreeSet::new();
+    let (mut changes, mut before) = (0, None);
     let chunk = found.source.preferred_samples().clamp(1, 1 << 20);
     for start in (0..found.samples).step_by(chunk) {
         let samples = found.source.read(start, chunk.min(found.samples - start))?.widened();
@@ -73,6 +76,10 @@ fn values(found: &FoundChannel) -> Result<Values, FormatError> {
                 }
             }
         }
+        for &code in &samples {
+            changes += usize::from(before.is_some_and(|before| before != code));
+            before = Some(code);
+        }
         census.push(samples);
     }
     let census = census.finish();
@@ -83,6 +90,7 @@ fn values(found: &FoundChannel) -> Result<Values, FormatError> {
         least: ends[0].min(ends[1]),
         largest: ends[0].max(ends[1]),
         codes: codes.len(),
+        changes,
         missing: census.not_finite + census.fill,
         saturated: census.saturated_low + census.saturated_high,
     })

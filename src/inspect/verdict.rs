@@ -145,7 +145,8 @@ mod tests {
             change(&mut channel.0);
             channel
         };
-        let values = |codes, missing, saturated| Values { least: 0.0, largest: 1.0, codes, missing, saturated };
+        let values =
+            |codes, missing, saturated| Values { least: 0.0, largest: 1.0, codes, changes: codes, missing, saturated };
         let noise: Vec<f64> = rings(true)[..1000].to_vec();
         let lacking = |k: usize, mut y: Vec<f64>| {
             y[k] = f64::NAN;

@@ -5,6 +5,8 @@ use super::pipeline::Wanted;
 use super::recordings::Source;
 use crate::inspect::{Channel, LEAST_CODES, Values};
 
+/// Fewer changes of a switch are steps, each a test of its own.
+const LEAST_CHANGES: usize = 20;
 /// How names of inputs begin.
 const INPUTS: [&str; 8] = ["input", "force", "hammer", "excit", "drive", "stimul", "torque", "actuat"];
 
@@ -93,9 +95,11 @@ fn listed(channels: &[&Channel]) -> String {
 }
 
 /// The channels that drive others: named as an input, or in a unit of force beside what is in another. None where
-/// nothing else is a signal. Two values are enough: binary sequences drive.
+/// nothing else is a signal. Two values are enough if they alternate: binary sequences drive, after a few steps a structure
+/// rings freely.
 pub fn driving(source: &Source) -> Vec<&Channel> {
-    let varies = |values: &Values| values.least < values.largest && values.missing == 0;
+    let alternates = |values: &Values| values.codes >= LEAST_CODES || values.changes >= LEAST_CHANGES;
+    let varies = |values: &Values| alternates(values) && values.missing == 0;
     let drives = |channel: &&Channel| {
         let known = !channel.is_axis && channel.values.as_ref().is_some_and(varies);
         known && is_input(&channel.location, &channel.unit)
