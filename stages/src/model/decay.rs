@@ -123,7 +123,7 @@ impl Stage for DecayFit {
             .map_err(StageError::from_error)?;
         let parts = Parts::new(&followed, &decays);
         let fit = &followed.fit;
-        self.warn(fit, &decays, cx);
+        self.warn(fit, followed.fitted.poles.len(), &decays, cx);
         let companions = followed.dropped.iter().filter(|d| matches!(d.reason, Dropped::Companion { .. })).count();
         if companions > 0 {
             cx.warn(format!(
@@ -192,17 +192,18 @@ impl DecayFit {
         }
     }
 
-    /// Warns where something does not fit.
-    fn warn(&self, fit: &ChannelRingdown, decays: &Decays<'_>, cx: &Context) {
+    /// Warns where something does not fit; `found`: exponentials that were fitted, of which some may be no modes.
+    fn warn(&self, fit: &ChannelRingdown, found: usize, decays: &Decays<'_>, cx: &Context) {
         if !fit.verdict.converged {
             cx.warn(format!(
                 "no minimum after {} steps: the last was {:.2} standard errors",
                 fit.verdict.steps, fit.verdict.distance
             ));
         }
-        let found = fit.poles.len();
         if self.modes == Count::Auto && found == self.max_modes {
-            cx.warn(format!("`modes = \"auto\"` found {found}, all that `max_modes` allows: there may be more"));
+            cx.warn(format!(
+                "`modes = \"auto\"` fitted {found} exponentials, all that `max_modes` allows: there may be more modes"
+            ));
         }
         let same = |channel: &usize| {
             let mut values = decays.hits.iter().filter_map(|hit| hit.get(*channel)).flat_map(|row| row.iter());
