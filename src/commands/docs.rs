@@ -65,9 +65,10 @@ const TUTORIALS: [(&str, &str); 5] = [
 ];
 
 /// What was measured: accuracy, performance, diagnosis.
-const RESULTS: [(&str, &str); 17] = [
+const RESULTS: [(&str, &str); 18] = [
     ("Modes from ringdowns", "ringdown.md"),
     ("Free decays in several channels", "decay.md"),
+    ("Modes from frequency responses", "frf.md"),
     ("Models from a frequency response", "frequency-response.md"),
     ("The grey modal form", "grey.md"),
     ("Contact stiffness", "contact.md"),
