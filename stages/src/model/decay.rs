@@ -227,6 +227,15 @@ impl DecayFit {
                 lacking.join(", ")
             ));
         }
+        for found in fit.harmonics() {
+            cx.warn(format!(
+                "mode {} is weak, at {} times the frequency of mode {}, and dies as much faster: a harmonic, if what was \
+                 measured is not linear",
+                found.mode + 1,
+                found.multiple,
+                found.of + 1
+            ));
+        }
         for (number, mode) in fit.shapes.iter().enumerate().filter(|(_, shape)| !shape.rank_one.holds()) {
             cx.warn(format!(
                 "mode {}: the {} hits do not share one shape over the {} channels (p = {:.1e}): a moving sensor, a \

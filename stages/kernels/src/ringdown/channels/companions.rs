@@ -129,7 +129,45 @@ fn one_shape(fit: &ChannelRingdown, i: usize, j: usize) -> bool {
     apart < ORTHOGONAL.0 + ORTHOGONAL.1 * (noise(&one, i) + noise(&other, j))
 }
 
+/// Largest multiple that is looked for: cubes and squares of the response make the first few.
+const MULTIPLES: usize = 5;
+/// How far a pole may be off the multiple of another, in its half width: the law is no pure power, and the mode may move.
+const OFF_MULTIPLE: f64 = 0.5;
+/// Energy of a harmonic over that of its mode, at most: a tenth of the amplitude.
+const WEAK: f64 = 0.01;
+
+/// A mode that looks like a harmonic of another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HarmonicOf {
+    /// Number of the mode, from 0.
+    pub mode: usize,
+    /// Number of the other.
+    pub of: usize,
+    /// Multiple of its frequency.
+    pub multiple: usize,
+}
+
 impl ChannelRingdown {
+    /// Weak modes whose pole is a multiple of a stronger one's: what a static curve or a stiffness that is not linear makes
+    /// of it. A mode of a rod or a string may be there as well.
+    ///
+    /// # Model
+    /// The n-th power of `Re(rho exp(s t))` has a part `exp(n s t)`.
+    pub fn harmonics(&self) -> Vec<HarmonicOf> {
+        let energy = energies(self);
+        let is_one = |mode: usize, of: usize, multiple: usize| {
+            let wanted = self.poles[of] * multiple as f64;
+            energy[mode] < WEAK * energy[of] && (self.poles[mode] - wanted).norm() < OFF_MULTIPLE * wanted.re.abs()
+        };
+        let of = |mode: usize| {
+            let pairs = (0..self.poles.len()).flat_map(|of| (2..=MULTIPLES).map(move |multiple| (of, multiple)));
+            let found = pairs.filter(|&(of, multiple)| of != mode && is_one(mode, of, multiple));
+            let (of, multiple) = found.max_by(|a, b| energy[a.0].total_cmp(&energy[b.0]))?;
+            Some(HarmonicOf { mode, of, multiple })
+        };
+        (0..self.poles.len()).filter_map(of).collect()
+    }
+
     /// The same without these modes, which stay in what was fitted: nuisances.
     pub(super) fn without(&self, modes: &[usize]) -> Self {
         let keep: Vec<usize> = (0..self.poles.len()).filter(|j| !modes.contains(j)).collect();

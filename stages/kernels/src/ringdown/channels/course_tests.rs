@@ -268,3 +268,22 @@ fn a_hit_that_ends_soon_after_the_cut_leaves_the_course_of_the_others() {
         assert!(found.course.first().is_some_and(|mode| mode.moves), "{more}: {:?}", found.course);
     }
 }
+
+#[test]
+fn the_third_harmonic_of_a_sensor_that_is_not_linear_is_pointed_out() {
+    let mut pointed_out = 0;
+    for seed in 0..20 {
+        let modes = [linear(110.0, 0.01, 1.0), linear(273.0, 0.006, 0.5)];
+        // a hundredth of the cube: the harmonic has 0.25 % of the amplitude
+        let cube = seed % 2 == 0;
+        let curve = |y: &f64| y + if cube { 0.01 * y.powi(3) } else { 0.0 };
+        let data: Vec<Vec<f64>> =
+            records(&modes, 1, 1e-4, 700 + seed).iter().map(|row| row.iter().map(curve).collect()).collect();
+        let fit = followed(&data).fit;
+        let thirds = fit.harmonics().iter().filter(|found| found.multiple == 3).count();
+        assert!(cube || thirds == 0, "seed {seed}: {:?}", fit.modes());
+        pointed_out += usize::from(thirds > 0);
+    }
+    println!("pointed out in {pointed_out} of 10");
+    assert!(pointed_out >= 9, "{pointed_out}");
+}

@@ -29,7 +29,7 @@ mod systems_tests;
 #[cfg(test)]
 mod tests;
 
-pub use companions::{Dropped, DroppedMode};
+pub use companions::{Dropped, DroppedMode, HarmonicOf};
 pub use course::{FollowedDecay, MOVES, ModeCourse, follow_channels};
 pub use options::{ChannelNoise, ChannelOptions, ModesWanted};
 pub use order::fit_channels;
