@@ -53,7 +53,7 @@ impl Systems {
         (systems.len() > 1).then(|| {
             format!(
                 "the {hits} hits are of {} unlike linear systems: {}; modes are those of system {chosen}, `systems` \
-                 lists all hits, `--set model.system={other}` gives the modes of another",
+                 lists all hits, `system = {other}` gives the modes of another",
                 systems.len(),
                 self.named()
             )

@@ -18,6 +18,9 @@ use std::cell::OnceCell;
 const CANDIDATES: usize = 2;
 /// Numbers of modes tried beyond the last one that was needed: two together may explain what neither does alone.
 const BEYOND: usize = 1;
+/// The same of those that white noise would not yield, wander might: several modes together look like wander as long as one
+/// of them is missing.
+const BEYOND_WANDER: usize = 6;
 /// Share of a mode's gain that the bank sees at least: its places are coarse, and other modes have moved.
 const BANK: f64 = 0.5;
 /// Weighted square of a mode's amplitudes over its gain from which on no fit without it is tried.
@@ -25,8 +28,6 @@ const CERTAIN: f64 = 10.0;
 /// Operations of a step up to which noise is whitened that is not flat over a mode's line: a tenth of a second. Beyond,
 /// least squares stay unbiased and lose a little.
 const WHITENED: f64 = 5e7;
-/// Share of the gain under white noise to which that under coloured noise is known.
-const PRECISION: f64 = 3e-3;
 /// Turns of noise and fit at the end.
 const NOISE_ROUNDS: usize = 2;
 
@@ -136,22 +137,21 @@ impl Ladder<'_> {
         step
     }
 
-    /// Minus twice the log-likelihood of a fit from these poles under this noise, to so much.
-    fn deviance(&self, poles: &Poles, noise: &[RingdownNoise], precision: f64) -> f64 {
-        self.fit(poles, noise, precision.sqrt()).deviance(self.records)
+    /// Minus twice the log-likelihood of a fit from these poles under this noise.
+    fn deviance(&self, poles: &Poles, noise: &[RingdownNoise]) -> f64 {
+        self.fit(poles, noise, NEARLY).deviance(self.records)
     }
 
     /// Gain of twice the log-likelihood, each step under white or under coloured noise, whichever is likelier; a lower
     /// bound of it where that is more than chance.
     fn likelihood_gain(&self, before: &Mark, step: &Step, modes: usize) -> f64 {
         let plain = step.fitted.deviance(self.records);
-        let precision = (PRECISION * (before.plain - plain)).max(NEARLY * NEARLY);
-        let of = |poles: &Poles, noise: &[RingdownNoise]| self.deviance(poles, noise, precision);
-        let least = before.coloured.get_or_init(|| of(&before.poles, &before.noise)).min(before.plain);
+        let coloured = before.coloured.get_or_init(|| self.deviance(&before.poles, &before.noise));
+        let least = coloured.min(before.plain);
         if !self.by_chance(least - plain, modes) {
             return least - plain;
         }
-        least - plain.min(*step.coloured.get_or_init(|| of(&step.fitted.poles, &step.noise)))
+        least - plain.min(*step.coloured.get_or_init(|| self.deviance(&step.fitted.poles, &step.noise)))
     }
 
     /// Operations of a step of the fit under coloured noise.
@@ -168,9 +168,8 @@ impl Ladder<'_> {
     /// Gain of twice the log-likelihood of a step over an earlier one, for its modes at `places`.
     ///
     /// Method: fall of the energy over the variance of what the step leaves; where noise is estimated, round these
-    /// modes' lines. What is left of coloured noise looks like modes of a few periods: under such noise the likelihoods
-    /// count too, each fit under its own noise.
-    fn gain(&self, before: &Mark, step: &Step, places: &[c64]) -> f64 {
+    /// modes' lines.
+    fn white_gain(&self, before: &Mark, step: &Step, places: &[c64]) -> f64 {
         let fall = |c: usize| before.energy[c] - step.energy[c];
         if self.given_noise() {
             return (0..step.energy.len()).map(fall).sum();
@@ -187,11 +186,22 @@ impl Ladder<'_> {
             variance = (0..usual.len()).map(most).collect();
         }
         let gain = (0..usual.len()).map(|c| fall(c) / variance[c]).sum();
-        let coloured = step.noise.iter().any(|noise| !noise.is_white());
-        if !coloured || self.by_chance(gain, places.len()) || self.operations(&step.fitted.poles) > WHITENED {
-            return gain;
+        gain
+    }
+
+    /// The same where noise is coloured: what is left of it looks like modes of a few periods. The likelihoods count too,
+    /// each fit under its own noise.
+    fn coloured_gain(&self, gain: f64, before: &Mark, step: &Step, modes: usize) -> f64 {
+        let coloured = !self.given_noise() && step.noise.iter().any(|noise| !noise.is_white());
+        match !coloured || self.by_chance(gain, modes) || self.operations(&step.fitted.poles) > WHITENED {
+            true => gain,
+            false => gain.min(self.likelihood_gain(before, step, modes)),
         }
-        gain.min(self.likelihood_gain(before, step, places.len()))
+    }
+
+    /// Gain of a step for its modes at `places`, by both.
+    fn gain(&self, before: &Mark, step: &Step, places: &[c64]) -> f64 {
+        self.coloured_gain(self.white_gain(before, step, places), before, step, places.len())
     }
 
     /// Whether noise alone would gain that much with `modes` further ones.
@@ -231,13 +241,16 @@ impl Ladder<'_> {
         let mut place = 0;
         for modes in 1..=most {
             let Some(next) = self.next(&current, all_noise.take().as_deref(), modes <= least) else { break };
-            let gain = self.gain(&needed, &next, &next.fitted.poles.0[place.min(modes - 1)..]);
+            let places = &next.fitted.poles.0[place.min(modes - 1)..];
+            let white = self.white_gain(&needed, &next, places);
+            let gain = self.coloured_gain(white, &needed, &next, places.len());
             let kept = modes <= least || !self.by_chance(gain, modes - place);
             seen.push(OrderTried { modes, gain, kept });
+            let beyond = if self.by_chance(white, modes - place) { BEYOND } else { BEYOND_WANDER };
             if kept {
                 (needed, place) = (self.mark(&next), modes);
                 best = None;
-            } else if modes > place + BEYOND {
+            } else if modes > place + beyond {
                 break;
             }
             // what is kept is the present one until a further one is tried

@@ -257,3 +257,28 @@ fn unusable_data_is_refused() {
     let none = ChannelOptions { modes: ModesWanted::AtMost(0), ..options.clone() };
     assert!(fit_channels(&[vec![&y]], &[], INTERVAL_S, &none).is_err());
 }
+
+#[test]
+fn strong_modes_that_are_sampled_finely_are_found() {
+    // noise that wanders explains all but one of them better than a mode does
+    for seed in 0..12u64 {
+        let count = 3 + (seed % 3) as usize;
+        let interval_s = if seed % 2 == 0 { 1e-4 } else { 2e-4 };
+        let truth: Vec<c64> = (0..count)
+            .map(|j| {
+                let w = TAU * 37.0 * 2.1f64.powi(j as i32);
+                c64::new(-0.006 * w, w)
+            })
+            .collect();
+        let noise = white_noise(12_000, 0.004, seed);
+        let at = |k: usize| -> f64 {
+            truth.iter().zip(1..).map(|(s, j)| (s * (k as f64 * interval_s)).exp().im / f64::from(j)).sum()
+        };
+        let y: Vec<f64> = (0..12_000).map(|k| at(k) + noise[k]).collect();
+        let fit = fit_channels(&[vec![&y[..]]], &[], interval_s, &ChannelOptions::default()).unwrap();
+        let off = |s: &c64| fit.poles.iter().map(|p| (p - s).norm() / s.norm()).fold(f64::INFINITY, f64::min);
+        assert_eq!(fit.poles.len(), count, "seed {seed}: {:?} {:?}", fit.poles, fit.seen);
+        // errors are some 1e-5 of the frequency
+        assert!(truth.iter().all(|s| off(s) < 1e-3), "seed {seed}: {:?}", fit.poles);
+    }
+}
