@@ -185,8 +185,7 @@ impl Ladder<'_> {
             let most = |c: usize| all.iter().map(|own| own[c]).reduce(f64::max).unwrap_or(usual[c]).max(rounding[c]);
             variance = (0..usual.len()).map(most).collect();
         }
-        let gain = (0..usual.len()).map(|c| fall(c) / variance[c]).sum();
-        gain
+        (0..usual.len()).map(|c| fall(c) / variance[c]).sum()
     }
 
     /// The same where noise is coloured: what is left of it looks like modes of a few periods. The likelihoods count too,
