@@ -110,9 +110,9 @@ fn rates_differ(records: &[Record]) -> StageError {
     let mut list: Vec<String> = rates.iter().take(most_rates).map(listed).collect();
     list.extend((rates.len() > most_rates).then(|| format!("{} more rates", rates.len() - most_rates)));
     StageError::new(format!("the {} records have {} sample rates: {}", records.len(), rates.len(), list.join("; "))).help(
-        "records of one analysis share a rate: `afmid new pipeline FILES... -o NAME.toml` takes the files of the rate that most have, \
-         and says the commands for the others; or run each file by itself, a line of a manifest each (`afmid batch CONFIG --manifest M.jsonl`); correct the \
-         attribute if a file states a wrong one",
+        "records of one analysis share a rate: `afmid new pipeline FILES... -o NAME.toml` takes the files of the rate \
+         that most have, and says the commands for the others; or run each file by itself, a line of a manifest each \
+         (`afmid batch CONFIG --manifest M.jsonl`); correct the attribute if a file states a wrong one",
     )
 }
 

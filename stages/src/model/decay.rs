@@ -28,7 +28,8 @@ use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Dro
 /// Of several hits each is fitted by itself first: hits without a mode in common are of unlike systems, and those of one
 /// of them (`system`) are fitted.
 /// Shapes: `modes` by row, ascending; `shapes` over mode and channel with the modal assurance criterion over mode and
-/// mode; `hits` a row per hit and mode; `course` a row per mode and part; `systems` a row per hit; `fit` over channel and time of the largest hit.
+/// mode; `hits` a row per hit and mode; `course` a row per mode and part; `systems` a row per hit;
+/// `fit` over channel and time of the largest hit.
 /// Units: Hz; shapes relative to the channel with the largest amplitude; amplitudes in the channels' units.
 /// Accuracy: docs/results/decay.md. Standard errors count what the fit leaves round each mode (`lack_of_fit`).
 /// Errors: no decay with 24 samples (shorter ones are left out with a warning); no oscillation.
