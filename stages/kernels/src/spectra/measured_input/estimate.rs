@@ -4,6 +4,7 @@ use faer::Mat;
 use num_complex::Complex64;
 
 use super::blocks::{Block, BlockKind, Prepared, check};
+use super::noise::{of_both, pooled, width};
 use crate::linear_algebra::definite_inverse;
 use crate::spectra::SpectrumError;
 use crate::spectra::error::positive;
@@ -75,8 +76,9 @@ pub struct MeasuredResponse {
 /// with `gamma^2 = |Syu|^2 / (Suu Syy)`. Several inputs: `H1 = Syu Suu^-1`. Offsets are removed: a segment's mean, a
 /// hit's median (the signal rests for most of it). The exponential window is put on inputs and outputs alike, which moves
 /// each pole by `-d` and leaves the ratio exact: a fit subtracts `d` from the decay rates that it finds. The noise of
-/// which variances are is a mean over neighbouring bins (of `H1` the output's, else its share of the power), as many as
-/// give 160 degrees of freedom: so weights and intervals of fits are right with few blocks, too.
+/// which variances are is smooth over neighbouring bins, as many as give 160 degrees of freedom: of `H1` that of the output
+/// and the square of the response times that of the input, which the peaks show, else its mean share of the power. So
+/// weights and intervals of fits are right with few blocks, too.
 ///
 /// # Shapes
 /// Blocks of equal length N; results `[N/2 + 1]`, a row for each output and input.
@@ -126,18 +128,25 @@ pub fn frequency_response(blocks: &[Block<'_>], settings: ResponseSettings) -> R
         frequency_hz,
     };
     let mut noise = vec![Vec::with_capacity(bins); outputs];
+    let mut gain = vec![Vec::with_capacity(bins); outputs];
     let mut scale = vec![Vec::with_capacity(bins); inputs * outputs];
     for bin in 0..bins {
         let inverse = sums.inverse(bin);
-        for (output, noise) in noise.iter_mut().enumerate() {
+        for output in 0..outputs {
             let at = At { sums: &sums, inverse: inverse.as_deref(), bin, output };
-            noise.push(at.put(settings.estimator, &mut found, &mut scale));
+            noise[output].push(at.put(settings.estimator, &mut found, &mut scale));
+            let own = &found.transfer[output * inputs..(output + 1) * inputs];
+            gain[output].push(own.iter().map(|row| row[bin].norm_sqr()).sum());
         }
     }
     if let Some(variance) = &mut found.variance {
         let freedom = averages - inputs as f64;
-        let width = (alike(settings.kind) * POOLED / (2.0 * freedom)).ceil() as usize;
-        let noise: Vec<Vec<f64>> = noise.iter().map(|row| pooled(row, width)).collect();
+        let width = width(settings.kind, freedom);
+        let smooth = |(noise, gain): (&Vec<f64>, &Vec<f64>)| match settings.estimator {
+            Estimator::H1 => of_both(noise, gain, width),
+            Estimator::H2 | Estimator::Hv => pooled(noise, width),
+        };
+        let noise: Vec<Vec<f64>> = noise.iter().zip(&gain).map(smooth).collect();
         for (row, scale) in scale.iter().enumerate() {
             let own = noise[row / inputs].iter().zip(scale);
             variance[row] = own.map(|(noise, scale)| noise * scale / freedom).collect();
@@ -146,31 +155,8 @@ pub fn frequency_response(blocks: &[Block<'_>], settings: ResponseSettings) -> R
     Ok(found)
 }
 
-/// Degrees of freedom of a variance. Why: of v numbers the variance that a weighted fit has is `v / (v - 4)` times the
-/// one it states, an error of 1.3 %.
-const POOLED: f64 = 160.0;
 /// Least share of an output's power that no input explains: what rounding leaves of the sums.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
-
-/// Bins that are worth one: a Hann window makes neighbours alike.
-fn alike(kind: BlockKind) -> f64 {
-    match kind {
-        BlockKind::Segments => 2.0,
-        BlockKind::Hits { .. } => 1.0,
-    }
-}
-
-/// Means of the finite values over so many bins about each, as many at the ends. Zero hertz, where the offset was, is no
-/// part of any.
-fn pooled(values: &[f64], width: usize) -> Vec<f64> {
-    let width = (width | 1).min(values.len().saturating_sub(1)).max(1);
-    let mean = |k: usize| {
-        let first = k.saturating_sub(width / 2).max(1).min(values.len().saturating_sub(width));
-        let own = values[first..(first + width).min(values.len())].iter().filter(|value| value.is_finite());
-        own.clone().sum::<f64>() / own.count() as f64
-    };
-    (0..values.len()).map(mean).collect()
-}
 
 fn check_blocks(blocks: &[Block<'_>], settings: ResponseSettings) -> Result<usize, SpectrumError> {
     let Some(first) = blocks.first() else { return Err(SpectrumError::TooShort { got: 0, wanted: 8 }) };

@@ -4,6 +4,7 @@
 
 mod blocks;
 mod estimate;
+mod noise;
 #[cfg(test)]
 mod tests;
 
