@@ -4,9 +4,11 @@
 
 mod blocks;
 mod estimate;
+mod follows;
 mod noise;
 #[cfg(test)]
 mod tests;
 
 pub use blocks::{Block, BlockKind, half_energy_samples, hit_spacing, hits, is_impulsive, segments};
 pub use estimate::{Estimator, MeasuredResponse, ResponseSettings, frequency_response};
+pub use follows::chance_coherence;
