@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::clipping::{clipped, touches};
-use super::drive::{ends_of_drive, ends_of_response};
+use super::drive::{bend, ends_of_drive, ends_of_response};
 use super::envelope::{Envelope, Pitch, without_drift};
 use super::error::DecaySearchError;
 use super::extent::{Begin, begin, beyond, departure, end, quiet_before};
@@ -28,6 +28,9 @@ const RANDOM_RISES: usize = 10;
 /// Departure of a random vibration's kurtosis from that of a normal distribution. Why: four standard errors of 1,500
 /// independent samples, of which ten rises have some; the narrower the band, the more.
 const RANDOM_KURTOSIS: f64 = 0.5;
+/// Change of the amplitude, nepers, below which a stretch may be a drive's. Why: of few segments a slope's error would
+/// also let the first beat of a decay pass.
+const DRIVEN_FALL: f64 = 0.05;
 /// Fall of the amplitude, nepers, below which an instrument's own gain may have drifted.
 const LEAST_FALL: f64 = 1e-3;
 
@@ -253,15 +256,21 @@ impl<'a> Record<'a> {
     ) -> Option<usize> {
         let period = self.envelope.period;
         let inside = |k: &usize| *k > onset + 8 * period && k + LEAST_PERIODS * period < end;
-        let last = self.response_ends.iter().copied().find(inside)?;
-        // the switch-on and the last period are not steady
-        let range = onset + period..last - period;
-        let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
-        if !tone.decline.std_per_s.is_finite() || !self.is_steady(&tone.decline, &range, DecayEnd::NextEvent, options) {
-            return None;
-        }
-        let (frequency_hz, amplitude, decline) = (tone.frequency * self.rate_hz, tone.amplitude, tone.decline);
-        found.steady.push(Steady { range, frequency_hz, amplitude, decline, growing: false });
+        let seen = self.response_ends.iter().copied().find(inside);
+        let bends = bend(&self.envelope, onset..end).filter(inside);
+        let steady = |last: usize| {
+            // the switch-on and the last period are not steady
+            let range = onset + period..last - period;
+            let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
+            let known = tone.decline.std_per_s.is_finite();
+            let falls = tone.decline.rate_per_s.abs() * range.len() as f64 / self.rate_hz;
+            let steady =
+                known && falls < DRIVEN_FALL && self.is_steady(&tone.decline, &range, DecayEnd::NextEvent, options);
+            let (frequency_hz, amplitude, decline) = (tone.frequency * self.rate_hz, tone.amplitude, tone.decline);
+            steady.then_some((last, Steady { range, frequency_hz, amplitude, decline, growing: false }))
+        };
+        let (last, stretch) = bends.and_then(steady).or_else(|| seen.and_then(steady))?;
+        found.steady.push(stretch);
         Some(last)
     }
 

@@ -219,3 +219,52 @@ fn a_random_vibration_of_a_narrow_band_is_said_to_be_one() {
         assert!(missed == 0, "{quality}: {missed}");
     }
 }
+
+#[test]
+fn a_drive_that_ends_leaves_a_decay_that_is_still_strong_at_the_end_of_the_record() {
+    let (samples, seeds) = (12_000, 60);
+    let mut late = Vec::new();
+    for seed in 0..seeds {
+        let draw = white_noise(8, 1.0, 7000 + seed);
+        let share = |k: usize| 0.5 * (1.0 + (draw[k] / 1.5).clamp(-1.0, 1.0));
+        let (frequency, ends) = (0.02 + 0.15 * share(0), (samples as f64 * (0.2 + 0.4 * share(1))) as usize);
+        // falls to 20 to 70 % by the end
+        let rate = -(0.2 + 0.5 * share(2)).ln() / (samples - ends) as f64;
+        let drive = frequency + 0.5 * rate / std::f64::consts::TAU * (2.0 * share(3) - 1.0);
+        let noise = white_noise(samples, 10f64.powf(-3.0 + 1.5 * share(4)), 8000 + seed);
+        let phase =
+            |k: usize| std::f64::consts::TAU * (drive * k.min(ends) as f64 + frequency * k.saturating_sub(ends) as f64);
+        let y: Vec<f64> =
+            (0..samples).map(|k| (-rate * k.saturating_sub(ends) as f64).exp() * phase(k).sin() + noise[k]).collect();
+        let found = find_decays(&[&y], 1e6, &DecaySearchOptions::default()).unwrap();
+        let what = format!("seed {seed}: {frequency} {ends} {rate} {drive} {:?}", share(4));
+        assert_eq!((found.decays.len(), found.steady.len()), (1, 1), "{what}: {:?}", found.decays);
+        late.push((found.decays[0].range.start as f64 - ends as f64) / (samples - ends) as f64);
+    }
+    // a bend is known to a few segments of a 256th each
+    let early = late.iter().filter(|late| **late < -0.005).count();
+    println!("{late:.3?}");
+    assert!(early <= 1 && late.iter().all(|late| *late < 0.02), "{late:?}");
+}
+
+#[test]
+fn a_decay_of_two_modes_that_beat_has_no_driven_stretch() {
+    for seed in 0..60 {
+        let draw = white_noise(4, 1.0, 9000 + seed);
+        let share = |k: usize| 0.5 * (1.0 + (draw[k] / 1.5).clamp(-1.0, 1.0));
+        let samples = 8000;
+        let noise = white_noise(samples, 1e-3, 9500 + seed);
+        // one to three beats before the decay time, amplitudes alike or not, in phase at first
+        let (beat, rate) = (1e-4 * (1.0 + 4.0 * share(0)), 3e-4 * (0.5 + share(1)));
+        let weight = 0.2 + 0.8 * share(2);
+        let y: Vec<f64> = (0..samples)
+            .map(|k| {
+                let t = k as f64;
+                let tone = |f: f64| (-rate * t).exp() * (std::f64::consts::TAU * f * t).sin();
+                tone(0.05) + weight * tone(0.05 + beat) + noise[k]
+            })
+            .collect();
+        let found = find_decays(&[&y], 1e4, &DecaySearchOptions::default()).unwrap();
+        assert!(found.steady.is_empty() && found.decays[0].range.start < 200, "seed {seed}: {:?}", found.steady);
+    }
+}

@@ -49,16 +49,12 @@ pub(super) fn oscillation(
     };
     let all: Vec<Vec<f64>> =
         channels.iter().map(|channel| (0..count).map(|segment| amplitude(channel, segment)).collect()).collect();
-    let logs: Vec<f64> = (0..count)
-        .map(|segment| {
-            let power: f64 = all.iter().zip(noise_std).map(|(a, s)| (a[segment] / s).powi(2)).sum();
-            0.5 * power.max(f64::MIN_POSITIVE).ln()
-        })
-        .collect();
+    let energy = |segment: usize| all.iter().zip(noise_std).map(|(a, s)| (a[segment] / s).powi(2)).sum();
+    let energies: Vec<f64> = (0..count).map(energy).collect();
     let rms = |a: &Vec<f64>| (a.iter().map(|v| v * v).sum::<f64>() / count.max(1) as f64).sqrt();
     Oscillation {
         frequency: refined,
-        decline: slope(&logs, length as f64 / rate_hz),
+        decline: slope(&energies, length as f64 / rate_hz),
         amplitude: all.iter().map(rms).collect(),
     }
 }
@@ -129,22 +125,27 @@ fn refined(values: &[f64], frequency: f64, length: usize, taper: &[f64]) -> f64 
     (found - found.round()).abs()
 }
 
-/// Least-squares slope of logarithms `interval_s` apart, falling counted positive.
-fn slope(logs: &[f64], interval_s: f64) -> Decline {
-    let n = logs.len() as f64;
-    let centre = 0.5 * (n - 1.0);
-    let mean = logs.iter().sum::<f64>() / n;
-    let spread = n * (n * n - 1.0) / 12.0;
-    if logs.len() < LEAST_SEGMENTS {
-        let rate_per_s = match (logs.first(), logs.last()) {
-            (Some(first), Some(last)) if logs.len() > 1 => (first - last) / ((n - 1.0) * interval_s),
+/// Least-squares slope of half the logarithms of energies `interval_s` apart, falling counted positive. Each counts by its
+/// energy: the little that is left between two beats says little of the slope.
+fn slope(energies: &[f64], interval_s: f64) -> Decline {
+    let log = |energy: &f64| 0.5 * energy.max(f64::MIN_POSITIVE).ln();
+    let n = energies.len() as f64;
+    if energies.len() < LEAST_SEGMENTS {
+        let rate_per_s = match (energies.first(), energies.last()) {
+            (Some(first), Some(last)) if energies.len() > 1 => (log(first) - log(last)) / ((n - 1.0) * interval_s),
             _ => 0.0,
         };
         return Decline { rate_per_s, std_per_s: f64::INFINITY, freedom: 0 };
     }
-    let by: f64 = logs.iter().enumerate().map(|(k, y)| (k as f64 - centre) * (y - mean)).sum::<f64>() / spread;
-    let rest: f64 = logs.iter().enumerate().map(|(k, y)| (y - mean - by * (k as f64 - centre)).powi(2)).sum();
-    let std = (rest / ((n - 2.0) * spread)).sqrt();
+    let total = energies.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let all = || energies.iter().enumerate().map(|(k, energy)| (energy / total, k as f64, log(energy)));
+    let [centre, mean] = [all().map(|(w, t, _)| w * t).sum::<f64>(), all().map(|(w, _, y)| w * y).sum::<f64>()];
+    let spread: f64 = all().map(|(w, t, _)| w * (t - centre).powi(2)).sum();
+    let by: f64 = all().map(|(w, t, y)| w * (t - centre) * (y - mean)).sum::<f64>() / spread;
+    // each segment's own residual: energies do not say how well they are known
+    let rest = |t: f64, y: f64| (y - mean - by * (t - centre)).powi(2);
+    let meat: f64 = all().map(|(w, t, y)| (w * (t - centre)).powi(2) * rest(t, y)).sum();
+    let std = (meat * n / (n - 2.0)).sqrt() / spread;
     let std_per_s = std.max(f64::EPSILON) / interval_s;
-    Decline { rate_per_s: -by / interval_s, std_per_s, freedom: logs.len() - 2 }
+    Decline { rate_per_s: -by / interval_s, std_per_s, freedom: energies.len() - 2 }
 }
