@@ -33,6 +33,7 @@ pub mod raw_binary;
 mod registry;
 mod regular;
 mod responses;
+mod straight;
 pub mod tdms;
 pub mod tektronix;
 mod text;
@@ -55,6 +56,7 @@ pub use raw_binary::{RawBinary, SampleType};
 pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};
 pub use regular::{open_regular, read_regular};
 pub use responses::{Degree, FoundResponse, Frequencies, Parts, responses, says_frequencies, unit_ratio};
+pub use text_table::even_step;
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
 ///

@@ -7,7 +7,7 @@ use super::plain::Rows;
 use super::titles::{self, Title};
 use super::units;
 use crate::FoundChannel;
-use crate::rate::{fewest_digits, of_step};
+use crate::rate::of_step;
 use std::sync::Arc;
 
 /// Channels of the columns, with the rate of the time column among them, or the rate that the header states.
@@ -138,7 +138,7 @@ fn clock(
             Clock { rate_hz: Some(of_step(step)), axis: counts.then_some(0) }
         }
         (None, Some(even)) => {
-            let rate = fewest_digits(of_step(even.step), even.uncertainty);
+            let rate = of_step(even.step);
             remarks.push(format!(
                 "{first} rises evenly: if it is time in seconds, there are {rate} samples per second; title it «Time (s)»"
             ));

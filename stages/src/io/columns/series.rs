@@ -1,6 +1,6 @@
 //! From a table's columns to inputs, output and their stretches.
 
-use afmid_pipeline::recording::{FoundChannel, WholeFile, agreed_rate};
+use afmid_pipeline::recording::{FoundChannel, WholeFile, agreed_rate, even_step};
 use afmid_pipeline::{Array, Axis, Document, StageError};
 use serde_json::{Value, json};
 
@@ -268,8 +268,10 @@ fn names(channels: &[&FoundChannel]) -> Vec<String> {
 
 /// The rate of a channel of times. Errors: there is none; they are not equally spaced.
 fn spaced_equally(column: &Column, file: &WholeFile) -> Result<f64, StageError> {
-    equal_spacing(&file.read(column.of(file.contents())?)?).ok_or_else(|| {
-        StageError::new(format!("the times in channel {column} are not equally spaced, ascending and complete to 1 %"))
+    let times = file.read(column.of(file.contents())?)?;
+    equal_spacing(&times).or_else(|| even_step(&times).ok().map(f64::recip)).ok_or_else(|| {
+        let problem = "are not equally spaced, ascending and complete to 1 % or to their last digit";
+        StageError::new(format!("the times in channel {column} {problem}"))
             .help("resample the record, or give `sample_rate_hz` if they are only a coarse clock")
     })
 }

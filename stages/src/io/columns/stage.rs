@@ -58,8 +58,8 @@ pub struct Columns {
     /// makes frequencies cycles per sample.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sample_rate_hz: Option<f64>,
-    /// Channel of the time in seconds, for the sample rate; equally spaced to 1 %. For files whose time axis is not
-    /// titled as one.
+    /// Channel of the time in seconds, for the sample rate; equally spaced to 1 %, or to half a unit of its last
+    /// digit. For files whose time axis is not titled as one.
     pub time: Option<Column>,
     /// Stretch to fit, as first sample (from 0) and one past the last. Absent: the first half.
     pub identification: Option<[usize; 2]>,

@@ -86,6 +86,27 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     assert!(stage(|s| s.file = "b.csv".to_owned()).sources(folder.path(), &InputFiles::new()).is_err());
 }
 
+#[test]
+fn times_that_are_rounded_to_their_last_digit_give_the_rate() {
+    let folder = tempfile::tempdir().unwrap();
+    let run_with = |title: &str, lost: usize| {
+        let rows = (0..3000)
+            .filter(|k| *k != lost)
+            .map(|k| format!("{:.4},{},{}\n", f64::from(k as u16) / 2560.0, k % 3, k % 5));
+        std::fs::write(folder.path().join("a.csv"), format!("{title},u,y\n{}", rows.collect::<String>())).unwrap();
+        let time = (title == "clock").then(|| Column::Name(title.to_owned()));
+        let inputs = vec![Column::Name("u".to_owned())];
+        let (file, output) = ("a.csv".to_owned(), Column::Name("y".to_owned()));
+        run(&Columns { file, inputs, output, time, ..Columns::default() }, folder.path())
+    };
+    for title in ["Time (s)", "clock"] {
+        let (ports, _) = run_with(title, usize::MAX).unwrap();
+        let rate = ports.get(&SUMMARY).unwrap().0["sample_rate_hz"].as_f64().unwrap();
+        assert!((rate - 2560.0).abs() < 1e-9, "{rate}");
+        assert!(run_with(title, 1700).is_err());
+    }
+}
+
 const LVM: &str = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\nX_Columns\tNo\n***End_of_Header***\t\n\t\n\
     Channels\t2\nSamples\t4\t4\t\nY_Unit_Label\tN\tV\nDelta_X\t2,5E-2\t2,5E-2\t\n***End_of_Header***\t\t\t\n\
     X_Value\tforce\tresponse\tComment\n\t1\t2\n\t2\t4\n\t3\t9\n\t5\t7\n";
