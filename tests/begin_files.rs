@@ -381,6 +381,24 @@ fn hit_file(here: &Path, name: &str, number: u32, start: usize) {
 }
 
 #[test]
+fn a_decay_beside_hum_that_is_stronger_gives_its_mode() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    // a mode of 50 Hz beside a line of 31.3 Hz and its third harmonic
+    let line = |k: usize| {
+        let turn = std::f64::consts::TAU * 0.0313 * k as f64;
+        2.0 * (turn + 0.7).sin() + 0.3 * (3.0 * turn).sin()
+    };
+    let values: Vec<f64> = decay(1.0, 3).iter().enumerate().map(|(k, y)| y + line(k)).collect();
+    table(here, "hum.csv", 1e-3, "Time (s),Acc (m/s^2)", &[values]);
+    let [stdout, _] = said(here, &["new", "pipeline", "hum.csv", "-o", "hum.toml"]);
+    assert!(stdout.contains("free decay") && stdout.contains("beside a line at 31.3"), "{stdout}");
+    let found = frequencies(here, "hum.toml");
+    // stated error: 0.2 Hz
+    assert!(found.len() == 1 && (found[0] / 50.0 - 1.0).abs() < 0.012, "{found:?}");
+}
+
+#[test]
 fn hits_with_a_file_each_are_averaged_to_one_response_of_each_sensor() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();

@@ -212,7 +212,9 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
         (Some(first), _) => {
             let time_s = first.range.start as f64 / file.rate(seen[0], wanted)?;
             let from = format!("from {} s on, at {} Hz", number(time_s), number(first.frequency_hz));
-            format!("{record}: {} {from}", counted(found.decays.len()))
+            let beside =
+                found.steady.first().map(|line| format!(", beside a line at {} Hz", number(line.frequency_hz)));
+            format!("{record}: {} {from}{}", counted(found.decays.len()), beside.unwrap_or_default())
         }
         (None, Some(reason)) if guessed && !found.steady.is_empty() && is_tone(&values[0]) => {
             return other(Goal::Steady, format!("{record}: {reason}"));

@@ -11,9 +11,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::artifacts::{PIEZO, Sensor, decay_array};
-use afmid_kernels::events::decay::{
-    DecayEnd, DecaySearch, DecaySearchOptions, DismissedReason, FreeDecay, find_decays,
-};
+use afmid_kernels::events::decay::{DecayEnd, DecaySearch, DecaySearchOptions, DismissedReason, FreeDecay};
+use afmid_kernels::harmonics::find_decays_beside_lines;
 
 /// Finds free decays in records: after a hit, a release, a pulse, or the end of a drive.
 ///
@@ -21,7 +20,9 @@ use afmid_kernels::events::decay::{
 /// die away is a steady oscillation, which has no quality factor to be had.
 /// Method: the energy of all channels over a period against the noise's; starts refined to the first departure from the
 /// quiet line before; the end is where the ringing is smaller than the noise, or the next start; the first free sample is
-/// the one from which later samples foretell the earlier ones backwards. Clipped samples are missing.
+/// the one from which later samples foretell the earlier ones backwards. Clipped samples are missing. Where a steady line
+/// hides all decays (hum), they are sought in what is left without it and its harmonics; the line stays in the decays, as
+/// one of the lines that `model.decay` fits beside the modes.
 /// Shapes: `decays` has a row per hit and channel, whose samples follow each other, and likewise the last 16,384 that
 /// were quiet before each hit; `events` a row per decay, steady oscillation and start that is neither.
 /// Units: the channels' own; Hz; s.
@@ -70,7 +71,7 @@ impl Stage for Decay {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.decay",
-        version: 3,
+        version: 4,
         summary: "finds free decays in records: where they begin, where they drown in the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -197,7 +198,7 @@ impl Group<'_> {
             values.push(read);
         }
         let slices: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
-        let found = find_decays(&slices, rate, options).map_err(StageError::from_error)?;
+        let found = find_decays_beside_lines(&slices, rate, options).map_err(StageError::from_error)?;
         Ok(Searched { values, found })
     }
 }
@@ -359,7 +360,8 @@ fn nothing_found(rows: &[Row], groups: &[Group]) -> StageError {
     let error = StageError::new(format!("no free decay in {} records: {}{more}", groups.len(), reasons.join("; ")));
     match rows.iter().any(|row| row.steady) {
         true => error.help(
-            "record the ringing after the drive has ended, or give its end: trigger = { given = { times_s = [...] } }",
+            "no decay is seen beside the steady line either: record the ringing after the drive has ended or without the \
+             hum, or say where decays begin: trigger = { given = { times_s = [...] } }",
         ),
         false => error.help("check the channel; `trigger = { given = { times_s = [...] } }` says where decays begin"),
     }
@@ -369,6 +371,7 @@ fn nothing_found(rows: &[Row], groups: &[Group]) -> StageError {
 mod tests {
     use super::*;
     use crate::fixture::white_noise;
+    use afmid_kernels::events::decay::find_decays;
 
     #[test]
     fn a_long_quiet_stretch_is_kept_from_its_end() {
