@@ -1,6 +1,7 @@
 //! Collecting what a file holds.
 
 use crate::grid::{Grid, Store};
+use crate::labels::Labels;
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::rate::{Clue, rate_in};
@@ -56,6 +57,7 @@ pub(crate) struct Listing {
     locations: HashMap<String, usize>,
     clues: HashMap<String, Vec<Clue>>,
     responses: Vec<FoundResponse>,
+    labels: Labels,
     remarks: Vec<String>,
     unsaid: usize,
     bytes: usize,
@@ -70,6 +72,12 @@ impl Listing {
         } else {
             self.unsaid += 1;
         }
+    }
+
+    /// A text: no channel, but it may be a channel's name or unit.
+    pub(crate) fn text(&mut self, location: &str, text: &str, remark: String) {
+        self.labels.add(location, text);
+        self.remark(remark);
     }
 
     /// A single number: no channel, but it may be the sampling rate.
@@ -216,7 +224,8 @@ impl Listing {
         if self.unsaid > 0 {
             self.remarks.push(format!("{} more remarks of this kind", self.unsaid));
         }
-        let channels = self.channels.into_iter().map(|(_, channel)| channel).collect();
+        let mut channels: Vec<FoundChannel> = self.channels.into_iter().map(|(_, channel)| channel).collect();
+        self.labels.give(&mut channels);
         Contents { format, started_at: String::new(), channels, responses: self.responses, remarks: self.remarks }
     }
 }

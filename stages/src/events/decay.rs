@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use afmid_pipeline::recording::lane_names;
 use afmid_pipeline::{
     Array, Channel, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
@@ -166,12 +167,17 @@ fn sensors(groups: &[Group]) -> Result<Vec<Sensor>, StageError> {
     }
     // one file a sensor: the file tells them apart
     let several = first.records.iter().any(|record| record.name != first.records[0].name);
-    let name = |(record, channel): (&&Record, &&Channel)| match several {
+    let lanes =
+        lane_names(first.channels.iter().map(|channel| (channel.location.as_str(), channel.long_name.as_str())));
+    let name = |(number, (record, channel)): (usize, (&&Record, &&Channel))| match several {
         true => format!("{} {}", record.name, channel.location),
-        false => channel.location.clone(),
+        false => lanes.as_ref().and_then(|names| names.get(number)).unwrap_or(&channel.location).clone(),
     };
-    let sensor = |pair: (&&Record, &&Channel)| Sensor { name: name(pair), unit: pair.1.unit.clone() };
-    Ok(first.records.iter().zip(&first.channels).map(sensor).collect())
+    let sensor = |(number, pair): (usize, (&&Record, &&Channel))| Sensor {
+        name: name((number, pair)),
+        unit: pair.1.unit.clone(),
+    };
+    Ok(first.records.iter().zip(&first.channels).enumerate().map(sensor).collect())
 }
 
 impl Group<'_> {

@@ -1,7 +1,7 @@
 //! The channels of one file: inputs, outputs, their rate and units.
 
 use afmid_pipeline::StageError;
-use afmid_pipeline::recording::{FoundChannel, WholeFile, agreed_rate, even_step};
+use afmid_pipeline::recording::{FoundChannel, WholeFile, agreed_rate, even_step, lane_names};
 
 use super::selection::Column;
 use super::stage::Columns;
@@ -159,7 +159,9 @@ fn unit(channels: &[&FoundChannel], given: Option<&str>, scale: f64, what: &str)
 
 /// As the file names channels.
 fn names(channels: &[&FoundChannel]) -> Vec<String> {
-    channels.iter().map(|channel| channel.location.trim_start_matches('/').to_owned()).collect()
+    let of = |channel: &&FoundChannel| channel.location.trim_start_matches('/').to_owned();
+    let lanes = lane_names(channels.iter().map(|channel| (channel.location.as_str(), channel.long_name.as_str())));
+    lanes.unwrap_or_else(|| channels.iter().map(of).collect())
 }
 
 /// The rate of a channel of times. Errors: there is none; they are not equally spaced.
