@@ -20,6 +20,7 @@ const CRATES: [Crate; 5] = [
         name: "afmid-formats",
         src: "pipeline/formats/src",
         floors: &[
+            &["facts"],
             &["budget", "fail", "frequency", "number", "text", "calendar", "rate", "lanes", "regular", "straight"],
             &["pinned"],
             &["fields", "inflating", "opened", "raw"],

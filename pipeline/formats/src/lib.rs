@@ -8,6 +8,7 @@ mod archive;
 mod axes;
 mod budget;
 mod calendar;
+mod facts;
 mod fail;
 mod fields;
 mod frequency;
@@ -47,6 +48,7 @@ use std::sync::Arc;
 
 pub use axes::{names_times, settle as settle_axes};
 pub use budget::most_inflated;
+pub use facts::is_fact;
 pub use frequency::hertz;
 pub use grid::numbers_in_file;
 pub use labels::{Labels, lane_names};

@@ -1,5 +1,6 @@
 //! Collecting what a file holds.
 
+use crate::facts::ONE_NUMBER;
 use crate::grid::{Grid, Store};
 use crate::labels::Labels;
 use crate::lanes::Lanes;
@@ -86,7 +87,7 @@ impl Listing {
             self.clue_count += 1;
             self.clues.entry(scope.to_owned()).or_default().push(clue);
         }
-        self.remark(format!("{location} is the single number {value}, no channel"));
+        self.remark(format!("{location} {ONE_NUMBER} {value}, no channel"));
     }
 
     /// An array of at least two numbers. Its bytes must have been found to lie within the file.

@@ -1,5 +1,6 @@
 //! The sampling rate, from numbers that are named like one.
 
+use crate::facts::RATE_FROM;
 use std::collections::HashMap;
 
 /// Names whose value is a rate in hertz. `IO_rate_[Hz]` and `IO_samp_rate_[Hz]` are those of general-mode AFM files.
@@ -121,7 +122,7 @@ pub fn agreed_rate(clues: &[Clue]) -> (Option<f64>, Option<String>) {
     };
     let first = rates.first().copied().unwrap_or_default();
     if rates.iter().all(|rate| (rate - first).abs() <= AGREE * first) {
-        (Some(first), Some(format!("the sampling rate is taken from {named}: {first} samples per second")))
+        (Some(first), Some(format!("{RATE_FROM} {named}: {first} samples per second")))
     } else {
         (None, Some(format!("the sampling rate is left unknown because these disagree: {named}")))
     }

@@ -39,7 +39,7 @@ pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native,
 
 pub use afmid_formats::{
     Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Source, even_step, formats,
-    lane_names, most_inflated, responses, says_frequencies, unit_ratio,
+    is_fact, lane_names, most_inflated, responses, says_frequencies, unit_ratio,
 };
 pub use contents::{UnpackedContents, open_contents, open_unpacked};
 pub use how::{How, Reading};

@@ -1,5 +1,6 @@
 //! The stage `events.decay`.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use afmid_pipeline::recording::lane_names;
@@ -103,7 +104,10 @@ impl Stage for Decay {
         if hits.is_empty() {
             return Err(nothing_found(&rows, &groups));
         }
-        for row in rows.iter().filter(|row| row.steady) {
+        // beside a decay a steady stretch is a fact, which the table and the summary state
+        let decays: HashSet<&str> =
+            rows.iter().filter(|row| row.rejected.is_empty()).map(|row| row.record.as_str()).collect();
+        for row in rows.iter().filter(|row| row.steady && !decays.contains(row.record.as_str())) {
             cx.warn(format!("{}: {}", row.record, row.rejected));
         }
         let quiet: Vec<Vec<Vec<f64>>> = searched.iter().flat_map(Searched::quiet).collect();

@@ -74,6 +74,7 @@ fn texts_in_a_struct_are_names_and_units_of_its_array() {
         let channel = channel(&contents, location);
         assert_eq!((channel.unit.as_str(), channel.long_name.as_str()), ("m/s^2", name));
     }
+    assert!(contents.remarks.iter().all(|remark| afmid_formats::is_fact(remark)), "{:?}", contents.remarks);
 }
 
 #[test]
