@@ -203,6 +203,10 @@ fn the_data_choose_the_pipeline_and_its_numbers_hold() {
         assert!(page.contains(words), "{words}");
     }
     assert!(measured_page(here, "hum.csv.h5").contains("<h2>Oscillation</h2>"));
+    let missing = afmid(here, &["show", "hum.csv.h5", "modes"]);
+    let said = String::from_utf8_lossy(&missing.stderr).into_owned();
+    assert!(missing.status.code() == Some(2) && said.contains("of a config `steady`"), "{said}");
+    assert!(said.contains("there is: records, oscillation"), "{said}");
     assert!(measured_page(here, "noise.csv.h5").contains("<h2>Resonance</h2>"));
     stdout(here, &["new", "pipeline", "both.csv", "--goal", "frf", "-o", "frf.toml"]);
     stdout(here, &["run", "frf.toml", "-o", "frf.h5", "--cache", "cache"]);

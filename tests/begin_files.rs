@@ -365,3 +365,77 @@ fn a_force_is_the_input_by_its_name_or_unit_and_one_set_of_like_sensors_the_outp
     said(here, &["new", "pipeline", "cell.csv", "-o", "l.toml"]);
     assert_eq!(frequencies(here, "l.toml").len(), 1);
 }
+
+/// Two sensors after a hit of the hammer at sample `start`; a file of its own.
+fn hit_file(here: &Path, name: &str, number: u32, start: usize) {
+    let mut force = vec![0.0; 2500 + 100 * number as usize];
+    for (k, value) in [0.4, 1.0, 0.5].iter().enumerate() {
+        force[start + k] = value * (1.0 + 0.2 * f64::from(number));
+    }
+    let added = noise(70 + number);
+    let force: Vec<f64> = force.iter().zip(added.iter().cycle()).map(|(f, e)| f + 1e-4 * e).collect();
+    // each file with an offset of its own
+    let offset = |values: Vec<f64>| values.iter().map(|y| y + 0.3 * f64::from(number)).collect();
+    let columns = [force.clone(), offset(moved(&force, 0.4, number)), offset(moved(&force, 0.8, 100 + number))];
+    table(here, name, 1e-3, "Time (s),Hammer (N),near (m/s^2),far (m/s^2)", &columns);
+}
+
+#[test]
+fn a_decay_beside_hum_that_is_stronger_gives_its_mode() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    // a mode of 50 Hz beside a line of 31.3 Hz and its third harmonic
+    let line = |k: usize| {
+        let turn = std::f64::consts::TAU * 0.0313 * k as f64;
+        2.0 * (turn + 0.7).sin() + 0.3 * (3.0 * turn).sin()
+    };
+    let values: Vec<f64> = decay(1.0, 3).iter().enumerate().map(|(k, y)| y + line(k)).collect();
+    table(here, "hum.csv", 1e-3, "Time (s),Acc (m/s^2)", &[values]);
+    let [stdout, _] = said(here, &["new", "pipeline", "hum.csv", "-o", "hum.toml"]);
+    assert!(stdout.contains("free decay") && stdout.contains("beside a line at 31.3"), "{stdout}");
+    let found = frequencies(here, "hum.toml");
+    // stated error: 0.2 Hz
+    assert!(found.len() == 1 && (found[0] / 50.0 - 1.0).abs() < 0.012, "{found:?}");
+}
+
+#[test]
+fn hits_with_a_file_each_are_averaged_to_one_response_of_each_sensor() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    std::fs::create_dir_all(here.join("by name")).expect("a folder");
+    for number in 1..=5 {
+        hit_file(here, &format!("by name/hit_{number}.csv"), number, 20 + 60 * number as usize);
+        hit_file(here, &format!("a{number}.csv"), number, 20 + 60 * number as usize);
+    }
+    let files: Vec<String> = (1..=5).map(|number| format!("a{number}.csv")).collect();
+    let mut words = vec!["new", "pipeline", "-o", "none.toml"];
+    words.extend(files.iter().map(String::as_str));
+    let output = afmid(here, &words);
+    let refused = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.code() == Some(2) && refused.contains("--as hits if all are of the same points"),
+        "{refused}"
+    );
+    words[3] = "said.toml";
+    words.extend(["--as", "hits"]);
+    said(here, &words);
+    let [stdout, _] = said(here, &["new", "pipeline", "by name", "-o", "named.toml"]);
+    assert!(stdout.contains("hits by the names of the 5 files"), "{stdout}");
+    for config in ["said.toml", "named.toml"] {
+        let found = frequencies(here, config);
+        assert_eq!(found.len(), MODES.len(), "{config}: {found:?}");
+        for (found, [frequency, _]) in found.iter().zip(MODES) {
+            // noise of a thousandth
+            assert!((found / frequency - 1.0).abs() < 2e-3, "{config}: {found}");
+        }
+        let [shown, _] = said(here, &["show", &format!("{config}.h5"), "frf", "--json"]);
+        let shown: Value = serde_json::from_str(&shown).expect("JSON");
+        assert_eq!(shown["blocks"], 5, "{shown}");
+        assert!(shown["median_coherence"].as_f64().is_some_and(|coherence| coherence > 0.99), "{shown}");
+    }
+    let named = std::fs::read_to_string(here.join("named.toml")).expect("a config");
+    assert!(
+        named.contains("files = [\"by name/*.csv\"]") && named.contains("# chosen: measured input Hammer"),
+        "{named}"
+    );
+}

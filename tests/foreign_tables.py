@@ -82,6 +82,27 @@ def main():
         group.attrs["encoder.scaling.multiplier"], group.attrs["encoder.scaling.offset"] = 1e-9, 0.5
         group.attrs["encoder.scaling.unit.unit"] = np.bytes_("V")
         group["y"] = np.round(1e9 * (Y - 0.5)).astype("i4")
+    # MATLAB 7.3: a struct with an array, the names of its columns in a cell array, and their unit
+    with h5py.File(folder / "struct.mat", "w", userblock_size=512) as file:
+        matlab(file, "Test/acc", np.stack([Y, -Y]), "double")
+        names = [matlab(file, f"#refs#/{name}", characters(name), "char").ref for name in ["left", "right"]]
+        matlab(file, "Test/names", np.array(names, dtype=h5py.ref_dtype).reshape(-1, 1), "cell")
+        matlab(file, "Test/units", characters("m/s^2"), "char")
+        matlab(file, "Test/fs", np.full((1, 1), 1000.0), "double")
+    with open(folder / "struct.mat", "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+
+
+def characters(text):
+    """A line of text as MATLAB stores it."""
+    return np.array([[ord(letter)] for letter in text], dtype="u2")
+
+
+def matlab(file, name, values, kind):
+    """A variable of MATLAB's."""
+    dataset = file.create_dataset(name, data=values)
+    dataset.attrs["MATLAB_class"] = np.bytes_(kind)
+    return dataset
 
 
 if __name__ == "__main__":

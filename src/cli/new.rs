@@ -64,8 +64,9 @@ pub struct NewPipelineArgs {
     /// an input, a drive].
     #[arg(long, value_name = "NAME")]
     pub input: Vec<String>,
-    /// What files and channels are, of decays: hits, or sensors that saw the same hits; of frequency responses, or of a
-    /// force and what moves: points [default: files are hits, channels are sensors, cells are hits].
+    /// What files and channels are, of decays: hits, or sensors that saw the same hits; of a force and what moves: hits, or
+    /// points; of frequency responses: points [default: files are hits, channels are sensors, cells are hits; files with a
+    /// force are hits if their names number hits].
     #[arg(long = "as", value_enum, value_name = "WHAT")]
     pub records_are: Option<RecordsAre>,
     /// Samples per second in Hz, of files that state none; of files of several rates, which to take [default: of which
@@ -87,7 +88,7 @@ pub struct NewPipelineArgs {
 /// What files and channels are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RecordsAre {
-    /// Each channel of each file is a hit.
+    /// Each channel of each file is a hit; of files with a force each file, averaged.
     Hits,
     /// All files and channels saw the same hits.
     Sensors,

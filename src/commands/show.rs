@@ -84,11 +84,10 @@ pub fn find<'a>(file: &'a ResultFile, id: &str) -> Result<&'a StageSummary, Fail
             );
         }
         let ids: Vec<&str> = file.stages().iter().map(|stage| stage.record.id.as_str()).collect();
-        let help = match nearest(id, ids.iter().copied()) {
-            Some(nearest) => format!("did you mean `{nearest}`?"),
-            None => format!("there is: {}", ids.join(", ")),
-        };
-        Failure::usage(format!("{} has no stage `{id}`", file.path().display()), Some(help))
+        let nearest = nearest(id, ids.iter().copied()).map(|nearest| format!("did you mean `{nearest}`? "));
+        let help = format!("{}there is: {}", nearest.unwrap_or_default(), ids.join(", "));
+        let about = one_line(&file.run().name);
+        Failure::usage(format!("{}, of a config `{about}`, has no stage `{id}`", file.path().display()), Some(help))
     })
 }
 

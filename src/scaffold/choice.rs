@@ -6,6 +6,7 @@ use afmid_kernels::spectra::{is_impulsive, shows_resonance};
 
 use super::channels::{driving, inputs, is_named, named, nothing, outputs};
 use super::first_file::FirstFile;
+use super::hit_names::are_hits;
 use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
 use super::sensors::{Sensors, left_out, like, sensors};
@@ -110,7 +111,12 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     let source = file.source;
     let inputs = inputs(source, wanted)?;
     let struck = file.samples(inputs[0]).is_ok_and(|force| is_impulsive(&force));
-    let records_are = wanted.records_are.filter(|what| *what == RecordsAre::Points);
+    let named_hits = source.files.len() > 1 && wanted.records_are.is_none() && are_hits(&source.files);
+    let records_are = match wanted.records_are {
+        Some(RecordsAre::Points) => Some(RecordsAre::Points),
+        Some(RecordsAre::Hits) if source.files.len() > 1 => Some(RecordsAre::Hits),
+        _ => named_hits.then_some(RecordsAre::Hits),
+    };
     let found = outputs(source, wanted, &inputs)?;
     let best = source.best.and_then(|index| source.channels.get(index));
     let best = best.filter(|best| found.iter().any(|channel| channel.location == best.location));
@@ -125,7 +131,12 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     }
     let short = if struck { ", which is short as a hammer's," } else { "" };
     let (input, output) = (names(&inputs), names(&outputs));
-    let why = format!("measured input {input}{short} and output {output} in {}", source.name());
+    let hits = match (records_are, named_hits) {
+        (Some(RecordsAre::Hits), true) => format!("; hits by the names of the {} files, averaged", source.files.len()),
+        (Some(RecordsAre::Hits), false) => format!("; --as hits: the {} files are averaged", source.files.len()),
+        _ => String::new(),
+    };
+    let why = format!("measured input {input}{short} and output {output} in {}{hits}", source.name());
     let taken: Vec<&Channel> = outputs.iter().chain(&inputs).copied().collect();
     let notes = left_out(source, &taken).filter(|_| wanted.channels.is_empty()).into_iter().collect();
     Ok(Choice { inputs, struck, records_are, notes, ..Choice::of(goal, outputs, why) })
@@ -201,7 +212,9 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
         (Some(first), _) => {
             let time_s = first.range.start as f64 / file.rate(seen[0], wanted)?;
             let from = format!("from {} s on, at {} Hz", number(time_s), number(first.frequency_hz));
-            format!("{record}: {} {from}", counted(found.decays.len()))
+            let beside =
+                found.steady.first().map(|line| format!(", beside a line at {} Hz", number(line.frequency_hz)));
+            format!("{record}: {} {from}{}", counted(found.decays.len()), beside.unwrap_or_default())
         }
         (None, Some(reason)) if guessed && !found.steady.is_empty() && is_tone(&values[0]) => {
             return other(Goal::Steady, format!("{record}: {reason}"));

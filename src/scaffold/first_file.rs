@@ -3,6 +3,7 @@
 use std::cell::OnceCell;
 
 use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, find_decays};
+use afmid_kernels::harmonics::find_decays_beside_lines;
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
 use afmid_pipeline::recording::{
     Contents, FoundChannel, FoundResponse, InputFiles, Reading, UnpackedContents, open_unpacked, responses,
@@ -105,7 +106,7 @@ impl<'a> FirstFile<'a> {
         let values: Vec<Vec<f64>> =
             channels.iter().map(|channel| self.samples(channel)).collect::<Result<_, Question>>()?;
         let slices: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
-        let found = find_decays(&slices, rate, &DecaySearchOptions::default());
+        let found = find_decays_beside_lines(&slices, rate, &DecaySearchOptions::default());
         Ok((values, found.map_err(|error| self.plain(&error.to_string()))?))
     }
 

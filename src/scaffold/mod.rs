@@ -4,6 +4,7 @@ mod channels;
 mod choice;
 mod first_file;
 mod groups;
+mod hit_names;
 mod left_out;
 mod pipeline;
 mod points;

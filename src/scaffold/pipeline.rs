@@ -78,15 +78,21 @@ pub fn quantity(unit: &str) -> Option<&'static str> {
 /// The config for a file in `folder`. Errors: what is not known of the recordings, and how to say it.
 pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
     let (template, reader) = choice.template();
-    let points = choice.records_are == Some(RecordsAre::Points) && reader == "io.columns";
-    if reader == "io.columns" && source.files.len() > 1 && !points {
-        let help = "--as points if each is of another point of the structure; else give one file with all hits, or a \
-                    config for each; --goal decay takes several without the force";
+    let of_columns = |what| choice.records_are == Some(what) && reader == "io.columns";
+    let points = of_columns(RecordsAre::Points);
+    let takes = of_columns(RecordsAre::Hits) && choice.goal == Goal::Frf;
+    if reader == "io.columns" && source.files.len() > 1 && !points && !takes {
+        let help = "--as hits if all are of the same points: their responses are averaged; --as points if each is of \
+                    another point of the structure; --goal decay takes several without the force";
         let problem = format!("{} files, wanted one record of input and output", source.files.len());
         return Err((problem, Some(help.to_owned())));
     }
     let params = match reader {
-        "io.columns" => columns(source, &source.file, choice, wanted, folder),
+        "io.columns" if takes => {
+            let files = source.patterns.iter().map(|pattern| path(pattern, folder)).collect();
+            columns(source, ("files", Value::Array(files)), choice, wanted)
+        }
+        "io.columns" => columns(source, ("file", path(&source.file, folder)), choice, wanted),
         "io.frf" => Ok(responses(source, wanted, folder)),
         _ => records(source, choice, wanted, folder),
     }?;
@@ -121,7 +127,9 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
                 let blocks = if choice.struck { "hits" } else { "segments" };
                 let quantity = quantity(wanted.unit.unwrap_or(&choice.channels[0].unit));
                 let quantity = quantity.map(|quantity| format!(", quantity = \"{quantity}\"")).unwrap_or_default();
-                text.push_str(&format!("params = {{ blocks = \"{blocks}\"{quantity} }}\n"));
+                let before = if takes && choice.struck { points::fewer_before(source, choice)? } else { None };
+                let before = before.map(|before| format!(", before_samples = {before}")).unwrap_or_default();
+                text.push_str(&format!("params = {{ blocks = \"{blocks}\"{before}{quantity} }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
                 let samples = segment_samples(choice.channels[0].samples);
@@ -145,7 +153,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
 fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
     let text = |text: &str| Value::String(text.to_owned());
     let channel = choice.channels[0];
-    let files = source.patterns.iter().map(|pattern| text(&relative(pattern, folder).to_string_lossy()));
+    let files = source.patterns.iter().map(|pattern| path(pattern, folder));
     let mut params = Table::new();
     params.insert("files".to_owned(), Value::Array(files.collect()));
     params.insert("channel".to_owned(), text(&channel.location));
@@ -182,18 +190,22 @@ fn responses(source: &Source, wanted: Wanted<'_>, folder: &Path) -> String {
     format!("params = {}\n", Value::Table(params))
 }
 
-/// The `params` of the stage `data`.
+/// A file or pattern as a config in `folder` names it.
+pub fn path(of: &Path, folder: &Path) -> Value {
+    Value::String(relative(of, folder).to_string_lossy().into_owned())
+}
+
+/// The `params` of a stage `io.columns` that reads a `file`, or several `files`.
 pub fn columns(
     source: &Source,
-    file: &Path,
+    (name, recordings): (&str, Value),
     choice: &Choice<'_>,
     wanted: Wanted<'_>,
-    folder: &Path,
 ) -> Result<String, Question> {
     let text = |text: &str| Value::String(text.to_owned());
     let (output, location) = (choice.channels[0], |channel: &&Channel| text(&channel.location));
     let mut params = Table::new();
-    params.insert("file".to_owned(), text(&relative(file, folder).to_string_lossy()));
+    params.insert(name.to_owned(), recordings);
     params.insert("inputs".to_owned(), Value::Array(choice.inputs.iter().map(location).collect()));
     match choice.channels.len() {
         1 => params.insert("output".to_owned(), text(&output.location)),

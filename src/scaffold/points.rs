@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use afmid_kernels::spectra::hit_spacing;
-use afmid_kernels::statistics::median;
+use afmid_kernels::spectra::{hit_begins, hit_spacing};
 use afmid_pipeline::recording::{InputFiles, Reading, open_unpacked};
 use afmid_pipeline::toml::{Table, Value};
 
 use super::choice::{Choice, Question};
-use super::pipeline::{Wanted, columns, quantity};
+use super::pipeline::{Wanted, columns, path, quantity};
 use super::recordings::Source;
 use crate::inspect::first_samples;
 
@@ -33,6 +32,11 @@ pub fn in_place_of_one(
     Ok(format!("{head}{stages}{modes}"))
 }
 
+/// Samples before the hits of all files, where they are fewer than usual. Errors: a file cannot be read.
+pub fn fewer_before(source: &Source, choice: &Choice<'_>) -> Result<Option<usize>, Question> {
+    Ok(Some(Blocks::of(source, choice)?.before).filter(|before| *before < BEFORE))
+}
+
 /// The stages that read the files, estimate their responses and join them; the last one has the id `frf`.
 fn stages(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
     let blocks = Blocks::of(source, choice)?;
@@ -41,7 +45,7 @@ fn stages(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pat
     for (number, file) in source.files.iter().enumerate() {
         let data = format!("data_{}", number + 1);
         let id = if number + 1 == source.files.len() { "frf".to_owned() } else { format!("frf_{}", number + 1) };
-        let params = columns(source, file, choice, wanted, folder)?;
+        let params = columns(source, ("file", path(file, folder)), choice, wanted)?;
         text += &format!("[[stage]]\nid = \"{data}\"\nuses = \"io.columns\"\n{params}\n");
         let before_input = before.map(|before| format!(", before = \"{before}.frf\"")).unwrap_or_default();
         let point = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -66,10 +70,10 @@ impl Blocks {
         let force = choice.inputs.first().map(|input| input.location.as_str()).unwrap_or_default();
         let forces: Vec<Vec<f64>> = source.files.iter().map(|file| series(file, force)).collect::<Result<_, _>>()?;
         if choice.struck {
-            blocks.before = forces.iter().map(|force| rise(force)).fold(BEFORE, usize::min);
+            blocks.before = forces.iter().map(|force| hit_begins(force, HIT)).fold(BEFORE, usize::min);
         }
         let samples = |force: &Vec<f64>| match choice.struck {
-            true => hit_spacing(force, blocks.before).unwrap_or(force.len() - rise(force) + blocks.before),
+            true => hit_spacing(force, blocks.before).unwrap_or(force.len() - hit_begins(force, HIT) + blocks.before),
             false => force.len() / EIGHTH,
         };
         blocks.samples = forces.iter().map(samples).min().unwrap_or_default();
@@ -91,14 +95,6 @@ impl Blocks {
         }
         params
     }
-}
-
-/// The sample in which the first hit begins.
-fn rise(force: &[f64]) -> usize {
-    let offset = median(&mut force.to_vec());
-    let size = |value: &f64| (value - offset).abs();
-    let largest = force.iter().map(size).fold(0.0, f64::max);
-    force.iter().position(|value| size(value) >= HIT * largest).unwrap_or_default()
 }
 
 /// A channel of a file. Errors: it is not there or cannot be read.

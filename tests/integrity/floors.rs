@@ -20,12 +20,15 @@ const CRATES: [Crate; 5] = [
         name: "afmid-formats",
         src: "pipeline/formats/src",
         floors: &[
-            &["budget", "fail", "frequency", "number", "text", "calendar", "rate", "lanes", "regular"],
+            &["facts"],
+            &["budget", "fail", "frequency", "number", "text", "calendar", "rate", "lanes", "regular", "straight"],
             &["pinned"],
             &["fields", "inflating", "opened", "raw"],
             &["packed"],
             &["grid"],
-            &["archive", "axes", "joined", "listing", "responses"],
+            &["archive", "axes", "joined", "responses"],
+            &["labels"],
+            &["listing"],
             &[
                 "igor",
                 "jpk",

@@ -8,6 +8,7 @@
 //! a cell `{3}` of times to the cell `{3}` beside it; of the cells of one array the first of times to the first of
 //! signals. Nothing else gets that rate.
 
+use crate::facts::{OF_ITS_LENGTH, TAKEN_AS_SECONDS};
 use crate::frequency::{hertz, perhaps_frequencies};
 use crate::rate::{fewest_digits, of_step};
 use crate::{Contents, FoundChannel};
@@ -353,10 +354,9 @@ fn axis(at: usize, kind: Kind, channel: &FoundChannel, remarks: &mut Vec<String>
         remarks.push(format!("{location} is an axis, evenly by {step} {unit}: it gives no sample rate"));
         return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
     }
-    let unit = if stated.is_none() { " (no unit: taken as seconds)" } else { "" };
+    let unit = if stated.is_none() { format!(" {TAKEN_AS_SECONDS}") } else { String::new() };
     let rounded = if off > REMARKED { format!(", to {off:.1e} of a step") } else { String::new() };
-    remarks
-        .push(format!("{location}{unit} runs evenly by {step}{rounded}: the sample rate of the arrays of its length"));
+    remarks.push(format!("{location}{unit} runs evenly by {step}{rounded}: {OF_ITS_LENGTH}"));
     Some(Axis { at, kind, step_s: Some(step * stated.unwrap_or(1.0)), uncertainty })
 }
 

@@ -8,6 +8,7 @@ mod archive;
 mod axes;
 mod budget;
 mod calendar;
+mod facts;
 mod fail;
 mod fields;
 mod frequency;
@@ -17,6 +18,7 @@ mod inflating;
 mod joined;
 pub mod jpk;
 pub mod keysight;
+mod labels;
 mod lanes;
 pub mod lecroy;
 mod listing;
@@ -33,6 +35,7 @@ pub mod raw_binary;
 mod registry;
 mod regular;
 mod responses;
+mod straight;
 pub mod tdms;
 pub mod tektronix;
 mod text;
@@ -45,8 +48,10 @@ use std::sync::Arc;
 
 pub use axes::{names_times, settle as settle_axes};
 pub use budget::most_inflated;
+pub use facts::is_fact;
 pub use frequency::hertz;
 pub use grid::numbers_in_file;
+pub use labels::{Labels, lane_names};
 pub use lanes::Lanes;
 pub use number::Number;
 pub use rate::{Clue, agreed_rate, rate_in};
@@ -55,6 +60,7 @@ pub use raw_binary::{RawBinary, SampleType};
 pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};
 pub use regular::{open_regular, read_regular};
 pub use responses::{Degree, FoundResponse, Frequencies, Parts, responses, says_frequencies, unit_ratio};
+pub use text_table::even_step;
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
 ///

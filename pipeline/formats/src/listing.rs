@@ -1,6 +1,8 @@
 //! Collecting what a file holds.
 
+use crate::facts::ONE_NUMBER;
 use crate::grid::{Grid, Store};
+use crate::labels::Labels;
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::rate::{Clue, rate_in};
@@ -56,6 +58,7 @@ pub(crate) struct Listing {
     locations: HashMap<String, usize>,
     clues: HashMap<String, Vec<Clue>>,
     responses: Vec<FoundResponse>,
+    labels: Labels,
     remarks: Vec<String>,
     unsaid: usize,
     bytes: usize,
@@ -72,13 +75,19 @@ impl Listing {
         }
     }
 
+    /// A text: no channel, but it may be a channel's name or unit.
+    pub(crate) fn text(&mut self, location: &str, text: &str, remark: String) {
+        self.labels.add(location, text);
+        self.remark(remark);
+    }
+
     /// A single number: no channel, but it may be the sampling rate.
     pub(crate) fn scalar(&mut self, scope: &str, name: &str, location: &str, value: f64) {
         if let Some(clue) = Clue::of(name, location, value).filter(|_| self.clue_count < MOST_CLUES) {
             self.clue_count += 1;
             self.clues.entry(scope.to_owned()).or_default().push(clue);
         }
-        self.remark(format!("{location} is the single number {value}, no channel"));
+        self.remark(format!("{location} {ONE_NUMBER} {value}, no channel"));
     }
 
     /// An array of at least two numbers. Its bytes must have been found to lie within the file.
@@ -216,7 +225,8 @@ impl Listing {
         if self.unsaid > 0 {
             self.remarks.push(format!("{} more remarks of this kind", self.unsaid));
         }
-        let channels = self.channels.into_iter().map(|(_, channel)| channel).collect();
+        let mut channels: Vec<FoundChannel> = self.channels.into_iter().map(|(_, channel)| channel).collect();
+        self.labels.give(&mut channels);
         Contents { format, started_at: String::new(), channels, responses: self.responses, remarks: self.remarks }
     }
 }

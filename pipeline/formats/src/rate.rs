@@ -1,5 +1,6 @@
 //! The sampling rate, from numbers that are named like one.
 
+use crate::facts::RATE_FROM;
 use std::collections::HashMap;
 
 /// Names whose value is a rate in hertz. `IO_rate_[Hz]` and `IO_samp_rate_[Hz]` are those of general-mode AFM files.
@@ -59,6 +60,15 @@ pub(crate) fn fewest_digits(number: f64, uncertainty: f64) -> f64 {
     within.next().unwrap_or(number)
 }
 
+/// Of the steps within an uncertainty (relative) of this one, that whose rate has the fewest digits, or that which has two
+/// fewer itself: clocks are set to round rates, some to round steps.
+pub(crate) fn roundest_step(step: f64, uncertainty: f64) -> f64 {
+    let (rate, round) = (fewest_digits(of_step(step), uncertainty), fewest_digits(step, uncertainty));
+    let digits =
+        |number: f64| format!("{number:e}").chars().take_while(|c| *c != 'e').filter(char::is_ascii_digit).count();
+    if digits(round) + 1 < digits(rate) { round } else { rate.recip() }
+}
+
 /// A step that is kept in single precision is the shortest decimal number that is rounded to it: instruments have steps
 /// of 1, 2 or 5 times a power of ten. One in double precision is taken as it is, unless it was widened from single.
 pub(crate) fn shortest(step: f64) -> f64 {
@@ -112,7 +122,7 @@ pub fn agreed_rate(clues: &[Clue]) -> (Option<f64>, Option<String>) {
     };
     let first = rates.first().copied().unwrap_or_default();
     if rates.iter().all(|rate| (rate - first).abs() <= AGREE * first) {
-        (Some(first), Some(format!("the sampling rate is taken from {named}: {first} samples per second")))
+        (Some(first), Some(format!("{RATE_FROM} {named}: {first} samples per second")))
     } else {
         (None, Some(format!("the sampling rate is left unknown because these disagree: {named}")))
     }

@@ -104,6 +104,10 @@ fn tables_and_times_of_pandas_pytables_and_others_are_columns_and_rates() {
         assert_eq!(channel.source.read(499, 1).unwrap().widened().len(), 1);
         assert!(channel.source.read(500, 1).is_err());
     }
+    let (found, contents) = described(&folder.file("struct.mat"));
+    assert_eq!(found, ["/Test/acc[1] 1000 m/s^2", "/Test/acc[2] 1000 m/s^2"], "{:?}", contents.remarks);
+    let names: Vec<&str> = contents.channels.iter().map(|channel| channel.long_name.as_str()).collect();
+    assert_eq!(names, ["left", "right"], "{:?}", contents.remarks);
     let (_, contents) = described(&folder.file("arrays.h5"));
     let said = |words: &str| contents.remarks.iter().any(|remark| remark.contains(words));
     assert!(said("/codes holds whole numbers in «V» without a scale"), "{:?}", contents.remarks);

@@ -16,6 +16,7 @@ const NOISE_GAIN: &str = "noise_gain";
 const WINDOW_KIND: &str = "window_kind";
 const INPUTS: &str = "inputs";
 const OUTPUTS: &str = "outputs";
+const FIRST_SAMPLE: &str = "first_sample";
 
 /// Inputs (`force`, over `input` too if there are several) and output (`response`, over `output` likewise) over time since
 /// sample `t0_sample`, of all events and of each half, with the output's standard error where it is known.
@@ -35,8 +36,27 @@ impl<'a> Pair<'a> {
         self.array.number(SAMPLE_RATE_HZ)
     }
 
-    /// Time since t0 of all events together.
+    /// First samples of its records, where several lie in a row; none of one.
+    pub fn record_starts(&self) -> Vec<usize> {
+        self.array.real(FIRST_SAMPLE).map(|all| all.iter().map(|first| *first as usize).collect()).unwrap_or_default()
+    }
+
+    /// Errors: several records lie in a row in these.
+    fn is_one_record(&self, set: DataSet) -> Result<(), StageError> {
+        match self.record_starts().len() {
+            count if count > 1 && set == DataSet::All => {
+                Err(StageError::new(format!("the pair is of {count} records in a row, wanted one")).help(
+                    "leave `files` of `io.columns` out and name one `file`, or take its `identification` record; \
+                     `spectrum.measured_frf` averages over all",
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Time since t0 of all events together. Errors: none is there; it is of several records.
     pub fn time(&self) -> Result<&'a [f64], StageError> {
+        self.is_one_record(DataSet::All)?;
         Ok(&self.array.axis("time")?.values)
     }
 
@@ -50,13 +70,15 @@ impl<'a> Pair<'a> {
         Ok(&self.array.axis(&set.of("time"))?.values)
     }
 
-    /// Inputs, one after the other.
+    /// Inputs, one after the other. Errors: they are of several records.
     pub fn force(&self, set: DataSet) -> Result<&'a [f64], StageError> {
+        self.is_one_record(set)?;
         self.array.real(&set.of(FORCE))
     }
 
-    /// Output. Errors: there are several.
+    /// Output. Errors: there are several, or several records.
     pub fn response(&self, set: DataSet) -> Result<&'a [f64], StageError> {
+        self.is_one_record(set)?;
         let name = set.of(RESPONSE);
         match self.array.variable(&name)?.dims.len() {
             0 | 1 => self.array.real(&name),
@@ -288,6 +310,14 @@ impl PairSet<'_> {
             None => to,
         }
     }
+}
+
+/// States where records begin that lie in a row.
+pub(crate) fn with_record_starts(mut pair: Array, starts: &[usize]) -> Array {
+    let numbers = (1..=starts.len()).map(|number| number as f64).collect();
+    pair.axes.push(Axis::new("record", "1", "number of the record", numbers));
+    let first: Vec<f64> = starts.iter().map(|start| *start as f64).collect();
+    pair.with(FIRST_SAMPLE, "1", "first sample of the record", &["record"], first)
 }
 
 /// States the names of the channels.

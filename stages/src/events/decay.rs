@@ -1,7 +1,9 @@
 //! The stage `events.decay`.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
+use afmid_pipeline::recording::lane_names;
 use afmid_pipeline::{
     Array, Channel, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
@@ -11,9 +13,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::artifacts::{PIEZO, Sensor, decay_array};
-use afmid_kernels::events::decay::{
-    DecayEnd, DecaySearch, DecaySearchOptions, DismissedReason, FreeDecay, find_decays,
-};
+use afmid_kernels::events::decay::{DecayEnd, DecaySearch, DecaySearchOptions, DismissedReason, FreeDecay};
+use afmid_kernels::harmonics::find_decays_beside_lines;
 
 /// Finds free decays in records: after a hit, a release, a pulse, or the end of a drive.
 ///
@@ -21,7 +22,9 @@ use afmid_kernels::events::decay::{
 /// die away is a steady oscillation, which has no quality factor to be had.
 /// Method: the energy of all channels over a period against the noise's; starts refined to the first departure from the
 /// quiet line before; the end is where the ringing is smaller than the noise, or the next start; the first free sample is
-/// the one from which later samples foretell the earlier ones backwards. Clipped samples are missing.
+/// the one from which later samples foretell the earlier ones backwards. Clipped samples are missing. Where a steady line
+/// hides all decays (hum), they are sought in what is left without it and its harmonics; the line stays in the decays, as
+/// one of the lines that `model.decay` fits beside the modes.
 /// Shapes: `decays` has a row per hit and channel, whose samples follow each other, and likewise the last 16,384 that
 /// were quiet before each hit; `events` a row per decay, steady oscillation and start that is neither.
 /// Units: the channels' own; Hz; s.
@@ -70,7 +73,7 @@ impl Stage for Decay {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.decay",
-        version: 3,
+        version: 5,
         summary: "finds free decays in records: where they begin, where they drown in the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -101,7 +104,10 @@ impl Stage for Decay {
         if hits.is_empty() {
             return Err(nothing_found(&rows, &groups));
         }
-        for row in rows.iter().filter(|row| row.steady) {
+        // beside a decay a steady stretch is a fact, which the table and the summary state
+        let decays: HashSet<&str> =
+            rows.iter().filter(|row| row.rejected.is_empty()).map(|row| row.record.as_str()).collect();
+        for row in rows.iter().filter(|row| row.steady && !decays.contains(row.record.as_str())) {
             cx.warn(format!("{}: {}", row.record, row.rejected));
         }
         let quiet: Vec<Vec<Vec<f64>>> = searched.iter().flat_map(Searched::quiet).collect();
@@ -165,12 +171,17 @@ fn sensors(groups: &[Group]) -> Result<Vec<Sensor>, StageError> {
     }
     // one file a sensor: the file tells them apart
     let several = first.records.iter().any(|record| record.name != first.records[0].name);
-    let name = |(record, channel): (&&Record, &&Channel)| match several {
+    let lanes =
+        lane_names(first.channels.iter().map(|channel| (channel.location.as_str(), channel.long_name.as_str())));
+    let name = |(number, (record, channel)): (usize, (&&Record, &&Channel))| match several {
         true => format!("{} {}", record.name, channel.location),
-        false => channel.location.clone(),
+        false => lanes.as_ref().and_then(|names| names.get(number)).unwrap_or(&channel.location).clone(),
     };
-    let sensor = |pair: (&&Record, &&Channel)| Sensor { name: name(pair), unit: pair.1.unit.clone() };
-    Ok(first.records.iter().zip(&first.channels).map(sensor).collect())
+    let sensor = |(number, pair): (usize, (&&Record, &&Channel))| Sensor {
+        name: name((number, pair)),
+        unit: pair.1.unit.clone(),
+    };
+    Ok(first.records.iter().zip(&first.channels).enumerate().map(sensor).collect())
 }
 
 impl Group<'_> {
@@ -197,7 +208,7 @@ impl Group<'_> {
             values.push(read);
         }
         let slices: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
-        let found = find_decays(&slices, rate, options).map_err(StageError::from_error)?;
+        let found = find_decays_beside_lines(&slices, rate, options).map_err(StageError::from_error)?;
         Ok(Searched { values, found })
     }
 }
@@ -359,7 +370,8 @@ fn nothing_found(rows: &[Row], groups: &[Group]) -> StageError {
     let error = StageError::new(format!("no free decay in {} records: {}{more}", groups.len(), reasons.join("; ")));
     match rows.iter().any(|row| row.steady) {
         true => error.help(
-            "record the ringing after the drive has ended, or give its end: trigger = { given = { times_s = [...] } }",
+            "no decay is seen beside the steady line either: record the ringing after the drive has ended or without the \
+             hum, or say where decays begin: trigger = { given = { times_s = [...] } }",
         ),
         false => error.help("check the channel; `trigger = { given = { times_s = [...] } }` says where decays begin"),
     }
@@ -369,6 +381,7 @@ fn nothing_found(rows: &[Row], groups: &[Group]) -> StageError {
 mod tests {
     use super::*;
     use crate::fixture::white_noise;
+    use afmid_kernels::events::decay::find_decays;
 
     #[test]
     fn a_long_quiet_stretch_is_kept_from_its_end() {

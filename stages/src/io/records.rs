@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{How, Opened, RawBinary, Reading, Wanted, open_records};
+use afmid_pipeline::recording::{How, Opened, RawBinary, Reading, Wanted, is_fact, open_records};
 use afmid_pipeline::{
     Caching, Context, Document, Example, Faults, InputFiles, Port, Ports, Record, Recording, Spec, Stage, StageError,
 };
@@ -26,7 +26,7 @@ use crate::artifacts::{DEFLECTION, PIEZO, SENSOR};
 /// Files in natural order; nothing but headers is read here (tables of text are parsed), samples are streamed by the
 /// stages that need them. Sample rate and unit must agree over all files; other lengths are reported. What a file does
 /// not state is given as a parameter; what it states is not overruled. Results of afmid's own that a pattern matches
-/// are left out and counted in a warning, as are remarks of readers.
+/// are left out and counted in a warning, as are remarks of readers but for mere facts (`afmid inspect` shows those).
 /// # Shapes
 /// One record per file, with the roles `deflection` and, where the file has it, `piezo`; where a recording was
 /// interrupted (restarts, lost buffers), one per uninterrupted stretch, `file.tdms[1]`, `file.tdms[2]`.
@@ -242,7 +242,7 @@ fn said_once(opened: &[Opened]) -> Vec<String> {
     for file in opened {
         let name = file.records.first().map_or("", |record| &record.name);
         let mut seen = HashSet::new();
-        for remark in &file.remarks {
+        for remark in file.remarks.iter().filter(|remark| !is_fact(remark)) {
             let kind = remark.replace(|letter: char| letter.is_ascii_digit(), "#");
             if !seen.insert(kind.clone()) {
                 continue;

@@ -186,3 +186,18 @@ fn results_of_afmids_own_are_left_out_with_a_counted_warning() {
     let alone = Records { files: vec!["result.h5".to_owned()], ..all() };
     assert!(folder.run(&alone).unwrap_err().to_string().contains("all files that match"));
 }
+
+#[test]
+fn facts_of_a_file_are_no_warnings_and_what_was_taken_for_granted_is_one() {
+    let folder = Folder::new("facts");
+    let read = |title: &str| {
+        let rows: String = (0..300).map(|k| format!("{:.4},{}\n", f64::from(k) / 2560.0, k % 7)).collect();
+        fs::write(folder.0.join("a.csv"), format!("{title},Acc (V)\n{rows}")).unwrap();
+        let files = vec!["a.csv".to_owned()];
+        let (channel, piezo_channel) = ("Acc".to_owned(), String::new());
+        folder.run(&Records { files, channel, piezo_channel, min_sample_rate_hz: 0.0, ..Records::default() }).unwrap().1
+    };
+    assert_eq!(read("Time (s)"), Vec::<String>::new());
+    let warnings = read("Time");
+    assert!(warnings.len() == 1 && warnings[0].contains("no unit: taken as seconds"), "{warnings:?}");
+}

@@ -11,7 +11,8 @@ use super::joined::Joining;
 use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf, Understood};
 use crate::io::{FRF, Roving};
 use afmid_kernels::spectra::{
-    Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, frequency_response, hit_spacing, hits, segments,
+    Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, common_hit_samples, frequency_response,
+    hit_spacing, hits, segments, with_hits,
 };
 
 /// Frequency response from measured input and output, averaged over hits or segments.
@@ -21,7 +22,8 @@ use afmid_kernels::spectra::{
 /// # Method
 /// Auto and cross spectra over blocks: half-overlapping Hann segments of the record, or hits of a hammer. `h1` is
 /// `Syu / Suu`, `h2` is `Syy / Suy`, `hv` their geometric mean; several inputs: `h1 = Syu Suu^-1`. Offsets are removed.
-/// The band in which the input has power is found and kept.
+/// The band in which the input has power is found and kept. Of several records (`files` of `io.columns`) the blocks of each
+/// are averaged, none over the end of one; a record without a hit is left out.
 /// # Shapes
 /// A row for each input of the pair, output after output, over the bins of the band, under the names of the channels; zero
 /// hertz is left out. Rows of `before` come first, over the bins that both have: responses of a structure that was
@@ -46,7 +48,8 @@ pub struct MeasuredFrf {
     /// often of the first kind.
     pub blocks: BlocksAre,
     /// Samples of a block. Absent: an eighth of the record for segments (15 of them: a coherence good to a tenth), as many
-    /// as hits are apart at least, the whole record for a single hit. With `before`, as many as its blocks have.
+    /// as hits are apart at least, the whole record for a single hit, to the end of the shortest for a record each. With
+    /// `before`, as many as its blocks have.
     #[schemars(range(min = 8))]
     pub block_samples: Option<usize>,
     /// Samples of a hit before the force comes to a tenth of its largest value. Why: a pulse has risen from nothing
@@ -136,6 +139,23 @@ impl Default for MeasuredFrf {
     }
 }
 
+/// Records that lie in a row, each from its first sample on; of none the whole.
+fn apart<'a>(record: &Block<'a>, starts: &[usize]) -> Vec<Block<'a>> {
+    let whole = record.outputs.first().map_or(0, |output| output.len());
+    if starts.len() < 2 {
+        return vec![record.clone()];
+    }
+    let ends = starts.iter().skip(1).copied().chain([whole]);
+    let cut = |series: &[&'a [f64]], from: usize, end: usize| {
+        series.iter().map(|values| values.get(from..end).unwrap_or_default()).collect()
+    };
+    let block = |(from, end): (usize, usize)| Block {
+        inputs: cut(&record.inputs, from, end),
+        outputs: cut(&record.outputs, from, end),
+    };
+    starts.iter().copied().zip(ends).map(block).collect()
+}
+
 /// Share of the largest force from which a hit is one.
 const HIT: f64 = 0.1;
 /// Segments in a record, if they did not overlap: see `block_samples`.
@@ -149,7 +169,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for MeasuredFrf {
     const SPEC: Spec = Spec {
         name: "spectrum.measured_frf",
-        version: 5,
+        version: 6,
         summary: "estimates the frequency response from measured input and output with coherence and variance",
         inputs: &[PAIR.spec(), BEFORE.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -176,7 +196,10 @@ impl Stage for MeasuredFrf {
         let before = inputs.find(&BEFORE)?.map(|array| Joining::new(array, rate)).transpose()?;
         let [inputs, outputs] = pair.channels(DataSet::All)?;
         let record = Block { inputs, outputs };
-        let blocks = self.cut(&record, self.block_samples.or(before.as_ref().map(Joining::block_samples)))?;
+        let records = apart(&record, &pair.record_starts());
+        let samples = self.block_samples.or(before.as_ref().map(Joining::block_samples));
+        let (blocks, left_out) = self.cut(&records, samples)?;
+        left_out.into_iter().for_each(|reason| cx.warn(reason));
         let found = frequency_response(&blocks, self.settings(rate)).map_err(StageError::from_error)?;
         if found.coherence.is_none() {
             cx.warn("a single block: neither coherence nor variance is known");
@@ -201,23 +224,47 @@ impl Stage for MeasuredFrf {
 }
 
 impl MeasuredFrf {
-    fn cut<'a>(&self, record: &Block<'a>, samples: Option<usize>) -> Result<Vec<Block<'a>>, StageError> {
-        let whole = record.outputs.first().map_or(0, |output| output.len());
-        let found = match (self.blocks, samples) {
-            (BlocksAre::Segments, samples) => segments(record, samples.unwrap_or(whole / EIGHTH)),
-            (BlocksAre::Hits, samples) => {
-                let force = record.inputs.first().copied().unwrap_or_default();
-                match samples.or_else(|| hit_spacing(force, self.before_samples)) {
-                    None => Ok(vec![record.clone()]),
-                    Some(samples) => hits(record, samples, self.before_samples, HIT),
-                }
+    /// The blocks of all records, and what is left out of several.
+    fn cut<'a>(
+        &self,
+        records: &[Block<'a>],
+        samples: Option<usize>,
+    ) -> Result<(Vec<Block<'a>>, Option<String>), StageError> {
+        let length = |record: &Block<'_>| record.outputs.first().map_or(0, |output| output.len());
+        let all = |found: Result<Vec<Vec<Block<'a>>>, _>| found.map_err(StageError::from_error);
+        if self.blocks == BlocksAre::Segments {
+            let samples = samples.unwrap_or_else(|| records.iter().map(length).min().unwrap_or(0) / EIGHTH);
+            let found = all(records.iter().map(|record| segments(record, samples)).collect())?;
+            return Ok((found.concat(), None));
+        }
+        let struck: Vec<Block<'a>> = match records {
+            [_] => records.to_vec(),
+            _ => records.iter().zip(with_hits(records, HIT)).filter(|(_, hit)| *hit).map(|(r, _)| r.clone()).collect(),
+        };
+        let force = struck.first().and_then(|record| record.inputs.first().copied()).unwrap_or_default();
+        let found = match samples.or_else(|| match &struck[..] {
+            [_] => hit_spacing(force, self.before_samples),
+            _ => common_hit_samples(&struck, self.before_samples, HIT),
+        }) {
+            None => vec![struck],
+            Some(samples) => {
+                all(struck.iter().map(|record| hits(record, samples, self.before_samples, HIT)).collect())?
             }
+        };
+        if found.iter().all(Vec::is_empty) {
+            return Err(StageError::new("no hit lies whole in the record: the force has none, or blocks are too long"));
         }
-        .map_err(StageError::from_error)?;
-        match found.is_empty() {
-            true => Err(StageError::new("no hit lies whole in the record: the force has none, or blocks are too long")),
-            false => Ok(found),
-        }
+        let used = found.iter().filter(|blocks| !blocks.is_empty()).count();
+        let left_out = (records.len() > 1 && used < records.len()).then(|| {
+            format!(
+                "{} of {} records are left out: their force stays below {HIT} of the largest, or fewer than \
+                 `before_samples` = {} lie before the hit",
+                records.len() - used,
+                records.len(),
+                self.before_samples
+            )
+        });
+        Ok((found.concat(), left_out))
     }
 
     fn settings(&self, sample_rate_hz: f64) -> ResponseSettings {

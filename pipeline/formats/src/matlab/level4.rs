@@ -176,6 +176,6 @@ fn texts(listing: &mut Listing, stream: &mut Stream, array: &Array, end: u64, da
     }
     let codes = array.number.decode(&stream.bytes(data, end, "a text")?, array.big_endian).widened();
     let shown: String = codes.into_iter().map(|code| char::from_u32(code as u32).unwrap_or('\u{fffd}')).collect();
-    listing.remark(text::remark_short(&array.location, &shown));
+    listing.text(&array.location, &shown, text::remark_short(&array.location, &shown));
     Ok(())
 }

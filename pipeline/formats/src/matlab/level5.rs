@@ -4,6 +4,7 @@ use super::class;
 use super::element::{Elements, Tag};
 use super::matrix::Walk;
 use super::stream::Stream;
+use crate::facts::HEADER_SAYS;
 use crate::fail;
 use crate::grid::Store;
 use crate::listing::Listing;
@@ -42,7 +43,7 @@ pub(super) fn open(pinned: &Pinned, head: &[u8]) -> Result<Contents, FormatError
     }
     let mut listing = Listing::default();
     let text: Vec<u8> = head.iter().copied().take(116).take_while(|&byte| byte != 0).collect();
-    listing.remark(format!("the file's header says: {}", crate::text::latin(&text).trim_end().escape_debug()));
+    listing.remark(format!("{HEADER_SAYS}: {}", crate::text::latin(&text).trim_end().escape_debug()));
     let stream = Stream::plain(pinned.reopen()?, HEADER_BYTES, pinned.bytes());
     let mut elements = Elements { stream, big_endian };
     while elements.stream.position() < pinned.bytes() {

@@ -201,7 +201,7 @@ impl Walk<'_> {
             }
             _ => String::from_utf8_lossy(&bytes).into_owned(),
         };
-        self.listing.remark(text::remark_short(&place.location, &shown));
+        self.listing.text(&place.location, &shown, text::remark_short(&place.location, &shown));
         Ok(())
     }
 }

@@ -11,7 +11,8 @@
 //! axis that is longer than 1 is time. Locations are as MATLAB counts, from 1: `/x`, column 2 `/x[2]`, `/x[2,3]`, field
 //! `/s.f`, `/s(2).f` of an array of structs, `/c{2}` of a cell array. Single numbers are remarks, as are texts; the
 //! sampling rate comes from a single number with a usual name (`fs`, `dt`, `Tinterval`, ...) in the same struct or,
-//! failing that, around it; or from an array of times (`t`, `time`, an `xData` beside `yData`) that runs evenly.
+//! failing that, around it; or from an array of times (`t`, `time`, an `xData` beside `yData`) that runs evenly. Texts beside
+//! an array (`units`, `names{1}`, `acc_units`) are units and long names of its channels where no other array can be meant.
 //!
 //! A compressed variable of at most 64 MiB is inflated to its end when the file is opened, so that damage shows, and
 //! once more and kept when one of its channels is read; a longer one is inflated by stream. All of a file may come to

@@ -7,7 +7,8 @@ use super::plain::Rows;
 use super::titles::{self, Title};
 use super::units;
 use crate::FoundChannel;
-use crate::rate::{fewest_digits, of_step};
+use crate::facts::{AS_RATE, KNOWN_TO, TAKEN_AS_SECONDS};
+use crate::rate::of_step;
 use std::sync::Arc;
 
 /// Channels of the columns, with the rate of the time column among them, or the rate that the header states.
@@ -138,7 +139,7 @@ fn clock(
             Clock { rate_hz: Some(of_step(step)), axis: counts.then_some(0) }
         }
         (None, Some(even)) => {
-            let rate = fewest_digits(of_step(even.step), even.uncertainty);
+            let rate = of_step(even.step);
             remarks.push(format!(
                 "{first} rises evenly: if it is time in seconds, there are {rate} samples per second; title it «Time (s)»"
             ));
@@ -165,9 +166,9 @@ fn rate(
         remarks.push(format!("{location} is in «{}», no unit of time that is known: no sample rate", title.unit));
         return (None, false);
     };
-    let unit = if title.unit.is_empty() { " (no unit: taken as seconds)" } else { "" };
+    let unit = if title.unit.is_empty() { format!(" {TAKEN_AS_SECONDS}") } else { String::new() };
     let first = column.values.first().copied().unwrap_or(0.0);
-    let runs = format!("{location}{unit} runs evenly from {first}: given as the sample rate, not as a channel");
+    let runs = format!("{location}{unit} runs evenly from {first}: {AS_RATE}");
     if let Some((step, words)) = stated {
         let step_there = step / unit_s;
         let even = axis::even_between(column, starts, Some(step_there)).is_ok() || axis::agrees(column, step_there);
@@ -188,7 +189,7 @@ fn rate(
             remarks.push(runs);
             if even.rounded {
                 let relative = even.uncertainty;
-                remarks.push(format!("{location} is rounded: the sample rate is known to {relative:.1e} of itself"));
+                remarks.push(format!("{location} {KNOWN_TO} {relative:.1e} of itself"));
             }
             (Some(of_step(even.step * unit_s)), goes_on)
         }

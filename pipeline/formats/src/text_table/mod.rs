@@ -22,8 +22,9 @@
 //! channel; otherwise it is one and there is no rate. An interval or a rate that the header states by a key (`Sample
 //! Interval`, `Increment`, `delta t`, `tInc`, `Sampling Frequency`) is taken where the times agree with it or there
 //! are none; a first column that counts by 1 is no channel then. If times and header disagree there is no rate.
-//! Evenly: each time deviates from the straight line by at most 1e-6 of a step plus one unit of the last place it is
-//! printed to.
+//! Evenly: there is a straight line from which no time deviates by more than 1e-6 of a step, or by more than half a unit of
+//! the last place it is printed to (or of single precision, if all are numbers of it), where that unit is at most half a
+//! step. Of the rates of such lines that with the fewest digits is given.
 //! A column of one number beside columns of more, and numbers behind words in front of the rows (a header beside them,
 //! as Tektronix writes it), are no channels.
 //!
@@ -44,6 +45,8 @@ mod sniff;
 mod stated;
 mod titles;
 mod units;
+
+pub use axis::even_step;
 
 use crate::pinned::{Pinned, stretch_of};
 use crate::{Contents, Format, FormatError, Raw, Source};

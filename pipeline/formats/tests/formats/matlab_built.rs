@@ -55,6 +55,29 @@ fn every_class_of_level_4_in_both_byte_orders() {
 }
 
 #[test]
+fn texts_in_a_struct_are_names_and_units_of_its_array() {
+    let order = Order(false);
+    let text = |text: &str| order.array(4, &[1, text.len() as u32], "", &order.element(16, text.as_bytes()));
+    let numbers: Vec<u8> = (0..6).flat_map(|k| f64::from(k).to_le_bytes()).collect();
+    let field = |name: &str| {
+        let mut bytes = name.as_bytes().to_vec();
+        bytes.resize(8, 0);
+        bytes
+    };
+    let fields = [field("acc"), field("names"), field("units")].concat();
+    let acc = order.array(6, &[3, 2], "", &order.element(9, &numbers));
+    let names = order.array(1, &[1, 2], "", &[text("left"), text("right")].concat());
+    let inside = [order.element(5, &order.word(8)), order.element(1, &fields), acc, names, text("m/s^2")].concat();
+    let (contents, _file) = opened(&[order.header(), order.array(2, &[1, 1], "Test", &inside)].concat());
+    assert_eq!(locations(&contents), ["/Test.acc[1]", "/Test.acc[2]"]);
+    for (location, name) in [("/Test.acc[1]", "left"), ("/Test.acc[2]", "right")] {
+        let channel = channel(&contents, location);
+        assert_eq!((channel.unit.as_str(), channel.long_name.as_str()), ("m/s^2", name));
+    }
+    assert!(contents.remarks.iter().all(|remark| afmid_formats::is_fact(remark)), "{:?}", contents.remarks);
+}
+
+#[test]
 fn level_4_that_cannot_be_read_is_refused() {
     let little = Order(false);
     for (machine, name) in [(2, "VAX D-float"), (3, "VAX G-float"), (4, "Cray")] {

@@ -14,12 +14,15 @@
 //! - Arrays of times (`/time`, the index of pandas, dimension scales in a unit of time) are axes: [`settle_axes`].
 //! - Integers in a unit but without a scale are codes, of which the unit is not known. JPK's files state the scale in
 //!   attributes of the group: `encoder.scaling.multiplier`, `encoder.scaling.offset`, `encoder.scaling.unit.unit`.
-//! - Text, structs, references, complex and half-precision numbers are remarks.
+//! - Texts of MATLAB beside an array (`units`, cells `names`) are units and long names of its channels where no other array
+//!   can be meant.
+//! - Other text, structs, references, complex and half-precision numbers are remarks.
 //!
 //! Source: The HDF Group, "HDF5 File Format Specification", version 3; pycroscopy, "USID" and "NSID" data models
 //! (<https://pycroscopy.github.io/USID>, <https://pycroscopy.github.io/pyNSID>); MathWorks, "MAT-File Versions" (7.3 is
 //! HDF5); PyTables, "File format"; pandas writes `DataFrame.to_hdf` by it, fixed and as a table.
 
+mod labels;
 mod matrix;
 mod pandas;
 mod scope;
@@ -29,7 +32,7 @@ mod walk;
 
 use std::path::Path;
 
-use afmid_formats::{Contents, most_inflated, settle_axes};
+use afmid_formats::{Contents, Labels, most_inflated, settle_axes};
 
 use super::input_files::{InputFiles, require_state};
 use super::native::{states_rate, text_attribute};
@@ -59,6 +62,7 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
     let (mut bytes, most_bytes) = (0_u64, most_inflated(hashed.state.size()));
     let found = walk::datasets(&file, &mut scopes, allowance, &mut remarks);
     let times = Times::of(&found);
+    let mut texts_found = Labels::default();
     for found in found {
         let series = match Variable::of(&found, matlab, allowance, &times) {
             Ok(Variable::Single(value)) => {
@@ -68,7 +72,14 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
             }
             Ok(Variable::Series(series)) => series,
             Err(why) => {
-                remarks.push(format!("{} is left out: {why}", found.location));
+                let texts = if matlab { labels::texts(&found, allowance) } else { Vec::new() };
+                if texts.is_empty() {
+                    remarks.push(format!("{} is left out: {why}", found.location));
+                }
+                for (location, text) in texts {
+                    remarks.push(format!("{location} is the text \"{}\"", text.escape_debug()));
+                    texts_found.add(&location, &text);
+                }
                 continue;
             }
         };
@@ -110,6 +121,7 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
             }
         }
     }
+    texts_found.give(&mut channels);
     let mut contents =
         Contents { format: String::new(), started_at: String::new(), channels, responses: Vec::new(), remarks };
     settle_axes(&mut contents);

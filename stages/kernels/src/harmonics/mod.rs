@@ -27,6 +27,7 @@
 //! # Ok::<(), afmid_kernels::harmonics::HarmonicError>(())
 //! ```
 
+mod beside;
 mod columns;
 mod fit;
 mod fundamental;
@@ -39,6 +40,7 @@ mod tone;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use beside::find_decays_beside_lines;
 pub use fit::fit_harmonics;
 pub use tone::is_tone;
 

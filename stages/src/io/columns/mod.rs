@@ -1,6 +1,7 @@
 //! Measured input and output from the channels of one file.
 
 mod example;
+mod part;
 mod selection;
 mod series;
 mod stage;

@@ -7,13 +7,15 @@ use afmid_pipeline::{Array, Context, Document, Example, Faults, InputFiles, Port
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::part::Part;
 use super::selection::Column;
 use super::series::Series;
 use super::stretch::Removal;
+use crate::io::file_patterns::matching_files;
 use crate::io::shared_data::moved;
 
 /// Reads measured input and output from the channels of a file, and splits them into a stretch to fit and one to judge
-/// on.
+/// on; of several files, hits or takes of the same channels, all in a row.
 ///
 /// # Model
 /// Equally sampled inputs u and an output y, or several, channels of a file of any format that `io.records` opens: columns of a
@@ -21,18 +23,19 @@ use crate::io::shared_data::moved;
 /// # Method
 /// Two stretches of time, identification and verification. Mean or line are taken off with the constants of the
 /// identification stretch alone, also from the other, which so stays unseen. Missing samples (empty, NaN, the given
-/// codes) stay missing: nothing is interpolated.
+/// codes) stay missing: nothing is interpolated. Of several files each is a record: from each its own mean or line is
+/// taken off; the first is the identification stretch, the last the verification.
 /// # Shapes
 /// `response`, `force` over `time`, the whole record; the same with `_identification` and `_verification` over axes of
 /// their own, which may differ in length. With several inputs `force` is over (`input`, time), with several outputs
-/// `response` over (`output`, time). The attributes `inputs` and `outputs` name the channels.
+/// `response` over (`output`, time). Of several files `first_sample` over `record` is where each begins. The attributes `inputs` and `outputs` name the channels.
 /// # Units
 /// Those of the file, times `input_scale` and `output_scale`.
 /// # Accuracy
 /// Numbers as in the file; 64-bit integers beyond 2^53 are rounded.
 /// # Errors
 /// A file of no format or damaged; a channel that is not there; no sample rate, two that differ, times that are not
-/// equally spaced; stretches beyond the record or across an interruption; missing inputs; an output that is missing
+/// equally spaced; files of unlike rates or units; stretches beyond the record or across an interruption; missing inputs; an output that is missing
 /// altogether.
 /// # Source
 /// L. Ljung, System Identification, 1999, sections 14.1 and 16.5; docs/archives.md for the formats.
@@ -40,8 +43,11 @@ use crate::io::shared_data::moved;
 #[serde(deny_unknown_fields, default)]
 pub struct Columns {
     /// The file, relative to the config file. A path that begins with `../../shared/data/` begins at the variable
-    /// `AFMID_DATA` where that is set. Required.
+    /// `AFMID_DATA` where that is set. Required, or `files`.
     pub file: String,
+    /// Several files with the same channels, instead of `file`: hits or takes, each recorded by itself, as patterns
+    /// likewise. Default: none. Why: `spectrum.measured_frf` averages over all; other stages take one record.
+    pub files: Vec<String>,
     /// Channels of the inputs, at least one. Default: the first.
     pub inputs: Vec<Column>,
     /// Channel of the output. Default: the second.
@@ -58,8 +64,8 @@ pub struct Columns {
     /// makes frequencies cycles per sample.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub sample_rate_hz: Option<f64>,
-    /// Channel of the time in seconds, for the sample rate; equally spaced to 1 %. For files whose time axis is not
-    /// titled as one.
+    /// Channel of the time in seconds, for the sample rate; equally spaced to 1 %, or to half a unit of its last
+    /// digit. For files whose time axis is not titled as one.
     pub time: Option<Column>,
     /// Stretch to fit, as first sample (from 0) and one past the last. Absent: the first half.
     pub identification: Option<[usize; 2]>,
@@ -86,6 +92,7 @@ impl Default for Columns {
     fn default() -> Self {
         Self {
             file: String::new(),
+            files: Vec::new(),
             inputs: vec![Column::Number(1)],
             output: Column::Number(2),
             outputs: Vec::new(),
@@ -113,7 +120,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Columns {
     const SPEC: Spec = Spec {
         name: "io.columns",
-        version: 3,
+        version: 4,
         summary: "reads measured input and output from the channels of a file of any format",
         inputs: &[],
         outputs: &[PAIR.spec(), SUMMARY.spec()],
@@ -122,8 +129,11 @@ impl Stage for Columns {
     };
 
     fn check(&self, faults: &mut Faults) {
-        faults.require(!self.file.is_empty(), || {
+        faults.require(!self.file.is_empty() || !self.files.is_empty(), || {
             "`file` is empty, wanted a file such as \"data/flutter.dat\"".to_owned()
+        });
+        faults.require(self.file.is_empty() || self.files.is_empty(), || {
+            "`file` and `files` are both given, wanted one of them".to_owned()
         });
         faults.require(!self.inputs.is_empty(), || "`inputs` is empty, wanted at least one channel".to_owned());
         self.inputs.iter().for_each(|column| faults.take(column.check("inputs")));
@@ -149,22 +159,28 @@ impl Stage for Columns {
         }
     }
 
-    fn sources(&self, base: &Path, _files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
-        let path = self.path(base);
-        if path.is_file() {
-            return Ok(vec![path]);
+    fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
+        let paths = self.paths(base, files)?;
+        match &paths[..] {
+            [path] if !path.is_file() => {
+                Err(StageError::new(format!("`file` is {}, which is not there", path.display())))
+            }
+            _ => Ok(paths),
         }
-        Err(StageError::new(format!("`file` is {}, which is not there", path.display())))
     }
 
     fn location_params() -> &'static [&'static str] {
-        &["file"]
+        &["file", "files"]
     }
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let path = self.path(cx.base());
-        let file = WholeFile::open(cx.files(), &path, &Reading::of(&self.format, self.raw.clone()))?;
-        let series = Series::new(self, &file).map_err(|error| error.at(&path))?;
+        let mut parts = Vec::new();
+        for path in self.paths(cx.base(), cx.files())? {
+            let file = WholeFile::open(cx.files(), &path, &Reading::of(&self.format, self.raw.clone()))?;
+            let part = Part::read(self, &file).and_then(|part| part.like(parts.first()));
+            parts.push(part.map_err(|error| error.at(&path))?);
+        }
+        let series = Series::of(self, parts)?;
         let (pair, summary) = series.split(self)?;
         series.warnings().into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new().with(&PAIR, pair).with(&SUMMARY, summary))
@@ -181,8 +197,18 @@ impl Columns {
         if self.outputs.is_empty() { std::slice::from_ref(&self.output) } else { &self.outputs }
     }
 
-    fn path(&self, base: &Path) -> PathBuf {
+    /// The files, one at least. Errors: a pattern without a match.
+    fn paths(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
         let root = std::env::var_os("AFMID_DATA");
-        base.join(moved(&self.file, root.as_deref().map(Path::new)))
+        let moved = |path: &String| moved(path, root.as_deref().map(Path::new));
+        if self.files.is_empty() {
+            return Ok(vec![base.join(moved(&self.file))]);
+        }
+        let found = matching_files(&self.files.iter().map(moved).collect::<Vec<_>>(), base, files)?;
+        let records: Vec<PathBuf> = found.into_iter().filter(|file| !file.is_result).map(|file| file.path).collect();
+        match records.is_empty() {
+            true => Err(StageError::new("`files` matches results of afmid's alone, wanted recordings")),
+            false => Ok(records),
+        }
     }
 }

@@ -86,6 +86,61 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     assert!(stage(|s| s.file = "b.csv".to_owned()).sources(folder.path(), &InputFiles::new()).is_err());
 }
 
+#[test]
+fn times_that_are_rounded_to_their_last_digit_give_the_rate() {
+    let folder = tempfile::tempdir().unwrap();
+    let run_with = |title: &str, lost: usize| {
+        let rows = (0..3000)
+            .filter(|k| *k != lost)
+            .map(|k| format!("{:.4},{},{}\n", f64::from(k as u16) / 2560.0, k % 3, k % 5));
+        std::fs::write(folder.path().join("a.csv"), format!("{title},u,y\n{}", rows.collect::<String>())).unwrap();
+        let time = (title == "clock").then(|| Column::Name(title.to_owned()));
+        let inputs = vec![Column::Name("u".to_owned())];
+        let (file, output) = ("a.csv".to_owned(), Column::Name("y".to_owned()));
+        run(&Columns { file, inputs, output, time, ..Columns::default() }, folder.path())
+    };
+    for title in ["Time (s)", "clock"] {
+        let (ports, _) = run_with(title, usize::MAX).unwrap();
+        let rate = ports.get(&SUMMARY).unwrap().0["sample_rate_hz"].as_f64().unwrap();
+        assert!((rate - 2560.0).abs() < 1e-9, "{rate}");
+        assert!(run_with(title, 1700).is_err());
+    }
+}
+
+#[test]
+fn several_files_are_records_in_a_row_each_without_its_own_mean() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, header: &str, samples: u32, level: f64| {
+        let row = |k: u32| format!("{},{},{}\n", f64::from(k) / 100.0, k % 2, level + f64::from(k % 5));
+        let rows: String = (0..samples).map(row).collect();
+        std::fs::write(folder.path().join(name), format!("{header}\n{rows}")).unwrap();
+    };
+    write("hit_2.csv", "Time (s),u (N),y (V)", 20, 7.0);
+    write("hit_10.csv", "Time (s),u (N),y (V)", 40, -3.0);
+    let of = |files: &[&str]| {
+        let files = files.iter().map(|file| (*file).to_owned()).collect();
+        Columns { files, ..Columns::default() }
+    };
+    let (ports, _) = run(&of(&["hit_*.csv"]), folder.path()).unwrap();
+    let pair = ports.get(&PAIR).unwrap();
+    pair.validate().unwrap();
+    assert_eq!(pair.real("first_sample").unwrap(), [0.0, 20.0]);
+    assert_eq!(pair.real("response").unwrap().len(), 60);
+    for (set, samples) in [("response_identification", 20), ("response_verification", 40)] {
+        let values = pair.real(set).unwrap();
+        // both hold whole cycles about a mean of their own
+        assert!(values.len() == samples && values[0] == -2.0 && values[samples - 1] == 2.0, "{values:?}");
+    }
+    let pair = crate::artifacts::Pair::new(pair);
+    let refused = pair.series(crate::artifacts::DataSet::All, 0).map(|_| ()).unwrap_err();
+    assert!(refused.to_string().contains("2 records in a row"), "{refused}");
+    write("other.csv", "Time (s),u (N),y (g)", 20, 0.0);
+    let error = run(&of(&["hit_2.csv", "other.csv"]), folder.path()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("the output's unit is g, that of the first of `files` V"), "{error}");
+    let both = Columns { file: "hit_2.csv".to_owned(), ..of(&["hit_10.csv"]) };
+    assert!(afmid_pipeline::stage::check(&both).is_err());
+}
+
 const LVM: &str = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\nX_Columns\tNo\n***End_of_Header***\t\n\t\n\
     Channels\t2\nSamples\t4\t4\t\nY_Unit_Label\tN\tV\nDelta_X\t2,5E-2\t2,5E-2\t\n***End_of_Header***\t\t\t\n\
     X_Value\tforce\tresponse\tComment\n\t1\t2\n\t2\t4\n\t3\t9\n\t5\t7\n";

@@ -28,6 +28,40 @@ pub enum BlockKind {
     Segments,
 }
 
+/// The sample in which the first hit begins: the force comes to the share `level` of its largest value about its median.
+pub fn hit_begins(force: &[f64], level: f64) -> usize {
+    let offset = median(&mut force.to_vec());
+    let size = |value: &f64| (value - offset).abs();
+    let largest = force.iter().map(size).fold(0.0, f64::max);
+    force.iter().position(|value| size(value) >= level * largest).unwrap_or_default()
+}
+
+/// Which of several records hold a hit: their first input comes to the share `level` of the largest of all, each about its
+/// median.
+pub fn with_hits(records: &[Block<'_>], level: f64) -> Vec<bool> {
+    let largest = |record: &Block<'_>| {
+        let force = record.inputs.first().copied().unwrap_or_default();
+        let offset = median(&mut force.to_vec());
+        force.iter().map(|value| (value - offset).abs()).fold(0.0, f64::max)
+    };
+    let each: Vec<f64> = records.iter().map(largest).collect();
+    let all = each.iter().copied().fold(0.0, f64::max);
+    each.iter().map(|one| *one > 0.0 && *one >= level * all).collect()
+}
+
+/// Samples of a block that every one of several records has: up to the end where half of the records or more hold one hit,
+/// else up to the next hit.
+pub fn common_hit_samples(records: &[Block<'_>], before: usize, level: f64) -> Option<usize> {
+    let forces = || records.iter().map(|record| record.inputs.first().copied().unwrap_or_default());
+    let spacings: Vec<Option<usize>> = forces().map(|force| hit_spacing(force, before)).collect();
+    let single = 2 * spacings.iter().filter(|spacing| spacing.is_none()).count() >= records.len();
+    let samples = forces().zip(spacings).map(|(force, spacing)| {
+        let to_the_end = || force.len() - hit_begins(force, level) + before;
+        spacing.filter(|_| !single).unwrap_or_else(to_the_end).min(force.len())
+    });
+    samples.min()
+}
+
 /// Share of samples that are the same number from which an input was under a force window when it was recorded: less
 /// than half the samples of a sensor's noise are the same code. Zeros may have been moved by an offset since.
 const WINDOWED: f64 = 0.5;

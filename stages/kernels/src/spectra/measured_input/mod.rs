@@ -9,6 +9,9 @@ mod noise;
 #[cfg(test)]
 mod tests;
 
-pub use blocks::{Block, BlockKind, half_energy_samples, hit_spacing, hits, is_impulsive, segments};
+pub use blocks::{
+    Block, BlockKind, common_hit_samples, half_energy_samples, hit_begins, hit_spacing, hits, is_impulsive, segments,
+    with_hits,
+};
 pub use estimate::{Estimator, MeasuredResponse, ResponseSettings, frequency_response};
 pub use follows::chance_coherence;

@@ -284,3 +284,22 @@ fn hits_are_as_far_apart_as_the_nearest_two_and_a_bounce_is_none() {
     let sine: Vec<f64> = (0..4000).map(|k| (0.1 * f64::from(k)).sin()).collect();
     assert!(!is_impulsive(&sine) && !is_impulsive(&[1.0; 500]));
 }
+
+#[test]
+fn blocks_of_records_with_a_hit_each_reach_to_the_end_of_the_shortest() {
+    let record = |samples: usize, hits: &[usize], size: f64| {
+        let mut force = vec![0.0; samples];
+        hits.iter().for_each(|at| force[*at] = size);
+        force
+    };
+    let forces =
+        [record(500, &[40], 1.0), record(400, &[100], 0.5), record(600, &[50, 90], 1.0), record(500, &[9], 1e-3)];
+    let blocks: Vec<Block<'_>> = forces.iter().map(|f| Block { inputs: vec![f], outputs: vec![f] }).collect();
+    assert_eq!(with_hits(&blocks, 0.1), [true, true, true, false]);
+    // a second hit in one of three is no reason for blocks of forty samples
+    assert_eq!(common_hit_samples(&blocks[..3], 10, 0.1), Some(400 - 100 + 10));
+    let twice = [record(500, &[40, 240], 1.0), record(500, &[50, 260], 1.0), record(500, &[50], 1.0)];
+    let blocks: Vec<Block<'_>> = twice.iter().map(|f| Block { inputs: vec![f], outputs: vec![f] }).collect();
+    assert_eq!(common_hit_samples(&blocks, 10, 0.1), Some(200));
+    assert_eq!(hit_begins(&forces[1], 0.1), 100);
+}

@@ -1,0 +1,183 @@
+//! The channels of one file: inputs, outputs, their rate and units.
+
+use afmid_pipeline::StageError;
+use afmid_pipeline::recording::{FoundChannel, WholeFile, agreed_rate, even_step, lane_names};
+
+use super::selection::Column;
+use super::stage::Columns;
+
+/// Inputs and outputs of one file in their units, NaN where missing.
+pub(super) struct Part {
+    pub inputs: Vec<Vec<f64>>,
+    pub outputs: Vec<Vec<f64>>,
+    pub samples: usize,
+    pub input_unit: String,
+    pub output_unit: String,
+    /// As the file names the channels.
+    pub input_names: Vec<String>,
+    pub output_names: Vec<String>,
+    pub rate: f64,
+    /// Samples before which a channel was interrupted.
+    pub gaps: Vec<usize>,
+}
+
+/// Largest departure of a channel of times from equal spacing, in intervals.
+const UNEQUAL: f64 = 0.01;
+/// What rates of two files may differ by, relative: `io.records` takes them for the same.
+const SAME_RATE: f64 = 1e-6;
+
+impl Part {
+    /// Reads the channels. Errors: see the stage.
+    pub fn read(wanted: &Columns, file: &WholeFile) -> Result<Self, StageError> {
+        let channels = Channels::find(wanted, file)?;
+        let rate = channels.rate(wanted, file)?;
+        let values = |channel: &FoundChannel, scale: f64| -> Result<Vec<f64>, StageError> {
+            let value = |value: f64| if wanted.missing.contains(&value) { f64::NAN } else { value * scale };
+            Ok(file.read(channel)?.into_iter().map(value).collect())
+        };
+        let inputs: Vec<Vec<f64>> =
+            channels.inputs.iter().map(|channel| values(channel, wanted.input_scale)).collect::<Result<_, _>>()?;
+        let outputs: Vec<Vec<f64>> =
+            channels.outputs.iter().map(|channel| values(channel, wanted.output_scale)).collect::<Result<_, _>>()?;
+        let samples = outputs.first().map_or(0, Vec::len);
+        for (channel, values) in channels.all().zip(inputs.iter().chain(&outputs)) {
+            if values.len() != samples {
+                let (name, output) = (&channel.location, channels.first_output());
+                return Err(StageError::new(format!(
+                    "{name} has {} samples, the output {output} has {samples}; wanted as many",
+                    values.len()
+                )));
+            }
+        }
+        for (channel, input) in channels.inputs.iter().zip(&inputs) {
+            let name = &channel.location;
+            if let Some(k) = input.iter().position(|value| !value.is_finite()) {
+                return Err(StageError::new(format!(
+                    "input {name} misses sample {k}: the response to an unknown input is unknown"
+                ))
+                .help("choose stretches without gaps in the input and cut the file to them"));
+            }
+        }
+        for (channel, output) in channels.outputs.iter().zip(&outputs) {
+            if output.iter().all(|value| !value.is_finite()) {
+                return Err(StageError::new(format!("output {} has no value at all", channel.location)));
+            }
+        }
+        Ok(Self {
+            input_unit: unit(&channels.inputs, wanted.input_unit.as_deref(), wanted.input_scale, "input")?,
+            output_unit: unit(&channels.outputs, wanted.output_unit.as_deref(), wanted.output_scale, "output")?,
+            input_names: names(&channels.inputs),
+            output_names: names(&channels.outputs),
+            gaps: channels.all().flat_map(|channel| channel.gaps.clone()).collect(),
+            rate,
+            inputs,
+            outputs,
+            samples,
+        })
+    }
+
+    /// Itself, if its rate and units are those of the first file. Errors: they differ.
+    pub fn like(self, first: Option<&Self>) -> Result<Self, StageError> {
+        let Some(first) = first else { return Ok(self) };
+        let differ = |what: &str, own: &dyn std::fmt::Display, theirs: &dyn std::fmt::Display| {
+            Err(StageError::new(format!("{what} is {own}, that of the first of `files` {theirs}")))
+        };
+        if (self.rate - first.rate).abs() > SAME_RATE * first.rate {
+            return differ("the sample rate", &self.rate, &first.rate);
+        }
+        if self.input_unit != first.input_unit {
+            return differ("the input's unit", &self.input_unit, &first.input_unit);
+        }
+        match self.output_unit == first.output_unit {
+            true => Ok(self),
+            false => differ("the output's unit", &self.output_unit, &first.output_unit),
+        }
+    }
+}
+
+/// The channels that are meant.
+struct Channels<'a> {
+    inputs: Vec<&'a FoundChannel>,
+    outputs: Vec<&'a FoundChannel>,
+}
+
+impl<'a> Channels<'a> {
+    fn find(wanted: &Columns, file: &'a WholeFile) -> Result<Self, StageError> {
+        let contents = file.contents();
+        let found = |columns: &[Column]| {
+            columns.iter().map(|column| column.of(contents)).collect::<Result<Vec<_>, StageError>>()
+        };
+        Ok(Self { inputs: found(&wanted.inputs)?, outputs: found(wanted.all_outputs())? })
+    }
+
+    fn all(&self) -> impl Iterator<Item = &'a FoundChannel> {
+        self.inputs.iter().chain(&self.outputs).copied()
+    }
+
+    /// Its place in the file.
+    fn first_output(&self) -> &'a str {
+        self.outputs.first().map_or("", |channel| &channel.location)
+    }
+
+    /// The one rate that all state, or that the user gives. Errors: none, or several.
+    fn rate(&self, wanted: &Columns, file: &WholeFile) -> Result<f64, StageError> {
+        let stated = self.all().map(|channel| (channel, channel.sample_rate_hz));
+        let stated: Vec<(&FoundChannel, f64)> =
+            stated.filter_map(|(channel, rate)| rate.map(|rate| (channel, rate))).collect();
+        let first = stated.first().map(|(_, rate)| *rate);
+        for (channel, rate) in &stated {
+            agreed_rate(Some(*rate), first, &channel.location)?;
+        }
+        if let (None, None, Some(column)) = (first, wanted.sample_rate_hz, &wanted.time) {
+            return spaced_equally(column, file);
+        }
+        agreed_rate(first, wanted.sample_rate_hz, self.first_output()).map_err(|error| match first {
+            Some(_) => error,
+            None => error.help("give `sample_rate_hz` (1 for cycles per sample) or the channel `time`"),
+        })
+    }
+}
+
+/// The unit of channels, with what the user says of it. Errors: they state several; the user states another; they are
+/// scaled to nobody knows what.
+fn unit(channels: &[&FoundChannel], given: Option<&str>, scale: f64, what: &str) -> Result<String, StageError> {
+    let scaled = scale != 1.0;
+    match (given, channels.first().map_or("", |channel| &channel.unit)) {
+        (Some(given), _) if scaled => Ok(given.to_owned()),
+        (None, _) if scaled => Err(StageError::new(format!("`{what}_scale` is {scale} and `{what}_unit` is missing"))
+            .help(format!("say what the scaled values are in: {what}_unit = \"N\""))),
+        (given, stated) => match channels.iter().find(|channel| given.unwrap_or(stated) != channel.unit) {
+            Some(other) if !other.unit.is_empty() => {
+                let wanted = given.unwrap_or(stated);
+                Err(StageError::new(format!("{} is in {}, wanted {wanted}", other.location, other.unit))
+                    .help(format!("leave `{what}_unit` out, or convert with `{what}_scale`")))
+            }
+            _ => Ok(Some(given.unwrap_or(stated)).filter(|unit| !unit.is_empty()).unwrap_or("1").to_owned()),
+        },
+    }
+}
+
+/// As the file names channels.
+fn names(channels: &[&FoundChannel]) -> Vec<String> {
+    let of = |channel: &&FoundChannel| channel.location.trim_start_matches('/').to_owned();
+    let lanes = lane_names(channels.iter().map(|channel| (channel.location.as_str(), channel.long_name.as_str())));
+    lanes.unwrap_or_else(|| channels.iter().map(of).collect())
+}
+
+/// The rate of a channel of times. Errors: there is none; they are not equally spaced.
+fn spaced_equally(column: &Column, file: &WholeFile) -> Result<f64, StageError> {
+    let times = file.read(column.of(file.contents())?)?;
+    equal_spacing(&times).or_else(|| even_step(&times).ok().map(f64::recip)).ok_or_else(|| {
+        let problem = "are not equally spaced, ascending and complete to 1 % or to their last digit";
+        StageError::new(format!("the times in channel {column} {problem}"))
+            .help("resample the record, or give `sample_rate_hz` if they are only a coarse clock")
+    })
+}
+
+/// Samples per unit of an equally spaced series.
+fn equal_spacing(times: &[f64]) -> Option<f64> {
+    let (first, last) = (times.first()?, times.last()?);
+    let interval = (last - first) / (times.len() - 1).max(1) as f64;
+    let even = times.windows(2).all(|pair| (pair[1] - pair[0] - interval).abs() <= UNEQUAL * interval);
+    (interval > 0.0 && interval.is_finite() && even).then(|| 1.0 / interval)
+}
