@@ -21,6 +21,10 @@ const BEYOND: usize = 1;
 /// The same of those that white noise would not yield, wander might: several modes together look like wander as long as one
 /// of them is missing.
 const BEYOND_WANDER: usize = 6;
+/// Share of a channel's energy that a further mode takes off and that more modes are tried for, however many: beside each
+/// of a pair its partner looks like noise, until all are there. Why 0.05: of twelve modes alike each takes a twelfth; of a
+/// noise that wanders over a hundredth of the record an exponential takes 0.02.
+const STRONG: f64 = 0.05;
 /// Share of a mode's gain that the bank sees at least: its places are coarse, and other modes have moved.
 const BANK: f64 = 0.5;
 /// Weighted square of a mode's amplitudes over its gain from which on no fit without it is tried.
@@ -245,7 +249,12 @@ impl Ladder<'_> {
             let gain = self.coloured_gain(white, &needed, &next, places.len());
             let kept = modes <= least || !self.by_chance(gain, modes - place);
             seen.push(OrderTried { modes, gain, kept });
-            let beyond = if self.by_chance(white, modes - place) { BEYOND } else { BEYOND_WANDER };
+            let fall = |c: usize| current.energy[c] - next.energy[c] > STRONG * current.energy[c];
+            let beyond = match self.by_chance(white, modes - place) {
+                _ if (0..next.energy.len()).any(fall) => most,
+                true => BEYOND,
+                false => BEYOND_WANDER,
+            };
             if kept {
                 (needed, place) = (self.mark(&next), modes);
                 best = None;
