@@ -28,6 +28,8 @@ const RANDOM_RISES: usize = 10;
 /// Departure of a random vibration's kurtosis from that of a normal distribution. Why: four standard errors of 1,500
 /// independent samples, of which ten rises have some; the narrower the band, the more.
 const RANDOM_KURTOSIS: f64 = 0.5;
+/// A sixteenth of a driven stretch is left out at its end: to so much a bend is known.
+const END: usize = 16;
 /// Change of the amplitude, nepers, below which a stretch may be a drive's. Why: of few segments a slope's error would
 /// also let the first beat of a decay pass.
 const DRIVEN_FALL: f64 = 0.05;
@@ -259,8 +261,8 @@ impl<'a> Record<'a> {
         let seen = self.response_ends.iter().copied().find(inside);
         let bends = bend(&self.envelope, onset..end).filter(inside);
         let steady = |last: usize| {
-            // the switch-on and the last period are not steady
-            let range = onset + period..last - period;
+            // the switch-on is not steady, nor are the last periods where the end is late
+            let range = onset + period..last - period.max((last - onset) / END);
             let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
             let known = tone.decline.std_per_s.is_finite();
             let falls = tone.decline.rate_per_s.abs() * range.len() as f64 / self.rate_hz;
