@@ -35,7 +35,7 @@ import least_squares
 import lscf
 import ours
 import subspace
-from table import Fits, print_tables
+from table import Fits, print_tables, print_whole
 from truth import CASES
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -136,6 +136,7 @@ def main():
     options = parser.parse_args()
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
+    shown = {}
     with tempfile.TemporaryDirectory() as folder:
         for case in options.case or CASES:
             records = [CASES[case](seed) for seed in range(1, options.seeds + 1)]
@@ -147,11 +148,13 @@ def main():
             ]
             for name, setting, arguments, counts in [] if options.ours else settings(case):
                 fits.append(Fits.of_peer(name, setting, peer(case, name, arguments, records), records, counts))
-            print_tables(case, fits, options.all)
+            shown[case] = print_tables(case, fits, options.all)
     load = " to ".join(f"{value:.1f}" for value in sorted(os.getloadavg()))
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "pyOMA-2", "sdypy-EMA"))
     print(f"\nPython {platform.python_version()}, {packages}; load {load}")
-    print("Start and imports, s: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in starts().items()))
+    seconds = starts()
+    print("Start and imports, s: " + ", ".join(f"{name} {own:.2f}" for name, own in seconds.items()))
+    print_whole(shown, seconds)
 
 
 if __name__ == "__main__":

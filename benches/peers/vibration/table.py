@@ -92,7 +92,7 @@ def row(case, fits, modes):
 
 
 def print_tables(case, fits, everything):
-    """One row a method, its best setting; then how afmid stands to each."""
+    """One row a method, its best setting; then how afmid stands to each: its run as it comes, and the best settings."""
     own, peers = fits[:2], fits[2:]
     modes = own[0].bound[..., 0].size
     print(
@@ -113,3 +113,14 @@ def print_tables(case, fits, everything):
         times = (own[0].more["run"], own[0].more["fit"], own[1].more["fit"])
         ratios = " | ".join(f"{seconds / theirs.seconds:.2f}" for seconds in times)
         print(f"| {theirs.name} | {f:.3f} ± {f_std:.3f} | {damping:.3f} ± {damping_std:.3f} | {ratios} |", flush=True)
+    return own[0], best
+
+
+def print_whole(cases, starts):
+    """From the start of a program to the modes: afmid's three commands, the others' start, imports and fit."""
+    print("\n| case | afmid: new, run and show, ms | " + " | ".join(f"{name}, ms" for name in starts) + " |")
+    print("|---" * (2 + len(starts)) + "|")
+    for case, (own, best) in cases.items():
+        ours = sum(own.more[step] for step in ("new", "run", "show"))
+        theirs = (next((f.seconds for f in best if name in f.name), np.nan) + start for name, start in starts.items())
+        print(f"| {case} | {1e3 * ours:.0f} | " + " | ".join(f"{1e3 * seconds:.0f}" for seconds in theirs) + " |")

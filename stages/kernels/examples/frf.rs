@@ -243,6 +243,7 @@ fn outcome(case: &Case, responses: usize, noise: f64, seed: u64, known: bool) ->
         frequency_hz: &truth.frequency_hz,
         transfer: &rows,
         variance: known.then_some(&variance[..]),
+        input_noise: None,
     };
     let options = FrfModesOptions { quantity: FrfQuantity::Accelerance, ..FrfModesOptions::default() };
     let begin = std::time::Instant::now();

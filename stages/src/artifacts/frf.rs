@@ -11,6 +11,7 @@ const RESPONSE: &str = "response";
 const FRF: &str = "frf";
 const VARIANCE: &str = "variance";
 const COHERENCE: &str = "coherence";
+const INPUT_NOISE: &str = "input_noise";
 const RESPONSES: &str = "responses";
 const QUANTITY: &str = "quantity";
 const DRIVING_POINT: &str = "driving_point";
@@ -63,10 +64,14 @@ impl Point {
 pub(crate) struct ResponseOf {
     pub output: Point,
     pub input: Point,
+    /// Responses of equal number were measured at once, from the same input.
+    #[serde(default)]
+    pub run: usize,
 }
 
 /// Frequency responses: `frf` over `response` and `frequency_hz`, ascending, NaN where it is not known; with `variance`,
-/// the expected squared error of the complex value, and `coherence` where these are known.
+/// the expected squared error of the complex value, `coherence` and `input_noise`, the part of the relative squared error
+/// that responses of one run have in common, where these are known.
 #[derive(Debug, Clone)]
 pub(crate) struct Frf<'a> {
     pub frequency_hz: &'a [f64],
@@ -76,6 +81,7 @@ pub(crate) struct Frf<'a> {
     pub frf: &'a [Complex64],
     pub variance: Option<&'a [f64]>,
     pub coherence: Option<&'a [f64]>,
+    pub input_noise: Option<&'a [f64]>,
     pub quantity: Quantity,
     /// Output over input.
     pub unit: &'a str,
@@ -123,6 +129,7 @@ impl<'a> Frf<'a> {
             frf,
             variance: real(VARIANCE)?,
             coherence: real(COHERENCE)?,
+            input_noise: real(INPUT_NOISE)?,
             quantity: quantity_of(text(QUANTITY))?,
             unit: &array.variable(FRF)?.unit,
             driving_point,
@@ -144,6 +151,12 @@ impl<'a> Frf<'a> {
     }
 }
 
+/// The rows of a variable, response by response.
+pub(crate) fn rows_of<T>(values: &[T], rows: usize) -> Vec<&[T]> {
+    let length = values.len() / rows.max(1);
+    (0..rows).map(|row| row_of(values, row, length)).collect()
+}
+
 fn row_of<T>(values: &[T], row: usize, length: usize) -> &[T] {
     values.get(row * length..(row + 1) * length).unwrap_or_default()
 }
@@ -156,6 +169,7 @@ pub(crate) struct NewFrf {
     pub frf: Vec<Complex64>,
     pub variance: Option<Vec<f64>>,
     pub coherence: Option<Vec<f64>>,
+    pub input_noise: Option<Vec<f64>>,
     pub quantity: Quantity,
     pub unit: String,
     pub driving_point: Option<usize>,
@@ -186,6 +200,10 @@ impl NewFrf {
             let what = "share of the output's power that all inputs explain: of one the ordinary coherence";
             array = array.with(COHERENCE, "1", what, over, coherence);
         }
+        if let Some(noise) = self.input_noise {
+            let what = "squared error relative to the response that all of one run have in common: the input's noise";
+            array = array.with(INPUT_NOISE, "1", what, over, noise);
+        }
         if let Some(row) = self.driving_point {
             array = array.attribute(DRIVING_POINT, row);
         }
@@ -212,7 +230,7 @@ mod tests {
     }
 
     fn two_responses() -> NewFrf {
-        let response = |output: &str| ResponseOf { output: point(output, Some(0.5)), input: point("1", None) };
+        let response = |output: &str| ResponseOf { output: point(output, Some(0.5)), input: point("1", None), run: 0 };
         NewFrf {
             frequency_hz: vec![1.0, 2.5, 3.0],
             responses: vec![response("1"), response("2")],

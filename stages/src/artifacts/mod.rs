@@ -39,7 +39,7 @@ pub(crate) use decays::{Decays, Sensor, decay_array};
 pub(crate) use density::{Density, NewDensity};
 pub(crate) use ensemble::{Ensemble, NewEnsemble, with_places};
 pub use frf::Quantity;
-pub(crate) use frf::{Frf, NewFrf, Point, ResponseOf};
+pub(crate) use frf::{Frf, NewFrf, Point, ResponseOf, rows_of};
 pub(crate) use model::{
     first_sample, further_inputs, innovations, nuisances, state_nuisances, state_space, state_t0_ambiguity,
     t0_ambiguity_s,

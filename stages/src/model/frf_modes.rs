@@ -17,9 +17,9 @@ use self::tables::{channels, fit_array, summary};
 use super::count::Count;
 use super::decay::{MODES, SHAPES};
 use super::stabilisation::pole_table;
-use crate::artifacts::{Frf, mode_table, shape_array};
+use crate::artifacts::{Frf, mode_table, rows_of, shape_array};
 use crate::io::FRF;
-use afmid_kernels::frf_modes::{FrfModes, FrfModesOptions, MeasuredResponses, frf_modes};
+use afmid_kernels::frf_modes::{FrfModes, FrfModesOptions, InputNoise, MeasuredResponses, frf_modes};
 use afmid_kernels::model::ModelError;
 use afmid_kernels::ringdown::{ModeEstimate, ModeShape, ModesWanted};
 
@@ -75,7 +75,7 @@ impl Stage for FrfModeFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.frf_modes",
-        version: 4,
+        version: 5,
         summary: "fits modes and mode shapes to measured frequency responses of many channels",
         inputs: &[FRF.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), DIAGRAM.spec(), FIT.spec(), SUMMARY.spec()],
@@ -128,8 +128,14 @@ impl FrfModeFit {
         let rows: Vec<Vec<c64>> = count.clone().map(row).collect();
         let rows: Vec<&[c64]> = rows.iter().map(Vec::as_slice).collect();
         let variance: Option<Vec<&[f64]>> = count.map(|r| frf.row_variance(r)).collect();
-        let measured =
-            MeasuredResponses { frequency_hz: frf.frequency_hz, transfer: &rows, variance: variance.as_deref() };
+        let run: Vec<usize> = frf.responses.iter().map(|response| response.run).collect();
+        let relative = frf.input_noise.map(|values| rows_of(values, frf.responses.len()));
+        let measured = MeasuredResponses {
+            frequency_hz: frf.frequency_hz,
+            transfer: &rows,
+            variance: variance.as_deref(),
+            input_noise: relative.as_deref().map(|relative| InputNoise { run: &run, relative }),
+        };
         frf_modes(measured, &options).map_err(|error| match error {
             ModelError::Response { number, problem } => {
                 let name = names.get(number - 1).copied().unwrap_or_default();

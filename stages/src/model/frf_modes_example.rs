@@ -57,7 +57,7 @@ pub(super) fn responses() -> NewFrf {
         exact.enumerate().map(move |(k, h)| h + Complex64::new(noise[2 * k], noise[2 * k + 1])).collect::<Vec<_>>()
     };
     NewFrf {
-        responses: (0..3).map(|r| ResponseOf { output: point(r + 1), input: point(1) }).collect(),
+        responses: (0..3).map(|r| ResponseOf { output: point(r + 1), input: point(1), run: 0 }).collect(),
         frf: (0..3).flat_map(row).collect(),
         frequency_hz: frequency_hz.clone(),
         quantity: Quantity::Accelerance,

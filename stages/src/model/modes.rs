@@ -1,5 +1,7 @@
 //! The stage `model.modes`.
 
+mod driven;
+
 use afmid_kernels::spectra::{Intersample, response_frequencies};
 use afmid_pipeline::{
     Array, Axis, Context, Document, Example, Faults, Port, Ports, Spec, Stage, StageError, StateSpace, Table,
@@ -10,6 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use self::driven::leave_out_undriven;
 use super::pem::MODEL;
 use crate::artifacts::{
     DataSet, Pair, SAMPLE_RATE_HZ, first_sample, further_inputs, innovations, mode_document, mode_table, nuisances,
@@ -26,7 +29,9 @@ use afmid_kernels::validation::{noise_ceiling_percent, simulate_held_out};
 /// Extracts modes, poles and zeros from a model, each with its standard error, and judges the model on held-out events.
 ///
 /// Model: s = ln(z) / Ts, f = |s| / 2 pi, Q = |s| / (-2 Re s), pole by pole; a mode is an established, weakly damped
-/// pair; the rest are detector poles, doubtful pairs, and real negative ones, which have no continuous counterpart.
+/// pair, and of a pair that was measured (no averaged event) one near which the response follows the input: its
+/// coherence there is above chance at 0.1 %; the rest are detector poles, doubtful pairs, and real negative ones, which
+/// have no continuous counterpart.
 /// Method: zeros are the invariant zeros of (A, B, C, D). Standard errors by the delta method from the model's
 /// covariance. Held-out fit: the model of the identification half simulated on the verification half's force, initial
 /// state, offset and drift fitted again. The error of a static share counts the ambiguity of t0: an event that was d
@@ -93,7 +98,7 @@ impl Stage for Modes {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 8,
+        version: 9,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -117,6 +122,10 @@ impl Stage for Modes {
         let artifact = inputs.get(&MODEL)?;
         let (model, covariance) = innovations(artifact)?;
         let mut found = poles(&model, &covariance, &self.criteria).map_err(StageError::from_error)?;
+        let pair = inputs.find(&PAIR)?;
+        if let Some(pair) = pair {
+            leave_out_undriven(&mut found, pair, cx)?;
+        }
         let ambiguity_s = onset_ambiguity(artifact);
         for pole in found.iter_mut().filter(|pole| pole.root.is_complex()) {
             let from_onset = share_error_from_onset(pole.amplitude, pole.root.s, ambiguity_s.unwrap_or(0.0));
@@ -128,7 +137,7 @@ impl Stage for Modes {
             cx.warn("no pole passes as a mode: lower min_significance or min_quality_factor, or raise the order");
         }
         let half = inputs.find(&HALF)?;
-        let fits = match (half, inputs.find(&PAIR)?) {
+        let fits = match (half, pair) {
             (Some(half), Some(pair)) => held_out(half, pair)?,
             _ => Fits::default(),
         };

@@ -3,7 +3,7 @@
 use afmid_pipeline::{Array, StageError};
 use num_complex::Complex64;
 
-use crate::artifacts::{Frf, NewFrf};
+use crate::artifacts::{Frf, NewFrf, ResponseOf};
 
 /// What rates of two files may differ by, relative: `io.records` takes them for the same.
 const SAME_RATE: f64 = 1e-6;
@@ -69,13 +69,16 @@ impl<'a> Joining<'a> {
         let both = |ours: Option<&[f64]>, theirs: &Option<Vec<f64>>| Some(kept(ours?, theirs.as_deref()?));
         let frf: Vec<Complex64> =
             rows(own.frf, widths[0], skipped, count).chain(rows(&new.frf, widths[1], also, count)).copied().collect();
+        let run = own.responses.iter().map(|response| response.run + 1).max().unwrap_or_default();
+        let later = new.responses.iter().map(|response| ResponseOf { run, ..response.clone() });
         let driving_point = own.driving_point.or(new.driving_point.map(|row| row + own.responses.len()));
         Ok(NewFrf {
             frequency_hz,
             frf,
             variance: both(own.variance, &new.variance),
             coherence: both(own.coherence, &new.coherence),
-            responses: own.responses.iter().chain(&new.responses).cloned().collect(),
+            input_noise: both(own.input_noise, &new.input_noise),
+            responses: own.responses.iter().cloned().chain(later).collect(),
             driving_point,
             averages: own.averages.zip(new.averages).map(|(ours, theirs)| ours.min(theirs)),
             ..new

@@ -33,7 +33,8 @@ use afmid_kernels::spectra::{
 /// units.
 /// # Accuracy
 /// `variance` is that of `(1 - g) abs(H)^2 / (g (n - 1))` for n independent blocks and the coherence g, its noise a mean
-/// over as many neighbouring bins as give 160 degrees of freedom. A single hit has neither coherence nor variance.
+/// over as many neighbouring bins as give 160 degrees of freedom, of `h1` that of the output and of the input parted by
+/// the response. `input_noise` is the part that responses have in common. A single hit has neither coherence nor variance.
 /// Segments bias responses whose resonances are narrower than about four bins.
 /// # Errors
 /// A record that is shorter than a block, samples that are missing, an input that is zero throughout, no hit; another
@@ -168,7 +169,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for MeasuredFrf {
     const SPEC: Spec = Spec {
         name: "spectrum.measured_frf",
-        version: 5,
+        version: 6,
         summary: "estimates the frequency response from measured input and output with coherence and variance",
         inputs: &[PAIR.spec(), BEFORE.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -306,8 +307,11 @@ impl MeasuredFrf {
             Point { name: point.unwrap_or(name).clone(), ..Point::default() }
         };
         let of = |output| {
-            let response =
-                move |input| ResponseOf { output: named(output, Roving::Sensor), input: named(input, Roving::Hammer) };
+            let response = move |input| ResponseOf {
+                output: named(output, Roving::Sensor),
+                input: named(input, Roving::Hammer),
+                run: 0,
+            };
             inputs.iter().map(response)
         };
         Ok(outputs.iter().flat_map(of).collect())
@@ -329,6 +333,7 @@ impl MeasuredFrf {
         // the multiple coherence of an output is that of each input
         let inputs = responses.len() / found.coherence.as_ref().map_or(1, |rows| rows.len().max(1));
         let of_each = |row| std::iter::repeat_n(row, inputs);
+        let noise = found.input_noise.map(|row| kept(vec![row; responses.len()], 1.0));
         let coherence = found.coherence.map(|rows| kept(rows.into_iter().flat_map(of_each).collect(), 1.0));
         Ok(NewFrf {
             frequency_hz: found.frequency_hz[first..end].to_vec(),
@@ -336,6 +341,7 @@ impl MeasuredFrf {
             frf: transfer,
             variance: found.variance.map(|rows| kept(rows, factor * factor)),
             coherence,
+            input_noise: noise,
             quantity,
             unit,
             driving_point: self.driving_point.map(|number| number - 1),

@@ -57,6 +57,18 @@ pub struct MeasuredResponses<'a> {
     /// should be known from a hundred numbers: of v numbers the true variances of what is found are v / (v - 4) of those
     /// stated.
     pub variance: Option<&'a [&'a [f64]]>,
+    /// Part of that variance that responses share. None: they share nothing.
+    pub input_noise: Option<InputNoise<'a>>,
+}
+
+/// Noise of a measured input, which responses that were measured at once have in common: of two of them
+/// `E e_r conj(e_s) = c H_r conj(H_s)`.
+#[derive(Debug, Clone, Copy)]
+pub struct InputNoise<'a> {
+    /// Responses of equal number were measured at once.
+    pub run: &'a [usize],
+    /// c, a row per response.
+    pub relative: &'a [&'a [f64]],
 }
 
 /// Complex mode indicator of one input: its only singular value at each line.
@@ -89,6 +101,10 @@ pub(super) struct Lines {
     pub merged: Vec<f64>,
     /// Whether the variance was given.
     pub known: bool,
+    /// Responses of equal number were measured at once.
+    pub run: Vec<usize>,
+    /// Squared relative error that those have in common; empty where they have none.
+    pub in_common: Vec<Vec<f64>>,
 }
 
 /// Most lines that are merged into one.
@@ -132,6 +148,10 @@ impl Lines {
             weight,
             merged: vec![1.0; kept.len()],
             known: measured.variance.is_some(),
+            run: measured.input_noise.map_or_else(Vec::new, |noise| noise.run.to_vec()),
+            in_common: measured.input_noise.map_or_else(Vec::new, |noise| {
+                noise.relative.iter().map(|row| kept.iter().map(|&k| row[k].max(0.0)).collect()).collect()
+            }),
         };
         lines.used()?;
         if !lines.known {
@@ -189,6 +209,8 @@ impl Lines {
         };
         let weight = |row: &Vec<f64>| stretches.iter().map(|own| weight_of(&row[own.clone()])).collect::<Vec<f64>>();
         let middle = |row: &[c64]| row.iter().sum::<c64>() / row.len() as f64;
+        let in_common =
+            |row: &Vec<f64>| stretches.iter().map(|own| mean(&row[own.clone()]) / own.len() as f64).collect();
         let transfer = |row: &Vec<c64>| stretches.iter().map(|own| middle(&row[own.clone()])).collect();
         Self {
             step_hz: stretches.iter().map(|own| mean(&self.step_hz[own.clone()])).collect(),
@@ -201,6 +223,8 @@ impl Lines {
             quiet: self.quiet.iter().map(weight).collect(),
             merged: stretches.iter().map(|own| self.merged[own.clone()].iter().sum()).collect(),
             known: self.known,
+            run: self.run.clone(),
+            in_common: self.in_common.iter().map(in_common).collect(),
         }
     }
 
@@ -254,6 +278,15 @@ fn checked(measured: MeasuredResponses<'_>) -> Result<(), ModelError> {
         if variance.len() != measured.transfer.len() {
             let (found, wanted) = (variance.len(), measured.transfer.len());
             return Err(ModelError::Length { what: "list of variances", found, wanted });
+        }
+    }
+    if let Some(noise) = measured.input_noise {
+        noise.relative.iter().try_for_each(|row| length("noise of the input", row.len()))?;
+        for found in [noise.relative.len(), noise.run.len()] {
+            if found != measured.transfer.len() {
+                let (what, wanted) = ("list of the input's noise", measured.transfer.len());
+                return Err(ModelError::Length { what, found, wanted });
+            }
         }
     }
     if measured.transfer.is_empty() {

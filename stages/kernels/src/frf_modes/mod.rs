@@ -17,7 +17,7 @@
 //!
 //! In reading order: options, data (lines and weights), noise (variance by bands), polynomial (Eq. 2), candidates,
 //! model and projection (Eq. 1), fit (Eq. 3), lack (what a fit leaves), selection (how many modes), scatter (responses
-//! that disagree), result.
+//! that disagree), in_common (errors that responses share), result.
 //!
 //! ```
 //! use afmid_kernels::c64;
@@ -41,7 +41,7 @@
 //!     .map(|r| truth.response(r, &frequency_hz).iter().enumerate().map(|(k, h)| h + noise(k, r)).collect())
 //!     .collect();
 //! let rows: Vec<&[c64]> = rows.iter().map(Vec::as_slice).collect();
-//! let measured = MeasuredResponses { frequency_hz: &frequency_hz, transfer: &rows, variance: None };
+//! let measured = MeasuredResponses { frequency_hz: &frequency_hz, transfer: &rows, variance: None, input_noise: None };
 //! let options =
 //!     FrfModesOptions { quantity: FrfQuantity::Accelerance, driving_point: Some(0), ..FrfModesOptions::default() };
 //! let found = frf_modes(measured, &options).unwrap();
@@ -60,6 +60,7 @@
 mod candidates;
 mod data;
 mod fit;
+mod in_common;
 mod lack;
 mod model;
 mod noise;
@@ -84,7 +85,7 @@ use self::projection::Projection;
 use self::selection::Search;
 use crate::model::ModelError;
 
-pub use self::data::{FrfQuantity, Indicator, MeasuredResponses};
+pub use self::data::{FrfQuantity, Indicator, InputNoise, MeasuredResponses};
 pub use self::model::FrfModel;
 pub use self::options::FrfModesOptions;
 pub use self::result::{FrfMode, FrfModes};

@@ -65,18 +65,26 @@ fn ringing(truth: &FrfModel) -> Vec<Vec<f64>> {
     (0..truth.residues.len()).map(|r| (0..SAMPLES).into_par_iter().map(|t| sample(r, t)).collect()).collect()
 }
 
-/// Responses averaged over hits, whose complex error has this standard deviation.
-fn averaged(ringing: &[Vec<f64>], hits: usize, noise: f64, seed: u64) -> MeasuredResponse {
-    let mut force = vec![0.0; SAMPLES];
-    force[0] = 1.0;
-    let std = noise * (hits as f64 / SAMPLES as f64).sqrt();
+/// Responses averaged over hits, whose complex error has this standard deviation; noise of the force adds a relative one.
+fn averaged(ringing: &[Vec<f64>], hits: usize, [relative, noise]: [f64; 2], seed: u64) -> MeasuredResponse {
+    let scale = (hits as f64 / SAMPLES as f64).sqrt();
+    let std = noise * scale;
+    let force = |b: usize| -> Vec<f64> {
+        let mut force = white_noise(SAMPLES, relative * scale, 1000 * seed + 500 + b as u64);
+        force[0] += 1.0;
+        force
+    };
+    let forces: Vec<Vec<f64>> = (0..hits).map(force).collect();
     let hit = |b: usize| -> Vec<Vec<f64>> {
         let drawn = white_noise(SAMPLES * ringing.len(), std, 1000 * seed + b as u64);
         ringing.iter().zip(drawn.chunks(SAMPLES)).map(|(y, e)| y.iter().zip(e).map(|(y, e)| y + e).collect()).collect()
     };
     let all: Vec<Vec<Vec<f64>>> = (0..hits).map(hit).collect();
-    let blocks: Vec<Block<'_>> =
-        all.iter().map(|y| Block { inputs: vec![&force], outputs: y.iter().map(Vec::as_slice).collect() }).collect();
+    let blocks: Vec<Block<'_>> = forces
+        .iter()
+        .zip(&all)
+        .map(|(u, y)| Block { inputs: vec![u], outputs: y.iter().map(Vec::as_slice).collect() })
+        .collect();
     let kind = BlockKind::Hits { force_window: None, added_decay_per_s: 0.0 };
     let settings = ResponseSettings { sample_rate_hz: RATE, estimator: Estimator::H1, kind, excited_share: 0.01 };
     frequency_response(&blocks, settings).unwrap()
@@ -88,7 +96,14 @@ fn fit_of(found: &MeasuredResponse) -> Result<FrfModes, ModelError> {
     let rows: Vec<&[c64]> = rows.iter().map(Vec::as_slice).collect();
     let variance: Vec<&[f64]> = found.variance.as_ref().unwrap().iter().map(Vec::as_slice).collect();
     let options = FrfModesOptions { from_hz: Some(30.0), to_hz: Some(400.0), ..of(FrfQuantity::Accelerance) };
-    let measured = MeasuredResponses { frequency_hz: &found.frequency_hz, transfer: &rows, variance: Some(&variance) };
+    let relative = found.input_noise.as_ref().map(|row| vec![row.as_slice(); rows.len()]);
+    let run = vec![0; rows.len()];
+    let measured = MeasuredResponses {
+        frequency_hz: &found.frequency_hz,
+        transfer: &rows,
+        variance: Some(&variance),
+        input_noise: relative.as_deref().map(|relative| InputNoise { run: &run, relative }),
+    };
     frf_modes(measured, &options)
 }
 
@@ -102,7 +117,7 @@ fn responses_of_few_hits_give_modes_at_the_bound_with_errors_that_hold() {
     for hits in [3, 4, 8] {
         let fits: Vec<FrfModes> = (0..40_u64)
             .into_par_iter()
-            .filter_map(|seed| fit_of(&averaged(&ringing, hits, noise, 100 * hits as u64 + seed)).ok())
+            .filter_map(|seed| fit_of(&averaged(&ringing, hits, [0.0, noise], 100 * hits as u64 + seed)).ok())
             .collect();
         let right: Vec<&FrfModes> = fits.iter().filter(|fit| fit.modes.len() == 3).collect();
         let scores: Vec<f64> = right
@@ -123,10 +138,39 @@ fn responses_of_few_hits_give_modes_at_the_bound_with_errors_that_hold() {
 }
 
 #[test]
+fn noise_of_the_force_is_in_all_responses_and_in_the_errors() {
+    let truth = struck();
+    let ringing = ringing(&truth);
+    for hits in [3, 5] {
+        let fits: Vec<FrfModes> = (0..60_u64)
+            .into_par_iter()
+            // at the peaks, of about one, the force's noise is three times the sensors'
+            .filter_map(|seed| fit_of(&averaged(&ringing, hits, [0.03, 0.01], 300 * hits as u64 + seed)).ok())
+            .collect();
+        let right: Vec<&FrfModes> = fits.iter().filter(|fit| fit.modes.len() == 3).collect();
+        assert!(right.len() >= 58, "{hits} hits: {} of 60", right.len());
+        let z: Vec<f64> = right.iter().flat_map(|fit| errors(fit, &truth)).collect();
+        // of each mode two numbers for the pole, six for the shape
+        let of = |poles: bool| -> Vec<f64> {
+            z.iter().enumerate().filter(|(i, _)| (i % 8 < 2) == poles).map(|(_, z)| *z).collect()
+        };
+        for z in [of(true), of(false)] {
+            let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
+            let covered = z.iter().filter(|z| z.abs() < 1.96).count() as f64 / z.len() as f64;
+            println!("{hits} hits: {} right, rms {rms:.3}, covered {covered:.3}", right.len());
+            // some 360 independent ones: standard errors of 1.2 % and of 0.04
+            assert!((0.91..0.99).contains(&covered) && (0.87..1.13).contains(&rms), "{hits} hits: {covered} {rms}");
+        }
+    }
+}
+
+#[test]
 fn noise_of_few_hits_is_no_mode() {
     let silent = vec![vec![0.0; SAMPLES]; 4];
-    let alarms: Vec<u64> =
-        (0..100_u64).into_par_iter().filter(|seed| fit_of(&averaged(&silent, 4, 0.1, 900 + seed)).is_ok()).collect();
+    let alarms: Vec<u64> = (0..100_u64)
+        .into_par_iter()
+        .filter(|seed| fit_of(&averaged(&silent, 4, [0.0, 0.1], 900 + seed)).is_ok())
+        .collect();
     // one in a thousand each
     assert!(alarms.len() <= 1, "{alarms:?}");
 }
@@ -134,7 +178,7 @@ fn noise_of_few_hits_is_no_mode() {
 #[test]
 fn hits_without_noise_give_their_modes_back() {
     let truth = struck();
-    let fit = fit_of(&averaged(&ringing(&truth), 4, 0.0, 1)).unwrap();
+    let fit = fit_of(&averaged(&ringing(&truth), 4, [0.0; 2], 1)).unwrap();
     assert_eq!(fit.modes.len(), 3);
     for (found, wanted) in fit.model.poles.iter().zip(&truth.poles) {
         // normal equations keep half of the digits
@@ -219,7 +263,12 @@ fn a_mean_of_lines_belongs_to_the_middle_of_its_stretch_whatever_their_weights_a
     let mut row: Vec<c64> = frequency_hz.iter().map(|f| c64::new(*f, -2.0 * f)).collect();
     row[50] = c64::new(f64::NAN, 0.0);
     let variance: Vec<f64> = frequency_hz.iter().map(|f| (250.0 - f).powi(4)).collect();
-    let measured = MeasuredResponses { frequency_hz: &frequency_hz, transfer: &[&row], variance: Some(&[&variance]) };
+    let measured = MeasuredResponses {
+        frequency_hz: &frequency_hz,
+        transfer: &[&row],
+        variance: Some(&[&variance]),
+        input_noise: None,
+    };
     let lines = Lines::new(measured, &of(FrfQuantity::Receptance)).unwrap();
     let means = lines.thinned(&[], 0.1, &noise::bands(lines.len()));
     assert!(means.len() < 10, "{}", means.len());

@@ -57,6 +57,14 @@ pub(super) struct Solved {
     pub information: Mat<f64>,
 }
 
+/// Factors of a response's weighted errors.
+pub(super) struct Changes {
+    /// In the scores of the poles' parameters, everything linear following: parameters x lines.
+    pub poles: Vec<Vec<c64>>,
+    /// In the parts of the residues at given poles: parts x lines.
+    pub residues: Vec<Vec<c64>>,
+}
+
 /// Share of the information of a pole beyond the band that is added to it. Why: four decades above rounding.
 const RIDGE: f64 = 1e-8;
 
@@ -148,6 +156,30 @@ impl Projection {
             left
         };
         self.solved.iter().zip(&lines.transfer).map(row).collect()
+    }
+
+    /// By what factors on the weighted errors each response moves scores and residues.
+    pub fn changes(&self, lines: &Lines, options: &FrfModesOptions) -> Vec<Changes> {
+        let columns = Columns::new(lines, &self.poles, options);
+        let linear = &columns.all[columns.slopes..];
+        let sum = |parts: &mut dyn Iterator<Item = (&Vec<c64>, f64)>| -> Vec<c64> {
+            let mut all = vec![c64::new(0.0, 0.0); lines.len()];
+            parts.for_each(|(part, x)| all.iter_mut().zip(part).for_each(|(all, c)| *all += c * x));
+            all
+        };
+        let of = |solved: &Solved| {
+            let (coupling, inverse) = (&solved.eliminated.coupling, &solved.eliminated.own_inverse);
+            let pole = |(i, own): (usize, Vec<(usize, f64)>)| {
+                let moved = own.iter().map(|(column, x)| (&columns.all[*column], *x));
+                sum(&mut moved.chain(linear.iter().enumerate().map(|(k, column)| (column, -coupling[(k, i)]))))
+            };
+            let residue = |i: usize| sum(&mut linear.iter().enumerate().map(|(k, column)| (column, inverse[(i, k)])));
+            Changes {
+                poles: turns(&self.poles, &solved.linear).into_iter().enumerate().map(pole).collect(),
+                residues: (0..columns.slopes).map(residue).collect(),
+            }
+        };
+        self.solved.iter().map(of).collect()
     }
 
     /// Fall of the weighted squares that each further pole promises, the others held (Eq. 4 of the module).

@@ -4,6 +4,7 @@ use faer::{Mat, c64};
 
 use super::data::Indicator;
 use super::fit::Fitted;
+use super::in_common::InCommon;
 use super::lack::Lack;
 use super::model::width;
 use super::polynomial::Diagram;
@@ -86,7 +87,7 @@ impl FrfModes {
         let left = fitted.at.left(lines, options);
         let lacks: Vec<Lack> =
             fitted.at.poles.iter().map(|s| Lack::around(lines, &left, &fitted.at.poles, *s)).collect();
-        let spread = Spread::new(fitted, &lacks);
+        let spread = Spread::new(fitted, &lacks, InCommon::new(lines, &fitted.at, &left, options));
         if order[..count].iter().flat_map(|j| [2 * j, 2 * j + 1]).any(|i| !spread.known(i)) {
             return Err(ModelError::Degenerate("no finite covariance of the modes"));
         }
@@ -158,16 +159,21 @@ fn numbered(diagram: Diagram, poles: &[c64]) -> Stabilisation {
 struct Spread {
     /// Of the poles' real parameters.
     poles: Mat<f64>,
+    /// Of the poles' real parameters, were errors independent and of the size that weights say.
+    inverse: Mat<f64>,
     /// Factor on standard errors of each real parameter.
     wide: Vec<f64>,
+    /// Errors that responses share.
+    in_common: InCommon,
 }
 
 impl Spread {
-    fn new(fitted: &Fitted, lacks: &[Lack]) -> Self {
+    fn new(fitted: &Fitted, lacks: &[Lack], in_common: InCommon) -> Self {
         let (information, _) = fitted.at.normal();
-        let plain = symmetric_inverse(&information);
-        let n = plain.nrows();
-        let scatter = Scatter::new(&fitted.at, &plain);
+        let inverse = symmetric_inverse(&information);
+        let n = inverse.nrows();
+        let scatter = Scatter::new(&fitted.at, &inverse);
+        let plain = &inverse + &inverse * in_common.scores() * &inverse;
         let mut first = 0;
         let mut wide = Vec::with_capacity(n);
         for (s, lack) in fitted.at.poles.iter().zip(lacks) {
@@ -176,7 +182,7 @@ impl Spread {
             let factor = scatter.factor(own.clone(), lack.factor());
             wide.extend(vec![factor.sqrt(); own.len()]);
         }
-        Self { poles: Mat::from_fn(n, n, |i, j| wide[i] * wide[j] * plain[(i, j)]), wide }
+        Self { poles: Mat::from_fn(n, n, |i, j| wide[i] * wide[j] * plain[(i, j)]), wide, inverse, in_common }
     }
 
     /// Whether a parameter has a finite error.
@@ -197,6 +203,21 @@ impl Spread {
         Mat::from_fn(2, 2, |a, b| factor * inverse[(2 * j + a, 2 * j + b)])
     }
 
+    /// Covariance of a sum of the residues of pole `j` in two responses, each times a matrix.
+    fn sum(&self, fitted: &Fitted, j: usize, parts: [(usize, Mat<f64>); 2]) -> Mat<f64> {
+        let n = self.poles.nrows();
+        let (mut all, mut moved, mut together) = (Mat::zeros(2, 2), Mat::zeros(2, n), Mat::zeros(2, n));
+        for (r, factor) in &parts {
+            all += factor * self.own(fitted, *r, j) * factor.transpose();
+            moved += factor * self.coupling(fitted, *r, j);
+            together += factor * self.in_common.with_scores(*r, j);
+        }
+        let [(r, first), (s, second)] = &parts;
+        let cross = first * self.in_common.residues(*r, *s, j) * second.transpose()
+            + together * &self.inverse * moved.transpose();
+        all + &moved * &self.poles * moved.transpose() + &cross + cross.transpose()
+    }
+
     fn mode(&self, fitted: &Fitted, j: usize, lack: &Lack, options: &FrfModesOptions) -> FrfMode {
         let count = fitted.at.solved.len();
         let s = fitted.at.poles[j];
@@ -204,8 +225,7 @@ impl Spread {
         let reference = (0..count).max_by(|&a, &b| values[a].norm().total_cmp(&values[b].norm())).unwrap_or(0);
         let residues: Vec<ShapePoint> = (0..count)
             .map(|r| {
-                let k = self.coupling(fitted, r, j);
-                let all = self.own(fitted, r, j) + &k * &self.poles * k.transpose();
+                let all = self.sum(fitted, j, [(r, times(c64::new(1.0, 0.0))), (r, Mat::zeros(2, 2))]);
                 ShapePoint { value: values[r], covariance: [all[(0, 0)], all[(0, 1)], all[(1, 1)]] }
             })
             .collect();
@@ -240,10 +260,7 @@ impl Spread {
             return ShapePoint { value: c64::new(1.0, 0.0), covariance: [0.0; 3] };
         }
         let (over, less) = (times(base.inv()), times(-value / base));
-        let shared = &over * self.coupling(fitted, r, j) + &less * self.coupling(fitted, reference, j);
-        let all = &over * self.own(fitted, r, j) * over.transpose()
-            + &less * self.own(fitted, reference, j) * less.transpose()
-            + &shared * &self.poles * shared.transpose();
+        let all = self.sum(fitted, j, [(r, over), (reference, less)]);
         ShapePoint { value, covariance: [all[(0, 0)], all[(0, 1)], all[(1, 1)]] }
     }
 
@@ -260,10 +277,7 @@ impl Spread {
             let first = if r == driving { 0.5 } else { 1.0 };
             let to = |factor: f64| times(scale * (factor * sign / own.sqrt()));
             let (mine, drive) = (to(first), to(share));
-            let shared = &mine * self.coupling(fitted, r, j) + &drive * self.coupling(fitted, driving, j);
-            let all = &mine * self.own(fitted, r, j) * mine.transpose()
-                + &drive * self.own(fitted, driving, j) * drive.transpose()
-                + &shared * &self.poles * shared.transpose();
+            let all = self.sum(fitted, j, [(r, mine), (driving, drive)]);
             Estimate { value, std: all[(0, 0)].max(0.0).sqrt() }
         };
         (0..values.len()).map(of).collect()

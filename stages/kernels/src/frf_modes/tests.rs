@@ -49,7 +49,10 @@ pub(super) fn found(
     let rows: Vec<&[c64]> = rows.iter().map(Vec::as_slice).collect();
     let variance: Option<Vec<Vec<f64>>> = variance.map(|v| vec![vec![v; frequency_hz.len()]; rows.len()]);
     let variance: Option<Vec<&[f64]>> = variance.as_ref().map(|all| all.iter().map(Vec::as_slice).collect());
-    frf_modes(MeasuredResponses { frequency_hz, transfer: &rows, variance: variance.as_deref() }, options)
+    frf_modes(
+        MeasuredResponses { frequency_hz, transfer: &rows, variance: variance.as_deref(), input_noise: None },
+        options,
+    )
 }
 
 pub(super) fn of(quantity: FrfQuantity) -> FrfModesOptions {
@@ -63,7 +66,7 @@ pub(super) fn bound(model: &FrfModel, frequency_hz: &[f64], noise: f64) -> Vec<f
     let variance = vec![noise * noise; frequency_hz.len()];
     let variance = vec![&variance[..]; rows.len()];
     let options = of(model.quantity);
-    let all = MeasuredResponses { frequency_hz, transfer: &rows, variance: Some(&variance) };
+    let all = MeasuredResponses { frequency_hz, transfer: &rows, variance: Some(&variance), input_noise: None };
     let lines = Lines::new(all, &options).unwrap();
     let (information, _) = projection::Projection::new(&lines, &model.poles, &options).normal();
     let covariance = symmetric_inverse(&information);

@@ -196,8 +196,11 @@ fn points(wanted: &Frf, all: &[Named<'_>]) -> Vec<ResponseOf> {
             Roving::Hammer => (fixed.clone(), roving(row)),
             Roving::Sensor => (roving(row), fixed.clone()),
         };
-        let mut response =
-            ResponseOf { output: point(&named.response.output, output), input: point(&named.response.input, input) };
+        let mut response = ResponseOf {
+            output: point(&named.response.output, output),
+            input: point(&named.response.input, input),
+            run: 0,
+        };
         let roves = match wanted.roving {
             Roving::Hammer => &mut response.input,
             Roving::Sensor => &mut response.output,
@@ -235,7 +238,7 @@ mod tests {
     #[test]
     fn two_responses_of_the_same_points_are_found() {
         let point = |name: &str| Point { name: name.to_owned(), ..Point::default() };
-        let of = |output: &str| ResponseOf { output: point(output), input: point("1") };
+        let of = |output: &str| ResponseOf { output: point(output), input: point("1"), run: 0 };
         assert_eq!(repeated(&[of("1"), of("2"), of("3")]), None);
         let remark = repeated(&[of("1"), of("2"), of("3"), of("2")]).unwrap();
         assert!(remark.contains("responses 2 and 4 are both of output 2 and input 1"), "{remark}");

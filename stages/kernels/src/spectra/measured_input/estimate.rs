@@ -4,7 +4,7 @@ use faer::Mat;
 use num_complex::Complex64;
 
 use super::blocks::{Block, BlockKind, Prepared, check};
-use super::noise::{of_both, pooled, width};
+use super::noise::{Pair, of_both, pooled, shared, width};
 use crate::linear_algebra::definite_inverse;
 use crate::spectra::SpectrumError;
 use crate::spectra::error::positive;
@@ -55,6 +55,9 @@ pub struct MeasuredResponse {
     pub transfer: Vec<Vec<Complex64>>,
     /// Expected squared error of each value, likewise; none of a single block per input.
     pub variance: Option<Vec<Vec<f64>>>,
+    /// Expected squared error, relative to the response, that all outputs have in common since it is the input's noise:
+    /// of `H1` of one input to several outputs; none else.
+    pub input_noise: Option<Vec<f64>>,
     /// Share of each output's power that all inputs explain (with one input: the ordinary coherence); none likewise.
     pub coherence: Option<Vec<Vec<f64>>>,
     /// Independent blocks that the averages are worth.
@@ -78,7 +81,8 @@ pub struct MeasuredResponse {
 /// each pole by `-d` and leaves the ratio exact: a fit subtracts `d` from the decay rates that it finds. The noise of
 /// which variances are is smooth over neighbouring bins, as many as give 160 degrees of freedom: of `H1` that of the output
 /// and the square of the response times that of the input, which the peaks show, else its mean share of the power. So
-/// weights and intervals of fits are right with few blocks, too.
+/// weights and intervals of fits are right with few blocks, too. Errors of several outputs to one input have the input's
+/// noise in common: what is left of the outputs' cross spectra along the product of their responses.
 ///
 /// # Shapes
 /// Blocks of equal length N; results `[N/2 + 1]`, a row for each output and input.
@@ -121,6 +125,7 @@ pub fn frequency_response(blocks: &[Block<'_>], settings: ResponseSettings) -> R
     let mut found = MeasuredResponse {
         transfer: vec![Vec::with_capacity(bins); inputs * outputs],
         variance: (blocks.len() > inputs).then(|| vec![Vec::with_capacity(bins); inputs * outputs]),
+        input_noise: None,
         coherence: (blocks.len() > inputs).then(|| vec![Vec::with_capacity(bins); outputs]),
         averages,
         excited_hz: sums.excited(&frequency_hz, settings.excited_share),
@@ -150,6 +155,11 @@ pub fn frequency_response(blocks: &[Block<'_>], settings: ResponseSettings) -> R
         for (row, scale) in scale.iter().enumerate() {
             let own = noise[row / inputs].iter().zip(scale);
             variance[row] = own.map(|(noise, scale)| noise * scale / freedom).collect();
+        }
+        if with_pairs(inputs, settings) && outputs > 1 {
+            let common = shared(&sums.left(&found.transfer, &noise), width);
+            let power = sums.power.first().into_iter().flatten();
+            found.input_noise = Some(common.iter().zip(power).map(|(c, power)| c / (power.re * freedom)).collect());
         }
     }
     Ok(found)
@@ -190,6 +200,8 @@ struct Sums {
     cross: Vec<Vec<Complex64>>,
     /// `|Y_o|^2`.
     output: Vec<Vec<f64>>,
+    /// `Y_o Y_p*` of all pairs, the first output with each later one, then the second.
+    outputs_cross: Vec<Vec<Complex64>>,
     windowed_before: bool,
 }
 
@@ -202,6 +214,7 @@ impl Sums {
             power: vec![Vec::new(); inputs * inputs],
             cross: vec![Vec::new(); outputs * inputs],
             output: vec![Vec::new(); outputs],
+            outputs_cross: vec![Vec::new(); if with_pairs(inputs, settings) { pairs(outputs).count() } else { 0 }],
             windowed_before: true,
         };
         for block in blocks {
@@ -219,6 +232,9 @@ impl Sums {
             for (sum, y) in sums.output.iter_mut().zip(y) {
                 add(sum, y.iter().map(Complex64::norm_sqr));
             }
+            for (sum, (o, p)) in sums.outputs_cross.iter_mut().zip(pairs(outputs)) {
+                add(sum, y[o].iter().zip(&y[p]).map(|(a, b)| a * b.conj()));
+            }
         }
         Ok(sums)
     }
@@ -235,6 +251,20 @@ impl Sums {
             [frequency_hz[low], frequency_hz[high]]
         };
         (0..self.inputs).map(band).collect()
+    }
+
+    /// What one input leaves of each pair of outputs: `Y_o Y_p* - H_o H_p* |U|^2`.
+    fn left<'a>(&self, transfer: &'a [Vec<Complex64>], noise: &'a [Vec<f64>]) -> Vec<Pair<'a>> {
+        let power = self.power.first().map_or(&[][..], Vec::as_slice);
+        let of = |(cross, (o, p)): (&Vec<Complex64>, (usize, usize))| {
+            let explained = transfer[o].iter().zip(&transfer[p]).zip(power).map(|((a, b), u)| a * b.conj() * u.re);
+            Pair {
+                left: cross.iter().zip(explained).map(|(all, explained)| all - explained).collect(),
+                responses: [&transfer[o], &transfer[p]],
+                noise: [&noise[o], &noise[p]],
+            }
+        };
+        self.outputs_cross.iter().zip(pairs(self.outputs)).map(of).collect()
     }
 
     /// The inverse of the inputs' power in a bin; none where it has none.
@@ -256,6 +286,16 @@ impl Sums {
         finite
             .then(|| (0..p * p).map(|k| Complex64::new(inverse[(k / p, k % p)], inverse[(k / p + p, k % p)])).collect())
     }
+}
+
+/// Whether the noise that outputs have in common is sought.
+fn with_pairs(inputs: usize, settings: ResponseSettings) -> bool {
+    inputs == 1 && settings.estimator == Estimator::H1
+}
+
+/// Pairs of different outputs.
+fn pairs(outputs: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..outputs).flat_map(move |o| (o + 1..outputs).map(move |p| (o, p)))
 }
 
 fn add<T: Copy + std::ops::AddAssign>(sum: &mut Vec<T>, values: impl Iterator<Item = T>) {

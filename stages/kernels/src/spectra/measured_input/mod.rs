@@ -4,6 +4,7 @@
 
 mod blocks;
 mod estimate;
+mod follows;
 mod noise;
 #[cfg(test)]
 mod tests;
@@ -13,3 +14,4 @@ pub use blocks::{
     with_hits,
 };
 pub use estimate::{Estimator, MeasuredResponse, ResponseSettings, frequency_response};
+pub use follows::chance_coherence;

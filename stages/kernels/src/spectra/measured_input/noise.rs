@@ -1,5 +1,7 @@
 //! Noise of a response over its bins: a few blocks say little of each bin, neighbouring bins say it together.
 
+use num_complex::Complex64;
+
 use super::blocks::BlockKind;
 
 /// Degrees of freedom of a variance. Why: of v numbers the variance that a weighted fit has is `v / (v - 4)` times the
@@ -53,6 +55,40 @@ pub(super) fn of_both(left: &[f64], gain: &[f64], width: usize) -> Vec<f64> {
             a + b * gain[k]
         })
         .collect()
+}
+
+/// Share `c` of the products of two outputs' responses that their errors have in common: what the input's noise leaves of
+/// `Y_o Y_p*` is `c H_o H_p*`, over neighbouring bins and all pairs of outputs, each weighted by the noise of both.
+pub(super) fn shared(pairs: &[Pair<'_>], width: usize) -> Vec<f64> {
+    let bins = pairs.first().map_or(0, |pair| pair.left.len());
+    let sums: Vec<[f64; 2]> = (0..bins)
+        .map(|bin| pairs.iter().filter_map(|pair| pair.along(bin)).fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]))
+        .collect();
+    (0..bins)
+        .map(|bin| {
+            let own = sums.get(around(bin, bins, WIDER * width)).unwrap_or_default();
+            let [left, gain] = own.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+            if gain > 0.0 { (left / gain).max(0.0) } else { 0.0 }
+        })
+        .collect()
+}
+
+/// What is left of the cross spectrum of two outputs.
+pub(super) struct Pair<'a> {
+    pub left: Vec<Complex64>,
+    pub responses: [&'a [Complex64]; 2],
+    /// Noise of each output.
+    pub noise: [&'a [f64]; 2],
+}
+
+impl Pair<'_> {
+    /// Products of the responses' with what is left and with themselves, each over the noise of both.
+    fn along(&self, bin: usize) -> Option<[f64; 2]> {
+        let gain = self.responses[0][bin] * self.responses[1][bin].conj();
+        let noise = self.noise[0][bin] * self.noise[1][bin];
+        let sums = [(self.left[bin] * gain.conj()).re / noise, gain.norm_sqr() / noise];
+        sums.iter().all(|sum| sum.is_finite()).then_some(sums)
+    }
 }
 
 /// The likeliest `a` and `b`, neither negative.
@@ -125,6 +161,32 @@ mod tests {
         // of that, times four
         assert!((mean(&peak) - 1.0).abs() < 0.07 && spread(&peak) < 0.25, "{} {}", mean(&peak), spread(&peak));
         assert!((mean(&rest) - 1.0).abs() < 0.04 && spread(&rest) < 0.12, "{} {}", mean(&rest), spread(&rest));
+    }
+
+    #[test]
+    fn what_two_outputs_have_in_common_is_the_input_s_noise() {
+        // one value of each of four blocks: noise of the input in both, of each output in one
+        let responses = [Complex64::new(3.0, 1.0), Complex64::new(-1.0, 2.0)];
+        let mut mean = 0.0;
+        for seed in 0..60 {
+            let draws = white_noise(4 * 6 * 200, 0.5f64.sqrt(), seed);
+            let left: Vec<Complex64> = draws
+                .chunks_exact(24)
+                .map(|bin| {
+                    let block = |own: &[f64]| {
+                        let of = |k: usize| Complex64::new(own[2 * k], own[2 * k + 1]);
+                        (responses[0] * of(0) + of(1)) * (responses[1] * of(0) + of(2)).conj()
+                    };
+                    bin.chunks_exact(6).map(block).sum()
+                })
+                .collect();
+            let (first, second) = ([responses[0]; 200], [responses[1]; 200]);
+            let pair = Pair { left, responses: [&first, &second], noise: [&[44.0; 200], &[24.0; 200]] };
+            mean += shared(&[pair], 20)[100] / 60.0;
+        }
+        // four blocks of one; a product of two scatters by 1.6 of it, over 80 bins of 4 and 60 seeds 1.2 %: times four
+        assert!((mean / 4.0 - 1.0).abs() < 0.05, "{mean}");
+        assert!(shared(&[], 20).is_empty());
     }
 
     #[test]
