@@ -1,6 +1,5 @@
 //! What recordings look like: snap-offs of a lever, free decays, measured input and output, a steady oscillation.
 
-use afmid_kernels::events::decay::FreeDecay;
 use afmid_kernels::harmonics::is_tone;
 use afmid_kernels::spectra::{is_impulsive, shows_resonance};
 
@@ -8,6 +7,7 @@ use super::channels::{driving, inputs, is_named, named, nothing, outputs};
 use super::first_file::FirstFile;
 use super::hit_names::are_hits;
 use super::pipeline::{Wanted, segment_samples};
+use super::lever::{force_curve, is_of_a_lever};
 use super::recordings::Source;
 use super::sensors::{Sensors, left_out, like, sensors};
 use super::stated::does_without_unit;
@@ -43,9 +43,6 @@ impl<'a> Choice<'a> {
     }
 }
 
-/// Least step of the level, in peaks of the ringing, that a snap-off has: it lets the whole load go.
-const STEP: f64 = 0.5;
-
 /// Chooses by what the first file holds, as far as the user has not. Errors: what is not known, and how to say it.
 pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     let file = FirstFile::new(source);
@@ -63,10 +60,12 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
 fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     let source = file.source;
     match wanted.goal {
-        Some(Goal::Modes) if looks_like_a_lever(source) => {
-            one_channel(source, wanted, Goal::SnapOff, format!("snap-offs: {} is of a force microscope", source.format))
-        }
-        None | Some(Goal::Modes) => by_looks(file, wanted),
+        None => by_looks(file, wanted),
+        // of a lever modes are those of its snap-offs where nothing else is seen
+        Some(Goal::Modes) => by_looks(file, wanted).or_else(|question| match is_of_a_lever(source) {
+            true => one_channel(source, wanted, Goal::SnapOff, String::new()),
+            false => Err(question),
+        }),
         Some(Goal::Decay) => decay(file, wanted, false),
         Some(goal @ Goal::InputOutput) => input_output(file, wanted, Some(goal)),
         Some(Goal::Frf) if wanted.inputs.is_empty() && file.has_responses(true) => Ok(responses(source)),
@@ -84,8 +83,7 @@ fn by_looks<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>,
     if file.has_responses(false) {
         return Ok(responses(source));
     }
-    if looks_like_a_lever(source) && !rings_without_a_step(file, wanted) {
-        let why = format!("snap-offs: {} is of a force microscope", source.format);
+    if let Some(why) = force_curve(file, wanted) {
         return one_channel(source, wanted, Goal::SnapOff, why);
     }
     match wanted.channels.len() < 2 && has_input(source, wanted) {
@@ -152,33 +150,6 @@ fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: Str
         }
     };
     Ok(Choice::of(goal, vec![channel], why))
-}
-
-/// Formats of force microscopes, and afmid's own; or a channel that is named as a deflection.
-fn looks_like_a_lever(source: &Source) -> bool {
-    let format = source.format.to_lowercase();
-    let of_microscope = ["native", "jpk", "nanoscope", "igor"].iter().any(|name| format.contains(name));
-    let named = source.channels.iter().any(|channel| channel.location.to_lowercase().contains("defl"));
-    named || of_microscope
-}
-
-/// Whether the best channel rings down from about the level that it rings round: nothing was let go.
-fn rings_without_a_step(file: &FirstFile<'_>, wanted: &Wanted<'_>) -> bool {
-    let channels = &file.source.channels;
-    let piezo = channels.iter().any(|channel| channel.location.to_lowercase().contains("piezo"));
-    let best = file.source.best.and_then(|index| channels.get(index));
-    let (Some(channel), false) = (best, piezo) else { return false };
-    let Ok((values, found)) = file.search(&[channel], wanted) else { return false };
-    let level = |decay: &FreeDecay| {
-        let tail = &values[0][decay.range.start + decay.range.len() / 2..decay.range.end];
-        tail.iter().sum::<f64>() / tail.len().max(1) as f64
-    };
-    let steps = found.decays.iter().filter(|decay| {
-        let before = decay.channels.first().and_then(|channel| channel.level_before);
-        let peak = decay.channels.first().map_or(f64::NAN, |channel| channel.peak.abs());
-        before.is_none_or(|before| (before - level(decay)).abs() > STEP * peak)
-    });
-    2 * steps.count() < found.decays.len()
 }
 
 fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result<Choice<'a>, Question> {

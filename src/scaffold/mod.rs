@@ -7,6 +7,7 @@ mod groups;
 mod hit_names;
 mod left_out;
 mod pipeline;
+mod lever;
 mod points;
 mod recordings;
 mod sensors;

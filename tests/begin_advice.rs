@@ -1,0 +1,90 @@
+//! What `afmid new pipeline` makes of names that mislead, of rates that contradict, and what it advises.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn afmid(here: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_afmid")).current_dir(here).args(arguments).output().expect("afmid starts")
+}
+
+/// What it says on stdout and on stderr.
+fn said(here: &Path, arguments: &[&str]) -> [String; 2] {
+    let output = afmid(here, arguments);
+    let [stdout, stderr] = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    [stdout, stderr]
+}
+
+fn refused(here: &Path, arguments: &[&str]) -> String {
+    let output = afmid(here, arguments);
+    assert!(!output.status.success(), "{arguments:?}");
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Noise of variance 1: sums of twelve uniform numbers.
+fn noise(seed: u64, samples: usize) -> Vec<f64> {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..samples).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+}
+
+/// 0.05 cycles a sample, Q = 20, `k` samples after it began.
+fn ring(k: usize) -> f64 {
+    let w = std::f64::consts::TAU * 0.05;
+    (-w * k as f64 / 40.0).exp() * (w * k as f64).cos()
+}
+
+/// A table with a column of times.
+fn table(here: &Path, name: &str, header: &str, times: impl Fn(usize) -> f64, columns: &[Vec<f64>]) {
+    let row = |k: usize| {
+        let values: Vec<String> = columns.iter().map(|column| format!("{:.9}", column[k])).collect();
+        format!("{:.7},{}\n", times(k), values.join(","))
+    };
+    let rows: String = (0..columns[0].len()).map(row).collect();
+    std::fs::write(here.join(name), format!("{header}\n{rows}")).expect("a table");
+}
+
+fn even(k: usize) -> f64 {
+    k as f64 * 1e-3
+}
+
+#[test]
+fn a_deflection_is_a_snap_off_s_only_where_a_contact_ruptures_or_the_distance_is_recorded() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let e = noise(1, 20_000);
+    let header = "Time (s),Deflection (V)";
+    let decay: Vec<f64> = (0..4000).map(|k| ring(k) + 1e-3 * e[k]).collect();
+    table(here, "decay.csv", header, even, &[decay]);
+    let (mut one, mut two) = (0.0, 0.0);
+    let thermal = |e: &f64| {
+        let next = 1.88 * one - 0.98 * two + e;
+        (two, one) = (one, next);
+        next
+    };
+    let thermal: Vec<f64> = e.iter().map(thermal).collect();
+    table(here, "thermal.csv", header, even, std::slice::from_ref(&thermal));
+    // pulled down, then let go
+    let load = |k: usize| if k < 6000 { 0.0 } else { -1e-4 * (k - 6000) as f64 };
+    let curve = |k: usize| if k < 12_000 { load(k) } else { -0.6 * ring(k - 12_000) };
+    let curve: Vec<f64> = (0..20_000).map(|k| curve(k) + 1e-3 * e[k]).collect();
+    table(here, "curve.csv", header, even, &[curve]);
+    let ramp: Vec<f64> = (0..20_000).map(|k| 1e-3 * (k as f64 - 1e4).abs()).collect();
+    table(here, "distance.csv", "Time (s),Deflection (V),Z Piezo (um)", even, &[thermal, ramp]);
+    for (name, goal, words) in [
+        ("decay", "decay", "free decay"),
+        ("thermal", "thermal", "noise with a resonance"),
+        ("curve", "modes", "snap-offs: a rupture at 1"),
+        ("distance", "modes", "snap-offs: distance.csv has the distance Z Piezo"),
+    ] {
+        let file = format!("{name}.csv");
+        let [stdout, _] = said(here, &["new", "pipeline", &file, "-o", &format!("{name}.toml"), "--json"]);
+        assert!(stdout.contains(&format!("\"goal\": \"{goal}\"")) && stdout.contains(words), "{name}: {stdout}");
+    }
+    said(here, &["new", "pipeline", "decay.csv", "--goal", "snap-off", "-o", "wrong.toml"]);
+    let stderr = refused(here, &["run", "wrong.toml", "-o", "wrong.h5", "--cache", "cache"]);
+    assert!(stderr.contains("--goal decay") && stderr.contains("--goal thermal"), "{stderr}");
+}
