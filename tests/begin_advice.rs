@@ -88,3 +88,30 @@ fn a_deflection_is_a_snap_off_s_only_where_a_contact_ruptures_or_the_distance_is
     let stderr = refused(here, &["run", "wrong.toml", "-o", "wrong.h5", "--cache", "cache"]);
     assert!(stderr.contains("--goal decay") && stderr.contains("--goal thermal"), "{stderr}");
 }
+
+#[test]
+fn a_rate_is_not_carried_over_to_files_with_times_and_a_contradiction_is_said() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    std::fs::create_dir(here.join("mixed")).expect("a folder");
+    let e = noise(2, 4000);
+    let decay: Vec<f64> = (0..4000).map(|k| if k < 500 { 0.0 } else { ring(k - 500) } + 1e-2 * e[k]).collect();
+    // a phone's clock: 200 Hz, give or take
+    let uneven = |k: usize| 5e-3 * k as f64 + 4e-4 * e[k].tanh();
+    table(here, "mixed/phone.csv", "Time (s),acc (m/s^2)", uneven, std::slice::from_ref(&decay));
+    let bare: String = decay.iter().map(|value| format!("{value:.6}\n")).collect();
+    for number in 1..=2 {
+        std::fs::write(here.join(format!("mixed/bare{number}.txt")), &bare).expect("a table");
+    }
+    let [_, stderr] = said(here, &["new", "pipeline", "mixed", "--rate", "44100", "-o", "mixed.toml"]);
+    let line = stderr.lines().find(|line| line.contains("mixed/phone.csv")).expect("a command");
+    assert!(line.contains("--rate 199.997") && !line.contains("44100"), "{line}");
+    let [_, stderr] = said(here, &["new", "pipeline", "mixed/phone.csv", "--rate", "44100", "-o", "phone.toml"]);
+    assert!(stderr.contains("44100 Hz") && stderr.contains("Time have 200 samples a second"), "{stderr}");
+    let [_, stderr] = said(here, &["run", "phone.toml", "-o", "phone.h5", "--cache", "cache"]);
+    assert!(stderr.contains("44100 Hz") && stderr.contains("Time have 200 samples a second"), "{stderr}");
+    let [_, stderr] = said(here, &["new", "pipeline", "mixed/phone.csv", "--rate", "200", "-o", "right.toml"]);
+    assert!(!stderr.contains("on average"), "{stderr}");
+    let stderr = refused(here, &["new", "pipeline", "mixed/phone.csv"]);
+    assert!(stderr.contains("Time have 200") || stderr.contains("Time have 199.9"), "{stderr}");
+}

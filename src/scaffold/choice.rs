@@ -62,6 +62,8 @@ fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, 
     match wanted.goal {
         None => by_looks(file, wanted),
         // of a lever modes are those of its snap-offs where nothing else is seen
+    let contradicted = choice.channels.first().and_then(|channel| file.contradicted_rate(channel, wanted));
+    choice.notes.extend(contradicted.map(|problem| format!("{problem}: is --rate right?")));
         Some(Goal::Modes) => by_looks(file, wanted).or_else(|question| match is_of_a_lever(source) {
             true => one_channel(source, wanted, Goal::SnapOff, String::new()),
             false => Err(question),

@@ -6,8 +6,8 @@ use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, find_decays}
 use afmid_kernels::harmonics::find_decays_beside_lines;
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
 use afmid_pipeline::recording::{
-    Contents, FoundChannel, FoundResponse, InputFiles, Reading, UnpackedContents, open_unpacked, responses,
-    says_frequencies,
+    Contents, FoundChannel, FoundResponse, InputFiles, Reading, UnpackedContents, contradiction, mean_rate,
+    open_unpacked, responses, says_frequencies,
 };
 
 use super::channels::{some_of, usable};
@@ -16,6 +16,7 @@ use super::pipeline::Wanted;
 use super::recordings::Source;
 use super::stated::missing;
 use crate::inspect::{Channel, first_samples};
+use crate::show::number;
 
 /// How many times as many samples as a hammer's pulse ringing has half of its energy in, at least: the pulse takes half a
 /// period or less of what it excites, half of its energy a sixth; of ringing of Q = 5 or more it is a third or more.
@@ -88,6 +89,21 @@ impl<'a> FirstFile<'a> {
         let channels = &self.opened().map_err(|problem| self.plain(&problem))?.contents.channels;
         let found = channels.iter().find(|found| found.location == channel.location);
         let found = found.ok_or_else(|| self.plain(&format!("there is no channel {}", channel.location)))?;
+    /// That the rate which the user gives is not that of the times beside a channel.
+    pub fn contradicted_rate(&self, channel: &Channel, wanted: &Wanted<'_>) -> Option<String> {
+        let channels = &self.opened().ok()?.contents.channels;
+        let found = channels.iter().find(|found| found.location == channel.location)?;
+        contradiction(channels, found, wanted.rate_hz?)
+    }
+
+    /// The mean rate of the times beside a channel that give none.
+    pub fn mean_rate(&self, channel: &Channel) -> Option<String> {
+        let channels = &self.opened().ok()?.contents.channels;
+        let found = channels.iter().find(|found| found.location == channel.location)?;
+        let (rate, axis) = mean_rate(channels, found)?;
+        Some(format!("the times in {axis} have {} samples a second on average", number(rate)))
+    }
+
         first_samples(found).map_err(|error| self.plain(&error.to_string()))
     }
 
@@ -96,7 +112,8 @@ impl<'a> FirstFile<'a> {
         let rate = channel.sample_rate_hz.or(wanted.rate_hz);
         rate.ok_or_else(|| {
             let (problem, help) = missing(self.source, channel, wanted, true);
-            (problem, Some(help.into_iter().chain(self.hammer()).collect::<Vec<_>>().join("; ")))
+            let more = self.mean_rate(channel).into_iter().chain(self.hammer());
+            (problem, Some(help.into_iter().chain(more).collect::<Vec<_>>().join("; ")))
         })
     }
 
