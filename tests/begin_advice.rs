@@ -115,3 +115,35 @@ fn a_rate_is_not_carried_over_to_files_with_times_and_a_contradiction_is_said() 
     let stderr = refused(here, &["new", "pipeline", "mixed/phone.csv"]);
     assert!(stderr.contains("Time have 200") || stderr.contains("Time have 199.9"), "{stderr}");
 }
+
+#[test]
+fn what_drives_in_steps_is_offered_as_the_input() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let e = noise(3, 8000);
+    let level = |k: usize| f64::from(u32::try_from(k / 1000 % 2).expect("0 or 1"));
+    let steps: Vec<f64> = (0..8000).map(level).collect();
+    // steps of up and down with a ring that dies
+    let moved = |k: usize| level(k) - (2.0 * level(k) - 1.0) * ring(k % 1000) * f64::from(u8::from(k >= 1000));
+    let moved: Vec<f64> = (0..8000).map(|k| moved(k) + 1e-2 * e[k]).collect();
+    table(here, "servo.csv", "Time (s),ref (V),position (mm)", even, &[steps.clone(), moved]);
+    let [_, stderr] = said(here, &["new", "pipeline", "servo.csv", "-o", "s.toml"]);
+    assert!(stderr.contains("ref has 2 levels") && stderr.contains("new pipeline servo.csv --input ref"), "{stderr}");
+    // nothing rings: it follows as a heater does
+    let mut y = 0.0;
+    let slow = |u: &f64| {
+        y += 0.01 * (u - y);
+        y
+    };
+    let slow: Vec<f64> = steps.iter().map(slow).zip(&e).map(|(y, e)| y + 1e-2 * e).collect();
+    table(here, "heater.csv", "Time (s),power (W),T (K)", even, &[steps, slow]);
+    let output = afmid(here, &["new", "pipeline", "heater.csv", "-o", "h.toml"]);
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(stderr.contains("--input power"), "{stderr}");
+    // what it does not follow is not offered
+    let other: Vec<f64> = (0..8000).map(|k| if k < 500 { 0.0 } else { ring(k - 500) } + 1e-2 * e[k]).collect();
+    let gate = (0..8000).map(|k| f64::from(u8::from(k % 14 < 7))).collect();
+    table(here, "gate.csv", "Time (s),gate (V),acc (g)", even, &[gate, other]);
+    let [_, stderr] = said(here, &["new", "pipeline", "gate.csv", "-o", "g.toml"]);
+    assert!(!stderr.contains("--input gate"), "{stderr}");
+}

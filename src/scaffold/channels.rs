@@ -8,7 +8,8 @@ use crate::inspect::{Channel, LEAST_CODES, Values};
 /// Fewer changes of a switch are steps, each a test of its own.
 const LEAST_CHANGES: usize = 20;
 /// How names of inputs begin.
-const INPUTS: [&str; 8] = ["input", "force", "hammer", "excit", "drive", "stimul", "torque", "actuat"];
+const INPUTS: [&str; 10] =
+    ["input", "force", "hammer", "excit", "drive", "stimul", "torque", "actuat", "setpoint", "command"];
 
 /// A channel by its name. Errors: there is none.
 pub fn named<'a>(source: &'a Source, name: &str) -> Result<&'a Channel, Question> {

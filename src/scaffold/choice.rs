@@ -12,6 +12,7 @@ use super::recordings::Source;
 use super::sensors::{Sensors, left_out, like, sensors};
 use super::stated::does_without_unit;
 use crate::cli::{Goal, RecordsAre};
+use super::steps;
 use crate::inspect::{Channel, counted};
 use crate::show::number;
 
@@ -170,7 +171,8 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
             Sensors { channels, left_out: None }
         }
     };
-    let notes: Vec<String> = left_out.into_iter().collect();
+    let steps = steps::hint(file, &channels, wanted);
+    let notes: Vec<String> = left_out.into_iter().chain(steps.clone()).collect();
     let cells = channels.len() > 1 && channels.iter().all(|channel| channel.location.ends_with('}'));
     let records_are = wanted.records_are.or(cells.then_some(RecordsAre::Hits));
     // cells are hits of their own: one is enough to see what they are
@@ -197,7 +199,8 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
         }
         (None, Some(reason)) if guessed => {
             let help = "look at it with `afmid inspect`; --channel names the signal, --goal says what to find";
-            return Err((format!("{}: no free decay, {reason}", source.file.display()), Some(help.to_owned())));
+            let help = steps.into_iter().chain([help.to_owned()]).collect::<Vec<_>>().join("; ");
+            return Err((format!("{}: no free decay, {reason}", source.file.display()), Some(help)));
         }
         (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };

@@ -14,6 +14,7 @@ mod sensors;
 mod stage;
 mod stated;
 
+mod steps;
 pub use choice::choose;
 pub use left_out::left_out;
 pub use pipeline::{Wanted, pipeline};
