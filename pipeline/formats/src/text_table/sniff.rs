@@ -136,15 +136,21 @@ fn leading(kinds: &[Kind], rows: &[&Vec<Kind>]) -> usize {
 /// The first line that is a row: as wide as rows are, without text where they have numbers, and with a first number. A
 /// line that fits worse is taken if there is no such line.
 fn first_row(lines: &[&str], dialect: Dialect, kinds: &[Kind], lead: usize) -> Option<usize> {
+    let nothing_from = |column: usize| {
+        let rest = kinds.get(column..).unwrap_or_default();
+        column > lead && !rest.is_empty() && rest.iter().all(|kind| *kind == Kind::Empty)
+    };
+    // columns of nothing at the end may be missing (Rigol's first row has a comma less than the others)
+    let as_wide = |found: usize| found == kinds.len() || (dialect.delimiter != ' ' && nothing_from(found));
     let fits = |line: &str| {
         let found = dialect.kinds(line);
         let fits = |(found, wanted): (&Kind, &Kind)| found == wanted || *found == Kind::Empty || is_text(*wanted);
-        found.len() == kinds.len()
+        as_wide(found.len())
             && !is_labelled(&found, kinds, lead)
             && found.iter().zip(kinds).all(fits)
             && found.get(lead) == kinds.get(lead)
     };
-    let row = |line: &&str| dialect.is_row(line) && dialect.fields(line).len() == kinds.len();
+    let row = |line: &&str| dialect.is_row(line) && as_wide(dialect.fields(line).len());
     let strict = lines.iter().position(|line| row(line) && fits(line));
     strict.or_else(|| lines.iter().position(row))
 }
