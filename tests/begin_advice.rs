@@ -147,3 +147,55 @@ fn what_drives_in_steps_is_offered_as_the_input() {
     let [_, stderr] = said(here, &["new", "pipeline", "gate.csv", "-o", "g.toml"]);
     assert!(!stderr.contains("--input gate"), "{stderr}");
 }
+
+#[test]
+fn tables_over_frequencies_are_read_for_what_they_are() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let f = |k: usize| 10.0 * (k + 1) as f64;
+    // the receptance of a mode at 5 kHz with Q = 50
+    let h = |k: usize| {
+        let x = f(k) / 5e3;
+        let (re, im) = (1.0 - x * x, x / 50.0);
+        (1.0 / re.hypot(im), -im.atan2(re).to_degrees())
+    };
+    let columns = |scale: f64| -> Vec<Vec<f64>> {
+        vec![(0..1000).map(|k| scale * h(k).0).collect(), (0..1000).map(|k| h(k).1).collect()]
+    };
+    table(here, "impedance.csv", "Frequency (Hz),Impedance (Ohm),Phase (deg)", f, &columns(4.0));
+    table(here, "admittance.csv", "Frequency(Hz),Y(S),theta-deg", f, &columns(1.0));
+    for name in ["impedance", "admittance"] {
+        let (file, config, result) = (format!("{name}.csv"), format!("{name}.toml"), format!("{name}.h5"));
+        let [stdout, _] = said(here, &["new", "pipeline", &file, "-o", &config]);
+        assert!(stdout.contains("frequency responses"), "{stdout}");
+        said(here, &["run", &config, "-o", &result, "--cache", "cache"]);
+        let [shown, _] = said(here, &["show", &result, "modes", "--json"]);
+        let shown: serde_json::Value = serde_json::from_str(&shown).expect("JSON");
+        let found = shown["modes"][0]["frequency_hz"].as_f64().expect("a mode");
+        assert!((found / 5e3 - 1.0).abs() < 1e-3, "{name}: {shown}");
+    }
+    // 64 averages
+    let scatter: Vec<Vec<f64>> = (0..128).map(|seed| noise(seed, 1000)).collect();
+    let mean = |k: usize| scatter.iter().map(|one| one[k] * one[k]).sum::<f64>() / 128.0;
+    let density = (0..1000).map(|k| mean(k) * (h(k).0.powi(2) + 0.1)).collect();
+    table(here, "psd.csv", "Frequency (Hz),PSD (V^2/Hz)", f, &[density]);
+    for (config, goal) in [("psd.toml", &[][..]), ("asked.toml", &["--goal", "thermal"])] {
+        said(here, &[&["new", "pipeline", "psd.csv", "-o", config], goal].concat());
+        let text = std::fs::read_to_string(here.join(config)).expect("a config");
+        assert!(text.contains("io.spectrum") && text.contains("unit = \"V\""), "{text}");
+    }
+    let [_, stderr] = said(here, &["run", "psd.toml", "-o", "psd.h5", "--cache", "cache"]);
+    // 64 within 8 %
+    let count = stderr.split("spectra were averaged: ").nth(1).and_then(|rest| rest.split(' ').next());
+    let count: f64 = count.and_then(|count| count.parse().ok()).unwrap_or_else(|| panic!("{stderr}"));
+    assert!((count / 64.0 - 1.0).abs() < 0.24 && stderr.contains("set `averages`"), "{stderr}");
+    let [shown, _] = said(here, &["show", "psd.h5", "thermal", "--json"]);
+    let shown: serde_json::Value = serde_json::from_str(&shown).expect("JSON");
+    let found = shown["frequency"]["value"].as_f64().expect("a resonance");
+    assert!((found / 5e3 - 1.0).abs() < 2e-3, "{shown}");
+    // which of both they are, the file does not say: what to say is named with the stage
+    table(here, "bare.csv", "Frequency (Hz),a,b", f, &columns(1.0));
+    said(here, &["new", "pipeline", "bare.csv", "--goal", "frf", "-o", "bare.toml"]);
+    let stderr = refused(here, &["run", "bare.toml", "-o", "bare.h5", "--cache", "cache"]);
+    assert!(stderr.contains("--set frf.values=amplitude-degrees"), "{stderr}");
+}

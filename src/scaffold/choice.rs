@@ -4,15 +4,16 @@ use afmid_kernels::harmonics::is_tone;
 use afmid_kernels::spectra::{is_impulsive, shows_resonance};
 
 use super::channels::{driving, inputs, is_named, named, nothing, outputs};
+use super::density::density;
 use super::first_file::FirstFile;
 use super::hit_names::are_hits;
-use super::pipeline::{Wanted, segment_samples};
 use super::lever::{force_curve, is_of_a_lever};
+use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
 use super::sensors::{Sensors, left_out, like, sensors};
 use super::stated::does_without_unit;
-use crate::cli::{Goal, RecordsAre};
 use super::steps;
+use crate::cli::{Goal, RecordsAre};
 use crate::inspect::{Channel, counted};
 use crate::show::number;
 
@@ -27,6 +28,8 @@ pub struct Choice<'a> {
     pub channels: Vec<&'a Channel>,
     /// The measured inputs; of input and output alone.
     pub inputs: Vec<&'a Channel>,
+    /// The frequencies of a power density.
+    pub frequencies: Option<&'a Channel>,
     /// Whether the input is a hammer's: short against the record.
     pub struck: bool,
     /// What files and channels are, where the stage's default is not meant.
@@ -40,13 +43,17 @@ pub struct Choice<'a> {
 impl<'a> Choice<'a> {
     /// Without a measured input.
     pub fn of(goal: Goal, channels: Vec<&'a Channel>, why: String) -> Self {
-        Self { goal, channels, inputs: Vec::new(), struck: false, records_are: None, why, notes: Vec::new() }
+        let (inputs, notes) = (Vec::new(), Vec::new());
+        Self { goal, channels, inputs, frequencies: None, struck: false, records_are: None, why, notes }
     }
 }
 
 /// Chooses by what the first file holds, as far as the user has not. Errors: what is not known, and how to say it.
 pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     let file = FirstFile::new(source);
+    if let Some(choice) = density(&file, wanted)? {
+        return Ok(choice);
+    }
     let of_time = wanted.rate_hz.is_some() || wanted.goal == Some(Goal::Frf) || file.has_responses(false);
     if let Some(question) = file.spectrum().filter(|_| !of_time) {
         return Err(question);
@@ -55,6 +62,8 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
     if choice.channels.first().is_some_and(|channel| does_without_unit(choice.goal, channel, wanted)) {
         choice.notes.push("no unit is stated: amplitudes are as in the file; --unit UNIT says theirs".to_owned());
     }
+    let contradicted = choice.channels.first().and_then(|channel| file.contradicted_rate(channel, wanted));
+    choice.notes.extend(contradicted.map(|problem| format!("{problem}: is --rate right?")));
     Ok(choice)
 }
 
@@ -63,8 +72,6 @@ fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, 
     match wanted.goal {
         None => by_looks(file, wanted),
         // of a lever modes are those of its snap-offs where nothing else is seen
-    let contradicted = choice.channels.first().and_then(|channel| file.contradicted_rate(channel, wanted));
-    choice.notes.extend(contradicted.map(|problem| format!("{problem}: is --rate right?")));
         Some(Goal::Modes) => by_looks(file, wanted).or_else(|question| match is_of_a_lever(source) {
             true => one_channel(source, wanted, Goal::SnapOff, String::new()),
             false => Err(question),

@@ -55,25 +55,30 @@ impl<'a> FirstFile<'a> {
         {
             return Some((format!("{}: {}", self.source.file.display(), error.problem), error.help));
         }
-        let axis = contents.channels.iter().find(|channel| says_frequencies(channel))?;
+        let (axis, spectra) = self.spectra(false)?;
+        let file = self.source.file.display();
+        let problem =
+            format!("{file}: {} over the frequencies {axis}: a spectrum, no record over time", some_of(&spectra));
+        let responses = "--goal frf reads complex numbers, real and imaginary part, amplitude and phase of responses";
+        let density = match &spectra[..] {
+            [only] => format!("--goal thermal takes {only} for a power density"),
+            _ => "--goal thermal --channel NAME takes one of them for a power density".to_owned(),
+        };
+        Some((problem, Some(format!("{responses}; {density}"))))
+    }
+
+    /// The axis of frequencies, and what lies over it; none where the file holds a record. `guessed`: even if the axis
+    /// does not say that it is one of frequencies.
+    pub fn spectra(&self, guessed: bool) -> Option<(String, Vec<String>)> {
+        let contents = &self.opened().ok()?.contents;
+        let untimed = |channel: &&FoundChannel| channel.is_axis && mean_rate(&contents.channels, channel).is_none();
+        let said = contents.channels.iter().find(|channel| says_frequencies(channel));
+        let axis = said.or_else(|| contents.channels.iter().find(untimed).filter(|_| guessed))?;
         let over = |channel: &&FoundChannel| !channel.is_axis && channel.sample_rate_hz.is_none();
         let of_length = |channel: &&FoundChannel| over(channel) && channel.samples == axis.samples;
-        let spectra: Vec<&str> = contents.channels.iter().filter(of_length).map(|c| c.location.as_str()).collect();
+        let spectra: Vec<String> = contents.channels.iter().filter(of_length).map(|c| c.location.clone()).collect();
         let timed = contents.channels.iter().any(|channel| !channel.is_axis && channel.sample_rate_hz.is_some());
-        if timed || spectra.is_empty() {
-            return None;
-        }
-        let problem = format!(
-            "{}: {} over the frequencies {}: a spectrum, no record over time",
-            self.source.file.display(),
-            some_of(&spectra),
-            axis.location
-        );
-        let responses = "--goal frf reads complex numbers, real and imaginary part, amplitude and phase of responses";
-        let density = spectra.first().filter(|_| self.source.format.contains("HDF5")).map(|density| {
-            format!("; `io.spectrum` a power density: frequency = \"{}\", density = \"{density}\"", axis.location)
-        });
-        Some((problem, Some(responses.to_owned() + &density.unwrap_or_default())))
+        (!timed && !spectra.is_empty()).then(|| (axis.location.clone(), spectra))
     }
 
     /// Whether free decays are in a channel, each of its samples taken as one of time.
@@ -84,11 +89,6 @@ impl<'a> FirstFile<'a> {
         found.is_ok_and(|found| !found.random && !found.decays.is_empty())
     }
 
-    /// A channel's first samples. Errors: they cannot be read.
-    pub fn samples(&self, channel: &Channel) -> Result<Vec<f64>, Question> {
-        let channels = &self.opened().map_err(|problem| self.plain(&problem))?.contents.channels;
-        let found = channels.iter().find(|found| found.location == channel.location);
-        let found = found.ok_or_else(|| self.plain(&format!("there is no channel {}", channel.location)))?;
     /// That the rate which the user gives is not that of the times beside a channel.
     pub fn contradicted_rate(&self, channel: &Channel, wanted: &Wanted<'_>) -> Option<String> {
         let channels = &self.opened().ok()?.contents.channels;
@@ -104,6 +104,11 @@ impl<'a> FirstFile<'a> {
         Some(format!("the times in {axis} have {} samples a second on average", number(rate)))
     }
 
+    /// A channel's first samples. Errors: they cannot be read.
+    pub fn samples(&self, channel: &Channel) -> Result<Vec<f64>, Question> {
+        let channels = &self.opened().map_err(|problem| self.plain(&problem))?.contents.channels;
+        let found = channels.iter().find(|found| found.location == channel.location);
+        let found = found.ok_or_else(|| self.plain(&format!("there is no channel {}", channel.location)))?;
         first_samples(found).map_err(|error| self.plain(&error.to_string()))
     }
 

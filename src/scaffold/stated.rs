@@ -76,7 +76,7 @@ pub fn missing(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bo
             return (format!("{} states no {what}", source.file.display()), help);
         }
         help.push(format!(
-            "{remark}; --goal frf if {} is a frequency, `io.spectrum` for a power density",
+            "{remark}; --goal frf if {} is a frequency and the others are responses, --goal thermal if a power density",
             axis.location
         ));
     }
