@@ -142,6 +142,21 @@ pub fn usable(channel: &&Channel) -> bool {
 
 /// That a file has no signal.
 pub fn nothing(source: &Source) -> Question {
-    let help = "`afmid inspect` says what recordings hold".to_owned();
-    (format!("{}: {}", source.file.display(), source.reason), Some(help))
+    let file = source.file.display();
+    let lacking = source.channels.iter().filter(|channel| !channel.is_axis);
+    let lacking = lacking.filter_map(|channel| Some((channel, channel.values.as_ref()?.missing)));
+    match lacking.max_by_key(|(_, missing)| *missing).filter(|(_, missing)| *missing > 0) {
+        Some((channel, missing)) => {
+            let problem = format!(
+                "{file}: {missing} of {} samples of {} are missing, and no other channel is a signal",
+                channel.samples, channel.location
+            );
+            let help = "fill them in, or cut the file to a stretch that has all".to_owned();
+            (problem, Some(help))
+        }
+        None => {
+            let help = "`afmid inspect` says what recordings hold".to_owned();
+            (format!("{file}: {}", source.reason), Some(help))
+        }
+    }
 }

@@ -17,23 +17,22 @@ pub(super) fn of(mut rows: Rows, mut titles: Vec<Title>, remarks: &mut Vec<Strin
     name_of_source(&rows, &mut titles, time);
     let names: Vec<&str> = titles.iter().map(|t| t.name.as_str()).collect();
     let locations = titles::locations(&names);
-    let time = time_column(&rows, &titles);
     if let Some(title) = time.and_then(|at| titles.get_mut(at)).filter(|title| title.unit.is_empty()) {
         title.unit.clone_from(&rows.stated.time_unit);
     }
     state_units(&rows, &mut titles, time);
-    let copies = copies(&rows, &titles, time);
     let clock = clock(&mut rows, &titles, &locations, time, remarks);
+    let copies = copies(&rows, &titles, time);
     let count = rows.count;
     let mut channels = Vec::new();
     for (number, ((column, title), location)) in rows.columns.into_iter().zip(&titles).zip(locations).enumerate() {
         if clock.axis == Some(number) && clock.rate_hz.is_some() {
             continue;
+        }
         if copies.contains(&number) {
             let first = time.and_then(|at| titles.get(at)).map_or("", |title| title.name.as_str());
             remarks.push(format!("{location} has the same times as {first}: it is left out"));
             continue;
-        }
         }
         if column.values.is_empty() {
             // Nothing at all behind a last delimiter is no column.

@@ -3,7 +3,7 @@
 use super::kind::Kind;
 use super::lines::BYTE_ORDER_MARK;
 use super::number;
-use crate::text::decode;
+use crate::text::{decode, is_utf16, utf16};
 use std::collections::BTreeMap;
 
 /// How fields are set apart and numbers printed.
@@ -162,6 +162,8 @@ fn is_text(kind: Kind) -> bool {
 /// Whether a file's first bytes are text with rows of numbers.
 pub(super) fn looks_like_a_table(head: &[u8]) -> bool {
     let head = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head);
+    let utf8 = is_utf16(head).then(|| utf16(head).into_bytes());
+    let head = utf8.as_deref().unwrap_or(head);
     // Control bytes are in no table of text; 0x1A ends some of old programs'.
     let is_text = |&b: &u8| b >= 0x20 || matches!(b, b'\t' | b'\r' | b'\n' | 0x0C | 0x1A);
     if head.is_empty() || !head.iter().all(is_text) {
