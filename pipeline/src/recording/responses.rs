@@ -32,7 +32,7 @@ pub struct FileResponse {
 }
 
 /// How to say what columns hold. `<this stage>` is [`crate::THIS_STAGE`].
-const VALUES: &str = "`--set <this stage>.values=amplitude-degrees` if the columns behind the frequencies are amplitude and \
+const VALUES: &str = "`--set <this stage>.values=amplitude-degrees` if the columns of each response are amplitude and \
                       phase in degrees, likewise `amplitude-radians`, `decibels-degrees`, `decibels-radians`, \
                       `real-imaginary`";
 

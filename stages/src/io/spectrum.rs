@@ -186,8 +186,8 @@ fn scattered_averages(density: &[f64], cx: &Context) -> Result<f64, StageError> 
     let unknown = || StageError::new("the file does not state how many spectra were averaged").help(help);
     let found = averages_by_scatter(density).ok_or_else(unknown)?;
     cx.warn(format!(
-        "the file does not state how many spectra were averaged: {found:.0} by the scatter of neighbouring values, on which \
-         the stated errors depend; {help}"
+        "the file does not state how many spectra were averaged: {found:.0} by the scatter of neighbouring values, \
+         on which the stated errors depend; {help}"
     ));
     Ok(found)
 }

@@ -76,7 +76,7 @@ fn no_samples(column: &Column, rows: usize) -> Option<String> {
     Some(format!("is the single number {single}"))
 }
 
-/// Columns that are titled as times and have those of the first such column: each channel of an oscilloscope has its own.
+/// Columns that are titled as times and have those of the first such column: each channel of an oscilloscope has some.
 fn copies(rows: &Rows, titles: &[Title], time: Option<usize>) -> Vec<usize> {
     let Some((at, first)) = time.and_then(|at| Some((at, rows.columns.get(at)?))) else { return Vec::new() };
     let columns = rows.columns.iter().zip(titles).enumerate().skip(at + 1);
@@ -108,10 +108,14 @@ fn stepping_as_stated(rows: &Rows, titles: &[Title]) -> Option<usize> {
     (untitled && others && even().is_some()).then_some(at)
 }
 
-/// The first column of times of day that rise, as seconds since its first; none where the header states an interval.
+/// The first column, or one that is titled as time, of times of day that rise, as seconds since its first; none where
+/// the header states an interval.
 fn stamped(rows: &mut Rows, titles: &mut [Title]) -> Option<usize> {
     let (count, several) = (rows.count, rows.columns.len() > 1);
-    let at = rows.columns.iter().position(|column| column.stamps.tell_time(count))?;
+    let first = |at: usize, title: &Title| at == 0 || titles::is_time(title);
+    let tells =
+        |(at, (column, title)): &(usize, (&Column, &Title))| column.stamps.tell_time(count) && first(*at, title);
+    let (at, _) = rows.columns.iter().zip(titles.iter()).enumerate().find(tells)?;
     if !several || !matches!(rows.stated.step(), Ok(None)) {
         return None;
     }

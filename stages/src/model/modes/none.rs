@@ -18,8 +18,8 @@ pub(super) fn no_mode(poles: &[Pole], criteria: &ModeCriteria) -> String {
     };
     let (root, significance) = (&pole.root, pole.significance);
     let which = format!(
-        "no pole passes as a mode: the strongest complex pair has {:.4} Hz, Q = {:.3} and an amplitude of {:.3} times its \
-         standard error",
+        "no pole passes as a mode: the strongest complex pair has {:.4} Hz, Q = {:.3} and an amplitude of {:.3} times \
+         its standard error",
         root.frequency_hz, root.quality_factor, significance
     );
     if significance < LEAST {
