@@ -33,7 +33,7 @@ pub use artifact::{
     Variable,
 };
 pub use config::{Config, Problem};
-pub use error::StageError;
+pub use error::{StageError, THIS_STAGE};
 pub use graph::{Node, Plan, Wire};
 pub use outcome::{Port, PortSpec, Ports, RunInfo, RunResult, SourceFile, StageRecord, StageResult, Unfinished};
 pub use recording::{Channel, InputFiles, Record, Recording, Source};

@@ -8,7 +8,8 @@ use crate::inspect::{Channel, LEAST_CODES, Values};
 /// Fewer changes of a switch are steps, each a test of its own.
 const LEAST_CHANGES: usize = 20;
 /// How names of inputs begin.
-const INPUTS: [&str; 8] = ["input", "force", "hammer", "excit", "drive", "stimul", "torque", "actuat"];
+const INPUTS: [&str; 10] =
+    ["input", "force", "hammer", "excit", "drive", "stimul", "torque", "actuat", "setpoint", "command"];
 
 /// A channel by its name. Errors: there is none.
 pub fn named<'a>(source: &'a Source, name: &str) -> Result<&'a Channel, Question> {
@@ -141,6 +142,21 @@ pub fn usable(channel: &&Channel) -> bool {
 
 /// That a file has no signal.
 pub fn nothing(source: &Source) -> Question {
-    let help = "`afmid inspect` says what recordings hold".to_owned();
-    (format!("{}: {}", source.file.display(), source.reason), Some(help))
+    let file = source.file.display();
+    let lacking = source.channels.iter().filter(|channel| !channel.is_axis);
+    let lacking = lacking.filter_map(|channel| Some((channel, channel.values.as_ref()?.missing)));
+    match lacking.max_by_key(|(_, missing)| *missing).filter(|(_, missing)| *missing > 0) {
+        Some((channel, missing)) => {
+            let problem = format!(
+                "{file}: {missing} of {} samples of {} are missing, and no other channel is a signal",
+                channel.samples, channel.location
+            );
+            let help = "fill them in, or cut the file to a stretch that has all".to_owned();
+            (problem, Some(help))
+        }
+        None => {
+            let help = "`afmid inspect` says what recordings hold".to_owned();
+            (format!("{file}: {}", source.reason), Some(help))
+        }
+    }
 }

@@ -1,16 +1,18 @@
 //! What recordings look like: snap-offs of a lever, free decays, measured input and output, a steady oscillation.
 
-use afmid_kernels::events::decay::FreeDecay;
 use afmid_kernels::harmonics::is_tone;
 use afmid_kernels::spectra::{is_impulsive, shows_resonance};
 
 use super::channels::{driving, inputs, is_named, named, nothing, outputs};
+use super::density::density;
 use super::first_file::FirstFile;
 use super::hit_names::are_hits;
+use super::lever::{force_curve, is_of_a_lever};
 use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
 use super::sensors::{Sensors, left_out, like, sensors};
 use super::stated::does_without_unit;
+use super::steps;
 use crate::cli::{Goal, RecordsAre};
 use crate::inspect::{Channel, counted};
 use crate::show::number;
@@ -26,6 +28,8 @@ pub struct Choice<'a> {
     pub channels: Vec<&'a Channel>,
     /// The measured inputs; of input and output alone.
     pub inputs: Vec<&'a Channel>,
+    /// The frequencies of a power density.
+    pub frequencies: Option<&'a Channel>,
     /// Whether the input is a hammer's: short against the record.
     pub struck: bool,
     /// What files and channels are, where the stage's default is not meant.
@@ -39,16 +43,17 @@ pub struct Choice<'a> {
 impl<'a> Choice<'a> {
     /// Without a measured input.
     pub fn of(goal: Goal, channels: Vec<&'a Channel>, why: String) -> Self {
-        Self { goal, channels, inputs: Vec::new(), struck: false, records_are: None, why, notes: Vec::new() }
+        let (inputs, notes) = (Vec::new(), Vec::new());
+        Self { goal, channels, inputs, frequencies: None, struck: false, records_are: None, why, notes }
     }
 }
-
-/// Least step of the level, in peaks of the ringing, that a snap-off has: it lets the whole load go.
-const STEP: f64 = 0.5;
 
 /// Chooses by what the first file holds, as far as the user has not. Errors: what is not known, and how to say it.
 pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     let file = FirstFile::new(source);
+    if let Some(choice) = density(&file, wanted)? {
+        return Ok(choice);
+    }
     let of_time = wanted.rate_hz.is_some() || wanted.goal == Some(Goal::Frf) || file.has_responses(false);
     if let Some(question) = file.spectrum().filter(|_| !of_time) {
         return Err(question);
@@ -57,16 +62,20 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
     if choice.channels.first().is_some_and(|channel| does_without_unit(choice.goal, channel, wanted)) {
         choice.notes.push("no unit is stated: amplitudes are as in the file; --unit UNIT says theirs".to_owned());
     }
+    let contradicted = choice.channels.first().and_then(|channel| file.contradicted_rate(channel, wanted));
+    choice.notes.extend(contradicted.map(|problem| format!("{problem}: is --rate right?")));
     Ok(choice)
 }
 
 fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     let source = file.source;
     match wanted.goal {
-        Some(Goal::Modes) if looks_like_a_lever(source) => {
-            one_channel(source, wanted, Goal::SnapOff, format!("snap-offs: {} is of a force microscope", source.format))
-        }
-        None | Some(Goal::Modes) => by_looks(file, wanted),
+        None => by_looks(file, wanted),
+        // of a lever modes are those of its snap-offs where nothing else is seen
+        Some(Goal::Modes) => by_looks(file, wanted).or_else(|question| match is_of_a_lever(source) {
+            true => one_channel(source, wanted, Goal::SnapOff, String::new()),
+            false => Err(question),
+        }),
         Some(Goal::Decay) => decay(file, wanted, false),
         Some(goal @ Goal::InputOutput) => input_output(file, wanted, Some(goal)),
         Some(Goal::Frf) if wanted.inputs.is_empty() && file.has_responses(true) => Ok(responses(source)),
@@ -84,8 +93,7 @@ fn by_looks<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>,
     if file.has_responses(false) {
         return Ok(responses(source));
     }
-    if looks_like_a_lever(source) && !rings_without_a_step(file, wanted) {
-        let why = format!("snap-offs: {} is of a force microscope", source.format);
+    if let Some(why) = force_curve(file, wanted) {
         return one_channel(source, wanted, Goal::SnapOff, why);
     }
     match wanted.channels.len() < 2 && has_input(source, wanted) {
@@ -154,33 +162,6 @@ fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: Str
     Ok(Choice::of(goal, vec![channel], why))
 }
 
-/// Formats of force microscopes, and afmid's own; or a channel that is named as a deflection.
-fn looks_like_a_lever(source: &Source) -> bool {
-    let format = source.format.to_lowercase();
-    let of_microscope = ["native", "jpk", "nanoscope", "igor"].iter().any(|name| format.contains(name));
-    let named = source.channels.iter().any(|channel| channel.location.to_lowercase().contains("defl"));
-    named || of_microscope
-}
-
-/// Whether the best channel rings down from about the level that it rings round: nothing was let go.
-fn rings_without_a_step(file: &FirstFile<'_>, wanted: &Wanted<'_>) -> bool {
-    let channels = &file.source.channels;
-    let piezo = channels.iter().any(|channel| channel.location.to_lowercase().contains("piezo"));
-    let best = file.source.best.and_then(|index| channels.get(index));
-    let (Some(channel), false) = (best, piezo) else { return false };
-    let Ok((values, found)) = file.search(&[channel], wanted) else { return false };
-    let level = |decay: &FreeDecay| {
-        let tail = &values[0][decay.range.start + decay.range.len() / 2..decay.range.end];
-        tail.iter().sum::<f64>() / tail.len().max(1) as f64
-    };
-    let steps = found.decays.iter().filter(|decay| {
-        let before = decay.channels.first().and_then(|channel| channel.level_before);
-        let peak = decay.channels.first().map_or(f64::NAN, |channel| channel.peak.abs());
-        before.is_none_or(|before| (before - level(decay)).abs() > STEP * peak)
-    });
-    2 * steps.count() < found.decays.len()
-}
-
 fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result<Choice<'a>, Question> {
     if wanted.records_are == Some(RecordsAre::Points) {
         let help =
@@ -197,7 +178,8 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
             Sensors { channels, left_out: None }
         }
     };
-    let notes: Vec<String> = left_out.into_iter().collect();
+    let steps = steps::hint(file, &channels, wanted);
+    let notes: Vec<String> = left_out.into_iter().chain(steps.clone()).collect();
     let cells = channels.len() > 1 && channels.iter().all(|channel| channel.location.ends_with('}'));
     let records_are = wanted.records_are.or(cells.then_some(RecordsAre::Hits));
     // cells are hits of their own: one is enough to see what they are
@@ -224,7 +206,8 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
         }
         (None, Some(reason)) if guessed => {
             let help = "look at it with `afmid inspect`; --channel names the signal, --goal says what to find";
-            return Err((format!("{}: no free decay, {reason}", source.file.display()), Some(help.to_owned())));
+            let help = steps.into_iter().chain([help.to_owned()]).collect::<Vec<_>>().join("; ");
+            return Err((format!("{}: no free decay, {reason}", source.file.display()), Some(help)));
         }
         (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };

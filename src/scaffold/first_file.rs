@@ -6,8 +6,8 @@ use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, find_decays}
 use afmid_kernels::harmonics::find_decays_beside_lines;
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
 use afmid_pipeline::recording::{
-    Contents, FoundChannel, FoundResponse, InputFiles, Reading, UnpackedContents, open_unpacked, responses,
-    says_frequencies,
+    Contents, FoundChannel, FoundResponse, InputFiles, Reading, UnpackedContents, contradiction, mean_rate,
+    open_unpacked, responses, says_frequencies,
 };
 
 use super::channels::{some_of, usable};
@@ -16,6 +16,7 @@ use super::pipeline::Wanted;
 use super::recordings::Source;
 use super::stated::missing;
 use crate::inspect::{Channel, first_samples};
+use crate::show::number;
 
 /// How many times as many samples as a hammer's pulse ringing has half of its energy in, at least: the pulse takes half a
 /// period or less of what it excites, half of its energy a sixth; of ringing of Q = 5 or more it is a third or more.
@@ -54,25 +55,30 @@ impl<'a> FirstFile<'a> {
         {
             return Some((format!("{}: {}", self.source.file.display(), error.problem), error.help));
         }
-        let axis = contents.channels.iter().find(|channel| says_frequencies(channel))?;
+        let (axis, spectra) = self.spectra(false)?;
+        let file = self.source.file.display();
+        let problem =
+            format!("{file}: {} over the frequencies {axis}: a spectrum, no record over time", some_of(&spectra));
+        let responses = "--goal frf reads complex numbers, real and imaginary part, amplitude and phase of responses";
+        let density = match &spectra[..] {
+            [only] => format!("--goal thermal takes {only} for a power density"),
+            _ => "--goal thermal --channel NAME takes one of them for a power density".to_owned(),
+        };
+        Some((problem, Some(format!("{responses}; {density}"))))
+    }
+
+    /// The axis of frequencies, and what lies over it; none where the file holds a record. `guessed`: even if the axis
+    /// does not say that it is one of frequencies.
+    pub fn spectra(&self, guessed: bool) -> Option<(String, Vec<String>)> {
+        let contents = &self.opened().ok()?.contents;
+        let untimed = |channel: &&FoundChannel| channel.is_axis && mean_rate(&contents.channels, channel).is_none();
+        let said = contents.channels.iter().find(|channel| says_frequencies(channel));
+        let axis = said.or_else(|| contents.channels.iter().find(untimed).filter(|_| guessed))?;
         let over = |channel: &&FoundChannel| !channel.is_axis && channel.sample_rate_hz.is_none();
         let of_length = |channel: &&FoundChannel| over(channel) && channel.samples == axis.samples;
-        let spectra: Vec<&str> = contents.channels.iter().filter(of_length).map(|c| c.location.as_str()).collect();
+        let spectra: Vec<String> = contents.channels.iter().filter(of_length).map(|c| c.location.clone()).collect();
         let timed = contents.channels.iter().any(|channel| !channel.is_axis && channel.sample_rate_hz.is_some());
-        if timed || spectra.is_empty() {
-            return None;
-        }
-        let problem = format!(
-            "{}: {} over the frequencies {}: a spectrum, no record over time",
-            self.source.file.display(),
-            some_of(&spectra),
-            axis.location
-        );
-        let responses = "--goal frf reads complex numbers, real and imaginary part, amplitude and phase of responses";
-        let density = spectra.first().filter(|_| self.source.format.contains("HDF5")).map(|density| {
-            format!("; `io.spectrum` a power density: frequency = \"{}\", density = \"{density}\"", axis.location)
-        });
-        Some((problem, Some(responses.to_owned() + &density.unwrap_or_default())))
+        (!timed && !spectra.is_empty()).then(|| (axis.location.clone(), spectra))
     }
 
     /// Whether free decays are in a channel, each of its samples taken as one of time.
@@ -81,6 +87,21 @@ impl<'a> FirstFile<'a> {
         let rate = channel.sample_rate_hz.unwrap_or(1.0);
         let found = find_decays(&[&values], rate, &DecaySearchOptions::default());
         found.is_ok_and(|found| !found.random && !found.decays.is_empty())
+    }
+
+    /// That the rate which the user gives is not that of the times beside a channel.
+    pub fn contradicted_rate(&self, channel: &Channel, wanted: &Wanted<'_>) -> Option<String> {
+        let channels = &self.opened().ok()?.contents.channels;
+        let found = channels.iter().find(|found| found.location == channel.location)?;
+        contradiction(channels, found, wanted.rate_hz?)
+    }
+
+    /// The mean rate of the times beside a channel that give none.
+    pub fn mean_rate(&self, channel: &Channel) -> Option<String> {
+        let channels = &self.opened().ok()?.contents.channels;
+        let found = channels.iter().find(|found| found.location == channel.location)?;
+        let (rate, axis) = mean_rate(channels, found)?;
+        Some(format!("the times in {axis} have {} samples a second on average", number(rate)))
     }
 
     /// A channel's first samples. Errors: they cannot be read.
@@ -96,7 +117,8 @@ impl<'a> FirstFile<'a> {
         let rate = channel.sample_rate_hz.or(wanted.rate_hz);
         rate.ok_or_else(|| {
             let (problem, help) = missing(self.source, channel, wanted, true);
-            (problem, Some(help.into_iter().chain(self.hammer()).collect::<Vec<_>>().join("; ")))
+            let more = self.mean_rate(channel).into_iter().chain(self.hammer());
+            (problem, Some(help.into_iter().chain(more).collect::<Vec<_>>().join("; ")))
         })
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{Contents, FoundChannel, InputFiles, Reading, open_unpacked, recognised};
+use afmid_pipeline::recording::{Contents, FoundChannel, InputFiles, Reading, mean_rate, open_unpacked, recognised};
 use rayon::prelude::*;
 
 use super::channels::{is_input, same_name};
@@ -39,6 +39,16 @@ pub struct Group {
     layout: Layout,
     /// Channels that the user named and these files do not have.
     pub lacks: Vec<String>,
+    pub axes: Axes,
+}
+
+/// What the first file of a group has besides signals.
+#[derive(Debug, Clone, Copy)]
+pub struct Axes {
+    /// Whether there are times or frequencies that give no rate.
+    pub any: bool,
+    /// The mean rate of such times.
+    pub mean_rate_hz: Option<f64>,
 }
 
 /// Files by what they hold.
@@ -54,7 +64,7 @@ pub struct Groups {
 
 /// What a file is.
 enum Kind {
-    Recording(Layout, Vec<String>),
+    Recording(Layout, Vec<String>, Axes),
     Own,
     None(String),
 }
@@ -69,7 +79,7 @@ impl Groups {
         let mut groups = Self::default();
         for ((path, _), kind) in files.iter().zip(kinds) {
             match kind? {
-                Kind::Recording(layout, lacks) => groups.add(path, layout, lacks),
+                Kind::Recording(layout, lacks, axes) => groups.add(path, layout, lacks, axes),
                 Kind::Own => groups.own.push(path.clone()),
                 Kind::None(why) => groups.skipped.push((path.clone(), why)),
             }
@@ -77,12 +87,15 @@ impl Groups {
         Ok(groups)
     }
 
-    fn add(&mut self, path: &Path, layout: Layout, lacks: Vec<String>) {
+    fn add(&mut self, path: &Path, layout: Layout, lacks: Vec<String>, axes: Axes) {
         let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
         let same = |group: &&mut Group| group.ending == ending && group.layout.is(&layout);
         match self.all.iter_mut().find(same) {
             Some(group) => group.files.push(path.to_owned()),
-            None => self.all.push(Group { files: vec![path.to_owned()], ending, layout, lacks }),
+            None => {
+                let files = vec![path.to_owned()];
+                self.all.push(Group { files, ending, layout, lacks, axes });
+            }
         }
     }
 
@@ -115,7 +128,11 @@ impl Group {
         const MOST: usize = 6;
         let files = if self.files.len() == 1 { "1 file".to_owned() } else { format!("{} files", self.files.len()) };
         let Layout::Signals(signals) = &self.layout else { return format!("{files} with frequency responses") };
-        let rate = self.rate_hz().map_or_else(|| "without a rate".to_owned(), |rate| format!("at {} Hz", number(rate)));
+        let rate = match (self.rate_hz(), self.axes.mean_rate_hz) {
+            (Some(rate), _) => format!("at {} Hz", number(rate)),
+            (None, Some(rate)) => format!("with uneven times, {} Hz on average", number(rate)),
+            (None, None) => "without a rate".to_owned(),
+        };
         let mut names: Vec<&str> = signals.iter().take(MOST).map(|signal| signal.name.as_str()).collect();
         names.extend((signals.len() > MOST).then_some("..."));
         match names.is_empty() {
@@ -196,5 +213,8 @@ fn kind((path, given): &Listed, wanted: &Wanted<'_>) -> Result<Kind, Question> {
         return Ok(Kind::None(format!("no channel of {LEAST_SAMPLES} samples")));
     }
     let (layout, lacks) = Layout::of(contents, wanted);
-    Ok(Kind::Recording(layout, lacks))
+    let mut channels = contents.channels.iter().filter(|channel| !channel.is_axis);
+    let mean_rate_hz = channels.find_map(|channel| mean_rate(&contents.channels, channel)).map(|(rate, _)| rate);
+    let axes = Axes { any: contents.channels.iter().any(|channel| channel.is_axis), mean_rate_hz };
+    Ok(Kind::Recording(layout, lacks, axes))
 }

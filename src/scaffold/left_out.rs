@@ -10,6 +10,7 @@ use super::recordings::Source;
 use super::stated::same_rate;
 use crate::batch::shell::quoted;
 use crate::cli::NewPipelineArgs;
+use crate::show::number as shown;
 
 /// Groups that are named; more are counted.
 const MOST: usize = 8;
@@ -59,8 +60,11 @@ fn command(source: &Source, number: usize, args: &NewPipelineArgs, config: &Path
     words.extend(files.iter().map(quoted));
     let name = |value: Option<clap::builder::PossibleValue>| value.map(|value| value.get_name().to_owned());
     let mut say = |flag: &str, value: String| words.push(format!("{flag} {}", quoted(value)));
-    if let Some(rate) = rate.or(args.rate.filter(|_| group.rate_hz().is_none())) {
-        say("--rate", rate.to_string());
+    // a rate that files state themselves, or their times or frequencies, is not that of the files that were taken
+    let own = group.axes.mean_rate_hz.filter(|_| group.rate_hz().is_none()).map(shown);
+    let carried = args.rate.filter(|_| source.rate_hz.or(group.rate_hz()).is_none() && !group.axes.any);
+    if let Some(rate) = rate.or(carried).map(|rate| rate.to_string()).or(own) {
+        say("--rate", rate);
     }
     name(args.goal.and_then(|goal| goal.to_possible_value())).into_iter().for_each(|goal| say("--goal", goal));
     name(args.records_are.and_then(|what| what.to_possible_value())).into_iter().for_each(|what| say("--as", what));

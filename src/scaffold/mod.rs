@@ -2,16 +2,19 @@
 
 mod channels;
 mod choice;
+mod density;
 mod first_file;
 mod groups;
 mod hit_names;
 mod left_out;
+mod lever;
 mod pipeline;
 mod points;
 mod recordings;
 mod sensors;
 mod stage;
 mod stated;
+mod steps;
 
 pub use choice::choose;
 pub use left_out::left_out;

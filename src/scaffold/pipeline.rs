@@ -6,6 +6,7 @@ use afmid_pipeline::toml::{Table, Value};
 use afmid_stages::io::quantity_of_unit;
 
 use super::choice::{Choice, Question};
+use super::density;
 use super::points;
 use super::recordings::Source;
 use super::stated;
@@ -61,6 +62,9 @@ impl Goal {
 impl Choice<'_> {
     /// The shipped config, and its stage that reads the recordings.
     const fn template(&self) -> (&'static str, &'static str) {
+        if self.frequencies.is_some() {
+            return (include_str!("../../configs/thermal-spectrum.toml"), "io.spectrum");
+        }
         match (self.goal, self.inputs.is_empty()) {
             (Goal::Frf, false) => (include_str!("../../configs/hammer.toml"), "io.columns"),
             (Goal::Frf, true) => (self.goal.config(), "io.frf"),
@@ -94,6 +98,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
         }
         "io.columns" => columns(source, ("file", path(&source.file, folder)), choice, wanted),
         "io.frf" => Ok(responses(source, wanted, folder)),
+        "io.spectrum" => Ok(density::params(source, choice, wanted, folder)),
         _ => records(source, choice, wanted, folder),
     }?;
     let reader = format!("\"{reader}\"");
@@ -113,6 +118,8 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
         match line.split_once(" = ") {
             Some(("name", _)) => text.push_str(&format!("name = \"{}\"\n", choice.goal.name())),
             Some(("params", _)) if stage == reader => text.push_str(&params),
+            // the band is one of its data
+            Some(("params", _)) if stage == "\"spectrum.thermal\"" => {}
             Some(("params", _)) if stage == "\"events.decay\"" => {
                 let records_are = match choice.records_are {
                     None => "auto",

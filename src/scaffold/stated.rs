@@ -70,8 +70,13 @@ pub fn missing(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bo
     let says = |axis: &Channel| source.remarks.iter().find(|remark| remark.starts_with(&axis.location)).cloned();
     let mut help = vec![how.to_owned()];
     if let Some((axis, remark)) = axis.and_then(|axis| Some((axis, says(axis)?))) {
+        let of_time = axis.location.to_lowercase().contains("time") || ["s", "ms", "us"].contains(&axis.unit.as_str());
+        if of_time {
+            help.push(remark);
+            return (format!("{} states no {what}", source.file.display()), help);
+        }
         help.push(format!(
-            "{remark}; --goal frf if {} is a frequency, `io.spectrum` for a power density",
+            "{remark}; --goal frf if {} is a frequency and the others are responses, --goal thermal if a power density",
             axis.location
         ));
     }

@@ -14,6 +14,9 @@ use crate::rate::{fewest_digits, of_step};
 use crate::{Contents, FoundChannel};
 use std::collections::HashMap;
 
+mod mean_rate;
+pub use mean_rate::{contradiction, mean_rate};
+
 /// Names of arrays of times, in lower case. A capital `T` is a temperature or a period.
 const TIMES: [&str; 11] = [
     "time",

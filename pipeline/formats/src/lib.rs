@@ -46,7 +46,7 @@ pub mod wav;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use axes::{names_times, settle as settle_axes};
+pub use axes::{contradiction, mean_rate, names_times, settle as settle_axes};
 pub use budget::most_inflated;
 pub use facts::is_fact;
 pub use frequency::hertz;

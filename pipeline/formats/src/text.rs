@@ -10,6 +10,22 @@ pub(crate) fn decoded(bytes: Vec<u8>) -> String {
     String::from_utf8(bytes).unwrap_or_else(|error| latin(error.as_bytes()))
 }
 
+/// Marks of UTF-16, little-endian and big-endian.
+const UTF_16: [[u8; 2]; 2] = [*b"\xFF\xFE", *b"\xFE\xFF"];
+
+/// Whether bytes begin as UTF-16 does.
+pub(crate) fn is_utf16(bytes: &[u8]) -> bool {
+    UTF_16.iter().any(|mark| bytes.starts_with(mark))
+}
+
+/// UTF-16 without the mark that it begins with; what is no character becomes a replacement.
+pub(crate) fn utf16(bytes: &[u8]) -> String {
+    let big = bytes.starts_with(&UTF_16[1]);
+    let (pairs, _) = bytes.get(2..).unwrap_or_default().as_chunks();
+    let units = pairs.iter().map(|pair| if big { u16::from_be_bytes(*pair) } else { u16::from_le_bytes(*pair) });
+    char::decode_utf16(units).map(|unit| unit.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+}
+
 /// One byte for one character.
 pub(crate) fn latin(bytes: &[u8]) -> String {
     bytes.iter().map(|&byte| char::from(byte)).collect()

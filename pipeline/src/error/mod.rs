@@ -3,6 +3,7 @@
 mod stage;
 mod store;
 
-pub use stage::StageError;
+pub(crate) use stage::with_id;
+pub use stage::{StageError, THIS_STAGE};
 pub(crate) use store::Result;
 pub use store::StoreError;

@@ -23,6 +23,14 @@ pub struct StageError {
     pub source: Option<Box<dyn std::error::Error + Send + Sync>>,
 }
 
+/// Stands for a stage's id in its errors and warnings, as in `--set <this stage>.order=4`: the runner puts the id there.
+pub const THIS_STAGE: &str = "<this stage>";
+
+/// A text of a stage's with its id in it.
+pub(crate) fn with_id(text: &str, id: &str) -> String {
+    text.replace(THIS_STAGE, id)
+}
+
 impl StageError {
     /// An error from what was found and what was wanted.
     pub fn new(problem: impl Into<String>) -> Self {
@@ -52,6 +60,13 @@ impl StageError {
     #[must_use]
     pub fn caused_by(mut self, error: impl std::error::Error + Send + Sync + 'static) -> Self {
         self.source = Some(Box::new(error));
+        self
+    }
+
+    /// The id of the stage in the place of [`THIS_STAGE`].
+    pub(crate) fn of_stage(mut self, id: &str) -> Self {
+        self.problem = with_id(&self.problem, id);
+        self.help = self.help.map(|help| with_id(&help, id));
         self
     }
 

@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::Ports;
+use crate::error::with_id;
 
 /// What a stage made: the unit of the cache.
 #[derive(Debug, Clone, Default)]
@@ -11,6 +12,13 @@ pub struct StageResult {
     pub outputs: Ports,
     /// Warnings, in the order in which they arose.
     pub warnings: Vec<String>,
+}
+
+impl StageResult {
+    /// The warnings with the id of the stage that they are of.
+    pub(crate) fn warnings_of(&self, id: &str) -> Vec<String> {
+        self.warnings.iter().map(|warning| with_id(warning, id)).collect()
+    }
 }
 
 /// A file that a stage read, without its folder: provenance that does not depend on where the data lies.

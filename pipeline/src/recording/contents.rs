@@ -91,7 +91,7 @@ pub(super) fn is_recognised(path: &Path) -> bool {
 }
 
 /// Whether a file begins as HDF5 does. Errors: it cannot be read.
-pub(super) fn is_hdf5_file(path: &Path) -> Result<bool, StageError> {
+pub fn is_hdf5_file(path: &Path) -> Result<bool, StageError> {
     Ok(is_hdf5(&head_of(path)?))
 }
 

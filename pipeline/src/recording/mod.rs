@@ -38,10 +38,10 @@ pub use series::{read_number_attribute, read_series};
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native, write_native_in};
 
 pub use afmid_formats::{
-    Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Source, even_step, formats,
-    is_fact, lane_names, most_inflated, responses, says_frequencies, unit_ratio,
+    Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Source, contradiction,
+    even_step, formats, hertz, is_fact, lane_names, mean_rate, most_inflated, responses, says_frequencies, unit_ratio,
 };
-pub use contents::{UnpackedContents, open_contents, open_unpacked};
+pub use contents::{UnpackedContents, is_hdf5_file, open_contents, open_unpacked};
 pub use how::{How, Reading};
 pub use open::{Opened, agreed_rate, open_records, recognised};
 pub use responses::{FileResponse, read_responses};

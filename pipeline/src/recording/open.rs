@@ -11,7 +11,7 @@ use super::lazy_source::LazySource;
 use super::native::{Wanted, open_if_native, open_native};
 use super::opened_files::contents;
 use super::stretches::uninterrupted;
-use super::{Channel, Contents, FoundChannel, Record};
+use super::{Channel, Contents, FoundChannel, Record, contradiction};
 use crate::error::StageError;
 
 /// Channels named in a message.
@@ -62,6 +62,7 @@ pub fn open_records(files: &InputFiles, path: &Path, wanted: &[Wanted], how: &Ho
     let file = File { files, path, size: state.size(), blake3: &inspected.blake3, reading, contents: &contents };
     let records = file.records(wanted, how).map_err(|error| error.at(path))?;
     let mut remarks = contents.remarks.clone();
+    remarks.extend(file.contradicted_rate(wanted, how));
     if records.len() > 1 {
         remarks.insert(0, format!("the recording has gaps: {} uninterrupted stretches, a record each", records.len()));
     }
@@ -122,6 +123,13 @@ impl File<'_> {
             })
         };
         stretches.iter().enumerate().map(record).collect()
+    }
+
+    /// That the rate which is given is not that of the file's times.
+    fn contradicted_rate(&self, wanted: &[Wanted], how: &How) -> Option<String> {
+        let given = how.sample_rate_hz?;
+        let mut found = wanted.iter().filter_map(|wanted| self.find(wanted).ok()?);
+        found.find_map(|channel| contradiction(&self.contents.channels, channel, given))
     }
 
     /// A channel by its location, with or without the slash before it.

@@ -31,6 +31,11 @@ pub struct FileResponse {
     pub remarks: Vec<String>,
 }
 
+/// How to say what columns hold. `<this stage>` is [`crate::THIS_STAGE`].
+const VALUES: &str = "`--set <this stage>.values=amplitude-degrees` if the columns of each response are amplitude and \
+                      phase in degrees, likewise `amplitude-radians`, `decibels-degrees`, `decibels-radians`, \
+                      `real-imaginary`";
+
 /// Reads all frequency responses of a file. `parts` says what its columns are; none: their titles say it.
 ///
 /// Errors: as [`WholeFile`]; none is found; columns that may be one or the other; frequencies that do not ascend.
@@ -41,7 +46,13 @@ pub fn read_responses(
     parts: Option<Parts>,
 ) -> Result<Vec<FileResponse>, StageError> {
     let file = WholeFile::open(files, path, reading)?;
-    let found = responses(file.contents(), parts).map_err(|error| error.in_file(path))?;
+    let found = responses(file.contents(), parts).map_err(|error| {
+        let mut error = error.in_file(path);
+        if parts.is_none() {
+            error.help = Some(error.help.map_or_else(|| VALUES.to_owned(), |help| format!("{help}; {VALUES}")));
+        }
+        error
+    })?;
     found.iter().map(|response| read(&file, response).map_err(|error| error.at(path))).collect()
 }
 
@@ -72,7 +83,7 @@ fn read(file: &WholeFile, found: &FoundResponse) -> Result<FileResponse, StageEr
                  first is nowhere negative",
                 found.values[0].location, found.values[1].location
             ))
-            .help("say it, for example: values = \"amplitude-degrees\""));
+            .help(VALUES));
         }
         remarks.push(format!(
             "{} and {} are taken as real and imaginary part: the file does not say",

@@ -139,7 +139,7 @@ fn perform(
     let needs = needs(plan);
     let failed = |index: usize, error: StageError| {
         let node = &plan.nodes[index];
-        RunError { id: node.id.clone(), uses: node.uses.clone(), error: Box::new(error) }
+        RunError { id: node.id.clone(), uses: node.uses.clone(), error: Box::new(error.of_stage(&node.id)) }
     };
     let arithmetic = arithmetic();
     let around =
@@ -165,7 +165,10 @@ fn perform(
                 if !finished.log.is_empty() {
                     logs.push((finished.record.id.clone(), finished.log));
                 }
-                stages.push(finished.record);
+                let mut record = finished.record;
+                // the cache keeps the others: its files belong to no stage
+                record.result.warnings = record.result.warnings_of(&record.id);
+                stages.push(record);
             }
             Outcome::Failed(error) => {
                 unfinished.push(without(Some(error.error.to_string())));
@@ -237,7 +240,7 @@ fn step(
         }
     };
     let took = clock.elapsed();
-    options.observer.end(&node.id, cached, took, &result.warnings);
+    options.observer.end(&node.id, cached, took, &result.warnings_of(&node.id));
     let wires = node
         .inputs
         .iter()

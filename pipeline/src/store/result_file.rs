@@ -171,7 +171,7 @@ fn write_stage_record(entry: &Group, group: &str, stage: &StageRecord, program: 
     let sizes: Vec<u64> = sources.iter().map(|file| file.size).collect();
     write::dataset(&group, "source_size", &[sizes.len()], &sizes)?;
     write::texts(&group, "source_blake3", &sources.iter().map(|file| file.blake3.as_str()).collect::<Vec<_>>())?;
-    write::texts(&group, "warnings", &stage.result.warnings)?;
+    write::texts(&group, "warnings", &stage.result.warnings_of(&stage.id))?;
     Ok(process)
 }
 

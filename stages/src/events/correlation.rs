@@ -298,7 +298,8 @@ fn nothing_found(listed: &Listed, records: &[Record]) -> StageError {
         format!(
             "check the channel, its sign, and `kind`: `afmid inspect` says where a record rings, `io.records` and \
          `io.overview` alone draw one (`afmid report`). The records have {rate} samples per second: a recorder of less \
-         than twenty samples a period filters a lever's ringing out"
+         than twenty samples a period filters a lever's ringing out. If they are no force curves: `afmid new pipeline` \
+         with `--goal decay` takes free decays, with `--goal thermal` thermal noise"
         ),
     )
 }

@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{InputFiles, read_number_attribute, read_series};
+use afmid_kernels::spectra::averages_by_scatter;
+use afmid_pipeline::recording::{
+    InputFiles, Reading, WholeFile, hertz, is_hdf5_file, read_number_attribute, read_series,
+};
 use afmid_pipeline::{Array, Context, Example, Faults, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,8 +17,9 @@ use crate::artifacts::NewDensity;
 /// Opens a power spectral density that another program has averaged and stored.
 ///
 /// # Model
-/// Two one-dimensional HDF5 datasets of one length: frequencies, equally spaced and ascending, and the one-sided
-/// density at them. Each value is the mean of `averages` independent periodograms.
+/// Two one-dimensional HDF5 datasets, or channels of a file of any other format such as columns of a table, of one
+/// length: frequencies, equally spaced and ascending, and the one-sided density at them. Each value is the mean of
+/// `averages` independent periodograms.
 /// # Method
 /// Both are read and checked; frequencies outside the range are left out. Nothing is rescaled but by `scale`.
 /// # Shapes
@@ -26,7 +30,7 @@ use crate::artifacts::NewDensity;
 /// `standard_error` is the density over the square root of the number of averages.
 /// # Errors
 /// No such file or dataset; lengths that differ; frequencies that do not ascend in equal steps; a density that is not
-/// positive; no number of averages.
+/// positive; no number of averages, and no scatter to estimate it from.
 /// # Source
 /// P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70, for the scatter of an average.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -35,16 +39,17 @@ pub struct Spectrum {
     /// The file, relative to the config file. A path that begins with `../../shared/data/` begins at the variable
     /// `AFMID_DATA` where that is set. Required.
     pub file: String,
-    /// Dataset of the frequencies, in Hz.
+    /// Dataset or channel of the frequencies, in Hz.
     pub frequency: String,
-    /// Dataset of the one-sided density.
+    /// Dataset or channel of the one-sided density.
     pub density: String,
     /// Unit of the signal whose density it is.
     pub unit: String,
     /// Factor from the stored density to `unit`^2/Hz. Why: 0.5 for a density that has been doubled once too often.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub scale: f64,
-    /// Independent spectra that were averaged. Absent: the attribute `n_avg` of the density's dataset or of the file.
+    /// Independent spectra that were averaged. Absent: the attribute `n_avg` of the density's dataset or of the file;
+    /// without it what the scatter of neighbouring values shows, with a warning.
     #[schemars(range(min = 1.0, max = 1e9))]
     pub averages: Option<f64>,
     /// Frequencies below are left out, in Hz.
@@ -79,7 +84,7 @@ pub(crate) const DENSITY: Port<Array> = Port::new(
 impl Stage for Spectrum {
     const SPEC: Spec = Spec {
         name: "io.spectrum",
-        version: 1,
+        version: 2,
         summary: "opens a stored power spectral density",
         inputs: &[],
         outputs: &[DENSITY.spec()],
@@ -112,12 +117,20 @@ impl Stage for Spectrum {
         let [path] = &paths[..] else {
             return Err(StageError::new(format!("`file` matches {} files, wanted one", paths.len())));
         };
-        let (f, p) = (read_series(cx.files(), path, &self.frequency)?, read_series(cx.files(), path, &self.density)?);
-        let averages = match self.averages {
-            Some(averages) => averages,
-            None => self.stored_averages(cx.files(), path)?,
+        let hdf5 = is_hdf5_file(path)?;
+        let (f, p) = match hdf5 {
+            true => (read_series(cx.files(), path, &self.frequency)?, read_series(cx.files(), path, &self.density)?),
+            false => self.channels(cx.files(), path).map_err(|error| error.at(path))?,
         };
         check_spectrum(&f, &p).map_err(|error| error.at(path))?;
+        let stored = || if hdf5 { self.stored_averages(cx.files(), path) } else { Ok(None) };
+        let averages = match self.averages {
+            Some(averages) => averages,
+            None => match stored()? {
+                Some(averages) => averages,
+                None => scattered_averages(&p, cx).map_err(|error| error.at(path))?,
+            },
+        };
         let highest = self.highest_hz.unwrap_or(f64::INFINITY);
         let inside = |f: f64| f >= self.lowest_hz && f <= highest;
         let (f, p): (Vec<f64>, Vec<f64>) =
@@ -134,21 +147,49 @@ impl Stage for Spectrum {
 }
 
 impl Spectrum {
-    fn stored_averages(&self, files: &InputFiles, path: &Path) -> Result<f64, StageError> {
+    /// Frequencies in hertz and density of a file that is not HDF5.
+    fn channels(&self, files: &InputFiles, path: &Path) -> Result<(Vec<f64>, Vec<f64>), StageError> {
+        let file = WholeFile::open(files, path, &Reading::of("auto", None))?;
+        let channels = &file.contents().channels;
+        let bare = |name: &str| name.strip_prefix('/').unwrap_or(name).to_owned();
+        let named = |name: &str| {
+            let found = channels.iter().find(|channel| bare(&channel.location) == bare(name));
+            found.ok_or_else(|| {
+                let names: Vec<&str> = channels.iter().take(20).map(|channel| channel.location.as_str()).collect();
+                StageError::new(format!("there is no channel `{name}`; the file has: {}", names.join(", ")))
+            })
+        };
+        let (frequency, density) = (named(&self.frequency)?, named(&self.density)?);
+        let unit_hz = hertz(&frequency.unit).unwrap_or(1.0);
+        let f = file.read(frequency)?.into_iter().map(|f| f * unit_hz).collect();
+        Ok((f, file.read(density)?))
+    }
+
+    fn stored_averages(&self, files: &InputFiles, path: &Path) -> Result<Option<f64>, StageError> {
         const NAME: &str = "n_avg";
         for location in [self.density.as_str(), "/"] {
             match read_number_attribute(files, path, location, NAME)? {
-                Some(n) if n.is_finite() && n >= 1.0 => return Ok(n),
+                Some(n) if n.is_finite() && n >= 1.0 => return Ok(Some(n)),
                 Some(n) => {
                     return Err(StageError::new(format!("{location}: `{NAME}` is {n}, wanted 1 or more")).at(path));
                 }
                 None => {}
             }
         }
-        Err(StageError::new(format!("neither `{}` nor the file has the attribute `{NAME}`", self.density))
-            .at(path)
-            .help("set `averages` to the number of independent spectra in the mean"))
+        Ok(None)
     }
+}
+
+/// The number of averages that neighbouring values show. Errors: they do not scatter.
+fn scattered_averages(density: &[f64], cx: &Context) -> Result<f64, StageError> {
+    let help = "set `averages` to the number of independent spectra in the mean";
+    let unknown = || StageError::new("the file does not state how many spectra were averaged").help(help);
+    let found = averages_by_scatter(density).ok_or_else(unknown)?;
+    cx.warn(format!(
+        "the file does not state how many spectra were averaged: {found:.0} by the scatter of neighbouring values, \
+         on which the stated errors depend; {help}"
+    ));
+    Ok(found)
 }
 
 /// A density as `spectrum.thermal` takes it.

@@ -1,6 +1,7 @@
 //! The stage `model.modes`.
 
 mod driven;
+mod none;
 
 use afmid_kernels::spectra::{Intersample, response_frequencies};
 use afmid_pipeline::{
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use self::driven::leave_out_undriven;
+use self::none::no_mode;
 use super::pem::MODEL;
 use crate::artifacts::{
     DataSet, Pair, SAMPLE_RATE_HZ, first_sample, further_inputs, innovations, mode_document, mode_table, nuisances,
@@ -98,7 +100,7 @@ impl Stage for Modes {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 9,
+        version: 10,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -134,7 +136,7 @@ impl Stage for Modes {
         let zeros = zeros(&model, &covariance).map_err(StageError::from_error)?;
         let modes: Vec<&Pole> = found.iter().filter(|pole| pole.kind == PoleClass::Mechanical).collect();
         if modes.is_empty() {
-            cx.warn("no pole passes as a mode: lower min_significance or min_quality_factor, or raise the order");
+            cx.warn(no_mode(&found, &self.criteria));
         }
         let half = inputs.find(&HALF)?;
         let fits = match (half, pair) {

@@ -117,6 +117,8 @@ fn by_title(mut columns: Vec<Column<'_>>) -> Result<Vec<Pair<'_>>, FormatError> 
         let wanted = match column.role {
             Some(Role::Real) => Role::Imaginary,
             Some(Role::Amplitude | Role::Decibels) => Role::Phase,
+            // a quantity with its phase beside it: its amplitude, whatever it is called
+            None if columns.get(at + 1).is_some_and(|next| !next.used && next.role == Some(Role::Phase)) => Role::Phase,
             _ => continue,
         };
         let (first, decibels) = (column.channel, column.role == Some(Role::Decibels));

@@ -18,7 +18,7 @@ pub(super) enum Role {
 /// Words of titles, in lower case.
 const WORDS: [(Role, &[&str]); 7] = [
     (Role::Coherence, &["coherence", "coh"]),
-    (Role::Phase, &["phase", "phi", "angle", "arg", "pha"]),
+    (Role::Phase, &["phase", "phi", "angle", "arg", "pha", "theta"]),
     (Role::Decibels, &["db"]),
     (Role::Imaginary, &["imaginary", "imag", "im", "i"]),
     (Role::Real, &["real", "re", "r"]),

@@ -13,18 +13,25 @@ use std::sync::Arc;
 
 /// Channels of the columns, with the rate of the time column among them, or the rate that the header states.
 pub(super) fn of(mut rows: Rows, mut titles: Vec<Title>, remarks: &mut Vec<String>) -> Vec<FoundChannel> {
+    let time = time_column(&rows, &titles).or_else(|| stamped(&mut rows, &mut titles));
+    name_of_source(&rows, &mut titles, time);
     let names: Vec<&str> = titles.iter().map(|t| t.name.as_str()).collect();
     let locations = titles::locations(&names);
-    let time = time_column(&rows, &titles);
     if let Some(title) = time.and_then(|at| titles.get_mut(at)).filter(|title| title.unit.is_empty()) {
         title.unit.clone_from(&rows.stated.time_unit);
     }
     state_units(&rows, &mut titles, time);
     let clock = clock(&mut rows, &titles, &locations, time, remarks);
+    let copies = copies(&rows, &titles, time);
     let count = rows.count;
     let mut channels = Vec::new();
     for (number, ((column, title), location)) in rows.columns.into_iter().zip(&titles).zip(locations).enumerate() {
         if clock.axis == Some(number) && clock.rate_hz.is_some() {
+            continue;
+        }
+        if copies.contains(&number) {
+            let first = time.and_then(|at| titles.get(at)).map_or("", |title| title.name.as_str());
+            remarks.push(format!("{location} has the same times as {first}: it is left out"));
             continue;
         }
         if column.values.is_empty() {
@@ -69,12 +76,66 @@ fn no_samples(column: &Column, rows: usize) -> Option<String> {
     Some(format!("is the single number {single}"))
 }
 
-/// The column of times: one that is titled so, or else a first column in a unit of time.
+/// Columns that are titled as times and have those of the first such column: each channel of an oscilloscope has some.
+fn copies(rows: &Rows, titles: &[Title], time: Option<usize>) -> Vec<usize> {
+    let Some((at, first)) = time.and_then(|at| Some((at, rows.columns.get(at)?))) else { return Vec::new() };
+    let columns = rows.columns.iter().zip(titles).enumerate().skip(at + 1);
+    let same = |(_, (column, title)): &(usize, (&Column, &Title))| {
+        titles::is_time(title) && column.values.len() <= first.values.len() && first.values.starts_with(&column.values)
+    };
+    columns.filter(same).map(|(number, _)| number).collect()
+}
+
+/// The column of times: one that is titled so, or else a first column in a unit of time, or a first column of numbers
+/// without a title that steps by the interval which the header states.
 fn time_column(rows: &Rows, titles: &[Title]) -> Option<usize> {
     let has_numbers = |at: &usize| rows.columns.get(*at).is_some_and(|column| column.numbers() > 1);
     let titled = titles.iter().position(titles::is_time);
     let first = titles.first().filter(|title| units::seconds(&title.unit).is_some()).map(|_| 0);
-    titled.filter(has_numbers).or(first.filter(has_numbers)).filter(|_| rows.columns.len() > 1)
+    let named = titled.filter(has_numbers).or(first.filter(has_numbers));
+    named.or_else(|| stepping_as_stated(rows, titles)).filter(|_| rows.columns.len() > 1)
+}
+
+/// The first column of numbers, if it has no title and steps by the interval that the header states (Tektronix TDS:
+/// behind three columns of the header).
+fn stepping_as_stated(rows: &Rows, titles: &[Title]) -> Option<usize> {
+    let (step, _) = rows.stated.step().ok()??;
+    let is_value = |column: &&Column| column.numbers() > 1 && no_samples(column, rows.count).is_none();
+    let at = rows.columns.iter().position(|column| is_value(&column))?;
+    let untitled = titles.get(at).is_some_and(|title| title.name.is_empty() && title.unit.is_empty());
+    let others = rows.columns.iter().filter(is_value).count() > 1;
+    let even = || axis::even_between(rows.columns.get(at)?, &rows.starts, Some(step)).ok();
+    (untitled && others && even().is_some()).then_some(at)
+}
+
+/// The first column, or one that is titled as time, of times of day that rise, as seconds since its first; none where
+/// the header states an interval.
+fn stamped(rows: &mut Rows, titles: &mut [Title]) -> Option<usize> {
+    let (count, several) = (rows.count, rows.columns.len() > 1);
+    let first = |at: usize, title: &Title| at == 0 || titles::is_time(title);
+    let tells =
+        |(at, (column, title)): &(usize, (&Column, &Title))| column.stamps.tell_time(count) && first(*at, title);
+    let (at, _) = rows.columns.iter().zip(titles.iter()).enumerate().find(tells)?;
+    if !several || !matches!(rows.stated.step(), Ok(None)) {
+        return None;
+    }
+    let column = rows.columns.get_mut(at)?;
+    (column.values, column.printed) = (std::mem::take(&mut column.stamps.seconds), column.stamps.printed);
+    (column.no_numbers, column.missing) = (0, 0);
+    titles.get_mut(at)?.unit = "s".to_owned();
+    Some(at)
+}
+
+/// The name of the channel that a header beside the rows states, for the only column of values without a title.
+fn name_of_source(rows: &Rows, titles: &mut [Title], time: Option<usize>) {
+    let [source] = &rows.stated.sources[..] else { return };
+    let mut others = titles.iter_mut().zip(&rows.columns).enumerate().filter(|(number, (title, column))| {
+        let is_value = column.numbers() > 1 && no_samples(column, rows.count).is_none();
+        time != Some(*number) && title.name.is_empty() && is_value
+    });
+    if let (Some((_, (title, _))), None) = (others.next(), others.next()) {
+        title.name.clone_from(source);
+    }
 }
 
 /// Units that the header states by a key: one for all columns of values, or one for each.

@@ -2,6 +2,7 @@
 
 use super::lines::Line;
 use super::number::{self, Printed};
+use super::stamps::Stamps;
 use crate::FormatError;
 use crate::fail;
 
@@ -18,6 +19,8 @@ pub(super) struct Column {
     pub(super) missing: usize,
     /// Numbers right of a text: values of a header that stands beside the rows.
     pub(super) labelled: usize,
+    /// Times of day, of a column that has such instead of numbers.
+    pub(super) stamps: Stamps,
 }
 
 /// How many numbers, gaps included, may still be kept: as many as the file has bytes. Rows that lack most of their
@@ -37,6 +40,7 @@ impl Column {
     ) -> Result<(), FormatError> {
         let Some(value) = number::parse(field, decimal) else {
             if !number::bare(field).is_empty() {
+                self.stamps.take(field);
                 self.no_numbers += 1;
                 self.first_no_number = if self.no_numbers == 1 { line.number } else { self.first_no_number };
             }

@@ -2,9 +2,9 @@
 
 use crate::FormatError;
 use crate::fail;
-use crate::text::decoded;
+use crate::text::{decoded, is_utf16, utf16};
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Cursor, Read};
 
 /// Marks UTF-8.
 pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
@@ -24,9 +24,8 @@ pub(super) struct Line {
 }
 
 /// Reads lines.
-#[derive(Debug)]
 pub(super) struct Lines {
-    reader: BufReader<File>,
+    reader: Box<dyn BufRead>,
     file_bytes: u64,
     at: u64,
     number: usize,
@@ -36,11 +35,21 @@ pub(super) struct Lines {
 
 impl Lines {
     pub(super) fn new(file: File, file_bytes: u64) -> Result<Self, FormatError> {
-        let mut lines =
-            Self { reader: BufReader::with_capacity(1 << 16, file), file_bytes, at: 0, number: 0, ahead: None };
+        let mut lines = Self {
+            reader: Box::new(BufReader::with_capacity(1 << 16, file)),
+            file_bytes,
+            at: 0,
+            number: 0,
+            ahead: None,
+        };
         let head = lines.reader.fill_buf().map_err(|e| cannot(0, &e))?;
-        if head.starts_with(b"\xFF\xFE") || head.starts_with(b"\xFE\xFF") {
-            return Err(fail::at(0, "the text is UTF-16, UTF-8 was wanted", "save it as UTF-8"));
+        if is_utf16(head) {
+            let mut bytes = Vec::new();
+            lines.reader.read_to_end(&mut bytes).map_err(|e| cannot(0, &e))?;
+            let text = utf16(&bytes);
+            lines.file_bytes = text.len() as u64;
+            lines.reader = Box::new(Cursor::new(text.into_bytes()));
+            return Ok(lines);
         }
         if head.starts_with(BYTE_ORDER_MARK) {
             lines.reader.consume(BYTE_ORDER_MARK.len());

@@ -25,6 +25,8 @@
 //! Evenly: there is a straight line from which no time deviates by more than 1e-6 of a step, or by more than half a unit of
 //! the last place it is printed to (or of single precision, if all are numbers of it), where that unit is at most half a
 //! step. Of the rates of such lines that with the fewest digits is given.
+//! Where no column of times in numbers and no header gives a rate, a column of times of day does (`12:00:01.250`,
+//! `2020-01-01T12:00:01Z`): seconds since its first.
 //! A column of one number beside columns of more, and numbers behind words in front of the rows (a header beside them,
 //! as Tektronix writes it), are no channels.
 //!
@@ -42,6 +44,7 @@ mod lvm_join;
 mod number;
 mod plain;
 mod sniff;
+mod stamps;
 mod stated;
 mod titles;
 mod units;

@@ -3,7 +3,7 @@
 use super::kind::Kind;
 use super::lines::BYTE_ORDER_MARK;
 use super::number;
-use crate::text::decode;
+use crate::text::{decode, is_utf16, utf16};
 use std::collections::BTreeMap;
 
 /// How fields are set apart and numbers printed.
@@ -136,15 +136,21 @@ fn leading(kinds: &[Kind], rows: &[&Vec<Kind>]) -> usize {
 /// The first line that is a row: as wide as rows are, without text where they have numbers, and with a first number. A
 /// line that fits worse is taken if there is no such line.
 fn first_row(lines: &[&str], dialect: Dialect, kinds: &[Kind], lead: usize) -> Option<usize> {
+    let nothing_from = |column: usize| {
+        let rest = kinds.get(column..).unwrap_or_default();
+        column > lead && !rest.is_empty() && rest.iter().all(|kind| *kind == Kind::Empty)
+    };
+    // columns of nothing at the end may be missing (Rigol's first row has a comma less than the others)
+    let as_wide = |found: usize| found == kinds.len() || (dialect.delimiter != ' ' && nothing_from(found));
     let fits = |line: &str| {
         let found = dialect.kinds(line);
         let fits = |(found, wanted): (&Kind, &Kind)| found == wanted || *found == Kind::Empty || is_text(*wanted);
-        found.len() == kinds.len()
+        as_wide(found.len())
             && !is_labelled(&found, kinds, lead)
             && found.iter().zip(kinds).all(fits)
             && found.get(lead) == kinds.get(lead)
     };
-    let row = |line: &&str| dialect.is_row(line) && dialect.fields(line).len() == kinds.len();
+    let row = |line: &&str| dialect.is_row(line) && as_wide(dialect.fields(line).len());
     let strict = lines.iter().position(|line| row(line) && fits(line));
     strict.or_else(|| lines.iter().position(row))
 }
@@ -156,6 +162,8 @@ fn is_text(kind: Kind) -> bool {
 /// Whether a file's first bytes are text with rows of numbers.
 pub(super) fn looks_like_a_table(head: &[u8]) -> bool {
     let head = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head);
+    let utf8 = is_utf16(head).then(|| utf16(head).into_bytes());
+    let head = utf8.as_deref().unwrap_or(head);
     // Control bytes are in no table of text; 0x1A ends some of old programs'.
     let is_text = |&b: &u8| b >= 0x20 || matches!(b, b'\t' | b'\r' | b'\n' | 0x0C | 0x1A);
     if head.is_empty() || !head.iter().all(is_text) {

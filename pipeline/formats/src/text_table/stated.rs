@@ -29,6 +29,8 @@ const RATES: [&str; 7] =
     ["sampling frequency", "sampling rate", "sample rate", "sample frequency", "samplerate", "sample_rate", "fs"];
 const TIME_UNITS: [&str; 3] = ["horizontal units", "x units", "xunits"];
 const VALUE_UNITS: [&str; 3] = ["vertical units", "y units", "yunits"];
+/// Keys whose value is the name of a channel.
+const SOURCES: [&str; 1] = ["source"];
 /// Keys that stand in a row of titles without being the title of a column.
 const OTHERS: [&str; 2] = ["start", "t0"];
 
@@ -43,6 +45,7 @@ enum Key {
     Rate,
     TimeUnit,
     ValueUnit,
+    Source,
     Other,
 }
 
@@ -55,6 +58,8 @@ pub(super) struct Stated {
     pub(super) time_unit: String,
     /// Units and the fields they stand in.
     pub(super) value_units: Vec<(usize, String)>,
+    /// Names of channels.
+    pub(super) sources: Vec<String>,
 }
 
 impl Stated {
@@ -82,7 +87,8 @@ impl Stated {
             name.rsplit_once('(').map(|(_, unit)| unit.trim_matches([')', ' ', '=', ':'])).unwrap_or_default();
         for (at, value) in values {
             match key {
-                Key::Other => {}
+                Key::Source if self.sources.len() < MOST => self.sources.push(number::bare(value).to_owned()),
+                Key::Source | Key::Other => {}
                 Key::TimeUnit if self.time_unit.is_empty() => self.time_unit = unit_in(value),
                 Key::TimeUnit => {}
                 Key::ValueUnit if self.value_units.len() < MOST => self.value_units.push((*at, unit_in(value))),
@@ -118,7 +124,8 @@ impl Stated {
 
 /// Whether a field is a key: no title of a column.
 pub(super) fn is_key(field: &str) -> bool {
-    key(split_value(field).0).is_some()
+    // channels are titled by their sources
+    key(split_value(field).0).is_some_and(|key| key != Key::Source)
 }
 
 fn key(name: &str) -> Option<Key> {
@@ -128,6 +135,7 @@ fn key(name: &str) -> Option<Key> {
         (&RATES, Key::Rate),
         (&TIME_UNITS, Key::TimeUnit),
         (&VALUE_UNITS, Key::ValueUnit),
+        (&SOURCES, Key::Source),
         (&OTHERS, Key::Other),
     ];
     keys.into_iter().find(|(names, _)| names.contains(&name.as_str())).map(|(_, key)| key)

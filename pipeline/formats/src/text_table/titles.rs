@@ -32,6 +32,11 @@ pub(super) fn split_unit(text: &str) -> Title {
             return Title { name: quoted(name).to_owned(), unit };
         }
     }
+    // `t/s`: no blanks round the stroke, which others use for ratios
+    let time = text.split_once('/').map(|(name, unit)| Title { name: name.to_owned(), unit: unit.to_owned() });
+    if let Some(time) = time.filter(|time| is_time(time) && units::seconds(&time.unit).is_some()) {
+        return time;
+    }
     // `in s` is a unit without a name
     if let Some(unit) = text.strip_prefix("in ").and_then(units::symbol) {
         return Title { name: String::new(), unit };
@@ -109,6 +114,8 @@ mod tests {
         assert_eq!(split_unit("DEF=\"Zeit\" t / s"), title("Zeit", "s"));
         assert_eq!(split_unit("C1 in V"), title("C1", "V"));
         assert_eq!(split_unit("in / out"), title("in / out", ""));
+        assert_eq!((split_unit("t/s"), split_unit("Time/ms")), (title("t", "s"), title("Time", "ms")));
+        assert_eq!((split_unit("m/s"), split_unit("H1/N")), (title("m/s", ""), title("H1/N", "")));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use crate::support::{assert_sum, channel, locations, open, real, remarked, values};
 use afmid_formats::text_table::TextTable;
 use afmid_formats::{Contents, Format, FormatError};
+use std::path::Path;
 
 fn table(name: &str, text: &str) -> Contents {
     open::<TextTable>(name, text.as_bytes()).unwrap()
@@ -232,10 +233,9 @@ fn holes_text_columns_and_one_column() {
 
 #[test]
 fn what_is_no_table_is_refused() {
-    let cases: [(&str, Vec<u8>, &str); 6] = [
+    let cases: [(&str, Vec<u8>, &str); 5] = [
         ("words.txt", b"no numbers\nhere\n".to_vec(), "row of numbers"),
         ("empty.csv", Vec::new(), "row of numbers"),
-        ("utf16.csv", b"\xFF\xFE1\0,\0".to_vec(), "UTF-16"),
         ("zero.dat", b"1,2\n3,4\n\0\n".to_vec(), "byte 0"),
         ("wide.csv", b"1,2\n3,4\n5,6,7\n8,9\n".to_vec(), "line 3 has 3 fields, 2 were wanted"),
         ("long.txt", vec![b'1'; 3 << 20], "longer than"),
@@ -344,10 +344,64 @@ fn a_header_beside_the_rows_is_no_channel() {
         text += &format!(",,,0.{row:03}0,{}\n", row + 1);
     }
     let found = table("tds.csv", &text);
-    let last = found.channels.last().unwrap();
-    assert_eq!(values(last), (1..=50).map(f64::from).collect::<Vec<f64>>());
-    assert_eq!((last.unit.as_str(), last.sample_rate_hz), ("V", Some(1000.0)), "{:?}", found.remarks);
+    assert_eq!(described(&found), [("CH1", "V", Some(1000.0))], "{:?}", found.remarks);
+    assert_eq!(values(&found.channels[0]), (1..=50).map(f64::from).collect::<Vec<f64>>());
     assert!(remarked(&found, "numbers behind words, values of a header"), "{:?}", found.remarks);
+}
+
+#[test]
+fn each_channel_s_own_times_are_no_signals() {
+    // Tektronix MSO: a pair of columns for each channel
+    let mut text =
+        "Model,MSO44\nSample Interval,1.0e-03,,1.0e-03,\nVertical Units,V,,V,\nLabel,,,,\nTIME,CH1,,TIME,CH2\n"
+            .to_owned();
+    for row in 0..40 {
+        text += &format!("0.{row:03}0,{row},,0.{row:03}0,{}\n", row * row);
+    }
+    let found = table("mso.csv", &text);
+    assert_eq!(described(&found), [("CH1", "V", Some(1000.0)), ("CH2", "V", Some(1000.0))], "{:?}", found.remarks);
+    assert!(remarked(&found, "TIME[2] has the same times as TIME"), "{:?}", found.remarks);
+}
+
+#[test]
+fn a_first_row_with_fewer_delimiters_is_no_header() {
+    // Rigol: the first row ends before the columns of start and increment
+    let mut text = "X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,-2.0e-03,1.0e-03\n0,5,7,\n".to_owned();
+    for row in 1..40 {
+        text += &format!("{row},{},{},,\n", 5 + row, 7 * row);
+    }
+    let found = table("rigol.csv", &text);
+    assert_eq!(described(&found), [("CH1", "V", Some(1000.0)), ("CH2", "V", Some(1000.0))], "{:?}", found.remarks);
+    assert_eq!((values(&found.channels[0])[0], found.channels[0].samples), (5.0, 40));
+}
+
+#[test]
+fn times_of_day_give_the_rate_where_nothing_else_does() {
+    let rows = |time: &dyn Fn(usize) -> String| (0..40).map(|k| format!("{},{k}\n", time(k))).collect::<String>();
+    let table_of =
+        |name: &str, header: &str, time: &dyn Fn(usize) -> String| table(name, &(header.to_owned() + &rows(time)));
+    let of_day = table_of("clock.csv", "Time,Acc (g)\n", &|k| format!("12:00:00.{:03}", 4 * k));
+    assert_eq!(described(&of_day), [("Acc", "g", Some(250.0))], "{:?}", of_day.remarks);
+    let iso = table_of("iso.csv", "when,a\n", &|k| format!("2023-03-01T10:00:00.{:03}Z", 2 * k));
+    assert_eq!(described(&iso), [("a", "", Some(500.0))], "{:?}", iso.remarks);
+    // a header that states the interval is believed, and so are times in numbers
+    let stated = table_of("stated.csv", "delta t,1E-3\nTime,a\n", &|k| format!("12:00:{:02}", k));
+    assert_eq!(described(&stated), [("a", "", Some(1000.0))], "{:?}", stated.remarks);
+    // seconds alone do not show the step
+    let coarse = table_of("coarse.csv", "Time,a\n", &|k| format!("12:00:0{}", k / 10));
+    assert_eq!(described(&coarse), [("Time", "s", None), ("a", "", None)], "{:?}", coarse.remarks);
+}
+
+#[test]
+fn utf16_is_text_like_any_other() {
+    let text = "Zeit/s,Größe (µm)\r\n0.0,1\r\n0.1,2\r\n0.2,3\r\n";
+    for big in [false, true] {
+        let units = std::iter::once(0xFEFF).chain(text.encode_utf16());
+        let bytes: Vec<u8> = units.flat_map(|unit| if big { unit.to_be_bytes() } else { unit.to_le_bytes() }).collect();
+        assert!(TextTable::recognises(&bytes, Path::new("a.csv")));
+        let found = open::<TextTable>("utf16.csv", &bytes).unwrap();
+        assert_eq!(described(&found), [("Größe", "µm", Some(10.0))], "{:?}", found.remarks);
+    }
 }
 
 #[test]

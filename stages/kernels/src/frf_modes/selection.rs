@@ -7,6 +7,7 @@ use super::FrfModesOptions;
 use super::candidates::{of_residual, same};
 use super::data::Lines;
 use super::fit::{COARSE, Effort, FINE, Fitted, fitted};
+use super::in_common::InCommon;
 use super::lack::{Lack, correlation};
 use super::model::width;
 use super::noise::from_residual;
@@ -236,7 +237,9 @@ impl<'a> Search<'a> {
         let quiet = self.lines.weighted(self.lines.quiet.clone());
         let energy = energies(&fit.at, &self.lines);
         let (information, _) = fit.at.normal();
-        let covariance = symmetric_inverse(&information);
+        let inverse = symmetric_inverse(&information);
+        let shared = InCommon::new(&self.lines, &fit.at, &left, self.options).scores();
+        let covariance = &inverse + &inverse * shared * &inverse;
         let mut worst: Option<(f64, usize)> = None;
         for j in 0..count {
             let s = fit.at.poles[j];

@@ -42,6 +42,7 @@
 //! ```
 
 mod averaged;
+mod averages;
 mod ensemble_response;
 mod error;
 mod fourier;
@@ -65,6 +66,7 @@ mod thermal_peak;
 
 pub use crate::signal::{Taper, TaperGains, taper, taper_gains};
 pub use averaged::{AveragedSpectrum, RecordSpectrum, average_spectra};
+pub use averages::averages_by_scatter;
 pub use ensemble_response::{EnsembleResponse, EnsembleResponseSettings, ensemble_response};
 pub use error::SpectrumError;
 pub use fourier::{bin_frequencies, transform};

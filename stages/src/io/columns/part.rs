@@ -1,7 +1,7 @@
 //! The channels of one file: inputs, outputs, their rate and units.
 
 use afmid_pipeline::StageError;
-use afmid_pipeline::recording::{FoundChannel, WholeFile, agreed_rate, even_step, lane_names};
+use afmid_pipeline::recording::{FoundChannel, WholeFile, agreed_rate, contradiction, even_step, lane_names};
 
 use super::selection::Column;
 use super::stage::Columns;
@@ -17,6 +17,8 @@ pub(super) struct Part {
     pub input_names: Vec<String>,
     pub output_names: Vec<String>,
     pub rate: f64,
+    /// That the rate which is given is not that of the file's times.
+    pub contradicted_rate: Option<String>,
     /// Samples before which a channel was interrupted.
     pub gaps: Vec<usize>,
 }
@@ -69,6 +71,9 @@ impl Part {
             input_names: names(&channels.inputs),
             output_names: names(&channels.outputs),
             gaps: channels.all().flat_map(|channel| channel.gaps.clone()).collect(),
+            contradicted_rate: wanted.sample_rate_hz.and_then(|given| {
+                channels.all().find_map(|channel| contradiction(&file.contents().channels, channel, given))
+            }),
             rate,
             inputs,
             outputs,

@@ -120,7 +120,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Columns {
     const SPEC: Spec = Spec {
         name: "io.columns",
-        version: 4,
+        version: 5,
         summary: "reads measured input and output from the channels of a file of any format",
         inputs: &[],
         outputs: &[PAIR.spec(), SUMMARY.spec()],
@@ -178,7 +178,9 @@ impl Stage for Columns {
         for path in self.paths(cx.base(), cx.files())? {
             let file = WholeFile::open(cx.files(), &path, &Reading::of(&self.format, self.raw.clone()))?;
             let part = Part::read(self, &file).and_then(|part| part.like(parts.first()));
-            parts.push(part.map_err(|error| error.at(&path))?);
+            let part = part.map_err(|error| error.at(&path))?;
+            part.contradicted_rate.iter().for_each(|problem| cx.warn(problem.clone()));
+            parts.push(part);
         }
         let series = Series::of(self, parts)?;
         let (pair, summary) = series.split(self)?;

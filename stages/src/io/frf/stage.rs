@@ -134,7 +134,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Frf {
     const SPEC: Spec = Spec {
         name: "io.frf",
-        version: 2,
+        version: 3,
         summary: "reads measured frequency responses from files of any format",
         inputs: &[],
         outputs: &[FRF.spec(), SUMMARY.spec()],

@@ -1,0 +1,90 @@
+//! The mean rate of times that give no rate: uneven ones, and such as are printed too coarsely.
+
+use super::{names_times, seconds};
+use crate::FoundChannel;
+use crate::rate::fewest_digits;
+
+/// Rates that differ by more, relative, are not of one recording: jitter and rounding of times make less.
+const CONTRADICTS: f64 = 1e-2;
+
+/// The times beside a channel without a rate: how many samples a second they have on average, and where they are. None
+/// where there are none, or they do not rise.
+///
+/// Errors are none: times that cannot be read say nothing.
+pub fn mean_rate<'a>(channels: &'a [FoundChannel], of: &FoundChannel) -> Option<(f64, &'a str)> {
+    let beside = channels.iter().filter(|axis| axis.is_axis && axis.samples == of.samples && axis.samples > 1);
+    let mut times = beside.filter_map(|axis| Some((axis, seconds_in(axis)?)));
+    let (axis, unit_s) = times.next().filter(|_| of.sample_rate_hz.is_none())?;
+    let at = |row: usize| Some(axis.source.read(row, 1).ok()?.widened().first()? * axis.scale_factor);
+    let step = (at(axis.samples - 1)? - at(0)?) / (axis.samples - 1) as f64;
+    // whole numbers without a unit count samples
+    let counts = axis.unit.is_empty() && step.fract() == 0.0;
+    let rate = (step * unit_s).recip();
+    (!counts && rate.is_finite() && rate > 0.0).then_some((rate, axis.location.as_str()))
+}
+
+/// That a rate which the user gives is not that of the times beside a channel; none where it agrees, or none are there.
+pub fn contradiction(channels: &[FoundChannel], of: &FoundChannel, given_hz: f64) -> Option<String> {
+    let (rate, axis) = mean_rate(channels, of)?;
+    let stated = channels.iter().any(|channel| channel.location == axis && !channel.unit.is_empty());
+    // times without a unit may be in milliseconds or microseconds
+    let units: &[f64] = if stated { &[1.0] } else { &[1.0, 1e3, 1e6] };
+    let agrees = units.iter().any(|unit| (given_hz / (rate * unit) - 1.0).abs() <= CONTRADICTS);
+    let rate = fewest_digits(rate, CONTRADICTS / 10.0);
+    let what = format!("the sample rate is given as {given_hz} Hz");
+    (!agrees).then(|| format!("{what}, the times in {axis} have {rate} samples a second on average"))
+}
+
+/// Seconds in the unit of an axis of times; none where it is of something else.
+fn seconds_in(axis: &FoundChannel) -> Option<f64> {
+    let name = axis.location.rsplit(['/', '.']).next().unwrap_or_default();
+    match axis.unit.as_str() {
+        "" => names_times(name).then_some(1.0),
+        unit => seconds(unit),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{FormatError, Raw, Source};
+
+    #[derive(Debug)]
+    struct Kept(Vec<f64>);
+
+    impl Source for Kept {
+        fn read(&self, start: usize, count: usize) -> Result<Raw, FormatError> {
+            Ok(Raw::Float64(self.0[start..start + count].to_vec()))
+        }
+    }
+
+    fn channels(name: &str, unit: &str, step: f64) -> Vec<FoundChannel> {
+        let times = (0..100).map(|k| step * f64::from(k) + 1e-4 * step * f64::from(k % 3)).collect();
+        let mut axis = FoundChannel::new(name, 100, "text", Arc::new(Kept(times)));
+        (axis.is_axis, axis.unit) = (true, unit.to_owned());
+        vec![axis, FoundChannel::new("y", 100, "text", Arc::new(Kept(vec![0.0; 100])))]
+    }
+
+    #[test]
+    fn times_that_give_no_rate_contradict_another_one() {
+        let said = |name: &str, unit: &str, step: f64, given: f64| {
+            let channels = channels(name, unit, step);
+            contradiction(&channels, &channels[1], given)
+        };
+        let problem = said("Time", "s", 5e-3, 44_100.0).expect("a contradiction");
+        assert!(problem.contains("44100 Hz") && problem.contains("Time have 200 samples"), "{problem}");
+        assert!(said("Time", "ms", 5.0, 44_100.0).is_some());
+        for (name, unit, step, given) in [
+            ("Time", "s", 5e-3, 201.0),
+            ("Time", "ms", 5.0, 200.0),
+            // milliseconds, which nothing says
+            ("time", "", 5.1, 196.0),
+            ("position", "mm", 5e-3, 44_100.0),
+            ("column_1", "", 5e-3, 44_100.0),
+        ] {
+            assert_eq!(said(name, unit, step, given), None, "{name} {unit} {step}");
+        }
+    }
+}
