@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 use super::{HarmonicFit, HarmonicOptions, fit_harmonics};
-use crate::events::decay::{DecaySearch, DecaySearchError, DecaySearchOptions, DecayTrigger, find_decays};
+use crate::events::decay::{DecaySearch, DecaySearchError, DecaySearchOptions, DecayTrigger, FreeDecay, find_decays};
 
 /// Least peak of a decay, in amplitudes of the line: of a drive that is steady to less what is left is none.
 const LEAST_PEAK: f64 = 0.2;
@@ -60,7 +60,9 @@ pub fn find_decays_beside_lines(
     match beside {
         true => {
             let steady = found.steady.into_iter().filter(|steady| own(steady.frequency_hz)).collect();
-            Ok(DecaySearch { steady, ..second })
+            // in the record the line rings there, too: what came before says nothing of the noise
+            let decays = second.decays.into_iter().map(|decay| FreeDecay { quiet: None, ..decay }).collect();
+            Ok(DecaySearch { steady, decays, ..second })
         }
         false => Ok(found),
     }

@@ -79,9 +79,9 @@ pub struct MeasuredResponse {
 /// with `gamma^2 = |Syu|^2 / (Suu Syy)`. Several inputs: `H1 = Syu Suu^-1`. Offsets are removed: a segment's mean, a
 /// hit's median (the signal rests for most of it). The exponential window is put on inputs and outputs alike, which moves
 /// each pole by `-d` and leaves the ratio exact: a fit subtracts `d` from the decay rates that it finds. The noise of
-/// which variances are is smooth over neighbouring bins, as many as give 160 degrees of freedom: of `H1` that of the output
-/// and the square of the response times that of the input, which the peaks show, else its mean share of the power. So
-/// weights and intervals of fits are right with few blocks, too. Errors of several outputs to one input have the input's
+/// which variances are is smooth over neighbouring bins, as many as give 160 degrees of freedom: of `H1` of hits that of
+/// the output and the square of the response times that of the input, which the peaks show, else its mean share of the
+/// power. So weights and intervals of fits are right with few blocks, too. Errors of several outputs to one input have the input's
 /// noise in common: what is left of the outputs' cross spectra along the product of their responses.
 ///
 /// # Shapes
@@ -147,9 +147,10 @@ pub fn frequency_response(blocks: &[Block<'_>], settings: ResponseSettings) -> R
     if let Some(variance) = &mut found.variance {
         let freedom = averages - inputs as f64;
         let width = width(settings.kind, freedom);
-        let smooth = |(noise, gain): (&Vec<f64>, &Vec<f64>)| match settings.estimator {
-            Estimator::H1 => of_both(noise, gain, width),
-            Estimator::H2 | Estimator::Hv => pooled(noise, width),
+        // segments leave what rings beyond their ends, which is no noise of the input
+        let smooth = |(noise, gain): (&Vec<f64>, &Vec<f64>)| match (settings.estimator, settings.kind) {
+            (Estimator::H1, BlockKind::Hits { .. }) => of_both(noise, gain, width),
+            _ => pooled(noise, width),
         };
         let noise: Vec<Vec<f64>> = noise.iter().zip(&gain).map(smooth).collect();
         for (row, scale) in scale.iter().enumerate() {
@@ -290,7 +291,7 @@ impl Sums {
 
 /// Whether the noise that outputs have in common is sought.
 fn with_pairs(inputs: usize, settings: ResponseSettings) -> bool {
-    inputs == 1 && settings.estimator == Estimator::H1
+    inputs == 1 && settings.estimator == Estimator::H1 && matches!(settings.kind, BlockKind::Hits { .. })
 }
 
 /// Pairs of different outputs.
