@@ -115,7 +115,7 @@ mod tests {
         let (damped, weak, real) = (c64::new(-100.0, 425.0), c64::new(-1.0, 300.0), c64::new(-20.0, 0.0));
         let said = no_mode(&[pole(damped, 40.0), pole(weak, 4.0), pole(real, 90.0)], &criteria);
         assert!(
-            said.contains("69.49 Hz") && said.contains("`--set <this stage>.min_quality_factor=2.1` lets"),
+            said.contains("69.4880 Hz") && said.contains("`--set <this stage>.min_quality_factor=2.1` lets"),
             "{said}"
         );
         assert!(!said.contains("min_significance"), "{said}");
