@@ -28,15 +28,16 @@ use crate::io::shared_data::moved;
 /// # Shapes
 /// `response`, `force` over `time`, the whole record; the same with `_identification` and `_verification` over axes of
 /// their own, which may differ in length. With several inputs `force` is over (`input`, time), with several outputs
-/// `response` over (`output`, time). Of several files `first_sample` over `record` is where each begins. The attributes `inputs` and `outputs` name the channels.
+/// `response` over (`output`, time). Of several files `first_sample` over `record` is where each begins. The attributes
+/// `inputs` and `outputs` name the channels.
 /// # Units
 /// Those of the file, times `input_scale` and `output_scale`.
 /// # Accuracy
 /// Numbers as in the file; 64-bit integers beyond 2^53 are rounded.
 /// # Errors
 /// A file of no format or damaged; a channel that is not there; no sample rate, two that differ, times that are not
-/// equally spaced; files of unlike rates or units; stretches beyond the record or across an interruption; missing inputs; an output that is missing
-/// altogether.
+/// equally spaced; files of unlike rates or units; stretches beyond the record or across an interruption; missing
+/// inputs; an output that is missing altogether.
 /// # Source
 /// L. Ljung, System Identification, 1999, sections 14.1 and 16.5; docs/archives.md for the formats.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
