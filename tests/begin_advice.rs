@@ -1,22 +1,13 @@
 //! What `afmid new pipeline` makes of names that mislead, of rates that contradict, and what it advises.
 
+mod common;
+
 use std::path::Path;
-use std::process::{Command, Output};
 
-fn afmid(here: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_afmid")).current_dir(here).args(arguments).output().expect("afmid starts")
-}
-
-/// What it says on stdout and on stderr.
-fn said(here: &Path, arguments: &[&str]) -> [String; 2] {
-    let output = afmid(here, arguments);
-    let [stdout, stderr] = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
-    assert!(output.status.success(), "{arguments:?}: {stderr}");
-    [stdout, stderr]
-}
+use self::common::said;
 
 fn refused(here: &Path, arguments: &[&str]) -> String {
-    let output = afmid(here, arguments);
+    let output = common::command(here, arguments).output().expect("afmid starts");
     assert!(!output.status.success(), "{arguments:?}");
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
@@ -137,7 +128,8 @@ fn what_drives_in_steps_is_offered_as_the_input() {
     };
     let slow: Vec<f64> = steps.iter().map(slow).zip(&e).map(|(y, e)| y + 1e-2 * e).collect();
     table(here, "heater.csv", "Time (s),power (W),T (K)", even, &[steps, slow]);
-    let output = afmid(here, &["new", "pipeline", "heater.csv", "-o", "h.toml"]);
+    let output =
+        common::command(here, &["new", "pipeline", "heater.csv", "-o", "h.toml"]).output().expect("afmid starts");
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(stderr.contains("--input power"), "{stderr}");
     // what it does not follow is not offered

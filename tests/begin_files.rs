@@ -3,21 +3,10 @@
 mod common;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
+use self::common::said;
 use serde_json::Value;
-
-fn afmid(here: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_afmid")).current_dir(here).args(arguments).output().expect("afmid starts")
-}
-
-/// What it says on stdout and on stderr.
-fn said(here: &Path, arguments: &[&str]) -> [String; 2] {
-    let output = afmid(here, arguments);
-    let [stdout, stderr] = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
-    assert!(output.status.success(), "{arguments:?}: {stderr}");
-    [stdout, stderr]
-}
 
 /// A decay of 0.05 cycles a sample and Q = 20 from sample 300 on, of this amplitude, with noise of a hundredth of 1.
 fn decay(amplitude: f64, seed: u32) -> Vec<f64> {
@@ -111,7 +100,7 @@ fn files_that_were_given_by_name_are_grouped_too_and_one_that_is_none_is_an_erro
     assert!(stderr.contains("afmid new pipeline 'hits/hit 2.csv' 'hits/hit 5.csv' -o c-2.toml"), "{stderr}");
     arguments[3] = "other.toml";
     arguments.push("hits/LICENSE");
-    let output = afmid(here, &arguments);
+    let output = common::command(here, &arguments).output().expect("afmid starts");
     let refused = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(2) && refused.contains("hits/LICENSE: "), "{refused}");
     // a config that names all of them says how to make one that does not
@@ -120,7 +109,8 @@ fn files_that_were_given_by_name_are_grouped_too_and_one_that_is_none_is_an_erro
     let to = from + config[from..].find(']').expect("an end");
     let mixed = format!("{}files = [\"hits/hit*.csv\"{}", &config[..from], &config[to..]);
     std::fs::write(here.join("mixed.toml"), mixed).expect("a config");
-    let output = afmid(here, &["run", "mixed.toml", "-o", "m.h5", "--cache", "cache"]);
+    let output =
+        common::command(here, &["run", "mixed.toml", "-o", "m.h5", "--cache", "cache"]).output().expect("afmid starts");
     let refused = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!output.status.success(), "{refused}");
     for words in ["2 sample rates: 3 at 1000 Hz", "takes the files of the rate that most have"] {
@@ -198,7 +188,9 @@ fn what_lies_over_frequencies_is_no_record() {
     for entry in std::fs::read_dir(here).expect("a folder") {
         let name = entry.expect("a file").file_name().to_string_lossy().into_owned();
         let config = format!("{name}.toml");
-        let output = afmid(here, &["new", "pipeline", &name, "--unit", "m", "-o", &config]);
+        let output = common::command(here, &["new", "pipeline", &name, "--unit", "m", "-o", &config])
+            .output()
+            .expect("afmid starts");
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
         if name == "density_x.h5" {
             // nothing says what `y` is
@@ -319,7 +311,11 @@ fn a_structure_that_was_struck_point_by_point_gives_common_modes_and_shapes_over
         words.chain(files.iter().cloned()).collect()
     };
     let words = |all: &[String]| -> Vec<String> { all.to_vec() };
-    let run = |all: Vec<String>| afmid(here, &words(&all).iter().map(String::as_str).collect::<Vec<&str>>());
+    let run = |all: Vec<String>| {
+        common::command(here, &words(&all).iter().map(String::as_str).collect::<Vec<&str>>())
+            .output()
+            .expect("afmid starts")
+    };
     let output = run(new(&struck, &["-o", "none.toml"]));
     let refused = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
@@ -421,7 +417,7 @@ fn hits_with_a_file_each_are_averaged_to_one_response_of_each_sensor() {
     let files: Vec<String> = (1..=5).map(|number| format!("a{number}.csv")).collect();
     let mut words = vec!["new", "pipeline", "-o", "none.toml"];
     words.extend(files.iter().map(String::as_str));
-    let output = afmid(here, &words);
+    let output = common::command(here, &words).output().expect("afmid starts");
     let refused = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
         output.status.code() == Some(2) && refused.contains("--as hits if all are of the same points"),

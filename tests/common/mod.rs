@@ -77,6 +77,14 @@ pub fn afmid(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8_lossy(&stdout).into_owned()
 }
 
+/// What it says on stdout and on stderr. Insists on exit code 0.
+pub fn said(folder: &Path, arguments: &[&str]) -> [String; 2] {
+    let output = command(folder, arguments).output().expect("afmid starts");
+    let [stdout, stderr] = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    [stdout, stderr]
+}
+
 /// The absolute path of a shipped config.
 pub fn config(name: &str) -> String {
     Path::new(ROOT).join("configs").join(name).display().to_string()
