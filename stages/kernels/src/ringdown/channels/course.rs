@@ -201,9 +201,11 @@ impl Decays<'_> {
             let options = ChannelOptions { start: all.clone(), missing: missing.clone(), ..self.options.clone() };
             let fit = fit_channels(&events, self.free, self.interval_s, &options)?;
             let gone: Vec<Option<usize>> = matched(&all, &fit.poles).split_off(start.len());
-            // one that leaves its line stands for what the modes lack
+            // one that leaves its line stands for what the modes lack; a line is no narrower than the part can resolve
+            let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(1);
+            let resolved = std::f64::consts::TAU / (longest as f64 * self.interval_s);
             let stays = |(other, place): (&c64, &Option<usize>)| {
-                place.is_some_and(|place| (fit.poles[place] - other).norm() <= other.re.abs())
+                place.is_some_and(|place| (fit.poles[place] - other).norm() <= other.re.abs().max(resolved))
             };
             let kept: Vec<c64> = others.iter().zip(&gone).filter(|pair| stays(*pair)).map(|pair| *pair.0).collect();
             if kept.len() == others.len() {
