@@ -29,6 +29,9 @@
 //! ```
 
 mod backward;
+mod beat;
+#[cfg(test)]
+mod beat_tests;
 mod clipping;
 mod drive;
 mod envelope;

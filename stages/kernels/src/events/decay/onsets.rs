@@ -7,6 +7,11 @@ use crate::statistics::median;
 /// Share of the largest energy up to the next rise that a hit has within two periods: beats go on rising.
 const SUDDEN: f64 = 0.5;
 
+/// Periods before a rise that tell whether it comes out of quiet, and the energy, over the noise's, that quiet has at
+/// most.
+pub(super) const QUIET_PERIODS: usize = 4;
+pub(super) const QUIET: f64 = 2.0;
+
 /// Rises of the envelope, in order of time, and the record's first sample where it already rings there.
 ///
 /// # Method
@@ -44,17 +49,22 @@ pub(super) fn rises(envelope: &Envelope, options: &DecaySearchOptions) -> Vec<us
     sudden(envelope, all)
 }
 
-/// Drops rises that go on rising for more than two periods, last ones first.
+/// Drops rises that go on rising for more than two periods, last ones first; not those out of quiet, which begin a decay
+/// of modes that at first all but cancel.
 ///
 /// Windows that reach into the next rise, which may be a quarter of a period early, do not count: it may be a hit with a
 /// hundred times the energy.
 fn sudden(envelope: &Envelope, mut all: Vec<usize>) -> Vec<usize> {
     let reach = envelope.period + envelope.period / 4;
     let mut next = envelope.samples();
+    // a quarter of a period: a rise may be found so much early
+    let quiet_to = |k: usize| k.saturating_sub(envelope.period / 4);
+    let out_of_quiet =
+        |k: usize| envelope.mean(quiet_to(k).saturating_sub(QUIET_PERIODS * envelope.period), quiet_to(k)) < QUIET;
     for place in (0..all.len()).rev() {
         let k = all[place];
         let at_once = envelope.largest(k, k + 2 * envelope.period);
-        if k > 0 && at_once < SUDDEN * envelope.largest(k, next.saturating_sub(reach)) {
+        if !out_of_quiet(k) && at_once < SUDDEN * envelope.largest(k, next.saturating_sub(reach)) {
             all.remove(place);
         } else {
             next = k;

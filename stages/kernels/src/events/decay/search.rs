@@ -9,7 +9,7 @@ use super::error::DecaySearchError;
 use super::extent::{Begin, begin, beyond, departure, end, quiet_before};
 use super::found::{ChannelDecay, DecayEnd, DecaySearch, Decline, DismissedDecay, DismissedReason, FreeDecay, Steady};
 use super::noise_floor::noise_std;
-use super::onsets::onsets;
+use super::onsets::{QUIET, QUIET_PERIODS, onsets};
 use super::options::{DecaySearchOptions, DecayTrigger};
 use super::steadiness::oscillation;
 use crate::events::baseline;
@@ -17,8 +17,6 @@ use crate::signal::code_step;
 
 /// Least samples of a record.
 const LEAST_SAMPLES: usize = 64;
-/// Quiet periods before a rise that is an event for sure.
-const QUIET_PERIODS: usize = 4;
 /// Periods of a decay at least.
 const LEAST_PERIODS: usize = 2;
 /// Fall of the amplitude, nepers, that is a decay whatever its slope's error: two periods of a low Q have none.
@@ -174,7 +172,7 @@ impl<'a> Record<'a> {
             let start = starts[place];
             let before = start.saturating_sub(period / 4);
             let quiet = start < QUIET_PERIODS * period
-                || self.envelope.mean(before - before.min(QUIET_PERIODS * period), before) < 2.0;
+                || self.envelope.mean(before - before.min(QUIET_PERIODS * period), before) < QUIET;
             let (end, _) = end(&self.envelope, start, next);
             if !quiet && (self.begin(start, end).foretold || self.is_late_beat(&starts[..=place])) {
                 starts.remove(place);
@@ -229,14 +227,20 @@ impl<'a> Record<'a> {
             return end;
         }
         let range = first..end;
-        let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
+        let mut tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
         // what does not turn twice is a relaxation
         if tone.frequency * (range.len() as f64) < LEAST_PERIODS as f64 {
             found.dismissed.push(DismissedDecay { onset, reason: DismissedReason::TooShort });
             return end;
         }
         let frequency_hz = tone.frequency * self.rate_hz;
-        if self.is_steady(&tone.decline, &range, why, options) {
+        let mut steady = self.is_steady(&tone.decline, &range, why, options);
+        if let Some(beat) = if steady { tone.beat() } else { None } {
+            // a slope through the lobes of a beat says little
+            steady = self.is_steady(&beat, &range, why, options);
+            tone.decline = if steady { tone.decline } else { beat };
+        }
+        if steady {
             let growing = tone.decline.rate_per_s < -tone.decline.limit_per_s(options.decline_significance);
             let (decline, amplitude) = (tone.decline, tone.amplitude);
             found.steady.push(Steady { range, frequency_hz, amplitude, decline, growing });
@@ -264,10 +268,14 @@ impl<'a> Record<'a> {
             // the switch-on is not steady, nor are the last periods where the end is late
             let range = onset + period..last - period.max((last - onset) / END);
             let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
-            let known = tone.decline.std_per_s.is_finite();
-            let falls = tone.decline.rate_per_s.abs() * range.len() as f64 / self.rate_hz;
-            let steady =
-                known && falls < DRIVEN_FALL && self.is_steady(&tone.decline, &range, DecayEnd::NextEvent, options);
+            let duration_s = range.len() as f64 / self.rate_hz;
+            let falls = tone.decline.rate_per_s.abs() * duration_s;
+            let known = tone.decline.std_per_s * duration_s < DRIVEN_FALL;
+            let steady = known
+                && falls < DRIVEN_FALL
+                && self.is_steady(&tone.decline, &range, DecayEnd::NextEvent, options)
+                // a lobe of a beat is level on the whole, too
+                && tone.beat().is_none();
             let (frequency_hz, amplitude, decline) = (tone.frequency * self.rate_hz, tone.amplitude, tone.decline);
             steady.then_some((last, Steady { range, frequency_hz, amplitude, decline, growing: false }))
         };

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use faer::Mat;
 
+use super::beat::beating;
 use super::found::Decline;
 use crate::linear_algebra::solve;
 use crate::signal::{RealTransform, hann};
@@ -20,8 +21,18 @@ pub(super) struct Oscillation {
     /// Cycles per sample.
     pub frequency: f64,
     pub decline: Decline,
+    /// Energies of the segments over the noise's, and the seconds between them.
+    energies: Vec<f64>,
+    interval_s: f64,
     /// Amplitude per channel: root mean square of the segments'.
     pub amplitude: Vec<f64>,
+}
+
+impl Oscillation {
+    /// Decline of two tones that beat; none where they do not.
+    pub fn beat(&self) -> Option<Decline> {
+        beating(&self.energies, self.interval_s)
+    }
 }
 
 /// Amplitude and decline of the oscillation at about `frequency` (cycles per sample).
@@ -55,6 +66,8 @@ pub(super) fn oscillation(
     Oscillation {
         frequency: refined,
         decline: slope(&energies, length as f64 / rate_hz),
+        energies,
+        interval_s: length as f64 / rate_hz,
         amplitude: all.iter().map(rms).collect(),
     }
 }
