@@ -85,3 +85,25 @@ fn two_steady_tones_that_beat_are_no_decay() {
     println!("{decays} of 60");
     assert!(decays <= 3, "{decays}");
 }
+
+#[test]
+fn the_level_up_to_the_release_is_no_decay_where_the_ringing_dies_ever_more_slowly() {
+    for seed in 0..30u64 {
+        let (rate, released) = (1e3_f64, 8000 + 100 * seed as usize);
+        let noise = white_noise(24_000, 2e-3, 40 + seed);
+        let frequency = 35.0 + 0.4 * seed as f64;
+        let y: Vec<f64> = (0..24_000)
+            .map(|k: usize| {
+                let since = k.saturating_sub(released) as f64 / rate;
+                // most falls at 1.8 1/s, a tenth at 0.5 1/s
+                let falls = 0.9 * (-1.8 * since).exp() + 0.1 * (-0.5 * since).exp();
+                falls * (std::f64::consts::TAU * frequency * k as f64 / rate).sin() + noise[k]
+            })
+            .collect();
+        let found = find_decays(&[&y], rate, &DecaySearchOptions::default()).unwrap();
+        let [decay] = &found.decays[..] else { panic!("seed {seed}: {found:?}") };
+        let late = decay.range.start as f64 - released as f64;
+        // to four of the segments of a 256th of the record
+        assert!(late > -100.0 && late < 400.0, "seed {seed}: {late}");
+    }
+}

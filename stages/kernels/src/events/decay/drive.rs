@@ -71,26 +71,39 @@ const SEGMENTS: usize = 256;
 /// Squares that a straight line leaves over those that a bend leaves, at least. Why: what bends by chance gains a few per
 /// cent; a beat's top gains more and is no steady stretch.
 const BENDS: f64 = 4.0;
+/// Fall of the logarithm of the energy in which a decline is straight: a neper of the amplitude.
+const FIRST_FALL: f64 = 2.0;
 
 /// Where a level amplitude bends into a decline: a drive that ended, though the response is still strong at the end of the
 /// record.
 ///
 /// # Method
 /// Of the logarithm of the energy in segments of whole periods, least squares of a level up to a segment and a straight
-/// decline from there on, for each segment; none where a straight line leaves less than four times as much. Late by a
-/// segment: what is forced is no decay.
+/// decline from there on, for each segment; none where a straight line leaves less than four times as much. A decline is
+/// straight at first alone: the bend is sought once more in what precedes a fall by a neper. Late by a segment: what is
+/// forced is no decay.
 pub(super) fn bend(envelope: &Envelope, range: Range<usize>) -> Option<usize> {
     // whole periods: a part of one has another energy
     let length = envelope.period * (range.len() / SEGMENTS / envelope.period + 1);
     let count = range.len() / length;
     let energy = |i: usize| envelope.mean(range.start + i * length, range.start + (i + 1) * length) - 1.0;
     let logs: Vec<f64> = (0..count).map(|i| energy(i).max(f64::MIN_POSITIVE).ln()).collect();
-    let after = |i: usize, from: usize| i.saturating_sub(from) as f64;
-    let left = |from: usize| left(&logs, |i| after(i, from));
-    let line = left(0);
-    let best = (LEAST_PERIODS..count.saturating_sub(2)).map(|from| (left(from), from));
-    let ((squares, slope), from) = best.min_by(|a, b| a.0.0.total_cmp(&b.0.0))?;
-    (slope < 0.0 && BENDS * squares < line.0).then_some(range.start + (from + 1) * length)
+    let (line, _) = left(&logs, |i| i as f64);
+    let (from, squares, slope) = corner(&logs)?;
+    if slope >= 0.0 || BENDS * squares >= line {
+        return None;
+    }
+    let level = median(&mut logs[..from].to_vec());
+    let first = (from..count).find(|&i| logs[i] < level - FIRST_FALL).unwrap_or(count);
+    let from = corner(&logs[..first]).map_or(from, |(from, ..)| from);
+    Some(range.start + (from + 1) * length)
+}
+
+/// The value from which on a level declines in a straight line, the squares that are left and the slope.
+fn corner(logs: &[f64]) -> Option<(usize, f64, f64)> {
+    let from = |from: usize| (from, left(logs, |i| i.saturating_sub(from) as f64));
+    let all = (LEAST_PERIODS..logs.len().saturating_sub(2)).map(from);
+    all.min_by(|a, b| a.1.0.total_cmp(&b.1.0)).map(|(from, (squares, slope))| (from, squares, slope))
 }
 
 /// Squares that a level and a multiple of `column` leave, and the multiple.
