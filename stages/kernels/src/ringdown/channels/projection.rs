@@ -86,10 +86,9 @@ fn solve_group(group: &Group, records: &Records<'_>, poles: &Poles, unit_s: f64)
     let (modes, count) = (poles.0.len(), group.members.len());
     let own = own_count(modes, records.drift);
     let shared = 2 * modes;
-    let r = match group.is_plain() && Recursion::pays(group.samples) {
-        true => by_recursion(group, records, poles, unit_s),
-        false => of_all_rows(group, records, poles, unit_s),
-    };
+    let quick = group.is_plain() && Recursion::pays(group.samples);
+    let quick = if quick { by_recursion(group, records, poles, unit_s) } else { None };
+    let r = quick.unwrap_or_else(|| of_all_rows(group, records, poles, unit_s));
     let root = inverse_of_upper(&r, own);
     let columns: Vec<usize> = (0..count).collect();
     let solve = |m: &usize| solve_record(&r, &root, own, own + shared + m, modes, group.scale[*m]);
@@ -107,17 +106,19 @@ fn of_all_rows(group: &Group, records: &Records<'_>, poles: &Poles, unit_s: f64)
     TallQr::triangle(matrix.as_ref())
 }
 
-/// The same of white noise: each record's energy outside the columns stands at its own row.
-fn by_recursion(group: &Group, records: &Records<'_>, poles: &Poles, unit_s: f64) -> Mat<f64> {
+/// The same of white noise: each record's energy outside the columns stands at its own row. None where columns are too
+/// much alike for it.
+fn by_recursion(group: &Group, records: &Records<'_>, poles: &Poles, unit_s: f64) -> Option<Mat<f64>> {
     let basis = Recursion::of(poles, records.interval_s, unit_s, group.samples, records.drift);
-    let along: Vec<(Vec<f64>, f64)> = group.signals.par_iter().map(|signal| basis.along(signal)).collect();
+    let along: Option<Vec<(Vec<f64>, f64)>> = group.signals.par_iter().map(|signal| basis.along(signal)).collect();
+    let along = along?;
     let width = basis.triangle().ncols();
-    Mat::from_fn(width + along.len(), width + along.len(), |i, j| match j.checked_sub(width) {
+    Some(Mat::from_fn(width + along.len(), width + along.len(), |i, j| match j.checked_sub(width) {
         None if i <= j => basis.triangle()[(i, j)],
         Some(record) if i < width => along[record].0[i],
         Some(record) if i == j => along[record].1,
         _ => 0.0,
-    })
+    }))
 }
 
 /// One record's column of the triangle solved; its amplitudes times `scale` are in its unit.

@@ -115,24 +115,35 @@ impl<'a> Recursion<'a> {
         &self.triangle
     }
 
-    /// A record's share along the orthonormal columns, and the root of the energy outside of them.
+    /// A record's share along the orthonormal columns, and the root of the energy outside of them; none where it would be
+    /// a difference of large numbers.
     ///
     /// # Method
-    /// Semi-normal equations, corrected once: amplitudes first, then what they leave, so that the energy is no
-    /// difference of large numbers.
+    /// Semi-normal equations, corrected once: amplitudes first, then what they leave. Where columns are nearly alike (a
+    /// pole next to zero beside offset and slope) the amplitudes are rounding, and what they leave is larger than the
+    /// record.
     /// # Source
     /// A. Bjorck, Linear Algebra Appl. 88/89 (1987) 31.
-    pub fn along(&self, signal: &[f64]) -> (Vec<f64>, f64) {
+    pub fn along(&self, signal: &[f64]) -> Option<(Vec<f64>, f64)> {
         let own = own_count(self.poles.0.len(), self.drift);
+        if (0..self.triangle.ncols()).any(|j| self.is_rounding(j)) {
+            return None;
+        }
         let first = self.forward(&self.products(signal));
         let mut amplitudes = first[..own].to_vec();
         self.backward(&mut amplitudes);
         let left = self.left(signal, &amplitudes);
         let rest = self.forward(&self.products(&left));
-        let energy: f64 = left.iter().map(|v| v * v).sum::<f64>() - rest.iter().map(|v| v * v).sum::<f64>();
+        let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+        let (all, own_left) = (square(signal), square(&left));
+        let energy = own_left - square(&rest);
+        // least squares leave no more than there is
+        if energy.is_nan() || own_left > 2.0 * all || energy < CANCELLED * own_left {
+            return None;
+        }
         let r = &self.triangle;
         let fitted = |i: usize| if i < own { (i..own).map(|k| r[(i, k)] * amplitudes[k]).sum() } else { 0.0 };
-        ((0..rest.len()).map(|i| fitted(i) + rest[i]).collect(), energy.max(0.0).sqrt())
+        Some(((0..rest.len()).map(|i| fitted(i) + rest[i]).collect(), energy.sqrt()))
     }
 
     fn tail<'b>(&self, signal: &'b [f64]) -> MatRef<'b, f64> {
@@ -213,6 +224,13 @@ impl<'a> Recursion<'a> {
         left
     }
 
+    /// Whether a column is the others' but for rounding.
+    fn is_rounding(&self, column: usize) -> bool {
+        let r = &self.triangle;
+        let length = (0..=column).map(|i| r[(i, column)] * r[(i, column)]).sum::<f64>().sqrt();
+        r[(column, column)].abs() <= ROUNDING * length
+    }
+
     /// Solves with the transposed triangle; a column of rounding alone gets nothing.
     fn forward(&self, products: &[f64]) -> Vec<f64> {
         let r = &self.triangle;
@@ -241,6 +259,8 @@ impl<'a> Recursion<'a> {
 
 /// Share of a column that is rounding alone: the triangle's is some hundred times the last bit.
 const ROUNDING: f64 = 1e-13;
+/// Share of an energy below which a difference from it is known to less than a millionth.
+const CANCELLED: f64 = 1e-9;
 
 /// Triangle of two triangles, one above the other.
 fn stacked(upper: &Mat<f64>, lower: &Mat<f64>) -> Mat<f64> {
@@ -267,7 +287,7 @@ mod tests {
             });
             let signal: Vec<f64> = (0..samples).map(|i| rows[(i, width)]).collect();
             let slow = TallQr::triangle(rows.as_ref());
-            let (along, outside) = fast.along(&signal);
+            let (along, outside) = fast.along(&signal).unwrap();
             for i in 0..width {
                 let sign = (slow[(i, i)] * fast.triangle()[(i, i)]).signum();
                 for j in i..width {
@@ -282,5 +302,26 @@ mod tests {
             }
             assert!((slow[(width, width)].abs() / outside - 1.0).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_pole_next_to_zero_is_left_to_the_rows() {
+        // as a step from afar leaves it: beside offset and slope its columns are rounding
+        let mut given = 0;
+        for size in [1e-9, 1e-7, 1e-5, 1e-3, 1e-1] {
+            let poles = Poles(vec![c64::new(-size, 0.5 * size)]);
+            let fast = Recursion::of(&poles, 2e-4, 0.4, 1939, true);
+            let y: Vec<f64> = (0..1939).map(|k| (-0.004 * k as f64).exp() * (0.17 * k as f64).sin()).collect();
+            let all = columns(&poles, 2e-4, 0.4, 1939, true);
+            let rows = Mat::from_fn(1939, all.len() + 1, |i, j| if j < all.len() { all[j][i] } else { y[i] });
+            let slow = TallQr::triangle(rows.as_ref());
+            let outside = slow[(all.len(), all.len())].abs();
+            if let Some((_, found)) = fast.along(&y) {
+                given += 1;
+                // of a direction that is half rounding a part of the energy may be lost, not all of it
+                assert!((found / outside - 1.0).abs() < 0.05, "{size}: {found} for {outside}");
+            }
+        }
+        println!("{given} of 5 by recursion");
     }
 }

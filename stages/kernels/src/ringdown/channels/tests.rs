@@ -282,3 +282,37 @@ fn strong_modes_that_are_sampled_finely_are_found() {
         assert!(truth.iter().all(|s| off(s) < 1e-3), "seed {seed}: {:?}", fit.poles);
     }
 }
+
+#[test]
+fn strong_modes_of_low_quality_factor_are_found_in_several_channels() {
+    // one that dies within a period of the other, both a thousand times the noise: a step from one mode's fit goes far
+    let poles = [pole(134.164, 19.0), pole(272.54, 4.91)];
+    let shape = |values: [(f64, f64); 3]| values.map(|(re, im)| c64::new(re, im));
+    for seed in 0..24 {
+        let draws = white_noise(6, 0.15, 60 + seed);
+        let shapes = [
+            shape([(1.0, 0.0), (0.555 + draws[0], -0.209), (0.728 + draws[1], 0.032)]),
+            shape([(1.0, 0.0), (0.6 + draws[2], 0.1), (-0.5 + draws[3], 0.2)]),
+        ];
+        let hit = [c64::from_polar(0.546, 2.63 + draws[4]), c64::from_polar(0.677, 0.97 + draws[5])];
+        let data: Vec<Vec<f64>> = (0..3)
+            .map(|c| {
+                let noise = white_noise(1939, 1e-3, 100 * seed + c as u64);
+                let y = |k: usize| {
+                    let t = k as f64 * INTERVAL_S;
+                    (0..2).map(|j| (hit[j] * shapes[j][c] * (poles[j] * t).exp()).re).sum::<f64>()
+                };
+                (0..1939).map(|k| y(k) + noise[k]).collect()
+            })
+            .collect();
+        let event: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
+        let fit = fit_channels(&[event], &[], INTERVAL_S, &ChannelOptions::default());
+        let fit = fit.unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        assert_eq!(fit.poles.len(), 2, "seed {seed}: {:?}", fit.seen);
+        for (mode, wanted) in fit.modes().iter().zip([134.164, 272.54]) {
+            let off = (mode.frequency_hz.value - wanted).abs() / mode.frequency_hz.std;
+            // five standard errors: none of 48
+            assert!(off < 5.0, "seed {seed}: {mode:?}");
+        }
+    }
+}
