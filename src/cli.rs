@@ -168,7 +168,7 @@ pub enum Command {
 pub struct ConfigArgs {
     /// The config, TOML of at most 8 MiB.
     pub config: PathBuf,
-    /// Set a parameter (or `pipeline.seed`); VALUE is TOML, so text needs quotes of its own.
+    /// Set a parameter (or `pipeline.seed`); VALUE is TOML or bare text.
     #[arg(long = "set", value_name = "ID.PARAM=VALUE")]
     pub set: Vec<String>,
 }
@@ -218,6 +218,8 @@ pub struct RunArgs {
     /// The config and what changes it.
     #[command(flatten)]
     pub config: ConfigArgs,
+    /// What it runs on instead of `records.files`: files, folders or patterns, from the working directory.
+    pub files: Vec<String>,
     /// The result file, in a folder that is there; of a config with [sweep], the folder of the results [default: the
     /// pipeline's name, in the working directory].
     #[arg(short, long, value_name = "OUT.h5")]

@@ -191,3 +191,27 @@ fn tables_over_frequencies_are_read_for_what_they_are() {
     let stderr = refused(here, &["run", "bare.toml", "-o", "bare.h5", "--cache", "cache"]);
     assert!(stderr.contains("--set frf.values=amplitude-degrees"), "{stderr}");
 }
+
+#[test]
+fn a_run_takes_other_files_and_bare_text_from_where_it_is_called() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let e = noise(7, 20_000);
+    let decay = |seed: usize| -> Vec<f64> {
+        (0..4000).map(|k| if k < 300 { 0.0 } else { ring(k - 300) } + 1e-3 * e[k + seed]).collect()
+    };
+    std::fs::create_dir(here.join("configs")).expect("a folder");
+    for (name, seed) in [("one.csv", 0), ("two.csv", 5000), ("three.csv", 9000)] {
+        table(here, name, "Time (s),a (V)", even, &[decay(seed)]);
+    }
+    said(here, &["new", "pipeline", "one.csv", "-o", "configs/decay.toml"]);
+    let run = ["run", "configs/decay.toml", "two.csv", "three.csv", "--set", "events.as=hits", "-o", "r.h5"];
+    said(here, &[&run[..], &["--cache", "cache"]].concat());
+    let events = &common::shown(here, "r.h5", "events")["events"];
+    assert_eq!(events["found"], 2, "{events}");
+    // the result says what it read, so that it can be run again
+    let [again, _] = said(here, &["rerun", "r.h5", "--cache", "cache"]);
+    assert!(again.contains("the same"), "{again}");
+    let bad = refused(here, &["run", "configs/decay.toml", "nowhere.csv", "-o", "n.h5", "--cache", "cache"]);
+    assert!(bad.contains("nowhere.csv"), "{bad}");
+}

@@ -36,11 +36,22 @@ impl DataSet {
 
     /// The `--set` arguments of its run, after those of the whole batch.
     pub fn arguments(&self) -> Vec<String> {
-        let files = self.files.iter().map(|file| toml::Value::String(file.clone())).collect();
-        let mut arguments = vec![format!("records.files={}", toml::Value::Array(files))];
+        let mut arguments = vec![records_are(&self.files)];
         arguments.extend(self.set.iter().cloned());
         arguments
     }
+}
+
+/// The `--set` argument that replaces `records.files` by files, folders or patterns of the working directory. Errors:
+/// there is none.
+pub fn records_in(files: &[String]) -> Result<String, String> {
+    let files: Vec<String> = files.iter().map(|file| absolute(file)).collect::<Result<_, String>>()?;
+    Ok(records_are(&files))
+}
+
+fn records_are(files: &[String]) -> String {
+    let files = files.iter().map(|file| toml::Value::String(file.clone())).collect();
+    format!("records.files={}", toml::Value::Array(files))
 }
 
 /// Errors: why a name cannot be that of a result file.

@@ -20,6 +20,7 @@ const HELP: &[Help] = &[
         &["run"],
         &[
             "afmid run configs/paper.toml -o paper.h5",
+            "afmid run configs/free-lever.toml archive/2004 -o 2004.h5",
             "afmid run configs/free-lever.toml --set 'records.files=[\"archive/*.h5\"]' --set model.order=9 -o a.h5",
             "afmid run configs/sweep-order.toml -o orders",
         ],

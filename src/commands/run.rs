@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 use super::load::load;
 use super::sweep;
 use super::target::{Input, Target, prepare};
+use crate::batch::dataset::records_in;
 use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
 use crate::interrupt;
@@ -28,7 +29,11 @@ pub const PROGRAM: &str = concat!("afmid ", env!("CARGO_PKG_VERSION"));
 
 /// Runs a config and writes its result file.
 pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
-    let plan = load(&args.config.config, &args.config.set, stages)?;
+    let mut set = args.config.set.clone();
+    if !args.files.is_empty() {
+        set.push(records_in(&args.files).map_err(|problem| Failure::usage(problem, None))?);
+    }
+    let plan = load(&args.config.config, &set, stages)?;
     if let Some(count) = plan.points() {
         return sweep::run(&plan, count, args);
     }

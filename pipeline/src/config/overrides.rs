@@ -31,7 +31,8 @@ pub struct Override {
 const FORM: &str = "write `--set ID.PARAM=VALUE`, such as `--set fit.order=11`";
 
 impl Override {
-    /// Parses `ID.PARAM=VALUE`; VALUE is TOML, and PARAM may lead into a table (`ID.a.b`). Errors: another form.
+    /// Parses `ID.PARAM=VALUE`; VALUE is TOML or bare text, and PARAM may lead into a table (`ID.a.b`). Errors: another
+    /// form.
     pub fn parse(text: &str) -> Result<Self, Problem> {
         let Some(equals) = equals_sign(text) else {
             return Err(problem(text, "the argument has no `=`", 0..text.len(), "wanted ID.PARAM=VALUE", FORM));
@@ -39,12 +40,8 @@ impl Override {
         let path = path(text, equals)?;
         let offset = equals + 1;
         let (rest, pad) = trimmed(&text[offset..]);
-        let value = DeValue::parse(rest).map_err(|error| {
+        let value = value_of(rest).map_err(|error| {
             let at = offset + pad;
-            if rest.starts_with(char::is_alphabetic) {
-                let message = format!("`{rest}` is not a TOML value");
-                return problem(text, &message, at..at + rest.len(), "not TOML", &value_help(rest));
-            }
             let span = error.span().map_or(at..text.len(), |span| span.start + at..span.end + at);
             problem(text, &error.message().replace(", expected ", ", wanted "), span, "not TOML", &value_help(rest))
         })?;
@@ -156,7 +153,7 @@ fn apply_to_pipeline(set: &Override, config: &mut Config) -> Result<(), Problem>
         return Err(problem(&set.text, "wanted `pipeline.seed` or `pipeline.name`", span, "not a key", FORM));
     };
     let start = set.place.value.start;
-    let value = DeValue::parse(set.text.get(set.place.value.clone()).unwrap_or_default())
+    let value = value_of(set.text.get(set.place.value.clone()).unwrap_or_default())
         .unwrap_or_else(|_| Spanned::new(0..0, DeValue::Boolean(false)));
     let here = |wrong: Problem| {
         let span = wrong.span.start + start..wrong.span.end + start;
@@ -229,11 +226,21 @@ fn trimmed(text: &str) -> (&str, usize) {
     (rest.trim_end(), text.len() - rest.len())
 }
 
+/// The value as TOML reads it; what is no TOML, and does not begin as quoted text, a list or a table, is text as it
+/// stands. Errors: those of TOML.
+fn value_of(rest: &str) -> Result<Spanned<DeValue<'_>>, toml::de::Error> {
+    let bare = !rest.is_empty() && !rest.starts_with(['"', '\'', '[', '{']) && !rest.contains(char::is_control);
+    match DeValue::parse(rest) {
+        Err(_) if bare => Ok(Spanned::new(0..rest.len(), DeValue::String(rest.into()))),
+        parsed => parsed,
+    }
+}
+
 fn value_help(rest: &str) -> String {
     if rest.is_empty() {
         return FORM.to_owned();
     }
-    format!("VALUE is TOML: text needs quotes of its own, as in `--set ID.PARAM='{rest:?}'`")
+    "VALUE is TOML or bare text; lists of texts take quotes, as in `--set 'ID.PARAM=[\"a\", \"b\"]'`".to_owned()
 }
 
 fn problem(text: &str, message: &str, span: Range<usize>, label: &str, help: &str) -> Problem {

@@ -219,7 +219,7 @@ fn wrong_arguments_are_marked_in_the_argument() {
         [
             "b | there is no stage `b` | did you mean `a`?",
             "smples | stage `a` (`test.sine`) has no parameter `smples` | did you mean `samples`?",
-            "five | `five` is not a TOML value | VALUE is TOML: text needs quotes of its own, as in `--set ID.PARAM='\"five\"'`",
+            "five | parameter `samples` of stage `a`: found the string \"five\", wanted a whole number, 0 or more | `afmid stages test.sine` lists the parameters",
             "true | parameter `amplitude_v` of stage `a`: found the flag `true`, wanted a number | `afmid stages test.sine` lists the parameters",
             "sdt_v | `noise` of stage `a` has no parameter `sdt_v` | did you mean `std_v`?",
             "samples | the argument has no `=` | write `--set ID.PARAM=VALUE`, such as `--set fit.order=11`",
