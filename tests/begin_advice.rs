@@ -215,3 +215,32 @@ fn a_run_takes_other_files_and_bare_text_from_where_it_is_called() {
     let bad = refused(here, &["run", "configs/decay.toml", "nowhere.csv", "-o", "n.h5", "--cache", "cache"]);
     assert!(bad.contains("nowhere.csv"), "{bad}");
 }
+
+#[test]
+fn a_unit_over_that_of_a_force_is_a_frequency_response_s() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let e = noise(8, 2000);
+    let hz = |k: usize| k as f64 + 1.0;
+    let response = |k: usize| {
+        let (w, n) = (hz(k) / 200.0, 1.0 - (hz(k) / 200.0).powi(2));
+        let (d, b) = (n * n + (0.05 * w).powi(2), 0.05 * w);
+        [n / d + 0.01 * e[2 * k], -b / d + 0.01 * e[2 * k + 1]]
+    };
+    let rows: String = (0..600)
+        .map(|k| {
+            let [re, im] = response(k);
+            format!("{:e}\t{re:e}\t{im:e}\n", hz(k))
+        })
+        .collect();
+    std::fs::write(here.join("point.txt"), rows).expect("a table");
+    let [said, _] = said(here, &["new", "pipeline", "point.txt", "--unit", "m/N", "-o", "point.toml"]);
+    assert!(said.contains("frequency responses in point.txt"), "{said}");
+    let text = std::fs::read_to_string(here.join("point.toml")).expect("a config");
+    assert!(text.contains("io.frf"), "{text}");
+    // with a rate they are samples of time
+    let timed = ["new", "pipeline", "point.txt", "--unit", "m/N", "--rate", "1", "-o", "t.toml"];
+    common::command(here, &timed).output().expect("afmid starts");
+    let text = std::fs::read_to_string(here.join("t.toml")).unwrap_or_default();
+    assert!(!text.contains("io.frf"), "{text}");
+}

@@ -2,6 +2,7 @@
 
 use afmid_kernels::harmonics::is_tone;
 use afmid_kernels::spectra::{is_impulsive, shows_resonance};
+use afmid_stages::io::quantity_of_unit;
 
 use super::channels::{driving, inputs, is_named, named, nothing, outputs};
 use super::density::density;
@@ -90,7 +91,9 @@ fn by_looks<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>,
     if !wanted.inputs.is_empty() {
         return input_output(file, wanted, None);
     }
-    if file.has_responses(false) {
+    // a unit over that of a force is a response's, whatever the columns are called
+    let said = wanted.rate_hz.is_none() && wanted.unit.is_some_and(|unit| quantity_of_unit(unit).is_some());
+    if file.has_responses(said) {
         return Ok(responses(source));
     }
     if let Some(why) = force_curve(file, wanted) {
