@@ -29,7 +29,7 @@ pub struct Holdings {
     pub channels: Vec<Channel>,
     pub remarks: Vec<String>,
     pub ringdown: Verdict,
-    /// The `io.records` stage that would read it, in TOML; none without a channel.
+    /// The `io.records` stage that would read it, in TOML; none without a signal.
     pub stage: Option<String>,
 }
 
@@ -77,7 +77,7 @@ fn read(path: &Path) -> Result<Holdings, StageError> {
             _ => contents.format.clone(),
         },
         started_at: contents.started_at.clone(),
-        stage: best.map(|channel| stage(path, channel)),
+        stage: best.filter(|channel| !channel.is_axis).map(|channel| stage(path, channel)),
         channels,
         remarks: contents.remarks.clone(),
         ringdown,

@@ -53,7 +53,8 @@ pub struct Verdict {
 pub fn of_file(channels: &[Channel], found: &[FoundChannel]) -> Verdict {
     let named = |channel: &Channel| channel.location.to_ascii_lowercase().contains("defl");
     let mut order: Vec<usize> = (0..channels.len().min(found.len())).collect();
-    order.sort_by_key(|&index| (unusable(&channels[index]).is_some(), !named(&channels[index])));
+    let last = |channel: &Channel| (unusable(channel).is_some(), channel.is_axis, !named(channel));
+    order.sort_by_key(|&index| last(&channels[index]));
     let mut best: Option<Verdict> = None;
     for index in order.into_iter().take(MOST_SEARCHED) {
         let (answer, reason) = match unusable(&channels[index]) {
@@ -187,6 +188,9 @@ mod tests {
         let (still, first) = (|| channel("/still", Some(5e3), rings(false)), channel("/a", Some(5e3), rings(true)));
         let named = channel("/Deflection", Some(5e3), rings(true));
         assert_eq!(verdict(vec![still(), first, named]).channel, Some(2));
+        let (mut time, constant) = (channel("/t", None, vec![0.0; 3000]), channel("/c", None, vec![0.0; 3000]));
+        time.0.is_axis = true;
+        assert_eq!(verdict(vec![time, constant]).channel, Some(1));
         let [a, b] = ["/a", "/b"].map(|name| channel(name, Some(5e3), rings(true)));
         assert_eq!(verdict(vec![still(), a, b]).channel, Some(1));
     }
