@@ -211,7 +211,7 @@ fn a_run_takes_other_files_and_bare_text_from_where_it_is_called() {
     assert_eq!(events["found"], 2, "{events}");
     // the result says what it read, so that it can be run again
     let [again, _] = said(here, &["rerun", "r.h5", "--cache", "cache"]);
-    assert!(again.contains("the same"), "{again}");
+    assert!(again.contains("identical"), "{again}");
     let bad = refused(here, &["run", "configs/decay.toml", "nowhere.csv", "-o", "n.h5", "--cache", "cache"]);
     assert!(bad.contains("nowhere.csv"), "{bad}");
 }
