@@ -37,6 +37,7 @@
 //! assert!(centre == 3.0 && scale < 2.0);
 //! ```
 
+pub mod block_oriented;
 pub mod calibration;
 pub mod contact;
 pub mod effects;
