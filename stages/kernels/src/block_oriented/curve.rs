@@ -4,6 +4,9 @@ use faer::Mat;
 
 use crate::linear_algebra::solve;
 
+/// One sample of so many lies beyond either end of a curve's knots.
+const BEYOND: usize = 2000;
+
 /// A cubic spline on equally spaced knots, given by its values there; straight beyond its ends, where the second
 /// derivative is zero.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,10 +29,13 @@ impl Curve {
         Self { first, step, values }
     }
 
-    /// A curve of zeros on `knots` knots over the range of `x`.
+    /// A curve of zeros on `knots` knots over the range of `x` but its outermost samples: a spline on knots that only a
+    /// few of them reach would follow their noise.
     pub(super) fn over(x: &[f64], knots: usize) -> Self {
-        let low = x.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut sorted = x.to_vec();
+        let beyond = x.len() / BEYOND;
+        let mut at = |place: usize| sorted.select_nth_unstable_by(place, f64::total_cmp).1.to_owned();
+        let (low, high) = (at(beyond), at(x.len() - 1 - beyond));
         let step = ((high - low) / (knots - 1) as f64).max(f64::MIN_POSITIVE);
         Self::new(low, step, vec![0.0; knots])
     }
@@ -107,13 +113,6 @@ impl Curve {
     pub(super) fn scaled(mut self, factor: f64) -> Self {
         self.values.iter_mut().for_each(|value| *value *= factor);
         self
-    }
-
-    /// Its values on `knots` knots over the range of `x`: nearly the same curve.
-    pub(super) fn spread_over(&self, x: &[f64], knots: usize) -> Self {
-        let other = Self::over(x, knots);
-        let values = self.of(&other.knots());
-        Self { values, ..other }
     }
 
     /// Second derivatives at the knots.

@@ -1,37 +1,38 @@
 //! From data to a model.
 
-use rayon::prelude::*;
-
-use super::model::Structure;
 use super::options::{BlockError, BlockOptions, checked};
 use super::refine::refined;
 use super::result::{BlockFit, Tried};
-use super::screening::{Candidate, Stretch, screened};
-use super::splits::{Split, splits};
+use super::screening::{Candidate, Stretch};
+use super::search::{divided, searched};
 use super::start::{Linear, linear};
 use crate::monitor::Monitor;
 use crate::pem::{ResidualColour, time_domain_covariance};
 
-/// Samples of the stretch on which divisions are scored.
-const SHORT: usize = 4096;
-/// Samples of the stretch on which the best of them are refined first.
-const MEDIUM: usize = 12_288;
-/// Samples simulated before a stretch, at most.
-const BEFORE: usize = 1024;
-/// Steps on the medium stretch.
-const FEW: usize = 12;
-/// Steps on all of the record before the best ones go on alone.
+/// Steps on all of the record before the best candidate of each structure goes on alone.
 const SOME: usize = 10;
-/// Candidates of one structure that are refined on all of the record.
-const KEPT: usize = 3;
-/// Those that leave this many times the mean square of the best one are given up.
+/// Structures that leave this many times the mean square of the best one are given up.
 const HOPELESS: f64 = 1.5;
-/// Divisions of the same poles that are refined.
-const ALIKE: usize = 2;
 /// Abscissas of the curve that are kept.
 const USED: usize = 2048;
 
-/// doc
+/// Identifies the block-oriented model of least output error.
+///
+/// # Model
+/// `y = G2(q) f(G1(q) u) + e` from rest, as the folder's page has it; e of any colour, its mean square minimised.
+/// # Method
+/// Divisions of the best linear approximation, refined by damped least squares: `ROUNDS` of a search on a stretch, then
+/// all of the record.
+/// # Shapes
+/// u and y: N samples each, at least ten for each parameter.
+/// # Accuracy
+/// Maximum likelihood for white Gaussian e, where the spline follows the curve. The covariance allows for a coloured
+/// residual, not for a curve that the spline cannot follow. No split is certain: see [`BlockFit::tried`].
+/// # Errors
+/// Lengths, samples that are not finite, a constant input or output, too few samples, options out of range, no finite
+/// linear or block-oriented model, cancelled.
+/// # Source
+/// J. Sjoberg and J. Schoukens, Automatica 48 (2012) 353.
 pub fn fit_block_oriented(
     u: &[f64],
     y: &[f64],
@@ -41,91 +42,53 @@ pub fn fit_block_oriented(
     checked(u, y, options)?;
     let whole = Stretch { u, y, skipped: options.transient };
     let linear = linear(u, y, options)?;
-    let medium = busiest(whole, &linear, MEDIUM);
-    let short = busiest(whole, &linear, SHORT);
-    let mut starts = Vec::new();
-    for structure in structures(options) {
-        starts.extend(screen(&splits(&linear, structure), short, options));
+    let (kept, given_up) = searched(whole, &linear, options, monitor)?;
+    let mut all = Vec::new();
+    for own in &kept {
+        if let Some(start) = own.with_knots(own.model.curve.values().len(), whole) {
+            all.extend(refined(&start, whole, SOME, monitor)?);
+        }
     }
-    monitor.expect(starts.len());
-    let attempt = |start: &Candidate| {
-        let found = refined(start, medium, FEW, monitor);
-        monitor.tick();
-        found
-    };
-    let tried: Vec<Option<Candidate>> = starts.par_iter().map(attempt).collect::<Result<_, _>>()?;
-    let (kept, mut given_up) = divided(tried.into_iter().flatten().collect(), KEPT);
-    let spread = |candidate: &Candidate, steps: usize| {
-        let model = candidate.model.normalised(u).spread(u, options.knots);
-        refined(&Candidate { model, ..candidate.clone() }, whole, steps, monitor)
-    };
-    let all: Vec<Option<Candidate>> = kept.iter().map(|c| spread(c, SOME)).collect::<Result<_, _>>()?;
-    let (kept, left) = divided(all.into_iter().flatten().collect(), 1);
-    let last: Vec<Option<Candidate>> =
-        kept.iter().map(|c| spread(c, options.max_iterations)).collect::<Result<_, _>>()?;
-    let mut last: Vec<Candidate> = last.into_iter().flatten().collect();
-    last.sort_by(|a, b| criterion(a, whole).total_cmp(&criterion(b, whole)));
+    let (mut last, left) = divided(all, 1, HOPELESS);
+    if last.len() > 1 {
+        let ended: Vec<Option<Candidate>> =
+            last.iter().map(|c| refined(c, whole, options.max_iterations, monitor)).collect::<Result<_, _>>()?;
+        last = ended.into_iter().flatten().collect();
+    }
+    last.sort_by(|a, b| a.criterion(whole).total_cmp(&b.criterion(whole)));
     let mut tried: Vec<Tried> = last.iter().chain(&left).map(|candidate| described(candidate, true)).collect();
-    given_up.sort_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
     tried.extend(given_up.iter().map(|candidate| described(candidate, false)));
     let best = last.into_iter().next().ok_or(BlockError::NoModel)?;
-    concluded(best, whole, &linear, tried)
+    concluded(with_right_knots(best, whole, options, monitor)?, whole, &linear, tried)
 }
 
-/// Structures in their order, each once.
-fn structures(options: &BlockOptions) -> Vec<Structure> {
-    Structure::ALL.into_iter().filter(|structure| options.structures.contains(structure)).collect()
-}
-
-/// The stretch of so many samples in which the linear model leaves most: there the curve shows.
-fn busiest<'a>(whole: Stretch<'a>, linear: &Linear, samples: usize) -> Stretch<'a> {
-    if whole.scored() <= samples {
-        return whole;
-    }
-    let energy = |top: usize| linear.residual[top..top + samples].iter().map(|r| r * r).sum::<f64>();
-    let tops = (whole.skipped..=whole.y.len() - samples).step_by(samples / 2);
-    let top = tops.max_by(|a, b| energy(*a).total_cmp(&energy(*b))).unwrap_or(whole.skipped);
-    let from = top.saturating_sub(BEFORE.max(whole.skipped));
-    Stretch { u: &whole.u[from..top + samples], y: &whole.y[from..top + samples], skipped: top - from }
-}
-
-/// The divisions that leave least by the cheap score, no more than [`ALIKE`] of the same poles.
-fn screen(splits: &[Split], stretch: Stretch<'_>, options: &BlockOptions) -> Vec<Candidate> {
-    let score = |(number, split): (usize, &Split)| {
-        screened(split, stretch, options.knots).map(|candidate| (number, candidate))
+/// The candidate with as many knots as Schwarz's criterion favours, at its minimum.
+fn with_right_knots(
+    start: Candidate,
+    whole: Stretch<'_>,
+    options: &BlockOptions,
+    monitor: &dyn Monitor,
+) -> Result<Candidate, BlockError> {
+    let steps = options.max_iterations;
+    let own = start.model.curve.values().len();
+    let mut best = refined(&start, whole, steps.min(SOME), monitor)?.unwrap_or(start);
+    let better = |best: &Candidate, knots: usize| -> Result<Option<Candidate>, BlockError> {
+        let Some(next) = best.with_knots(knots, whole) else { return Ok(None) };
+        let next = refined(&next, whole, steps.min(2 * SOME), monitor)?;
+        Ok(next.filter(|next| next.criterion(whole) < best.criterion(whole)))
     };
-    let mut scored: Vec<(usize, Candidate)> = splits.par_iter().enumerate().filter_map(score).collect();
-    scored.sort_by(|a, b| a.1.mean_square.total_cmp(&b.1.mean_square));
-    let mut kept: Vec<(usize, Candidate)> = Vec::new();
-    for (number, candidate) in scored {
-        let alike = kept.iter().filter(|(other, _)| splits[*other].first.0 == splits[number].first.0).count();
-        if alike < ALIKE {
-            kept.push((number, candidate));
-        }
-        if kept.len() == options.starts {
-            break;
+    let fewer = if own > options.knots { better(&best, options.knots)? } else { None };
+    match fewer {
+        Some(fewer) => best = fewer,
+        None => {
+            let mut knots = 2 * own - 1;
+            while knots <= options.most_knots {
+                let Some(next) = better(&best, knots)? else { break };
+                (best, knots) = (next, 2 * knots - 1);
+            }
         }
     }
-    kept.into_iter().map(|(_, candidate)| candidate).collect()
-}
-
-/// Those that go on, at most so many of each structure, and those that are given up.
-fn divided(mut candidates: Vec<Candidate>, most: usize) -> (Vec<Candidate>, Vec<Candidate>) {
-    candidates.sort_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
-    let limit = HOPELESS * candidates.first().map_or(0.0, |best| best.mean_square);
-    let (mut kept, mut left): (Vec<Candidate>, Vec<Candidate>) = (Vec::new(), Vec::new());
-    for candidate in candidates {
-        let same = kept.iter().filter(|other| other.structure == candidate.structure).count();
-        let place = if candidate.mean_square <= limit && same < most { &mut kept } else { &mut left };
-        place.push(candidate);
-    }
-    (kept, left)
-}
-
-/// Schwarz's criterion: the structure with fewer parameters where both leave the same.
-fn criterion(candidate: &Candidate, stretch: Stretch<'_>) -> f64 {
-    let n = stretch.scored() as f64;
-    n * candidate.mean_square.ln() + candidate.model.vector().len() as f64 * n.ln()
+    Ok(refined(&best, whole, steps, monitor)?.unwrap_or(best))
 }
 
 fn described(candidate: &Candidate, on_all: bool) -> Tried {
@@ -141,12 +104,7 @@ fn described(candidate: &Candidate, on_all: bool) -> Tried {
     Tried { structure: candidate.structure, description, rms: candidate.mean_square.sqrt(), on_all }
 }
 
-fn concluded(
-    best: Candidate,
-    whole: Stretch<'_>,
-    linear: &Linear,
-    tried: Vec<Tried>,
-) -> Result<BlockFit, BlockError> {
+fn concluded(best: Candidate, whole: Stretch<'_>, linear: &Linear, tried: Vec<Tried>) -> Result<BlockFit, BlockError> {
     let model = best.model.normalised(whole.u);
     let (output, columns) = model.sensitivities(whole.u);
     let scored = whole.skipped..whole.y.len();

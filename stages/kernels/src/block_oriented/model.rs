@@ -104,11 +104,6 @@ impl BlockModel {
             second: self.second.clone().scaled(1.0 / other).holding_largest(&scaled),
         }
     }
-
-    /// Nearly the same model, the curve on `knots` knots over what `u` makes of its abscissa.
-    pub(super) fn spread(&self, u: &[f64], knots: usize) -> Self {
-        Self { curve: self.curve.spread_over(&self.first.filter(u), knots), ..self.clone() }
-    }
 }
 
 /// Standard deviation.

@@ -15,9 +15,13 @@ pub struct BlockOptions {
     /// Poles of both linear parts together. Why: two parts of third order, which all but resonant chains stay below.
     #[schemars(range(min = 1, max = 20))]
     pub order: usize,
-    /// Knots of the curve. Why: ten follow a smooth bend to a thousandth and a kink to a hundredth.
+    /// Knots of the curve in the search. Why: ten tell the divisions apart; more need longer records.
     #[schemars(range(min = 4, max = 100))]
     pub knots: usize,
+    /// Knots of the curve in the end, at most: one more between any two is tried as long as Schwarz's criterion falls.
+    /// Why: 40 follow a kink to some thousandths of the range. `knots` or less: never.
+    #[schemars(range(min = 0, max = 200))]
+    pub most_knots: usize,
     /// Samples at the beginning that are simulated and not scored. Why: nothing is known of what was put in before
     /// them; longer than the slowest decay, or 0 for a system that was at rest.
     pub transient: usize,
@@ -32,7 +36,7 @@ pub struct BlockOptions {
 impl Default for BlockOptions {
     fn default() -> Self {
         let structures = Structure::ALL.to_vec();
-        Self { structures, order: 6, knots: 10, transient: 0, starts: 12, max_iterations: 60 }
+        Self { structures, order: 6, knots: 10, most_knots: 40, transient: 0, starts: 12, max_iterations: 60 }
     }
 }
 
@@ -73,6 +77,7 @@ pub(super) fn checked(u: &[f64], y: &[f64], options: &BlockOptions) -> Result<()
     let chain = options.order > 1 || options.structures.iter().any(|s| *s != Structure::WienerHammerstein);
     range("order", options.order, chain, "at least 2 for two linear parts")?;
     range("knots", options.knots, (4..=100).contains(&options.knots), "4 to 100")?;
+    range("most_knots", options.most_knots, options.most_knots <= 200, "at most 200")?;
     range("starts", options.starts, options.starts >= 1, "at least 1")?;
     range("max_iterations", options.max_iterations, options.max_iterations >= 1, "at least 1")?;
     // ten samples for each parameter

@@ -11,8 +11,8 @@ use crate::model::ModelError;
 use crate::monitor::Monitor;
 use crate::optimise::{Damping, Limits, Objective, Taken, Trial, damped_step, descend};
 
-/// Share of the residual along the parameters that counts as none: a thirtieth of a standard error at 100,000 samples.
-const ARRIVED: f64 = 1e-4;
+/// Standard errors from the minimum that count as none: they add half a per cent to the variance.
+const ARRIVED: f64 = 0.1;
 /// Rows whose products are summed at once, one block on each thread.
 const BLOCK: usize = 16_384;
 
@@ -75,7 +75,7 @@ impl Objective for Search<'_> {
         if !along.is_finite() {
             return Err(ModelError::Degenerate("the derivatives are not finite").into());
         }
-        Ok((along > ARRIVED * ARRIVED * point.cost).then_some((information, gradient)))
+        Ok((along * self.stretch.scored() as f64 > ARRIVED * ARRIVED * point.cost).then_some((information, gradient)))
     }
 
     fn trial(&mut self, from: &Point, local: &Self::Local, damping: f64) -> Result<Trial<Point, f64>, BlockError> {

@@ -105,9 +105,8 @@ impl BlockFit {
         };
         let whole = quadratic(&|i, j| all[(i, j)]).max(f64::MIN_POSITIVE);
         let count = values.len();
-        let noise: f64 = (0..count)
-            .map(|i| (0..count).map(|j| bend(i, j) * self.covariance[(at + i, at + j)]).sum::<f64>())
-            .sum();
+        let noise: f64 =
+            (0..count).map(|i| (0..count).map(|j| bend(i, j) * self.covariance[(at + i, at + j)]).sum::<f64>()).sum();
         let share = |square: f64| (square.max(0.0) / whole).sqrt();
         CurveStrength { relative: share(quadratic(&bend)), std: share(noise) }
     }

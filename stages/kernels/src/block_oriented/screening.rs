@@ -31,10 +31,35 @@ pub(super) struct Candidate {
     pub mean_square: f64,
 }
 
-/// The model of this division whose curve leaves least, by linear least squares; none without a finite one.
+impl Candidate {
+    /// Its linear parts with the curve on so many knots that leaves least; none without a finite one.
+    pub fn with_knots(&self, knots: usize, stretch: Stretch<'_>) -> Option<Self> {
+        with_best_curve(self.structure, &self.model.first, &self.model.second, stretch, knots)
+    }
+
+    /// Schwarz's criterion: the lower of two models is the better one by its residual and its number of parameters.
+    pub fn criterion(&self, stretch: Stretch<'_>) -> f64 {
+        let n = stretch.scored() as f64;
+        n * self.mean_square.ln() + self.model.vector().len() as f64 * n.ln()
+    }
+}
+
+/// The model of this division whose curve leaves least; none without a finite one.
 pub(super) fn screened(split: &Split, stretch: Stretch<'_>, knots: usize) -> Option<Candidate> {
     let first = Rational::from_roots(&split.first.0, &split.first.1)?;
     let second = Rational::from_roots(&split.second.0, &split.second.1)?;
+    with_best_curve(split.structure, &first, &second, stretch, knots)
+}
+
+/// These linear parts with the curve that leaves least on the stretch, by linear least squares: on so many knots over
+/// the range of its abscissa. None without a finite one.
+fn with_best_curve(
+    structure: Structure,
+    first: &Rational,
+    second: &Rational,
+    stretch: Stretch<'_>,
+    knots: usize,
+) -> Option<Candidate> {
     let before = first.filter(stretch.u);
     let curve = Curve::over(&before, knots);
     let columns: Vec<Vec<f64>> = curve.basis(&before).iter().map(|column| second.filter(column)).collect();
@@ -49,6 +74,7 @@ pub(super) fn screened(split: &Split, stretch: Stretch<'_>, knots: usize) -> Opt
     if !mean_square.is_finite() {
         return None;
     }
+    let (first, second) = (first.clone(), second.clone());
     let model = BlockModel { first, curve: curve.at(&values), second }.normalised(stretch.u);
-    Some(Candidate { structure: split.structure, model, mean_square })
+    Some(Candidate { structure, model, mean_square })
 }

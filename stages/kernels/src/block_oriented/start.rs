@@ -5,8 +5,8 @@ use faer::c64;
 use super::model::deviation;
 use super::options::BlockOptions;
 use super::rational::Rational;
-use crate::model::transmission_zeros;
 use crate::model::ModelError;
+use crate::model::transmission_zeros;
 use crate::pem::{Experiment, NoiseModel, PemOptions, identify};
 
 /// Zeros beyond this radius are delays.
@@ -30,8 +30,7 @@ pub(super) struct Linear {
 pub(super) fn linear(u: &[f64], y: &[f64], options: &BlockOptions) -> Result<Linear, ModelError> {
     let n = options.order;
     let block_rows = (y.len() / 50).clamp(n + 2, PemOptions::default().block_rows.max(2 * n));
-    let settings =
-        PemOptions { order: n, block_rows, noise: NoiseModel::White, drift: false, ..PemOptions::default() };
+    let settings = PemOptions { order: n, block_rows, noise: NoiseModel::White, drift: false, ..PemOptions::default() };
     let fit = identify(&[Experiment { input: u, output: y }], 1.0, &settings)?;
     let residual: Vec<f64> = fit.residuals.into_iter().flatten().collect();
     let poles: Vec<c64> = fit.model.sections.iter().flat_map(|section| section.poles()).collect();
@@ -64,8 +63,8 @@ fn cancelling(u: &[f64], poles: &[Group], zeros: &[Group], limit: f64) -> Option
     for (i, pole) in poles.iter().enumerate().filter(|(_, pole)| pole.len() < total) {
         let nearest = |zero: &Group| zero.iter().map(|z| (z - pole[0]).norm()).fold(f64::INFINITY, f64::min);
         let alike = zeros.iter().enumerate().filter(|(_, zero)| zero.len() == pole.len());
-        let Some((k, zero)) = alike.min_by(|a, b| nearest(a.1).total_cmp(&nearest(b.1))) else { continue };
-        if let Some(change) = change(u, pole, zero, poles, zeros, (i, k))
+        let Some((k, _)) = alike.min_by(|a, b| nearest(a.1).total_cmp(&nearest(b.1))) else { continue };
+        if let Some(change) = change(u, poles, zeros, (i, k))
             && change < limit
             && found.is_none_or(|(least, ..)| change < least)
         {
@@ -77,14 +76,7 @@ fn cancelling(u: &[f64], poles: &[Group], zeros: &[Group], limit: f64) -> Option
 
 /// Share of the response that is left of it when the response without the pole and the zero, times a gain, is taken
 /// off.
-fn change(
-    u: &[f64],
-    _pole: &Group,
-    _zero: &Group,
-    poles: &[Group],
-    zeros: &[Group],
-    without: (usize, usize),
-) -> Option<f64> {
+fn change(u: &[f64], poles: &[Group], zeros: &[Group], without: (usize, usize)) -> Option<f64> {
     let flat = |groups: &[Group], left_out: Option<usize>| -> Vec<c64> {
         groups.iter().enumerate().filter(|(i, _)| Some(*i) != left_out).flat_map(|(_, g)| g.clone()).collect()
     };
@@ -92,9 +84,8 @@ fn change(
     let part = Rational::from_roots(&flat(poles, Some(without.0)), &flat(zeros, Some(without.1)))?.filter(u);
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     let (a, b) = (mean(&whole), mean(&part));
-    let product = |x: &[f64], x0: f64, z: &[f64], z0: f64| -> f64 {
-        x.iter().zip(z).map(|(x, z)| (x - x0) * (z - z0)).sum()
-    };
+    let product =
+        |x: &[f64], x0: f64, z: &[f64], z0: f64| -> f64 { x.iter().zip(z).map(|(x, z)| (x - x0) * (z - z0)).sum() };
     let (ww, wp, pp) = (product(&whole, a, &whole, a), product(&whole, a, &part, b), product(&part, b, &part, b));
     let share = (1.0 - wp * wp / (ww * pp)).max(0.0).sqrt();
     share.is_finite().then_some(share)

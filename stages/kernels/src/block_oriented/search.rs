@@ -1,0 +1,111 @@
+//! The search over all divisions, on stretches of the record.
+
+use rayon::prelude::*;
+
+use super::model::Structure;
+use super::options::{BlockError, BlockOptions};
+use super::refine::refined;
+use super::screening::{Candidate, Stretch, screened};
+use super::splits::{Split, splits};
+use super::start::Linear;
+use crate::monitor::Monitor;
+
+/// Samples of the stretch on which divisions are scored.
+const SHORT: usize = 4096;
+/// Samples of the stretch on which the best of them are refined.
+const MEDIUM: usize = 12_288;
+/// Samples simulated before a stretch, at most.
+const BEFORE: usize = 1024;
+/// Divisions of the same poles that are refined.
+const ALIKE: usize = 2;
+/// Steps of each round, candidates of a structure that go on after it, and the mean square over the best one's beyond
+/// which one does not: early ones have far to go.
+const ROUNDS: [(usize, usize, f64); 3] = [(10, 6, 100.0), (15, 4, 20.0), (25, 2, 1.5)];
+
+/// The candidates that are refined on all of the record, and those that were given up; both begin with the best.
+pub(super) fn searched(
+    whole: Stretch<'_>,
+    linear: &Linear,
+    options: &BlockOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Vec<Candidate>, Vec<Candidate>), BlockError> {
+    let (short, medium) = (busiest(whole, linear, SHORT), busiest(whole, linear, MEDIUM));
+    let mut kept = Vec::new();
+    for structure in structures(options) {
+        kept.extend(screen(&splits(linear, structure), short, options));
+    }
+    monitor.expect(kept.len());
+    let mut given_up = Vec::new();
+    for (round, (steps, most, factor)) in ROUNDS.into_iter().enumerate() {
+        let last = round + 1 == ROUNDS.len();
+        let attempt = |start: &Candidate| {
+            // with few knots a wrong division makes up for what the curve cannot follow
+            let finer = last.then(|| start.with_knots(finest(options), medium)).flatten();
+            let found = refined(finer.as_ref().unwrap_or(start), medium, steps, monitor);
+            if round == 0 {
+                monitor.tick();
+            }
+            found
+        };
+        let found: Vec<Option<Candidate>> = kept.par_iter().map(attempt).collect::<Result<_, _>>()?;
+        let (next, left) = divided(found.into_iter().flatten().collect(), most, factor);
+        kept = next;
+        given_up.extend(left);
+    }
+    given_up.sort_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
+    Ok((kept, given_up))
+}
+
+/// Knots of the last round: one more between any two.
+pub(super) fn finest(options: &BlockOptions) -> usize {
+    (2 * options.knots - 1).min(options.most_knots).max(options.knots)
+}
+
+/// Structures in their order, each once.
+fn structures(options: &BlockOptions) -> Vec<Structure> {
+    Structure::ALL.into_iter().filter(|structure| options.structures.contains(structure)).collect()
+}
+
+/// The stretch of so many samples in which the linear model leaves most: there the curve shows.
+fn busiest<'a>(whole: Stretch<'a>, linear: &Linear, samples: usize) -> Stretch<'a> {
+    if whole.scored() <= samples {
+        return whole;
+    }
+    let energy = |top: usize| linear.residual[top..top + samples].iter().map(|r| r * r).sum::<f64>();
+    let tops = (whole.skipped..=whole.y.len() - samples).step_by(samples / 2);
+    let top = tops.max_by(|a, b| energy(*a).total_cmp(&energy(*b))).unwrap_or(whole.skipped);
+    let from = top.saturating_sub(BEFORE.max(whole.skipped));
+    Stretch { u: &whole.u[from..top + samples], y: &whole.y[from..top + samples], skipped: top - from }
+}
+
+/// The divisions that leave least by the cheap score, no more than [`ALIKE`] of the same poles.
+fn screen(splits: &[Split], stretch: Stretch<'_>, options: &BlockOptions) -> Vec<Candidate> {
+    let score =
+        |(number, split): (usize, &Split)| screened(split, stretch, options.knots).map(|candidate| (number, candidate));
+    let mut scored: Vec<(usize, Candidate)> = splits.par_iter().enumerate().filter_map(score).collect();
+    scored.sort_by(|a, b| a.1.mean_square.total_cmp(&b.1.mean_square));
+    let mut kept: Vec<(usize, Candidate)> = Vec::new();
+    for (number, candidate) in scored {
+        let alike = kept.iter().filter(|(other, _)| splits[*other].first.0 == splits[number].first.0).count();
+        if alike < ALIKE {
+            kept.push((number, candidate));
+        }
+        if kept.len() == options.starts {
+            break;
+        }
+    }
+    kept.into_iter().map(|(_, candidate)| candidate).collect()
+}
+
+/// Those that go on, at most so many of each structure, and those that are given up.
+pub(super) fn divided(mut candidates: Vec<Candidate>, most: usize, factor: f64) -> (Vec<Candidate>, Vec<Candidate>) {
+    candidates.sort_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
+    let limit = factor * candidates.first().map_or(0.0, |best| best.mean_square);
+    let (mut kept, mut left): (Vec<Candidate>, Vec<Candidate>) = (Vec::new(), Vec::new());
+    for candidate in candidates {
+        let same = kept.iter().filter(|other| other.structure == candidate.structure).count();
+        let place = if candidate.mean_square <= limit && same < most { &mut kept } else { &mut left };
+        place.push(candidate);
+    }
+    (kept, left)
+}
