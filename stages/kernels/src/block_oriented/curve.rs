@@ -40,6 +40,13 @@ impl Curve {
         Self::new(low, step, vec![0.0; knots])
     }
 
+    /// Whether the knots lie within the range of `x`, give or take half a step.
+    pub(super) fn covers_no_more_than(&self, x: &[f64]) -> bool {
+        let own = Self::over(x, self.values.len());
+        let last = |curve: &Self| curve.first + (curve.values.len() - 1) as f64 * curve.step;
+        self.first > own.first - 0.5 * self.step && last(self) < last(&own) + 0.5 * self.step
+    }
+
     /// The abscissas of the knots.
     pub fn knots(&self) -> Vec<f64> {
         (0..self.values.len()).map(|k| self.first + k as f64 * self.step).collect()

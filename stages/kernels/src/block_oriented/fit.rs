@@ -88,7 +88,15 @@ fn with_right_knots(
             }
         }
     }
-    Ok(refined(&best, whole, steps, monitor)?.unwrap_or(best))
+    best = refined(&best, whole, steps, monitor)?.unwrap_or(best);
+    // the scale of the abscissa moves with the first part: knots that no sample reaches any more are not determined
+    let before = best.model.first.filter(whole.u);
+    if best.model.curve.covers_no_more_than(&before) {
+        return Ok(best);
+    }
+    let spread = best.with_knots(best.model.curve.values().len(), whole);
+    let again = spread.map(|own| refined(&own, whole, steps, monitor)).transpose()?.flatten();
+    Ok(again.unwrap_or(best))
 }
 
 fn described(candidate: &Candidate, on_all: bool) -> Tried {

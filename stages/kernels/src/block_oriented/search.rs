@@ -7,7 +7,7 @@ use super::options::{BlockError, BlockOptions};
 use super::refine::refined;
 use super::screening::{Candidate, Stretch, screened};
 use super::splits::{Split, splits};
-use super::start::Linear;
+use super::start::{Linear, linear_of};
 use crate::monitor::Monitor;
 
 /// Samples of the stretch on which divisions are scored.
@@ -20,7 +20,13 @@ const BEFORE: usize = 1024;
 const ALIKE: usize = 2;
 /// Steps of each round, candidates of a structure that go on after it, and the mean square over the best one's beyond
 /// which one does not: early ones have far to go.
-const ROUNDS: [(usize, usize, f64); 3] = [(10, 6, 100.0), (15, 4, 20.0), (25, 2, 1.5)];
+const ROUNDS: [(usize, usize, f64); 3] = [(10, 6, 100.0), (15, 4, 20.0), (25, 2, LAST)];
+/// The same factor after all rounds.
+const LAST: f64 = 1.5;
+/// Times that all divisions of the best model's own poles and zeros are tried.
+const PASSES: usize = 3;
+/// Share of the mean square below which a pass has found something.
+const ENOUGH: f64 = 0.98;
 
 /// The candidates that are refined on all of the record, and those that were given up; both begin with the best.
 pub(super) fn searched(
@@ -30,18 +36,46 @@ pub(super) fn searched(
     monitor: &dyn Monitor,
 ) -> Result<(Vec<Candidate>, Vec<Candidate>), BlockError> {
     let (short, medium) = (busiest(whole, linear, SHORT), busiest(whole, linear, MEDIUM));
-    let mut kept = Vec::new();
+    let mut starts = Vec::new();
     for structure in structures(options) {
-        kept.extend(screen(&splits(linear, structure), short, options));
+        starts.extend(screen(&splits(linear, structure), short, options.knots, options));
     }
-    monitor.expect(kept.len());
+    monitor.expect(starts.len());
+    let (mut kept, mut given_up) = rounds(starts, medium, options, monitor)?;
+    for _ in 0..PASSES {
+        let of_two = |own: &&Candidate| own.structure == Structure::WienerHammerstein;
+        let Some(best) = kept.iter().find(of_two).cloned() else { break };
+        let again = linear_of(&best.model, medium.u, linear);
+        let starts = screen(&splits(&again, best.structure), short, finest(options), options);
+        monitor.expect(starts.len());
+        let (next, left) = rounds(starts, medium, options, monitor)?;
+        given_up.extend(left);
+        let improved = next.iter().any(|own| own.mean_square < ENOUGH * best.mean_square);
+        let (next, left) = divided([kept, next].concat(), 2, LAST);
+        kept = next;
+        given_up.extend(left);
+        if !improved {
+            break;
+        }
+    }
+    given_up.sort_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
+    Ok((kept, given_up))
+}
+
+/// All rounds, on one stretch: those that are left, and those that were given up.
+fn rounds(
+    mut kept: Vec<Candidate>,
+    stretch: Stretch<'_>,
+    options: &BlockOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Vec<Candidate>, Vec<Candidate>), BlockError> {
     let mut given_up = Vec::new();
     for (round, (steps, most, factor)) in ROUNDS.into_iter().enumerate() {
         let last = round + 1 == ROUNDS.len();
         let attempt = |start: &Candidate| {
             // with few knots a wrong division makes up for what the curve cannot follow
-            let finer = last.then(|| start.with_knots(finest(options), medium)).flatten();
-            let found = refined(finer.as_ref().unwrap_or(start), medium, steps, monitor);
+            let finer = last.then(|| start.with_knots(finest(options), stretch)).flatten();
+            let found = refined(finer.as_ref().unwrap_or(start), stretch, steps, monitor);
             if round == 0 {
                 monitor.tick();
             }
@@ -52,7 +86,6 @@ pub(super) fn searched(
         kept = next;
         given_up.extend(left);
     }
-    given_up.sort_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
     Ok((kept, given_up))
 }
 
@@ -79,9 +112,8 @@ fn busiest<'a>(whole: Stretch<'a>, linear: &Linear, samples: usize) -> Stretch<'
 }
 
 /// The divisions that leave least by the cheap score, no more than [`ALIKE`] of the same poles.
-fn screen(splits: &[Split], stretch: Stretch<'_>, options: &BlockOptions) -> Vec<Candidate> {
-    let score =
-        |(number, split): (usize, &Split)| screened(split, stretch, options.knots).map(|candidate| (number, candidate));
+fn screen(splits: &[Split], stretch: Stretch<'_>, knots: usize, options: &BlockOptions) -> Vec<Candidate> {
+    let score = |(number, split): (usize, &Split)| screened(split, stretch, knots).map(|candidate| (number, candidate));
     let mut scored: Vec<(usize, Candidate)> = splits.par_iter().enumerate().filter_map(score).collect();
     scored.sort_by(|a, b| a.1.mean_square.total_cmp(&b.1.mean_square));
     let mut kept: Vec<(usize, Candidate)> = Vec::new();

@@ -2,7 +2,7 @@
 
 use faer::c64;
 
-use super::model::deviation;
+use super::model::{BlockModel, deviation};
 use super::options::BlockOptions;
 use super::rational::Rational;
 use crate::model::ModelError;
@@ -37,14 +37,29 @@ pub(super) fn linear(u: &[f64], y: &[f64], options: &BlockOptions) -> Result<Lin
     let mut zeros = transmission_zeros(&fit.model)?;
     zeros.retain(|zero| zero.norm() < FAR);
     zeros.truncate(n);
-    let (mut poles, mut zeros) = (grouped(&poles), grouped(&zeros));
-    let limit = CANCELS * deviation(&residual);
-    let gain = deviation(y);
-    while let Some((pole, zero)) = cancelling(u, &poles, &zeros, limit / gain) {
+    let (poles, zeros) = without_cancelling(u, &poles, &zeros, CANCELS * deviation(&residual) / deviation(y));
+    Ok(Linear { poles, zeros, residual })
+}
+
+/// The linear model of a block-oriented one's poles and zeros, which the curve's distortion no longer blurs; the
+/// residual stays.
+pub(super) fn linear_of(model: &BlockModel, u: &[f64], known: &Linear) -> Linear {
+    let parts = [&model.first, &model.second];
+    let poles: Vec<c64> = parts.iter().flat_map(|part| part.poles()).collect();
+    let mut zeros: Vec<c64> = parts.iter().flat_map(|part| part.zeros()).collect();
+    zeros.retain(|zero| zero.norm() < FAR);
+    let (poles, zeros) = without_cancelling(u, &poles, &zeros, CANCELS * CANCELS);
+    Linear { poles, zeros, residual: known.residual.clone() }
+}
+
+/// Groups of poles and zeros, less those whose removal changes the response by less than the share `limit`.
+fn without_cancelling(u: &[f64], poles: &[c64], zeros: &[c64], limit: f64) -> (Vec<Group>, Vec<Group>) {
+    let (mut poles, mut zeros) = (grouped(poles), grouped(zeros));
+    while let Some((pole, zero)) = cancelling(u, &poles, &zeros, limit) {
         poles.remove(pole);
         zeros.remove(zero);
     }
-    Ok(Linear { poles, zeros, residual })
+    (poles, zeros)
 }
 
 fn grouped(roots: &[c64]) -> Vec<Group> {
