@@ -1,20 +1,18 @@
 //! From data to a model.
 
+use super::conclusion::{concluded, described};
 use super::options::{BlockError, BlockOptions, checked};
 use super::refine::refined;
 use super::result::{BlockFit, Tried};
 use super::screening::{Candidate, Stretch};
 use super::search::{divided, searched};
-use super::start::{Linear, linear};
+use super::start::{linear, without_weakest};
 use crate::monitor::Monitor;
-use crate::pem::{ResidualColour, time_domain_covariance};
 
 /// Steps on all of the record before the best candidate of each structure goes on alone.
 const SOME: usize = 10;
 /// Structures that leave this many times the mean square of the best one are given up.
 const HOPELESS: f64 = 1.5;
-/// Abscissas of the curve that are kept.
-const USED: usize = 2048;
 
 /// Identifies the block-oriented model of least output error.
 ///
@@ -59,11 +57,11 @@ pub fn fit_block_oriented(
     let mut tried: Vec<Tried> = last.iter().chain(&left).map(|candidate| described(candidate, true)).collect();
     tried.extend(given_up.iter().map(|candidate| described(candidate, false)));
     let best = last.into_iter().next().ok_or(BlockError::NoModel)?;
-    concluded(with_right_knots(best, whole, options, monitor)?, whole, &linear, tried)
+    concluded(simplified_or_grown(best, whole, options, monitor)?, whole, &linear, tried)
 }
 
-/// The candidate with as many knots as Schwarz's criterion favours, at its minimum.
-fn with_right_knots(
+/// The candidate with the poles and knots that Schwarz's criterion favours, at its minimum.
+fn simplified_or_grown(
     start: Candidate,
     whole: Stretch<'_>,
     options: &BlockOptions,
@@ -72,6 +70,12 @@ fn with_right_knots(
     let steps = options.max_iterations;
     let own = start.model.curve.values().len();
     let mut best = refined(&start, whole, steps.min(SOME), monitor)?.unwrap_or(start);
+    while let Some(simpler) = without_weakest(&best, whole) {
+        match refined(&simpler, whole, steps.min(2 * SOME), monitor)? {
+            Some(next) if next.criterion(whole) < best.criterion(whole) => best = next,
+            _ => break,
+        }
+    }
     let better = |best: &Candidate, knots: usize| -> Result<Option<Candidate>, BlockError> {
         let Some(next) = best.with_knots(knots, whole) else { return Ok(None) };
         let next = refined(&next, whole, steps.min(2 * SOME), monitor)?;
@@ -97,39 +101,4 @@ fn with_right_knots(
     let spread = best.with_knots(best.model.curve.values().len(), whole);
     let again = spread.map(|own| refined(&own, whole, steps, monitor)).transpose()?.flatten();
     Ok(again.unwrap_or(best))
-}
-
-fn described(candidate: &Candidate, on_all: bool) -> Tried {
-    let list = |part: &super::Rational| {
-        let poles = part.poles().into_iter().filter(|z| z.im >= 0.0);
-        let named = |z: faer::c64| match z.im {
-            0.0 => format!("{:.4}", z.re),
-            im => format!("{:.4}+-{:.4}i", z.re, im),
-        };
-        poles.map(named).collect::<Vec<_>>().join(" ")
-    };
-    let description = format!("{} | {}", list(&candidate.model.first), list(&candidate.model.second));
-    Tried { structure: candidate.structure, description, rms: candidate.mean_square.sqrt(), on_all }
-}
-
-fn concluded(best: Candidate, whole: Stretch<'_>, linear: &Linear, tried: Vec<Tried>) -> Result<BlockFit, BlockError> {
-    let model = best.model.normalised(whole.u);
-    let (output, columns) = model.sensitivities(whole.u);
-    let scored = whole.skipped..whole.y.len();
-    let slices: Vec<&[f64]> = columns.iter().map(|column| &column[scored.clone()]).collect();
-    let residual: Vec<f64> = scored.clone().map(|t| whole.y[t] - output[t]).collect();
-    let covariance = time_domain_covariance(&slices, &residual, &[residual.len()], ResidualColour::Spectrum)?;
-    let rms = |e: &[f64]| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
-    let before = model.first.filter(whole.u);
-    let stride = scored.len().div_ceil(USED).max(1);
-    let used = before[scored.clone()].iter().step_by(stride).copied().collect();
-    Ok(BlockFit {
-        structure: best.structure,
-        training_rms: rms(&residual),
-        linear_rms: rms(linear.residual.get(scored).unwrap_or_default()),
-        model,
-        covariance,
-        tried,
-        used,
-    })
 }

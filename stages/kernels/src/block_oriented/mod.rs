@@ -59,6 +59,7 @@
 
 #[cfg(test)]
 mod benchmark_tests;
+mod conclusion;
 mod curve;
 mod fit;
 mod model;

@@ -25,7 +25,8 @@ pub struct BlockOptions {
     /// Samples at the beginning that are simulated and not scored. Why: nothing is known of what was put in before
     /// them; longer than the slowest decay, or 0 for a system that was at rest.
     pub transient: usize,
-    /// Splits that are refined on a part of the record. Why: the right one is nearly always among the first three.
+    /// Splits that are refined on a part of the record. Why: a cheap score ranks the right one among the
+    /// first ten.
     #[schemars(range(min = 1, max = 1000))]
     pub starts: usize,
     /// Most steps of the last refinement. Why: ten to thirty are usual.
@@ -36,7 +37,7 @@ pub struct BlockOptions {
 impl Default for BlockOptions {
     fn default() -> Self {
         let structures = Structure::ALL.to_vec();
-        Self { structures, order: 6, knots: 10, most_knots: 40, transient: 0, starts: 12, max_iterations: 60 }
+        Self { structures, order: 6, knots: 10, most_knots: 40, transient: 0, starts: 16, max_iterations: 60 }
     }
 }
 

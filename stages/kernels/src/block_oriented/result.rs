@@ -53,6 +53,9 @@ pub struct BlockFit {
     pub covariance: Mat<f64>,
     /// Every division that was refined, the best ones first.
     pub tried: Vec<Tried>,
+    /// Covariance of the curve's values, both parts of fixed gain: with the gains of a numerator coefficient that is held
+    /// the curve's own errors would be those of its scales.
+    pub(super) curve_covariance: Mat<f64>,
     /// Abscissas of the curve that the training input reaches, evenly over its samples.
     pub(super) used: Vec<f64>,
 }
@@ -86,7 +89,6 @@ impl BlockFit {
     pub fn curve_strength(&self) -> CurveStrength {
         let columns = self.model.curve.basis(&self.used);
         let values = self.model.curve.values();
-        let at = self.model.first.parameters().len();
         let n = self.used.len() as f64;
         let mean = |v: &[f64]| v.iter().sum::<f64>() / n;
         let about = |v: &[f64]| {
@@ -106,7 +108,7 @@ impl BlockFit {
         let whole = quadratic(&|i, j| all[(i, j)]).max(f64::MIN_POSITIVE);
         let count = values.len();
         let noise: f64 =
-            (0..count).map(|i| (0..count).map(|j| bend(i, j) * self.covariance[(at + i, at + j)]).sum::<f64>()).sum();
+            (0..count).map(|i| (0..count).map(|j| bend(i, j) * self.curve_covariance[(i, j)]).sum::<f64>()).sum();
         let share = |square: f64| (square.max(0.0) / whole).sqrt();
         CurveStrength { relative: share(quadratic(&bend)), std: share(noise) }
     }

@@ -17,7 +17,7 @@ const MEDIUM: usize = 12_288;
 /// Samples simulated before a stretch, at most.
 const BEFORE: usize = 1024;
 /// Divisions of the same poles that are refined.
-const ALIKE: usize = 2;
+const ALIKE: usize = 4;
 /// Steps of each round, candidates of a structure that go on after it, and the mean square over the best one's beyond
 /// which one does not: early ones have far to go.
 const ROUNDS: [(usize, usize, f64); 3] = [(10, 6, 100.0), (15, 4, 20.0), (25, 2, LAST)];

@@ -5,6 +5,7 @@ use faer::c64;
 use super::model::{BlockModel, deviation};
 use super::options::BlockOptions;
 use super::rational::Rational;
+use super::screening::{Candidate, Stretch};
 use crate::model::ModelError;
 use crate::model::transmission_zeros;
 use crate::pem::{Experiment, NoiseModel, PemOptions, identify};
@@ -50,6 +51,29 @@ pub(super) fn linear_of(model: &BlockModel, u: &[f64], known: &Linear) -> Linear
     zeros.retain(|zero| zero.norm() < FAR);
     let (poles, zeros) = without_cancelling(u, &poles, &zeros, CANCELS * CANCELS);
     Linear { poles, zeros, residual: known.residual.clone() }
+}
+
+/// The candidate without the pole and zero of one part that cancel best, if they change the response of this part by
+/// less than a tenth.
+pub(super) fn without_weakest(candidate: &Candidate, stretch: Stretch<'_>) -> Option<Candidate> {
+    let weaker = |part: &Rational, input: &[f64]| {
+        let (mut poles, mut zeros) = (grouped(&part.poles()), grouped(&part.zeros()));
+        let (pole, zero) = cancelling(input, &poles, &zeros, 0.1)?;
+        let change = change(input, &poles, &zeros, (pole, zero))?;
+        poles.remove(pole);
+        zeros.remove(zero);
+        Some((change, Rational::from_roots(&poles.concat(), &zeros.concat())?))
+    };
+    let model = &candidate.model;
+    let (first, second) = (weaker(&model.first, stretch.u), weaker(&model.second, &model.intermediate(stretch.u).1));
+    let change = |found: &Option<(f64, Rational)>| found.as_ref().map_or(f64::INFINITY, |(change, _)| *change);
+    let of_first = change(&first) < change(&second);
+    let next = match (of_first, first, second) {
+        (true, Some((_, part)), _) => BlockModel { first: part, ..model.clone() },
+        (false, _, Some((_, part))) => BlockModel { second: part, ..model.clone() },
+        _ => return None,
+    };
+    Candidate { model: next, ..candidate.clone() }.with_knots(model.curve.values().len(), stretch)
 }
 
 /// Groups of poles and zeros, less those whose removal changes the response by less than the share `limit`.
