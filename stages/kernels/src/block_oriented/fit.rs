@@ -70,12 +70,6 @@ fn simplified_or_grown(
     let steps = options.max_iterations;
     let own = start.model.curve.values().len();
     let mut best = refined(&start, whole, steps.min(SOME), monitor)?.unwrap_or(start);
-    while let Some(simpler) = without_weakest(&best, whole) {
-        match refined(&simpler, whole, steps.min(2 * SOME), monitor)? {
-            Some(next) if next.criterion(whole) < best.criterion(whole) => best = next,
-            _ => break,
-        }
-    }
     let better = |best: &Candidate, knots: usize| -> Result<Option<Candidate>, BlockError> {
         let Some(next) = best.with_knots(knots, whole) else { return Ok(None) };
         let next = refined(&next, whole, steps.min(2 * SOME), monitor)?;
@@ -90,6 +84,13 @@ fn simplified_or_grown(
                 let Some(next) = better(&best, knots)? else { break };
                 (best, knots) = (next, 2 * knots - 1);
             }
+        }
+    }
+    // only now: a curve of few knots hides what a weak pole does
+    while let Some(simpler) = without_weakest(&best, whole) {
+        match refined(&simpler, whole, steps.min(2 * SOME), monitor)? {
+            Some(next) if next.criterion(whole) < best.criterion(whole) => best = next,
+            _ => break,
         }
     }
     best = refined(&best, whole, steps, monitor)?.unwrap_or(best);

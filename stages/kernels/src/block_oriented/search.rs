@@ -24,7 +24,7 @@ const ROUNDS: [(usize, usize, f64); 3] = [(10, 6, 100.0), (15, 4, 20.0), (25, 2,
 /// The same factor after all rounds.
 const LAST: f64 = 1.5;
 /// Times that all divisions of the best model's own poles and zeros are tried.
-const PASSES: usize = 3;
+const PASSES: usize = 2;
 /// Share of the mean square below which a pass has found something.
 const ENOUGH: f64 = 0.98;
 
@@ -36,9 +36,14 @@ pub(super) fn searched(
     monitor: &dyn Monitor,
 ) -> Result<(Vec<Candidate>, Vec<Candidate>), BlockError> {
     let (short, medium) = (busiest(whole, linear, SHORT), busiest(whole, linear, MEDIUM));
+    let fewer = linear.without_cancelling(medium.u, medium.y);
     let mut starts = Vec::new();
     for structure in structures(options) {
-        starts.extend(screen(&splits(linear, structure), short, options.knots, options));
+        let mut all = splits(linear, structure, options.order);
+        if structure == Structure::WienerHammerstein {
+            all.extend(fewer.iter().flat_map(|fewer| splits(fewer, structure, options.order)));
+        }
+        starts.extend(screen(&all, short, options.starts, options));
     }
     monitor.expect(starts.len());
     let (mut kept, mut given_up) = rounds(starts, medium, options, monitor)?;
@@ -46,7 +51,7 @@ pub(super) fn searched(
         let of_two = |own: &&Candidate| own.structure == Structure::WienerHammerstein;
         let Some(best) = kept.iter().find(of_two).cloned() else { break };
         let again = linear_of(&best.model, medium.u, linear);
-        let starts = screen(&splits(&again, best.structure), short, finest(options), options);
+        let starts = screen(&splits(&again, best.structure, options.order), short, options.starts.div_ceil(2), options);
         monitor.expect(starts.len());
         let (next, left) = rounds(starts, medium, options, monitor)?;
         given_up.extend(left);
@@ -111,9 +116,10 @@ fn busiest<'a>(whole: Stretch<'a>, linear: &Linear, samples: usize) -> Stretch<'
     Stretch { u: &whole.u[from..top + samples], y: &whole.y[from..top + samples], skipped: top - from }
 }
 
-/// The divisions that leave least by the cheap score, no more than [`ALIKE`] of the same poles.
-fn screen(splits: &[Split], stretch: Stretch<'_>, knots: usize, options: &BlockOptions) -> Vec<Candidate> {
-    let score = |(number, split): (usize, &Split)| screened(split, stretch, knots).map(|candidate| (number, candidate));
+/// So many divisions that leave least by the cheap score, no more than [`ALIKE`] of the same poles.
+fn screen(splits: &[Split], stretch: Stretch<'_>, most: usize, options: &BlockOptions) -> Vec<Candidate> {
+    let score =
+        |(number, split): (usize, &Split)| screened(split, stretch, options.knots).map(|candidate| (number, candidate));
     let mut scored: Vec<(usize, Candidate)> = splits.par_iter().enumerate().filter_map(score).collect();
     scored.sort_by(|a, b| a.1.mean_square.total_cmp(&b.1.mean_square));
     let mut kept: Vec<(usize, Candidate)> = Vec::new();
@@ -122,7 +128,7 @@ fn screen(splits: &[Split], stretch: Stretch<'_>, knots: usize, options: &BlockO
         if alike < ALIKE {
             kept.push((number, candidate));
         }
-        if kept.len() == options.starts {
+        if kept.len() == most {
             break;
         }
     }

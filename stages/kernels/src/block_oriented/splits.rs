@@ -16,14 +16,14 @@ pub(super) struct Split {
 }
 
 /// Most divisions that are scored.
-const MOST: usize = 6000;
+const MOST: usize = 2000;
 
 /// All divisions of the linear model that the structure has.
 ///
-/// A conjugate pair stays together; no part has more zeros than poles. Real poles are given to both parts too, one at a
-/// time, with a zero in one part that cancels it: the linear model of a chain with two like poles has only one of them
-/// where the curve's distortion hides the other.
-pub(super) fn splits(linear: &Linear, structure: Structure) -> Vec<Split> {
+/// A conjugate pair stays together; no part has more zeros than poles. Up to `order` poles, real ones are given to both
+/// parts too, one at a time, with a zero in one part that cancels it: the linear model of a chain with two like poles has
+/// only one of them where the curve's distortion hides the other.
+pub(super) fn splits(linear: &Linear, structure: Structure, order: usize) -> Vec<Split> {
     let all = |groups: &[Group]| groups.iter().flatten().copied().collect::<Vec<_>>();
     let (poles, zeros) = (all(&linear.poles), all(&linear.zeros));
     match structure {
@@ -31,7 +31,8 @@ pub(super) fn splits(linear: &Linear, structure: Structure) -> Vec<Split> {
         Structure::Hammerstein => vec![Split { structure, first: (Vec::new(), Vec::new()), second: (poles, zeros) }],
         Structure::WienerHammerstein => {
             let mut found = divided(&linear.poles, &linear.zeros, None);
-            for (i, pole) in linear.poles.iter().enumerate().filter(|(_, pole)| pole.len() == 1) {
+            let single = |(_, pole): &(usize, &Group)| pole.len() == 1 && poles.len() <= order;
+            for (i, pole) in linear.poles.iter().enumerate().filter(single) {
                 let mut rest = linear.poles.clone();
                 rest.remove(i);
                 found.extend(divided(&rest, &linear.zeros, pole.first().copied()));

@@ -16,10 +16,13 @@ const FAR: f64 = 20.0;
 /// them that grows by a thousandth.
 const CANCELS: f64 = 0.05;
 
+/// Those of a block-oriented model that change its linear parts' response by less than this share are not divided again.
+const WEAK: f64 = 0.01;
+
 /// Poles or zeros that stay together: a real one, or a conjugate pair.
 pub(super) type Group = Vec<c64>;
 
-/// The best linear approximation.
+/// A linear model to divide.
 pub(super) struct Linear {
     pub poles: Vec<Group>,
     pub zeros: Vec<Group>,
@@ -27,7 +30,18 @@ pub(super) struct Linear {
     pub residual: Vec<f64>,
 }
 
-/// Fits the linear model of least output error, less poles and zeros that cancel. Errors: no finite fit.
+impl Linear {
+    /// The same without poles and zeros that cancel; none where none do. A slow pair that only follows the distortion
+    /// takes the place of a pole; one that is weak in the linear model may be a part's own: both are to be tried.
+    pub fn without_cancelling(&self, u: &[f64], y: &[f64]) -> Option<Self> {
+        let limit = CANCELS * deviation(&self.residual) / deviation(y);
+        let (poles, zeros) = without_cancelling(u, &self.poles.concat(), &self.zeros.concat(), limit);
+        let fewer = poles.len() < self.poles.len();
+        fewer.then(|| Self { poles, zeros, residual: self.residual.clone() })
+    }
+}
+
+/// Fits the linear model of least output error. Errors: no finite fit.
 pub(super) fn linear(u: &[f64], y: &[f64], options: &BlockOptions) -> Result<Linear, ModelError> {
     let n = options.order;
     let block_rows = (y.len() / 50).clamp(n + 2, PemOptions::default().block_rows.max(2 * n));
@@ -38,8 +52,7 @@ pub(super) fn linear(u: &[f64], y: &[f64], options: &BlockOptions) -> Result<Lin
     let mut zeros = transmission_zeros(&fit.model)?;
     zeros.retain(|zero| zero.norm() < FAR);
     zeros.truncate(n);
-    let (poles, zeros) = without_cancelling(u, &poles, &zeros, CANCELS * deviation(&residual) / deviation(y));
-    Ok(Linear { poles, zeros, residual })
+    Ok(Linear { poles: grouped(&poles), zeros: grouped(&zeros), residual })
 }
 
 /// The linear model of a block-oriented one's poles and zeros, which the curve's distortion no longer blurs; the
@@ -49,7 +62,7 @@ pub(super) fn linear_of(model: &BlockModel, u: &[f64], known: &Linear) -> Linear
     let poles: Vec<c64> = parts.iter().flat_map(|part| part.poles()).collect();
     let mut zeros: Vec<c64> = parts.iter().flat_map(|part| part.zeros()).collect();
     zeros.retain(|zero| zero.norm() < FAR);
-    let (poles, zeros) = without_cancelling(u, &poles, &zeros, CANCELS * CANCELS);
+    let (poles, zeros) = without_cancelling(u, &poles, &zeros, WEAK);
     Linear { poles, zeros, residual: known.residual.clone() }
 }
 

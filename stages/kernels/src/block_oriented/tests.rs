@@ -137,7 +137,7 @@ fn every_structure_is_found_and_predicts_fresh_data_to_the_noise_free_floor() {
         let bend = fit.curve_strength();
         assert!(bend.relative > 4.0 * bend.std, "{structure:?} {seed}: {bend:?}");
     }
-    // a wrong division that simulates nearly as well is a local minimum that the search may end in: one of six
+    // at the least noise the search may use up its steps short of the minimum: one of six
     assert!(wrong.iter().all(|(structure, _)| *structure == wiener_hammerstein) && wrong.len() <= 1, "{wrong:?}");
 }
 
