@@ -24,7 +24,7 @@ fn records() -> Option<[Vec<f64>; 2]> {
 }
 
 #[test]
-fn the_benchmark_circuit_is_simulated_to_the_best_published_error() {
+fn the_benchmark_circuit_is_simulated_to_a_thousandth_of_its_output() {
     let Some([u, y]) = records() else {
         println!("left out: 1 record, ../shared/data/wiener-hammerstein is not there");
         return;
@@ -37,7 +37,7 @@ fn the_benchmark_circuit_is_simulated_to_the_best_published_error() {
     let rms_mv = 1e3 * (sum / 77_800.0).sqrt();
     println!("{rms_mv:.4} mV, training {:.4} mV, linear {:.2} mV", 1e3 * fit.training_rms, 1e3 * fit.linear_rms);
     assert_eq!(fit.structure, Structure::WienerHammerstein);
-    // the best block models of the literature leave 0.28 to 0.5 mV
+    // the output's standard deviation is 244 mV, a linear model leaves 43; 0.27 is reached
     assert!(rms_mv < 0.3, "{rms_mv} mV");
     let bend = fit.curve_strength();
     assert!(bend.relative > 10.0 * bend.std, "{bend:?}");

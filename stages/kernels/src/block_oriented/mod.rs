@@ -6,24 +6,25 @@
 //! its ends ([`Curve`]). The gains of G1 and G2 are in f: a numerator coefficient is held in either.
 //! # Method
 //! The best linear approximation has the poles and zeros of both parts: for a Gaussian input it is `c G1 G2`
-//! (Bussgang). It is fitted by [`crate::pem`], and all divisions of its poles and zeros between the two parts are listed,
-//! with and without pairs that all but cancel, conjugate pairs together, one real pole at a time in both (`splits`). Each
-//! is scored by linear least squares for the curve on the stretch where the linear model leaves most (`screening`). The
-//! best are refined there by damped least squares with sensitivities that are filtered signals (`refine`), fewer and
-//! further in every round; then all divisions of the best one's own poles and zeros are tried in the same way (`search`).
-//! A few are refined on all of the record. At the end the curve gets as many knots as Schwarz's criterion favours, and
-//! weak poles that it does not favour go; it also chooses among structures that leave alike (`fit`).
+//! (Bussgang). It is fitted by [`crate::pem`], and all divisions of its poles and zeros between the two parts are
+//! listed, with and without pairs that all but cancel, conjugate pairs together, one real pole at a time in both
+//! (`splits`). Each is scored by linear least squares for the curve on the stretch where the linear model leaves most
+//! (`screening`). The best are refined there by damped least squares with sensitivities that are filtered signals
+//! (`refine`), fewer and further in every round; then all divisions of the best one's own poles and zeros are tried in
+//! the same way (`search`). A few are refined on all of the record. At the end the curve gets as many knots as
+//! Schwarz's criterion favours, and weak poles that it does not favour go; it also chooses among structures that
+//! leave alike (`fit`).
 //! # Shapes
 //! u and y: N samples each; [`BlockModel::vector`]: twice the poles and the knots.
 //! # Units
 //! Those of u and y; time in samples.
 //! # Cost
-//! A step on a record: `O(N p^2)` for p parameters. 100,000 samples, order 6: some 14 s of one core.
+//! A step on a record: `O(N p^2)` for p parameters. 100,000 samples, order 6: some 15 s of one core.
 //! # Accuracy
-//! Known chains of order 3 and 6, 12,000 samples, noise of 0.1 to 1 %: fresh data are simulated to 0.7 to 1.5 times
-//! `noise sqrt(p / N)`, poles within four standard errors, in nine of ten cases (tests); in the tenth, of the least
-//! noise, the search ends some three of these from the minimum. The curve's own error is the spline's: the fourth power
-//! of the distance of the knots where f is smooth, the first at a kink.
+//! Known chains of order 3 and 6, 12,000 samples, noise of 0.1 to 1 %: in nine of ten cases (tests) fresh data are
+//! simulated to 0.5 to 1.5 times `noise sqrt(p / N)` and the poles are within four standard errors. In the tenth, two
+//! linear parts with the least noise, the error is three times as much and poles are farther off. The curve's own error
+//! is the spline's: the fourth power of the distance of the knots where f is smooth, the first at a kink.
 //! # Source
 //! J. Sjoberg and J. Schoukens, Automatica 48 (2012) 353; M. Schoukens and K. Tiels, Automatica 85 (2017) 272; J. J.
 //! Bussgang, MIT Technical Report 216 (1952); C. de Boor, A Practical Guide to Splines (1978).

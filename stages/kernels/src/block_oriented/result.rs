@@ -53,8 +53,8 @@ pub struct BlockFit {
     pub covariance: Mat<f64>,
     /// Every division that was refined, the best ones first.
     pub tried: Vec<Tried>,
-    /// Covariance of the curve's values, both parts of fixed gain: with the gains of a numerator coefficient that is held
-    /// the curve's own errors would be those of its scales.
+    /// Covariance of the curve's values where both parts have a fixed gain: with a numerator coefficient held instead,
+    /// errors of the scales would count as errors of the curve.
     pub(super) curve_covariance: Mat<f64>,
     /// Abscissas of the curve that the training input reaches, evenly over its samples.
     pub(super) used: Vec<f64>,

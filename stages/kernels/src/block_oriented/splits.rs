@@ -20,9 +20,9 @@ const MOST: usize = 2000;
 
 /// All divisions of the linear model that the structure has.
 ///
-/// A conjugate pair stays together; no part has more zeros than poles. Up to `order` poles, real ones are given to both
-/// parts too, one at a time, with a zero in one part that cancels it: the linear model of a chain with two like poles has
-/// only one of them where the curve's distortion hides the other.
+/// A conjugate pair stays together; no part has more zeros than poles. Of up to `order` poles, real ones are given to
+/// both parts too, one at a time, with a zero in one part that cancels it: the linear model of a chain with two like
+/// poles has only one of them where the curve's distortion hides the other.
 pub(super) fn splits(linear: &Linear, structure: Structure, order: usize) -> Vec<Split> {
     let all = |groups: &[Group]| groups.iter().flatten().copied().collect::<Vec<_>>();
     let (poles, zeros) = (all(&linear.poles), all(&linear.zeros));

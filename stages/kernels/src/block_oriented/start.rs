@@ -16,7 +16,8 @@ const FAR: f64 = 20.0;
 /// them that grows by a thousandth.
 const CANCELS: f64 = 0.05;
 
-/// Those of a block-oriented model that change its linear parts' response by less than this share are not divided again.
+/// Pairs of a block-oriented model that change its linear parts' response by less than this share are not divided
+/// again.
 const WEAK: f64 = 0.01;
 
 /// Poles or zeros that stay together: a real one, or a conjugate pair.

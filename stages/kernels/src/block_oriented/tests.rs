@@ -123,7 +123,7 @@ fn every_structure_is_found_and_predicts_fresh_data_to_the_noise_free_floor() {
             let (errors, _) = fitted(other);
             assert!(error < errors, "{structure:?} {seed}: {error}, {other:?} {errors}");
         }
-        // white noise leaves an error of sqrt(parameters / samples) of its own; three of them: its scatter, and the spline
+        // white noise leaves an error of sqrt(parameters / samples) of its own; three: its scatter, and the spline
         let floor = share * (fit.model.vector().len() as f64 / samples as f64).sqrt();
         let missed = truth.missed(&fit, 4.0);
         println!(
@@ -137,7 +137,7 @@ fn every_structure_is_found_and_predicts_fresh_data_to_the_noise_free_floor() {
         let bend = fit.curve_strength();
         assert!(bend.relative > 4.0 * bend.std, "{structure:?} {seed}: {bend:?}");
     }
-    // at the least noise the search may use up its steps short of the minimum: one of six
+    // at the least noise one division of six is right and its poles are not within their errors
     assert!(wrong.iter().all(|(structure, _)| *structure == wiener_hammerstein) && wrong.len() <= 1, "{wrong:?}");
 }
 
