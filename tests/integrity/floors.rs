@@ -76,7 +76,7 @@ const CRATES: [Crate; 5] = [
             &["calibration", "force", "harmonics", "model", "simulate"],
             &["spectra", "modes", "ringdown", "subspace", "vector_fitting"],
             &["contact", "pem"],
-            &["grey", "stabilisation", "validation"],
+            &["block_oriented", "grey", "stabilisation", "validation"],
             &["frf_modes"],
         ],
     },

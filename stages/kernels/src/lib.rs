@@ -12,6 +12,7 @@
 //! | [`pem`] | input and output | the innovations form of the paper's Eq. 8 with its covariance |
 //! | [`subspace`] | input and output, or a decay | poles, without a start |
 //! | [`frf_modes`] | frequency responses of many channels | modes, shapes, a stabilisation diagram |
+//! | [`block_oriented`] | input and output | linear parts before and behind a static curve |
 //! | [`grey`] | input and output, numbers that are known | modes with static shares, real poles, a delay |
 //! | [`spectra`] | records | ETFE, smoothed responses, power spectra, thermal fits |
 //! | [`contact`] | poles in contact and free | contact stiffness and damping |
@@ -23,9 +24,10 @@
 //! From the ground up, each using only those before it:
 //! [`linear_algebra`], [`signal`], [`statistics`], [`effects`], [`Monitor`] - [`optimise`] - [`events`] -
 //! [`calibration`], [`force`], [`harmonics`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`],
-//! [`subspace`], [`vector_fitting`] - [`contact`], [`pem`] - [`grey`], [`stabilisation`], [`validation`] -
-//! [`frf_modes`]. Kernels that fit many times take a [`Monitor`]: [`ringdown::fit_counted_ringdowns`],
-//! [`validation::choose_order`], [`validation::bootstrap`].
+//! [`subspace`], [`vector_fitting`] - [`contact`], [`pem`] - [`block_oriented`], [`grey`], [`stabilisation`],
+//! [`validation`] - [`frf_modes`]. Kernels that fit many times take a [`Monitor`]:
+//! [`ringdown::fit_counted_ringdowns`], [`validation::choose_order`], [`validation::bootstrap`],
+//! [`block_oriented::fit_block_oriented`].
 //!
 //! ```
 //! use afmid_kernels::statistics::{chi_square_tail, median_and_scale};
@@ -37,6 +39,7 @@
 //! assert!(centre == 3.0 && scale < 2.0);
 //! ```
 
+pub mod block_oriented;
 pub mod calibration;
 pub mod contact;
 pub mod effects;
