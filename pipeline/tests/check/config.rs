@@ -224,7 +224,7 @@ fn wrong_arguments_are_marked_in_the_argument() {
             "sdt_v | `noise` of stage `a` has no parameter `sdt_v` | did you mean `std_v`?",
             "samples | the argument has no `=` | write `--set ID.PARAM=VALUE`, such as `--set fit.order=11`",
             "a | the argument names no parameter | write `--set ID.PARAM=VALUE`, such as `--set fit.order=11`",
-            "samples | `samples` of stage `a`: found integer, wanted a table | set it as a whole",
+            "samples | `samples` of stage `a`: found string, wanted a table | set it as a whole",
             "sed | [pipeline] has no key `sed` | did you mean `seed`?",
             "-1 | `seed`: found the integer `-1`, wanted a whole number from 0 to 2^64 - 1 | -",
             "[2] | parameter `spikes_v[1]` of stage `a`: found an array, wanted a number | `afmid stages test.sine` lists the parameters",
