@@ -1,4 +1,4 @@
-//! Measured input and output, diagnosed: silverbox and frid as shipped.
+//! Measured data, diagnosed by the configs that ship: an oscillator, a decay, an axis, an oscillation, a circuit.
 
 mod common;
 
@@ -111,4 +111,154 @@ fn frid_names_nonlinear_stiffness_and_damping_of_a_decay() {
     assert!(any(&["nonlinear-damping", "quadratic-damping", "coulomb-friction"]), "{:?}", ids(&found));
     let (before, after) = (number(&found, "/validation/0/rms_before"), number(&found, "/validation/0/rms_after"));
     assert!(after < before, "the last third: {before} to {after}");
+}
+
+/// A mass with friction under a controller that asks for a speed: reference, drive and position at 1 kHz.
+fn axis(path: &Path) {
+    let (mass, viscous, dry, step, inner) = (90.0, 200.0, 20.0, 1e-3, 50);
+    let (mut q, mut v, mut last, mut text) = (0.0, 0.0, [0.0; 2], "qg,vir,qm\n".to_owned());
+    for k in 0..16_000_u32 {
+        let t = f64::from(k) * step;
+        let reference = 0.05 * (1.0 - (TAU * 0.25 * t).cos()) * (1.0 + 0.3 * (TAU * 0.11 * t).sin());
+        // a pattern of a tenth of a micrometre stands for the encoder's noise
+        let measured = q + 1e-7 * (f64::from(k * k % 10_007) / 10_007.0 - 0.5);
+        let drive = 243.0 * (160.0 * (reference - measured) - (measured - last[1]) / (2.0 * step)) / 35.0;
+        last = [measured, last[0]];
+        writeln!(text, "{reference},{drive},{measured}").expect("text");
+        for _ in 0..inner {
+            let force = 35.0 * drive - 3.0 - viscous * v;
+            let moves = v != 0.0 || force.abs() > dry;
+            let sign = if v == 0.0 { force.signum() } else { v.signum() };
+            let next = if moves { v + step / f64::from(inner) * (force - dry * sign) / mass } else { 0.0 };
+            // dry friction stops a motion and does not turn it
+            v = if next * v < 0.0 { 0.0 } else { next };
+            q += step / f64::from(inner) * v;
+        }
+    }
+    std::fs::write(path, text).expect("a table");
+}
+
+#[test]
+fn an_axis_under_its_controller_names_friction_and_offset() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let (file, stand_in) = data(here, "emps/DATA_EMPS.mat", axis);
+    let path = format!("data.file='{}'", file.display());
+    let mut args = vec!["run".to_owned(), config("emps.toml"), "--set".to_owned(), path];
+    if stand_in {
+        for set in [
+            "data.identification=[0,16000]",
+            "data.verification=[0,16000]",
+            "diagnosis.drive_scale=35.0",
+            "diagnosis.parts=[{name='all',first=0,end=16000,state_samples=0}]",
+        ] {
+            args.extend(["--set".to_owned(), set.to_owned()]);
+        }
+    }
+    args.extend(["-o", "e.h5", "--cache", "cache"].map(str::to_owned));
+    afmid(here, &args.iter().map(String::as_str).collect::<Vec<&str>>());
+    let found = shown(here, "e.h5", "diagnosis");
+    println!("emps: {:?} {}", ids(&found), found["baseline"]["parameters"]);
+    assert_eq!(found["verdict"], "named");
+    assert_eq!(ids(&found), ["coulomb-friction", "offset"]);
+    // what is published, to 3 %; what was simulated
+    let wanted = if stand_in { [90.0, 200.0, 20.0] } else { [95.1, 203.5, 20.4] };
+    let places = [
+        "/baseline/parameters/mass/value",
+        "/baseline/parameters/viscous_friction/value",
+        "/causes/0/parameters/friction_force/value",
+    ];
+    for (place, wanted) in places.into_iter().zip(wanted) {
+        let value = number(&found, place);
+        assert!((value / wanted - 1.0).abs() < 0.03, "{place}: {value}, wanted {wanted}");
+    }
+    if !stand_in {
+        let rms = number(&found, "/validation/0/rms_after");
+        assert!(rms < 1e-5, "{rms} m");
+    }
+}
+
+/// A steady oscillation seen by an interferometer.
+fn fringe(path: &Path) {
+    let mut text = "s\n".to_owned();
+    for k in 0..60_000_u32 {
+        let noise = 1e-4 * (f64::from(k * (k % 4001) % 10_007) / 10_007.0 - 0.5);
+        let x = 0.6 * (TAU * 0.05273 * f64::from(k)).cos();
+        writeln!(text, "{}", 0.4 * (0.64 + x).sin() + noise).expect("text");
+    }
+    std::fs::write(path, text).expect("a table");
+}
+
+#[test]
+fn a_steady_oscillation_names_the_interferometer_and_no_line_at_a_harmonic() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let (file, stand_in) = data(here, "skpm/JAM_9p90.h5", fringe);
+    let path = format!("records.files=['{}']", file.display());
+    let mut args = vec!["run".to_owned(), config("skpm.toml"), "--set".to_owned(), path];
+    if stand_in {
+        for set in ["records.channel='s'", "diagnosis.parts=[{name='end',first=50000,end=60000,state_samples=0}]"] {
+            args.extend(["--set".to_owned(), set.to_owned()]);
+        }
+    }
+    args.extend(["-o", "s.h5", "--cache", "cache"].map(str::to_owned));
+    afmid(here, &args.iter().map(String::as_str).collect::<Vec<&str>>());
+    let found = shown(here, "s.h5", "diagnosis");
+    println!("skpm: {:?}", ids(&found));
+    assert_eq!(found["verdict"], "named");
+    assert_eq!(ids(&found)[0], "self-fringe");
+    let of = |name: &str| number(&found, &format!("/causes/0/parameters/{name}/value"));
+    let (predicted, measured) = (of("fourth_harmonic_predicted_v"), of("fourth_harmonic_measured_v"));
+    assert!((predicted / measured - 1.0).abs() < 0.2, "{predicted} V for {measured} V");
+    let fundamental = number(&found, "/baseline/parameters/frequency_hz/value");
+    for (i, id) in ids(&found).into_iter().enumerate().skip(1) {
+        assert_eq!(id, "spurious-line");
+        let ratio = number(&found, &format!("/causes/{i}/parameters/frequency_hz/value")) / fundamental;
+        assert!((ratio - ratio.round()).abs() > 1e-3 || ratio < 0.5, "a line at {ratio} of the fundamental");
+    }
+}
+
+/// A low pass, a diode, a low pass, under an input without a pattern.
+fn circuit(path: &Path) {
+    let (mut state, mut a, mut b, mut text) = (1_u32, 0.0, 0.0, "uBenchMark,yBenchMark\n".to_owned());
+    for _ in 0..16_000 {
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1_u32 << 23) - 1.0
+        };
+        let (u, noise) = (3.0 * random(), 1e-4 * random());
+        a = 0.8 * a + 0.2 * u;
+        let passed: f64 = if a > 0.3 { 0.3 + 0.3 * (a - 0.3) } else { a };
+        b = 0.6 * b + 0.4 * passed;
+        writeln!(text, "{u},{}", b + noise).expect("text");
+    }
+    std::fs::write(path, text).expect("a table");
+}
+
+#[test]
+fn a_circuit_names_the_curve_between_two_linear_parts() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let (file, stand_in) = data(here, "wiener-hammerstein/WienerHammerBenchMark.mat", circuit);
+    let path = format!("data.file='{}'", file.display());
+    let mut args = vec!["run".to_owned(), config("wiener-hammerstein.toml"), "--set".to_owned(), path];
+    if stand_in {
+        for set in [
+            "data.identification=[500,12000]",
+            "data.verification=[12000,16000]",
+            "diagnosis.parts=[{name='test',first=12000,end=16000,state_samples=0}]",
+        ] {
+            args.extend(["--set".to_owned(), set.to_owned()]);
+        }
+    }
+    args.extend(["-o", "w.h5", "--cache", "cache"].map(str::to_owned));
+    afmid(here, &args.iter().map(String::as_str).collect::<Vec<&str>>());
+    let found = shown(here, "w.h5", "diagnosis");
+    println!("wiener-hammerstein: {:?} {}", ids(&found), found["validation"]);
+    assert_eq!(found["verdict"], "named");
+    assert_eq!(ids(&found), ["wiener-hammerstein-curve"]);
+    if !stand_in {
+        let rms = number(&found, "/validation/0/rms_after");
+        assert!(rms < 1e-3, "{rms} V");
+    }
 }

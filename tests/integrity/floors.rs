@@ -73,11 +73,11 @@ const CRATES: [Crate; 5] = [
             &["fixture", "linear_algebra", "signal", "statistics", "effects", "monitor"],
             &["optimise"],
             &["events"],
-            &["calibration", "force", "harmonics", "model", "simulate"],
+            &["calibration", "causes", "force", "harmonics", "model", "simulate"],
             &["spectra", "modes", "ringdown", "subspace", "vector_fitting"],
             &["contact", "pem"],
             &["block_oriented", "grey", "stabilisation", "validation"],
-            &["frf_modes"],
+            &["diagnosis", "frf_modes"],
         ],
     },
     Crate {

@@ -134,7 +134,7 @@ pub(crate) fn release(answer: Value) -> RunResult {
     run(vec![stage("diagnosis", "diagnosis.release", &[], json!({}), outputs)])
 }
 
-/// A run of `diagnosis.system` with this answer.
+/// A run of `diagnosis.causes` with this answer.
 pub(crate) fn system(answer: Value) -> RunResult {
     let time: Vec<f64> = (0..3000).map(|k| 1e-3 * f64::from(k)).collect();
     let wave = |scale: f64| -> Vec<f64> { time.iter().map(|t| scale * t * (500.0 * t).sin()).collect() };
@@ -166,5 +166,5 @@ pub(crate) fn system(answer: Value) -> RunResult {
         ("errors", errors.wrap()),
         ("judged", judged.wrap()),
     ];
-    run(vec![stage("diagnosis", "diagnosis.system", &[], json!({}), outputs)])
+    run(vec![stage("diagnosis", "diagnosis.causes", &[], json!({}), outputs)])
 }

@@ -13,6 +13,7 @@
 //! | [`subspace`] | input and output, or a decay | poles, without a start |
 //! | [`frf_modes`] | frequency responses of many channels | modes, shapes, a stabilisation diagram |
 //! | [`block_oriented`] | input and output | linear parts before and behind a static curve |
+//! | [`diagnosis`] | runs, decays, an axis in its loop, a steady oscillation | what a linear model gets wrong, by name |
 //! | [`grey`] | input and output, numbers that are known | modes with static shares, real poles, a delay |
 //! | [`spectra`] | records | ETFE, smoothed responses, power spectra, thermal fits |
 //! | [`contact`] | poles in contact and free | contact stiffness and damping |
@@ -23,9 +24,9 @@
 //!
 //! From the ground up, each using only those before it:
 //! [`linear_algebra`], [`signal`], [`statistics`], [`effects`], [`Monitor`] - [`optimise`] - [`events`] -
-//! [`calibration`], [`force`], [`harmonics`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`],
+//! [`calibration`], [`causes`], [`force`], [`harmonics`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`],
 //! [`subspace`], [`vector_fitting`] - [`contact`], [`pem`] - [`block_oriented`], [`grey`], [`stabilisation`],
-//! [`validation`] - [`frf_modes`]. Kernels that fit many times take a [`Monitor`]:
+//! [`validation`] - [`diagnosis`], [`frf_modes`]. Kernels that fit many times take a [`Monitor`]:
 //! [`ringdown::fit_counted_ringdowns`], [`validation::choose_order`], [`validation::bootstrap`],
 //! [`block_oriented::fit_block_oriented`].
 //!
@@ -41,7 +42,9 @@
 
 pub mod block_oriented;
 pub mod calibration;
+pub mod causes;
 pub mod contact;
+pub mod diagnosis;
 pub mod effects;
 pub mod events;
 pub mod force;

@@ -1,4 +1,4 @@
-//! The example of `diagnosis.system`: an oscillator with a cubic spring.
+//! The example of `diagnosis.causes`: an oscillator with a cubic spring.
 
 use afmid_pipeline::{Array, Axis, Document, Example, Port, Ports};
 

@@ -1,5 +1,8 @@
-//! What the simulation gets wrong: the verdict of a diagnosis, and the diagnosis of a measured input and output.
+//! What the simulation gets wrong: releases, measured inputs and outputs, free decays.
 
+mod causes_stage;
+mod causes_story;
+mod closed_loop;
 mod example;
 mod measured_events;
 pub mod records;
@@ -13,21 +16,20 @@ mod replay_example;
 mod replay_stage;
 #[cfg(test)]
 mod replay_tests;
-pub mod system;
-mod system_stage;
-mod system_story;
-mod verdict;
+mod steady;
 
+pub use afmid_kernels::diagnosis::verdict::{
+    DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
+};
+pub use causes_stage::{CausesDiagnose, JudgedPart};
 pub use release_stage::ReleaseDiagnose;
 pub use replay_stage::ReleaseReplay;
-pub use system_stage::{JudgedPart, SystemDiagnose};
-pub use verdict::{DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict};
 
 use afmid_pipeline::Entry;
 
 /// The stages of this domain.
 pub const STAGES: &[Entry] =
-    &[Entry::of::<ReleaseDiagnose>(), Entry::of::<ReleaseReplay>(), Entry::of::<SystemDiagnose>()];
+    &[Entry::of::<CausesDiagnose>(), Entry::of::<ReleaseDiagnose>(), Entry::of::<ReleaseReplay>()];
 
 #[cfg(test)]
 #[test]

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use super::release::{JointFit, Naming, Problem};
-use super::verdict::{Diagnosis, NamedCause, Verdict};
 use crate::causes::find;
 use crate::simulate::{
     Estimated, LeverModel, LinearPart, ModelAmplitude, ModelCause, ModelMode, ModelNoise, ModelThermal, ModelWander,
 };
+use afmid_kernels::diagnosis::verdict::{Diagnosis, NamedCause, Verdict};
 
 /// Baseline, extension and noise as an artifact; the extension is that of the answer: none unless causes are named.
 pub(super) fn lever_model(

@@ -18,11 +18,11 @@ use super::release::{
 };
 use super::release_model::lever_model;
 use super::release_story::{residual_array, tile_table};
-use super::verdict::Verdict;
 use crate::artifacts::{Ensemble, deflection, piezo};
 use crate::causes::{added, catalogue, find};
 use crate::model::ModeNumber;
 use crate::simulate::LEVER_MODEL;
+use afmid_kernels::diagnosis::verdict::Verdict;
 use afmid_kernels::events::EventKind;
 
 /// Says what a linear lever and detector get wrong in snap-off events: names the causes, extends the model, measures

@@ -10,7 +10,9 @@ use super::residuals::Tile;
 use super::search::{Named, Naming};
 use crate::causes::Cause;
 use crate::diagnosis::records::RecordSign;
-use crate::diagnosis::verdict::{DiagnosedMode, Diagnosis, NamedCause, Rung, RunnerUp, Value, Verdict};
+use afmid_kernels::diagnosis::verdict::{
+    BaselineSummary, DiagnosedMode, Diagnosis, NamedCause, Rung, RunnerUp, Value, Verdict,
+};
 
 /// Puts shapes and whole records together.
 ///
@@ -49,17 +51,34 @@ pub fn answer(
     let last = naming.fits.last().unwrap_or(&naming.fits[0]);
     let p_shape = naming.first_p_value;
     let p_value = records.iter().chain(left_out).map(|sign| sign.p_value).fold(p_shape, f64::min);
+    let ladder = ladder(problem, naming);
     Diagnosis {
         verdict,
         p_value: Some(p_value.clamp(0.0, 1.0)),
+        baseline: baseline(&naming.fits[0], &ladder),
         causes,
         evidence,
         nearest: naming.nearest.clone(),
         modes_before: modes,
         modes_after: modes_of(last),
         validation: Vec::new(),
-        ladder: ladder(problem, naming),
+        ladder,
         false_alarm_rate,
+    }
+}
+
+/// The lever and its detector. Noise is what the last model leaves of the mean event, distortion what it takes of what
+/// the first leaves.
+fn baseline(first: &JointFit, ladder: &[Rung]) -> BaselineSummary {
+    let rms = |rung: Option<&Rung>| rung.and_then(|rung| rung.rms);
+    let (before, noise_rms) = (rms(ladder.first()), rms(ladder.last()));
+    let distortion = before.zip(noise_rms).map(|(before, noise)| (before.powi(2) - noise.powi(2)).max(0.0).sqrt());
+    BaselineSummary {
+        adequate: true,
+        order: Some(2 * first.state.lever.modes.len() + first.state.lever.poles.len()),
+        parameters: BTreeMap::new(),
+        noise_rms,
+        distortion_rms: distortion,
     }
 }
 

@@ -10,7 +10,7 @@ use super::search::{Named, NamingOptions, scene_of};
 use super::state::{Hold, State};
 use super::trials::{Trial, combination};
 use crate::causes::Cause;
-use crate::diagnosis::verdict::RunnerUp;
+use afmid_kernels::diagnosis::verdict::RunnerUp;
 use afmid_kernels::model::ModelError;
 
 /// Puts one cause in the place of several named ones where it alone explains the events as well, parameters paid:

@@ -7,7 +7,7 @@ use super::problem::Problem;
 use super::residuals::{common, residuals};
 use super::state::Hold;
 use super::subset::Subset;
-use crate::diagnosis::verdict::Gain;
+use afmid_kernels::diagnosis::verdict::Gain;
 
 /// Trial steps of a half, which begins where the whole ended.
 const HALF: usize = 8;

@@ -10,7 +10,7 @@ use super::search::{Named, NamingOptions, same_class, scene_of};
 use super::state::{Hold, State};
 use super::trials::{Trial, combination};
 use crate::causes::Cause;
-use crate::diagnosis::verdict::RunnerUp;
+use afmid_kernels::diagnosis::verdict::RunnerUp;
 use afmid_kernels::model::ModelError;
 
 /// Puts another cause in the place of a named one where that explains the events better beside all others: `fits` holds

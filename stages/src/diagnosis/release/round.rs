@@ -7,7 +7,7 @@ use super::problem::Problem;
 use super::search::same_class;
 use super::trials::{Trial, combination};
 use crate::causes::Cause;
-use crate::diagnosis::verdict::{Gain, RunnerUp};
+use afmid_kernels::diagnosis::verdict::{Gain, RunnerUp};
 
 /// Difference of penalised gains below which two classes tie, unless held-out events decide.
 pub(super) const TIE: f64 = 6.0;

@@ -8,7 +8,7 @@ use super::screen::Screen;
 use super::seeking::Seeking;
 use super::state::State;
 use crate::causes::{Cause, Domain, Identifiable, Part, Scene};
-use crate::diagnosis::verdict::{Gain, RunnerUp, Verdict};
+use afmid_kernels::diagnosis::verdict::{Gain, RunnerUp, Verdict};
 use afmid_kernels::model::ModelError;
 
 /// How names are given.

@@ -12,7 +12,7 @@ use super::search::{Named, NamingOptions, same_class, scene_of};
 use super::state::{Hold, State};
 use super::trials::Trial;
 use crate::causes::Cause;
-use crate::diagnosis::verdict::RunnerUp;
+use afmid_kernels::diagnosis::verdict::RunnerUp;
 use afmid_kernels::model::ModelError;
 
 /// Times that names may give way to others.

@@ -1,0 +1,52 @@
+//! A mode that feels another's swing.
+
+use std::sync::Arc;
+
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use crate::effects::Effects;
+
+/// `w2^2 (1 + c q1^2)`.
+pub struct ModeCoupling;
+
+const ABOUT: About = About {
+    id: "mode-coupling",
+    physics: "the swing of the first mode stiffens the second",
+    part: Part::Lever,
+    domain: Domain::Release,
+    parameters: &[Parameter {
+        name: "coupling",
+        unit: "1/V^2",
+        meaning: "relative change of the second mode's stiffness per square of the first mode's signal",
+        low: -10.0,
+        high: 10.0,
+    }],
+    class: &["mode-coupling"],
+    resembles: "duffing: acts on the first mode itself",
+    next_measurement: "drive both modes: the second one's resonance moves with the first one's amplitude",
+    identifiable: Identifiable::Shape,
+    source: "M. H. Matheny et al., Nano Lett. 13 (2013) 1622",
+};
+
+impl Cause for ModeCoupling {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn add(&self, values: &[f64], effects: &mut Effects) {
+        let coupling = values[0];
+        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+            let (Some([q1, q2]), Some(w2)) = (motion.position.first_chunk::<2>(), motion.omega.get(1)) else { return };
+            if let Some(a) = acceleration.get_mut(1) {
+                *a -= w2 * w2 * coupling * q1 * q1 * q2;
+            }
+        }));
+    }
+
+    fn modes(&self) -> usize {
+        2
+    }
+
+    fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        vec![vec![0.003 / scene.level_v.powi(2)]]
+    }
+}

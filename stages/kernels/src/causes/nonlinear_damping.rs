@@ -1,0 +1,49 @@
+//! Damping that grows with the swing.
+
+use std::sync::Arc;
+
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use crate::effects::Effects;
+
+/// `+ w c q^2 q'` on the first mode.
+pub struct NonlinearDamping;
+
+const ABOUT: About = About {
+    id: "nonlinear-damping",
+    physics: "energy is lost in strongly bent parts or by coupling: the loss factor grows with the square of the deflection",
+    part: Part::Lever,
+    domain: Domain::Both,
+    parameters: &[Parameter {
+        name: "c",
+        unit: "1/V^2",
+        meaning: "loss 1/Q per square of the first mode's deflection signal",
+        low: -10.0,
+        high: 10.0,
+    }],
+    class: &["nonlinear-damping"],
+    resembles: "quadratic-damping: grows with the amplitude, not its square; cubic-detector: bends the envelope too, but makes a third harmonic",
+    next_measurement: "let it ring from twice the amplitude: the early loss grows fourfold (quadratic-damping: twofold)",
+    identifiable: Identifiable::Shape,
+    source: "A. Eichler et al., Nat. Nanotechnol. 6 (2011) 339",
+};
+
+impl Cause for NonlinearDamping {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn add(&self, values: &[f64], effects: &mut Effects) {
+        let c = values[0];
+        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+            if let (Some(a), Some(q), Some(v), Some(w)) =
+                (acceleration.first_mut(), motion.position.first(), motion.velocity.first(), motion.omega.first())
+            {
+                *a -= w * c * q * q * v;
+            }
+        }));
+    }
+
+    fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        vec![vec![0.003 / scene.level_v.powi(2)]]
+    }
+}

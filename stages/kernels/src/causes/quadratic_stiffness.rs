@@ -1,0 +1,49 @@
+//! A spring that is softer one way than the other.
+
+use std::sync::Arc;
+
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use crate::effects::Effects;
+
+/// `+ w^2 k2 q^2` on the first mode.
+pub struct QuadraticStiffness;
+
+const ABOUT: About = About {
+    id: "quadratic-stiffness",
+    physics: "stiffness changes with the side that the oscillator swings to: a bias, a magnet or gravity acts from one side",
+    part: Part::Lever,
+    domain: Domain::InputOutput,
+    parameters: &[Parameter {
+        name: "k2",
+        unit: "1/V",
+        meaning: "relative change of stiffness per deflection",
+        low: -10.0,
+        high: 10.0,
+    }],
+    class: &["quadratic-stiffness"],
+    resembles: "output-quadratic: also even harmonics, but it shifts no frequency and follows the output instantly",
+    next_measurement: "drive at two amplitudes: the mean output moves with the square and the resonance falls with it",
+    identifiable: Identifiable::Shape,
+    source: "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, 1979, chapter 2",
+};
+
+impl Cause for QuadraticStiffness {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn add(&self, values: &[f64], effects: &mut Effects) {
+        let k2 = values[0];
+        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+            if let (Some(a), Some(q), Some(w)) =
+                (acceleration.first_mut(), motion.position.first(), motion.omega.first())
+            {
+                *a -= w * w * k2 * q * q;
+            }
+        }));
+    }
+
+    fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        vec![vec![0.01 / scene.level_v]]
+    }
+}

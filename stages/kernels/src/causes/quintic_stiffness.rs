@@ -1,0 +1,49 @@
+//! A spring that stiffens late.
+
+use std::sync::Arc;
+
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use crate::effects::Effects;
+
+/// `+ w^2 k5 q^5` on the first mode.
+pub struct QuinticStiffness;
+
+const ABOUT: About = About {
+    id: "quintic-stiffness",
+    physics: "stiffness grows with the fourth power of the deflection: contact, magnets or geometry at large swings",
+    part: Part::Lever,
+    domain: Domain::InputOutput,
+    parameters: &[Parameter {
+        name: "k5",
+        unit: "1/V^4",
+        meaning: "relative change of stiffness per fourth power of the deflection",
+        low: -10.0,
+        high: 10.0,
+    }],
+    class: &["quintic-stiffness"],
+    resembles: "duffing: grows with the square; only a range of amplitudes tells the two apart",
+    next_measurement: "drive at three amplitudes: the shift of the resonance against amplitude on logarithmic axes has slope 4, not 2",
+    identifiable: Identifiable::Shape,
+    source: "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, 1979, chapter 2",
+};
+
+impl Cause for QuinticStiffness {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn add(&self, values: &[f64], effects: &mut Effects) {
+        let k5 = values[0];
+        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+            if let (Some(a), Some(q), Some(w)) =
+                (acceleration.first_mut(), motion.position.first(), motion.omega.first())
+            {
+                *a -= w * w * k5 * q.powi(5);
+            }
+        }));
+    }
+
+    fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        vec![vec![0.01 / scene.level_v.powi(4)]]
+    }
+}

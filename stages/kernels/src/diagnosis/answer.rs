@@ -1,0 +1,294 @@
+//! From models to the answer that is stored and shown.
+
+use std::collections::BTreeMap;
+
+use super::data::{Bench, Part, PartStart, Record};
+use super::dynamics::Kind;
+use super::fit::{Blocks, FOLDS};
+use super::lack_of_fit::Misfit;
+use super::options::DiagnosisOptions;
+use super::selection::{Choice, Chosen, Judged};
+use super::validation::free_run_rms;
+use super::verdict::{
+    BaselineSummary, DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
+};
+
+/// Block-wise standard errors beyond which a misfit is one: one chance in six hundred.
+const SIGNIFICANT: f64 = 3.0;
+
+/// What an answer is made from.
+pub(super) struct Findings<'a> {
+    pub bench: &'a Bench,
+    pub records: &'a [Record<'a>],
+    pub options: &'a DiagnosisOptions,
+    pub blocks: Blocks,
+    pub choice: Choice,
+    pub misfit: Misfit,
+    /// Whether the extended model describes as much as any linear model does.
+    pub adequate: bool,
+}
+
+impl Findings<'_> {
+    pub fn answer(&self) -> Diagnosis {
+        let ladder = &self.choice.ladder;
+        let validation = self.validation();
+        let verdict = self.verdict();
+        let causes = if verdict == Verdict::Named { self.named() } else { Vec::new() };
+        Diagnosis {
+            p_value: None,
+            verdict,
+            baseline: self.baseline(),
+            causes,
+            evidence: self.evidence(verdict),
+            nearest: if verdict == Verdict::Unexplained { self.nearest() } else { Vec::new() },
+            modes_before: ladder.first().map_or(Vec::new(), |judged| self.modes(judged)),
+            modes_after: ladder.last().map_or(Vec::new(), |judged| self.modes(judged)),
+            validation,
+            ladder: self.rungs(),
+            false_alarm_rate: self.options.false_alarm_rate,
+        }
+    }
+
+    /// The linear model. Noise is what neither the extended model nor any general term predicts.
+    fn baseline(&self) -> BaselineSummary {
+        let Some(first) = self.choice.ladder.first() else { return BaselineSummary::default() };
+        let left = self.choice.ladder.last().map_or(first.fit.loss, |last| last.fit.loss);
+        let noise = left / (1.0 + self.misfit.ratio.powi(2));
+        BaselineSummary {
+            adequate: self.adequate,
+            order: Some(first.fit.model.dynamics.order()),
+            parameters: BTreeMap::new(),
+            noise_rms: self.rms(noise),
+            distortion_rms: self.rms((first.fit.loss - noise).max(0.0)),
+        }
+    }
+
+    /// Unit of the first channel's scaled output.
+    fn scale(&self) -> f64 {
+        self.bench.output_scale.first().copied().unwrap_or(1.0)
+    }
+
+    fn systematic(&self) -> bool {
+        self.misfit.ratio > self.options.tolerated_misfit && self.misfit.significance > SIGNIFICANT
+    }
+
+    fn verdict(&self) -> Verdict {
+        if !self.adequate {
+            return Verdict::Unexplained;
+        }
+        let untied = self.choice.chosen.iter().any(|chosen| !chosen.tied);
+        match (self.choice.chosen.is_empty(), self.systematic()) {
+            (_, true) => Verdict::Unexplained,
+            (true, false) => Verdict::Clean,
+            (false, false) if untied => Verdict::Named,
+            (false, false) => Verdict::Unexplained,
+        }
+    }
+
+    fn rms(&self, loss: f64) -> Option<f64> {
+        finite((loss / self.bench.count as f64).sqrt() * self.scale())
+    }
+
+    /// Errors of the first part to be judged on, model by model; of the held-out folds where there is none.
+    fn held_out(&self) -> Vec<Option<f64>> {
+        let judge = |judged: &Judged| match self.options.parts.first() {
+            Some(part) => free_run_rms(self.bench, self.records, &judged.fit.model, part),
+            None => self.rms(judged.unseen()),
+        };
+        self.choice.ladder.iter().map(judge).collect()
+    }
+
+    /// Samples that count as independent for the score of a cause.
+    fn effective(&self, count: usize) -> f64 {
+        let worst = self.choice.chosen.iter().map(|chosen| chosen.inflation).fold(1.0, f64::max);
+        (count as f64 / worst).max(1.0)
+    }
+
+    fn named(&self) -> Vec<NamedCause> {
+        let held_out = self.held_out();
+        let (count, place) = match self.options.parts.first() {
+            Some(part) => (scored(part), format!("part {}", part.name)),
+            None => (self.bench.count, format!("{FOLDS} folds of the training part in turn")),
+        };
+        let one = |chosen: &Chosen| {
+            let which = chosen.place;
+            let at = |rung: usize| held_out.get(rung).copied().flatten();
+            let (before, after) = (at(which), at(which + 1));
+            let gain = before.zip(after).and_then(|(b, a)| finite(self.effective(count) * (b / a).ln()));
+            let about = crate::causes::built_in(chosen.id).map(|cause| cause.about());
+            NamedCause {
+                id: chosen.id.to_owned(),
+                class: about.map_or(Vec::new(), |about| about.class.iter().map(|id| (*id).to_owned()).collect()),
+                p_value: finite(chosen.p_value),
+                parameters: self.parameters(which),
+                gain: Gain {
+                    rms_before: before,
+                    rms_after: after,
+                    unit: self.options.output_unit.clone(),
+                    log_likelihood: gain,
+                    held_out: place.clone(),
+                },
+                runner_up: chosen
+                    .runner_up
+                    .map(|(id, share)| RunnerUp { id: id.to_owned(), share_of_gain: finite(share) }),
+                next_measurement: about.map_or(String::new(), |about| about.next_measurement.to_owned()),
+            }
+        };
+        self.choice.chosen.iter().filter(|chosen| !chosen.tied).map(one).collect()
+    }
+
+    fn parameters(&self, which: usize) -> BTreeMap<String, Value> {
+        let Some(last) = self.choice.ladder.last() else { return BTreeMap::new() };
+        let covariance = last.fit.moments(self.bench, &self.blocks).sandwich();
+        let Some(added) = last.fit.model.causes.get(which) else { return BTreeMap::new() };
+        let places = last.fit.model.places(which);
+        let one = |(i, parameter): (usize, &crate::causes::Parameter)| {
+            let factor = self.factor(parameter.unit);
+            let std = (i < places.len()).then(|| covariance[places.start + i][places.start + i].sqrt() * factor);
+            let value = Value {
+                value: added.values.get(i).and_then(|value| finite(value * factor)),
+                std: std.and_then(finite),
+                unit: self.unit(parameter.unit),
+            };
+            (parameter.name.to_owned(), value)
+        };
+        added.cause.about().parameters.iter().enumerate().map(one).collect()
+    }
+
+    /// A parameter's unit in the scaled problem, in the record's units.
+    fn factor(&self, unit: &str) -> f64 {
+        let y = self.scale();
+        match unit {
+            "V" => y,
+            "1/V" => 1.0 / y,
+            "1/V^2" => y.powi(-2),
+            "1/V^4" => y.powi(-4),
+            "input" => self.bench.input_scale,
+            _ => 1.0,
+        }
+    }
+
+    fn unit(&self, unit: &str) -> String {
+        match unit {
+            "input" => self.options.input_unit.clone(),
+            _ => unit.replace('V', &self.options.output_unit),
+        }
+    }
+
+    fn modes(&self, judged: &Judged) -> Vec<DiagnosedMode> {
+        let covariance = judged.fit.moments(self.bench, &self.blocks).sandwich();
+        let dynamics = &judged.fit.model.dynamics;
+        let std = |place: usize| covariance.get(place).and_then(|row| finite(row.get(place)?.sqrt()));
+        let one = |(s, section): (usize, &super::dynamics::Section)| {
+            let place = dynamics.place(s);
+            (section.kind == Kind::Oscillator).then(|| DiagnosedMode {
+                frequency_hz: section.frequency_hz,
+                frequency_std_hz: std(place),
+                quality_factor: 1.0 / section.loss,
+                quality_factor_std: std(place + 1).map(|std| std / section.loss.powi(2)),
+            })
+        };
+        dynamics.sections.iter().enumerate().filter_map(one).collect()
+    }
+
+    fn validation(&self) -> Vec<Validation> {
+        let ladder = &self.choice.ladder;
+        let rms = |judged: Option<&Judged>, part: &Part| {
+            judged.and_then(|judged| free_run_rms(self.bench, self.records, &judged.fit.model, part))
+        };
+        let one = |part: &Part| Validation {
+            name: part.name.clone(),
+            rms_before: rms(ladder.first(), part),
+            rms_after: rms(ladder.last(), part),
+            unit: self.options.output_unit.clone(),
+        };
+        self.options.parts.iter().map(one).collect()
+    }
+
+    fn rungs(&self) -> Vec<Rung> {
+        let effective = self.effective(self.bench.count);
+        let held_out = self.held_out();
+        let ladder = &self.choice.ladder;
+        let one = |(i, judged): (usize, &Judged)| {
+            let parameters = judged.fit.model.system_parameters();
+            let mean_square = judged.fit.loss / self.bench.count as f64 * self.scale().powi(2);
+            let before = i.checked_sub(1).and_then(|i| ladder.get(i));
+            Rung {
+                added: judged.fit.model.causes.last().map_or("linear model", |added| added.id()).to_owned(),
+                parameters,
+                rms: self.rms(judged.fit.loss),
+                held_out_rms: held_out[i],
+                unit: self.options.output_unit.clone(),
+                log_likelihood_gain: before
+                    .and_then(|before| finite(0.5 * effective * (before.fit.loss / judged.fit.loss).ln())),
+                bic: finite(effective * mean_square.ln() + parameters as f64 * effective.ln()),
+            }
+        };
+        ladder.iter().enumerate().map(one).collect()
+    }
+
+    fn nearest(&self) -> Vec<RunnerUp> {
+        let chosen = self.choice.chosen.iter().map(|chosen| (chosen.id, None));
+        let rivals =
+            self.choice.chosen.iter().filter_map(|chosen| chosen.runner_up).map(|(id, share)| (id, Some(share)));
+        let left = self.choice.nearest.iter().map(|(id, share)| (*id, Some(*share)));
+        let all: Vec<(&str, Option<f64>)> = chosen.chain(rivals).chain(left).collect();
+        let mut nearest: Vec<RunnerUp> = Vec::new();
+        for (id, share) in all {
+            if !nearest.iter().any(|other| other.id == id) {
+                nearest.push(RunnerUp { id: id.to_owned(), share_of_gain: share.and_then(finite) });
+            }
+        }
+        nearest
+    }
+
+    fn evidence(&self, verdict: Verdict) -> Vec<String> {
+        let unit = &self.options.output_unit;
+        let mut lines: Vec<String> = self
+            .choice
+            .ladder
+            .windows(2)
+            .map(|pair| {
+                let rms = |judged: &Judged| (judged.fit.loss / self.bench.count as f64).sqrt() * self.scale();
+                let added = pair[1].fit.model.causes.last().map_or("", |added| added.id());
+                let [before, after] = [rms(&pair[0]), rms(&pair[1])];
+                format!(
+                    "{added} lowers the free-run error of the training part from {before:.4e} to {after:.4e} {unit}"
+                )
+            })
+            .collect();
+        for chosen in self.choice.chosen.iter().filter(|chosen| chosen.tied) {
+            let rival = chosen.runner_up.map_or("nothing", |(id, _)| id);
+            lines.push(format!(
+                "{} can't be told from {rival}: their losses differ by less than 4 variances of the noise",
+                chosen.id
+            ));
+        }
+        let share = 100.0 * self.misfit.ratio.powi(2) / (1.0 + self.misfit.ratio.powi(2));
+        if self.misfit.significance > SIGNIFICANT {
+            lines.push(format!(
+                "motion and input predict another {share:.1} % of the squared residual ({:.1} standard errors), {}",
+                self.misfit.significance,
+                if verdict == Verdict::Unexplained && self.systematic() {
+                    "more than is tolerated"
+                } else {
+                    "which is tolerated"
+                }
+            ));
+        }
+        if let Some((id, share)) = self.choice.nearest.first().filter(|_| verdict == Verdict::Named) {
+            lines.push(format!("left on the table: {id} would take {:.2} % of the squared residual", 100.0 * share));
+        }
+        lines
+    }
+}
+
+/// Samples of a part that are scored.
+fn scored(part: &Part) -> usize {
+    let state = if let PartStart::FirstSamples(count) = part.start { count } else { 0 };
+    part.stretch.samples().saturating_sub(state)
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}

@@ -1,0 +1,125 @@
+//! The linear model that the diagnosis begins with: what identification finds by itself.
+
+mod black_box;
+mod decay;
+mod linear;
+mod oscillator;
+
+use super::data::{Bench, Record};
+use super::dynamics::Modal;
+use super::error::DiagnosisError;
+use super::fit::{Blocks, Fit};
+
+/// A linear model that causes may extend, and how it was judged.
+pub(super) struct Baseline {
+    pub fit: Fit,
+    /// The stretches at a step that suits its highest frequency.
+    pub bench: Bench,
+    pub adequacy: Adequacy,
+}
+
+/// How well linear models describe what was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Adequacy {
+    /// Least criterion of any linear model that was tried.
+    pub best: f64,
+    /// Its rms over that of the outputs.
+    pub left: f64,
+}
+
+/// A structure is extended where its error is at most so many times that of the best linear model, or where it is the
+/// simplest of a free decay.
+///
+/// Why: exponentials beside one another follow a frequency that moves with the amplitude, so that the best linear model
+/// of one nonlinear mode has several; one oscillator with the right causes beats them all.
+const CLOSE: f64 = 5.0;
+/// Share of the signal beyond which what the best linear model leaves is as good as all of it.
+const NOTHING: f64 = 0.9;
+
+impl Adequacy {
+    /// Whether the output follows from a linear model at all.
+    pub fn follows(&self) -> bool {
+        self.left < NOTHING
+    }
+
+    /// Whether a model describes as much as any linear model does.
+    pub fn holds(&self, criterion: f64) -> bool {
+        self.follows() && criterion <= self.best + 1e-9 * self.best.abs()
+    }
+}
+
+/// Schwarz's criterion of a fit, the blocks counted as the independent observations.
+///
+/// Why blocks: what a model leaves of a nonlinear system is no white noise; as many samples as there are would pay for
+/// any number of poles that follow it.
+/// # Source
+/// G. Schwarz, Ann. Stat. 6 (1978) 461.
+pub(super) fn criterion(bench: &Bench, fit: &Fit) -> f64 {
+    let count = blocks(bench, fit).count() as f64;
+    let own = fit.model.own_numbers() * bench.layout.stretches();
+    let numbers = fit.model.system_parameters() + own;
+    count * (fit.loss / bench.count as f64).ln() + numbers as f64 * count.ln()
+}
+
+/// Finds linear models to extend, the simplest first.
+///
+/// # Method
+/// Without an input: the strongest one, two, ... modes of the free decays, by [`crate::ringdown`], and one oscillator by
+/// a grid. With an input: one oscillator by a grid, and the poles of models of rising order by the prediction error
+/// method. Each is fitted to the free-run error. The last has the least criterion ([`criterion`]); simpler ones come
+/// before it where they are not far worse.
+pub(super) fn baselines(records: &[Record<'_>], coarse: &Bench) -> Result<Vec<Baseline>, DiagnosisError> {
+    let mut starts: Vec<Modal> = Vec::new();
+    let single = coarse.layout.channels == 1 && coarse.layout.stretches() == 1;
+    starts.extend(single.then(|| oscillator::best(coarse)).flatten().map(|fit| fit.model.dynamics));
+    let has_oscillator = !starts.is_empty();
+    if coarse.driven {
+        starts.extend(black_box::starts(records, coarse));
+    } else {
+        starts.extend(decay::starts(records, coarse).into_iter().skip(usize::from(has_oscillator)));
+    }
+    let mut tried: Vec<(Fit, Bench)> =
+        starts.iter().filter_map(|start| fitted(records, coarse, start, start.highest_hz())).collect();
+    tried.sort_by_key(|(fit, _)| fit.model.dynamics.order());
+    let criteria: Vec<f64> = tried.iter().map(|(fit, bench)| criterion(bench, fit)).collect();
+    let best = criteria.iter().copied().fold(f64::INFINITY, f64::min);
+    let last = criteria.iter().position(|own| *own <= best).ok_or(DiagnosisError::NoBaseline)?;
+    let rms = |fit: &Fit| (fit.loss / coarse.count as f64).sqrt();
+    let signal =
+        (coarse.output.iter().filter(|y| y.is_finite()).map(|y| y * y).sum::<f64>() / coarse.count as f64).sqrt();
+    let least = tried.get(last).map_or(0.0, |(fit, _)| rms(fit));
+    let adequacy = Adequacy { best, left: least / signal };
+    let keep = |(place, (fit, _)): (usize, &(Fit, Bench))| {
+        let simple = fit.model.dynamics.is_oscillator() || !coarse.driven;
+        let near = rms(fit) <= CLOSE * least || (place == 0 && !coarse.driven);
+        place == last || (place < last && simple && near)
+    };
+    let kept: Vec<bool> = tried.iter().enumerate().map(keep).collect();
+    let of = |(fit, bench): (Fit, Bench)| Baseline { fit, bench, adequacy };
+    Ok(tried.into_iter().zip(kept).filter(|(_, keep)| *keep).map(|(found, _)| of(found)).collect())
+}
+
+/// A start fitted to all stretches.
+fn fitted(records: &[Record<'_>], coarse: &Bench, start: &Modal, highest_hz: f64) -> Option<(Fit, Bench)> {
+    let bench = Bench::new(records, &coarse.stretches, coarse.interval_s, highest_hz).ok()?;
+    let model = linear::solved(&bench, start)?;
+    let fit = Fit::new(&bench, &model, Some(LINEAR_STEPS))?;
+    Some((fit, bench))
+}
+
+/// Steps of a linear fit from identified poles.
+const LINEAR_STEPS: usize = 20;
+
+/// Fewest and most blocks: fewer leave the errors' own error above a fifth, more gain nothing.
+const BLOCKS: (usize, usize) = (24, 128);
+/// Periods of the slowest mode in a block at least. Much longer blocks would hold all that a decay tells of its large
+/// swings in one.
+const PERIODS: f64 = 2.0;
+
+/// Blocks of a few periods, as far as there are enough of them.
+pub(super) fn blocks(bench: &Bench, fit: &Fit) -> Blocks {
+    let samples = bench.layout.all_samples();
+    let lowest_hz = fit.model.dynamics.lowest_hz();
+    let count = (samples as f64 * bench.interval_s * lowest_hz / PERIODS) as usize;
+    Blocks::new(&bench.layout, count.clamp(BLOCKS.0, BLOCKS.1).min(samples / 4))
+}

@@ -1,0 +1,193 @@
+//! A static curve beside linear parts: what is tried where no oscillator with causes accounts for an input and output.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use super::data::{Bench, Part, Record};
+use super::fit::paired;
+use super::options::DiagnosisOptions;
+use super::verdict::{Diagnosis, Gain, NamedCause, Rung, Validation, Value, Verdict};
+use crate::Unwatched;
+use crate::block_oriented::{BlockFit, BlockOptions, Structure, fit_block_oriented};
+
+/// Fewest samples: some twenty parameters, each with a hundred.
+const LEAST: usize = 2000;
+/// Share of the squared error of the linear model that the curve has to account for on what did not choose it. Why: a
+/// chain follows some part of any nonlinearity; what it names has to be nearly all of it.
+const SHARE: f64 = 0.9;
+/// Standard errors of a gain or of a bend that counts.
+const SIGNIFICANT: f64 = 3.0;
+/// Blocks that the gain on what was held out is tested on.
+const BLOCKS: usize = 32;
+
+/// A chain of linear parts and a curve that passed.
+pub(super) struct Chain {
+    /// Its simulation of the stretch that was learnt from, in the output's unit.
+    pub after: Vec<f64>,
+}
+
+/// Fits chains of linear parts and one static curve to the first stretch, and writes what is found into an answer that
+/// names nothing; none where no chain accounts for the data.
+///
+/// # Method
+/// [`fit_block_oriented`] with every structure that may be named. It is judged on the first part, or on the last quarter
+/// of the stretch, which then takes no share in the fit.
+pub(super) fn chain(
+    bench: &Bench,
+    records: &[Record<'_>],
+    options: &DiagnosisOptions,
+    linear: &[f64],
+    diagnosis: &mut Diagnosis,
+) -> Option<Chain> {
+    let (stretch, record) = (*bench.stretches.first()?, records.first()?);
+    let single = bench.driven && bench.layout.channels == 1 && bench.layout.stretches() == 1 && records.len() == 1;
+    let output = *record.outputs.first()?;
+    if diagnosis.verdict != Verdict::Unexplained || !single || stretch.samples() < LEAST {
+        return None;
+    }
+    let structures: Vec<Structure> = Structure::ALL
+        .into_iter()
+        .filter(|structure| options.candidates.iter().any(|cause| cause.about().id == id(*structure)))
+        .collect();
+    let held_out = options.parts.first();
+    let learnt = match held_out {
+        Some(_) => stretch.first..stretch.end,
+        None => stretch.first..stretch.end - stretch.samples() / 4,
+    };
+    let judged = held_out.map_or(learnt.end..stretch.end, scored);
+    let (u, y) = (record.input.get(learnt.clone())?, output.get(learnt.clone())?);
+    if structures.is_empty() || y.iter().any(|y| !y.is_finite()) {
+        return None;
+    }
+    // nothing is known of what was put in before: the start is simulated and not scored
+    let transient = (u.len() / 20).min(1000);
+    let wanted = BlockOptions { structures, transient, ..BlockOptions::default() };
+    let fit = fit_block_oriented(u, y, &wanted, &Unwatched).ok()?;
+    let simulated = fit.model.simulate(record.input.get(..judged.end.max(stretch.end))?);
+    // the linear model's error there: its simulation where it was learnt from, its rms elsewhere
+    let before = match held_out {
+        Some(part) => diagnosis.validation.iter().find(|v| v.name == part.name)?.rms_before?,
+        None => rms(output, linear, stretch.first, &judged)?,
+    };
+    let after = rms(output, &simulated, 0, &judged)?;
+    let bend = fit.curve_strength();
+    let sure = bend.relative > SIGNIFICANT * bend.std && significant(output, &simulated, before, &judged);
+    let accounts = after * after < (1.0 - SHARE) * before * before;
+    if !(sure && accounts) {
+        let share = 100.0 * (1.0 - (after / before).powi(2)).max(0.0);
+        diagnosis.evidence.push(format!(
+            "linear parts and a static curve ({}) account for {share:.0} % of the squared error of the linear model on \
+             what did not choose them: not enough to be named",
+            id(fit.structure)
+        ));
+        return None;
+    }
+    write(diagnosis, &fit, options, [before, after], 1.0 / bench.interval_s);
+    for part in &options.parts {
+        let rms_after = rms(output, &simulated, 0, &scored(part));
+        if let Some(validation) = diagnosis.validation.iter_mut().find(|v: &&mut Validation| v.name == part.name) {
+            validation.rms_after = rms_after;
+        }
+    }
+    Some(Chain { after: simulated.get(stretch.first..stretch.end)?.to_vec() })
+}
+
+/// Samples of a part that are scored.
+fn scored(part: &Part) -> Range<usize> {
+    let skipped = if let super::data::PartStart::FirstSamples(count) = part.start { count } else { 0 };
+    (part.stretch.first + skipped).min(part.stretch.end)..part.stretch.end
+}
+
+/// The cause that a structure is.
+fn id(structure: Structure) -> &'static str {
+    match structure {
+        Structure::Wiener => "wiener-curve",
+        Structure::Hammerstein => "hammerstein-curve",
+        Structure::WienerHammerstein => "wiener-hammerstein-curve",
+    }
+}
+
+/// Root mean square of the output less a simulation whose first sample is sample `begin` of the record.
+fn rms(output: &[f64], simulated: &[f64], begin: usize, range: &Range<usize>) -> Option<f64> {
+    let error = |k: usize| Some(output.get(k)? - simulated.get(k.checked_sub(begin)?)?);
+    let squares: Vec<f64> = range.clone().filter_map(error).filter(|e| e.is_finite()).map(|e| e * e).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    (!squares.is_empty() && mean.is_finite()).then(|| mean.sqrt())
+}
+
+/// Whether a simulation is better than an error of `before`, block by block.
+fn significant(output: &[f64], simulated: &[f64], before: f64, range: &Range<usize>) -> bool {
+    let length = range.len().div_ceil(BLOCKS).max(1);
+    let block = |first: usize| rms(output, simulated, 0, &(first..(first + length).min(range.end)));
+    let gains: Vec<f64> =
+        range.clone().step_by(length).filter_map(block).map(|after| before * before - after * after).collect();
+    paired(&gains) > SIGNIFICANT
+}
+
+fn write(
+    diagnosis: &mut Diagnosis,
+    fit: &BlockFit,
+    options: &DiagnosisOptions,
+    [before, after]: [f64; 2],
+    rate_hz: f64,
+) {
+    let (id, bend, unit) = (id(fit.structure), fit.curve_strength(), options.output_unit.clone());
+    let poles = fit.poles();
+    let count = |of_first: bool| poles.iter().filter(|pole| pole.of_first == of_first).count();
+    let number = |value: f64, std: Option<f64>| Value { value: Some(value), std, unit: "1".to_owned() };
+    let parameters = BTreeMap::from([
+        ("bend".to_owned(), number(bend.relative, Some(bend.std))),
+        ("poles_before".to_owned(), number(count(true) as f64, None)),
+        ("poles_behind".to_owned(), number(count(false) as f64, None)),
+    ]);
+    let about = crate::causes::built_in(id).map(|cause| cause.about());
+    let held_out = match options.parts.first() {
+        Some(part) => format!("part {}", part.name),
+        None => "the last quarter of the training part".to_owned(),
+    };
+    let places = |of_first: bool| {
+        let hz = |pole: &crate::block_oriented::BlockPole| pole.z.ln().norm() * rate_hz / TAU;
+        let own: Vec<String> =
+            poles.iter().filter(|p| p.of_first == of_first && p.z.im >= 0.0).map(|p| format!("{:.4}", hz(p))).collect();
+        if own.is_empty() { "no poles".to_owned() } else { format!("poles at {} Hz", own.join(", ")) }
+    };
+    diagnosis.verdict = Verdict::Named;
+    diagnosis.baseline.adequate = true;
+    diagnosis.baseline.order = Some(poles.len());
+    diagnosis.baseline.noise_rms = Some(fit.training_rms);
+    diagnosis.baseline.distortion_rms = Some((fit.linear_rms.powi(2) - fit.training_rms.powi(2)).max(0.0).sqrt());
+    diagnosis.nearest.clear();
+    diagnosis.modes_after.clear();
+    diagnosis.evidence = vec![
+        format!(
+            "a static curve lowers the error of the linear model from {:.4e} to {:.4e} {unit} where it was fitted",
+            fit.linear_rms, fit.training_rms
+        ),
+        format!(
+            "the curve departs from a straight line by {:.1} % of what it passes, {:.0} standard errors",
+            100.0 * bend.relative,
+            bend.relative / bend.std.max(f64::MIN_POSITIVE)
+        ),
+        format!("before the curve {}, behind it {}", places(true), places(false)),
+    ];
+    diagnosis.ladder.truncate(1);
+    diagnosis.ladder.push(Rung {
+        added: id.to_owned(),
+        parameters: fit.model.vector().len(),
+        rms: Some(fit.training_rms),
+        held_out_rms: Some(after),
+        unit: unit.clone(),
+        log_likelihood_gain: None,
+        bic: None,
+    });
+    diagnosis.causes = vec![NamedCause {
+        id: id.to_owned(),
+        class: about.map_or(Vec::new(), |about| about.class.iter().map(|id| (*id).to_owned()).collect()),
+        p_value: None,
+        parameters,
+        gain: Gain { rms_before: Some(before), rms_after: Some(after), unit, log_likelihood: None, held_out },
+        runner_up: None,
+        next_measurement: about.map_or(String::new(), |about| about.next_measurement.to_owned()),
+    }];
+}

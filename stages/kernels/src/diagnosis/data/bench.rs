@@ -1,0 +1,269 @@
+//! The stretches that are learnt from, scaled, and simulations of them.
+
+use std::sync::Arc;
+
+use super::{FineInput, Layout, Record, Stretch};
+use crate::diagnosis::dynamics::{Model, Span, State};
+use crate::diagnosis::error::DiagnosisError;
+use crate::effects::{Effects, Intersample};
+
+/// Fewest samples of a stretch: a hundred periods' worth of nothing is not enough, a few of a ringdown are.
+pub(crate) const LEAST_SAMPLES: usize = 24;
+/// Largest angle of a step, rad: the scheme's error is its fourth power over a hundred of what is not linear. Records
+/// of more than [`LONG`] samples take the second, whose error is still a thousandth of what a cause has to buy there.
+const ANGLES: [f64; 2] = [0.15, 0.45];
+/// Samples beyond which time counts.
+const LONG: usize = 8192;
+/// Most steps between samples.
+const MOST_STEPS: usize = 16;
+
+/// Stretches in units of the largest input and outputs, and what simulates them.
+///
+/// Scaled by the largest output, a cause's limits and trials mean the same for volts and for strain.
+#[derive(Clone)]
+pub struct Bench {
+    /// Outputs stretch by stretch, channel by channel, sample by sample; NaN where missing.
+    pub output: Vec<f64>,
+    /// Where each stretch and channel lies in that.
+    pub(crate) layout: Layout,
+    /// The stretches.
+    pub stretches: Vec<Stretch>,
+    /// Interval of the samples, s.
+    pub interval_s: f64,
+    /// Unit of each channel's scaled output.
+    pub output_scale: Vec<f64>,
+    /// Unit of the scaled input.
+    pub input_scale: f64,
+    /// Whether there is an input.
+    pub driven: bool,
+    /// Values that are there.
+    pub count: usize,
+    /// Length that the causes' place within a record is counted in, s.
+    reference_s: f64,
+    /// Input of each record by its course between samples; none where there is no input.
+    inputs: Arc<Vec<[FineInput; 3]>>,
+    /// Steps of the integrator between samples.
+    steps: usize,
+}
+
+impl Bench {
+    /// Scales records by the stretches that are learnt from; the input between samples is built for all three
+    /// assumptions, at a step that suits `highest_hz`.
+    ///
+    /// # Errors
+    /// See [`DiagnosisError`].
+    pub fn new(
+        records: &[Record<'_>],
+        stretches: &[Stretch],
+        interval_s: f64,
+        highest_hz: f64,
+    ) -> Result<Self, DiagnosisError> {
+        check(records, stretches, interval_s)?;
+        let channels = records[0].outputs.len();
+        let layout = Layout::new(stretches, channels);
+        let (mut output_scale, mut output) = (Vec::new(), vec![f64::NAN; layout.values()]);
+        for channel in 0..channels {
+            let of = |s: &Stretch| &records[s.record].outputs[channel][s.first..s.end];
+            let scale = stretches.iter().map(|s| largest(of(s))).fold(0.0, f64::max);
+            let moves = stretches.iter().any(|s| {
+                let first = of(s).first().copied().unwrap_or(f64::NAN);
+                of(s).iter().filter(|v| v.is_finite()).any(|v| *v != first)
+            });
+            if scale == 0.0 || !moves {
+                return Err(DiagnosisError::Silent { channel: channel + 1 });
+            }
+            for (e, stretch) in stretches.iter().enumerate() {
+                let place = layout.part(e, channel, 0, stretch.samples());
+                output[place].iter_mut().zip(of(stretch)).for_each(|(to, y)| *to = y / scale);
+            }
+            output_scale.push(scale);
+        }
+        let input = |s: &Stretch| records[s.record].input.get(s.first..s.end).map_or(0.0, largest);
+        let input_scale = stretches.iter().map(input).fold(0.0, f64::max);
+        let driven = input_scale > 0.0;
+        let input_scale = if driven { input_scale } else { 1.0 };
+        let angle = std::f64::consts::TAU * highest_hz * interval_s;
+        let largest_angle = ANGLES[usize::from(layout.all_samples() > LONG)];
+        let steps = ((angle / largest_angle).ceil() as usize).clamp(1, MOST_STEPS);
+        let kinds = [Intersample::Held, Intersample::Linear, Intersample::BandLimited];
+        let fine = |record: &Record<'_>| {
+            let scaled: Vec<f64> = record.input.iter().map(|u| u / input_scale).collect();
+            kinds.map(|kind| FineInput::new(&scaled, kind, steps))
+        };
+        let longest = stretches.iter().map(Stretch::samples).max().unwrap_or(0);
+        Ok(Self {
+            count: output.iter().filter(|y| y.is_finite()).count(),
+            output,
+            layout,
+            stretches: stretches.to_vec(),
+            interval_s,
+            output_scale,
+            input_scale,
+            driven,
+            reference_s: longest as f64 * interval_s,
+            inputs: Arc::new(if driven { records.iter().map(fine).collect() } else { Vec::new() }),
+            steps,
+        })
+    }
+
+    /// The same with every stretch cut down to its samples `range(e)`, counted from its beginning.
+    pub(crate) fn cut(&self, range: impl Fn(usize) -> (usize, usize)) -> Self {
+        let pieces: Vec<Stretch> = self
+            .stretches
+            .iter()
+            .enumerate()
+            .map(|(e, s)| Stretch { first: s.first + range(e).0, end: s.first + range(e).1, ..*s })
+            .collect();
+        let layout = Layout::new(&pieces, self.layout.channels);
+        let mut output = Vec::with_capacity(layout.values());
+        for e in 0..pieces.len() {
+            for channel in 0..layout.channels {
+                output.extend_from_slice(&self.output[self.layout.part(e, channel, range(e).0, range(e).1)]);
+            }
+        }
+        Self {
+            count: output.iter().filter(|y| y.is_finite()).count(),
+            output,
+            layout,
+            stretches: pieces,
+            ..self.clone()
+        }
+    }
+
+    /// Other stretches of the same records, in the same scale. None: they do not lie in the records.
+    pub(crate) fn elsewhere(&self, records: &[Record<'_>], stretches: &[Stretch]) -> Option<Self> {
+        let layout = Layout::new(stretches, self.layout.channels);
+        let mut output = Vec::with_capacity(layout.values());
+        for stretch in stretches {
+            for (samples, scale) in records.get(stretch.record)?.outputs.iter().zip(&self.output_scale) {
+                output.extend(samples.get(stretch.first..stretch.end)?.iter().map(|y| y / scale));
+            }
+        }
+        let count = output.iter().filter(|y| y.is_finite()).count();
+        Some(Self { count, output, layout, stretches: stretches.to_vec(), ..self.clone() })
+    }
+
+    /// First sample of the window of `length` samples of stretch `e` whose first channel has the largest mean square.
+    pub(crate) fn loudest(&self, e: usize, length: usize) -> usize {
+        let samples = self.layout.samples(e);
+        let output = &self.output[self.layout.part(e, 0, 0, samples)];
+        let power = |first: usize| -> f64 {
+            output[first..first + length].iter().filter(|y| y.is_finite()).map(|y| y * y).sum()
+        };
+        let starts = (0..=samples.saturating_sub(length)).step_by((length / 4).max(1));
+        let larger = |best: (f64, usize), next: (f64, usize)| if next.0 > best.0 { next } else { best };
+        starts.map(|first| (power(first), first)).fold((-1.0, 0), larger).1
+    }
+
+    /// Length of the longest stretch that is learnt from, s.
+    pub(crate) fn reference_s(&self) -> f64 {
+        self.reference_s
+    }
+
+    /// The model's output over the stretches.
+    pub fn simulate(&self, model: &Model) -> Vec<f64> {
+        self.simulate_with(model, &model.effects())
+    }
+
+    /// The model's output under other effects than its own.
+    pub(crate) fn simulate_with(&self, model: &Model, effects: &Effects) -> Vec<f64> {
+        let mut output = Vec::with_capacity(self.layout.values());
+        for (e, stretch) in self.stretches.iter().enumerate() {
+            let Some(state) = model.states.get(e) else { break };
+            output.extend(self.simulate_stretch(model, state, stretch, effects));
+        }
+        output
+    }
+
+    /// The model's output over any stretch of the records from a state there, channel by channel.
+    pub(crate) fn simulate_stretch(
+        &self,
+        model: &Model,
+        state: &State,
+        stretch: &Stretch,
+        effects: &Effects,
+    ) -> Vec<f64> {
+        let span = Span {
+            interval_s: self.interval_s,
+            begin_s: stretch.first as f64 * self.interval_s,
+            reference_s: self.reference_s,
+            record: stretch.record,
+            steps: self.steps,
+            samples: stretch.samples(),
+        };
+        let nodes = self.nodes(stretch, effects);
+        let driven = (!nodes.is_empty()).then_some(&nodes[..]);
+        model.dynamics.output(state, driven, effects, &span)
+    }
+
+    /// Motion of the modes over the stretches: by stretch, mode and sample.
+    pub(crate) fn motion(&self, model: &Model) -> Vec<Vec<Vec<[f64; 2]>>> {
+        let effects = model.effects();
+        let one = |(e, stretch): (usize, &Stretch)| {
+            let nodes = self.nodes(stretch, &effects);
+            let driven = (!nodes.is_empty()).then_some(&nodes[..]);
+            let state = model.states.get(e).cloned().unwrap_or_default();
+            model.dynamics.motion(&state, driven, &effects, self.interval_s, self.steps, stretch.samples())
+        };
+        self.stretches.iter().enumerate().map(one).collect()
+    }
+
+    /// Output less simulation; 0 where the output is missing.
+    pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
+        self.output.iter().zip(simulated).map(|(y, s)| if y.is_finite() { y - s } else { 0.0 }).collect()
+    }
+
+    /// The input at the integrator's nodes, through the effects' maps.
+    fn nodes(&self, stretch: &Stretch, effects: &Effects) -> Vec<f64> {
+        let Some(inputs) = self.inputs.get(stretch.record) else { return Vec::new() };
+        let input = match effects.intersample.unwrap_or_default() {
+            Intersample::Held => &inputs[0],
+            Intersample::Linear => &inputs[1],
+            Intersample::BandLimited => &inputs[2],
+        };
+        let through = |u: &f64| effects.input.iter().fold(*u, |u, map| map(u));
+        input.part(stretch.first, stretch.end).iter().map(through).collect()
+    }
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().filter(|v| v.is_finite()).fold(0.0, |most, v| most.max(v.abs()))
+}
+
+fn check(records: &[Record<'_>], stretches: &[Stretch], interval_s: f64) -> Result<(), DiagnosisError> {
+    if !(interval_s > 0.0 && interval_s.is_finite()) {
+        return Err(DiagnosisError::Interval(interval_s));
+    }
+    let channels = records.first().map_or(0, |record| record.outputs.len());
+    if channels == 0 || stretches.is_empty() {
+        return Err(DiagnosisError::Nothing);
+    }
+    for (number, record) in records.iter().enumerate() {
+        let samples = record.samples();
+        let lengths = record.outputs.iter().map(|output| output.len());
+        let input = (!record.input.is_empty()).then_some(record.input.len());
+        if let Some(found) = lengths.chain(input).find(|length| *length != samples) {
+            return Err(DiagnosisError::Lengths { record: number + 1, found, wanted: samples });
+        }
+        if record.outputs.len() != channels {
+            let found = record.outputs.len();
+            return Err(DiagnosisError::Channels { record: number + 1, found, wanted: channels });
+        }
+        if let Some(sample) = record.input.iter().position(|u| !u.is_finite()) {
+            return Err(DiagnosisError::Missing { record: number + 1, sample });
+        }
+    }
+    for s in stretches {
+        let samples = records.get(s.record).map_or(0, Record::samples);
+        if s.end > samples || s.first + LEAST_SAMPLES > s.end {
+            return Err(DiagnosisError::Part {
+                name: "training".to_owned(),
+                first: s.first,
+                end: s.end,
+                samples,
+                least: LEAST_SAMPLES,
+            });
+        }
+    }
+    Ok(())
+}

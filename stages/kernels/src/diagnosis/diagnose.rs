@@ -1,0 +1,194 @@
+//! The whole way from records to a verdict.
+
+use super::answer::Findings;
+use super::baseline::{Baseline, baselines, blocks, criterion};
+use super::chain::chain;
+use super::data::{Bench, Record};
+use super::dynamics::Model;
+use super::error::DiagnosisError;
+use super::fit::{Blocks, Fit, with_own};
+use super::lack_of_fit::misfit;
+use super::options::DiagnosisOptions;
+use super::score_test::{Candidate, trials};
+use super::selection::{Choice, Judged, Search};
+use super::story::{Story, story};
+use super::validation::check_part;
+use super::verdict::Diagnosis;
+use crate::causes::{Cause, Domain, Part};
+
+/// A diagnosis and the model that it ends with.
+pub struct Diagnosed {
+    /// The answer.
+    pub diagnosis: Diagnosis,
+    /// Output of the stretches that were learnt from, stretch by stretch and channel by channel, NaN where missing.
+    pub output: Vec<f64>,
+    /// The linear baseline's simulation of it.
+    pub before: Vec<f64>,
+    /// The extended model's.
+    pub after: Vec<f64>,
+    /// What both models miss, for a person to look at.
+    pub story: Story,
+    /// The extended model, in units of the largest output and input.
+    pub model: Model,
+    /// Those units: of each channel, of the input.
+    pub scales: (Vec<f64>, f64),
+}
+
+/// Samples that causes are chosen on; all samples fit what was chosen. Below half as many again all are taken.
+const SAMPLE: usize = 16_384;
+
+/// The largest stretches of motion, where there are many samples.
+fn sampled(whole: &Bench) -> Bench {
+    let layout = &whole.layout;
+    if 2 * layout.all_samples() < 3 * SAMPLE {
+        return whole.clone();
+    }
+    let share = (SAMPLE / layout.stretches().max(1)).max(super::data::LEAST_SAMPLES);
+    let windows: Vec<(usize, usize)> = (0..layout.stretches())
+        .map(|e| {
+            let length = layout.samples(e).min(share);
+            let first = whole.loudest(e, length);
+            (first, first + length)
+        })
+        .collect();
+    whole.cut(|e| windows[e])
+}
+
+/// Says what a linear model gets wrong in measured runs of a system.
+///
+/// # Model
+/// A sum of modes, free masses and real poles under the measured input, if there is one, free-running from a state of
+/// each stretch's own; all else is a cause.
+/// # Method
+/// Least squares of the free-run error on what is learnt from; causes added by score test, joint refits of the best
+/// five, and likelihood less the Bayesian penalty; dropped or exchanged where later ones do better; each tested by
+/// blocks against its best rival. What a library of general terms still predicts of the residual decides whether the
+/// causes are the whole story.
+/// # Shapes
+/// Records of one or several channels; the answer's simulations are those of the stretches that were learnt from.
+/// # Units
+/// Any; scaled inside by the largest input and outputs.
+/// # Accuracy
+/// See docs/diagnosis.md.
+/// # Errors
+/// Parts beyond the records, a missing input, an output that does not move: see [`DiagnosisError`].
+/// # Source
+/// L. Ljung, System Identification, 2nd ed., 1999, chapter 7; J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019)
+/// 28.
+pub fn diagnose(
+    records: &[Record<'_>],
+    interval_s: f64,
+    options: &DiagnosisOptions,
+) -> Result<Diagnosed, DiagnosisError> {
+    let whole = Bench::new(records, &options.training, interval_s, 0.0)?;
+    options.parts.iter().try_for_each(|part| check_part(part, &whole, records))?;
+    let sample = sampled(&whole);
+    let mut extended = Vec::new();
+    for baseline in baselines(records, &sample)? {
+        let found = extend(baseline, options);
+        let enough = found.adequate;
+        extended.push(found);
+        if enough {
+            break;
+        }
+    }
+    // the first that is as good as any linear model; else the last, which a linear model alone is
+    let Some(last) = extended.pop() else { return Err(DiagnosisError::NoBaseline) };
+    let Extended { bench, blocks, choice, adequate } =
+        last.on_all(records, options).ok_or(DiagnosisError::NoBaseline)?;
+    let Some(last) = choice.ladder.last() else { return Err(DiagnosisError::NoBaseline) };
+    let misfit = misfit(&bench, &last.fit, &blocks);
+    let first = &choice.ladder[0].fit;
+    let simulated = [&first.simulated[..], &last.fit.simulated];
+    let mut story = story(&bench, records, [&first.model, &last.fit.model], simulated, &options.parts);
+    let layout = &bench.layout;
+    let in_units = |values: &[f64]| -> Vec<f64> {
+        let mut values = values.to_vec();
+        for e in 0..layout.stretches() {
+            for (channel, scale) in bench.output_scale.iter().enumerate() {
+                values[layout.part(e, channel, 0, layout.samples(e))].iter_mut().for_each(|value| *value *= scale);
+            }
+        }
+        values
+    };
+    let (before, mut after) = (in_units(&choice.ladder[0].fit.simulated), in_units(&last.fit.simulated));
+    let (output, model) = (in_units(&bench.output), last.fit.model.clone());
+    let findings = Findings { bench: &bench, records, options, blocks, choice, misfit, adequate };
+    let mut diagnosis = findings.answer();
+    if let Some(chain) = chain(&bench, records, options, &before, &mut diagnosis) {
+        after = chain.after;
+        story = Story::of_series(&output, [&before, &after], interval_s, &[]);
+    }
+    Ok(Diagnosed {
+        diagnosis,
+        output,
+        before,
+        after,
+        story,
+        model,
+        scales: (bench.output_scale.clone(), bench.input_scale),
+    })
+}
+
+/// A baseline with the causes that extend it.
+struct Extended {
+    bench: Bench,
+    blocks: Blocks,
+    choice: Choice,
+    /// Whether the extended model describes as much as any linear model does.
+    adequate: bool,
+}
+
+impl Extended {
+    /// Every model fitted to all samples, from where it was found.
+    fn on_all(self, records: &[Record<'_>], options: &DiagnosisOptions) -> Option<Self> {
+        if self.bench.stretches == options.training {
+            return Some(self);
+        }
+        let bench = self.bench.elsewhere(records, &options.training)?;
+        let first = self.choice.ladder.first()?;
+        let blocks = blocks(&bench, &first.fit);
+        let fitted = |judged: &Judged| {
+            let start = with_own(&bench, &judged.fit.model);
+            Some(Judged::new(Fit::new(&bench, &start, None)?, &bench, &blocks))
+        };
+        let ladder: Vec<Judged> = self.choice.ladder.iter().map_while(fitted).collect();
+        // a model that diverges on all samples ends the ladder before it
+        let mut chosen = self.choice.chosen;
+        chosen.retain(|chosen| chosen.place + 1 < ladder.len());
+        (!ladder.is_empty()).then_some(Self { choice: Choice { ladder, chosen, ..self.choice }, bench, blocks, ..self })
+    }
+}
+
+fn extend(baseline: Baseline, options: &DiagnosisOptions) -> Extended {
+    let Baseline { fit, bench, adequacy } = baseline;
+    let blocks = blocks(&bench, &fit);
+    let candidates = candidates(options, &bench, &fit.model);
+    let search = Search {
+        bench: &bench,
+        blocks: blocks.clone(),
+        options,
+        trials: trials(&bench, &fit, &candidates),
+        candidates,
+    };
+    let choice = search.run(fit);
+    let adequate = choice.ladder.last().is_some_and(|last| adequacy.holds(criterion(&bench, &last.fit)));
+    Extended { bench, blocks, choice, adequate }
+}
+
+/// The causes that these data can show, at every place.
+fn candidates(options: &DiagnosisOptions, bench: &Bench, model: &Model) -> Vec<Candidate> {
+    let several = bench.layout.stretches() > 1;
+    let usable = |cause: &&&'static dyn Cause| {
+        let about = cause.about();
+        let (driven, alone) = (bench.driven, bench.layout.channels == 1);
+        about.domain != Domain::Release
+            && (driven || about.part != Part::Input)
+            // a sensor's curve belongs to its channel
+            && (alone || about.part != Part::Detector)
+            // what differs from stretch to stretch by chance, and what each has of its own
+            && !(several && (cause.free_in_each_record() > 0 || about.part == Part::Record))
+    };
+    let modes = model.dynamics.modes();
+    options.candidates.iter().filter(usable).flat_map(|cause| Candidate::places(*cause, modes)).collect()
+}

@@ -1,0 +1,222 @@
+//! What a motion and an input could still explain, whatever the cause.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::data::Bench;
+use super::fit::{Blocks, Cholesky, Fit, Moments, dot, paired};
+use super::score_test::{first_channel, peaks};
+use crate::effects::{Effects, Intersample};
+
+/// Share of a residual that something systematic makes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Misfit {
+    /// Root mean square of the part that can be predicted on folds that were held out, over that of the rest.
+    pub ratio: f64,
+    /// The prediction's gain, block by block, over its standard error.
+    pub significance: f64,
+}
+
+/// Highest degree of the polynomials in deflection and rate.
+const DEGREE: i32 = 5;
+/// A force or signal of this size: small enough to be linear.
+const SMALL: f64 = 1e-6;
+/// Of the Gram matrix scaled to a unit diagonal: the directions overlap, the small ones are noise.
+const RIDGE: f64 = 1e-6;
+
+/// How much of a fit's residual a library of general terms predicts.
+///
+/// # Method
+/// Regression, by folds of blocks, on what any smooth force or sensor would do to first order: all monomials up to
+/// degree five of deflection and rate, their absolute values and signs, once as forces through the oscillator and once
+/// directly; powers of the input; another course of the input between samples; slow polynomials in time and the
+/// residual's largest lines. Noise that does not depend on the motion cannot be predicted, so that no noise model is
+/// needed.
+/// # Source
+/// T. Hastie, R. Tibshirani, J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, section 7.10.
+pub(super) fn misfit(bench: &Bench, fit: &Fit, blocks: &Blocks) -> Misfit {
+    let moments = Moments::new(&general(bench, fit), &clean(bench, fit), blocks);
+    let own = fit.moments(bench, blocks).held_out(0.0);
+    let after = moments.held_out(RIDGE);
+    let differences: Vec<f64> = own.iter().zip(&after).map(|(a, b)| a - b).collect();
+    let (gain, floor) = (differences.iter().sum::<f64>(), after.iter().sum::<f64>());
+    let ratio = if gain > 0.0 && floor > 0.0 { (gain / floor).sqrt() } else { 0.0 };
+    Misfit { ratio, significance: paired(&differences) }
+}
+
+/// What a fit's parameters and the library together leave of its residual: the nearest to pure noise that can be had
+/// without a noise model.
+pub(super) struct Floor {
+    /// Sample by sample.
+    pub residual: Vec<f64>,
+    /// Its variance, the directions that were taken out counted.
+    pub mean_square: f64,
+}
+
+impl Floor {
+    pub fn new(bench: &Bench, fit: &Fit, blocks: &Blocks) -> Self {
+        let columns = general(bench, fit);
+        let mut residual = clean(bench, fit);
+        let moments = Moments::new(&columns, &residual, blocks);
+        let weights = Cholesky::new(&moments.total_curvature(|_| true), RIDGE).solve(&moments.total_score(|_| true));
+        for (column, weight) in columns.iter().zip(&weights) {
+            residual.iter_mut().zip(column).for_each(|(r, c)| *r -= weight * c);
+        }
+        let free = bench.count.saturating_sub(columns.len()).max(1);
+        let mean_square = dot(&residual, &residual) / free as f64;
+        Self { residual, mean_square }
+    }
+}
+
+/// What a fit leaves, beyond what the stretches' own numbers can make.
+fn clean(bench: &Bench, fit: &Fit) -> Vec<f64> {
+    let mut left = fit.residual.clone();
+    fit.own.take_out(&mut left, &bench.layout);
+    left
+}
+
+/// A fit's own sensitivities and the library's columns.
+fn general(bench: &Bench, fit: &Fit) -> Vec<Vec<f64>> {
+    let mut columns = fit.sensitivities.clone();
+    let mut others = library(bench, fit);
+    others.par_iter_mut().for_each(|column| fit.own.take_out(column, &bench.layout));
+    columns.extend(others);
+    columns
+}
+
+type Term = Arc<dyn Fn(f64, f64) -> f64 + Send + Sync>;
+
+/// Functions of deflection and rate / omega, each near 1 at the largest motion; fewer where many modes have them.
+fn terms(modes: usize) -> Vec<Term> {
+    let mut terms: Vec<Term> = vec![Arc::new(|q, _| q.abs()), Arc::new(|_, p| p.abs()), Arc::new(|_, _| 1.0)];
+    terms.push(Arc::new(|_, p| (p / 0.02).tanh()));
+    terms.push(Arc::new(|q, p| q.hypot(p) * p));
+    terms.push(Arc::new(|q, p| q.hypot(p) * q));
+    for degree in 2..=if modes > 1 { DEGREE - 2 } else { DEGREE } {
+        for rates in 0..=degree {
+            terms.push(Arc::new(move |q, p| q.powi(degree - rates) * p.powi(rates)));
+        }
+    }
+    terms
+}
+
+fn library(bench: &Bench, fit: &Fit) -> Vec<Vec<f64>> {
+    let model = &fit.model;
+    let effects = model.effects();
+    let modes = model.dynamics.modes();
+    let fill = |mut column: Vec<f64>| {
+        column.iter_mut().zip(&bench.output).filter(|(_, y)| !y.is_finite()).for_each(|(value, _)| *value = 0.0);
+        column
+    };
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    let mut changed: Vec<Effects> = Vec::new();
+    let motion = bench.motion(model);
+    for mode in 0..modes {
+        let direct = terms(modes).into_iter().map(|term| fill(seen(bench, &motion, mode, &term)));
+        columns.extend(direct);
+        changed.extend(terms(modes).into_iter().map(|term| with_force(&effects, mode, term)));
+        for other in (0..modes).filter(|other| *other != mode) {
+            changed.extend(products().into_iter().map(|term| with_coupling(&effects, [mode, other], term)));
+        }
+    }
+    if bench.driven {
+        changed.extend((2..=5).map(|power| with_input(&effects, Arc::new(move |u: f64| u.powi(power)))));
+        changed.push(with_input(&effects, Arc::new(f64::abs)));
+        changed.push(with_input(&effects, Arc::new(|u: f64| (u / 0.05).tanh())));
+        for kind in [Intersample::Held, Intersample::Linear, Intersample::BandLimited] {
+            changed.push(Effects { intersample: Some(kind), ..effects.clone() });
+        }
+    }
+    let through: Vec<Vec<f64>> = changed
+        .par_iter()
+        .map(|effects| {
+            let moved = bench.simulate_with(model, effects);
+            fill(moved.iter().zip(&fit.simulated).map(|(a, b)| (a - b) / SMALL).collect())
+        })
+        .collect();
+    columns.extend(through.into_iter().filter(|column| column.iter().all(|value| value.is_finite())));
+    columns.extend(slow(bench, fit).into_iter().map(fill));
+    columns
+}
+
+/// A term of one mode's motion, in the first channel.
+fn seen(bench: &Bench, motion: &[Vec<Vec<[f64; 2]>>], mode: usize, term: &Term) -> Vec<f64> {
+    let mut column = vec![0.0; bench.output.len()];
+    for (e, states) in motion.iter().enumerate() {
+        let Some(states) = states.get(mode) else { continue };
+        let place = bench.layout.part(e, 0, 0, bench.layout.samples(e));
+        column[place].iter_mut().zip(states).for_each(|(to, [q, p])| *to = term(*q, *p));
+    }
+    column
+}
+
+fn with_force(effects: &Effects, mode: usize, term: Term) -> Effects {
+    let mut effects = effects.clone();
+    effects.modal_force.push(Arc::new(move |motion, acceleration| {
+        if let (Some(a), Some(q), Some(v), Some(w)) =
+            (acceleration.get_mut(mode), motion.position.get(mode), motion.velocity.get(mode), motion.omega.get(mode))
+        {
+            *a += SMALL * w * w * term(*q, v / w);
+        }
+    }));
+    effects
+}
+
+type Product = fn([f64; 2], [f64; 2]) -> f64;
+
+/// Products of two modes' (deflection, rate / omega), the first the one that the force acts on.
+fn products() -> Vec<Product> {
+    vec![
+        |[a, _], [b, _]| a * b,
+        |[a, _], [_, b]| a * b,
+        |[_, a], [b, _]| a * b,
+        |[_, a], [_, b]| a * b,
+        |_, [b, _]| b * b,
+        |_, [b, p]| b * p,
+        |_, [_, p]| p * p,
+        |[a, _], [b, p]| a * (b * b + p * p),
+        |[_, a], [b, p]| a * (b * b + p * p),
+    ]
+}
+
+fn with_coupling(effects: &Effects, [mode, other]: [usize; 2], term: Product) -> Effects {
+    let mut effects = effects.clone();
+    effects.modal_force.push(Arc::new(move |motion, acceleration| {
+        let state = |m: usize| Some([*motion.position.get(m)?, motion.velocity.get(m)? / motion.omega.get(m)?]);
+        if let (Some(a), Some(w), Some(own), Some(of)) =
+            (acceleration.get_mut(mode), motion.omega.get(mode), state(mode), state(other))
+        {
+            *a += SMALL * w * w * term(own, of);
+        }
+    }));
+    effects
+}
+
+fn with_input(effects: &Effects, map: Arc<dyn Fn(f64) -> f64 + Send + Sync>) -> Effects {
+    let mut effects = effects.clone();
+    effects.input.push(Arc::new(move |u| u + SMALL * map(u)));
+    effects
+}
+
+/// Polynomials in time of each stretch's first channel, and cosine and sine of the residual's largest line.
+fn slow(bench: &Bench, fit: &Fit) -> Vec<Vec<f64>> {
+    let layout = &bench.layout;
+    let over = |value: &dyn Fn(usize, f64) -> f64| {
+        let mut column = vec![0.0; bench.output.len()];
+        for e in 0..layout.stretches() {
+            let n = layout.samples(e);
+            let time = |k: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
+            let place = layout.part(e, 0, 0, n);
+            column[place].iter_mut().enumerate().for_each(|(k, to)| *to = value(k, time(k)));
+        }
+        column
+    };
+    let mut columns: Vec<Vec<f64>> = (1..=4).map(|power| over(&|_, time: f64| time.powi(power))).collect();
+    for frequency_hz in peaks(first_channel(bench, &fit.residual), bench.interval_s).into_iter().take(1) {
+        let angle = 2.0 * std::f64::consts::PI * frequency_hz * bench.interval_s;
+        columns.push(over(&|k, _| (angle * k as f64).cos()));
+        columns.push(over(&|k, _| (angle * k as f64).sin()));
+    }
+    columns
+}

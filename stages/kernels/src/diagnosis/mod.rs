@@ -1,0 +1,41 @@
+//! What a linear model gets wrong in measured runs of a system: the verdict, the causes by name, the extended model.
+//!
+//! [`diagnose`] is the front door. In reading order: data (runs, stretches, parts to judge on), dynamics (what is
+//! simulated), fit (least squares of the free-run error, blocks, folds), baseline (the linear model, found by itself),
+//! score_test (which causes could make what is left), selection (forward steps, backward elimination, exchange),
+//! lack_of_fit (whether anything systematic remains), chain (linear parts around a static curve, where no causes
+//! account for the data), validation (parts that chose nothing), story (what a person looks
+//! at), answer.
+//!
+//! Two kinds of measurement have equations of their own: an axis under a feedback controller ([`closed_loop`]), whose
+//! drive depends on its output, and a steady oscillation ([`steady`]), which says nothing of a decay but everything of
+//! the detector's curve.
+
+mod answer;
+mod baseline;
+mod chain;
+pub mod closed_loop;
+mod data;
+mod diagnose;
+mod dynamics;
+mod error;
+mod fit;
+mod lack_of_fit;
+mod options;
+mod score_test;
+mod selection;
+pub mod steady;
+mod story;
+#[cfg(test)]
+mod tests;
+mod validation;
+pub mod verdict;
+
+pub use data::{Bench, FineInput, Part, PartStart, Record, Stretch};
+pub use diagnose::{Diagnosed, diagnose};
+pub use dynamics::{Added, Kind, Modal, Model, Section, State, Weights};
+pub use error::DiagnosisError;
+pub use fit::Fit;
+pub use lack_of_fit::Misfit;
+pub use options::DiagnosisOptions;
+pub use story::{Binned, Spectra, Story};

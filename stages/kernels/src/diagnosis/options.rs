@@ -1,0 +1,43 @@
+//! What a diagnosis is asked for.
+
+use super::data::{Part, Stretch};
+use crate::causes::Cause;
+
+/// Settings; the defaults suit a record whose noise is white.
+#[derive(Clone)]
+pub struct DiagnosisOptions {
+    /// Stretches that choose the causes and fit everything.
+    pub training: Vec<Stretch>,
+    /// Parts to judge on.
+    pub parts: Vec<Part>,
+    /// Rate of false alarms over all candidates together.
+    pub false_alarm_rate: f64,
+    /// Least share by which a cause has to lower the held-out error.
+    pub least_gain: f64,
+    /// Remaining misfit over the rest of the residual, both root mean squares, up to which causes are named.
+    pub tolerated_misfit: f64,
+    /// Most causes.
+    pub most_causes: usize,
+    /// Causes that are tried, as far as the data have what they need.
+    pub candidates: Vec<&'static dyn Cause>,
+    /// Unit of the output.
+    pub output_unit: String,
+    /// Unit of the input.
+    pub input_unit: String,
+}
+
+impl Default for DiagnosisOptions {
+    fn default() -> Self {
+        Self {
+            training: Vec::new(),
+            parts: Vec::new(),
+            false_alarm_rate: 0.01,
+            least_gain: 0.0005,
+            tolerated_misfit: 0.25,
+            most_causes: 8,
+            candidates: crate::causes::CATALOGUE.to_vec(),
+            output_unit: "V".to_owned(),
+            input_unit: "V".to_owned(),
+        }
+    }
+}

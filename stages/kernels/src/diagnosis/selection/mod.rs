@@ -1,0 +1,341 @@
+//! Which causes to add: greedily, then each again against its rivals.
+
+use super::data::Bench;
+use super::dynamics::Model;
+use super::fit::{Blocks, Fit, dot};
+use super::lack_of_fit::{Floor, misfit};
+use super::options::DiagnosisOptions;
+use super::score_test::{Candidate, Promise, Sample, screen, significance};
+use crate::causes::Cause;
+
+/// Candidates that are fitted at each step.
+const REFITTED: usize = 5;
+/// Samples times steps of a fit that only has to be compared: ten steps of many samples.
+const WORK: usize = 160_000;
+/// Times that a model may be changed after its causes were held against their rivals.
+const ROUNDS: usize = 4;
+/// Rivals that a named cause is held against.
+const RIVALS: usize = 2;
+/// Predictable over unpredictable part of what a model leaves, both rms, from which on another model is looked for: half
+/// of the squared residual.
+const MUCH: f64 = 1.0;
+/// Last causes that another search goes on without.
+const AGAIN: usize = 2;
+/// Two models tie whose losses differ by less than this many variances of the floor: a likelihood ratio of 7.
+const TIE: f64 = 4.0;
+
+/// A model with what it loses on folds that it has not seen, block by block.
+#[derive(Clone)]
+pub(crate) struct Judged {
+    pub fit: Fit,
+    pub held_out: Vec<f64>,
+}
+
+impl Judged {
+    pub fn new(fit: Fit, bench: &Bench, blocks: &Blocks) -> Self {
+        let held_out = fit.moments(bench, blocks).held_out(0.0);
+        Self { fit, held_out }
+    }
+
+    /// Loss on folds that were not seen.
+    pub fn unseen(&self) -> f64 {
+        self.held_out.iter().sum()
+    }
+}
+
+/// A cause that was chosen, and what it was held against.
+#[derive(Clone)]
+pub(crate) struct Chosen {
+    /// Its id.
+    pub id: &'static str,
+    /// Its place among the model's causes.
+    pub place: usize,
+    /// Corrected for all candidates and their trials.
+    pub p_value: f64,
+    /// Ratio of the score's scatter between blocks to that of white residuals.
+    pub inflation: f64,
+    /// The best model with another cause in its place: id, share of the gain.
+    pub runner_up: Option<(&'static str, f64)>,
+    /// Whether the two can't be told apart.
+    pub tied: bool,
+}
+
+/// What the search found.
+pub(crate) struct Choice {
+    /// The baseline and each model with one more cause, in order: rung n has n causes.
+    pub ladder: Vec<Judged>,
+    /// The causes of the last.
+    pub chosen: Vec<Chosen>,
+    /// What came nearest where nothing was added: id, share of the squared residual that it would take.
+    pub nearest: Vec<(&'static str, f64)>,
+}
+
+impl Choice {
+    /// Loss of its last model on folds that it has not seen.
+    fn unseen(&self) -> f64 {
+        self.ladder.last().map_or(f64::INFINITY, Judged::unseen)
+    }
+}
+
+/// All that a step of the search looks at.
+pub(crate) struct Search<'a> {
+    pub bench: &'a Bench,
+    pub blocks: Blocks,
+    pub options: &'a DiagnosisOptions,
+    pub candidates: Vec<Candidate>,
+    /// Trials of all candidates together.
+    pub trials: usize,
+}
+
+impl Search<'_> {
+    /// Adds causes until nothing is significant, drops what later ones make superfluous, exchanges what a rival does
+    /// better, and tries what would have come in the place of each.
+    ///
+    /// # Method
+    /// Score screen, joint refits of the best five, the largest gain of the log likelihood less the
+    /// Bayesian penalty; a cause stays while its F test by blocks, corrected for the number of trials, and its share of
+    /// the held-out error both pass.
+    /// # Source
+    /// S. A. Billings, Nonlinear System Identification, 2013, chapter 3, on forward selection; G. Schwarz, Ann. Stat. 6
+    /// (1978) 461.
+    pub fn run(&self, baseline: Fit) -> Choice {
+        let mut best = self.from(vec![Judged::new(baseline, self.bench, &self.blocks)], None);
+        let rest = |choice: &Choice| choice.ladder.last().map(|last| misfit(self.bench, &last.fit, &self.blocks));
+        if rest(&best).is_none_or(|misfit| misfit.ratio < MUCH.min(self.options.tolerated_misfit)) {
+            return best;
+        }
+        // the first step is seldom wrong; the cause that helps most alone may be in the way of two that help together
+        for place in (1..best.ladder.len().saturating_sub(1)).rev().take(AGAIN) {
+            let Some(causes) = best.ladder.last().map(|last| &last.fit.model.causes) else { break };
+            let Some(added) = causes.get(place) else { continue };
+            let other = Candidate { cause: added.cause, modes: added.modes.clone() };
+            let next = self.from(best.ladder[..=place].to_vec(), Some(&other));
+            if next.unseen() < best.unseen() {
+                best = next;
+            }
+        }
+        best
+    }
+
+    /// The search from a ladder on, without a candidate.
+    fn from(&self, mut ladder: Vec<Judged>, banned: Option<&Candidate>) -> Choice {
+        let mut chosen = Vec::new();
+        let mut nearest = Vec::new();
+        // an exchange lowers the loss, so that this ends; the bound is for ties by rounding
+        for round in 0..ROUNDS {
+            nearest = self.climb(&mut ladder, banned);
+            match self.examined(&ladder, round + 1 < ROUNDS) {
+                Examined::Stands(causes) => {
+                    chosen = causes;
+                    break;
+                }
+                Examined::Changes(model) => ladder = self.rebuilt(&ladder[0], &model),
+            }
+        }
+        Choice { ladder, chosen, nearest }
+    }
+
+    /// Adds one cause after another; gives what came nearest at the last step.
+    fn climb(&self, ladder: &mut Vec<Judged>, banned: Option<&Candidate>) -> Vec<(&'static str, f64)> {
+        loop {
+            let Some(current) = ladder.last().cloned() else { return Vec::new() };
+            let mut promises = screen(self.bench, &current.fit, &self.candidates);
+            promises.retain(|promise| !banned.is_some_and(|banned| banned.is(&promise.candidate)));
+            let nearest = promises.iter().take(3).map(|p| (p.candidate.id(), p.gain / current.fit.loss)).collect();
+            if current.fit.model.causes.len() >= self.options.most_causes {
+                return nearest;
+            }
+            match self.best(&current, &promises) {
+                Some(next) => ladder.push(next),
+                None => return nearest,
+            }
+        }
+    }
+
+    /// The best of the first few promises that passes.
+    fn best(&self, current: &Judged, promises: &[Promise]) -> Option<Judged> {
+        let promising: Vec<&Promise> =
+            promises.iter().take(REFITTED).filter(|promise| self.could_matter(current, promise)).collect();
+        if promising.is_empty() {
+            return None;
+        }
+        let mut tried: Vec<(f64, Model)> = Vec::new();
+        for promise in promising {
+            let Some(next) = self.extended(&current.fit.model, promise) else { continue };
+            let parameters = next.fit.model.vector().len().saturating_sub(current.fit.model.vector().len()).max(1);
+            let samples = self.bench.count as f64;
+            let gain = 0.5 * samples * (current.fit.loss / next.fit.loss).ln();
+            tried.push((gain - 0.5 * parameters as f64 * samples.ln(), next.fit.model));
+        }
+        tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let sample = self.sample(&current.fit);
+        for (_, model) in tried.into_iter().filter(|(gain, _)| gain.is_finite()) {
+            let next = Judged::new(Fit::new(self.bench, &model, None)?, self.bench, &self.blocks);
+            let which = next.fit.model.causes.len() - 1;
+            if self.passes(&sample, &next, which, current) {
+                return Some(next);
+            }
+        }
+        None
+    }
+
+    /// Whether a promise, taken at its word, could be significant or large: a fit of what is neither is time lost.
+    fn could_matter(&self, current: &Judged, promise: &Promise) -> bool {
+        let mean_square = current.fit.loss / self.bench.count as f64;
+        // a cause that only works beside refitted others holds far more than its secant promises: fits decide
+        promise.gain > 2.0 * mean_square
+    }
+
+    /// Steps of a fit that only has to be compared.
+    fn few(&self) -> usize {
+        (WORK / self.bench.count.max(1)).clamp(10, 40)
+    }
+
+    /// A model in a few steps of its fit.
+    fn compared(&self, model: &Model) -> Option<Judged> {
+        Some(Judged::new(Fit::new(self.bench, model, Some(self.few()))?, self.bench, &self.blocks))
+    }
+
+    fn sample<'b>(&'b self, fit: &'b Fit) -> Sample<'b> {
+        let floor = Floor::new(self.bench, fit, &self.blocks);
+        Sample { bench: self.bench, blocks: &self.blocks, fit, floor }
+    }
+
+    /// A promise fitted jointly with a model.
+    fn extended(&self, model: &Model, promise: &Promise) -> Option<Judged> {
+        let candidate = &promise.candidate;
+        let start = |values: &Vec<f64>| model.with(candidate.cause, &candidate.modes, values.clone());
+        let loss = |values: &Vec<f64>| {
+            let rest = self.bench.residual(&self.bench.simulate(&start(values)));
+            let loss = dot(&rest, &rest);
+            if loss.is_finite() { loss } else { f64::INFINITY }
+        };
+        // the strength that the score asks for may be far outside where it is linear
+        let from = if loss(&promise.values) <= loss(&promise.trial) { &promise.values } else { &promise.trial };
+        self.compared(&start(from))
+    }
+
+    /// Whether cause `which` of a model is significant and large enough against the model without it.
+    fn passes(&self, sample: &Sample<'_>, with: &Judged, which: usize, without: &Judged) -> bool {
+        let gain = without.fit.loss - with.fit.loss;
+        let sign = significance(sample, &with.fit.model, which, gain);
+        let share = 1.0 - (with.fit.loss / without.fit.loss).sqrt();
+        let p_value = self.corrected(sign.p_value, with.fit.model.causes[which].cause);
+        p_value < self.options.false_alarm_rate && share > self.options.least_gain && with.unseen() < without.unseen()
+    }
+
+    /// Bonferroni over all candidates' trials; a frequency is searched among as many as the record resolves.
+    fn corrected(&self, p_value: f64, cause: &dyn Cause) -> f64 {
+        let searched = cause.about().parameters.iter().any(|parameter| parameter.unit == "Hz");
+        let tries = self.trials * if searched { self.bench.layout.samples(0) / 2 } else { 1 };
+        (p_value * tries as f64).min(1.0)
+    }
+
+    /// Holds each cause of the last model against its absence and against its rivals.
+    fn examined(&self, ladder: &[Judged], may_change: bool) -> Examined {
+        let Some(here) = ladder.last() else { return Examined::Stands(Vec::new()) };
+        let sample = self.sample(&here.fit);
+        let mut chosen = Vec::new();
+        for which in 0..here.fit.model.causes.len() {
+            let without = self
+                .compared(&here.fit.model.without(which))
+                .filter(|without| without.fit.loss > here.fit.loss)
+                // the others' values may diverge without it: then the model before it came
+                .or_else(|| self.compared(&ladder.get(which)?.fit.model));
+            let Some(without) = without else { continue };
+            let rival = self.rival(here, which, &without);
+            let found = self.audit(&sample, here, which, &without, rival.as_ref());
+            let share = 1.0 - (here.fit.loss / without.fit.loss).sqrt();
+            let weak = found.p_value > self.options.false_alarm_rate || share < self.options.least_gain;
+            // the last has just passed
+            if may_change && weak && which + 1 < here.fit.model.causes.len() {
+                return Examined::Changes(without.fit.model);
+            }
+            if let Some((rival, _)) = rival.filter(|_| may_change)
+                && rival.fit.loss - here.fit.loss < -TIE * sample.floor.mean_square
+            {
+                return Examined::Changes(rival.fit.model);
+            }
+            chosen.push(found);
+        }
+        Examined::Stands(chosen)
+    }
+
+    /// The best model with another cause in the place of `which`, of another class.
+    fn rival(&self, here: &Judged, which: usize, without: &Judged) -> Option<(Judged, &'static str)> {
+        let about = here.fit.model.causes[which].cause.about();
+        let others: Vec<Candidate> = self
+            .candidates
+            .iter()
+            .filter(|other| !about.class.contains(&other.id()) && !here.fit.model.has(other.cause, &other.modes))
+            .cloned()
+            .collect();
+        let promises = screen(self.bench, &without.fit, &others);
+        let sample = self.sample(&without.fit);
+        let extended = promises.iter().take(RIVALS).filter_map(|promise| {
+            let rival = self.extended(&without.fit.model, promise)?;
+            // what is not significant by itself is no rival
+            self.passes(&sample, &rival, rival.fit.model.causes.len() - 1, without)
+                .then_some((rival, promise.candidate.id()))
+        });
+        extended.min_by(|a, b| a.0.fit.loss.total_cmp(&b.0.fit.loss))
+    }
+
+    /// The ladder to a model's causes, in their order.
+    fn rebuilt(&self, baseline: &Judged, model: &Model) -> Vec<Judged> {
+        let mut ladder = vec![baseline.clone()];
+        for added in &model.causes {
+            let Some(current) = ladder.last() else { break };
+            // from what this rung asks for, not from values that only hold beside the causes to come; where that
+            // diverges, from what hardly acts
+            let again = Candidate { cause: added.cause, modes: added.modes.clone() };
+            let promise = screen(self.bench, &current.fit, &[again]).into_iter().next();
+            let asked = promise.into_iter().flat_map(|promise| [promise.values, promise.trial]);
+            let next = asked.chain([added.values.clone()]).find_map(|values| {
+                Fit::new(self.bench, &current.fit.model.with(added.cause, &added.modes, values), None)
+            });
+            let Some(next) = next else { break };
+            ladder.push(Judged::new(next, self.bench, &self.blocks));
+        }
+        // the last from where it was found, if that is the better
+        let found = Fit::new(self.bench, model, None);
+        if let (Some(last), Some(found)) = (ladder.last_mut(), found)
+            && last.fit.model.causes.len() == model.causes.len()
+            && found.loss < last.fit.loss
+        {
+            *last = Judged::new(found, self.bench, &self.blocks);
+        }
+        ladder
+    }
+
+    /// A cause with its p-value and its runner-up.
+    fn audit(
+        &self,
+        sample: &Sample<'_>,
+        here: &Judged,
+        which: usize,
+        without: &Judged,
+        rival: Option<&(Judged, &'static str)>,
+    ) -> Chosen {
+        let added = &here.fit.model.causes[which];
+        let gain = without.fit.loss - here.fit.loss;
+        let sign = significance(sample, &here.fit.model, which, gain);
+        let tie = TIE * sample.floor.mean_square * sign.inflation.max(1.0);
+        Chosen {
+            id: added.id(),
+            place: which,
+            p_value: self.corrected(sign.p_value, added.cause),
+            inflation: sign.inflation,
+            tied: rival.is_some_and(|(rival, _)| rival.fit.loss - here.fit.loss < tie),
+            runner_up: rival.map(|(rival, id)| (*id, (without.fit.loss - rival.fit.loss) / gain)),
+        }
+    }
+}
+
+/// Whether a model's causes stand.
+enum Examined {
+    /// Each, with what it was held against.
+    Stands(Vec<Chosen>),
+    /// The model without a superfluous cause, or with a better one in its place.
+    Changes(Model),
+}

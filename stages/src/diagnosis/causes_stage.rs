@@ -1,0 +1,335 @@
+//! The stage `diagnosis.causes`.
+
+use afmid_pipeline::{
+    Array, Axis, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::causes_story::{error_array, error_table, ladder};
+use super::{closed_loop, steady};
+use crate::artifacts::{DataSet, Decays, Pair};
+use crate::causes::{Cause, Domain, catalogue};
+use afmid_kernels::diagnosis::verdict::Diagnosis;
+use afmid_kernels::diagnosis::{Diagnosed, DiagnosisOptions, Part, PartStart, Record, Story, Stretch, diagnose};
+
+/// Says what a linear model gets wrong in a measured input and output, in free decays, in an axis under a controller, or
+/// in a steady oscillation: names the causes, extends the model, measures the gain.
+///
+/// # Model
+/// Modes `q'' + (w/Q) q' + w^2 q = w^2 g u(t)` and real poles, as many as identification finds by itself, free-running
+/// from a state of each stretch's own, the input held between samples; whatever else there is, is a cause of the
+/// catalogue (`afmid causes`): stiffness, damping, friction and couplings of the modes, static maps of input and output,
+/// another course of the input between samples, offset, drift, lines. Without an input it is a free decay. With a
+/// `reference` the drive depends on the output: an axis `M v' + Fv v + Fc sgn v + F0 = G u` under a controller that is
+/// identified too, the loop simulated from its reference. `records` hold a steady oscillation: harmonics against a
+/// detector's static curves.
+/// # Method
+/// Least squares of the free-run error on what is learnt from; causes by score test, joint refits, F tests by blocks
+/// against the part of the residual that no general term predicts, corrected for all trials, each of which has to lower
+/// the error of held-out hits or folds; greedily, each held against its absence and its best rival at the end. Nothing
+/// is named where no linear model describes the linear part.
+/// # Shapes
+/// `summary`: the answer as JSON; `ladder` by model; `simulation` over the time of what is learnt from, of the largest
+/// hit where there are several; `errors` by frequency and by the output's size; `judged` by stretches of time of the
+/// parts.
+/// # Units
+/// Those of `pair` or `decays`; seconds, Hz.
+/// # Accuracy
+/// Right names, errors and false alarms over many seeds, and measured benchmarks: docs/diagnosis.md.
+/// # Errors
+/// None or several of `pair`, `decays` and `records`, several inputs without a `reference`, a missing input, parts beyond
+/// the record, an output that does not move, an unknown candidate, a drive that follows from no reference, an oscillation
+/// that is not steady.
+/// # Source
+/// J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28; S. A. Billings, Nonlinear System Identification, 2013,
+/// chapter 3; A. Janot, P.-O. Vandanjon, M. Gautier, IEEE Trans. Control Syst. Technol. 22 (2014) 132; D. Rugar, H. J.
+/// Mamin, P. Guethner, Appl. Phys. Lett. 55 (1989) 2588.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CausesDiagnose {
+    /// Parts of the record to judge on, by name. None: then gains are those on folds of the identification stretch.
+    pub parts: Vec<JudgedPart>,
+    /// Hits of `decays` to judge on, counted from 1: they choose nothing, but set their own amplitudes and phases.
+    #[schemars(inner(range(min = 1, max = 1_000_000)))]
+    pub judged_hits: Vec<usize>,
+    /// Rate of false alarms over all candidates together.
+    #[schemars(range(min = 1e-6, max = 0.2))]
+    pub false_alarm_rate: f64,
+    /// Least share by which a cause has to lower the free-run error. Why: below what a significant cause gains in some
+    /// thousand samples of white noise; on measured data, where everything is significant, some per cent keep
+    /// micro-terms from piling up.
+    #[schemars(range(min = 0.0, max = 0.9))]
+    pub least_gain: f64,
+    /// Remaining systematic misfit over the rest of the residual, as root mean squares, up to which causes are named.
+    /// Why: six per cent of the squared residual; more on measured data whose noise is far below any model.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub tolerated_misfit: f64,
+    /// Causes that are left out of the catalogue.
+    pub without: Vec<String>,
+    /// Most causes.
+    #[schemars(range(min = 1, max = 20))]
+    pub most_causes: usize,
+    /// Ids of the causes that are tried. Empty: all that the data can show.
+    pub candidates: Vec<String>,
+    /// The input that the output is to follow, where a controller makes the other one, the drive: its channel's name.
+    /// Empty: the input does not depend on the output.
+    pub reference: String,
+    /// Force per unit of the drive, with a `reference`.
+    #[schemars(range(min = -1e12, max = 1e12))]
+    pub drive_scale: f64,
+    /// Unit of that force.
+    pub force_unit: String,
+}
+
+/// A part of the record that chooses nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JudgedPart {
+    /// Its name in the answer.
+    pub name: String,
+    /// First sample of the record, from 0.
+    pub first: usize,
+    /// One past the last.
+    pub end: usize,
+    /// Samples at its beginning that fit its initial state and are not scored; 0: the simulation of the identification
+    /// stretch goes on into it.
+    pub state_samples: usize,
+}
+
+impl Default for CausesDiagnose {
+    fn default() -> Self {
+        let options = DiagnosisOptions::default();
+        Self {
+            parts: Vec::new(),
+            judged_hits: Vec::new(),
+            false_alarm_rate: options.false_alarm_rate,
+            least_gain: options.least_gain,
+            tolerated_misfit: options.tolerated_misfit,
+            most_causes: options.most_causes,
+            candidates: Vec::new(),
+            without: Vec::new(),
+            reference: String::new(),
+            drive_scale: 1.0,
+            force_unit: "N".to_owned(),
+        }
+    }
+}
+
+const PAIR: Port<Array> =
+    Port::optional("pair", "pair", "input and output over time, whole and identification stretch");
+const DECAYS: Port<Array> = Port::optional("decays", "decays", "free decays, hit by hit and channel by channel");
+const RECORDS: Port<Recording> = Port::optional("records", "records", "the record of a steady oscillation");
+const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict: causes, evidence, gains, ladder");
+const LADDER: Port<Table> = Port::new("ladder", "model-ladder", "models, each with one more cause");
+const SIMULATION: Port<Array> =
+    Port::new("simulation", "simulation", "the identification stretch, simulated before and after the extension");
+const ERRORS: Port<Array> = Port::new(
+    "errors",
+    "diagnosis-errors",
+    "errors over the identification stretch, by frequency and by the output's size",
+);
+const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over the time of the parts to judge on");
+
+impl Stage for CausesDiagnose {
+    const SPEC: Spec = Spec {
+        name: "diagnosis.causes",
+        version: 1,
+        summary: "names what a linear model gets wrong in inputs and outputs, decays, servo axes, steady oscillations",
+        inputs: &[PAIR.spec(), DECAYS.spec(), RECORDS.spec()],
+        outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec()],
+        source: "J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28",
+        ..Spec::STORED
+    };
+
+    fn check(&self, faults: &mut Faults) {
+        for part in self.parts.iter().filter(|part| part.first >= part.end) {
+            faults.add(StageError::new(format!(
+                "part `{}` is samples {} to {}, wanted the first sample and one past the last",
+                part.name, part.first, part.end
+            )));
+        }
+    }
+
+    fn depends_on(&self) -> Vec<String> {
+        crate::causes::added()
+    }
+
+    fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
+        self.known_candidates()?;
+        let wired = (inputs.get(&PAIR).ok(), inputs.get(&DECAYS).ok(), inputs.get(&RECORDS).ok());
+        let answer = match wired {
+            (Some(pair), None, None) if !self.reference.is_empty() => closed_loop::answer(self, &Pair::new(pair))?,
+            (Some(pair), None, None) => self.extended(&self.forced(&Pair::new(pair))?)?,
+            (None, Some(decays), None) => self.extended(&self.decays(&Decays::new(decays)?)?)?,
+            (None, None, Some(records)) => steady::answer(self, records)?,
+            (pair, decays, records) => {
+                let several = [pair.is_some(), decays.is_some(), records.is_some()].into_iter().any(|wired| wired);
+                let found = if several { "several are" } else { "none is" };
+                return Err(StageError::new(format!("wanted one of `pair`, `decays`, `records`: {found} wired"))
+                    .help("wire `pair` from io.columns, `decays` from events.decay or `records` from io.records"));
+            }
+        };
+        Ok(Ports::new()
+            .with(&SUMMARY, Document::new(&answer.diagnosis)?)
+            .with(&LADDER, ladder(&answer.diagnosis))
+            .with(&SIMULATION, answer.simulation)
+            .with(&ERRORS, error_array(&answer.story, &answer.unit))
+            .with(&JUDGED, error_table(&answer.story, &answer.unit)))
+    }
+
+    fn examples() -> Vec<Example> {
+        super::example::examples()
+    }
+}
+
+/// What every way of diagnosing gives.
+pub(super) struct Answer {
+    pub diagnosis: Diagnosis,
+    pub story: Story,
+    pub simulation: Array,
+    /// Unit of the output.
+    pub unit: String,
+}
+
+/// What was measured, as the kernel takes it.
+struct Measured<'a> {
+    records: Vec<Record<'a>>,
+    training: Vec<Stretch>,
+    parts: Vec<Part>,
+    interval_s: f64,
+    output_unit: String,
+    input_unit: String,
+}
+
+impl CausesDiagnose {
+    /// A measured input and output.
+    fn forced<'a>(&self, pair: &Pair<'a>) -> Result<Measured<'a>, StageError> {
+        let (rate, input, output) = (pair.sample_rate_hz()?, pair.force(DataSet::All)?, pair.response(DataSet::All)?);
+        if input.len() != output.len() {
+            let inputs = input.len() / output.len().max(1);
+            return Err(StageError::new(format!("{inputs} inputs, wanted one"))
+                .help("choose one column as input; a system under several inputs is beyond this stage"));
+        }
+        let learnt = pair.own_time(DataSet::Identification)?;
+        let first = learnt.first().zip(pair.time()?.first()).map_or(0.0, |(a, b)| ((a - b) * rate).round()) as usize;
+        let [input_unit, output_unit] = pair.units()?.map(str::to_owned);
+        let part = |part: &JudgedPart| Part {
+            name: part.name.clone(),
+            stretch: Stretch { record: 0, first: part.first, end: part.end },
+            start: match part.state_samples {
+                0 => PartStart::GoesOn,
+                count => PartStart::FirstSamples(count),
+            },
+        };
+        Ok(Measured {
+            records: vec![Record { input, outputs: vec![output] }],
+            training: vec![Stretch { record: 0, first, end: first + learnt.len() }],
+            parts: self.parts.iter().map(part).collect(),
+            interval_s: 1.0 / rate,
+            output_unit,
+            input_unit,
+        })
+    }
+
+    /// Free decays: all hits but the judged ones are learnt from.
+    fn decays<'a>(&self, decays: &Decays<'a>) -> Result<Measured<'a>, StageError> {
+        let records: Vec<Record<'a>> =
+            decays.hits.iter().map(|hit| Record { input: &[], outputs: hit.clone() }).collect();
+        if let Some(number) = self.judged_hits.iter().find(|number| !(1..=records.len()).contains(*number)) {
+            let found = StageError::new(format!("`judged_hits` names hit {number} of {}", records.len()));
+            return Err(found.help(format!("name hits from 1 to {}", records.len())));
+        }
+        let whole = |record: usize| Stretch { record, first: 0, end: records[record].samples() };
+        let judged = |number: &usize| Part {
+            name: format!("hit {number}"),
+            stretch: whole(number - 1),
+            start: PartStart::Whole,
+        };
+        let training = (0..records.len()).filter(|r| !self.judged_hits.contains(&(r + 1))).map(whole).collect();
+        Ok(Measured {
+            training,
+            parts: self.judged_hits.iter().map(judged).collect(),
+            records,
+            interval_s: 1.0 / decays.sample_rate_hz,
+            output_unit: decays.sensors.first().map_or(String::new(), |sensor| sensor.unit.clone()),
+            input_unit: String::new(),
+        })
+    }
+
+    /// Errors: a name of `candidates` or `without` that is no cause's.
+    fn known_candidates(&self) -> Result<(), StageError> {
+        let known = |id: &&String| catalogue().iter().any(|cause| cause.about().id == **id);
+        match self.candidates.iter().chain(&self.without).find(|id| !known(id)) {
+            Some(id) => Err(StageError::new(format!("there is no cause `{id}`")).help("`afmid causes` lists them")),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether a cause may be named.
+    pub(super) fn wants(&self, id: &str) -> bool {
+        (self.candidates.is_empty() || self.candidates.iter().any(|wanted| wanted == id))
+            && !self.without.iter().any(|banned| banned == id)
+    }
+
+    /// The linear model of what was measured, extended.
+    fn extended(&self, measured: &Measured<'_>) -> Result<Answer, StageError> {
+        let options = self.options(measured);
+        let found = diagnose(&measured.records, measured.interval_s, &options).map_err(StageError::from_error)?;
+        Ok(Answer {
+            simulation: measured.simulation(&found),
+            diagnosis: found.diagnosis,
+            story: found.story,
+            unit: options.output_unit,
+        })
+    }
+
+    fn options(&self, measured: &Measured<'_>) -> DiagnosisOptions {
+        let usable = |cause: &&'static dyn Cause| {
+            let about = cause.about();
+            about.domain != Domain::Release && self.wants(about.id)
+        };
+        DiagnosisOptions {
+            training: measured.training.clone(),
+            parts: measured.parts.clone(),
+            false_alarm_rate: self.false_alarm_rate,
+            least_gain: self.least_gain,
+            tolerated_misfit: self.tolerated_misfit,
+            most_causes: self.most_causes,
+            candidates: catalogue().into_iter().filter(usable).collect(),
+            output_unit: measured.output_unit.clone(),
+            input_unit: measured.input_unit.clone(),
+        }
+    }
+}
+
+impl Measured<'_> {
+    /// The largest stretch's first channel, measured and simulated.
+    fn simulation(&self, found: &Diagnosed) -> Array {
+        let channels = self.records.first().map_or(1, |record| record.outputs.len());
+        let mut begin = 0;
+        let mut largest = (0.0, 0..0, 0.0);
+        for stretch in &self.training {
+            let place = begin..begin + stretch.samples();
+            let size =
+                found.output[place.clone()].iter().filter(|y| y.is_finite()).fold(0.0, |m: f64, y| m.max(y.abs()));
+            if size > largest.0 {
+                largest = (size, place, stretch.first as f64 * self.interval_s);
+            }
+            begin += stretch.samples() * channels;
+        }
+        let (_, place, from) = largest;
+        let time = (0..place.len()).map(|k| from + k as f64 * self.interval_s).collect();
+        let part = |values: &[f64]| values[place.clone()].to_vec();
+        simulation(time, &self.output_unit, [part(&found.output), part(&found.before), part(&found.after)])
+    }
+}
+
+/// Measured, simulated by the linear model, simulated with the causes.
+pub(super) fn simulation(time: Vec<f64>, unit: &str, [measured, before, after]: [Vec<f64>; 3]) -> Array {
+    let over = &["time"];
+    Array::over(vec![Axis::new("time", "s", "time since the first sample", time)])
+        .with("measured", unit, "output", over, measured)
+        .with("before", unit, "linear model", over, before)
+        .with("after", unit, "with the causes", over, after)
+}
