@@ -1,8 +1,7 @@
 //! A linear system seen through a curve.
 
-use std::sync::Arc;
-
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::wiener_hammerstein_curve::{CURVE, cubic};
+use super::{About, Cause, Domain, Identifiable, Part, Scene};
 use crate::effects::Effects;
 
 /// `y = f(G u)`.
@@ -13,17 +12,7 @@ const ABOUT: About = About {
     physics: "the sensor or the amplifier behind the system is bent: a static curve after all dynamics",
     part: Part::Detector,
     domain: Domain::InputOutput,
-    parameters: &[
-        Parameter {
-            name: "bend",
-            unit: "1",
-            meaning: "departure of the curve from a straight line over what it passes, both rms; simulated as a cubic of a signal of size 1",
-            low: 0.0,
-            high: 1.0,
-        },
-        Parameter { name: "poles_before", unit: "1", meaning: "poles before the curve", low: 0.0, high: 20.0 },
-        Parameter { name: "poles_behind", unit: "1", meaning: "poles behind the curve", low: 0.0, high: 20.0 },
-    ],
+    parameters: CURVE,
     class: &["wiener-curve"],
     resembles: "wiener-hammerstein-curve with a fast part behind the curve; output-cubic: the same beside an oscillator",
     next_measurement: "measure the output by a second sensor: it is straight",
@@ -37,8 +26,7 @@ impl Cause for WienerCurve {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let bend = values[0];
-        effects.optics.push(Arc::new(move |x| x - bend * x * x * x));
+        effects.optics.push(cubic(values[0]));
     }
 
     fn trials(&self, _scene: &Scene) -> Vec<Vec<f64>> {

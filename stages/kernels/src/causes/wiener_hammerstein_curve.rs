@@ -3,7 +3,26 @@
 use std::sync::Arc;
 
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, StaticMap};
+
+/// Numbers of a static curve between linear parts.
+pub(super) const CURVE: &[Parameter] = &[
+    Parameter {
+        name: "bend",
+        unit: "1",
+        meaning: "departure of the curve from a straight line over what it passes, both rms; simulated as a cubic \
+                  of a signal of size 1",
+        low: 0.0,
+        high: 1.0,
+    },
+    Parameter { name: "poles_before", unit: "1", meaning: "poles before the curve", low: 0.0, high: 20.0 },
+    Parameter { name: "poles_behind", unit: "1", meaning: "poles behind the curve", low: 0.0, high: 20.0 },
+];
+
+/// A cubic that bends that much at size 1.
+pub(super) fn cubic(bend: f64) -> StaticMap {
+    Arc::new(move |x| x - bend * x * x * x)
+}
 
 /// `y = G2 f(G1 u)`.
 pub struct WienerHammersteinCurve;
@@ -13,17 +32,7 @@ const ABOUT: About = About {
     physics: "a static curve between two parts of the dynamics: an amplifier, a diode, a valve between two filters",
     part: Part::Detector,
     domain: Domain::InputOutput,
-    parameters: &[
-        Parameter {
-            name: "bend",
-            unit: "1",
-            meaning: "departure of the curve from a straight line over what it passes, both rms; simulated as a cubic of a signal of size 1",
-            low: 0.0,
-            high: 1.0,
-        },
-        Parameter { name: "poles_before", unit: "1", meaning: "poles before the curve", low: 0.0, high: 20.0 },
-        Parameter { name: "poles_behind", unit: "1", meaning: "poles behind the curve", low: 0.0, high: 20.0 },
-    ],
+    parameters: CURVE,
     class: &["wiener-hammerstein-curve"],
     resembles: "wiener-curve and hammerstein-curve, where one of the parts is fast",
     next_measurement: "measure between the two parts: what comes before the curve is linear in the input",
@@ -37,8 +46,7 @@ impl Cause for WienerHammersteinCurve {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let bend = values[0];
-        effects.optics.push(Arc::new(move |x| x - bend * x * x * x));
+        effects.optics.push(cubic(values[0]));
     }
 
     fn trials(&self, _scene: &Scene) -> Vec<Vec<f64>> {
