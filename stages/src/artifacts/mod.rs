@@ -45,7 +45,9 @@ pub(crate) use model::{
     t0_ambiguity_s,
 };
 pub(crate) use modes::{mode_document, mode_table, modes};
-pub(crate) use pair::{NewPair, Pair, PairSeries, PairSet, with_channel_names, with_counts, with_record_starts};
+pub(crate) use pair::{
+    NewPair, Pair, PairSeries, PairSet, with_channel_names, with_counts, with_record_starts, with_taken_off,
+};
 pub(crate) use quantity::Understood;
 pub use quantity::quantity_of_unit;
 pub(crate) use ringing::{ringing, ringing_array};

@@ -17,6 +17,9 @@ const WINDOW_KIND: &str = "window_kind";
 const INPUTS: &str = "inputs";
 const OUTPUTS: &str = "outputs";
 const FIRST_SAMPLE: &str = "first_sample";
+const INPUT_LEVEL: &str = "input_level";
+const OUTPUT_LEVEL: &str = "output_level";
+const TAKEN_OFF: &str = "taken_off";
 
 /// Inputs (`force`, over `input` too if there are several) and output (`response`, over `output` likewise) over time since
 /// sample `t0_sample`, of all events and of each half, with the output's standard error where it is known.
@@ -161,6 +164,17 @@ impl<'a> Pair<'a> {
     /// How many events are in these, where it is stated.
     pub fn count(&self, set: DataSet) -> Option<f64> {
         self.array.attributes.get(&set.of(COUNT)).and_then(Attribute::as_f64)
+    }
+
+    /// What was taken off its channels: `none`, `mean` or `line`; `none` where it is not stated.
+    pub fn taken_off(&self) -> &'a str {
+        self.array.attributes.get(TAKEN_OFF).and_then(Attribute::as_str).unwrap_or("none")
+    }
+
+    /// Means that were taken off the one input and the one output of one record. None: there are several, or lines were.
+    pub fn levels(&self) -> Option<[f64; 2]> {
+        let level = |name: &str| self.array.attributes.get(name).and_then(Attribute::as_f64);
+        Some([level(INPUT_LEVEL)?, level(OUTPUT_LEVEL)?])
     }
 
     /// Newtons per volt of force, where both are there.
@@ -323,6 +337,15 @@ pub(crate) fn with_record_starts(mut pair: Array, starts: &[usize]) -> Array {
 /// States the names of the channels.
 pub(crate) fn with_channel_names(pair: Array, inputs: &[String], outputs: &[String]) -> Array {
     pair.attribute(INPUTS, inputs.join("\n")).attribute(OUTPUTS, outputs.join("\n"))
+}
+
+/// States what was taken off its channels, and the means of one input and one output.
+pub(crate) fn with_taken_off(pair: Array, what: &str, levels: Option<[f64; 2]>) -> Array {
+    let pair = pair.attribute(TAKEN_OFF, what.to_owned());
+    match levels {
+        Some([input, output]) => pair.attribute(INPUT_LEVEL, input).attribute(OUTPUT_LEVEL, output),
+        None => pair,
+    }
 }
 
 /// States how many events are in a set, and how wide the interval is in which t0 may lie.

@@ -3,6 +3,7 @@
 use afmid_pipeline::{
     Array, Axis, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
 };
+use afmid_pipeline::config::nearest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -149,18 +150,44 @@ impl Stage for CausesDiagnose {
                 part.name, part.first, part.end
             )));
         }
+        let all = catalogue();
+        let known: Vec<&str> = all.iter().map(|cause| cause.about().id).collect();
+        for (list, ids) in [("candidates", &self.candidates), ("without", &self.without)] {
+            for id in ids.iter().filter(|id| !known.contains(&id.as_str())) {
+                let help = match nearest(id, known.iter().copied()) {
+                    Some(name) => format!("did you mean `{name}`?"),
+                    None => "`afmid causes` lists them".to_owned(),
+                };
+                faults.add(StageError::new(format!("`{list}` names `{id}`, which is no cause")).help(help));
+            }
+        }
+        if let Some(id) = self.candidates.iter().find(|id| self.without.contains(id)) {
+            faults.add(StageError::new(format!("`{id}` is in `candidates` and in `without`")).help("leave it out of one"));
+        }
     }
 
     fn depends_on(&self) -> Vec<String> {
         crate::causes::added()
     }
 
-    fn run(&self, inputs: &Ports, _cx: &Context) -> Result<Ports, StageError> {
-        self.known_candidates()?;
+    fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let wired = (inputs.get(&PAIR).ok(), inputs.get(&DECAYS).ok(), inputs.get(&RECORDS).ok());
         let answer = match wired {
-            (Some(pair), None, None) if !self.reference.is_empty() => closed_loop::answer(self, &Pair::new(pair))?,
-            (Some(pair), None, None) => self.extended(&self.forced(&Pair::new(pair))?)?,
+            (Some(pair), None, None) if !self.reference.is_empty() => {
+                let pair = Pair::new(pair);
+                if pair.taken_off() != "none" {
+                    cx.warn(format!("channels without their {}s: {ZERO}", pair.taken_off()));
+                }
+                closed_loop::answer(self, &pair)?
+            }
+            (Some(pair), None, None) => {
+                let pair = Pair::new(pair);
+                if pair.taken_off() != "none" && pair.levels().is_none() {
+                    cx.warn(format!("data without their {}s: {ZERO}", pair.taken_off()));
+                }
+                let whole = Restored::new(&pair)?;
+                self.extended(&self.forced(&pair, &whole)?)?
+            }
             (None, Some(decays), None) => self.extended(&self.decays(&Decays::new(decays)?)?)?,
             (None, None, Some(records)) => steady::answer(self, records)?,
             (pair, decays, records) => {
@@ -180,6 +207,24 @@ impl Stage for CausesDiagnose {
 
     fn examples() -> Vec<Example> {
         super::example::examples()
+    }
+}
+
+/// Why what was taken off matters.
+const ZERO: &str = "where a spring, a sensor or a friction is straight is not known any more; set `remove = \"none\"` \
+                    in io.columns";
+
+/// Input and output with the means that were taken off them: a curve has its zero where the record has.
+struct Restored {
+    input: Vec<f64>,
+    output: Vec<f64>,
+}
+
+impl Restored {
+    fn new(pair: &Pair<'_>) -> Result<Self, StageError> {
+        let [input, output] = pair.levels().unwrap_or_default();
+        let with = |values: &[f64], level: f64| values.iter().map(|value| value + level).collect();
+        Ok(Self { input: with(pair.force(DataSet::All)?, input), output: with(pair.response(DataSet::All)?, output) })
     }
 }
 
@@ -204,8 +249,8 @@ struct Measured<'a> {
 
 impl CausesDiagnose {
     /// A measured input and output.
-    fn forced<'a>(&self, pair: &Pair<'a>) -> Result<Measured<'a>, StageError> {
-        let (rate, input, output) = (pair.sample_rate_hz()?, pair.force(DataSet::All)?, pair.response(DataSet::All)?);
+    fn forced<'a>(&self, pair: &Pair<'_>, whole: &'a Restored) -> Result<Measured<'a>, StageError> {
+        let (rate, input, output) = (pair.sample_rate_hz()?, &whole.input[..], &whole.output[..]);
         if input.len() != output.len() {
             let inputs = input.len() / output.len().max(1);
             return Err(StageError::new(format!("{inputs} inputs, wanted one"))
@@ -255,15 +300,6 @@ impl CausesDiagnose {
             output_unit: decays.sensors.first().map_or(String::new(), |sensor| sensor.unit.clone()),
             input_unit: String::new(),
         })
-    }
-
-    /// Errors: a name of `candidates` or `without` that is no cause's.
-    fn known_candidates(&self) -> Result<(), StageError> {
-        let known = |id: &&String| catalogue().iter().any(|cause| cause.about().id == **id);
-        match self.candidates.iter().chain(&self.without).find(|id| !known(id)) {
-            Some(id) => Err(StageError::new(format!("there is no cause `{id}`")).help("`afmid causes` lists them")),
-            None => Ok(()),
-        }
     }
 
     /// Whether a cause may be named.

@@ -25,6 +25,8 @@ const BLOCKS: usize = 32;
 pub(super) struct Chain {
     /// Its simulation of the stretch that was learnt from, in the output's unit.
     pub after: Vec<f64>,
+    /// The same from the record's first sample on, to the end of the last part.
+    pub whole: Vec<f64>,
 }
 
 /// Fits chains of linear parts and one static curve to the first stretch, and writes what is found into an answer that
@@ -64,7 +66,8 @@ pub(super) fn chain(
     let transient = (u.len() / 20).min(1000);
     let wanted = BlockOptions { structures, transient, ..BlockOptions::default() };
     let fit = fit_block_oriented(u, y, &wanted, &Unwatched).ok()?;
-    let simulated = fit.model.simulate(record.input.get(..judged.end.max(stretch.end))?);
+    let end = options.parts.iter().map(|part| part.stretch.end).fold(judged.end.max(stretch.end), usize::max);
+    let simulated = fit.model.simulate(record.input.get(..end)?);
     // the linear model's error there: its simulation where it was learnt from, its rms elsewhere
     let before = match held_out {
         Some(part) => diagnosis.validation.iter().find(|v| v.name == part.name)?.rms_before?,
@@ -90,7 +93,7 @@ pub(super) fn chain(
             validation.rms_after = rms_after;
         }
     }
-    Some(Chain { after: simulated.get(stretch.first..stretch.end)?.to_vec() })
+    Some(Chain { after: simulated.get(stretch.first..stretch.end)?.to_vec(), whole: simulated })
 }
 
 /// Samples of a part that are scored.

@@ -99,6 +99,7 @@ pub fn diagnose(
     let Some(last) = choice.ladder.last() else { return Err(DiagnosisError::NoBaseline) };
     let misfit = misfit(&bench, &last.fit, &blocks);
     let first = &choice.ladder[0].fit;
+    let linear = first.model.clone();
     let simulated = [&first.simulated[..], &last.fit.simulated];
     let mut story = story(&bench, records, [&first.model, &last.fit.model], simulated, &options.parts);
     let layout = &bench.layout;
@@ -117,7 +118,8 @@ pub fn diagnose(
     let mut diagnosis = findings.answer();
     if let Some(chain) = chain(&bench, records, options, &before, &mut diagnosis) {
         after = chain.after;
-        story = Story::of_series(&output, [&before, &after], interval_s, &[]);
+        story = Story::of_series(&output, [&before, &after], interval_s, &[])
+            .over_parts(&bench, records, &linear, &chain.whole, &options.parts);
     }
     Ok(Diagnosed {
         diagnosis,

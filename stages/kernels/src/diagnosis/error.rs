@@ -71,6 +71,12 @@ pub enum DiagnosisError {
         /// Number of the channel, from 1.
         channel: usize,
     },
+    /// An input that does not move.
+    #[error(
+        "the input is constant over what is learnt from: it causes nothing that can be told from an offset; choose a \
+         stretch in which it moves, or diagnose a free decay without an input"
+    )]
+    Still,
     /// No linear model follows the output.
     #[error(
         "no linear model follows the output: every start of the fit diverged; check that input and output belong together"

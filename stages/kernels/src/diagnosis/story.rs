@@ -121,6 +121,30 @@ impl Errors {
 }
 
 impl Story {
+    /// The same with the errors over the time of the parts to judge on, `after` simulated from the record's first sample
+    /// on, before by a linear model.
+    pub(super) fn over_parts(
+        mut self,
+        bench: &Bench,
+        records: &[Record<'_>],
+        linear: &Model,
+        after: &[f64],
+        parts: &[Part],
+    ) -> Self {
+        let scale = bench.output_scale.first().copied().unwrap_or(1.0);
+        let of = |part: &Part| {
+            let run = free_run_part(bench, records, linear, part)?;
+            let after: Vec<f64> = after.get(run.first..run.first + run.samples)?.iter().map(|y| y / scale).collect();
+            let output = run.output.get(..run.samples)?;
+            let errors = Errors::new(output, [run.simulated.get(..run.samples)?, &after], scale);
+            Some((part.name.clone(), errors.over_time(run.first as f64 * bench.interval_s, bench.interval_s)))
+        };
+        if !parts.is_empty() {
+            self.times = parts.iter().filter_map(of).collect();
+        }
+        self
+    }
+
     /// Of one output, simulated before and after, in its unit; by name the samples of the parts to judge on, of all of it
     /// where there is none.
     pub fn of_series(

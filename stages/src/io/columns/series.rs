@@ -5,8 +5,8 @@ use serde_json::{Value, json};
 
 use super::part::Part;
 use super::stage::Columns;
-use super::stretch::{Stretch, Trend, halves};
-use crate::artifacts::{DataSet, NewPair, PairSet, with_channel_names, with_record_starts};
+use super::stretch::{Removal, Stretch, Trend, halves};
+use crate::artifacts::{DataSet, NewPair, PairSet, with_channel_names, with_record_starts, with_taken_off};
 
 /// Inputs and outputs of all files in a row, NaN where missing.
 pub(super) struct Series {
@@ -106,6 +106,12 @@ impl Series {
             let starts: Vec<usize> = self.records.iter().map(|record| record.first).collect();
             pair = with_record_starts(pair, &starts);
         }
+        let single = |all: &[Vec<Trend>]| match all {
+            [one] if one.len() == 1 => one.first().map(|trend| trend.level),
+            _ => None,
+        };
+        let levels_of = single(&trends).zip(single(&levels)).filter(|_| wanted.remove != Removal::Line);
+        pair = with_taken_off(pair, wanted.remove.name(), levels_of.map(|(input, output)| [input, output]));
         // of several records those of the first
         let first = |all: &[Vec<Trend>]| all.iter().filter_map(|of| of.first().copied()).collect::<Vec<Trend>>();
         Ok((pair, self.summary(wanted, &first(&trends), &first(&levels))?))

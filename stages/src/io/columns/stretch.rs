@@ -37,6 +37,17 @@ pub enum Removal {
     Line,
 }
 
+impl Removal {
+    /// Its name in configs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Mean => "mean",
+            Self::Line => "line",
+        }
+    }
+}
+
 /// Level and slope that were taken off: `level + slope (k - origin)` at sample k.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Trend {

@@ -81,6 +81,13 @@ impl Bench {
         let input = |s: &Stretch| records[s.record].input.get(s.first..s.end).map_or(0.0, largest);
         let input_scale = stretches.iter().map(input).fold(0.0, f64::max);
         let driven = input_scale > 0.0;
+        let input_moves = stretches.iter().any(|s| {
+            let own = records[s.record].input.get(s.first..s.end).unwrap_or(&[]);
+            own.first().is_some_and(|first| own.iter().any(|u| u != first))
+        });
+        if driven && !input_moves {
+            return Err(DiagnosisError::Still);
+        }
         let input_scale = if driven { input_scale } else { 1.0 };
         let angle = std::f64::consts::TAU * highest_hz * interval_s;
         let largest_angle = ANGLES[usize::from(layout.all_samples() > LONG)];
