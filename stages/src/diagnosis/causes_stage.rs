@@ -1,9 +1,9 @@
 //! The stage `diagnosis.causes`.
 
+use afmid_pipeline::config::nearest;
 use afmid_pipeline::{
     Array, Axis, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
 };
-use afmid_pipeline::config::nearest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +13,7 @@ use crate::artifacts::{DataSet, Decays, Pair};
 use crate::causes::{Cause, Domain, catalogue};
 use afmid_kernels::diagnosis::verdict::Diagnosis;
 use afmid_kernels::diagnosis::{Diagnosed, DiagnosisOptions, Part, PartStart, Record, Story, Stretch, diagnose};
+use afmid_kernels::signal::decimate;
 
 /// Says what a linear model gets wrong in a measured input and output, in free decays, in an axis under a controller, or
 /// in a steady oscillation: names the causes, extends the model, measures the gain.
@@ -54,6 +55,10 @@ pub struct CausesDiagnose {
     /// Hits of `decays` to judge on, counted from 1: they choose nothing, but set their own amplitudes and phases.
     #[schemars(inner(range(min = 1, max = 1_000_000)))]
     pub judged_hits: Vec<usize>,
+    /// Highest frequency of `decays` that is looked at, Hz: what lies above is filtered out first, and the sample rate
+    /// lowered. Why: five modes are followed at most, and the causes of one are its own. 0: all.
+    #[schemars(range(min = 0.0, max = 1e12))]
+    pub highest_hz: f64,
     /// Rate of false alarms over all candidates together.
     #[schemars(range(min = 1e-6, max = 0.2))]
     pub false_alarm_rate: f64,
@@ -104,6 +109,7 @@ impl Default for CausesDiagnose {
         Self {
             parts: Vec::new(),
             judged_hits: Vec::new(),
+            highest_hz: 0.0,
             false_alarm_rate: options.false_alarm_rate,
             least_gain: options.least_gain,
             tolerated_misfit: options.tolerated_misfit,
@@ -135,7 +141,7 @@ const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over
 impl Stage for CausesDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.causes",
-        version: 1,
+        version: 2,
         summary: "names what a linear model gets wrong in inputs and outputs, decays, servo axes, steady oscillations",
         inputs: &[PAIR.spec(), DECAYS.spec(), RECORDS.spec()],
         outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec()],
@@ -162,7 +168,9 @@ impl Stage for CausesDiagnose {
             }
         }
         if let Some(id) = self.candidates.iter().find(|id| self.without.contains(id)) {
-            faults.add(StageError::new(format!("`{id}` is in `candidates` and in `without`")).help("leave it out of one"));
+            faults.add(
+                StageError::new(format!("`{id}` is in `candidates` and in `without`")).help("leave it out of one"),
+            );
         }
     }
 
@@ -188,7 +196,11 @@ impl Stage for CausesDiagnose {
                 let whole = Restored::new(&pair)?;
                 self.extended(&self.forced(&pair, &whole)?)?
             }
-            (None, Some(decays), None) => self.extended(&self.decays(&Decays::new(decays)?)?)?,
+            (None, Some(decays), None) => {
+                let decays = Decays::new(decays)?;
+                let lowered = Lowered::new(&decays, self.highest_hz)?;
+                self.extended(&self.decays(&decays, lowered.as_ref())?)?
+            }
             (None, None, Some(records)) => steady::answer(self, records)?,
             (pair, decays, records) => {
                 let several = [pair.is_some(), decays.is_some(), records.is_some()].into_iter().any(|wired| wired);
@@ -220,6 +232,36 @@ struct Restored {
     output: Vec<f64>,
 }
 
+/// Hits at a lower rate, without what lies above the frequencies that are looked at.
+struct Lowered {
+    hits: Vec<Vec<Vec<f64>>>,
+    rate_hz: f64,
+}
+
+impl Lowered {
+    /// None where all is looked at. Errors: hits shorter than the filter.
+    fn new(decays: &Decays<'_>, highest_hz: f64) -> Result<Option<Self>, StageError> {
+        let rate_hz = decays.sample_rate_hz;
+        let mut every = None;
+        let mut hits = Vec::new();
+        for hit in decays.hits.iter().filter(|_| highest_hz > 0.0) {
+            let mut rows = Vec::new();
+            for row in hit {
+                let lower = decimate(row, rate_hz, highest_hz).ok_or_else(|| {
+                    let wanted =
+                        format!("wanted more samples than the filter has, and a rate of 10 times {highest_hz} Hz");
+                    StageError::new(format!("`highest_hz`: {} samples at {rate_hz} Hz, {wanted}", row.len()))
+                        .help("take a higher `highest_hz` for short decays, or 0 for all frequencies")
+                })?;
+                every = Some(lower.every);
+                rows.push(lower.samples);
+            }
+            hits.push(rows);
+        }
+        Ok(every.map(|every| Self { hits, rate_hz: rate_hz / every as f64 }))
+    }
+}
+
 impl Restored {
     fn new(pair: &Pair<'_>) -> Result<Self, StageError> {
         let [input, output] = pair.levels().unwrap_or_default();
@@ -243,6 +285,8 @@ struct Measured<'a> {
     training: Vec<Stretch>,
     parts: Vec<Part>,
     interval_s: f64,
+    /// Whether each stretch has an offset of its own.
+    free_offsets: bool,
     output_unit: String,
     input_unit: String,
 }
@@ -272,15 +316,19 @@ impl CausesDiagnose {
             training: vec![Stretch { record: 0, first, end: first + learnt.len() }],
             parts: self.parts.iter().map(part).collect(),
             interval_s: 1.0 / rate,
+            free_offsets: false,
             output_unit,
             input_unit,
         })
     }
 
     /// Free decays: all hits but the judged ones are learnt from.
-    fn decays<'a>(&self, decays: &Decays<'a>) -> Result<Measured<'a>, StageError> {
-        let records: Vec<Record<'a>> =
-            decays.hits.iter().map(|hit| Record { input: &[], outputs: hit.clone() }).collect();
+    fn decays<'a>(&self, decays: &Decays<'a>, lowered: Option<&'a Lowered>) -> Result<Measured<'a>, StageError> {
+        let of = |hit: &'a Vec<Vec<f64>>| Record { input: &[], outputs: hit.iter().map(Vec::as_slice).collect() };
+        let records: Vec<Record<'a>> = match lowered {
+            Some(lowered) => lowered.hits.iter().map(of).collect(),
+            None => decays.hits.iter().map(|hit| Record { input: &[], outputs: hit.clone() }).collect(),
+        };
         if let Some(number) = self.judged_hits.iter().find(|number| !(1..=records.len()).contains(*number)) {
             let found = StageError::new(format!("`judged_hits` names hit {number} of {}", records.len()));
             return Err(found.help(format!("name hits from 1 to {}", records.len())));
@@ -296,7 +344,8 @@ impl CausesDiagnose {
             training,
             parts: self.judged_hits.iter().map(judged).collect(),
             records,
-            interval_s: 1.0 / decays.sample_rate_hz,
+            interval_s: 1.0 / lowered.map_or(decays.sample_rate_hz, |lowered| lowered.rate_hz),
+            free_offsets: true,
             output_unit: decays.sensors.first().map_or(String::new(), |sensor| sensor.unit.clone()),
             input_unit: String::new(),
         })
@@ -331,6 +380,7 @@ impl CausesDiagnose {
             false_alarm_rate: self.false_alarm_rate,
             least_gain: self.least_gain,
             tolerated_misfit: self.tolerated_misfit,
+            free_offsets: measured.free_offsets,
             most_causes: self.most_causes,
             candidates: catalogue().into_iter().filter(usable).collect(),
             output_unit: measured.output_unit.clone(),

@@ -127,6 +127,11 @@ pub trait Cause: Sync {
         usize::from(self.about().part == Part::Lever)
     }
 
+    /// Whether a coupling is the same with its two modes exchanged.
+    fn is_symmetric(&self) -> bool {
+        false
+    }
+
     /// Numbers that differ from record to record by chance, a line's phase among them: each must be found anew in every
     /// record.
     fn free_in_each_record(&self) -> usize {

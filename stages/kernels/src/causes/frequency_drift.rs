@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "frequency-drift",
     physics: "temperature or adsorption moves all frequencies in proportion from record to record",
     part: Part::Archive,
-    domain: Domain::Release,
+    domain: Domain::Both,
     parameters: &[Parameter {
         name: "relative_drift",
         unit: "1",

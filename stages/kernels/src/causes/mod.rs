@@ -6,6 +6,7 @@
 
 mod cause;
 
+mod absolute_stiffness;
 mod ac_coupling;
 mod adc_nonlinearity;
 mod alignment_jitter;
@@ -15,6 +16,7 @@ mod clipping;
 mod clock_error;
 mod constant_delay;
 mod coulomb_friction;
+mod cubic_coupling;
 mod cubic_detector;
 mod duffing;
 mod extra_mode;
@@ -42,6 +44,7 @@ mod output_saturation;
 mod photodiode_tail;
 mod piezo_crosstalk;
 mod piezo_ring;
+mod quadratic_coupling;
 mod quadratic_damping;
 mod quadratic_detector;
 mod quadratic_stiffness;
@@ -58,6 +61,7 @@ pub use cause::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, with
 
 /// Every built-in cause, by id.
 pub const CATALOGUE: &[&dyn Cause] = &[
+    &absolute_stiffness::AbsoluteStiffness,
     &ac_coupling::AcCoupling,
     &adc_nonlinearity::AdcNonlinearity,
     &alignment_jitter::AlignmentJitter,
@@ -67,6 +71,7 @@ pub const CATALOGUE: &[&dyn Cause] = &[
     &clock_error::ClockError,
     &constant_delay::ConstantDelay,
     &coulomb_friction::CoulombFriction,
+    &cubic_coupling::CubicCoupling,
     &cubic_detector::CubicDetector,
     &duffing::Duffing,
     &extra_mode::ExtraModeCause,
@@ -94,6 +99,7 @@ pub const CATALOGUE: &[&dyn Cause] = &[
     &photodiode_tail::PhotodiodeTail,
     &piezo_crosstalk::PiezoCrosstalk,
     &piezo_ring::PiezoRing,
+    &quadratic_coupling::QuadraticCoupling,
     &quadratic_damping::QuadraticDamping,
     &quadratic_detector::QuadraticDetector,
     &quadratic_stiffness::QuadraticStiffness,

@@ -8,7 +8,7 @@ use super::fit::{Blocks, FOLDS};
 use super::lack_of_fit::Misfit;
 use super::options::DiagnosisOptions;
 use super::selection::{Choice, Chosen, Judged};
-use super::validation::free_run_rms;
+use super::validation::{free_run_rms, held_out, pooled_rms};
 use super::verdict::{
     BaselineSummary, DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
 };
@@ -33,7 +33,8 @@ impl Findings<'_> {
         let ladder = &self.choice.ladder;
         let validation = self.validation();
         let verdict = self.verdict();
-        let causes = if verdict == Verdict::Named { self.named() } else { Vec::new() };
+        let errors = self.held_out();
+        let causes = if verdict == Verdict::Named { self.named(&errors) } else { Vec::new() };
         Diagnosis {
             p_value: None,
             verdict,
@@ -44,7 +45,7 @@ impl Findings<'_> {
             modes_before: ladder.first().map_or(Vec::new(), |judged| self.modes(judged)),
             modes_after: ladder.last().map_or(Vec::new(), |judged| self.modes(judged)),
             validation,
-            ladder: self.rungs(),
+            ladder: self.rungs(&errors),
             false_alarm_rate: self.options.false_alarm_rate,
         }
     }
@@ -76,7 +77,7 @@ impl Findings<'_> {
         if !self.adequate {
             return Verdict::Unexplained;
         }
-        let untied = self.choice.chosen.iter().any(|chosen| !chosen.tied);
+        let untied = self.choice.chosen.iter().any(Chosen::has_a_name);
         match (self.choice.chosen.is_empty(), self.systematic()) {
             (_, true) => Verdict::Unexplained,
             (true, false) => Verdict::Clean,
@@ -89,13 +90,19 @@ impl Findings<'_> {
         finite((loss / self.bench.count as f64).sqrt() * self.scale())
     }
 
-    /// Errors of the first part to be judged on, model by model; of the held-out folds where there is none.
+    /// Errors on what names have to gain on, model by model: the first part to be judged on, all that are whole
+    /// experiments, the held-out folds where there are no parts.
     fn held_out(&self) -> Vec<Option<f64>> {
-        let judge = |judged: &Judged| match self.options.parts.first() {
-            Some(part) => free_run_rms(self.bench, self.records, &judged.fit.model, part),
-            None => self.rms(judged.unseen()),
+        let judge = |judged: &Judged| match held_out(&self.options.parts) {
+            [] => self.rms(judged.unseen()),
+            parts => pooled_rms(self.bench, self.records, &judged.fit.model, parts),
         };
         self.choice.ladder.iter().map(judge).collect()
+    }
+
+    /// The error on what names have to gain on of a model, in the output's unit: a loss where folds are held out.
+    fn in_units(&self, error: f64) -> Option<f64> {
+        if self.options.parts.is_empty() { self.rms(error) } else { Some(error) }
     }
 
     /// Samples that count as independent for the score of a cause.
@@ -104,21 +111,29 @@ impl Findings<'_> {
         (count as f64 / worst).max(1.0)
     }
 
-    fn named(&self) -> Vec<NamedCause> {
-        let held_out = self.held_out();
-        let (count, place) = match self.options.parts.first() {
-            Some(part) => (scored(part), format!("part {}", part.name)),
-            None => (self.bench.count, format!("{FOLDS} folds of the training part in turn")),
+    fn named(&self, errors: &[Option<f64>]) -> Vec<NamedCause> {
+        let (count, place) = match held_out(&self.options.parts) {
+            [] => (self.bench.count, format!("{FOLDS} folds of the training part in turn")),
+            [part] => (scored(part), format!("part {}", part.name)),
+            parts => {
+                let names: Vec<&str> = parts.iter().map(|part| &part.name[..]).collect();
+                (parts.iter().map(scored).sum(), format!("parts {}", names.join(", ")))
+            }
         };
         let one = |chosen: &Chosen| {
             let which = chosen.place;
-            let at = |rung: usize| held_out.get(rung).copied().flatten();
-            let (before, after) = (at(which), at(which + 1));
+            let at = |rung: usize| errors.get(rung).copied().flatten();
+            // beside all others where they were refitted without it, else as it was added
+            let last = errors.len().saturating_sub(1);
+            let (before, after) = match chosen.left_out.and_then(|error| self.in_units(error)) {
+                Some(without) => (Some(without), at(last)),
+                None => (at(which), at(which + 1)),
+            };
             let gain = before.zip(after).and_then(|(b, a)| finite(self.effective(count) * (b / a).ln()));
             let about = crate::causes::built_in(chosen.id).map(|cause| cause.about());
             NamedCause {
                 id: chosen.id.to_owned(),
-                class: about.map_or(Vec::new(), |about| about.class.iter().map(|id| (*id).to_owned()).collect()),
+                class: chosen.class(),
                 p_value: finite(chosen.p_value),
                 parameters: self.parameters(which),
                 gain: Gain {
@@ -134,7 +149,7 @@ impl Findings<'_> {
                 next_measurement: about.map_or(String::new(), |about| about.next_measurement.to_owned()),
             }
         };
-        self.choice.chosen.iter().filter(|chosen| !chosen.tied).map(one).collect()
+        self.choice.chosen.iter().filter(|chosen| chosen.has_a_name()).map(one).collect()
     }
 
     fn parameters(&self, which: usize) -> BTreeMap<String, Value> {
@@ -205,9 +220,8 @@ impl Findings<'_> {
         self.options.parts.iter().map(one).collect()
     }
 
-    fn rungs(&self) -> Vec<Rung> {
+    fn rungs(&self, errors: &[Option<f64>]) -> Vec<Rung> {
         let effective = self.effective(self.bench.count);
-        let held_out = self.held_out();
         let ladder = &self.choice.ladder;
         let one = |(i, judged): (usize, &Judged)| {
             let parameters = judged.fit.model.system_parameters();
@@ -217,7 +231,7 @@ impl Findings<'_> {
                 added: judged.fit.model.causes.last().map_or("linear model", |added| added.id()).to_owned(),
                 parameters,
                 rms: self.rms(judged.fit.loss),
-                held_out_rms: held_out[i],
+                held_out_rms: errors.get(i).copied().flatten(),
                 unit: self.options.output_unit.clone(),
                 log_likelihood_gain: before
                     .and_then(|before| finite(0.5 * effective * (before.fit.loss / judged.fit.loss).ln())),

@@ -1,16 +1,16 @@
 //! The whole way from records to a verdict.
 
 use super::answer::Findings;
-use super::baseline::{Baseline, baselines, blocks, criterion};
+use super::baseline::{Baseline, baselines, blocks, criterion, starts};
 use super::chain::chain;
-use super::data::{Bench, Record};
-use super::dynamics::Model;
+use super::data::{Bench, Record, Thinned};
+use super::dynamics::{Modal, Model};
 use super::error::DiagnosisError;
-use super::fit::{Blocks, Fit, with_own};
+use super::fit::Blocks;
 use super::lack_of_fit::misfit;
 use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, trials};
-use super::selection::{Choice, Judged, Search};
+use super::selection::{Choice, Search};
 use super::story::{Story, story};
 use super::validation::check_part;
 use super::verdict::Diagnosis;
@@ -37,13 +37,13 @@ pub struct Diagnosed {
 /// Samples that causes are chosen on; all samples fit what was chosen. Below half as many again all are taken.
 const SAMPLE: usize = 16_384;
 
-/// The largest stretches of motion, where there are many samples.
-fn sampled(whole: &Bench) -> Bench {
+/// The largest stretches of motion, where there are many samples; every so many were kept of what was measured.
+fn sampled(whole: &Bench, every: usize) -> Bench {
     let layout = &whole.layout;
-    if 2 * layout.all_samples() < 3 * SAMPLE {
+    if 2 * layout.all_samples() * every < 3 * SAMPLE {
         return whole.clone();
     }
-    let share = (SAMPLE / layout.stretches().max(1)).max(super::data::LEAST_SAMPLES);
+    let share = (SAMPLE / every / layout.stretches().max(1)).max(super::data::LEAST_SAMPLES);
     let windows: Vec<(usize, usize)> = (0..layout.stretches())
         .map(|e| {
             let length = layout.samples(e).min(share);
@@ -82,9 +82,22 @@ pub fn diagnose(
 ) -> Result<Diagnosed, DiagnosisError> {
     let whole = Bench::new(records, &options.training, interval_s, 0.0)?;
     options.parts.iter().try_for_each(|part| check_part(part, &whole, records))?;
-    let sample = sampled(&whole);
+    let sample = sampled(&whole, 1);
+    let starts = starts(records, &sample, options.free_offsets);
+    let highest_hz = starts.linear.iter().map(Modal::highest_hz).fold(0.0, f64::max);
+    let long = sample.layout.all_samples() < whole.layout.all_samples();
+    let thinned = long.then(|| Thinned::new(records, &options.training, interval_s, highest_hz)).flatten();
+    let found = match &thinned {
+        Some(thinned) => {
+            let kept = thinned.records();
+            let bench = Bench::new(&kept, &thinned.stretches, thinned.interval_s, highest_hz)?;
+            let every = (thinned.interval_s / interval_s).round() as usize;
+            baselines(&kept, &sampled(&bench, every), &starts)?
+        }
+        None => baselines(records, &sample, &starts)?,
+    };
     let mut extended = Vec::new();
-    for baseline in baselines(records, &sample)? {
+    for baseline in found {
         let found = extend(baseline, options);
         let enough = found.adequate;
         extended.push(found);
@@ -95,7 +108,7 @@ pub fn diagnose(
     // the first that is as good as any linear model; else the last, which a linear model alone is
     let Some(last) = extended.pop() else { return Err(DiagnosisError::NoBaseline) };
     let Extended { bench, blocks, choice, adequate } =
-        last.on_all(records, options).ok_or(DiagnosisError::NoBaseline)?;
+        last.on_all(records, interval_s, options).ok_or(DiagnosisError::NoBaseline)?;
     let Some(last) = choice.ladder.last() else { return Err(DiagnosisError::NoBaseline) };
     let misfit = misfit(&bench, &last.fit, &blocks);
     let first = &choice.ladder[0].fit;
@@ -118,8 +131,13 @@ pub fn diagnose(
     let mut diagnosis = findings.answer();
     if let Some(chain) = chain(&bench, records, options, &before, &mut diagnosis) {
         after = chain.after;
-        story = Story::of_series(&output, [&before, &after], interval_s, &[])
-            .over_parts(&bench, records, &linear, &chain.whole, &options.parts);
+        story = Story::of_series(&output, [&before, &after], interval_s, &[]).over_parts(
+            &bench,
+            records,
+            &linear,
+            &chain.whole,
+            &options.parts,
+        );
     }
     Ok(Diagnosed {
         diagnosis,
@@ -133,33 +151,12 @@ pub fn diagnose(
 }
 
 /// A baseline with the causes that extend it.
-struct Extended {
-    bench: Bench,
-    blocks: Blocks,
-    choice: Choice,
+pub(super) struct Extended {
+    pub bench: Bench,
+    pub blocks: Blocks,
+    pub choice: Choice,
     /// Whether the extended model describes as much as any linear model does.
-    adequate: bool,
-}
-
-impl Extended {
-    /// Every model fitted to all samples, from where it was found.
-    fn on_all(self, records: &[Record<'_>], options: &DiagnosisOptions) -> Option<Self> {
-        if self.bench.stretches == options.training {
-            return Some(self);
-        }
-        let bench = self.bench.elsewhere(records, &options.training)?;
-        let first = self.choice.ladder.first()?;
-        let blocks = blocks(&bench, &first.fit);
-        let fitted = |judged: &Judged| {
-            let start = with_own(&bench, &judged.fit.model);
-            Some(Judged::new(Fit::new(&bench, &start, None)?, &bench, &blocks))
-        };
-        let ladder: Vec<Judged> = self.choice.ladder.iter().map_while(fitted).collect();
-        // a model that diverges on all samples ends the ladder before it
-        let mut chosen = self.choice.chosen;
-        chosen.retain(|chosen| chosen.place + 1 < ladder.len());
-        (!ladder.is_empty()).then_some(Self { choice: Choice { ladder, chosen, ..self.choice }, bench, blocks, ..self })
-    }
+    pub adequate: bool,
 }
 
 fn extend(baseline: Baseline, options: &DiagnosisOptions) -> Extended {
@@ -178,14 +175,23 @@ fn extend(baseline: Baseline, options: &DiagnosisOptions) -> Extended {
     Extended { bench, blocks, choice, adequate }
 }
 
+/// Fewest records that show a change from one to the next: its slope, and whether it is one.
+const ARCHIVE: usize = 4;
+
 /// The causes that these data can show, at every place.
 fn candidates(options: &DiagnosisOptions, bench: &Bench, model: &Model) -> Vec<Candidate> {
     let several = bench.layout.stretches() > 1;
+    let mut numbers: Vec<usize> = options.training.iter().map(|stretch| stretch.record).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let archive = numbers.len() >= ARCHIVE;
     let usable = |cause: &&&'static dyn Cause| {
         let about = cause.about();
         let (driven, alone) = (bench.driven, bench.layout.channels == 1);
         about.domain != Domain::Release
             && (driven || about.part != Part::Input)
+            && (archive || about.part != Part::Archive)
+            && !(options.free_offsets && about.id == "offset")
             // a sensor's curve belongs to its channel
             && (alone || about.part != Part::Detector)
             // what differs from stretch to stretch by chance, and what each has of its own

@@ -15,6 +15,8 @@ mod answer;
 mod baseline;
 mod chain;
 pub mod closed_loop;
+#[cfg(test)]
+mod coupled_tests;
 mod data;
 mod diagnose;
 mod dynamics;
@@ -24,6 +26,7 @@ mod lack_of_fit;
 mod options;
 mod score_test;
 mod selection;
+mod settled;
 pub mod steady;
 mod story;
 #[cfg(test)]

@@ -16,6 +16,9 @@ pub struct DiagnosisOptions {
     pub least_gain: f64,
     /// Remaining misfit over the rest of the residual, both root mean squares, up to which causes are named.
     pub tolerated_misfit: f64,
+    /// Whether each stretch has an offset of its own, as decays that were cut from longer records do; else an offset is
+    /// a cause.
+    pub free_offsets: bool,
     /// Most causes.
     pub most_causes: usize,
     /// Causes that are tried, as far as the data have what they need.
@@ -34,6 +37,7 @@ impl Default for DiagnosisOptions {
             false_alarm_rate: 0.01,
             least_gain: 0.0005,
             tolerated_misfit: 0.25,
+            free_offsets: false,
             most_causes: 8,
             candidates: crate::causes::CATALOGUE.to_vec(),
             output_unit: "V".to_owned(),

@@ -27,6 +27,9 @@ impl Candidate {
             _ if modes == 0 => Vec::new(),
             1 if modes == 1 => vec![at(Vec::new())],
             1 => (0..modes).map(|m| at(vec![m])).collect(),
+            _ if cause.is_symmetric() => {
+                (0..modes).flat_map(|m| (m + 1..modes).map(move |n| vec![m, n])).map(at).collect()
+            }
             _ => {
                 (0..modes).flat_map(|m| (0..modes).filter(move |n| *n != m).map(move |n| vec![m, n])).map(at).collect()
             }

@@ -57,10 +57,26 @@ pub(super) fn free_run_part(bench: &Bench, records: &[Record<'_>], model: &Model
 /// Root mean square of the free-run error over a part, in units of the first channel; none if it diverges or has no
 /// sample.
 pub(super) fn free_run_rms(bench: &Bench, records: &[Record<'_>], model: &Model, part: &Part) -> Option<f64> {
-    let run = free_run_part(bench, records, model, part)?;
-    let squares: Vec<f64> =
-        run.output.iter().zip(&run.simulated).filter(|(y, _)| y.is_finite()).map(|(y, s)| (y - s).powi(2)).collect();
-    let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt() * bench.output_scale[0];
+    pooled_rms(bench, records, model, std::slice::from_ref(part))
+}
+
+/// The parts that names have to gain on: whole experiments together, else the first.
+pub(super) fn held_out(parts: &[Part]) -> &[Part] {
+    let whole = parts.iter().take_while(|part| part.start == PartStart::Whole).count();
+    &parts[..whole.max(1).min(parts.len())]
+}
+
+/// Root mean square of the free-run error over parts together, as [`free_run_rms`].
+pub(super) fn pooled_rms(bench: &Bench, records: &[Record<'_>], model: &Model, parts: &[Part]) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0);
+    for part in parts {
+        let run = free_run_part(bench, records, model, part)?;
+        for (y, s) in run.output.iter().zip(&run.simulated).filter(|(y, _)| y.is_finite()) {
+            sum += (y - s).powi(2);
+            count += 1;
+        }
+    }
+    let rms = (sum / f64::from(count)).sqrt() * bench.output_scale[0];
     rms.is_finite().then_some(rms)
 }
 

@@ -18,6 +18,7 @@
 //! ```
 
 mod codes;
+mod decimation;
 mod error;
 mod fourier;
 mod periodogram;
@@ -25,6 +26,7 @@ mod taper;
 mod welch;
 
 pub use codes::code_step;
+pub use decimation::{Decimated, decimate};
 pub use error::SignalError;
 pub use fourier::{RealTransform, TransformPlans};
 pub use periodogram::{autocorrelation, mean_periodogram, summed_periodograms};

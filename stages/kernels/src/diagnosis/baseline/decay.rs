@@ -4,27 +4,61 @@ use faer::c64;
 
 use crate::diagnosis::data::{Bench, Record};
 use crate::diagnosis::dynamics::{Kind, Modal, Section, Weights};
-use crate::ringdown::{ChannelOptions, follow_channels};
+use crate::ringdown::{ChannelOptions, RecordFit, follow_channels};
 
 /// Most modes of a structure: the library of general terms grows with their square.
 const MOST: usize = 5;
 
 /// The strongest one, two, ... modes of all stretches together; none where no decay is found.
-pub(super) fn starts(records: &[Record<'_>], bench: &Bench) -> Vec<Modal> {
-    let Some((all, strength)) = modes(records, bench) else { return Vec::new() };
+///
+/// Modes that lie within one another's bandwidth are offered as one first: a mode that does not decay exponentially is
+/// followed by two exponentials, and it is that mode's law that has to be found.
+///
+/// Beside them the least number of modes that a baseline needs: the strong ones, none of which can be made by another.
+pub(super) fn starts(records: &[Record<'_>], bench: &Bench) -> (Vec<Modal>, usize) {
+    let Some(Found { all, strength, amplitude }) = modes(records, bench) else { return (Vec::new(), 1) };
     let mut order: Vec<usize> = (0..strength.len()).collect();
     order.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]));
-    (1..=order.len().min(MOST))
-        .map(|count| {
-            let mut chosen: Vec<usize> = order[..count].to_vec();
-            chosen.sort_unstable();
-            all.of(&chosen)
-        })
-        .collect()
+    let overlap = |a: usize, b: usize| {
+        let (a, b) = (&all.sections[a], &all.sections[b]);
+        (a.frequency_hz - b.frequency_hz).abs() < 0.5 * (a.loss * a.frequency_hz + b.loss * b.frequency_hz)
+    };
+    let mut apart: Vec<usize> = Vec::new();
+    for mode in &order {
+        if !apart.iter().any(|other| overlap(*mode, *other)) {
+            apart.push(*mode);
+        }
+    }
+    let prefix = |order: &[usize], count: usize| {
+        let mut chosen: Vec<usize> = order[..count].to_vec();
+        chosen.sort_unstable();
+        all.of(&chosen)
+    };
+    let mut starts: Vec<Modal> = (1..=apart.len().min(MOST)).map(|count| prefix(&apart, count)).collect();
+    if apart.len() < order.len() {
+        starts.extend((2..=order.len().min(MOST)).map(|count| prefix(&order, count)));
+    }
+    let largest = amplitude.iter().copied().fold(0.0, f64::max);
+    let mut needed: Vec<f64> = Vec::new();
+    for mode in order.iter().filter(|mode| amplitude[**mode] > HARMONIC * largest) {
+        let hz = all.sections[*mode].frequency_hz;
+        if needed.iter().all(|other| (hz / other - 1.0).abs() > BESIDE) {
+            needed.push(hz);
+        }
+    }
+    (starts, needed.len().clamp(1, MOST))
 }
 
-/// Modes and shapes of all stretches together, and the energy of each.
-fn modes(records: &[Record<'_>], bench: &Bench) -> Option<(Modal, Vec<f64>)> {
+/// Modes and shapes of all stretches together.
+struct Found {
+    all: Modal,
+    /// Energy of each.
+    strength: Vec<f64>,
+    /// Amplitude of each at its largest, all channels together.
+    amplitude: Vec<f64>,
+}
+
+fn modes(records: &[Record<'_>], bench: &Bench) -> Option<Found> {
     let hits: Vec<Vec<&[f64]>> = bench
         .stretches
         .iter()
@@ -49,19 +83,32 @@ fn modes(records: &[Record<'_>], bench: &Bench) -> Option<(Modal, Vec<f64>)> {
     modal.weights = vec![Vec::new(); channels];
     modal.free = if channels > 1 { Weights::Shapes } else { Weights::Fixed };
     let moves = |mode: usize| followed.course.iter().any(|course| course.mode == mode && course.moves);
-    let strength: Vec<f64> = (0..found.poles.len())
-        .map(|mode| {
-            let square: f64 = (0..channels).map(|channel| residue(mode, channel).norm_sqr()).sum();
-            square / -found.poles[mode].re
-        })
-        .collect();
+    let square = |mode: usize| (0..channels).map(|channel| residue(mode, channel).norm_sqr()).sum::<f64>();
+    let strength: Vec<f64> = (0..found.poles.len()).map(|mode| square(mode) / -found.poles[mode].re).collect();
     let hz: Vec<f64> = found.poles.iter().map(|pole| pole.norm() / std::f64::consts::TAU).collect();
-    let follows = |mode: usize| {
-        (0..hz.len()).any(|of| strength[of] > strength[mode] && moves(of) && is_shadow(hz[mode] / hz[of]))
+    // exponentials beside one another, of which a moving frequency is made, may be large and cancel: what counts is
+    // their sum, in one hit
+    let size = |event: usize| -> f64 {
+        let own = found.records.iter().filter(|record| record.event == event);
+        own.flat_map(|record| &record.residues).map(|residue| residue.norm_sqr()).sum()
     };
-    let mut energy = Vec::new();
+    let largest = (0..hits.len()).fold(0, |best, event| if size(event) > size(best) { event } else { best });
+    let together = |mode: usize| -> f64 {
+        let beside = |other: &usize| (hz[*other] / hz[mode] - 1.0).abs() < BESIDE;
+        let of = |record: &RecordFit| (0..hz.len()).filter(beside).map(|other| record.residues[other]).sum::<c64>();
+        let rows = found.records.iter().filter(|record| record.event == largest);
+        rows.map(|record| (of(record) / bench.output_scale[record.channel]).norm_sqr()).sum()
+    };
+    let follows = |mode: usize| {
+        (0..hz.len()).any(|of| {
+            let weak = together(mode) < HARMONIC * HARMONIC * together(of);
+            strength[of] > strength[mode] && moves(of) && is_shadow(hz[mode] / hz[of], weak)
+        })
+    };
+    let (mut energy, mut amplitude) = (Vec::new(), Vec::new());
     for (mode, pole) in found.poles.iter().enumerate().filter(|(mode, _)| !follows(*mode)) {
         energy.push(strength[mode]);
+        amplitude.push(together(mode).sqrt());
         let (omega, loss) = (pole.norm(), -2.0 * pole.re / pole.norm());
         modal.sections.push(Section {
             kind: Kind::Oscillator,
@@ -78,17 +125,20 @@ fn modes(records: &[Record<'_>], bench: &Bench) -> Option<(Modal, Vec<f64>)> {
             weights.push(if channel == own { [1.0, 0.0] } else { of_ratio(ratio, *pole) });
         }
     }
-    (!modal.sections.is_empty()).then_some((modal, energy))
+    (!modal.sections.is_empty()).then_some(Found { all: modal, strength: energy, amplitude })
 }
 
 /// Whether an exponential at that ratio of frequencies follows a stronger mode that moves with its amplitude: beside it,
-/// where a moving frequency is made of several, or at a harmonic.
-fn is_shadow(ratio: f64) -> bool {
+/// where a moving frequency is made of several, or, if it is weak, at a harmonic.
+fn is_shadow(ratio: f64, weak: bool) -> bool {
     let multiple = ratio.round();
     (ratio - 1.0).abs() < BESIDE
-        || ((2.0..=HARMONICS).contains(&multiple) && (ratio - multiple).abs() < NEAR * multiple)
+        || (weak && (2.0..=HARMONICS).contains(&multiple) && (ratio - multiple).abs() < NEAR * multiple)
 }
 
+/// Amplitude over the stronger mode's up to which a harmonic is one: an interferometer's reach a tenth, and what is
+/// stronger at a multiple is a mode in internal resonance.
+const HARMONIC: f64 = 0.2;
 /// Distance in frequency, relative, that a moving mode's other exponentials keep.
 const BESIDE: f64 = 0.2;
 /// Highest harmonic, and how near to it an exponential lies, relative.

@@ -8,7 +8,7 @@ mod oscillator;
 use super::data::{Bench, Record};
 use super::dynamics::Modal;
 use super::error::DiagnosisError;
-use super::fit::{Blocks, Fit};
+use super::fit::{Blocks, Fit, Until};
 
 /// A linear model that causes may extend, and how it was judged.
 pub(super) struct Baseline {
@@ -61,25 +61,46 @@ pub(super) fn criterion(bench: &Bench, fit: &Fit) -> f64 {
     count * (fit.loss / bench.count as f64).ln() + numbers as f64 * count.ln()
 }
 
+/// Linear models as identification finds them.
+pub(super) struct Starts {
+    pub linear: Vec<Modal>,
+    /// Fewest modes that a free decay's model needs.
+    needed: usize,
+}
+
 /// Finds linear models to extend, the simplest first.
 ///
 /// # Method
 /// Without an input: the strongest one, two, ... modes of the free decays, by [`crate::ringdown`], and one oscillator by
 /// a grid. With an input: one oscillator by a grid, and the poles of models of rising order by the prediction error
-/// method. Each is fitted to the free-run error. The last has the least criterion ([`criterion`]); simpler ones come
-/// before it where they are not far worse.
-pub(super) fn baselines(records: &[Record<'_>], coarse: &Bench) -> Result<Vec<Baseline>, DiagnosisError> {
-    let mut starts: Vec<Modal> = Vec::new();
+/// method.
+pub(super) fn starts(records: &[Record<'_>], coarse: &Bench, free_offsets: bool) -> Starts {
+    let (mut starts, mut needed) = (Vec::new(), 1);
     let single = coarse.layout.channels == 1 && coarse.layout.stretches() == 1;
-    starts.extend(single.then(|| oscillator::best(coarse)).flatten().map(|fit| fit.model.dynamics));
+    starts.extend(single.then(|| oscillator::best(coarse, free_offsets)).flatten().map(|fit| fit.model.dynamics));
     let has_oscillator = !starts.is_empty();
     if coarse.driven {
         starts.extend(black_box::starts(records, coarse));
     } else {
-        starts.extend(decay::starts(records, coarse).into_iter().skip(usize::from(has_oscillator)));
+        let (modes, least) = decay::starts(records, coarse);
+        starts.extend(modes.into_iter().skip(usize::from(has_oscillator)));
+        needed = least;
     }
+    Starts { linear: starts, needed }
+}
+
+/// Fits linear models to stretches from where they were found, and keeps those to extend, the simplest first.
+///
+/// # Method
+/// Least squares of the free-run error. The last has the least criterion ([`criterion`]); simpler ones come before it
+/// where they are not far worse, or have the modes that a free decay needs.
+pub(super) fn baselines(
+    records: &[Record<'_>],
+    coarse: &Bench,
+    starts: &Starts,
+) -> Result<Vec<Baseline>, DiagnosisError> {
     let mut tried: Vec<(Fit, Bench)> =
-        starts.iter().filter_map(|start| fitted(records, coarse, start, start.highest_hz())).collect();
+        starts.linear.iter().filter_map(|start| fitted(records, coarse, start, start.highest_hz())).collect();
     tried.sort_by_key(|(fit, _)| fit.model.dynamics.order());
     let criteria: Vec<f64> = tried.iter().map(|(fit, bench)| criterion(bench, fit)).collect();
     let best = criteria.iter().copied().fold(f64::INFINITY, f64::min);
@@ -91,7 +112,7 @@ pub(super) fn baselines(records: &[Record<'_>], coarse: &Bench) -> Result<Vec<Ba
     let adequacy = Adequacy { best, left: least / signal };
     let keep = |(place, (fit, _)): (usize, &(Fit, Bench))| {
         let simple = fit.model.dynamics.is_oscillator() || !coarse.driven;
-        let near = rms(fit) <= CLOSE * least || (place == 0 && !coarse.driven);
+        let near = rms(fit) <= CLOSE * least || (fit.model.dynamics.modes() == starts.needed && !coarse.driven);
         place == last || (place < last && simple && near)
     };
     let kept: Vec<bool> = tried.iter().enumerate().map(keep).collect();
@@ -103,7 +124,7 @@ pub(super) fn baselines(records: &[Record<'_>], coarse: &Bench) -> Result<Vec<Ba
 fn fitted(records: &[Record<'_>], coarse: &Bench, start: &Modal, highest_hz: f64) -> Option<(Fit, Bench)> {
     let bench = Bench::new(records, &coarse.stretches, coarse.interval_s, highest_hz).ok()?;
     let model = linear::solved(&bench, start)?;
-    let fit = Fit::new(&bench, &model, Some(LINEAR_STEPS))?;
+    let fit = Fit::new(&bench, &model, Until::steps(LINEAR_STEPS))?;
     Some((fit, bench))
 }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::linear::{left, solved};
 use crate::diagnosis::data::Bench;
 use crate::diagnosis::dynamics::{Kind, Modal, Model, Section};
-use crate::diagnosis::fit::Fit;
+use crate::diagnosis::fit::{Fit, Until};
 
 /// Samples of the window that the grid is tried on: ten to a hundred periods of what a recording is made for.
 const WINDOW: usize = 256;
@@ -22,7 +22,7 @@ const STARTS: usize = 4;
 /// On the window of the largest output, every pair of a grid of frequencies and quality factors with gain and initial
 /// state by linear least squares; the best few different ones fitted on windows that grow fourfold until they reach the
 /// stretch's end, and then on all of it. The least error wins.
-pub(super) fn best(bench: &Bench) -> Option<Fit> {
+pub(super) fn best(bench: &Bench, free_offsets: bool) -> Option<Fit> {
     let samples = bench.layout.samples(0);
     let window = WINDOW.min(samples);
     let first = bench.loudest(0, window);
@@ -47,6 +47,10 @@ pub(super) fn best(bench: &Bench) -> Option<Fit> {
             starts.push(model);
         }
     }
+    starts.iter_mut().filter(|_| free_offsets).for_each(|start| {
+        start.dynamics.offsets = true;
+        start.states.iter_mut().for_each(|state| state.offsets = vec![0.0]);
+    });
     let fits: Vec<Fit> = starts.iter().filter_map(|start| grown(bench, start, first, window)).collect();
     fits.into_iter().min_by(|a, b| a.loss.total_cmp(&b.loss))
 }
@@ -62,11 +66,11 @@ fn grown(bench: &Bench, start: &Model, first: usize, window: usize) -> Option<Fi
     let samples = bench.layout.samples(0);
     loop {
         let end = (first + length).min(samples);
-        model = Fit::new(&bench.cut(|_| (first, end)), &model, None)?.model;
+        model = Fit::new(&bench.cut(|_| (first, end)), &model, Until::MINIMUM)?.model;
         if end == samples {
             break;
         }
         length *= 4;
     }
-    Fit::new(bench, &solved(bench, &model.dynamics)?, None)
+    Fit::new(bench, &solved(bench, &model.dynamics)?, Until::MINIMUM)
 }

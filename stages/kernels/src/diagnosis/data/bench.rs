@@ -1,11 +1,12 @@
 //! The stretches that are learnt from, scaled, and simulations of them.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::{FineInput, Layout, Record, Stretch};
-use crate::diagnosis::dynamics::{Model, Span, State};
+use crate::diagnosis::dynamics::{Modal, Model, Span, State};
 use crate::diagnosis::error::DiagnosisError;
-use crate::effects::{Effects, Intersample};
+use crate::effects::{Effects, Instant, Intersample};
 
 /// Fewest samples of a stretch: a hundred periods' worth of nothing is not enough, a few of a ringdown are.
 pub(crate) const LEAST_SAMPLES: usize = 24;
@@ -36,6 +37,8 @@ pub struct Bench {
     pub input_scale: f64,
     /// Whether there is an input.
     pub driven: bool,
+    /// Records that there are.
+    records: usize,
     /// Values that are there.
     pub count: usize,
     /// Length that the causes' place within a record is counted in, s.
@@ -89,9 +92,7 @@ impl Bench {
             return Err(DiagnosisError::Still);
         }
         let input_scale = if driven { input_scale } else { 1.0 };
-        let angle = std::f64::consts::TAU * highest_hz * interval_s;
-        let largest_angle = ANGLES[usize::from(layout.all_samples() > LONG)];
-        let steps = ((angle / largest_angle).ceil() as usize).clamp(1, MOST_STEPS);
+        let steps = steps(highest_hz, interval_s, layout.all_samples());
         let kinds = [Intersample::Held, Intersample::Linear, Intersample::BandLimited];
         let fine = |record: &Record<'_>| {
             let scaled: Vec<f64> = record.input.iter().map(|u| u / input_scale).collect();
@@ -107,6 +108,7 @@ impl Bench {
             output_scale,
             input_scale,
             driven,
+            records: records.len(),
             reference_s: longest as f64 * interval_s,
             inputs: Arc::new(if driven { records.iter().map(fine).collect() } else { Vec::new() }),
             steps,
@@ -148,6 +150,18 @@ impl Bench {
         }
         let count = output.iter().filter(|y| y.is_finite()).count();
         Some(Self { count, output, layout, stretches: stretches.to_vec(), ..self.clone() })
+    }
+
+    /// Other samples of the same runs, at another interval, in the same scale. None: the stretches do not lie there.
+    pub(crate) fn at_interval(
+        &self,
+        records: &[Record<'_>],
+        stretches: &[Stretch],
+        interval_s: f64,
+        highest_hz: f64,
+    ) -> Option<Self> {
+        let steps = steps(highest_hz, interval_s, stretches.iter().map(Stretch::samples).sum());
+        Some(Self { interval_s, steps, ..self.elsewhere(records, stretches)? })
     }
 
     /// First sample of the window of `length` samples of stretch `e` whose first channel has the largest mean square.
@@ -200,7 +214,21 @@ impl Bench {
         };
         let nodes = self.nodes(stretch, effects);
         let driven = (!nodes.is_empty()).then_some(&nodes[..]);
-        model.dynamics.output(state, driven, effects, &span)
+        self.dynamics(model, stretch, effects).output(state, driven, effects, &span)
+    }
+
+    /// A model's dynamics as they are in the record of a stretch.
+    fn dynamics<'m>(&self, model: &'m Model, stretch: &Stretch, effects: &Effects) -> Cow<'m, Modal> {
+        if effects.frequency.is_empty() {
+            return Cow::Borrowed(&model.dynamics);
+        }
+        let place = stretch.record as f64 / (self.records - 1).max(1) as f64;
+        let time_s = stretch.first as f64 * self.interval_s;
+        let instant = Instant { record: stretch.record, place, time_s, piezo_m: 0.0 };
+        let factor = 1.0 + effects.frequency_change(&instant);
+        let mut dynamics = model.dynamics.clone();
+        dynamics.sections.iter_mut().for_each(|section| section.frequency_hz *= factor);
+        Cow::Owned(dynamics)
     }
 
     /// Motion of the modes over the stretches: by stretch, mode and sample.
@@ -210,7 +238,14 @@ impl Bench {
             let nodes = self.nodes(stretch, &effects);
             let driven = (!nodes.is_empty()).then_some(&nodes[..]);
             let state = model.states.get(e).cloned().unwrap_or_default();
-            model.dynamics.motion(&state, driven, &effects, self.interval_s, self.steps, stretch.samples())
+            self.dynamics(model, stretch, &effects).motion(
+                &state,
+                driven,
+                &effects,
+                self.interval_s,
+                self.steps,
+                stretch.samples(),
+            )
         };
         self.stretches.iter().enumerate().map(one).collect()
     }
@@ -231,6 +266,12 @@ impl Bench {
         let through = |u: &f64| effects.input.iter().fold(*u, |u, map| map(u));
         input.part(stretch.first, stretch.end).iter().map(through).collect()
     }
+}
+
+/// Steps of the integrator between samples.
+fn steps(highest_hz: f64, interval_s: f64, samples: usize) -> usize {
+    let angle = std::f64::consts::TAU * highest_hz * interval_s;
+    ((angle / ANGLES[usize::from(samples > LONG)]).ceil() as usize).clamp(1, MOST_STEPS)
 }
 
 fn largest(values: &[f64]) -> f64 {

@@ -40,7 +40,7 @@ impl Added {
         let before = effects.modal_force.len();
         self.cause.add(&self.values, effects);
         for force in &mut effects.modal_force[before..] {
-            *force = seen_from(force.clone(), self.modes.clone());
+            *force = seen_from(force.clone(), &self.modes);
         }
     }
 }
@@ -49,25 +49,41 @@ impl Added {
 const MOST: usize = 8;
 
 /// A force that takes modes `order` for its first, second, ...
-fn seen_from(force: ModalForce, order: Vec<usize>) -> ModalForce {
+fn seen_from(force: ModalForce, order: &[usize]) -> ModalForce {
+    // this runs four times a step: nothing is copied where it need not be
+    if order.iter().enumerate().all(|(i, mode)| i == *mode) {
+        return force;
+    }
+    match *order {
+        [mode] => of_one(force, mode),
+        [first, second] => seen(force, [first, second]),
+        _ => seen(force, std::array::from_fn::<usize, MOST, _>(|i| order.get(i).copied().unwrap_or(usize::MAX))),
+    }
+}
+
+fn of_one(force: ModalForce, mode: usize) -> ModalForce {
+    let own = mode..mode + 1;
     Arc::new(move |motion, acceleration| {
-        let n = order.len().min(MOST);
-        let (mut position, mut velocity, mut omega, mut own) = ([0.0; MOST], [0.0; MOST], [0.0; MOST], [0.0; MOST]);
-        for (to, &from) in order.iter().take(n).enumerate() {
-            let of = |values: &[f64]| values.get(from).copied().unwrap_or(0.0);
-            (position[to], velocity[to], omega[to]) = (of(motion.position), of(motion.velocity), of(motion.omega));
+        let at = |values| <[f64]>::get(values, own.clone());
+        if let (Some(position), Some(velocity), Some(omega), Some(acceleration)) =
+            (at(motion.position), at(motion.velocity), at(motion.omega), acceleration.get_mut(own.clone()))
+        {
+            force(&Motion { position, velocity, omega, gap: position[0], thermal: motion.thermal }, acceleration);
         }
-        let seen = Motion {
-            position: &position[..n],
-            velocity: &velocity[..n],
-            omega: &omega[..n],
-            gap: position[0],
-            thermal: motion.thermal,
-        };
-        force(&seen, &mut own[..n]);
-        for (from, &to) in order.iter().take(n).enumerate() {
+    })
+}
+
+fn seen<const N: usize>(force: ModalForce, order: [usize; N]) -> ModalForce {
+    Arc::new(move |motion, acceleration| {
+        let of = |values: &[f64]| order.map(|from| values.get(from).copied().unwrap_or(0.0));
+        let (position, velocity, omega) = (of(motion.position), of(motion.velocity), of(motion.omega));
+        let gap = position[0];
+        let mut own = [0.0; N];
+        let seen = Motion { position: &position, velocity: &velocity, omega: &omega, gap, thermal: motion.thermal };
+        force(&seen, &mut own);
+        for (to, own) in order.into_iter().zip(own) {
             if let Some(a) = acceleration.get_mut(to) {
-                *a += own[from];
+                *a += own;
             }
         }
     })

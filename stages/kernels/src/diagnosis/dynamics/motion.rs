@@ -148,6 +148,8 @@ struct Nonlinear<'a, const N: usize> {
     steps: [Propagator; N],
     gains: [f64; N],
     omega: [f64; N],
+    /// 1 / omega^2.
+    compliance: [f64; N],
     modes: usize,
     x: [[f64; 2]; N],
 }
@@ -162,6 +164,7 @@ impl<'a, const N: usize> Nonlinear<'a, N> {
             steps: std::array::from_fn(|s| of(s).map_or(still, |section| Propagator::new(section, step_s))),
             gains: std::array::from_fn(|s| of(s).map_or(0.0, |section| section.gain)),
             omega: std::array::from_fn(|s| of(s).map_or(1.0, Section::omega)),
+            compliance: std::array::from_fn(|s| of(s).map_or(1.0, |section| section.omega().powi(-2))),
             // modes come first
             modes: sections.iter().take_while(|section| section.is_mode()).count(),
             x: [[0.0; 2]; N],
@@ -182,7 +185,7 @@ impl<'a, const N: usize> Nonlinear<'a, N> {
         };
         let forces = &mut acceleration[..self.modes];
         self.effects.modal_force.iter().for_each(|force| force(&motion, forces));
-        std::array::from_fn(|s| self.gains[s] * u + acceleration[s] / (self.omega[s] * self.omega[s]))
+        std::array::from_fn(|s| self.gains[s] * u + acceleration[s] * self.compliance[s])
     }
 
     /// One step under the input at its beginning, middle and end; the numbers are the source's.

@@ -1,12 +1,14 @@
 //! Free-run fits: the simulation's error, not the one-step prediction's, made least.
 
 mod blocks;
+mod chords;
 mod own;
 mod small;
 
 use rayon::prelude::*;
 
 pub(super) use blocks::{Blocks, FOLDS, Moments, paired};
+pub(super) use chords::Chords;
 pub(super) use own::Own;
 pub(super) use small::{Cholesky, dot};
 
@@ -33,8 +35,25 @@ pub struct Fit {
     pub converged: bool,
 }
 
-/// Steps after which a fit is given up; three to ten are usual, more where much is left unexplained.
-const STEPS: usize = 60;
+/// When a fit ends that has not reached its minimum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Until {
+    /// After so many steps.
+    pub steps: usize,
+    /// At a step that lowers the loss by a smaller share.
+    pub gain: f64,
+}
+
+impl Until {
+    /// At its minimum, or given up: three to ten steps are usual, more where much is left unexplained.
+    pub const MINIMUM: Self = Self::steps(60);
+
+    /// After so many steps.
+    pub const fn steps(steps: usize) -> Self {
+        Self { steps, gain: 0.0 }
+    }
+}
+
 /// A step this small against the residual's own scatter, squared: a thirtieth of a standard error.
 const SMALL: f64 = 1e-3;
 
@@ -48,7 +67,7 @@ impl Fit {
     /// # Source
     /// J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., 2006, section 10.3; G. H. Golub, V. Pereyra, SIAM J.
     /// Numer. Anal. 10 (1973) 413.
-    pub fn new(bench: &Bench, start: &Model, steps: Option<usize>) -> Option<Self> {
+    pub fn new(bench: &Bench, start: &Model, until: Until) -> Option<Self> {
         let simulated = bench.simulate(start);
         let residual = bench.residual(&simulated);
         let loss = dot(&residual, &residual);
@@ -59,8 +78,9 @@ impl Fit {
         let model = start.clone();
         let mut fit = Self { model, simulated, residual, sensitivities, own, loss, converged: false };
         let mut damping = 1e-4;
-        for _ in 0..steps.unwrap_or(STEPS) {
-            if !fit.step(bench, &mut damping) {
+        for _ in 0..until.steps {
+            let before = fit.loss;
+            if !fit.step(bench, &mut damping) || before - fit.loss < until.gain * before {
                 break;
             }
         }
@@ -104,13 +124,28 @@ impl Fit {
 
     /// The model a step of the shared numbers away, each stretch's own following as the samples want.
     fn moved(&self, bench: &Bench, step: &[f64]) -> Model {
-        let vector: Vec<f64> = self.model.vector().iter().zip(step).map(|(x, d)| x + d).collect();
-        let mut left = self.residual.clone();
-        let shared = raw(bench, &self.model, &self.simulated, step);
-        left.iter_mut().zip(&shared).for_each(|(l, s)| *l -= s);
-        let own: Vec<Vec<f64>> =
-            (0..bench.layout.stretches()).map(|e| self.own.solve(e, &left, &bench.layout)).collect();
-        self.model.at(&vector).moved(|e, i| own.get(e).and_then(|own| own.get(i)).copied().unwrap_or(0.0))
+        moved(bench, &self.model, &self.simulated, &self.residual, &self.own, step)
+    }
+
+    /// What the model with one more cause reaches from a start, near its minimum. None where the start diverges.
+    pub(crate) fn with_chords(&self, bench: &Bench, start: &Model, until: Until) -> Option<Chords> {
+        let (vector, simulated) = (start.vector(), bench.simulate(start));
+        let mut columns = self.sensitivities.clone();
+        for i in columns.len()..vector.len() {
+            let mut column = shared_column(bench, start, &vector, &simulated, i);
+            self.own.take_out(&mut column, &bench.layout);
+            columns.push(column);
+        }
+        Chords::new(bench, start, simulated, columns, &self.own, until)
+    }
+
+    /// What the model without one of its causes reaches, near its minimum. None where it diverges.
+    pub(crate) fn without_chords(&self, bench: &Bench, which: usize, until: Until) -> Option<Chords> {
+        let start = self.model.without(which);
+        let places = self.model.places(which);
+        let kept = self.sensitivities.iter().enumerate().filter(|(i, _)| !places.contains(i));
+        let columns = kept.map(|(_, column)| column.clone()).collect();
+        Chords::new(bench, &start, bench.simulate(&start), columns, &self.own, until)
     }
 
     /// Standard deviation of what it leaves.
@@ -185,6 +220,16 @@ fn own_column(bench: &Bench, model: &Model, simulated: &[f64], i: usize) -> Vec<
     change(bench, &bench.simulate(&moved), simulated, step)
 }
 
+/// The model a step of the shared numbers away, each stretch's own following as the samples want.
+fn moved(bench: &Bench, model: &Model, simulated: &[f64], residual: &[f64], own: &Own, step: &[f64]) -> Model {
+    let vector: Vec<f64> = model.vector().iter().zip(step).map(|(x, d)| x + d).collect();
+    let mut left = residual.to_vec();
+    let shared = raw(bench, model, simulated, step);
+    left.iter_mut().zip(&shared).for_each(|(l, s)| *l -= s);
+    let own: Vec<Vec<f64>> = (0..bench.layout.stretches()).map(|e| own.solve(e, &left, &bench.layout)).collect();
+    model.at(&vector).moved(|e, i| own.get(e).and_then(|own| own.get(i)).copied().unwrap_or(0.0))
+}
+
 /// Change of the output under a step of the shared numbers, to first order.
 fn raw(bench: &Bench, model: &Model, simulated: &[f64], step: &[f64]) -> Vec<f64> {
     // a step that is a thousandth of the wanted one, by differences: exact enough to say how the states follow
@@ -204,26 +249,34 @@ fn change(bench: &Bench, moved: &[f64], simulated: &[f64], by: f64) -> Vec<f64> 
 /// Sensitivities to what is shared, the stretches' own taken out, and those.
 fn differentiate(bench: &Bench, model: &Model, simulated: &[f64]) -> (Vec<Vec<f64>>, Own) {
     let vector = model.vector();
-    let shared = |i: usize| {
-        let step = 1e-6 * vector[i].abs().max(1e-3);
-        let shifted = |step: f64| {
-            let mut moved = vector.clone();
-            moved[i] += step;
-            let model = model.at(&moved);
-            (model.vector()[i] - vector[i], model)
-        };
-        // a parameter at its limit is differentiated inwards
-        let (by, moved) = Some(shifted(step)).filter(|(by, _)| *by != 0.0).unwrap_or_else(|| shifted(-step));
-        if by == 0.0 { vec![0.0; simulated.len()] } else { change(bench, &bench.simulate(&moved), simulated, by) }
-    };
     let (n, count) = (vector.len(), model.own_numbers());
     let mut columns: Vec<Vec<f64>> = (0..n + count)
         .into_par_iter()
-        .map(|i| if i < n { shared(i) } else { own_column(bench, model, simulated, i - n) })
+        .map(|i| {
+            if i < n {
+                shared_column(bench, model, &vector, simulated, i)
+            } else {
+                own_column(bench, model, simulated, i - n)
+            }
+        })
         .collect();
     let directions = Own::new(&columns.split_off(n), &bench.layout);
     columns.par_iter_mut().for_each(|column| directions.take_out(column, &bench.layout));
     (columns, directions)
+}
+
+/// Sensitivity of the output to number i of what is shared.
+fn shared_column(bench: &Bench, model: &Model, vector: &[f64], simulated: &[f64], i: usize) -> Vec<f64> {
+    let step = 1e-6 * vector[i].abs().max(1e-3);
+    let shifted = |step: f64| {
+        let mut moved = vector.to_vec();
+        moved[i] += step;
+        let model = model.at(&moved);
+        (model.vector()[i] - vector[i], model)
+    };
+    // a parameter at its limit is differentiated inwards
+    let (by, moved) = Some(shifted(step)).filter(|(by, _)| *by != 0.0).unwrap_or_else(|| shifted(-step));
+    if by == 0.0 { vec![0.0; simulated.len()] } else { change(bench, &bench.simulate(&moved), simulated, by) }
 }
 
 /// Products of columns with one another and with a residual.

@@ -1,12 +1,14 @@
 //! Which causes to add: greedily, then each again against its rivals.
 
+use rayon::prelude::*;
+
 use super::data::Bench;
 use super::dynamics::Model;
-use super::fit::{Blocks, Fit, dot};
+use super::fit::{Blocks, Chords, Fit, Until, dot};
 use super::lack_of_fit::{Floor, misfit};
 use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, Promise, Sample, screen, significance};
-use crate::causes::Cause;
+use crate::causes::{Cause, built_in};
 
 /// Candidates that are fitted at each step.
 const REFITTED: usize = 5;
@@ -14,6 +16,14 @@ const REFITTED: usize = 5;
 const WORK: usize = 160_000;
 /// Times that a model may be changed after its causes were held against their rivals.
 const ROUNDS: usize = 4;
+/// Share of the largest gain from which on a candidate may be the best.
+const NEAR: f64 = 0.8;
+/// Share of the loss below which a step of a fit that only has to be compared is its last.
+const SLOW: f64 = 1e-3;
+/// Share of the loss that is left below which chords are not trusted.
+const FAR: f64 = 0.5;
+/// Share of a cause's gain from which on a rival explains the same.
+const ALIKE: f64 = 0.99;
 /// Rivals that a named cause is held against.
 const RIVALS: usize = 2;
 /// Predictable over unpredictable part of what a model leaves, both rms, from which on another model is looked for: half
@@ -58,6 +68,23 @@ pub(crate) struct Chosen {
     pub runner_up: Option<(&'static str, f64)>,
     /// Whether the two can't be told apart.
     pub tied: bool,
+    /// Error without it on what did not choose it, all others refitted; none where it is far from the error with it.
+    pub left_out: Option<f64>,
+}
+
+impl Chosen {
+    /// Whether it is told from its rival, or acts in the same place as that: then both make its class.
+    pub fn has_a_name(&self) -> bool {
+        let part = |id| built_in(id).map(|cause| cause.about().part);
+        !self.tied || self.runner_up.is_some_and(|(rival, _)| part(rival) == part(self.id))
+    }
+
+    /// What it can't be told from, itself included.
+    pub fn class(&self) -> Vec<String> {
+        let own = built_in(self.id).map_or(&[][..], |cause| cause.about().class);
+        let rival = self.runner_up.map(|(id, _)| id).filter(|id| self.tied && !own.contains(id));
+        own.iter().copied().chain(rival).map(str::to_owned).collect()
+    }
 }
 
 /// What the search found.
@@ -159,18 +186,41 @@ impl Search<'_> {
         if promising.is_empty() {
             return None;
         }
-        let mut tried: Vec<(f64, Model)> = Vec::new();
-        for promise in promising {
-            let Some(next) = self.extended(&current.fit.model, promise) else { continue };
-            let parameters = next.fit.model.vector().len().saturating_sub(current.fit.model.vector().len()).max(1);
+        let gain = |model: Model, loss: f64| {
+            let parameters = model.vector().len().saturating_sub(current.fit.model.vector().len()).max(1);
             let samples = self.bench.count as f64;
-            let gain = 0.5 * samples * (current.fit.loss / next.fit.loss).ln();
-            tried.push((gain - 0.5 * parameters as f64 * samples.ln(), next.fit.model));
-        }
-        tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let gain = 0.5 * samples * (current.fit.loss / loss).ln();
+            (gain - 0.5 * parameters as f64 * samples.ln(), model)
+        };
+        let falling = |a: &(f64, Model), b: &(f64, Model)| b.0.total_cmp(&a.0);
+        let starts: Vec<Model> = promising.into_iter().map(|promise| self.start(&current.fit.model, promise)).collect();
+        let reached: Vec<Chords> = starts
+            .par_iter()
+            .filter_map(|start| current.fit.with_chords(self.bench, start, self.compared_until()))
+            .collect();
+        let least = reached.iter().map(|reached| reached.loss).fold(f64::INFINITY, f64::min);
+        let fitted = |models: Vec<Model>| -> Vec<(f64, Model)> {
+            let fits = models.iter().filter_map(|model| self.compared(model));
+            fits.map(|judged| gain(judged.fit.model, judged.fit.loss)).collect()
+        };
+        // a cause that moves the others' numbers much misleads chords: then all are fitted, else those near the first
+        let mut tried = if least < FAR * current.fit.loss {
+            fitted(starts)
+        } else {
+            let mut tried: Vec<(f64, Model)> =
+                reached.into_iter().map(|reached| gain(reached.model, reached.loss)).collect();
+            tried.sort_by(falling);
+            let near = tried.iter().filter(|(gain, _)| *gain > NEAR * tried[0].0).count();
+            if near > 1 {
+                let models = tried.drain(..near).map(|(_, model)| model).collect();
+                tried.extend(fitted(models));
+            }
+            tried
+        };
+        tried.sort_by(falling);
         let sample = self.sample(&current.fit);
         for (_, model) in tried.into_iter().filter(|(gain, _)| gain.is_finite()) {
-            let next = Judged::new(Fit::new(self.bench, &model, None)?, self.bench, &self.blocks);
+            let next = Judged::new(Fit::new(self.bench, &model, Until::MINIMUM)?, self.bench, &self.blocks);
             let which = next.fit.model.causes.len() - 1;
             if self.passes(&sample, &next, which, current) {
                 return Some(next);
@@ -193,7 +243,11 @@ impl Search<'_> {
 
     /// A model in a few steps of its fit.
     fn compared(&self, model: &Model) -> Option<Judged> {
-        Some(Judged::new(Fit::new(self.bench, model, Some(self.few()))?, self.bench, &self.blocks))
+        Some(Judged::new(Fit::new(self.bench, model, self.compared_until())?, self.bench, &self.blocks))
+    }
+
+    fn compared_until(&self) -> Until {
+        Until { steps: self.few(), gain: SLOW.min(0.25 * self.options.least_gain) }
     }
 
     fn sample<'b>(&'b self, fit: &'b Fit) -> Sample<'b> {
@@ -201,8 +255,8 @@ impl Search<'_> {
         Sample { bench: self.bench, blocks: &self.blocks, fit, floor }
     }
 
-    /// A promise fitted jointly with a model.
-    fn extended(&self, model: &Model, promise: &Promise) -> Option<Judged> {
+    /// Where the joint fit of a promise begins.
+    fn start(&self, model: &Model, promise: &Promise) -> Model {
         let candidate = &promise.candidate;
         let start = |values: &Vec<f64>| model.with(candidate.cause, &candidate.modes, values.clone());
         let loss = |values: &Vec<f64>| {
@@ -212,7 +266,7 @@ impl Search<'_> {
         };
         // the strength that the score asks for may be far outside where it is linear
         let from = if loss(&promise.values) <= loss(&promise.trial) { &promise.values } else { &promise.trial };
-        self.compared(&start(from))
+        start(from)
     }
 
     /// Whether cause `which` of a model is significant and large enough against the model without it.
@@ -251,8 +305,20 @@ impl Search<'_> {
             if may_change && weak && which + 1 < here.fit.model.causes.len() {
                 return Examined::Changes(without.fit.model);
             }
-            if let Some((rival, _)) = rival.filter(|_| may_change)
+            if let Some((rival, _)) = rival.as_ref().filter(|_| may_change)
                 && rival.fit.loss - here.fit.loss < -TIE * sample.floor.mean_square
+            {
+                return Examined::Changes(rival.fit.model.clone());
+            }
+            // of two laws that explain the same the one that another mode follows as well
+            let follows = |id: &str| {
+                let mut others = here.fit.model.causes.iter().enumerate().filter(|(other, _)| *other != which);
+                others.any(|(_, other)| other.id() == id)
+            };
+            if let Some((rival, id)) =
+                rival.filter(|_| may_change && found.runner_up.is_some_and(|(_, share)| share > ALIKE))
+                && follows(id)
+                && !follows(found.id)
             {
                 return Examined::Changes(rival.fit.model);
             }
@@ -272,13 +338,22 @@ impl Search<'_> {
             .collect();
         let promises = screen(self.bench, &without.fit, &others);
         let sample = self.sample(&without.fit);
-        let extended = promises.iter().take(RIVALS).filter_map(|promise| {
-            let rival = self.extended(&without.fit.model, promise)?;
+        let mut rivals: Vec<Chords> = promises
+            .par_iter()
+            .take(RIVALS)
+            .filter_map(|promise| {
+                let start = self.start(&without.fit.model, promise);
+                without.fit.with_chords(self.bench, &start, self.compared_until())
+            })
+            .collect();
+        rivals.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+        rivals.into_iter().find_map(|reached| {
+            let rival = self.compared(&reached.model)?;
+            let place = rival.fit.model.causes.len() - 1;
+            let id = rival.fit.model.causes[place].id();
             // what is not significant by itself is no rival
-            self.passes(&sample, &rival, rival.fit.model.causes.len() - 1, without)
-                .then_some((rival, promise.candidate.id()))
-        });
-        extended.min_by(|a, b| a.0.fit.loss.total_cmp(&b.0.fit.loss))
+            self.passes(&sample, &rival, place, without).then_some((rival, id))
+        })
     }
 
     /// The ladder to a model's causes, in their order.
@@ -292,13 +367,13 @@ impl Search<'_> {
             let promise = screen(self.bench, &current.fit, &[again]).into_iter().next();
             let asked = promise.into_iter().flat_map(|promise| [promise.values, promise.trial]);
             let next = asked.chain([added.values.clone()]).find_map(|values| {
-                Fit::new(self.bench, &current.fit.model.with(added.cause, &added.modes, values), None)
+                Fit::new(self.bench, &current.fit.model.with(added.cause, &added.modes, values), Until::MINIMUM)
             });
             let Some(next) = next else { break };
             ladder.push(Judged::new(next, self.bench, &self.blocks));
         }
         // the last from where it was found, if that is the better
-        let found = Fit::new(self.bench, model, None);
+        let found = Fit::new(self.bench, model, Until::MINIMUM);
         if let (Some(last), Some(found)) = (ladder.last_mut(), found)
             && last.fit.model.causes.len() == model.causes.len()
             && found.loss < last.fit.loss
@@ -327,6 +402,7 @@ impl Search<'_> {
             p_value: self.corrected(sign.p_value, added.cause),
             inflation: sign.inflation,
             tied: rival.is_some_and(|(rival, _)| rival.fit.loss - here.fit.loss < tie),
+            left_out: None,
             runner_up: rival.map(|(rival, id)| (*id, (without.fit.loss - rival.fit.loss) / gain)),
         }
     }

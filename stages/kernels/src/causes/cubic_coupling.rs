@@ -1,0 +1,71 @@
+//! Two modes that stiffen one another.
+
+use std::sync::Arc;
+
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use crate::effects::Effects;
+
+/// `w1^2 c1 q1 q2^2` on the first mode, `w2^2 c2 q1^2 q2` on the second.
+pub struct CubicCoupling;
+
+const ABOUT: About = About {
+    id: "cubic-coupling",
+    physics: "the swing of either mode stretches what the other bends: internal resonance 1:1, or a shift of one mode's frequency by the other",
+    part: Part::Lever,
+    domain: Domain::InputOutput,
+    parameters: &[
+        Parameter {
+            name: "c1",
+            unit: "1/V^2",
+            meaning: "relative change of the first mode's stiffness per square of the second's deflection signal",
+            low: -10.0,
+            high: 10.0,
+        },
+        Parameter {
+            name: "c2",
+            unit: "1/V^2",
+            meaning: "relative change of the second mode's stiffness per square of the first's deflection signal",
+            low: -10.0,
+            high: 10.0,
+        },
+    ],
+    class: &["cubic-coupling"],
+    resembles: "duffing: acts on each mode by itself",
+    next_measurement: "excite one mode alone, then both: its frequency depends on the other's swing",
+    identifiable: Identifiable::Shape,
+    source: "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, 1979, chapter 6",
+};
+
+impl Cause for CubicCoupling {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn add(&self, values: &[f64], effects: &mut Effects) {
+        let (c1, c2) = (values[0], values[1]);
+        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+            let (Some([q1, q2]), Some([w1, w2])) =
+                (motion.position.first_chunk::<2>(), motion.omega.first_chunk::<2>())
+            else {
+                return;
+            };
+            if let Some([a1, a2]) = acceleration.first_chunk_mut::<2>() {
+                *a1 -= w1 * w1 * c1 * q1 * q2 * q2;
+                *a2 -= w2 * w2 * c2 * q1 * q1 * q2;
+            }
+        }));
+    }
+
+    fn modes(&self) -> usize {
+        2
+    }
+
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
+    fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let c = 0.003 / scene.level_v.powi(2);
+        vec![vec![c, c], vec![c, 0.0]]
+    }
+}

@@ -1,0 +1,67 @@
+//! Two modes that feed one another at one to two.
+
+use std::sync::Arc;
+
+use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use crate::effects::Effects;
+
+/// `w1^2 c1 q1 q2` on the first mode, `w2^2 c2 q1^2` on the second.
+pub struct QuadraticCoupling;
+
+const ABOUT: About = About {
+    id: "quadratic-coupling",
+    physics: "the square of one mode's swing drives another at twice its frequency, and that one pumps it in turn: internal resonance 1:2",
+    part: Part::Lever,
+    domain: Domain::InputOutput,
+    parameters: &[
+        Parameter {
+            name: "c1",
+            unit: "1/V",
+            meaning: "relative change of the first mode's stiffness per deflection signal of the second",
+            low: -10.0,
+            high: 10.0,
+        },
+        Parameter {
+            name: "c2",
+            unit: "1/V",
+            meaning: "force on the second mode over its stiffness, per square of the first's deflection signal",
+            low: -10.0,
+            high: 10.0,
+        },
+    ],
+    class: &["quadratic-coupling"],
+    resembles: "quadratic-stiffness: its second harmonic does not beat, and does not feed back",
+    next_measurement: "detune the modes by a small mass: energy no longer goes to and fro between them",
+    identifiable: Identifiable::Shape,
+    source: "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, 1979, chapter 6",
+};
+
+impl Cause for QuadraticCoupling {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn add(&self, values: &[f64], effects: &mut Effects) {
+        let (c1, c2) = (values[0], values[1]);
+        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+            let (Some([q1, q2]), Some([w1, w2])) =
+                (motion.position.first_chunk::<2>(), motion.omega.first_chunk::<2>())
+            else {
+                return;
+            };
+            if let Some([a1, a2]) = acceleration.first_chunk_mut::<2>() {
+                *a1 -= w1 * w1 * c1 * q1 * q2;
+                *a2 -= w2 * w2 * c2 * q1 * q1;
+            }
+        }));
+    }
+
+    fn modes(&self) -> usize {
+        2
+    }
+
+    fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {
+        let c = 0.003 / scene.level_v;
+        vec![vec![c, c], vec![c, 0.0]]
+    }
+}

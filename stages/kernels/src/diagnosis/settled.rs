@@ -1,0 +1,134 @@
+//! What was chosen on a sample, fitted to all samples, and what does not hold there taken out.
+
+use rayon::prelude::*;
+
+use super::baseline::blocks;
+use super::data::{Bench, Record};
+use super::diagnose::Extended;
+use super::dynamics::Model;
+use super::fit::{Chords, Fit, Moments, Until, with_own};
+use super::options::DiagnosisOptions;
+use super::selection::{Choice, Judged};
+use super::validation::{held_out, pooled_rms};
+
+/// The fit to all samples of a model between the baseline and the last: its error is shown, not used.
+const PASSED: Until = Until::steps(3);
+/// The fit without a cause, for comparison.
+const COMPARED: Until = Until { steps: 6, gain: 1e-3 };
+/// Ratio of losses without and with a cause from which on it needs no further test.
+const PLAIN: f64 = 1.5;
+/// Standard errors that a strength must reach.
+const STRENGTH: f64 = 3.0;
+
+/// A cause of the last model, seen on all samples.
+struct Standing {
+    /// Its largest strength over its error; a choice has none.
+    strength: Option<f64>,
+    /// Without it: the error on what did not choose it, and the model; none where that is far off.
+    without: Option<(f64, Model)>,
+}
+
+impl Extended {
+    /// Every model fitted to all samples, from where it was found, without causes whose strength is below three of its
+    /// errors or that gain nothing on what did not choose them. None where the baseline diverges.
+    ///
+    /// # Method
+    /// Backward elimination, the cause first that loses most by being there.
+    pub fn on_all(self, records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions) -> Option<Self> {
+        let here = self.bench.stretches == options.training && self.bench.interval_s == interval_s;
+        let first = self.choice.ladder.first()?;
+        let highest_hz = first.fit.model.dynamics.highest_hz();
+        let bench = match here {
+            true => self.bench.clone(),
+            false => self.bench.at_interval(records, &options.training, interval_s, highest_hz)?,
+        };
+        let blocks = blocks(&bench, &first.fit);
+        let fitted = |model: &Model, until: Until| {
+            let mut start = if here { model.clone() } else { with_own(&bench, model) };
+            start.dynamics.interval_s = interval_s;
+            Some(Judged::new(Fit::new(&bench, &start, until)?, &bench, &blocks))
+        };
+        let mut models: Vec<Model> = self.choice.ladder.iter().map(|judged| judged.fit.model.clone()).collect();
+        let mut chosen = self.choice.chosen.clone();
+        // a model that diverges on all samples ends the ladder before it
+        let mut last = loop {
+            if let Some(last) = fitted(models.last()?, Until::MINIMUM) {
+                break last;
+            }
+            models.pop();
+        };
+        chosen.retain(|chosen| chosen.place + 1 < models.len());
+        let baseline = if models.len() > 1 { fitted(&models[0], Until::MINIMUM)? } else { last.clone() };
+        let mut unchanged = if here { models.len() } else { 0 };
+        while models.len() > 1 {
+            let error = |model: &Model| pooled_rms(&bench, records, model, held_out(&options.parts));
+            let folds = options.parts.is_empty();
+            let with = if folds { Some(last.unseen()) } else { error(&last.fit.model) };
+            let covariance = last.fit.moments(&bench, &blocks).sandwich();
+            let judge = |reached: &Chords| match folds {
+                true => Some(Moments::new(&reached.columns, &reached.residual, &blocks).held_out(0.0).iter().sum()),
+                false => error(&reached.model),
+            };
+            let standings: Vec<Standing> = (0..models.len() - 1)
+                .into_par_iter()
+                .map(|which| standing(&bench, &last.fit, &covariance, which, judge))
+                .collect();
+            let loses = |s: &Standing| Some(with? / s.without.as_ref()?.0);
+            let worst = (0..standings.len())
+                .filter_map(|which| Some((loses(&standings[which])?, which)))
+                .filter(|(ratio, _)| *ratio >= 1.0)
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            let faint = (0..standings.len())
+                .filter_map(|which| Some((standings[which].strength?, which)))
+                .filter(|(strength, _)| *strength < STRENGTH)
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, which)) = worst.or(faint) else {
+                // what is far from it is fitted, to say how far
+                let fitted = |which: usize| {
+                    let judged =
+                        Judged::new(Fit::new(&bench, &last.fit.model.without(which), PASSED)?, &bench, &blocks);
+                    if folds { Some(judged.unseen()) } else { error(&judged.fit.model) }
+                };
+                for own in &mut chosen {
+                    let near = standings.get(own.place).and_then(|s| Some(s.without.as_ref()?.0));
+                    own.left_out = near.or_else(|| fitted(own.place));
+                }
+                break;
+            };
+            let without = standings.into_iter().nth(which).and_then(|s| s.without).map(|(_, model)| model);
+            let next = without.unwrap_or_else(|| last.fit.model.without(which));
+            last = Judged::new(Fit::new(&bench, &next, Until::MINIMUM)?, &bench, &blocks);
+            models.remove(which + 1);
+            models.iter_mut().skip(which + 1).for_each(|model| *model = model.without(which));
+            unchanged = unchanged.min(which + 1);
+            chosen.retain(|own| own.place != which);
+            chosen.iter_mut().filter(|own| own.place > which).for_each(|own| own.place -= 1);
+        }
+        let mut ladder = vec![baseline];
+        let between = 1..models.len().saturating_sub(1);
+        for (rung, model) in models.iter().enumerate().take(between.end).skip(between.start) {
+            let known = (rung < unchanged).then(|| self.choice.ladder[rung].clone());
+            let until = if here { Until::MINIMUM } else { PASSED };
+            ladder.push(known.or_else(|| fitted(model, until))?);
+        }
+        if models.len() > 1 {
+            ladder.push(last);
+        }
+        Some(Self { choice: Choice { ladder, chosen, ..self.choice }, bench, blocks, ..self })
+    }
+}
+
+fn standing(
+    bench: &Bench,
+    last: &Fit,
+    covariance: &[Vec<f64>],
+    which: usize,
+    error: impl Fn(&Chords) -> Option<f64>,
+) -> Standing {
+    let added = &last.model.causes[which];
+    let ratio = |(place, value): (usize, &f64)| value.abs() / covariance[place][place].sqrt();
+    let strength = last.model.places(which).zip(&added.values).map(ratio).fold(0.0, f64::max);
+    let reached = last.without_chords(bench, which, COMPARED).filter(|reached| reached.loss < PLAIN * last.loss);
+    let without = reached.and_then(|reached| Some((error(&reached)?, reached.model)));
+    Standing { strength: (!added.is_choice()).then_some(strength), without }
+}
