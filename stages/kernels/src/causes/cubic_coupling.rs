@@ -10,7 +10,8 @@ pub struct CubicCoupling;
 
 const ABOUT: About = About {
     id: "cubic-coupling",
-    physics: "the swing of either mode stretches what the other bends: internal resonance 1:1, or a shift of one mode's frequency by the other",
+    physics: "the swing of either mode stretches what the other bends: internal resonance 1:1, or a shift of one \
+              mode's frequency by the other",
     part: Part::Lever,
     domain: Domain::InputOutput,
     parameters: &[

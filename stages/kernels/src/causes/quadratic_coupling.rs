@@ -10,7 +10,8 @@ pub struct QuadraticCoupling;
 
 const ABOUT: About = About {
     id: "quadratic-coupling",
-    physics: "the square of one mode's swing drives another at twice its frequency, and that one pumps it in turn: internal resonance 1:2",
+    physics: "the square of one mode's swing drives another at twice its frequency, and that one pumps it in turn: \
+              internal resonance 1:2",
     part: Part::Lever,
     domain: Domain::InputOutput,
     parameters: &[

@@ -73,7 +73,7 @@ pub enum DiagnosisError {
     },
     /// An input that does not move.
     #[error(
-        "the input is constant over what is learnt from: it causes nothing that can be told from an offset; choose a \
+        "the input is constant over what is learnt from: it causes nothing but an offset; choose a \
          stretch in which it moves, or diagnose a free decay without an input"
     )]
     Still,

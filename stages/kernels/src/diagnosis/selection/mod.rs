@@ -73,13 +73,13 @@ pub(crate) struct Chosen {
 }
 
 impl Chosen {
-    /// Whether it is told from its rival, or acts in the same place as that: then both make its class.
+    /// Whether the data distinguish it from its rival, or both act in the same place and make its class.
     pub fn has_a_name(&self) -> bool {
         let part = |id| built_in(id).map(|cause| cause.about().part);
         !self.tied || self.runner_up.is_some_and(|(rival, _)| part(rival) == part(self.id))
     }
 
-    /// What it can't be told from, itself included.
+    /// What these data can't distinguish from it, itself included.
     pub fn class(&self) -> Vec<String> {
         let own = built_in(self.id).map_or(&[][..], |cause| cause.about().class);
         let rival = self.runner_up.map(|(id, _)| id).filter(|id| self.tied && !own.contains(id));
