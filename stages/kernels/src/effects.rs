@@ -37,14 +37,142 @@ pub struct Instant {
 /// Share of the load that still acts `t` seconds after the release (t >= 0); the unhurt release leaves none. What acts
 /// again later than 120 samples after it must last 8 samples to be seen by the diagnosis.
 pub type RemainingLoad = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
-/// Adds to the acceleration of each mode, V/s^2.
-pub type ModalForce = Arc<dyn Fn(&Motion<'_>, &mut [f64]) + Send + Sync>;
+/// Any force: adds to the acceleration of each mode, V/s^2.
+pub type ForceLaw = Arc<dyn Fn(&Motion<'_>, &mut [f64]) + Send + Sync>;
 /// A static map, volts to volts: of the optics before the electronics, or of an input.
 pub type StaticMap = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
 /// Relative change of every mode's frequency at a place in the archive.
 pub type FrequencyChange = Arc<dyn Fn(&Instant) -> f64 + Send + Sync>;
 /// Volts added behind the electronics.
 pub type Added = Arc<dyn Fn(&Instant) -> f64 + Send + Sync>;
+
+/// What a factor of a [`PowerLaw`] is of its mode's motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quantity {
+    /// Deflection q, V.
+    Deflection,
+    /// Rate q' / omega, V.
+    Rate,
+    /// |q|.
+    Distance,
+    /// |q' / omega|.
+    Speed,
+    /// Amplitude sqrt(q^2 + (q' / omega)^2).
+    Amplitude,
+}
+
+/// One factor of a [`PowerLaw`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Factor {
+    /// Which.
+    pub of: Quantity,
+    /// Of which mode.
+    pub mode: usize,
+}
+
+/// A force on one mode that is a product: acceleration `- omega^2 strength x_1 x_2 ...`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PowerLaw {
+    /// The mode that it acts on.
+    pub on: usize,
+    /// Strength, 1/V^(factors - 1).
+    pub strength: f64,
+    /// Its factors.
+    pub factors: Vec<Factor>,
+}
+
+impl PowerLaw {
+    /// A force on mode `on`.
+    pub fn new(on: usize, strength: f64, factors: &[(Quantity, usize)]) -> Self {
+        let factors = factors.iter().map(|(of, mode)| Factor { of: *of, mode: *mode }).collect();
+        Self { on, strength, factors }
+    }
+
+    /// Acceleration of the mode that it acts on; none where a mode is not there.
+    fn acceleration(&self, motion: &Motion<'_>) -> Option<f64> {
+        let omega = motion.omega.get(self.on)?;
+        let mut product = omega * omega * self.strength;
+        for Factor { of, mode } in &self.factors {
+            let q = *motion.position.get(*mode)?;
+            let rate = motion.velocity.get(*mode)? / motion.omega.get(*mode)?;
+            product *= match of {
+                Quantity::Deflection => q,
+                Quantity::Rate => rate,
+                Quantity::Distance => q.abs(),
+                Quantity::Speed => rate.abs(),
+                Quantity::Amplitude => (q * q + rate * rate).sqrt(),
+            };
+        }
+        Some(-product)
+    }
+}
+
+/// A force on the modes.
+#[derive(Clone)]
+pub enum ModalForce {
+    /// A product of powers: many motions are simulated under it side by side.
+    Power(PowerLaw),
+    /// Any other, and the modes that it takes for its first, second, ...; empty: in their own order.
+    Law(ForceLaw, Vec<usize>),
+}
+
+/// Most modes that a law with an order of its own sees.
+const MOST_MODES: usize = 4;
+
+impl ModalForce {
+    /// Any force.
+    pub fn law(law: impl Fn(&Motion<'_>, &mut [f64]) + Send + Sync + 'static) -> Self {
+        Self::Law(Arc::new(law), Vec::new())
+    }
+
+    /// Adds to the acceleration of each mode, V/s^2.
+    pub fn add(&self, motion: &Motion<'_>, acceleration: &mut [f64]) {
+        match self {
+            Self::Law(law, order) if order.is_empty() => law(motion, acceleration),
+            Self::Law(law, order) => seen_from(law, order, motion, acceleration),
+            Self::Power(law) => {
+                if let (Some(to), Some(by)) = (acceleration.get_mut(law.on), law.acceleration(motion)) {
+                    *to += by;
+                }
+            }
+        }
+    }
+
+    /// Makes it take modes `order` for its first, second, ...; what has no place there is no force.
+    pub fn place(&mut self, order: &[usize]) {
+        let of = |mode: usize| order.get(mode).copied().unwrap_or(usize::MAX);
+        match self {
+            Self::Power(law) => {
+                law.on = of(law.on);
+                law.factors.iter_mut().for_each(|factor| factor.mode = of(factor.mode));
+            }
+            Self::Law(_, own) if own.is_empty() => *own = order.to_vec(),
+            Self::Law(_, own) => own.iter_mut().for_each(|mode| *mode = of(*mode)),
+        }
+    }
+}
+
+fn seen_from(law: &ForceLaw, order: &[usize], motion: &Motion<'_>, acceleration: &mut [f64]) {
+    let count = order.len().min(MOST_MODES);
+    let of = |values: &[f64]| -> [f64; MOST_MODES] {
+        std::array::from_fn(|i| order.get(i).and_then(|mode| values.get(*mode)).copied().unwrap_or(0.0))
+    };
+    let (position, velocity, omega) = (of(motion.position), of(motion.velocity), of(motion.omega));
+    let seen = Motion {
+        position: &position[..count],
+        velocity: &velocity[..count],
+        omega: &omega[..count],
+        gap: position[0],
+        thermal: motion.thermal,
+    };
+    let mut own = [0.0; MOST_MODES];
+    law(&seen, &mut own[..count]);
+    for (mode, own) in order.iter().zip(own) {
+        if let Some(to) = acceleration.get_mut(*mode) {
+            *to += own;
+        }
+    }
+}
 
 /// A load that outlasts the release as `Re(share exp(rate t))` of what it was: as a [`RemainingLoad`], but followed
 /// exactly and at no cost.

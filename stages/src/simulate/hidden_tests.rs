@@ -2,7 +2,7 @@
 
 use super::Afm;
 use crate::fixture::Lever as ClosedForm;
-use afmid_kernels::effects::{Effects, ExtraMode, LinearSection};
+use afmid_kernels::effects::{Effects, ExtraMode, LinearSection, ModalForce};
 use afmid_kernels::simulate::*;
 use faer::c64;
 use rand::SeedableRng;
@@ -281,10 +281,10 @@ fn duffing_obeys_the_amplitude_frequency_law() {
 fn halving_the_step_changes_little_of_what_modal_forces_do() {
     let closed = ClosedForm::paper();
     let rig = rig(&closed);
-    let forces: [(&str, afmid_kernels::effects::ModalForce); 3] = [
-        ("stiffness", Arc::new(|m, a| a[0] -= m.omega[0].powi(2) * 0.01 * m.position[0].powi(3))),
-        ("damping", Arc::new(|m, a| a[1] -= m.omega[1] * 2e-3 * m.velocity[1] * m.position[1].powi(2))),
-        ("gap", Arc::new(|m, a| (0..4).for_each(|n| a[n] -= m.omega[n].powi(2) * 0.01 * (-m.gap / 0.1).exp()))),
+    let forces: [(&str, ModalForce); 3] = [
+        ("stiffness", ModalForce::law(|m, a| a[0] -= m.omega[0].powi(2) * 0.01 * m.position[0].powi(3))),
+        ("damping", ModalForce::law(|m, a| a[1] -= m.omega[1] * 2e-3 * m.velocity[1] * m.position[1].powi(2))),
+        ("gap", ModalForce::law(|m, a| (0..4).for_each(|n| a[n] -= m.omega[n].powi(2) * 0.01 * (-m.gap / 0.1).exp()))),
     ];
     for (name, force) in forces {
         let effects = Effects { modal_force: vec![force], ..Effects::default() };

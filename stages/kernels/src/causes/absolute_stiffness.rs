@@ -1,9 +1,7 @@
 //! A joint that slips the more the further it is bent.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w^2 k abs(q) q` on the first mode.
 pub struct AbsoluteStiffness;
@@ -33,14 +31,8 @@ impl Cause for AbsoluteStiffness {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let k = values[0];
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
-            if let (Some(a), Some(q), Some(w)) =
-                (acceleration.first_mut(), motion.position.first(), motion.omega.first())
-            {
-                *a -= w * w * k * q.abs() * q;
-            }
-        }));
+        let factors = [(Quantity::Distance, 0), (Quantity::Deflection, 0)];
+        effects.modal_force.push(ModalForce::Power(PowerLaw::new(0, values[0], &factors)));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! Viscous friction that differs between the two directions.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ d abs(q')` on the first mode.
 pub struct AsymmetricFriction;
@@ -33,14 +31,8 @@ impl Cause for AsymmetricFriction {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let difference = values[0];
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
-            if let (Some(a), Some(v), Some(w)) =
-                (acceleration.first_mut(), motion.velocity.first(), motion.omega.first())
-            {
-                *a -= difference * w * v.abs();
-            }
-        }));
+        let law = PowerLaw::new(0, values[0], &[(Quantity::Speed, 0)]);
+        effects.modal_force.push(ModalForce::Power(law));
     }
 
     fn trials(&self, _scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! Dry friction.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce};
 
 /// `+ w^2 c sgn(q')` on the first mode.
 pub struct CoulombFriction;
@@ -41,7 +39,7 @@ impl Cause for CoulombFriction {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let c = values[0];
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+        effects.modal_force.push(ModalForce::law(move |motion, acceleration| {
             if let (Some(a), Some(v), Some(w)) =
                 (acceleration.first_mut(), motion.velocity.first(), motion.omega.first())
             {

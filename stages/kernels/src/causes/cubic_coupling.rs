@@ -1,9 +1,7 @@
 //! Two modes that stiffen one another.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `w1^2 c1 q1 q2^2` on the first mode, `w2^2 c2 q1^2 q2` on the second.
 pub struct CubicCoupling;
@@ -43,18 +41,11 @@ impl Cause for CubicCoupling {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let (c1, c2) = (values[0], values[1]);
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
-            let (Some([q1, q2]), Some([w1, w2])) =
-                (motion.position.first_chunk::<2>(), motion.omega.first_chunk::<2>())
-            else {
-                return;
-            };
-            if let Some([a1, a2]) = acceleration.first_chunk_mut::<2>() {
-                *a1 -= w1 * w1 * c1 * q1 * q2 * q2;
-                *a2 -= w2 * w2 * c2 * q1 * q1 * q2;
-            }
-        }));
+        use Quantity::Deflection as Q;
+        effects.modal_force.extend([
+            ModalForce::Power(PowerLaw::new(0, values[0], &[(Q, 0), (Q, 1), (Q, 1)])),
+            ModalForce::Power(PowerLaw::new(1, values[1], &[(Q, 0), (Q, 0), (Q, 1)])),
+        ]);
     }
 
     fn modes(&self) -> usize {

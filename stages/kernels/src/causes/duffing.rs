@@ -1,9 +1,7 @@
 //! A lever that stiffens with its deflection.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w^2 k3 q^3` on the first mode.
 pub struct Duffing;
@@ -33,14 +31,8 @@ impl Cause for Duffing {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let k3 = values[0];
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
-            if let (Some(a), Some(q), Some(w)) =
-                (acceleration.first_mut(), motion.position.first(), motion.omega.first())
-            {
-                *a -= w * w * k3 * q * q * q;
-            }
-        }));
+        let law = PowerLaw::new(0, values[0], &[(Quantity::Deflection, 0); 3]);
+        effects.modal_force.push(ModalForce::Power(law));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! A mode that feels another's swing.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `w2^2 (1 + c q1^2)`.
 pub struct ModeCoupling;
@@ -33,13 +31,8 @@ impl Cause for ModeCoupling {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let coupling = values[0];
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
-            let (Some([q1, q2]), Some(w2)) = (motion.position.first_chunk::<2>(), motion.omega.get(1)) else { return };
-            if let Some(a) = acceleration.get_mut(1) {
-                *a -= w2 * w2 * coupling * q1 * q1 * q2;
-            }
-        }));
+        use Quantity::Deflection as Q;
+        effects.modal_force.push(ModalForce::Power(PowerLaw::new(1, values[0], &[(Q, 0), (Q, 0), (Q, 1)])));
     }
 
     fn modes(&self) -> usize {

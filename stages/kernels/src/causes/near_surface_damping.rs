@@ -1,9 +1,7 @@
 //! Air that is squeezed near the surface.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce};
 
 /// `+ c exp(-z / l) q'`.
 pub struct NearSurfaceDamping;
@@ -37,7 +35,7 @@ impl Cause for NearSurfaceDamping {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (damping, length) = (values[0], values[1]);
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+        effects.modal_force.push(ModalForce::law(move |motion, acceleration| {
             if let (Some(a), Some(v), Some(w)) =
                 (acceleration.first_mut(), motion.velocity.first(), motion.omega.first())
             {

@@ -1,9 +1,7 @@
 //! Damping that grows with the swing.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w c q^2 q'` on the first mode.
 pub struct NonlinearDamping;
@@ -33,14 +31,8 @@ impl Cause for NonlinearDamping {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let c = values[0];
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
-            if let (Some(a), Some(q), Some(v), Some(w)) =
-                (acceleration.first_mut(), motion.position.first(), motion.velocity.first(), motion.omega.first())
-            {
-                *a -= w * c * q * q * v;
-            }
-        }));
+        let factors = [(Quantity::Deflection, 0), (Quantity::Deflection, 0), (Quantity::Rate, 0)];
+        effects.modal_force.push(ModalForce::Power(PowerLaw::new(0, values[0], &factors)));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

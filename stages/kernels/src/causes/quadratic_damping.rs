@@ -1,9 +1,7 @@
 //! Damping by a fluid that is pushed aside.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ c abs(q') q'` on the first mode.
 pub struct QuadraticDamping;
@@ -33,12 +31,8 @@ impl Cause for QuadraticDamping {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let c = values[0];
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
-            if let (Some(a), Some(v)) = (acceleration.first_mut(), motion.velocity.first()) {
-                *a -= c * v.abs() * v;
-            }
-        }));
+        let factors = [(Quantity::Speed, 0), (Quantity::Rate, 0)];
+        effects.modal_force.push(ModalForce::Power(PowerLaw::new(0, values[0], &factors)));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! A spring that is softer one way than the other.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w^2 k2 q^2` on the first mode.
 pub struct QuadraticStiffness;
@@ -33,14 +31,8 @@ impl Cause for QuadraticStiffness {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let k2 = values[0];
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
-            if let (Some(a), Some(q), Some(w)) =
-                (acceleration.first_mut(), motion.position.first(), motion.omega.first())
-            {
-                *a -= w * w * k2 * q * q;
-            }
-        }));
+        let law = PowerLaw::new(0, values[0], &[(Quantity::Deflection, 0); 2]);
+        effects.modal_force.push(ModalForce::Power(law));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

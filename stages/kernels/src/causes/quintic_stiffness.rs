@@ -1,9 +1,7 @@
 //! A spring that stiffens late.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w^2 k5 q^5` on the first mode.
 pub struct QuinticStiffness;
@@ -33,14 +31,8 @@ impl Cause for QuinticStiffness {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        let k5 = values[0];
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
-            if let (Some(a), Some(q), Some(w)) =
-                (acceleration.first_mut(), motion.position.first(), motion.omega.first())
-            {
-                *a -= w * w * k5 * q.powi(5);
-            }
-        }));
+        let law = PowerLaw::new(0, values[0], &[(Quantity::Deflection, 0); 5]);
+        effects.modal_force.push(ModalForce::Power(law));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! Attraction that returns on the backswing.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, ModalForce};
 
 /// `u -= F exp(-z / l)`.
 pub struct TipSampleForce;
@@ -37,7 +35,7 @@ impl Cause for TipSampleForce {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (strength, length) = (values[0], values[1]);
-        effects.modal_force.push(Arc::new(move |motion, acceleration| {
+        effects.modal_force.push(ModalForce::law(move |motion, acceleration| {
             let pull = strength * (-motion.gap.max(0.0) / length).exp();
             acceleration.iter_mut().zip(motion.omega).for_each(|(a, w)| *a -= w * w * pull);
         }));

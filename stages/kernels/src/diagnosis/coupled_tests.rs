@@ -45,7 +45,7 @@ fn simulated(seed: u64, hidden: Option<&Hidden>) -> Vec<Vec<f64>> {
             let gap = position.first().copied().unwrap_or(0.0);
             let motion = Motion { position: &position, velocity: &velocity, omega: &w, gap, thermal: 0.0 };
             let mut extra = vec![0.0; order.len()];
-            effects.modal_force.iter().for_each(|force| force(&motion, &mut extra));
+            effects.modal_force.iter().for_each(|force| force.add(&motion, &mut extra));
             let mut rate = [x[1], 0.0, x[3], 0.0];
             for m in 0..2 {
                 rate[2 * m + 1] = -omega[m] * omega[m] * x[2 * m] - omega[m] * loss[m] * x[2 * m + 1];

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::data::Bench;
 use super::fit::{Blocks, Cholesky, Fit, Moments, dot, paired};
 use super::score_test::{first_channel, peaks};
-use crate::effects::{Effects, Intersample};
+use crate::effects::{Effects, Intersample, ModalForce, PowerLaw, Quantity};
 
 /// Share of a residual that something systematic makes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +19,7 @@ pub struct Misfit {
 }
 
 /// Highest degree of the polynomials in deflection and rate.
-const DEGREE: i32 = 5;
+const DEGREE: usize = 5;
 /// A force or signal of this size: small enough to be linear.
 const SMALL: f64 = 1e-6;
 /// Of the Gram matrix scaled to a unit diagonal: the directions overlap, the small ones are noise.
@@ -80,22 +80,68 @@ fn clean(bench: &Bench, fit: &Fit) -> Vec<f64> {
 fn general(bench: &Bench, fit: &Fit) -> Vec<Vec<f64>> {
     let mut columns = fit.sensitivities.clone();
     let mut others = library(bench, fit);
-    others.par_iter_mut().for_each(|column| fit.own.take_out(column, &bench.layout));
+    others.par_iter_mut().for_each(|column| {
+        fit.own.take_out(column, &bench.layout);
+    });
     columns.extend(others);
     columns
 }
 
-type Term = Arc<dyn Fn(f64, f64) -> f64 + Send + Sync>;
+/// A product of quantities of one motion, or another function of (deflection, rate / omega).
+#[derive(Clone)]
+enum Term {
+    Product(Vec<Quantity>),
+    Sign,
+}
+
+impl Term {
+    /// Its value at a motion.
+    fn at(&self, [q, p]: [f64; 2]) -> f64 {
+        match self {
+            Self::Sign => (p / 0.02).tanh(),
+            Self::Product(factors) => factors.iter().map(|of| value(*of, [q, p])).product(),
+        }
+    }
+
+    /// The force that it is on a mode.
+    fn force(&self, mode: usize) -> ModalForce {
+        match self {
+            Self::Product(factors) => {
+                let factors: Vec<(Quantity, usize)> = factors.iter().map(|of| (*of, mode)).collect();
+                ModalForce::Power(PowerLaw::new(mode, -SMALL, &factors))
+            }
+            Self::Sign => ModalForce::law(move |motion, acceleration| {
+                if let (Some(a), Some(v), Some(w)) =
+                    (acceleration.get_mut(mode), motion.velocity.get(mode), motion.omega.get(mode))
+                {
+                    *a += SMALL * w * w * (v / w / 0.02).tanh();
+                }
+            }),
+        }
+    }
+}
+
+fn value(of: Quantity, [q, p]: [f64; 2]) -> f64 {
+    match of {
+        Quantity::Deflection => q,
+        Quantity::Rate => p,
+        Quantity::Distance => q.abs(),
+        Quantity::Speed => p.abs(),
+        Quantity::Amplitude => (q * q + p * p).sqrt(),
+    }
+}
 
 /// Functions of deflection and rate / omega, each near 1 at the largest motion; fewer where many modes have them.
 fn terms(modes: usize) -> Vec<Term> {
-    let mut terms: Vec<Term> = vec![Arc::new(|q, _| q.abs()), Arc::new(|_, p| p.abs()), Arc::new(|_, _| 1.0)];
-    terms.push(Arc::new(|_, p| (p / 0.02).tanh()));
-    terms.push(Arc::new(|q, p| q.hypot(p) * p));
-    terms.push(Arc::new(|q, p| q.hypot(p) * q));
+    use Quantity::{Amplitude, Deflection, Distance, Rate, Speed};
+    let mut terms: Vec<Term> =
+        [vec![Distance], vec![Speed], vec![], vec![Amplitude, Rate], vec![Amplitude, Deflection]]
+            .map(Term::Product)
+            .to_vec();
+    terms.push(Term::Sign);
     for degree in 2..=if modes > 1 { DEGREE - 2 } else { DEGREE } {
         for rates in 0..=degree {
-            terms.push(Arc::new(move |q, p| q.powi(degree - rates) * p.powi(rates)));
+            terms.push(Term::Product([vec![Deflection; degree - rates], vec![Rate; rates]].concat()));
         }
     }
     terms
@@ -115,9 +161,10 @@ fn library(bench: &Bench, fit: &Fit) -> Vec<Vec<f64>> {
     for mode in 0..modes {
         let direct = terms(modes).into_iter().map(|term| fill(seen(bench, &motion, mode, &term)));
         columns.extend(direct);
-        changed.extend(terms(modes).into_iter().map(|term| with_force(&effects, mode, term)));
+        changed.extend(terms(modes).iter().map(|term| with_forces(&effects, [term.force(mode)])));
         for other in (0..modes).filter(|other| *other != mode) {
-            changed.extend(products().into_iter().map(|term| with_coupling(&effects, [mode, other], term)));
+            let forces = couplings(mode, other).into_iter().map(|laws| laws.into_iter().map(ModalForce::Power));
+            changed.extend(forces.map(|forces| with_forces(&effects, forces)));
         }
     }
     if bench.driven {
@@ -128,13 +175,9 @@ fn library(bench: &Bench, fit: &Fit) -> Vec<Vec<f64>> {
             changed.push(Effects { intersample: Some(kind), ..effects.clone() });
         }
     }
-    let through: Vec<Vec<f64>> = changed
-        .par_iter()
-        .map(|effects| {
-            let moved = bench.simulate_with(model, effects);
-            fill(moved.iter().zip(&fit.simulated).map(|(a, b)| (a - b) / SMALL).collect())
-        })
-        .collect();
+    let moved = bench.simulate_each(&changed.iter().map(|effects| (model, effects)).collect::<Vec<_>>());
+    let change = |moved: &Vec<f64>| fill(moved.iter().zip(&fit.simulated).map(|(a, b)| (a - b) / SMALL).collect());
+    let through: Vec<Vec<f64>> = moved.par_iter().map(change).collect();
     columns.extend(through.into_iter().filter(|column| column.iter().all(|value| value.is_finite())));
     columns.extend(slow(bench, fit).into_iter().map(fill));
     columns
@@ -146,51 +189,29 @@ fn seen(bench: &Bench, motion: &[Vec<Vec<[f64; 2]>>], mode: usize, term: &Term) 
     for (e, states) in motion.iter().enumerate() {
         let Some(states) = states.get(mode) else { continue };
         let place = bench.layout.part(e, 0, 0, bench.layout.samples(e));
-        column[place].iter_mut().zip(states).for_each(|(to, [q, p])| *to = term(*q, *p));
+        column[place].iter_mut().zip(states).for_each(|(to, state)| *to = term.at(*state));
     }
     column
 }
 
-fn with_force(effects: &Effects, mode: usize, term: Term) -> Effects {
+fn with_forces(effects: &Effects, forces: impl IntoIterator<Item = ModalForce>) -> Effects {
     let mut effects = effects.clone();
-    effects.modal_force.push(Arc::new(move |motion, acceleration| {
-        if let (Some(a), Some(q), Some(v), Some(w)) =
-            (acceleration.get_mut(mode), motion.position.get(mode), motion.velocity.get(mode), motion.omega.get(mode))
-        {
-            *a += SMALL * w * w * term(*q, v / w);
-        }
-    }));
+    effects.modal_force.extend(forces);
     effects
 }
 
-type Product = fn([f64; 2], [f64; 2]) -> f64;
-
-/// Products of two modes' (deflection, rate / omega), the first the one that the force acts on.
-fn products() -> Vec<Product> {
-    vec![
-        |[a, _], [b, _]| a * b,
-        |[a, _], [_, b]| a * b,
-        |[_, a], [b, _]| a * b,
-        |[_, a], [_, b]| a * b,
-        |_, [b, _]| b * b,
-        |_, [b, p]| b * p,
-        |_, [_, p]| p * p,
-        |[a, _], [b, p]| a * (b * b + p * p),
-        |[_, a], [b, p]| a * (b * b + p * p),
-    ]
-}
-
-fn with_coupling(effects: &Effects, [mode, other]: [usize; 2], term: Product) -> Effects {
-    let mut effects = effects.clone();
-    effects.modal_force.push(Arc::new(move |motion, acceleration| {
-        let state = |m: usize| Some([*motion.position.get(m)?, motion.velocity.get(m)? / motion.omega.get(m)?]);
-        if let (Some(a), Some(w), Some(own), Some(of)) =
-            (acceleration.get_mut(mode), motion.omega.get(mode), state(mode), state(other))
-        {
-            *a += SMALL * w * w * term(own, of);
-        }
-    }));
-    effects
+/// Forces on a mode by products of its and another's deflection and rate / omega, each a sum of powers.
+fn couplings(mode: usize, other: usize) -> Vec<Vec<PowerLaw>> {
+    use Quantity::{Deflection as Q, Rate as P};
+    let one = |factors: &[(Quantity, usize)]| PowerLaw::new(mode, -SMALL, factors);
+    let mut forces: Vec<Vec<PowerLaw>> = Vec::new();
+    for own in [Q, P] {
+        forces.extend([Q, P].map(|of| vec![one(&[(own, mode), (of, other)])]));
+    }
+    forces.extend([[Q, Q], [Q, P], [P, P]].map(|of| vec![one(&of.map(|of| (of, other)))]));
+    // its own times the square of the other's amplitude
+    forces.extend([Q, P].map(|own| [Q, P].map(|of| one(&[(own, mode), (of, other), (of, other)])).to_vec()));
+    forces
 }
 
 fn with_input(effects: &Effects, map: Arc<dyn Fn(f64) -> f64 + Send + Sync>) -> Effects {

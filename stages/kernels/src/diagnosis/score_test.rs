@@ -114,8 +114,14 @@ pub(super) fn screen(bench: &Bench, fit: &Fit, candidates: &[Candidate]) -> Vec<
             !frequency(candidate.cause, trial).is_some_and(|frequency_hz| is_own(bench, fit, frequency_hz))
         })
         .collect();
-    let promises: Vec<Option<Promise>> =
-        trials.into_par_iter().map(|(candidate, trial)| promise(bench, fit, &basis, candidate, trial)).collect();
+    let with =
+        |(candidate, trial): &(&Candidate, Vec<f64>)| fit.model.with(candidate.cause, &candidate.modes, trial.clone());
+    let changed = bench.simulate_all(&trials.iter().map(with).collect::<Vec<_>>());
+    let promises: Vec<Option<Promise>> = trials
+        .into_par_iter()
+        .zip(changed)
+        .map(|((candidate, trial), changed)| promise(bench, fit, &basis, candidate, trial, &changed))
+        .collect();
     let mut best: Vec<Promise> = Vec::new();
     for next in promises.into_iter().flatten() {
         let same = |other: &&mut Promise| {
@@ -158,9 +164,15 @@ pub(super) fn trials(bench: &Bench, fit: &Fit, candidates: &[Candidate]) -> usiz
     candidates.iter().map(|candidate| candidate.cause.trials(&scene).len()).sum::<usize>().max(1)
 }
 
-fn promise(bench: &Bench, fit: &Fit, basis: &Basis, candidate: &Candidate, trial: Vec<f64>) -> Option<Promise> {
+fn promise(
+    bench: &Bench,
+    fit: &Fit,
+    basis: &Basis,
+    candidate: &Candidate,
+    trial: Vec<f64>,
+    changed: &[f64],
+) -> Option<Promise> {
     let cause = candidate.cause;
-    let changed = bench.simulate(&fit.model.with(cause, &candidate.modes, trial.clone()));
     let direction: Vec<f64> = (0..changed.len())
         .map(|k| if bench.output[k].is_finite() { changed[k] - fit.simulated[k] } else { 0.0 })
         .collect();
@@ -249,7 +261,8 @@ pub(super) fn significance(sample: &Sample<'_>, model: &Model, which: usize, gai
     let fit = sample.fit;
     let blocks = sample.blocks;
     let Some(added) = model.causes.get(which) else { return Significance { p_value: 1.0, inflation: 1.0 } };
-    let (with, without) = (bench.simulate(model), bench.simulate(&model.without(which)));
+    let mut outputs = bench.simulate_all(&[model.clone(), model.without(which)]).into_iter();
+    let (with, without) = (outputs.next().unwrap_or_default(), outputs.next().unwrap_or_default());
     let direction: Vec<f64> =
         (0..without.len()).map(|k| if bench.output[k].is_finite() { with[k] - without[k] } else { 0.0 }).collect();
     // the cause's own sensitivities don't count as the others'

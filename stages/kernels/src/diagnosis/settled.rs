@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::baseline::blocks;
-use super::data::{Bench, Record};
+use super::data::Record;
 use super::diagnose::Extended;
 use super::dynamics::Model;
 use super::fit::{Chords, Fit, Moments, Until, with_own};
@@ -69,9 +69,12 @@ impl Extended {
                 true => Some(Moments::new(&reached.columns, &reached.residual, &blocks).held_out(0.0).iter().sum()),
                 false => error(&reached.model),
             };
-            let standings: Vec<Standing> = (0..models.len() - 1)
+            let standings: Vec<Standing> = last
+                .fit
+                .without_chords(&bench, COMPARED)
                 .into_par_iter()
-                .map(|which| standing(&bench, &last.fit, &covariance, which, judge))
+                .enumerate()
+                .map(|(which, reached)| standing(&last.fit, &covariance, which, reached, judge))
                 .collect();
             let loses = |s: &Standing| Some(with? / s.without.as_ref()?.0);
             let worst = (0..standings.len())
@@ -119,16 +122,16 @@ impl Extended {
 }
 
 fn standing(
-    bench: &Bench,
     last: &Fit,
     covariance: &[Vec<f64>],
     which: usize,
+    reached: Option<Chords>,
     error: impl Fn(&Chords) -> Option<f64>,
 ) -> Standing {
     let added = &last.model.causes[which];
     let ratio = |(place, value): (usize, &f64)| value.abs() / covariance[place][place].sqrt();
     let strength = last.model.places(which).zip(&added.values).map(ratio).fold(0.0, f64::max);
-    let reached = last.without_chords(bench, which, COMPARED).filter(|reached| reached.loss < PLAIN * last.loss);
+    let reached = reached.filter(|reached| reached.loss < PLAIN * last.loss);
     let without = reached.and_then(|reached| Some((error(&reached)?, reached.model)));
     Standing { strength: (!added.is_choice()).then_some(strength), without }
 }

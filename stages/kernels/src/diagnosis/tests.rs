@@ -55,7 +55,7 @@ fn simulated(seed: u64, hidden: &[(&str, Vec<f64>)], noise: f64) -> (Vec<f64>, V
         let u = effects.input.iter().fold(u, |u, map| map(u));
         let motion = Motion { position: &[q], velocity: &[v], omega: &omega, gap: q, thermal: 0.0 };
         let mut a = [omega[0] * omega[0] * (0.5 * u - q) - omega[0] / quality * v];
-        effects.modal_force.iter().for_each(|force| force(&motion, &mut a));
+        effects.modal_force.iter().for_each(|force| force.add(&motion, &mut a));
         a[0]
     };
     let h = 1.0 / RATE_HZ / STEPS as f64;

@@ -42,7 +42,7 @@ pub(super) fn free_run_part(bench: &Bench, records: &[Record<'_>], model: &Model
     };
     let whole = Stretch { first: from, ..stretch };
     let here = bench.elsewhere(records, &[whole])?;
-    let simulated = here.simulate_stretch(model, &state, &whole, &model.effects());
+    let simulated = here.simulate_stretch(model, &state, &whole);
     let scored = |values: &[f64]| -> Vec<f64> {
         values.chunks(whole.samples().max(1)).flat_map(|channel| channel.iter().skip(skipped).copied()).collect()
     };

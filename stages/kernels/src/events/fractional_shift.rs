@@ -4,6 +4,8 @@ use std::f64::consts::PI;
 
 use pulp::Simd;
 
+use crate::signal::bessel_i0;
+
 /// Samples that the kernel reaches to either side.
 pub const REACH: usize = 32;
 
@@ -131,19 +133,6 @@ impl pulp::WithSimd for Sums<'_> {
             }
         }
     }
-}
-
-/// Modified Bessel function of the first kind, order 0, by its power series (converges for every argument; 30 terms at
-/// 10).
-fn bessel_i0(x: f64) -> f64 {
-    let quarter = 0.25 * x * x;
-    let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
-    while term > 1e-17 * sum {
-        term *= quarter / (k * k);
-        sum += term;
-        k += 1.0;
-    }
-    sum
 }
 
 #[cfg(test)]

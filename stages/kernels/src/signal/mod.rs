@@ -30,5 +30,5 @@ pub use decimation::{Decimated, decimate};
 pub use error::SignalError;
 pub use fourier::{RealTransform, TransformPlans};
 pub use periodogram::{autocorrelation, mean_periodogram, summed_periodograms};
-pub use taper::{Taper, TaperGains, hann, taper, taper_gains};
+pub use taper::{Taper, TaperGains, bessel_i0, hann, taper, taper_gains};
 pub use welch::{AveragedPeriodogram, Detrend, Welch};

@@ -94,6 +94,19 @@ pub fn taper_gains(window: &[f64]) -> TaperGains {
     TaperGains { coherent, noise, equivalent_bins }
 }
 
+/// Modified Bessel function of the first kind, order 0, by its power series (converges for every argument; 30 terms at
+/// 10). Source: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 1964, equation 9.6.10.
+pub fn bessel_i0(x: f64) -> f64 {
+    let quarter = 0.25 * x * x;
+    let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
+    while term > 1e-17 * sum {
+        term *= quarter / (k * k);
+        sum += term;
+        k += 1.0;
+    }
+    sum
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -338,7 +338,7 @@ impl Run<'_> {
             thermal: 0.0,
         };
         for force in &hidden.effects.modal_force {
-            force(&motion, &mut hidden.acceleration);
+            force.add(&motion, &mut hidden.acceleration);
         }
         for (n, scale) in hidden.volts_per_modal_m.iter().enumerate() {
             self.state[2 * n + 1] += weight_s * hidden.acceleration[n] / (scale * hidden.omega[n]);

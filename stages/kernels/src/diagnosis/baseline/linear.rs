@@ -44,7 +44,9 @@ pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
     }
     let simulated = bench.simulate(&quiet(&model));
     let own = own_directions(bench, &quiet(&model), &simulated);
-    columns.iter_mut().for_each(|column| own.take_out(column, &bench.layout));
+    for column in &mut columns {
+        own.take_out(column, &bench.layout);
+    }
     let mut output = bench.residual(&vec![0.0; bench.output.len()]);
     own.take_out(&mut output, &bench.layout);
     let (curvature, score) = normal(&columns, &output);

@@ -4,14 +4,14 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::{FineInput, Layout, Record, Stretch};
-use crate::diagnosis::dynamics::{Modal, Model, Span, State};
+use crate::diagnosis::dynamics::{Modal, Model, Run, Span, State, motions, outputs};
 use crate::diagnosis::error::DiagnosisError;
 use crate::effects::{Effects, Instant, Intersample};
 
 /// Fewest samples of a stretch: a hundred periods' worth of nothing is not enough, a few of a ringdown are.
 pub(crate) const LEAST_SAMPLES: usize = 24;
 /// Largest angle of a step, rad: the scheme's error is its fourth power over a hundred of what is not linear. Records
-/// of more than [`LONG`] samples take the second, whose error is still a thousandth of what a cause has to buy there.
+/// of more than [`LONG`] samples take the second, whose error is still a thousandth of what a cause has to gain there.
 const ANGLES: [f64; 2] = [0.15, 0.45];
 /// Samples beyond which time counts.
 const LONG: usize = 8192;
@@ -188,22 +188,35 @@ impl Bench {
 
     /// The model's output under other effects than its own.
     pub(crate) fn simulate_with(&self, model: &Model, effects: &Effects) -> Vec<f64> {
-        let mut output = Vec::with_capacity(self.layout.values());
-        for (e, stretch) in self.stretches.iter().enumerate() {
-            let Some(state) = model.states.get(e) else { break };
-            output.extend(self.simulate_stretch(model, state, stretch, effects));
-        }
-        output
+        self.simulate_each(&[(model, effects)]).pop().unwrap_or_default()
+    }
+
+    /// Output of several models, each over the stretches: side by side, which takes little longer than one alone.
+    pub(crate) fn simulate_all(&self, models: &[Model]) -> Vec<Vec<f64>> {
+        let effects: Vec<Effects> = models.iter().map(Model::effects).collect();
+        self.simulate_each(&models.iter().zip(&effects).collect::<Vec<_>>())
+    }
+
+    /// Output of several models under effects, each over the stretches.
+    pub(crate) fn simulate_each(&self, models: &[(&Model, &Effects)]) -> Vec<Vec<f64>> {
+        let runs: Vec<Run<'_>> = models.iter().flat_map(|(model, effects)| self.runs(model, effects)).collect();
+        let mut parts = outputs(&runs).into_iter();
+        let lengths = models.iter().map(|(model, _)| model.states.len().min(self.stretches.len()));
+        lengths.map(|stretches| parts.by_ref().take(stretches).collect::<Vec<_>>().concat()).collect()
     }
 
     /// The model's output over any stretch of the records from a state there, channel by channel.
-    pub(crate) fn simulate_stretch(
-        &self,
-        model: &Model,
-        state: &State,
-        stretch: &Stretch,
-        effects: &Effects,
-    ) -> Vec<f64> {
+    pub(crate) fn simulate_stretch(&self, model: &Model, state: &State, stretch: &Stretch) -> Vec<f64> {
+        let effects = model.effects();
+        outputs(&[self.run(model, state, stretch, &effects)]).pop().unwrap_or_default()
+    }
+
+    fn runs<'a>(&'a self, model: &'a Model, effects: &'a Effects) -> impl Iterator<Item = Run<'a>> {
+        let stretches = self.stretches.iter().zip(&model.states);
+        stretches.map(move |(stretch, state)| self.run(model, state, stretch, effects))
+    }
+
+    fn run<'a>(&'a self, model: &'a Model, state: &'a State, stretch: &Stretch, effects: &'a Effects) -> Run<'a> {
         let span = Span {
             interval_s: self.interval_s,
             begin_s: stretch.first as f64 * self.interval_s,
@@ -212,9 +225,13 @@ impl Bench {
             steps: self.steps,
             samples: stretch.samples(),
         };
-        let nodes = self.nodes(stretch, effects);
-        let driven = (!nodes.is_empty()).then_some(&nodes[..]);
-        self.dynamics(model, stretch, effects).output(state, driven, effects, &span)
+        Run {
+            dynamics: self.dynamics(model, stretch, effects),
+            state,
+            nodes: self.nodes(stretch, effects),
+            effects,
+            span,
+        }
     }
 
     /// A model's dynamics as they are in the record of a stretch.
@@ -234,20 +251,7 @@ impl Bench {
     /// Motion of the modes over the stretches: by stretch, mode and sample.
     pub(crate) fn motion(&self, model: &Model) -> Vec<Vec<Vec<[f64; 2]>>> {
         let effects = model.effects();
-        let one = |(e, stretch): (usize, &Stretch)| {
-            let nodes = self.nodes(stretch, &effects);
-            let driven = (!nodes.is_empty()).then_some(&nodes[..]);
-            let state = model.states.get(e).cloned().unwrap_or_default();
-            self.dynamics(model, stretch, &effects).motion(
-                &state,
-                driven,
-                &effects,
-                self.interval_s,
-                self.steps,
-                stretch.samples(),
-            )
-        };
-        self.stretches.iter().enumerate().map(one).collect()
+        motions(&self.runs(model, &effects).collect::<Vec<_>>())
     }
 
     /// Output less simulation; 0 where the output is missing.
@@ -255,16 +259,20 @@ impl Bench {
         self.output.iter().zip(simulated).map(|(y, s)| if y.is_finite() { y - s } else { 0.0 }).collect()
     }
 
-    /// The input at the integrator's nodes, through the effects' maps.
-    fn nodes(&self, stretch: &Stretch, effects: &Effects) -> Vec<f64> {
-        let Some(inputs) = self.inputs.get(stretch.record) else { return Vec::new() };
+    /// The input at the integrator's nodes, through the effects' maps; none where there is no input.
+    fn nodes(&self, stretch: &Stretch, effects: &Effects) -> Option<Cow<'_, [f64]>> {
+        let inputs = self.inputs.get(stretch.record)?;
         let input = match effects.intersample.unwrap_or_default() {
             Intersample::Held => &inputs[0],
             Intersample::Linear => &inputs[1],
             Intersample::BandLimited => &inputs[2],
         };
+        let nodes = input.part(stretch.first, stretch.end);
+        if effects.input.is_empty() {
+            return (!nodes.is_empty()).then_some(Cow::Borrowed(nodes));
+        }
         let through = |u: &f64| effects.input.iter().fold(*u, |u, map| map(u));
-        input.part(stretch.first, stretch.end).iter().map(through).collect()
+        Some(Cow::Owned(nodes.iter().map(through).collect()))
     }
 }
 

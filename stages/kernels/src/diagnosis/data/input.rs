@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::effects::{Intersample, StaticMap};
+use crate::signal::bessel_i0;
 
 /// Samples on either side that the band-limited signal is built from: what lies further away weighs less than 1e-4 up
 /// to 0.9 of the Nyquist frequency.
@@ -81,16 +82,6 @@ fn convolve(samples: &[f64], k: usize, filter: &[f64]) -> f64 {
             filter.iter().enumerate().map(|(i, weight)| at(i) * weight).sum()
         }
     }
-}
-
-/// Modified Bessel function of order 0 by its power series (Abramowitz, Stegun 9.6.10).
-fn bessel_i0(x: f64) -> f64 {
-    let (mut term, mut sum) = (1.0, 1.0);
-    for k in 1..60 {
-        term *= (0.5 * x / f64::from(k)).powi(2);
-        sum += term;
-    }
-    sum
 }
 
 #[cfg(test)]

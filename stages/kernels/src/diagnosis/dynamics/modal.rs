@@ -1,9 +1,7 @@
 //! Dynamics as a sum of sections: modes, free masses, real poles.
 
 use super::model::State;
-use super::motion::{Span, motion};
 use super::section::Section;
-use crate::effects::Effects;
 
 /// Which weights of the sections in the outputs are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,37 +128,5 @@ impl Modal {
     /// Numbers of a stretch's own: state, offsets.
     pub(super) fn own_numbers(&self) -> usize {
         self.order() + if self.offsets { self.weights.len() } else { 0 }
-    }
-
-    /// States of the sections over a stretch, by section and sample.
-    pub(crate) fn motion(
-        &self,
-        state: &State,
-        nodes: Option<&[f64]>,
-        effects: &Effects,
-        interval_s: f64,
-        steps: usize,
-        samples: usize,
-    ) -> Vec<Vec<[f64; 2]>> {
-        motion(&self.sections, &state.sections, nodes, effects, interval_s, steps, samples)
-    }
-
-    /// Output over a stretch, channel by channel.
-    pub(crate) fn output(&self, state: &State, nodes: Option<&[f64]>, effects: &Effects, span: &Span) -> Vec<f64> {
-        let states = self.motion(state, nodes, effects, span.interval_s, span.steps, span.samples);
-        let width = 2 * span.steps + 1;
-        let mut output = Vec::with_capacity(span.samples * self.weights.len());
-        for (channel, weights) in self.weights.iter().enumerate() {
-            let offset = state.offsets.get(channel).copied().unwrap_or(0.0);
-            for k in 0..span.samples {
-                let moved: f64 = states.iter().zip(weights).map(|(x, w)| w[0] * x[k][0] + w[1] * x[k][1]).sum();
-                let direct = self.through.zip(nodes).map_or(0.0, |(through, nodes)| {
-                    // the last sample is the end of the last interval
-                    through * nodes.get(k * width).or(nodes.last()).copied().unwrap_or(0.0)
-                });
-                output.push(effects.seen(moved + direct) + offset + span.added(k, effects));
-            }
-        }
-        output
     }
 }

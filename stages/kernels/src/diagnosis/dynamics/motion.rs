@@ -1,8 +1,14 @@
-//! Motion of the sections under an input and the forces of causes.
+//! Motion of the sections under an input and the forces of causes, several motions side by side.
 
-use super::propagator::{Propagator, times};
+use std::borrow::Cow;
+
+use super::forces::{Forces, Table, table};
+use super::lane::{LANES, Lane};
+use super::modal::Modal;
+use super::model::State;
+use super::propagator::Propagator;
 use super::section::Section;
-use crate::effects::{Effects, Instant, Motion};
+use crate::effects::{Effects, Instant};
 
 /// Where a stretch of samples lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,181 +43,294 @@ impl Span {
     }
 }
 
-/// States at the samples of a stretch, free-running from its first, by section and sample.
+/// One motion to simulate, free-running from its first sample.
+pub(crate) struct Run<'a> {
+    pub dynamics: Cow<'a, Modal>,
+    pub state: &'a State,
+    /// The input at the integrator's nodes: `2 steps + 1` per interval (see [`crate::diagnosis::FineInput`]); none: no
+    /// input.
+    pub nodes: Option<Cow<'a, [f64]>>,
+    pub effects: &'a Effects,
+    pub span: Span,
+}
+
+/// Sections that a motion takes; more have no motion.
+const MOST_SECTIONS: usize = 32;
+
+impl Run<'_> {
+    fn sections(&self) -> &[Section] {
+        &self.dynamics.sections
+    }
+
+    fn is_bent(&self) -> bool {
+        !self.effects.modal_force.is_empty()
+    }
+
+    /// Modes come first.
+    fn modes(&self) -> usize {
+        self.sections().iter().take_while(|section| section.is_mode()).count()
+    }
+
+    /// What motions side by side have in common: sections, modes, the scheme, the input's being there.
+    fn kind(&self) -> (usize, usize, bool, bool, usize, u64) {
+        let Span { steps, interval_s, .. } = self.span;
+        let bent = self.is_bent();
+        (self.sections().len(), self.modes(), bent, self.nodes.is_some(), steps, interval_s.to_bits())
+    }
+}
+
+/// Runs that go side by side, by their numbers: of one kind, those of like length together.
+pub(super) fn groups(runs: &[Run<'_>]) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..runs.len()).collect();
+    order.sort_by_key(|i| (runs[*i].kind(), std::cmp::Reverse(runs[*i].span.samples)));
+    order
+        .chunk_by(|a, b| runs[*a].kind() == runs[*b].kind())
+        .flat_map(|alike| alike.chunks(LANES).map(<[usize]>::to_vec))
+        .collect()
+}
+
+/// What takes the states of all sections at each sample.
+pub(super) trait Sink {
+    /// States (deflection, rate / omega) by section at sample `k`.
+    fn take(&mut self, k: usize, states: &[[Lane; 2]]);
+}
+
+/// Runs of one kind, at most [`LANES`] of them, sample by sample into a sink.
 ///
 /// # Model
-/// [`Section`] by section under the input at `nodes` (see [`crate::diagnosis::FineInput`]: `2 steps + 1` per interval;
-/// none: no input) and the effects' forces on the modes.
+/// [`Section`] by section under the input and the effects' forces on the modes.
 /// # Method
 /// Exponential time differencing of fourth order, the sections side by side; exact for linear ones under a held input.
 /// # Accuracy
-/// Nonlinear parts and moving inputs to order (w h)^4 of the step h: 1e-5 of them at 0.25 rad a step.
+/// Nonlinear parts and moving inputs to order (w h)^4 of the step h: 1e-5 of them at 0.25 rad a step. A run's numbers do
+/// not depend on those beside it.
 /// # Errors
-/// None; a motion that diverges gives values that are not finite.
+/// None; a motion that diverges gives values that are not finite, as do more than 32 sections.
 /// # Source
 /// S. M. Cox, P. C. Matthews, J. Comput. Phys. 176 (2002) 430.
-pub(super) fn motion(
-    sections: &[Section],
-    start: &[[f64; 2]],
-    nodes: Option<&[f64]>,
-    effects: &Effects,
-    interval_s: f64,
-    steps: usize,
-    samples: usize,
-) -> Vec<Vec<[f64; 2]>> {
-    let start = |s: usize| start.get(s).copied().unwrap_or([0.0; 2]);
-    if effects.modal_force.is_empty() {
-        return sections
-            .iter()
-            .enumerate()
-            .map(|(s, section)| linear(section, start(s), nodes, interval_s, steps, samples))
-            .collect();
-    }
-    let run: Run<'_> = (sections, &start, nodes, effects, interval_s, steps, samples);
-    // sections side by side in arrays of a length that the compiler knows: the step's loops are most of a diagnosis
-    match sections.len() {
-        0..=1 => nonlinear::<1>(run),
-        2 => nonlinear::<2>(run),
-        3 => nonlinear::<3>(run),
-        4 => nonlinear::<4>(run),
-        5..=6 => nonlinear::<6>(run),
-        7..=8 => nonlinear::<8>(run),
-        9..=12 => nonlinear::<12>(run),
-        _ => nonlinear::<MOST_SECTIONS>(run),
+pub(super) fn integrate(runs: &[&Run<'_>], sink: &mut impl Sink) {
+    let Some(first) = runs.first() else { return };
+    // arrays of a length that the compiler knows: the step's loops are most of a diagnosis
+    match first.sections().len() {
+        0..=1 => of_length::<1, _>(runs, sink),
+        2 => of_length::<2, _>(runs, sink),
+        3 => of_length::<3, _>(runs, sink),
+        4 => of_length::<4, _>(runs, sink),
+        5..=6 => of_length::<6, _>(runs, sink),
+        7..=8 => of_length::<8, _>(runs, sink),
+        9..=12 => of_length::<12, _>(runs, sink),
+        13..=MOST_SECTIONS => of_length::<MOST_SECTIONS, _>(runs, sink),
+        more => {
+            let samples = runs.iter().map(|run| run.span.samples).max().unwrap_or(0);
+            (0..samples).for_each(|k| sink.take(k, &vec![[Lane::splat(f64::NAN); 2]; more]));
+        }
     }
 }
 
-/// Sections that a motion with forces takes; more have no motion.
-const MOST_SECTIONS: usize = 32;
+fn of_length<const N: usize, S: Sink>(runs: &[&Run<'_>], sink: &mut S) {
+    pulp::Arch::new().dispatch(Whole::<N, S> { runs, sink });
+}
 
-/// Sections, their first states, input, effects, interval, steps, samples.
-type Run<'a> = (&'a [Section], &'a dyn Fn(usize) -> [f64; 2], Option<&'a [f64]>, &'a Effects, f64, usize, usize);
+/// Carries the loop over samples to the vector units.
+struct Whole<'r, 'a, const N: usize, S> {
+    runs: &'r [&'r Run<'a>],
+    sink: &'r mut S,
+}
 
-fn nonlinear<const N: usize>(run: Run<'_>) -> Vec<Vec<[f64; 2]>> {
-    let (sections, start, nodes, effects, interval_s, steps, samples) = run;
-    let mut states: Vec<Vec<[f64; 2]>> = sections.iter().map(|_| Vec::with_capacity(samples)).collect();
-    if sections.len() > N {
-        states.iter_mut().for_each(|of| of.resize(samples, [f64::NAN; 2]));
-        return states;
+impl<const N: usize, S: Sink> pulp::NullaryFnOnce for Whole<'_, '_, N, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { runs, sink } = self;
+        let samples = runs.iter().map(|run| run.span.samples).max().unwrap_or(0);
+        let (steps, input) = (runs[0].span.steps, Input::new(runs));
+        let bent = runs[0].is_bent();
+        // what no force and no input drives takes the whole interval at once
+        let parts = if bent || input.is_some() { steps } else { 1 };
+        let mut run = Sections::<N>::new(runs, runs[0].span.interval_s / parts as f64);
+        let width = 2 * steps + 1;
+        for k in 0..samples {
+            for i in 0..if k > 0 { parts } else { 0 } {
+                let u = match &input {
+                    Some(input) => input.at((k - 1) * width + 2 * i),
+                    None => [Lane::default(); 3],
+                };
+                if bent {
+                    run.bent_step(&u);
+                } else {
+                    run.linear_step(&u);
+                }
+            }
+            sink.take(k, &run.x[..run.sections]);
+        }
     }
-    let mut run = Nonlinear::<N>::new(sections, effects, interval_s / steps as f64);
-    run.x.iter_mut().enumerate().take(sections.len()).for_each(|(s, x)| *x = start(s));
-    let width = 2 * steps + 1;
-    for k in 0..samples {
-        if k > 0 {
-            match nodes.and_then(|nodes| nodes.get((k - 1) * width..k * width)) {
-                Some(interval) => interval.windows(3).step_by(2).for_each(|u| run.step(u)),
-                None => (0..steps).for_each(|_| run.step(&[0.0; 3])),
+}
+
+/// Inputs of several runs.
+enum Input<'r> {
+    /// One for all.
+    Same(&'r [f64]),
+    Own([&'r [f64]; LANES]),
+}
+
+impl<'r> Input<'r> {
+    fn new(runs: &[&'r Run<'_>]) -> Option<Self> {
+        let nodes = |l: usize| runs.get(l).or(runs.first()).and_then(|run| run.nodes.as_deref());
+        let first = nodes(0)?;
+        let own: [&[f64]; LANES] = std::array::from_fn(|l| nodes(l).unwrap_or(&[]));
+        let same = own.iter().all(|nodes| std::ptr::eq(*nodes, first));
+        Some(if same { Self::Same(first) } else { Self::Own(own) })
+    }
+
+    /// At the beginning, middle and end of a step; beyond a run's end nothing.
+    #[inline(always)]
+    fn at(&self, node: usize) -> [Lane; 3] {
+        let of = |nodes: &[f64]| match nodes.get(node..node + 3) {
+            Some(&[a, b, c]) => [a, b, c],
+            _ => [0.0; 3],
+        };
+        match self {
+            Self::Same(nodes) => of(nodes).map(Lane::splat),
+            Self::Own(own) => {
+                let mut u = [Lane::default(); 3];
+                for (l, nodes) in own.iter().enumerate() {
+                    let values = of(nodes);
+                    (0..3).for_each(|i| u[i].0[l] = values[i]);
+                }
+                u
             }
         }
-        states.iter_mut().zip(&run.x).for_each(|(of, x)| of.push(*x));
     }
-    states
 }
 
-fn linear(
-    section: &Section,
-    start: [f64; 2],
-    nodes: Option<&[f64]>,
-    interval_s: f64,
-    steps: usize,
-    samples: usize,
-) -> Vec<[f64; 2]> {
-    let mut states = Vec::with_capacity(samples);
-    let mut x = start;
-    let Some(nodes) = nodes else {
-        let whole = Propagator::new(section, interval_s);
-        for _ in 0..samples {
-            states.push(x);
-            x = times(&whole.full, x);
-        }
-        return states;
-    };
-    let step = Propagator::new(section, interval_s / steps as f64);
-    let width = 2 * steps + 1;
-    states.push(x);
-    for interval in nodes.chunks_exact(width) {
-        for u in interval.windows(3).step_by(2) {
-            let [e0, e1] = times(&step.full, x);
-            let kick =
-                |i: usize| section.gain * (step.first[i] * u[0] + 2.0 * step.middle[i] * u[1] + step.last[i] * u[2]);
-            x = [e0 + kick(0), e1 + kick(1)];
-        }
-        states.push(x);
-    }
-    states
+/// A 2 x 2 matrix of each run, by rows.
+type Matrix = [[Lane; 2]; 2];
+
+#[inline(always)]
+fn times(matrix: &Matrix, x: &[Lane; 2]) -> [Lane; 2] {
+    [matrix[0][0] * x[0] + matrix[0][1] * x[1], matrix[1][0] * x[0] + matrix[1][1] * x[1]]
 }
 
-/// All sections side by side, coupled by forces on their modes, with room for the intermediate stages.
-struct Nonlinear<'a, const N: usize> {
-    effects: &'a Effects,
-    steps: [Propagator; N],
-    gains: [f64; N],
-    omega: [f64; N],
-    /// 1 / omega^2.
-    compliance: [f64; N],
-    modes: usize,
-    x: [[f64; 2]; N],
+#[inline(always)]
+fn pushed(drift: [Lane; 2], kick: &[Lane; 2], force: Lane) -> [Lane; 2] {
+    [drift[0] + kick[0] * force, drift[1] + kick[1] * force]
 }
 
-impl<'a, const N: usize> Nonlinear<'a, N> {
-    fn new(sections: &[Section], effects: &'a Effects, step_s: f64) -> Self {
-        // what is beyond the sections stays at rest
-        let of = |s: usize| sections.get(s);
-        let still = Propagator::default();
+/// Sections and their states, coupled by forces on their modes.
+struct Sections<'a, const N: usize> {
+    forces: Forces<'a>,
+    sections: usize,
+    half: [Matrix; N],
+    half_kick: [[Lane; 2]; N],
+    full: [Matrix; N],
+    first: [[Lane; 2]; N],
+    middle: [[Lane; 2]; N],
+    last: [[Lane; 2]; N],
+    gains: [Lane; N],
+    omega: [Lane; N],
+    x: [[Lane; 2]; N],
+    table: Table<N>,
+}
+
+impl<'a, const N: usize> Sections<'a, N> {
+    fn new(runs: &[&'a Run<'_>], step_s: f64) -> Self {
+        let sections = runs[0].sections().len();
+        // what is beyond the runs and their sections stays at rest
+        let of = |s: usize, l: usize| runs.get(l).and_then(|run| run.sections().get(s));
+        let each =
+            |s: usize, value: &dyn Fn(&Section) -> f64, without: f64| Lane::of(|l| of(s, l).map_or(without, value));
+        let steps: Vec<[Propagator; LANES]> = (0..N)
+            .map(|s| {
+                std::array::from_fn(|l| {
+                    of(s, l).map_or(Propagator::default(), |section| Propagator::new(section, step_s))
+                })
+            })
+            .collect();
+        let pair = |s: usize, of: &dyn Fn(&Propagator) -> [f64; 2]| -> [Lane; 2] {
+            std::array::from_fn(|i| Lane::of(|l| of(&steps[s][l])[i]))
+        };
+        let matrix = |s: usize, of: &dyn Fn(&Propagator) -> [[f64; 2]; 2]| -> Matrix {
+            std::array::from_fn(|i| std::array::from_fn(|j| Lane::of(|l| of(&steps[s][l])[i][j])))
+        };
+        let state =
+            |s: usize, i: usize, l: usize| runs.get(l).and_then(|run| run.state.sections.get(s)).map_or(0.0, |x| x[i]);
+        let effects: Vec<&'a Effects> = runs.iter().map(|run| run.effects).collect();
         Self {
-            effects,
-            steps: std::array::from_fn(|s| of(s).map_or(still, |section| Propagator::new(section, step_s))),
-            gains: std::array::from_fn(|s| of(s).map_or(0.0, |section| section.gain)),
-            omega: std::array::from_fn(|s| of(s).map_or(1.0, Section::omega)),
-            compliance: std::array::from_fn(|s| of(s).map_or(1.0, |section| section.omega().powi(-2))),
-            // modes come first
-            modes: sections.iter().take_while(|section| section.is_mode()).count(),
-            x: [[0.0; 2]; N],
+            forces: Forces::new(&effects, runs[0].modes()),
+            sections,
+            half: std::array::from_fn(|s| matrix(s, &|p| p.half)),
+            half_kick: std::array::from_fn(|s| pair(s, &|p| p.half_kick)),
+            full: std::array::from_fn(|s| matrix(s, &|p| p.full)),
+            first: std::array::from_fn(|s| pair(s, &|p| p.first)),
+            middle: std::array::from_fn(|s| pair(s, &|p| p.middle)),
+            last: std::array::from_fn(|s| pair(s, &|p| p.last)),
+            gains: std::array::from_fn(|s| each(s, &|section| section.gain, 0.0)),
+            omega: std::array::from_fn(|s| each(s, &Section::omega, 1.0)),
+            x: std::array::from_fn(|s| {
+                std::array::from_fn(|i| if s < sections { Lane::of(|l| state(s, i, l)) } else { Lane::default() })
+            }),
+            table: table(),
         }
     }
 
     /// What drives each section at those states.
-    fn drive(&self, states: &[[f64; 2]; N], u: f64) -> [f64; N] {
-        let position: [f64; N] = std::array::from_fn(|s| states[s][0]);
-        let velocity: [f64; N] = std::array::from_fn(|s| states[s][1] * self.omega[s]);
-        let mut acceleration = [0.0; N];
-        let motion = Motion {
-            position: &position[..self.modes],
-            velocity: &velocity[..self.modes],
-            omega: &self.omega[..self.modes],
-            gap: if self.modes > 0 { position[0] } else { 0.0 },
-            thermal: 0.0,
-        };
-        let forces = &mut acceleration[..self.modes];
-        self.effects.modal_force.iter().for_each(|force| force(&motion, forces));
-        std::array::from_fn(|s| self.gains[s] * u + acceleration[s] * self.compliance[s])
+    #[inline(always)]
+    fn drive(&mut self, states: &[[Lane; 2]; N], u: Lane) -> [Lane; N] {
+        let mut drive = [Lane::default(); N];
+        for (drive, gain) in drive.iter_mut().zip(&self.gains) {
+            *drive = *gain * u;
+        }
+        self.forces.add(states, &self.omega, &mut self.table, &mut drive);
+        drive
     }
 
-    /// One step under the input at its beginning, middle and end; the numbers are the source's.
-    fn step(&mut self, u: &[f64]) {
-        let (first, middle, last) = (u[0], u[1], u[2]);
-        let half: [[f64; 2]; N] = std::array::from_fn(|s| times(&self.steps[s].half, self.x[s]));
-        let push = |from: &[[f64; 2]; N], force: &dyn Fn(usize) -> f64| -> [[f64; 2]; N] {
-            std::array::from_fn(|s| pushed(from[s], &self.steps[s].half_kick, force(s)))
-        };
-        let at_first = self.drive(&self.x, first);
-        let a = push(&half, &|s| at_first[s]); // (26)
-        let at_a = self.drive(&a, middle);
-        let b = push(&half, &|s| at_a[s]); // (27)
-        let at_b = self.drive(&b, middle);
-        let onwards: [[f64; 2]; N] = std::array::from_fn(|s| times(&self.steps[s].half, a[s]));
-        let c = push(&onwards, &|s| 2.0 * at_b[s] - at_first[s]); // (28)
-        let at_c = self.drive(&c, last);
-        self.x = std::array::from_fn(|s| {
-            let p = &self.steps[s];
-            let e = times(&p.full, self.x[s]);
-            let kick = |i: usize| p.first[i] * at_first[s] + p.middle[i] * (at_a[s] + at_b[s]) + p.last[i] * at_c[s];
-            [e[0] + kick(0), e[1] + kick(1)] // (29)
-        });
+    /// One step under the input at its beginning, middle and end, without forces.
+    #[inline(always)]
+    fn linear_step(&mut self, u: &[Lane; 3]) {
+        for s in 0..N {
+            let e = times(&self.full[s], &self.x[s]);
+            for (i, e) in e.into_iter().enumerate() {
+                let middle = self.middle[s][i] * u[1];
+                let kick = self.first[s][i] * u[0] + (middle + middle) + self.last[s][i] * u[2];
+                self.x[s][i] = e + self.gains[s] * kick;
+            }
+        }
     }
-}
 
-fn pushed(drift: [f64; 2], kick: &[f64; 2], force: f64) -> [f64; 2] {
-    [drift[0] + kick[0] * force, drift[1] + kick[1] * force]
+    /// One step with forces; the numbers are the source's.
+    #[inline(always)]
+    fn bent_step(&mut self, u: &[Lane; 3]) {
+        let mut half = self.x;
+        for (half, (matrix, x)) in half.iter_mut().zip(self.half.iter().zip(&self.x)) {
+            *half = times(matrix, x);
+        }
+        let x = self.x;
+        let at_first = self.drive(&x, u[0]);
+        let mut a = half;
+        for s in 0..N {
+            a[s] = pushed(half[s], &self.half_kick[s], at_first[s]); // (26)
+        }
+        let at_a = self.drive(&a, u[1]);
+        let mut b = half;
+        for s in 0..N {
+            b[s] = pushed(half[s], &self.half_kick[s], at_a[s]); // (27)
+        }
+        let at_b = self.drive(&b, u[1]);
+        let mut c = half;
+        for s in 0..N {
+            let onwards = times(&self.half[s], &a[s]);
+            c[s] = pushed(onwards, &self.half_kick[s], at_b[s] + at_b[s] - at_first[s]); // (28)
+        }
+        let at_c = self.drive(&c, u[2]);
+        for s in 0..N {
+            let e = times(&self.full[s], &self.x[s]);
+            for (i, e) in e.into_iter().enumerate() {
+                let kick = self.first[s][i] * at_first[s]
+                    + self.middle[s][i] * (at_a[s] + at_b[s])
+                    + self.last[s][i] * at_c[s];
+                self.x[s][i] = e + kick; // (29)
+            }
+        }
+    }
 }

@@ -72,8 +72,3 @@ fn sum(a: &Matrix, b: &Matrix) -> Matrix {
 fn scaled(a: Matrix, factor: f64) -> Matrix {
     a.map(|row| row.map(|value| value * factor))
 }
-
-/// `matrix x`.
-pub(super) fn times(matrix: &Matrix, x: [f64; 2]) -> [f64; 2] {
-    [matrix[0][0] * x[0] + matrix[0][1] * x[1], matrix[1][0] * x[0] + matrix[1][1] * x[1]]
-}

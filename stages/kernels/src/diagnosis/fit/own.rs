@@ -12,6 +12,9 @@ pub(crate) struct Own {
     of: Vec<Directions>,
 }
 
+/// How much of each direction a column has, by stretch.
+pub(crate) type Along = Vec<Vec<f64>>;
+
 #[derive(Debug, Clone)]
 struct Directions {
     basis: Vec<Vec<f64>>,
@@ -58,27 +61,34 @@ impl Own {
         Self { of }
     }
 
-    /// Takes what the stretches' own numbers can make out of a column.
-    pub fn take_out(&self, column: &mut [f64], layout: &Layout) {
-        for (e, own) in self.of.iter().enumerate() {
+    /// Takes what the stretches' own numbers can make out of a column; gives how much of each direction that was.
+    pub fn take_out(&self, column: &mut [f64], layout: &Layout) -> Along {
+        let one = |(e, own): (usize, &Directions)| {
             let part = &mut column[layout.stretch(e)];
-            for direction in &own.basis {
+            let out = |direction: &Vec<f64>| {
                 let along = dot(direction, part);
                 part.iter_mut().zip(direction).for_each(|(p, d)| *p -= along * d);
-            }
-        }
+                along
+            };
+            own.basis.iter().map(out).collect()
+        };
+        self.of.iter().enumerate().map(one).collect()
     }
 
     /// The own numbers of stretch `e` that make most of `column`, by least squares; what no sample shows is 0.
     pub fn solve(&self, e: usize, column: &[f64], layout: &Layout) -> Vec<f64> {
         let Some(own) = self.of.get(e) else { return Vec::new() };
         let part = &column[layout.stretch(e)];
-        let n = own.basis.len();
-        let mut x = vec![0.0; n];
-        for i in (0..n).rev() {
-            let known: f64 = (i + 1..n).map(|j| own.factor[i][j] * x[j]).sum();
-            let along = dot(&own.basis[i], part);
-            x[i] = if own.factor[i][i] > 0.0 { (along - known) / own.factor[i][i] } else { 0.0 };
+        self.numbers(e, &own.basis.iter().map(|direction| dot(direction, part)).collect::<Vec<f64>>())
+    }
+
+    /// The own numbers of stretch `e` that move its samples by so much of each direction.
+    pub fn numbers(&self, e: usize, along: &[f64]) -> Vec<f64> {
+        let Some(own) = self.of.get(e) else { return Vec::new() };
+        let mut x = vec![0.0; along.len()];
+        for i in (0..along.len()).rev() {
+            let known: f64 = (i + 1..along.len()).map(|j| own.factor[i][j] * x[j]).sum();
+            x[i] = if own.factor[i][i] > 0.0 { (along[i] - known) / own.factor[i][i] } else { 0.0 };
         }
         x
     }

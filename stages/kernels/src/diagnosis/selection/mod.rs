@@ -1,7 +1,5 @@
 //! Which causes to add: greedily, then each again against its rivals.
 
-use rayon::prelude::*;
-
 use super::data::Bench;
 use super::dynamics::Model;
 use super::fit::{Blocks, Chords, Fit, Until, dot};
@@ -30,7 +28,7 @@ const RIVALS: usize = 2;
 /// of the squared residual.
 const MUCH: f64 = 1.0;
 /// Last causes that another search goes on without.
-const AGAIN: usize = 2;
+const AGAIN: usize = 1;
 /// Two models tie whose losses differ by less than this many variances of the floor: a likelihood ratio of 7.
 const TIE: f64 = 4.0;
 
@@ -193,11 +191,9 @@ impl Search<'_> {
             (gain - 0.5 * parameters as f64 * samples.ln(), model)
         };
         let falling = |a: &(f64, Model), b: &(f64, Model)| b.0.total_cmp(&a.0);
-        let starts: Vec<Model> = promising.into_iter().map(|promise| self.start(&current.fit.model, promise)).collect();
-        let reached: Vec<Chords> = starts
-            .par_iter()
-            .filter_map(|start| current.fit.with_chords(self.bench, start, self.compared_until()))
-            .collect();
+        let starts = self.starts(&current.fit.model, &promising);
+        let reached = current.fit.with_chords(self.bench, &starts, self.compared_until());
+        let reached: Vec<Chords> = reached.into_iter().flatten().collect();
         let least = reached.iter().map(|reached| reached.loss).fold(f64::INFINITY, f64::min);
         let fitted = |models: Vec<Model>| -> Vec<(f64, Model)> {
             let fits = models.iter().filter_map(|model| self.compared(model));
@@ -255,18 +251,25 @@ impl Search<'_> {
         Sample { bench: self.bench, blocks: &self.blocks, fit, floor }
     }
 
-    /// Where the joint fit of a promise begins.
-    fn start(&self, model: &Model, promise: &Promise) -> Model {
-        let candidate = &promise.candidate;
-        let start = |values: &Vec<f64>| model.with(candidate.cause, &candidate.modes, values.clone());
-        let loss = |values: &Vec<f64>| {
-            let rest = self.bench.residual(&self.bench.simulate(&start(values)));
+    /// Where the joint fits of promises begin.
+    fn starts(&self, model: &Model, promises: &[&Promise]) -> Vec<Model> {
+        // the strength that the score asks for may be far outside where it is linear
+        let both = |promise: &&Promise| {
+            let candidate = &promise.candidate;
+            [&promise.values, &promise.trial]
+                .map(|values| model.with(candidate.cause, &candidate.modes, values.clone()))
+        };
+        let models: Vec<Model> = promises.iter().flat_map(both).collect();
+        let outputs = self.bench.simulate_all(&models);
+        let loss = |output: &Vec<f64>| {
+            let rest = self.bench.residual(output);
             let loss = dot(&rest, &rest);
             if loss.is_finite() { loss } else { f64::INFINITY }
         };
-        // the strength that the score asks for may be far outside where it is linear
-        let from = if loss(&promise.values) <= loss(&promise.trial) { &promise.values } else { &promise.trial };
-        start(from)
+        let better = |(models, outputs): (&[Model], &[Vec<f64>])| {
+            models[usize::from(loss(&outputs[0]) > loss(&outputs[1]))].clone()
+        };
+        models.chunks_exact(2).zip(outputs.chunks_exact(2)).map(better).collect()
     }
 
     /// Whether cause `which` of a model is significant and large enough against the model without it.
@@ -338,14 +341,9 @@ impl Search<'_> {
             .collect();
         let promises = screen(self.bench, &without.fit, &others);
         let sample = self.sample(&without.fit);
-        let mut rivals: Vec<Chords> = promises
-            .par_iter()
-            .take(RIVALS)
-            .filter_map(|promise| {
-                let start = self.start(&without.fit.model, promise);
-                without.fit.with_chords(self.bench, &start, self.compared_until())
-            })
-            .collect();
+        let starts = self.starts(&without.fit.model, &promises.iter().take(RIVALS).collect::<Vec<_>>());
+        let reached = without.fit.with_chords(self.bench, &starts, self.compared_until());
+        let mut rivals: Vec<Chords> = reached.into_iter().flatten().collect();
         rivals.sort_by(|a, b| a.loss.total_cmp(&b.loss));
         rivals.into_iter().find_map(|reached| {
             let rival = self.compared(&reached.model)?;

@@ -135,7 +135,7 @@ impl<'a> Run<'a> {
             thermal: self.thermal,
         };
         for force in &self.effects.modal_force {
-            force(&motion, &mut self.acceleration[..own]);
+            force.add(&motion, &mut self.acceleration[..own]);
         }
     }
 
