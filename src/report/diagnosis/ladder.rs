@@ -52,7 +52,7 @@ pub(super) fn validation(answer: &Diagnosis) -> Option<TableView> {
     }
     let scale = Scale::of(parts.iter().flat_map(|part| [part.rms_before, part.rms_after]).flatten());
     let heads = vec![Head::text("part"), Head::number("linear model", ""), Head::number("extended model", "")];
-    let caption = format!("Free-run error (rms) on parts that chose nothing. {}", scale.words());
+    let caption = format!("Free-run error (rms) on parts that added no name. {}", scale.words());
     let mut table = TableView::new(&caption, heads);
     for part in parts {
         let error = |value: Option<f64>| rounded(or_nan(value), 4, &part.unit);

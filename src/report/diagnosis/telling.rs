@@ -102,12 +102,10 @@ pub(super) fn figure(told: &Told<'_>) -> Option<Figure> {
     let reading = shown.reading();
     let rest = "The panels below are other views of the same residual.";
     let caption = match (told.answer.verdict, cause) {
-        (Verdict::Clean, _) | (_, None) => {
-            "Nothing stands out: the residual lies at the noise in every view.".to_owned()
-        }
+        (Verdict::Clean, _) => "Nothing stands out: the residual lies at the noise in every view.".to_owned(),
         (Verdict::Named, Some(id)) if shown == first => format!("What gave {id} away: {reading}. {rest}"),
-        (Verdict::Named, Some(_)) => format!("Look for {reading}. {rest}"),
-        (Verdict::Unexplained, Some(_)) => format!("What no cause accounts for. Look for {reading}. {rest}"),
+        (Verdict::Named, _) => format!("Look for {reading}. {rest}"),
+        (Verdict::Unexplained, _) => format!("What no cause accounts for. Look for {reading}. {rest}"),
     };
     let id = format!("diagnosis-{}-telling", told.slug());
     let mut figure = Figure::new(&id, "The picture that gave it away", &caption).row(Row::one(270.0, large));
@@ -126,7 +124,7 @@ pub(super) fn parts(told: &Told<'_>) -> Option<Figure> {
         return None;
     }
     let caption =
-        "Free-run error over the parts that chose nothing, each point the rms of a stretch; grey: the output itself.";
+        "Free-run error over the parts that added no name, each point the rms of a stretch; grey: the output itself.";
     let id = format!("diagnosis-{}-parts", told.slug());
     Some(
         panels

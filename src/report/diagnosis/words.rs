@@ -55,7 +55,9 @@ fn sentences(answer: &Diagnosis) -> Vec<String> {
             "The strongest sign of any candidate has {}, held against a false-alarm rate of {rate}: noise alone does that. No name is given.",
             p_value(answer.p_value)
         )),
-        (Verdict::Clean, None) => out.push(format!("No candidate bought enough at a false-alarm rate of {rate}.")),
+        // where no model was extended, no candidate was tried
+        (Verdict::Clean, None) if answer.ladder.is_empty() => {}
+        (Verdict::Clean, None) => out.push(format!("No candidate is significant at a false-alarm rate of {rate}.")),
         (_, Some(_)) => out.push(format!(
             "Where nothing is wrong, so strong a sign has {}; the false-alarm rate was set to {rate}.",
             p_value(answer.p_value)

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::causes_story::{error_array, error_table, ladder};
-use super::{closed_loop, steady};
+use super::{closed_loop, several_inputs, steady};
 use crate::artifacts::{DataSet, Decays, Pair};
 use crate::causes::{Cause, Domain, catalogue};
 use afmid_kernels::diagnosis::verdict::Diagnosis;
@@ -25,7 +25,8 @@ use afmid_kernels::signal::decimate;
 /// another course of the input between samples, offset, drift, lines. Without an input it is a free decay. With a
 /// `reference` the drive depends on the output: an axis `M v' + Fv v + Fc sgn v + F0 = G u` under a controller that is
 /// identified too, the loop simulated from its reference. `records` hold a steady oscillation: harmonics against a
-/// detector's static curves.
+/// detector's static curves. Under several inputs no cause is tried: the answer is whether a linear model of all of them
+/// is adequate.
 /// # Method
 /// Least squares of the free-run error on what is learnt from; causes by score test, joint refits, F tests by blocks
 /// against the part of the residual that no general term predicts, corrected for all trials, each of which has to lower
@@ -40,8 +41,7 @@ use afmid_kernels::signal::decimate;
 /// # Accuracy
 /// Right names, errors and false alarms over many seeds, and measured benchmarks: docs/diagnosis.md.
 /// # Errors
-/// None or several of `pair`, `decays` and `records`, several inputs without a `reference`, a missing input, parts beyond
-/// the record, an output that does not move, an unknown candidate, a drive that follows from no reference, an oscillation
+/// None or several of `pair`, `decays` and `records`, a missing input, parts beyond the record, an output that does not move, an unknown candidate, a drive that follows from no reference, an oscillation
 /// that is not steady.
 /// # Source
 /// J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28; S. A. Billings, Nonlinear System Identification, 2013,
@@ -52,7 +52,8 @@ use afmid_kernels::signal::decimate;
 pub struct CausesDiagnose {
     /// Parts of the record to judge on, by name. None: then gains are those on folds of the identification stretch.
     pub parts: Vec<JudgedPart>,
-    /// Hits of `decays` to judge on, counted from 1: they choose nothing, but set their own amplitudes and phases.
+    /// Hits of `decays` to judge on, counted from 1: they add no cause, but one that gains nothing on them is
+    /// taken away; they set their own amplitudes and phases.
     #[schemars(inner(range(min = 1, max = 1_000_000)))]
     pub judged_hits: Vec<usize>,
     /// Highest frequency of `decays` that is looked at, Hz: what lies above is filtered out first, and the sample rate
@@ -141,7 +142,7 @@ const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over
 impl Stage for CausesDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.causes",
-        version: 2,
+        version: 3,
         summary: "names what a linear model gets wrong in inputs and outputs, decays, servo axes, steady oscillations",
         inputs: &[PAIR.spec(), DECAYS.spec(), RECORDS.spec()],
         outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec()],
@@ -194,7 +195,11 @@ impl Stage for CausesDiagnose {
                     cx.warn(format!("data without their {}s: {ZERO}", pair.taken_off()));
                 }
                 let whole = Restored::new(&pair)?;
-                self.extended(&self.forced(&pair, &whole)?)?
+                if whole.input.len() > whole.output.len() {
+                    several_inputs::answer(self, &pair, &whole.input, &whole.output, cx)?
+                } else {
+                    self.extended(&self.forced(&pair, &whole)?)?
+                }
             }
             (None, Some(decays), None) => {
                 let decays = Decays::new(decays)?;
@@ -295,11 +300,6 @@ impl CausesDiagnose {
     /// A measured input and output.
     fn forced<'a>(&self, pair: &Pair<'_>, whole: &'a Restored) -> Result<Measured<'a>, StageError> {
         let (rate, input, output) = (pair.sample_rate_hz()?, &whole.input[..], &whole.output[..]);
-        if input.len() != output.len() {
-            let inputs = input.len() / output.len().max(1);
-            return Err(StageError::new(format!("{inputs} inputs, wanted one"))
-                .help("choose one column as input; a system under several inputs is beyond this stage"));
-        }
         let learnt = pair.own_time(DataSet::Identification)?;
         let first = learnt.first().zip(pair.time()?.first()).map_or(0.0, |(a, b)| ((a - b) * rate).round()) as usize;
         let [input_unit, output_unit] = pair.units()?.map(str::to_owned);

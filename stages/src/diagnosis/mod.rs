@@ -16,6 +16,7 @@ mod replay_example;
 mod replay_stage;
 #[cfg(test)]
 mod replay_tests;
+mod several_inputs;
 mod steady;
 
 pub use afmid_kernels::diagnosis::verdict::{

@@ -291,7 +291,7 @@ impl Findings<'_> {
             ));
         }
         if let Some((id, share)) = self.choice.nearest.first().filter(|_| verdict == Verdict::Named) {
-            lines.push(format!("left on the table: {id} would take {:.2} % of the squared residual", 100.0 * share));
+            lines.push(format!("not named: {id} would take {:.2} % of the squared residual", 100.0 * share));
         }
         lines
     }

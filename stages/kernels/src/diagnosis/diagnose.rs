@@ -8,12 +8,14 @@ use super::dynamics::{Modal, Model};
 use super::error::DiagnosisError;
 use super::fit::Blocks;
 use super::lack_of_fit::misfit;
+use super::linear_only::{LinearOnly, halves, linear_only};
 use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, trials};
 use super::selection::{Choice, Search};
 use super::story::{Story, story};
 use super::validation::check_part;
-use super::verdict::Diagnosis;
+use super::verdict::{Diagnosis, Verdict};
+use crate::Unwatched;
 use crate::causes::{Cause, Domain, Part};
 
 /// A diagnosis and the model that it ends with.
@@ -139,6 +141,19 @@ pub fn diagnose(
             &options.parts,
         );
     }
+    if diagnosis.verdict == Verdict::Unexplained
+        && let Some(linear) = alone(&bench, records, options)
+    {
+        // where no model that causes could extend was found, the order's own choice decides
+        if !diagnosis.baseline.adequate && linear.is_adequate(options.tolerated_misfit) {
+            diagnosis.verdict = Verdict::Clean;
+            diagnosis.baseline.adequate = true;
+            diagnosis.baseline.order = Some(linear.order);
+            diagnosis.evidence.clear();
+            diagnosis.nearest.clear();
+        }
+        diagnosis.evidence.extend(linear.sentences(options.tolerated_misfit));
+    }
     Ok(Diagnosed {
         diagnosis,
         output,
@@ -148,6 +163,17 @@ pub fn diagnose(
         model,
         scales: (bench.output_scale.clone(), bench.input_scale),
     })
+}
+
+/// How far a linear model of one input goes, where no model accounts for the data.
+fn alone(bench: &Bench, records: &[Record<'_>], options: &DiagnosisOptions) -> Option<LinearOnly> {
+    let (stretch, record) = (bench.stretches.first()?, records.first()?);
+    if !bench.driven || bench.layout.channels != 1 || bench.layout.stretches() != 1 || records.len() != 1 {
+        return None;
+    }
+    let part = options.parts.first().map(|part| part.stretch.first..part.stretch.end);
+    let (learnt, held_out) = halves(stretch.first..stretch.end, part, record.samples());
+    linear_only(&[record.input], record.outputs[0], learnt, held_out, bench.interval_s, &Unwatched).ok()
 }
 
 /// A baseline with the causes that extend it.

@@ -4,8 +4,8 @@
 //! simulated), fit (least squares of the free-run error, blocks, folds), baseline (the linear model, found by itself),
 //! score_test (which causes could make what is left), selection (forward steps, backward elimination, exchange),
 //! lack_of_fit (whether anything systematic remains), chain (linear parts around a static curve, where no causes
-//! account for the data), validation (parts that chose nothing), story (what a person looks
-//! at), answer.
+//! account for the data), linear_only (how far a linear model goes, where none can be extended), validation (parts that
+//! chose nothing), story (what a person looks at), answer.
 //!
 //! Two kinds of measurement have equations of their own: an axis under a feedback controller ([`closed_loop`]), whose
 //! drive depends on its output, and a steady oscillation ([`steady`]), which says nothing of a decay but everything of
@@ -23,6 +23,7 @@ mod dynamics;
 mod error;
 mod fit;
 mod lack_of_fit;
+mod linear_only;
 mod options;
 mod score_test;
 mod selection;
@@ -40,5 +41,6 @@ pub use dynamics::{Added, Kind, Modal, Model, Section, State, Weights};
 pub use error::DiagnosisError;
 pub use fit::Fit;
 pub use lack_of_fit::Misfit;
+pub use linear_only::{LinearOnly, halves, linear_only};
 pub use options::DiagnosisOptions;
 pub use story::{Binned, Spectra, Story};

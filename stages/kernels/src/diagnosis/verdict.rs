@@ -28,7 +28,7 @@ pub struct Value {
     pub unit: String,
 }
 
-/// What an extension buys on data that did not choose it.
+/// What an extension gains on data that did not choose it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
     /// Rms of the held-out residuals without it.
@@ -63,7 +63,7 @@ pub struct NamedCause {
     pub p_value: Option<f64>,
     /// Its parameters.
     pub parameters: BTreeMap<String, Value>,
-    /// What it buys.
+    /// What it gains.
     pub gain: Gain,
     /// Runner-up, null if none was tried.
     pub runner_up: Option<RunnerUp>,

@@ -1,0 +1,232 @@
+//! How far a linear model goes, whatever its order and however many inputs: for what no cause can extend.
+
+use std::ops::Range;
+
+use super::data::{Layout, Stretch};
+use super::error::DiagnosisError;
+use super::fit::{Blocks, Moments, paired};
+use super::lack_of_fit::Misfit;
+use crate::Monitor;
+use crate::pem::{Experiment, Focus, NoiseModel, PemOptions, identify};
+use crate::validation::{Nuisances, choose_order, simulate_held_out};
+
+/// A linear model whose order the data chose, judged on samples that it was not fitted to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearOnly {
+    /// Its order.
+    pub order: usize,
+    /// FIT on what was held out, per cent: `100 (1 - |y - simulated| / |y - mean|)`.
+    pub fit_percent: f64,
+    /// Root mean square of its error there.
+    pub rms: f64,
+    /// What static terms of inputs, output and rate of the output still predict of that error.
+    pub misfit: Misfit,
+    /// Its simulation of what was held out.
+    pub simulated: Vec<f64>,
+}
+
+/// Orders that are tried.
+const MOST: usize = 16;
+/// Samples that it is fitted to at most.
+const SAMPLES: usize = 20_000;
+/// Blocks of what was held out.
+const BLOCKS: usize = 48;
+/// Of the Gram matrix scaled to a unit diagonal.
+const RIDGE: f64 = 1e-6;
+/// FIT from which on the output follows from the inputs at all, per cent.
+const FOLLOWS: f64 = 10.0;
+/// Standard errors of what counts.
+const SIGNIFICANT: f64 = 3.0;
+
+impl LinearOnly {
+    /// Whether it describes what was measured: the output follows from the inputs, and no static term predicts more than
+    /// is tolerated.
+    pub fn is_adequate(&self, tolerated: f64) -> bool {
+        let bent = self.misfit.ratio > tolerated && self.misfit.significance > SIGNIFICANT;
+        self.fit_percent > FOLLOWS && !bent
+    }
+
+    /// What to say about it.
+    pub fn sentences(&self, tolerated: f64) -> Vec<String> {
+        let share = 100.0 * (1.0 - 1.0 / (1.0 + self.misfit.ratio.powi(2)));
+        let sure = format!("{share:.1} % of the squared error there ({:.1} standard errors)", self.misfit.significance);
+        let end = match (self.fit_percent > FOLLOWS, self.is_adequate(tolerated)) {
+            (_, true) => {
+                format!("static terms of inputs and output predict {sure}: nothing speaks against a linear model")
+            }
+            (true, false) => format!("static terms of inputs and output predict {sure}: a linear model is not enough"),
+            (false, false) => "the output does not follow from the inputs by a linear model".to_owned(),
+        };
+        let fit = format!(
+            "a linear model of order {}, chosen by the data that it was fitted to, has a FIT of {:.1} % on what was held \
+             out",
+            self.order, self.fit_percent
+        );
+        vec![fit, end]
+    }
+}
+
+/// What to learn from and what to judge on: a part that was named, else what follows, else the last third.
+pub fn halves(learnt: Range<usize>, part: Option<Range<usize>>, samples: usize) -> (Range<usize>, Range<usize>) {
+    let behind = learnt.end..samples;
+    match part {
+        Some(part) => (learnt, part),
+        None if behind.len() >= learnt.len() / 3 && !learnt.is_empty() => (learnt, behind),
+        None => {
+            let cut = learnt.end - learnt.len() / 3;
+            (learnt.start..cut, cut..learnt.end)
+        }
+    }
+}
+
+/// Fits a linear model to samples `learnt` and judges it on samples `held_out`.
+///
+/// # Model
+/// That of [`identify`] without noise model, its order chosen by [`choose_order`] from `learnt` alone.
+/// # Method
+/// The error of the simulation over `held_out` is regressed, by folds of blocks, on linear terms alone and on these with
+/// all products of two and three of the inputs, the simulated output and its rate, and their absolute values, each as it
+/// is and through the model. What the products gain is the misfit. A linear model whose noise is independent of the
+/// inputs leaves nothing to gain.
+/// # Shapes
+/// Inputs and output of equal length.
+/// # Accuracy
+/// See docs/results/input-output.md.
+/// # Errors
+/// Too few samples for a fit, an output that does not move.
+/// # Source
+/// L. Ljung, System Identification, 2nd ed., 1999, section 16.5; S. A. Billings, W. S. F. Voon, Int. J. Control 44 (1986)
+/// 235.
+pub fn linear_only(
+    inputs: &[&[f64]],
+    output: &[f64],
+    learnt: Range<usize>,
+    held_out: Range<usize>,
+    interval_s: f64,
+    monitor: &dyn Monitor,
+) -> Result<LinearOnly, DiagnosisError> {
+    let wrong = |_| DiagnosisError::NoBaseline;
+    let cut = |range: Range<usize>| -> Option<(Vec<f64>, &[f64])> {
+        let parts: Option<Vec<&[f64]>> = inputs.iter().map(|u| u.get(range.clone())).collect();
+        Some((parts?.concat(), output.get(range)?))
+    };
+    let learnt = learnt.start..learnt.end.min(learnt.start + SAMPLES);
+    let (u, y) = cut(learnt).ok_or(DiagnosisError::NoBaseline)?;
+    let experiment = Experiment { input: &u, output: y };
+    let options = PemOptions {
+        block_rows: 2 * MOST + 4,
+        noise: NoiseModel::White,
+        focus: Focus::Simulation,
+        starts: 4,
+        offset: true,
+        drift: false,
+        ..PemOptions::default()
+    };
+    let choice = choose_order(experiment, interval_s, MOST, &options, monitor).map_err(wrong)?;
+    let options = PemOptions { order: choice.order, ..options };
+    let fit = identify(&[experiment], interval_s, &options).map_err(wrong)?;
+    let (u, y) = cut(held_out).ok_or(DiagnosisError::NoBaseline)?;
+    let nuisances = Nuisances { offset: true, slope: false };
+    let simulation = simulate_held_out(&fit.model, &fit.further_inputs, &u, y, nuisances).map_err(wrong)?;
+    let simulated = simulation.response;
+    let error: Vec<f64> = y.iter().zip(&simulated).map(|(y, s)| if y.is_finite() { y - s } else { 0.0 }).collect();
+    let through = |term: &[f64]| fit.model.simulate(term, &vec![0.0; fit.model.order()]).unwrap_or_default();
+    let misfit = bent(&u, &simulated, &error, &through);
+    let rms = (error.iter().map(|e| e * e).sum::<f64>() / error.len().max(1) as f64).sqrt();
+    Ok(LinearOnly { order: fit.model.order(), fit_percent: simulation.fit_percent, rms, misfit, simulated })
+}
+
+/// What products of inputs, output and rate predict of an error beyond what they themselves do.
+fn bent(u: &[f64], simulated: &[f64], error: &[f64], through: &dyn Fn(&[f64]) -> Vec<f64>) -> Misfit {
+    let samples = error.len();
+    let rate: Vec<f64> =
+        (0..samples).map(|k| simulated[k] - if k > 0 { simulated[k - 1] } else { simulated[0] }).collect();
+    let mut signals: Vec<Vec<f64>> = u.chunks(samples.max(1)).map(<[f64]>::to_vec).collect();
+    signals.extend([simulated.to_vec(), rate]);
+    for signal in &mut signals {
+        let largest = signal.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        signal.iter_mut().for_each(|v| *v /= largest.max(f64::MIN_POSITIVE));
+    }
+    let mut columns = vec![vec![1.0; samples]];
+    for signal in &signals {
+        columns.push(signal.clone());
+        columns.push(through(signal));
+        // a delay that the model has not
+        columns.push((0..samples).map(|k| if k > 0 { signal[k - 1] } else { 0.0 }).collect());
+    }
+    let layout = Layout::new(&[Stretch { record: 0, first: 0, end: samples }], 1);
+    let blocks = Blocks::new(&layout, BLOCKS.min(samples / 4).max(1));
+    let linear = Moments::new(&columns, error, &blocks).held_out(RIDGE);
+    for term in products(&signals) {
+        let mut passed = through(&term);
+        let largest = passed.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        passed.iter_mut().for_each(|v| *v /= largest.max(f64::MIN_POSITIVE));
+        columns.extend([term, passed]);
+    }
+    let after = Moments::new(&columns, error, &blocks).held_out(RIDGE);
+    let differences: Vec<f64> = linear.iter().zip(&after).map(|(a, b)| a - b).collect();
+    let (gain, floor) = (differences.iter().sum::<f64>(), after.iter().sum::<f64>());
+    let ratio = if gain > 0.0 && floor > 0.0 { (gain / floor).sqrt() } else { 0.0 };
+    Misfit { ratio, significance: paired(&differences) }
+}
+
+/// Products of two and of three signals, and their absolute values.
+fn products(signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let times = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
+    let mut terms: Vec<Vec<f64>> = signals.iter().map(|s| s.iter().map(|v| v.abs()).collect()).collect();
+    for (i, a) in signals.iter().enumerate() {
+        for (j, b) in signals.iter().enumerate().skip(i) {
+            let pair = times(a, b);
+            terms.extend(signals.iter().skip(j).map(|c| times(&pair, c)));
+            terms.push(pair);
+        }
+    }
+    terms
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Unwatched;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const SAMPLES: usize = 3000;
+
+    /// Two inputs through two resonances, seen by a sensor that bends by `square` times the square of what it sees.
+    fn system(seed: u64, square: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut white = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (u, v): (Vec<f64>, Vec<f64>) = (0..SAMPLES).map(|_| (white(), white())).unzip();
+        let (mut a, mut b) = ([0.0; 2], [0.0; 2]);
+        let mut output = Vec::with_capacity(SAMPLES);
+        for k in 0..SAMPLES {
+            let seen: f64 = a[0] + b[0];
+            output.push(seen + square * seen * seen + 0.3 * white());
+            let next = 1.6 * a[0] - 0.9 * a[1] + 0.5 * u[k] + 0.2 * v[k];
+            a = [next, a[0]];
+            let next = 0.9 * b[0] - 0.8 * b[1] + v[k] - 0.4 * u[k];
+            b = [next, b[0]];
+        }
+        (u, v, output)
+    }
+
+    fn judged(seed: u64, square: f64) -> LinearOnly {
+        let (u, v, output) = system(seed, square);
+        let half = SAMPLES / 2;
+        linear_only(&[&u, &v], &output, 0..half, half..SAMPLES, 1.0, &Unwatched).expect("a model")
+    }
+
+    #[test]
+    fn linear_systems_of_two_inputs_are_adequate_and_a_bent_sensor_is_seen() {
+        for seed in 0..6 {
+            let linear = judged(seed, 0.0);
+            assert!(linear.is_adequate(0.25), "{seed}: {linear:?}");
+            // noise of 0.3 beside a signal of about 3
+            assert!(linear.fit_percent > 80.0 && (4..=6).contains(&linear.order), "{seed}: {linear:?}");
+            let bent = judged(seed, 0.04);
+            assert!(!bent.is_adequate(0.25), "{seed}: {:?} {}", bent.misfit, bent.fit_percent);
+        }
+    }
+}
