@@ -61,6 +61,19 @@ pub enum Quantity {
     Amplitude,
 }
 
+impl Quantity {
+    /// Its value at a deflection and rate / omega.
+    pub fn of(self, [q, rate]: [f64; 2]) -> f64 {
+        match self {
+            Self::Deflection => q,
+            Self::Rate => rate,
+            Self::Distance => q.abs(),
+            Self::Speed => rate.abs(),
+            Self::Amplitude => (q * q + rate * rate).sqrt(),
+        }
+    }
+}
+
 /// One factor of a [`PowerLaw`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Factor {
@@ -95,13 +108,7 @@ impl PowerLaw {
         for Factor { of, mode } in &self.factors {
             let q = *motion.position.get(*mode)?;
             let rate = motion.velocity.get(*mode)? / motion.omega.get(*mode)?;
-            product *= match of {
-                Quantity::Deflection => q,
-                Quantity::Rate => rate,
-                Quantity::Distance => q.abs(),
-                Quantity::Speed => rate.abs(),
-                Quantity::Amplitude => (q * q + rate * rate).sqrt(),
-            };
+            product *= of.of([q, rate]);
         }
         Some(-product)
     }
@@ -116,8 +123,8 @@ pub enum ModalForce {
     Law(ForceLaw, Vec<usize>),
 }
 
-/// Most modes that a law with an order of its own sees.
-const MOST_MODES: usize = 4;
+/// Most modes that a law with an order of its own sees; those of the catalogue see two.
+const MOST_MODES: usize = 8;
 
 impl ModalForce {
     /// Any force.

@@ -15,18 +15,18 @@ use afmid_kernels::diagnosis::verdict::Diagnosis;
 use afmid_kernels::diagnosis::{Diagnosed, DiagnosisOptions, Part, PartStart, Record, Story, Stretch, diagnose};
 use afmid_kernels::signal::decimate;
 
-/// Says what a linear model gets wrong in a measured input and output, in free decays, in an axis under a controller, or
-/// in a steady oscillation: names the causes, extends the model, measures the gain.
+/// Says what a linear model gets wrong in a measured input and output, in free decays, in an axis under a controller,
+/// or in a steady oscillation: names the causes, extends the model, measures the gain.
 ///
 /// # Model
 /// Modes `q'' + (w/Q) q' + w^2 q = w^2 g u(t)` and real poles, as many as identification finds by itself, free-running
 /// from a state of each stretch's own, the input held between samples; whatever else there is, is a cause of the
-/// catalogue (`afmid causes`): stiffness, damping, friction and couplings of the modes, static maps of input and output,
-/// another course of the input between samples, offset, drift, lines. Without an input it is a free decay. With a
-/// `reference` the drive depends on the output: an axis `M v' + Fv v + Fc sgn v + F0 = G u` under a controller that is
-/// identified too, the loop simulated from its reference. `records` hold a steady oscillation: harmonics against a
-/// detector's static curves. Under several inputs no cause is tried: the answer is whether a linear model of all of them
-/// is adequate.
+/// catalogue (`afmid causes`): stiffness, damping, friction and couplings of the modes, static maps of input and
+/// output, another course of the input between samples, offset, drift, lines. Without an input it is a free decay. With
+/// a `reference` the drive depends on the output: an axis `M v' + Fv v + Fc sgn v + F0 = G u` under a controller that
+/// is identified too, the loop simulated from its reference. `records` hold a steady oscillation: harmonics against a
+/// detector's static curves. Under several inputs no cause is tried: the answer is whether a linear model of all of
+/// them is adequate.
 /// # Method
 /// Least squares of the free-run error on what is learnt from; causes by score test, joint refits, F tests by blocks
 /// against the part of the residual that no general term predicts, corrected for all trials, each of which has to lower
@@ -41,8 +41,8 @@ use afmid_kernels::signal::decimate;
 /// # Accuracy
 /// Right names, errors and false alarms over many seeds, and measured benchmarks: docs/diagnosis.md.
 /// # Errors
-/// None or several of `pair`, `decays` and `records`, a missing input, parts beyond the record, an output that does not move, an unknown candidate, a drive that follows from no reference, an oscillation
-/// that is not steady.
+/// None or several of `pair`, `decays` and `records`, a missing input, parts beyond the record, an output that does not
+/// move, an unknown candidate, a drive that follows from no reference, an oscillation that is not steady.
 /// # Source
 /// J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28; S. A. Billings, Nonlinear System Identification, 2013,
 /// chapter 3; A. Janot, P.-O. Vandanjon, M. Gautier, IEEE Trans. Control Syst. Technol. 22 (2014) 132; D. Rugar, H. J.
@@ -300,8 +300,7 @@ impl CausesDiagnose {
     /// A measured input and output.
     fn forced<'a>(&self, pair: &Pair<'_>, whole: &'a Restored) -> Result<Measured<'a>, StageError> {
         let (rate, input, output) = (pair.sample_rate_hz()?, &whole.input[..], &whole.output[..]);
-        let learnt = pair.own_time(DataSet::Identification)?;
-        let first = learnt.first().zip(pair.time()?.first()).map_or(0.0, |(a, b)| ((a - b) * rate).round()) as usize;
+        let learnt = identification(pair, rate)?;
         let [input_unit, output_unit] = pair.units()?.map(str::to_owned);
         let part = |part: &JudgedPart| Part {
             name: part.name.clone(),
@@ -313,7 +312,7 @@ impl CausesDiagnose {
         };
         Ok(Measured {
             records: vec![Record { input, outputs: vec![output] }],
-            training: vec![Stretch { record: 0, first, end: first + learnt.len() }],
+            training: vec![Stretch { record: 0, first: learnt.start, end: learnt.end }],
             parts: self.parts.iter().map(part).collect(),
             interval_s: 1.0 / rate,
             free_offsets: false,
@@ -409,6 +408,13 @@ impl Measured<'_> {
         let part = |values: &[f64]| values[place.clone()].to_vec();
         simulation(time, &self.output_unit, [part(&found.output), part(&found.before), part(&found.after)])
     }
+}
+
+/// Samples of the identification stretch, counted from the first of all.
+pub(super) fn identification(pair: &Pair<'_>, rate_hz: f64) -> Result<std::ops::Range<usize>, StageError> {
+    let own = pair.own_time(DataSet::Identification)?;
+    let first = own.first().zip(pair.time()?.first()).map_or(0.0, |(a, b)| ((a - b) * rate_hz).round()) as usize;
+    Ok(first..first + own.len())
 }
 
 /// Measured, simulated by the linear model, simulated with the causes.

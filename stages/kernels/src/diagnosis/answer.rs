@@ -13,9 +13,6 @@ use super::verdict::{
     BaselineSummary, DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
 };
 
-/// Block-wise standard errors beyond which a misfit is one: one chance in six hundred.
-const SIGNIFICANT: f64 = 3.0;
-
 /// What an answer is made from.
 pub(super) struct Findings<'a> {
     pub bench: &'a Bench,
@@ -70,7 +67,7 @@ impl Findings<'_> {
     }
 
     fn systematic(&self) -> bool {
-        self.misfit.ratio > self.options.tolerated_misfit && self.misfit.significance > SIGNIFICANT
+        self.misfit.is_systematic(self.options.tolerated_misfit)
     }
 
     fn verdict(&self) -> Verdict {
@@ -278,8 +275,8 @@ impl Findings<'_> {
                 chosen.id
             ));
         }
-        let share = 100.0 * self.misfit.ratio.powi(2) / (1.0 + self.misfit.ratio.powi(2));
-        if self.misfit.significance > SIGNIFICANT {
+        let share = 100.0 * self.misfit.share();
+        if self.misfit.is_significant() {
             lines.push(format!(
                 "motion and input predict another {share:.1} % of the squared residual ({:.1} standard errors), {}",
                 self.misfit.significance,

@@ -144,15 +144,14 @@ pub fn diagnose(
     if diagnosis.verdict == Verdict::Unexplained
         && let Some(linear) = alone(&bench, records, options)
     {
-        // where no model that causes could extend was found, the order's own choice decides
+        // where no model that causes could extend was found, this one decides
         if !diagnosis.baseline.adequate && linear.is_adequate(options.tolerated_misfit) {
-            diagnosis.verdict = Verdict::Clean;
-            diagnosis.baseline.adequate = true;
-            diagnosis.baseline.order = Some(linear.order);
-            diagnosis.evidence.clear();
-            diagnosis.nearest.clear();
+            let part = options.parts.first().map_or("held out", |part| &part.name[..]);
+            diagnosis = linear.answer(part, &options.output_unit, options.tolerated_misfit, options.false_alarm_rate);
+            after.clone_from(&before);
+        } else {
+            diagnosis.evidence.extend(linear.sentences(options.tolerated_misfit));
         }
-        diagnosis.evidence.extend(linear.sentences(options.tolerated_misfit));
     }
     Ok(Diagnosed {
         diagnosis,

@@ -18,12 +18,41 @@ pub struct Misfit {
     pub significance: f64,
 }
 
+/// Block-wise standard errors beyond which a misfit is one: one chance in six hundred.
+const SIGNIFICANT: f64 = 3.0;
+
+impl Misfit {
+    /// From losses on what was held out, block by block, without and with what predicts.
+    pub(super) fn between(without: &[f64], with: &[f64]) -> Self {
+        let differences: Vec<f64> = without.iter().zip(with).map(|(a, b)| a - b).collect();
+        let (gain, floor) = (differences.iter().sum::<f64>(), with.iter().sum::<f64>());
+        let ratio = if gain > 0.0 && floor > 0.0 { (gain / floor).sqrt() } else { 0.0 };
+        Self { ratio, significance: paired(&differences) }
+    }
+
+    /// Whether it is more than chance.
+    pub fn is_significant(&self) -> bool {
+        self.significance > SIGNIFICANT
+    }
+
+    /// Whether it is more than chance and more than is tolerated.
+    pub fn is_systematic(&self, tolerated: f64) -> bool {
+        self.ratio > tolerated && self.is_significant()
+    }
+
+    /// Share of the squared residual.
+    pub fn share(&self) -> f64 {
+        let square = self.ratio * self.ratio;
+        square / (1.0 + square)
+    }
+}
+
 /// Highest degree of the polynomials in deflection and rate.
 const DEGREE: usize = 5;
 /// A force or signal of this size: small enough to be linear.
 const SMALL: f64 = 1e-6;
 /// Of the Gram matrix scaled to a unit diagonal: the directions overlap, the small ones are noise.
-const RIDGE: f64 = 1e-6;
+pub(super) const RIDGE: f64 = 1e-6;
 
 /// How much of a fit's residual a library of general terms predicts.
 ///
@@ -39,10 +68,7 @@ pub(super) fn misfit(bench: &Bench, fit: &Fit, blocks: &Blocks) -> Misfit {
     let moments = Moments::new(&general(bench, fit), &clean(bench, fit), blocks);
     let own = fit.moments(bench, blocks).held_out(0.0);
     let after = moments.held_out(RIDGE);
-    let differences: Vec<f64> = own.iter().zip(&after).map(|(a, b)| a - b).collect();
-    let (gain, floor) = (differences.iter().sum::<f64>(), after.iter().sum::<f64>());
-    let ratio = if gain > 0.0 && floor > 0.0 { (gain / floor).sqrt() } else { 0.0 };
-    Misfit { ratio, significance: paired(&differences) }
+    Misfit::between(&own, &after)
 }
 
 /// What a fit's parameters and the library together leave of its residual: the nearest to pure noise that can be had
@@ -99,7 +125,7 @@ impl Term {
     fn at(&self, [q, p]: [f64; 2]) -> f64 {
         match self {
             Self::Sign => (p / 0.02).tanh(),
-            Self::Product(factors) => factors.iter().map(|of| value(*of, [q, p])).product(),
+            Self::Product(factors) => factors.iter().map(|quantity| quantity.of([q, p])).product(),
         }
     }
 
@@ -118,16 +144,6 @@ impl Term {
                 }
             }),
         }
-    }
-}
-
-fn value(of: Quantity, [q, p]: [f64; 2]) -> f64 {
-    match of {
-        Quantity::Deflection => q,
-        Quantity::Rate => p,
-        Quantity::Distance => q.abs(),
-        Quantity::Speed => p.abs(),
-        Quantity::Amplitude => (q * q + p * p).sqrt(),
     }
 }
 

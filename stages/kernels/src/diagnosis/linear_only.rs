@@ -1,11 +1,13 @@
 //! How far a linear model goes, whatever its order and however many inputs: for what no cause can extend.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::data::{Layout, Stretch};
+use super::data::{LEAST_SAMPLES, Layout, Stretch};
 use super::error::DiagnosisError;
-use super::fit::{Blocks, Moments, paired};
-use super::lack_of_fit::Misfit;
+use super::fit::{Blocks, Moments};
+use super::lack_of_fit::{Misfit, RIDGE};
+use super::verdict::{BaselineSummary, Diagnosis, Validation, Verdict};
 use crate::Monitor;
 use crate::pem::{Experiment, Focus, NoiseModel, PemOptions, identify};
 use crate::validation::{Nuisances, choose_order, simulate_held_out};
@@ -25,41 +27,69 @@ pub struct LinearOnly {
     pub simulated: Vec<f64>,
 }
 
-/// Orders that are tried.
+/// Orders that are tried: as many as `model.pem` tries by itself.
 const MOST: usize = 16;
-/// Samples that it is fitted to at most.
+/// Samples that it is fitted to at most: as for the poles of the baselines, a second or two.
 const SAMPLES: usize = 20_000;
-/// Blocks of what was held out.
+/// Blocks of what was held out: the standard error of their gains is known to a tenth.
 const BLOCKS: usize = 48;
-/// Of the Gram matrix scaled to a unit diagonal.
-const RIDGE: f64 = 1e-6;
-/// FIT from which on the output follows from the inputs at all, per cent.
+/// FIT from which on the output follows from the inputs at all, per cent: below, nine tenths of the signal are left, at
+/// which the baselines of causes count as none.
 const FOLLOWS: f64 = 10.0;
-/// Standard errors of what counts.
-const SIGNIFICANT: f64 = 3.0;
 
 impl LinearOnly {
-    /// Whether it describes what was measured: the output follows from the inputs, and no static term predicts more than
-    /// is tolerated.
+    /// Whether it describes what was measured: the output follows from the inputs, and no product of them predicts more
+    /// than is tolerated.
     pub fn is_adequate(&self, tolerated: f64) -> bool {
-        let bent = self.misfit.ratio > tolerated && self.misfit.significance > SIGNIFICANT;
-        self.fit_percent > FOLLOWS && !bent
+        self.fit_percent > FOLLOWS && !self.misfit.is_systematic(tolerated)
+    }
+
+    /// The verdict on it alone: no cause, whatever it says.
+    ///
+    /// `part`: name of what was held out.
+    pub fn answer(&self, part: &str, unit: &str, tolerated: f64, false_alarm_rate: f64) -> Diagnosis {
+        let adequate = self.is_adequate(tolerated);
+        let noise = self.rms * (1.0 - self.misfit.share()).sqrt();
+        Diagnosis {
+            verdict: if adequate { Verdict::Clean } else { Verdict::Unexplained },
+            p_value: None,
+            baseline: BaselineSummary {
+                adequate,
+                order: Some(self.order),
+                parameters: BTreeMap::new(),
+                noise_rms: Some(noise),
+                distortion_rms: Some((self.rms.powi(2) - noise.powi(2)).max(0.0).sqrt()),
+            },
+            causes: Vec::new(),
+            evidence: self.sentences(tolerated),
+            nearest: Vec::new(),
+            modes_before: Vec::new(),
+            modes_after: Vec::new(),
+            validation: vec![Validation {
+                name: part.to_owned(),
+                rms_before: Some(self.rms),
+                rms_after: Some(self.rms),
+                unit: unit.to_owned(),
+            }],
+            ladder: Vec::new(),
+            false_alarm_rate,
+        }
     }
 
     /// What to say about it.
     pub fn sentences(&self, tolerated: f64) -> Vec<String> {
-        let share = 100.0 * (1.0 - 1.0 / (1.0 + self.misfit.ratio.powi(2)));
-        let sure = format!("{share:.1} % of the squared error there ({:.1} standard errors)", self.misfit.significance);
+        let predicted = format!(
+            "products of inputs and output predict {:.1} % of the squared error there ({:.1} standard errors)",
+            100.0 * self.misfit.share(),
+            self.misfit.significance
+        );
         let end = match (self.fit_percent > FOLLOWS, self.is_adequate(tolerated)) {
-            (_, true) => {
-                format!("static terms of inputs and output predict {sure}: nothing speaks against a linear model")
-            }
-            (true, false) => format!("static terms of inputs and output predict {sure}: a linear model is not enough"),
+            (_, true) => format!("{predicted}: nothing speaks against a linear model"),
+            (true, false) => format!("{predicted}: a linear model is not enough"),
             (false, false) => "the output does not follow from the inputs by a linear model".to_owned(),
         };
         let fit = format!(
-            "a linear model of order {}, chosen by the data that it was fitted to, has a FIT of {:.1} % on what was held \
-             out",
+            "a linear model of order {}, chosen by the data that it was fitted to, has a FIT of {:.1} % on what was held out",
             self.order, self.fit_percent
         );
         vec![fit, end]
@@ -84,19 +114,19 @@ pub fn halves(learnt: Range<usize>, part: Option<Range<usize>>, samples: usize) 
 /// # Model
 /// That of [`identify`] without noise model, its order chosen by [`choose_order`] from `learnt` alone.
 /// # Method
-/// The error of the simulation over `held_out` is regressed, by folds of blocks, on linear terms alone and on these with
-/// all products of two and three of the inputs, the simulated output and its rate, and their absolute values, each as it
-/// is and through the model. What the products gain is the misfit. A linear model whose noise is independent of the
-/// inputs leaves nothing to gain.
+/// The error of the simulation over `held_out` is regressed, by folds of blocks, on linear terms alone and on these
+/// with all products of two and three of the inputs, the simulated output and its rate, and their absolute values, each
+/// as it is and through the model. What the products gain is the misfit. A linear system whose noise is independent of
+/// the inputs leaves nothing to gain.
 /// # Shapes
 /// Inputs and output of equal length.
 /// # Accuracy
 /// See docs/results/input-output.md.
 /// # Errors
-/// Too few samples for a fit, an output that does not move.
+/// Stretches beyond the data, too few samples for a fit, an output that does not move.
 /// # Source
-/// L. Ljung, System Identification, 2nd ed., 1999, section 16.5; S. A. Billings, W. S. F. Voon, Int. J. Control 44 (1986)
-/// 235.
+/// L. Ljung, System Identification, 2nd ed., 1999, section 16.5; S. A. Billings, W. S. F. Voon, Int. J. Control 44
+/// (1986) 235.
 pub fn linear_only(
     inputs: &[&[f64]],
     output: &[f64],
@@ -106,12 +136,16 @@ pub fn linear_only(
     monitor: &dyn Monitor,
 ) -> Result<LinearOnly, DiagnosisError> {
     let wrong = |_| DiagnosisError::NoBaseline;
-    let cut = |range: Range<usize>| -> Option<(Vec<f64>, &[f64])> {
+    let cut = |name: &str, range: Range<usize>| -> Result<(Vec<f64>, &[f64]), DiagnosisError> {
+        let (Range { start: first, end }, samples) = (range.clone(), output.len());
         let parts: Option<Vec<&[f64]>> = inputs.iter().map(|u| u.get(range.clone())).collect();
-        Some((parts?.concat(), output.get(range)?))
+        match parts.zip(output.get(range)) {
+            Some((u, y)) if y.len() >= LEAST_SAMPLES => Ok((u.concat(), y)),
+            _ => Err(DiagnosisError::Part { name: name.to_owned(), first, end, samples, least: LEAST_SAMPLES }),
+        }
     };
     let learnt = learnt.start..learnt.end.min(learnt.start + SAMPLES);
-    let (u, y) = cut(learnt).ok_or(DiagnosisError::NoBaseline)?;
+    let (u, y) = cut("training", learnt)?;
     let experiment = Experiment { input: &u, output: y };
     let options = PemOptions {
         block_rows: 2 * MOST + 4,
@@ -125,7 +159,7 @@ pub fn linear_only(
     let choice = choose_order(experiment, interval_s, MOST, &options, monitor).map_err(wrong)?;
     let options = PemOptions { order: choice.order, ..options };
     let fit = identify(&[experiment], interval_s, &options).map_err(wrong)?;
-    let (u, y) = cut(held_out).ok_or(DiagnosisError::NoBaseline)?;
+    let (u, y) = cut("held out", held_out)?;
     let nuisances = Nuisances { offset: true, slope: false };
     let simulation = simulate_held_out(&fit.model, &fit.further_inputs, &u, y, nuisances).map_err(wrong)?;
     let simulated = simulation.response;
@@ -164,10 +198,7 @@ fn bent(u: &[f64], simulated: &[f64], error: &[f64], through: &dyn Fn(&[f64]) ->
         columns.extend([term, passed]);
     }
     let after = Moments::new(&columns, error, &blocks).held_out(RIDGE);
-    let differences: Vec<f64> = linear.iter().zip(&after).map(|(a, b)| a - b).collect();
-    let (gain, floor) = (differences.iter().sum::<f64>(), after.iter().sum::<f64>());
-    let ratio = if gain > 0.0 && floor > 0.0 { (gain / floor).sqrt() } else { 0.0 };
-    Misfit { ratio, significance: paired(&differences) }
+    Misfit::between(&linear, &after)
 }
 
 /// Products of two and of three signals, and their absolute values.

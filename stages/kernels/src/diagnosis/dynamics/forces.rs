@@ -55,6 +55,8 @@ impl<'a> Forces<'a> {
                 }
             }
         }
+        // one order whatever motions are together: each has the sums, to the last bit, that it has by itself
+        forces.terms.iter_mut().for_each(|terms| terms.sort_by(|a, b| a.factors.cmp(&b.factors)));
         forces
     }
 
@@ -64,17 +66,19 @@ impl<'a> Forces<'a> {
             return;
         }
         let Some(terms) = self.terms.get_mut(law.on) else { return };
-        if let Some(term) = terms.iter_mut().find(|term| term.factors == law.factors) {
+        let mut factors = law.factors.clone();
+        factors.sort_unstable();
+        if let Some(term) = terms.iter_mut().find(|term| term.factors == factors) {
             term.strength.0[l] += law.strength;
             return;
         }
         let mut strength = Lane::default();
         strength.0[l] = law.strength;
-        let entries = entries(&law.factors);
+        let entries = entries(&factors);
         entries.iter().for_each(|(_, column)| self.wanted[*column] = true);
         let mut entries = entries.into_iter();
         let three = std::array::from_fn(|_| entries.next().unwrap_or((0, ONE)));
-        terms.push(Term { strength, entries: three, further: entries.collect(), factors: law.factors.clone() });
+        terms.push(Term { strength, entries: three, further: entries.collect(), factors });
     }
 
     /// Takes force / omega^2 of each mode to what drives it.
@@ -91,7 +95,7 @@ impl<'a> Forces<'a> {
             let row = &mut table[s];
             row[0] = q;
             row[1] = p;
-            // what no term reads is not written: that is most of a step
+            // what no term reads is not written
             if self.wanted[2] {
                 row[2] = q.abs();
             }
@@ -148,10 +152,9 @@ impl<'a> Forces<'a> {
     }
 }
 
-/// Entries of the table whose product factors are; two equal ones are a square.
-fn entries(factors: &[Factor]) -> Vec<Entry> {
-    let mut left = factors.to_vec();
-    left.sort_unstable();
+/// Entries of the table whose product sorted factors are; two equal ones are a square.
+fn entries(sorted: &[Factor]) -> Vec<Entry> {
+    let mut left = sorted.to_vec();
     let mut entries = Vec::new();
     while let Some(factor) = left.pop() {
         let square = match factor.of {

@@ -9,6 +9,8 @@ mod motion;
 mod outputs;
 mod propagator;
 mod section;
+#[cfg(test)]
+mod tests;
 
 pub use added::Added;
 pub(super) use added::is_choice;

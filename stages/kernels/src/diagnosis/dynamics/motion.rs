@@ -102,8 +102,8 @@ pub(super) trait Sink {
 /// # Method
 /// Exponential time differencing of fourth order, the sections side by side; exact for linear ones under a held input.
 /// # Accuracy
-/// Nonlinear parts and moving inputs to order (w h)^4 of the step h: 1e-5 of them at 0.25 rad a step. A run's numbers do
-/// not depend on those beside it.
+/// Nonlinear parts and moving inputs to order (w h)^4 of the step h: 1e-5 of them at 0.25 rad a step. A run's numbers
+/// do not depend on those beside it, to the last bit.
 /// # Errors
 /// None; a motion that diverges gives values that are not finite, as do more than 32 sections.
 /// # Source

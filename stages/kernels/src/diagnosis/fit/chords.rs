@@ -75,7 +75,8 @@ impl Chords {
     /// Damped Gauss-Newton with the same sensitivities at every step, all starts side by side.
     ///
     /// # Source
-    /// J. M. Ortega, W. C. Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables, 1970, section 7.1.
+    /// J. M. Ortega, W. C. Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables, 1970, section
+    /// 7.1.
     pub(super) fn all(bench: &Bench, mut climbs: Vec<Option<Climb>>, own: &Own, until: Until) -> Vec<Option<Self>> {
         for _ in 0..until.steps {
             let mut going: Vec<&mut Climb> = climbs.iter_mut().flatten().filter(|climb| climb.goes_on).collect();
