@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use afmid_kernels::effects::Effects;
-use afmid_stages::causes::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, add};
+use afmid_stages::causes::{About, Cause, Identifiable, Need, Parameter, Part, Scene, add};
 
 /// The signal has another slope on either side of the spot's centre: `y = v + a |v|`.
 struct UnequalSegments;
@@ -20,7 +20,7 @@ const ABOUT: About = About {
     physics: "the amplifiers of the photodiode's two segments differ in gain, so that the slope changes where the spot \
         crosses their gap",
     part: Part::Detector,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "asymmetry",
         unit: "1",

@@ -2,17 +2,17 @@
 
 use serde_json::{Value, json};
 
-use super::{About, Cause, Domain, Identifiable, Part};
+use super::{About, Cause, Identifiable, Need, Part};
 
 /// The page of a cause, in Markdown.
 pub fn page(cause: &dyn Cause) -> String {
     let about = cause.about();
     let mut text = format!(
-        "# {}\n\n{}.\n\nActs on: {}. Found in: {}. {}\n\n| parameter | unit | limits | meaning |\n|---|---|---|---|\n",
+        "# {}\n\n{}.\n\nActs on: {}. Needs: {}. {}\n\n| parameter | unit | limits | meaning |\n|---|---|---|---|\n",
         about.id,
         capital(about.physics),
         part(about.part),
-        domain(about.domain),
+        about.needs.iter().map(|need| need_in_words(*need)).collect::<Vec<_>>().join(", "),
         naming(about),
     );
     for p in about.parameters {
@@ -59,7 +59,7 @@ pub fn as_json(cause: &dyn Cause) -> Value {
         "id": about.id,
         "physics": about.physics,
         "part": part(about.part),
-        "domain": domain(about.domain),
+        "needs": about.needs.iter().map(|need| need_in_words(*need)).collect::<Vec<_>>(),
         "parameters": parameters,
         "class": about.class,
         "resembles": about.resembles,
@@ -81,11 +81,16 @@ fn part(part: Part) -> &'static str {
     }
 }
 
-fn domain(domain: Domain) -> &'static str {
-    match domain {
-        Domain::Release => "releases",
-        Domain::InputOutput => "measured input and output",
-        Domain::Both => "releases, measured input and output",
+fn need_in_words(need: Need) -> &'static str {
+    match need {
+        Need::Release => "releases of a lever",
+        Need::Run => "free decays or a measured input and output",
+        Need::Mode => "a mode",
+        Need::TwoModes => "two modes",
+        Need::Input => "a measured input",
+        Need::Records => "several records",
+        Need::OneChannel => "one channel",
+        Need::OneRun => "one run at a time",
     }
 }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::causes_story::{error_array, error_table, ladder};
 use super::{closed_loop, several_inputs, steady};
 use crate::artifacts::{DataSet, Decays, Pair};
-use crate::causes::{Cause, Domain, catalogue};
+use crate::causes::{Cause, catalogue, runs_have};
 use afmid_kernels::diagnosis::verdict::Diagnosis;
 use afmid_kernels::diagnosis::{Diagnosed, DiagnosisOptions, Part, PartStart, Record, Story, Stretch, diagnose};
 use afmid_kernels::signal::decimate;
@@ -371,7 +371,7 @@ impl CausesDiagnose {
     fn options(&self, measured: &Measured<'_>) -> DiagnosisOptions {
         let usable = |cause: &&'static dyn Cause| {
             let about = cause.about();
-            about.domain != Domain::Release && self.wants(about.id)
+            about.is_met(runs_have) && self.wants(about.id)
         };
         DiagnosisOptions {
             training: measured.training.clone(),

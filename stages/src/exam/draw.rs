@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::levers::lever;
 use super::limits::{Count, Limits, limit};
-use crate::causes::{About, Cause, Domain, Identifiable, Parameter, Scene};
+use crate::causes::{About, Cause, Identifiable, Parameter, Scene, releases_have};
 use crate::simulate::{Afm, Hidden};
 
 /// What is hidden in an archive.
@@ -249,7 +249,7 @@ fn nameable(cause: &dyn Cause) -> bool {
     let about = cause.about();
     // a level at which a signal is cut is no strength: less of it shows more
     let has_a_strength = about.id != "clipping";
-    has_a_strength && about.domain != Domain::InputOutput && !matches!(about.identifiable, Identifiable::No(_))
+    has_a_strength && about.is_met(releases_have) && !matches!(about.identifiable, Identifiable::No(_))
 }
 
 /// What trial values come from: the truth, and a frequency where nothing rings yet.

@@ -7,7 +7,7 @@ use afmid_pipeline::config::nearest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::causes::{About, Cause, Domain, catalogue, find, within_limits};
+use crate::causes::{About, Cause, catalogue, find, releases_have, within_limits};
 use afmid_kernels::effects::Effects;
 
 /// One value of a hidden cause.
@@ -58,9 +58,9 @@ impl Hidden {
             return Err(StageError::new(format!("`hidden`: there is no cause named `{id}`")).help(help));
         };
         let about = cause.about();
-        if about.domain == Domain::InputOutput {
+        if !about.is_met(releases_have) {
             let message = format!("`hidden`: `{id}` acts on a measured input, which force curves do not have");
-            return Err(StageError::new(message).help("`afmid causes` says where each cause acts"));
+            return Err(StageError::new(message).help("`afmid causes` says what each cause needs"));
         }
         let values = self.values(about)?;
         within_limits(about, &values).map_err(|(name, found, low, high)| {

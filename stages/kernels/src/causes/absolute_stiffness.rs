@@ -1,6 +1,6 @@
 //! A joint that slips the more the further it is bent.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w^2 k abs(q) q` on the first mode.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "absolute-stiffness",
     physics: "micro-slip in a joint or a clamp: stiffness falls in proportion to the amplitude",
     part: Part::Lever,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::Mode],
     parameters: &[Parameter {
         name: "k",
         unit: "1/V",

@@ -1,6 +1,6 @@
 //! A readout that forgets its level.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, LinearSection};
 
 /// `D = s / (s + w)`.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "ac-coupling",
     physics: "a coupling capacitor lets slow signals through only in part: levels droop",
     part: Part::Detector,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter { name: "corner_hz", unit: "Hz", meaning: "corner of the high-pass", low: 0.0, high: 5e3 }],
     class: &["ac-coupling"],
     resembles: "baseline-drift and tails: those do not droop before the rupture as well",

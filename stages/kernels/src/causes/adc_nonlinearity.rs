@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// Error `A sin(2 pi v / period)`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "adc-nonlinearity",
     physics: "the converter's codes are not evenly spaced: the error repeats with the code",
     part: Part::Record,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter { name: "amplitude_v", unit: "V", meaning: "amplitude of the error", low: -0.1, high: 0.1 },
         Parameter { name: "period_v", unit: "V", meaning: "volts after which it repeats", low: 1e-4, high: 100.0 },

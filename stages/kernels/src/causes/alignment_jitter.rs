@@ -1,6 +1,6 @@
 //! Events that are not aligned.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// Onsets scatter.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "alignment-jitter",
     physics: "events lie a fraction of a sample apart: their mean blurs the high modes",
     part: Part::Record,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "jitter_s",
         unit: "s",

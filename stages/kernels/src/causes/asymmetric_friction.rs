@@ -1,6 +1,6 @@
 //! Viscous friction that differs between the two directions.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ d abs(q')` on the first mode.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "asymmetric-friction",
     physics: "viscous friction is stronger one way than the other: a guide or a seal under a side load",
     part: Part::Lever,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::Mode],
     parameters: &[Parameter {
         name: "viscous_difference",
         unit: "1",

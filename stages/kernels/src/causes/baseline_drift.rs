@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `y = q + s P1 + b P2 + t P3`, Legendre polynomials in the place within the record.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "baseline-drift",
     physics: "temperature or charge moves the zero of the sensor slowly over the record",
     part: Part::Record,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::OneRun],
     parameters: &[
         Parameter {
             name: "slope",

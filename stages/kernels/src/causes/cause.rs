@@ -19,15 +19,25 @@ pub enum Part {
     Input,
 }
 
-/// Which data a cause can be found in.
+/// What data must have for a cause to be found in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Domain {
-    /// Releases of a lever.
+pub enum Need {
+    /// Events in which a lever is released from a load.
     Release,
-    /// A measured input and output.
-    InputOutput,
-    /// Both.
-    Both,
+    /// Runs of a system without such events: free decays, or a measured input and output.
+    Run,
+    /// A mode that it acts on.
+    Mode,
+    /// Two modes that it couples.
+    TwoModes,
+    /// A measured input.
+    Input,
+    /// Several records: it changes from one to the next.
+    Records,
+    /// One channel: it belongs to one sensor.
+    OneChannel,
+    /// One run: it differs from run to run.
+    OneRun,
 }
 
 /// One number of a cause.
@@ -66,8 +76,8 @@ pub struct About {
     pub physics: &'static str,
     /// Where it acts.
     pub part: Part,
-    /// Where it can be found.
-    pub domain: Domain,
+    /// What the data must have to show it.
+    pub needs: &'static [Need],
     /// Its numbers; the first is its strength, zero for nothing.
     pub parameters: &'static [Parameter],
     /// What the data at hand can't tell it from, itself included: any of them is a right name.
@@ -80,6 +90,23 @@ pub struct About {
     pub identifiable: Identifiable,
     /// Where the model comes from.
     pub source: &'static str,
+}
+
+impl About {
+    /// Whether data are enough for it that have what `has` says.
+    pub fn is_met(&self, has: impl Fn(Need) -> bool) -> bool {
+        self.needs.iter().all(|need| has(*need))
+    }
+
+    /// Modes that it looks at: one for what acts on a mode's motion, two for a coupling.
+    pub fn modes(&self) -> usize {
+        let of = |need: &Need| match need {
+            Need::Mode => 1,
+            Need::TwoModes => 2,
+            _ => 0,
+        };
+        self.needs.iter().map(of).sum()
+    }
 }
 
 /// What the data show before any cause is tried: where trial values come from.
@@ -121,11 +148,6 @@ pub trait Cause: Sync {
     ///
     /// The first value of each is a strength that changes the response by about a hundredth.
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>>;
-
-    /// Modes that it looks at: one for what acts on a mode's motion, two for a coupling.
-    fn modes(&self) -> usize {
-        usize::from(self.about().part == Part::Lever)
-    }
 
     /// Whether a coupling is the same with its two modes exchanged.
     fn is_symmetric(&self) -> bool {

@@ -1,6 +1,6 @@
 //! A converter or amplifier at its limits.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `v` limited on both sides.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "clipping",
     physics: "the signal leaves the range of an amplifier before the converter's own limits",
     part: Part::Record,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "limit_v",
         unit: "V",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// All modes drift in proportion.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "clock-error",
     physics: "the sampling clock drifts over the archive: all frequencies seem to",
     part: Part::Archive,
-    domain: Domain::Release,
+    needs: &[Need::Release, Need::Records],
     parameters: &[Parameter {
         name: "relative_drift",
         unit: "1",

@@ -1,6 +1,6 @@
 //! A delay of the whole readout.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `exp(-s delay)`.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "constant-delay",
     physics: "cables and converters delay the whole signal",
     part: Part::Detector,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter { name: "delay_s", unit: "s", meaning: "delay", low: 0.0, high: 1e-5 }],
     class: &["constant-delay", "extra-pole"],
     resembles: "onset: the same signal",

@@ -1,6 +1,6 @@
 //! Dry friction.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce};
 
 /// `+ w^2 c sgn(q')` on the first mode.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "coulomb-friction",
     physics: "two surfaces rub: a force of constant size against the motion, so that the envelope falls on a straight line and stops",
     part: Part::Lever,
-    domain: Domain::Both,
+    needs: &[Need::Mode],
     parameters: &[Parameter {
         name: "c",
         unit: "V",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `v = s + a3 s^3`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "cubic-detector",
     physics: "the spot is as wide as the photodiode's travel: its answer flattens symmetrically, a term in the cube of the deflection",
     part: Part::Detector,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "a3",
         unit: "1/V^2",

@@ -1,6 +1,6 @@
 //! A lever that stiffens with its deflection.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w^2 k3 q^3` on the first mode.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "duffing",
     physics: "stiffness grows with the square of the deflection: large swings are faster than small ones",
     part: Part::Lever,
-    domain: Domain::Both,
+    needs: &[Need::Mode],
     parameters: &[Parameter {
         name: "k3",
         unit: "1/V^2",

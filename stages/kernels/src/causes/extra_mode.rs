@@ -1,6 +1,6 @@
 //! A resonance that the lever's model does not have.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ExtraMode};
 
 /// One more pole pair.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "extra-mode",
     physics: "another resonance rings along: torsion, holder, a fifth flexural mode",
     part: Part::Lever,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter { name: "share", unit: "1", meaning: "its share of the static response", low: -0.2, high: 0.2 },
         Parameter { name: "frequency_hz", unit: "Hz", meaning: "its frequency", low: 1e2, high: 1e8 },

@@ -1,6 +1,6 @@
 //! One more roll-off of the electronics.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, LinearSection};
 
 /// One more real pole.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "extra-pole",
     physics: "an amplifier or cable adds a roll-off that the detector's nominal poles don't have",
     part: Part::Detector,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "time_constant_s",
         unit: "s",

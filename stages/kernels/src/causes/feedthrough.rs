@@ -1,6 +1,6 @@
 //! Force that reaches the readout without the lever.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `d0 u` beside the modes.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "feedthrough",
     physics: "part of the signal follows the force at once: modes beyond the model's, or a bent base",
     part: Part::Lever,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "share",
         unit: "1",

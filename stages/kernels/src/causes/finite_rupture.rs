@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// The load falls on a straight line instead of at once.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "finite-rupture",
     physics: "the neck tears over a while: the force falls on a ramp, not at once",
     part: Part::Force,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "rupture_time_s",
         unit: "s",

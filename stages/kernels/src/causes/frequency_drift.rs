@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// All modes drift in proportion.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "frequency-drift",
     physics: "temperature or adsorption moves all frequencies in proportion from record to record",
     part: Part::Archive,
-    domain: Domain::Both,
+    needs: &[Need::Records],
     parameters: &[Parameter {
         name: "relative_drift",
         unit: "1",

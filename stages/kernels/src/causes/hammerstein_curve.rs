@@ -1,7 +1,7 @@
 //! A linear system behind a curve.
 
 use super::wiener_hammerstein_curve::{CURVE, cubic};
-use super::{About, Cause, Domain, Identifiable, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Part, Scene};
 use crate::effects::Effects;
 
 /// `y = G f(u)`.
@@ -11,7 +11,7 @@ const ABOUT: About = About {
     id: "hammerstein-curve",
     physics: "the actuator or its amplifier is bent: a static curve before all dynamics",
     part: Part::Input,
-    domain: Domain::InputOutput,
+    needs: &[Need::Input],
     parameters: CURVE,
     class: &["hammerstein-curve"],
     resembles: "wiener-hammerstein-curve with a fast part before the curve; input-saturation: the same beside an oscillator",

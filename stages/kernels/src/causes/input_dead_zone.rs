@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// A share of what lies within the zone is lost: `u - share clamp(u, -width, width)`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "input-dead-zone",
     physics: "play or stiction keeps small inputs from acting: a share of what lies within a zone is lost",
     part: Part::Input,
-    domain: Domain::InputOutput,
+    needs: &[Need::Input],
     parameters: &[
         Parameter { name: "share", unit: "1", meaning: "share that is lost within the zone", low: 0.0, high: 2.0 },
         Parameter { name: "width", unit: "input", meaning: "half width of the zone", low: 0.0, high: 1e6 },

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// A share of what exceeds a level is lost: `u - share (abs(u) - level)+ sgn(u)`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "input-saturation",
     physics: "the actuator or its amplifier runs into a limit: beyond a level a share of the input does not act",
     part: Part::Input,
-    domain: Domain::InputOutput,
+    needs: &[Need::Input],
     parameters: &[
         Parameter {
             name: "share",

@@ -1,6 +1,6 @@
 //! A laser that flickers.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// Noise that grows with the deflection.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "intensity-noise",
     physics: "the laser's intensity fluctuates: noise in proportion to the deflection",
     part: Part::Record,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "relative",
         unit: "1",

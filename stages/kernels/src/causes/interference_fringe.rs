@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `v += B cos(4 pi z / lambda + phi)`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "interference-fringe",
     physics: "light reflected by the sample interferes with the lever's: the baseline waves with the piezo position",
     part: Part::Record,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter { name: "amplitude_v", unit: "V", meaning: "amplitude of the wave", low: 0.0, high: 1.0 },
         Parameter { name: "wavelength_m", unit: "m", meaning: "wavelength of the light", low: 3e-7, high: 2e-6 },

@@ -1,6 +1,6 @@
 //! An input that does not run between its samples as assumed.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, Intersample};
 
 /// The baseline holds the input; `kind` 1: straight lines, 2: the band-limited signal.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "intersample",
     physics: "the input was measured through an anti-alias filter or made without a hold: between samples it does not stay where it was",
     part: Part::Input,
-    domain: Domain::InputOutput,
+    needs: &[Need::Input],
     parameters: &[Parameter {
         name: "kind",
         unit: "1",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `A sin(2 pi f t + phi)`, f the mains' frequency.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "mains-hum",
     physics: "the mains couples into the readout",
     part: Part::Record,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter { name: "amplitude_v", unit: "V", meaning: "amplitude", low: 0.0, high: 1.0 },
         Parameter {

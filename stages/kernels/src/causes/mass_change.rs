@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// All modes step at a place in the archive.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "mass-change",
     physics: "the tip picks something up, or loses it: all frequencies step between two records",
     part: Part::Archive,
-    domain: Domain::Release,
+    needs: &[Need::Release, Need::Records],
     parameters: &[
         Parameter {
             name: "relative_change",

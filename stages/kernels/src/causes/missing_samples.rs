@@ -1,6 +1,6 @@
 //! Samples that were never stored.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// Time jumps inside a record.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "missing-samples",
     physics: "the acquisition drops samples: time jumps",
     part: Part::Record,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter { name: "samples", unit: "1", meaning: "samples lost", low: 0.0, high: 1e6 },
         Parameter { name: "time_s", unit: "s", meaning: "when, since the record's start", low: 0.0, high: 1e4 },

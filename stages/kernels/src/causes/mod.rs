@@ -57,7 +57,7 @@ mod two_step_rupture;
 mod wiener_curve;
 mod wiener_hammerstein_curve;
 
-pub use cause::{About, Cause, Domain, Identifiable, Parameter, Part, Scene, within_limits};
+pub use cause::{About, Cause, Identifiable, Need, Parameter, Part, Scene, within_limits};
 
 /// Every built-in cause, by id.
 pub const CATALOGUE: &[&dyn Cause] = &[

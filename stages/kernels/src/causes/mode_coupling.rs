@@ -1,6 +1,6 @@
 //! A mode that feels another's swing.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `w2^2 (1 + c q1^2)`.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "mode-coupling",
     physics: "the swing of the first mode stiffens the second",
     part: Part::Lever,
-    domain: Domain::Release,
+    needs: &[Need::Release, Need::TwoModes],
     parameters: &[Parameter {
         name: "coupling",
         unit: "1/V^2",
@@ -33,10 +33,6 @@ impl Cause for ModeCoupling {
     fn add(&self, values: &[f64], effects: &mut Effects) {
         use Quantity::Deflection as Q;
         effects.modal_force.push(ModalForce::Power(PowerLaw::new(1, values[0], &[(Q, 0), (Q, 0), (Q, 1)])));
-    }
-
-    fn modes(&self) -> usize {
-        2
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,6 +1,6 @@
 //! Air that is squeezed near the surface.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce};
 
 /// `+ c exp(-z / l) q'`.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "near-surface-damping",
     physics: "near the surface the squeezed film damps the first periods more",
     part: Part::Lever,
-    domain: Domain::Release,
+    needs: &[Need::Release, Need::Mode],
     parameters: &[
         Parameter {
             name: "damping",

@@ -1,6 +1,6 @@
 //! Damping that grows with the swing.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w c q^2 q'` on the first mode.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "nonlinear-damping",
     physics: "energy is lost in strongly bent parts or by coupling: the loss factor grows with the square of the deflection",
     part: Part::Lever,
-    domain: Domain::Both,
+    needs: &[Need::Mode],
     parameters: &[Parameter {
         name: "c",
         unit: "1/V^2",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `y = q + offset`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "offset",
     physics: "the sensor or its amplifier adds a constant",
     part: Part::Record,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::OneRun],
     parameters: &[Parameter {
         name: "offset",
         unit: "V",

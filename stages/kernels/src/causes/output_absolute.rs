@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `y = q + a abs(q)`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "output-absolute",
     physics: "the sensor has one sensitivity to one side and another to the other",
     part: Part::Detector,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::OneChannel],
     parameters: &[Parameter {
         name: "a",
         unit: "1",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `y = q + a q^3`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "output-cubic",
     physics: "the sensor flattens or steepens symmetrically: a term in the cube of the motion",
     part: Part::Detector,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::OneChannel],
     parameters: &[Parameter {
         name: "a",
         unit: "1/V^2",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `y = q + a q^2`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "output-quadratic",
     physics: "the sensor answers more to one side than to the other: a term in the square of the motion",
     part: Part::Detector,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::OneChannel],
     parameters: &[Parameter {
         name: "a",
         unit: "1/V",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// A share of what exceeds a level is lost: `y = q - share (abs(q) - level)+ sgn(q)`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "output-saturation",
     physics: "the sensor or its amplifier runs into a limit: beyond a level a share of the output is lost, all of it where it clips",
     part: Part::Detector,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::OneChannel],
     parameters: &[
         Parameter {
             name: "share",

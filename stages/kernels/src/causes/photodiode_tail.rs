@@ -1,6 +1,6 @@
 //! Carriers that arrive late.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, LinearSection};
 
 /// `D = (1 - a) + a / (1 + s tau)`.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "photodiode-tail",
     physics: "part of the light is absorbed deep in the photodiode: its carriers diffuse and arrive late",
     part: Part::Detector,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter { name: "fraction", unit: "1", meaning: "share of the late carriers", low: -0.3, high: 0.3 },
         Parameter { name: "tau_s", unit: "s", meaning: "their time constant", low: 4e-7, high: 1e-2 },

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `v += kappa z`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "piezo-crosstalk",
     physics: "the piezo's voltage, or its tilt, leaks into the deflection channel",
     part: Part::Record,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "kappa_v_per_m",
         unit: "V/m",

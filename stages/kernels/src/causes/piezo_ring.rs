@@ -2,7 +2,7 @@
 
 use faer::c64;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{DecayingLoad, Effects};
 
 /// Base motion at the piezo's resonance, passed on by the modes.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "piezo-ring",
     physics: "the release kicks the piezo stack: its resonance shakes the lever's base",
     part: Part::Force,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter {
             name: "share",

@@ -1,6 +1,6 @@
 //! Two modes that feed one another at one to two.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `w1^2 c1 q1 q2` on the first mode, `w2^2 c2 q1^2` on the second.
@@ -11,7 +11,7 @@ const ABOUT: About = About {
     physics: "the square of one mode's swing drives another at twice its frequency, and that one pumps it in turn: \
               internal resonance 1:2",
     part: Part::Lever,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::TwoModes],
     parameters: &[
         Parameter {
             name: "c1",
@@ -46,10 +46,6 @@ impl Cause for QuadraticCoupling {
             ModalForce::Power(PowerLaw::new(0, values[0], &[(Q, 0), (Q, 1)])),
             ModalForce::Power(PowerLaw::new(1, values[1], &[(Q, 0), (Q, 0)])),
         ]);
-    }
-
-    fn modes(&self) -> usize {
-        2
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,6 +1,6 @@
 //! Damping by a fluid that is pushed aside.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ c abs(q') q'` on the first mode.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "quadratic-damping",
     physics: "the medium or a clamp takes energy in proportion to the square of the speed: large swings decay faster",
     part: Part::Lever,
-    domain: Domain::Both,
+    needs: &[Need::Mode],
     parameters: &[Parameter {
         name: "c",
         unit: "1/V",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `v = s + a2 s^2`.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "quadratic-detector",
     physics: "the spot sits off the middle of the photodiode: its answer has a term in the square of the deflection",
     part: Part::Detector,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[Parameter {
         name: "a2",
         unit: "1/V",

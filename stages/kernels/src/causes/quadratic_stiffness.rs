@@ -1,6 +1,6 @@
 //! A spring that is softer one way than the other.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w^2 k2 q^2` on the first mode.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "quadratic-stiffness",
     physics: "stiffness changes with the side that the oscillator swings to: a bias, a magnet or gravity acts from one side",
     part: Part::Lever,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::Mode],
     parameters: &[Parameter {
         name: "k2",
         unit: "1/V",

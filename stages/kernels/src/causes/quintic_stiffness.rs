@@ -1,6 +1,6 @@
 //! A spring that stiffens late.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce, PowerLaw, Quantity};
 
 /// `+ w^2 k5 q^5` on the first mode.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "quintic-stiffness",
     physics: "stiffness grows with the fourth power of the deflection: contact, magnets or geometry at large swings",
     part: Part::Lever,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::Mode],
     parameters: &[Parameter {
         name: "k5",
         unit: "1/V^4",

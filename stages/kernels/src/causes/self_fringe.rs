@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `v = A (sin(phi + beta x) - sin phi) / (beta cos phi)` of a deflection x between -1 and 1 at its largest.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "self-fringe",
     physics: "an interferometer's own fringe bends the signal: the deflection is no longer small against the wavelength",
     part: Part::Detector,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::OneChannel],
     parameters: &[
         Parameter {
             name: "modulation_depth_rad",

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `y = q + amplitude cos(2 pi frequency t + phase)`.
@@ -13,7 +13,7 @@ const ABOUT: About = About {
     id: "spurious-line",
     physics: "mains, a fan or a switching supply couples into the output at a frequency of its own",
     part: Part::Record,
-    domain: Domain::Both,
+    needs: &[Need::OneRun],
     parameters: &[
         Parameter { name: "amplitude", unit: "V", meaning: "amplitude of the line", low: -1e6, high: 1e6 },
         Parameter { name: "frequency_hz", unit: "Hz", meaning: "its frequency", low: 0.0, high: 1e9 },

@@ -2,7 +2,7 @@
 
 use faer::c64;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{DecayingLoad, Effects};
 
 /// `u = -F p exp(-t / tau)` after the release.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "tether-tail",
     physics: "a thread still pulls after the rupture and relaxes exponentially",
     part: Part::Force,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter {
             name: "fraction",

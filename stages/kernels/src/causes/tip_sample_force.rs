@@ -1,6 +1,6 @@
 //! Attraction that returns on the backswing.
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, ModalForce};
 
 /// `u -= F exp(-z / l)`.
@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "tip-sample-force",
     physics: "the tip swings back towards the surface in the first periods and feels its attraction",
     part: Part::Force,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter {
             name: "strength_v",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
 /// `u = -F p` for a while after the first rupture.
@@ -12,7 +12,7 @@ const ABOUT: About = About {
     id: "two-step-rupture",
     physics: "a second, smaller contact or neck holds on and ruptures a little later",
     part: Part::Force,
-    domain: Domain::Release,
+    needs: &[Need::Release],
     parameters: &[
         Parameter {
             name: "fraction",

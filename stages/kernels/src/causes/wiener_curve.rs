@@ -1,7 +1,7 @@
 //! A linear system seen through a curve.
 
 use super::wiener_hammerstein_curve::{CURVE, cubic};
-use super::{About, Cause, Domain, Identifiable, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Part, Scene};
 use crate::effects::Effects;
 
 /// `y = f(G u)`.
@@ -11,7 +11,7 @@ const ABOUT: About = About {
     id: "wiener-curve",
     physics: "the sensor or the amplifier behind the system is bent: a static curve after all dynamics",
     part: Part::Detector,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::OneChannel],
     parameters: CURVE,
     class: &["wiener-curve"],
     resembles: "wiener-hammerstein-curve with a fast part behind the curve; output-cubic: the same beside an oscillator",

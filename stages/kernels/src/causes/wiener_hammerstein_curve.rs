@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{About, Cause, Domain, Identifiable, Parameter, Part, Scene};
+use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, StaticMap};
 
 /// Numbers of a static curve between linear parts.
@@ -31,7 +31,7 @@ const ABOUT: About = About {
     id: "wiener-hammerstein-curve",
     physics: "a static curve between two parts of the dynamics: an amplifier, a diode, a valve between two filters",
     part: Part::Detector,
-    domain: Domain::InputOutput,
+    needs: &[Need::Run, Need::OneChannel],
     parameters: CURVE,
     class: &["wiener-hammerstein-curve"],
     resembles: "wiener-curve and hammerstein-curve, where one of the parts is fast",

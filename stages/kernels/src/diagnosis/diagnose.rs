@@ -16,7 +16,7 @@ use super::story::{Story, story};
 use super::validation::check_part;
 use super::verdict::{Diagnosis, Verdict};
 use crate::Unwatched;
-use crate::causes::{Cause, Domain, Part};
+use crate::causes::{Cause, Need};
 
 /// A diagnosis and the model that it ends with.
 pub struct Diagnosed {
@@ -205,23 +205,24 @@ const ARCHIVE: usize = 4;
 
 /// The causes that these data can show, at every place.
 fn candidates(options: &DiagnosisOptions, bench: &Bench, model: &Model) -> Vec<Candidate> {
-    let several = bench.layout.stretches() > 1;
     let mut numbers: Vec<usize> = options.training.iter().map(|stretch| stretch.record).collect();
     numbers.sort_unstable();
     numbers.dedup();
     let archive = numbers.len() >= ARCHIVE;
+    let modes = model.dynamics.modes();
+    let has = |need: Need| match need {
+        Need::Release => false,
+        Need::Run => true,
+        Need::Mode => modes > 0,
+        Need::TwoModes => modes > 1,
+        Need::Input => bench.driven,
+        Need::Records => archive,
+        Need::OneChannel => bench.layout.channels == 1,
+        Need::OneRun => bench.layout.stretches() == 1,
+    };
     let usable = |cause: &&&'static dyn Cause| {
         let about = cause.about();
-        let (driven, alone) = (bench.driven, bench.layout.channels == 1);
-        about.domain != Domain::Release
-            && (driven || about.part != Part::Input)
-            && (archive || about.part != Part::Archive)
-            && !(options.free_offsets && about.id == "offset")
-            // a sensor's curve belongs to its channel
-            && (alone || about.part != Part::Detector)
-            // what differs from stretch to stretch by chance, and what each has of its own
-            && !(several && (cause.free_in_each_record() > 0 || about.part == Part::Record))
+        about.is_met(has) && !(options.free_offsets && about.id == "offset")
     };
-    let modes = model.dynamics.modes();
     options.candidates.iter().filter(usable).flat_map(|cause| Candidate::places(*cause, modes)).collect()
 }

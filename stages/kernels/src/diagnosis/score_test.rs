@@ -22,7 +22,7 @@ impl Candidate {
     /// Every place of a cause in a model of so many modes.
     pub fn places(cause: &'static dyn Cause, modes: usize) -> Vec<Self> {
         let at = |modes: Vec<usize>| Self { cause, modes };
-        match cause.modes() {
+        match cause.about().modes() {
             0 => vec![at(Vec::new())],
             _ if modes == 0 => Vec::new(),
             1 if modes == 1 => vec![at(Vec::new())],

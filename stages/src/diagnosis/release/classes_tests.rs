@@ -9,7 +9,7 @@ use super::joint::Linear;
 use super::screen::Sensitivities;
 use super::search::scene;
 use super::*;
-use crate::causes::{CATALOGUE, Cause, Domain, Identifiable, Part, find};
+use crate::causes::{CATALOGUE, Cause, Identifiable, Part, find, releases_have};
 use afmid_kernels::effects::Instant;
 use afmid_kernels::ringdown::internals::signal;
 use afmid_kernels::ringdown::{EventParameters, RingdownNoise};
@@ -78,7 +78,7 @@ fn seen() -> Seen {
     scene.residual_peaks_hz = vec![120e3];
     let acts = |cause: &&&'static dyn Cause| {
         let about = cause.about();
-        matches!(about.domain, Domain::Release | Domain::Both) && !matches!(about.part, Part::Record | Part::Input)
+        about.is_met(releases_have) && !matches!(about.part, Part::Record | Part::Input)
     };
     let trials: Vec<(&'static dyn Cause, Vec<f64>)> = CATALOGUE
         .iter()

@@ -7,7 +7,7 @@ use super::residuals::{Tile, common, peaks, residuals, whitened};
 use super::screen::Screen;
 use super::seeking::Seeking;
 use super::state::State;
-use crate::causes::{Cause, Domain, Identifiable, Part, Scene};
+use crate::causes::{Cause, Identifiable, Part, Scene, releases_have};
 use afmid_kernels::diagnosis::verdict::{Gain, RunnerUp, Verdict};
 use afmid_kernels::model::ModelError;
 
@@ -83,7 +83,7 @@ fn candidates(catalogue: &[&'static dyn Cause], without: &[String]) -> Vec<&'sta
 /// Whether a candidate belongs into a screen of events' shapes.
 fn is_candidate(cause: &dyn Cause, without: &[String]) -> bool {
     let about = cause.about();
-    let here = matches!(about.domain, Domain::Release | Domain::Both) && about.identifiable == Identifiable::Shape;
+    let here = about.is_met(releases_have) && about.identifiable == Identifiable::Shape;
     here && !matches!(about.part, Part::Record | Part::Input) && !without.iter().any(|id| id == about.id)
 }
 
