@@ -6,11 +6,9 @@
 //! names it, and `causes`, `exam` and `simulate.model` know it like any built-in one: the program is afmid with one
 //! more cause.
 
-use std::process::ExitCode;
-use std::sync::Arc;
-
-use afmid_kernels::effects::Effects;
+use afmid_kernels::effects::{Effects, Passage};
 use afmid_stages::causes::{About, Cause, Identifiable, Need, Parameter, Part, Scene, add};
+use std::process::ExitCode;
 
 /// The signal has another slope on either side of the spot's centre: `y = v + a |v|`.
 struct UnequalSegments;
@@ -42,7 +40,7 @@ impl Cause for UnequalSegments {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let asymmetry = values[0];
-        effects.optics.push(Arc::new(move |v| v + asymmetry * v.abs()));
+        effects.optics.push(Passage::map(move |v| v + asymmetry * v.abs()));
     }
 
     fn trials(&self, _scene: &Scene) -> Vec<Vec<f64>> {

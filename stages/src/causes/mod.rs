@@ -7,7 +7,7 @@ mod page;
 pub use afmid_kernels::causes::{About, CATALOGUE, Cause, Identifiable, Need, Parameter, Part, Scene, within_limits};
 pub use afmid_kernels::effects::{
     Added, DecayingLoad, Effects, ExtraMode, FrequencyChange, Instant, Intersample, LinearSection, ModalForce, Motion,
-    RemainingLoad, StaticMap,
+    Passage, RemainingLoad, SignalPath, StaticMap,
 };
 pub use catalogue::{CauseError, add, added, catalogue, find};
 pub use needs::{releases_have, runs_have};

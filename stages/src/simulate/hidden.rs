@@ -66,6 +66,13 @@ impl Hidden {
         within_limits(about, &values).map_err(|(name, found, low, high)| {
             StageError::new(format!("`hidden`: `{name}` of `{id}` is {found}, wanted {low} to {high}"))
         })?;
+        let mut effects = Effects::default();
+        cause.add(&values, &mut effects);
+        if effects.have_paths() {
+            let message =
+                format!("`hidden`: `{id}` remembers what came before, which force curves are simulated without");
+            return Err(StageError::new(message).help("hide it in runs of a system of your own"));
+        }
         Ok((cause, values))
     }
 

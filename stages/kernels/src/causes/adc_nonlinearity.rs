@@ -1,9 +1,7 @@
 //! A converter with uneven steps.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, Passage};
 
 /// Error `A sin(2 pi v / period)`.
 pub struct AdcNonlinearity;
@@ -31,7 +29,7 @@ impl Cause for AdcNonlinearity {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (amplitude, period) = (values[0], values[1]);
-        effects.optics.push(Arc::new(move |v| v + amplitude * (std::f64::consts::TAU * v / period).sin()));
+        effects.optics.push(Passage::map(move |v| v + amplitude * (std::f64::consts::TAU * v / period).sin()));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

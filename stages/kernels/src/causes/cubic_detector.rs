@@ -1,9 +1,7 @@
 //! A photodiode that saturates.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, Passage};
 
 /// `v = s + a3 s^3`.
 pub struct CubicDetector;
@@ -34,7 +32,7 @@ impl Cause for CubicDetector {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let a3 = values[0];
-        effects.optics.push(Arc::new(move |s| s + a3 * s * s * s));
+        effects.optics.push(Passage::map(move |s| s + a3 * s * s * s));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

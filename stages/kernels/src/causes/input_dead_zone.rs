@@ -1,9 +1,7 @@
 //! An actuator with play.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, Passage};
 
 /// A share of what lies within the zone is lost: `u - share clamp(u, -width, width)`.
 pub struct InputDeadZone;
@@ -31,7 +29,7 @@ impl Cause for InputDeadZone {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (share, width) = (values[0], values[1].abs());
-        effects.input.push(Arc::new(move |u| u - share * u.clamp(-width, width)));
+        effects.input.push(Passage::map(move |u| u - share * u.clamp(-width, width)));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! An actuator that saturates.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, Passage};
 
 /// A share of what exceeds a level is lost: `u - share (abs(u) - level)+ sgn(u)`.
 pub struct InputSaturation;
@@ -37,7 +35,7 @@ impl Cause for InputSaturation {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (share, level) = (values[0], values[1].abs());
-        effects.input.push(Arc::new(move |u| u - share * (u.abs() - level).max(0.0) * u.signum()));
+        effects.input.push(Passage::map(move |u| u - share * (u.abs() - level).max(0.0) * u.signum()));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! A sensor with two slopes.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, Passage};
 
 /// `y = q + a abs(q)`.
 pub struct OutputAbsolute;
@@ -34,7 +32,7 @@ impl Cause for OutputAbsolute {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let a = values[0];
-        effects.optics.push(Arc::new(move |v| v + a * v.abs()));
+        effects.optics.push(Passage::map(move |v| v + a * v.abs()));
     }
 
     fn trials(&self, _scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! A sensor whose output bends to one side.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, Passage};
 
 /// `y = q + a q^2`.
 pub struct OutputQuadratic;
@@ -34,7 +32,7 @@ impl Cause for OutputQuadratic {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let a = values[0];
-        effects.optics.push(Arc::new(move |v| v + a * v * v));
+        effects.optics.push(Passage::map(move |v| v + a * v * v));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! A sensor that saturates.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, Passage};
 
 /// A share of what exceeds a level is lost: `y = q - share (abs(q) - level)+ sgn(q)`.
 pub struct OutputSaturation;
@@ -37,7 +35,7 @@ impl Cause for OutputSaturation {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (share, level) = (values[0], values[1].abs());
-        effects.optics.push(Arc::new(move |v| v - share * (v.abs() - level).max(0.0) * v.signum()));
+        effects.optics.push(Passage::map(move |v| v - share * (v.abs() - level).max(0.0) * v.signum()));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

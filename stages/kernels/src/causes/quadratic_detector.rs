@@ -1,9 +1,7 @@
 //! A photodiode whose output bends.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, Passage};
 
 /// `v = s + a2 s^2`.
 pub struct QuadraticDetector;
@@ -34,7 +32,7 @@ impl Cause for QuadraticDetector {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let a2 = values[0];
-        effects.optics.push(Arc::new(move |s| s + a2 * s * s));
+        effects.optics.push(Passage::map(move |s| s + a2 * s * s));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -1,9 +1,7 @@
 //! An interferometer whose fringe the signal itself runs through.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::Effects;
+use crate::effects::{Effects, Passage};
 
 /// `v = A (sin(phi + beta x) - sin phi) / (beta cos phi)` of a deflection x between -1 and 1 at its largest.
 pub struct SelfFringe;
@@ -47,7 +45,7 @@ impl Cause for SelfFringe {
         // the slope at rest stays 1: the curve bends, the gain does not change
         let slope = amplitude * phase.cos();
         if depth > 0.0 && slope > 0.0 {
-            effects.optics.push(Arc::new(move |v| amplitude * ((phase + v / slope).sin() - phase.sin())));
+            effects.optics.push(Passage::map(move |v| amplitude * ((phase + v / slope).sin() - phase.sin())));
         }
     }
 

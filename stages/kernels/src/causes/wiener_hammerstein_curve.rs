@@ -1,9 +1,7 @@
 //! A curve between two linear systems.
 
-use std::sync::Arc;
-
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
-use crate::effects::{Effects, StaticMap};
+use crate::effects::{Effects, Passage};
 
 /// Numbers of a static curve between linear parts.
 pub(super) const CURVE: &[Parameter] = &[
@@ -20,8 +18,8 @@ pub(super) const CURVE: &[Parameter] = &[
 ];
 
 /// A cubic that bends that much at size 1.
-pub(super) fn cubic(bend: f64) -> StaticMap {
-    Arc::new(move |x| x - bend * x * x * x)
+pub(super) fn cubic(bend: f64) -> Passage {
+    Passage::map(move |x| x - bend * x * x * x)
 }
 
 /// `y = G2 f(G1 u)`.

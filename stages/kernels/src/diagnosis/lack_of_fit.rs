@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::data::Bench;
 use super::fit::{Blocks, Cholesky, Fit, Moments, dot, paired};
 use super::score_test::{first_channel, peaks};
-use crate::effects::{Effects, Intersample, ModalForce, PowerLaw, Quantity};
+use crate::effects::{Effects, Intersample, ModalForce, Passage, PowerLaw, Quantity, StaticMap};
 
 /// Share of a residual that something systematic makes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -230,9 +230,9 @@ fn couplings(mode: usize, other: usize) -> Vec<Vec<PowerLaw>> {
     forces
 }
 
-fn with_input(effects: &Effects, map: Arc<dyn Fn(f64) -> f64 + Send + Sync>) -> Effects {
+fn with_input(effects: &Effects, map: StaticMap) -> Effects {
     let mut effects = effects.clone();
-    effects.input.push(Arc::new(move |u| u + SMALL * map(u)));
+    effects.input.push(Passage::map(move |u| u + SMALL * map(u)));
     effects
 }
 

@@ -22,6 +22,8 @@ mod diagnose;
 mod dynamics;
 mod error;
 mod fit;
+#[cfg(test)]
+mod hidden_paths;
 mod lack_of_fit;
 mod linear_only;
 mod options;

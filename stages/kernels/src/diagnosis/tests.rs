@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
+use super::hidden_paths::{actuator, detector, through};
 use super::verdict::{Diagnosis, Verdict};
 use super::{DiagnosisOptions, Record, Stretch, diagnose};
 use crate::causes::{Cause, built_in as find};
@@ -52,22 +53,30 @@ fn simulated(seed: u64, hidden: &[(&str, Vec<f64>)], noise: f64) -> (Vec<f64>, V
     let sampled: Vec<f64> = (0..SAMPLES).map(|k| drive.at(k as f64 / RATE_HZ)).collect();
     let held = effects.intersample.unwrap_or_default() == Intersample::Held;
     let acceleration = |q: f64, v: f64, u: f64| {
-        let u = effects.input.iter().fold(u, |u, map| map(u));
         let motion = Motion { position: &[q], velocity: &[v], omega: &omega, gap: q, thermal: 0.0 };
         let mut a = [omega[0] * omega[0] * (0.5 * u - q) - omega[0] / quality * v];
         effects.modal_force.iter().for_each(|force| force.add(&motion, &mut a));
         a[0]
     };
     let h = 1.0 / RATE_HZ / STEPS as f64;
+    let (mut actuator, mut detector) = (actuator(hidden), detector(hidden));
+    // the first value, which takes no time
+    through(&mut actuator, sampled[0], 0.0, 0.0);
     let (mut q, mut v, mut output) = (0.0, 0.0, Vec::with_capacity(SAMPLES));
     for (k, u) in sampled.iter().enumerate() {
         let instant = Instant { record: 0, place: k as f64 / SAMPLES as f64, time_s: k as f64 / RATE_HZ, piezo_m: 0.0 };
         let white: f64 = StandardNormal.sample(&mut rng);
-        output.push(effects.seen(q) + effects.added.iter().map(|added| added(&instant)).sum::<f64>() + noise * white);
+        let seen = through(&mut detector, q, instant.time_s, if k > 0 { h } else { 0.0 });
+        output.push(seen + effects.added.iter().map(|added| added(&instant)).sum::<f64>() + noise * white);
         for i in 0..STEPS {
             let input =
                 |part: f64| if held { *u } else { drive.at((k as f64 + (i as f64 + part) / STEPS as f64) / RATE_HZ) };
-            let (u0, u1, u2) = (input(0.0), input(0.5), input(1.0));
+            let at_s = instant.time_s + i as f64 * h;
+            if i > 0 {
+                through(&mut detector, q, at_s, h);
+            }
+            let [u0, u1, u2] = [(0.0, 0.0), (0.5, 0.5 * h), (1.0, 0.5 * h)]
+                .map(|(part, since_s)| through(&mut actuator, input(part), at_s + part * h, since_s));
             let (a1, v1) = (acceleration(q, v, u0), v);
             let (v2, a2) = (v + 0.5 * h * a1, acceleration(q + 0.5 * h * v1, v + 0.5 * h * a1, u1));
             let (v3, a3) = (v + 0.5 * h * a2, acceleration(q + 0.5 * h * v2, v + 0.5 * h * a2, u1));

@@ -3,10 +3,12 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::{FineInput, Layout, Record, Stretch};
 use crate::diagnosis::dynamics::{Modal, Model, Run, Span, State, motions, outputs};
 use crate::diagnosis::error::DiagnosisError;
-use crate::effects::{Effects, Instant, Intersample};
+use crate::effects::{Effects, Instant, Intersample, Passage, pass};
 
 /// Fewest samples of a stretch: a hundred periods' worth of nothing is not enough, a few of a ringdown are.
 pub(crate) const LEAST_SAMPLES: usize = 24;
@@ -199,7 +201,8 @@ impl Bench {
 
     /// Output of several models under effects, each over the stretches.
     pub(crate) fn simulate_each(&self, models: &[(&Model, &Effects)]) -> Vec<Vec<f64>> {
-        let runs: Vec<Run<'_>> = models.iter().flat_map(|(model, effects)| self.runs(model, effects)).collect();
+        let runs: Vec<Run<'_>> =
+            models.par_iter().flat_map_iter(|(model, effects)| self.runs(model, effects)).collect();
         let mut parts = outputs(&runs).into_iter();
         let lengths = models.iter().map(|(model, _)| model.states.len().min(self.stretches.len()));
         lengths.map(|stretches| parts.by_ref().take(stretches).collect::<Vec<_>>().concat()).collect()
@@ -259,7 +262,7 @@ impl Bench {
         self.output.iter().zip(simulated).map(|(y, s)| if y.is_finite() { y - s } else { 0.0 }).collect()
     }
 
-    /// The input at the integrator's nodes, through the effects' maps; none where there is no input.
+    /// The input at the integrator's nodes, through the effects' passages; none where there is no input.
     fn nodes(&self, stretch: &Stretch, effects: &Effects) -> Option<Cow<'_, [f64]>> {
         let inputs = self.inputs.get(stretch.record)?;
         let input = match effects.intersample.unwrap_or_default() {
@@ -271,8 +274,14 @@ impl Bench {
         if effects.input.is_empty() {
             return (!nodes.is_empty()).then_some(Cow::Borrowed(nodes));
         }
-        let through = |u: &f64| effects.input.iter().fold(*u, |u, map| map(u));
-        Some(Cow::Owned(nodes.iter().map(through).collect()))
+        if effects.input.iter().any(Passage::is_path) {
+            // from the record's beginning, so that all its stretches and parts see the same input
+            let mut whole = input.passed(&effects.input, stretch.end, self.interval_s);
+            return Some(Cow::Owned(whole.split_off(whole.len().saturating_sub(nodes.len()))));
+        }
+        let mut nodes = nodes.to_vec();
+        pass(&effects.input, |_| 0.0, &mut nodes);
+        Some(Cow::Owned(nodes))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::effects::{Intersample, StaticMap};
+use crate::effects::{Intersample, Passage, pass};
 use crate::signal::bessel_i0;
 
 /// Samples on either side that the band-limited signal is built from: what lies further away weighs less than 1e-4 up
@@ -53,10 +53,17 @@ impl FineInput {
         self.nodes.get(first * width..end.saturating_sub(1) * width).unwrap_or(&[])
     }
 
-    /// The same through maps, in their order.
-    pub fn mapped(&self, maps: &[StaticMap]) -> Self {
-        let through = |u: &f64| maps.iter().fold(*u, |u, map| map(u));
-        Self { nodes: self.nodes.iter().map(through).collect(), steps: self.steps }
+    /// The nodes of the intervals that begin before sample `end - 1`, through passages: all that a path remembers at
+    /// any of them.
+    pub fn passed(&self, passages: &[Passage], end: usize, interval_s: f64) -> Vec<f64> {
+        let mut nodes = self.part(0, end).to_vec();
+        let width = 2 * self.steps + 1;
+        let time_s = |node: usize| {
+            let place = (node % width) as f64 / (width - 1) as f64;
+            ((node / width) as f64 + place) * interval_s
+        };
+        pass(passages, time_s, &mut nodes);
+        nodes
     }
 }
 

@@ -28,6 +28,11 @@ pub struct Span {
 }
 
 impl Span {
+    /// Time of sample k since the record's first, s.
+    pub(super) fn time_s(&self, k: usize) -> f64 {
+        self.begin_s + k as f64 * self.interval_s
+    }
+
     /// What the instrument adds at sample k.
     pub(super) fn added(&self, k: usize, effects: &Effects) -> f64 {
         if effects.added.is_empty() {
@@ -36,7 +41,7 @@ impl Span {
         let instant = Instant {
             record: self.record,
             place: k as f64 * self.interval_s / self.reference_s.max(f64::MIN_POSITIVE),
-            time_s: self.begin_s + k as f64 * self.interval_s,
+            time_s: self.time_s(k),
             piezo_m: 0.0,
         };
         effects.added.iter().map(|added| added(&instant)).sum()

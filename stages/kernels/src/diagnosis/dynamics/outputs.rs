@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::lane::Lane;
 use super::motion::{Run, Sink, groups, integrate};
+use crate::effects::pass;
 
 /// Output of each run, channel by channel.
 pub(crate) fn outputs(runs: &[Run<'_>]) -> Vec<Vec<f64>> {
@@ -86,13 +87,16 @@ impl Seen {
                 output.extend(sums.iter().take(span.samples).map(|sum| sum.0[l] + offset));
                 continue;
             }
+            let begin = output.len();
             for (k, sum) in sums.iter().enumerate().take(span.samples) {
                 let direct = dynamics.through.zip(nodes.as_deref()).map_or(0.0, |(through, nodes)| {
                     // the last sample is the end of the last interval
                     through * nodes.get(k * width).or(nodes.last()).copied().unwrap_or(0.0)
                 });
-                output.push(effects.seen(sum.0[l] + direct) + offset + span.added(k, effects));
+                output.push(sum.0[l] + direct);
             }
+            pass(&effects.optics, |k| span.time_s(k), &mut output[begin..]);
+            output[begin..].iter_mut().enumerate().for_each(|(k, y)| *y += offset + span.added(k, effects));
         }
         output
     }

@@ -156,7 +156,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::causes::find;
+    use crate::causes::{Passage, find};
     use crate::diagnosis::release::LeverMode;
     use afmid_kernels::effects::LinearSection;
     use afmid_kernels::ringdown::internals::signal;
@@ -207,7 +207,7 @@ mod tests {
         freed.electronics.push(LinearSection { pole: 3e4, low: 0.01, high: 1.0 });
         // a map that changes nothing keeps all in steps
         let mut stepped = freed.clone();
-        stepped.optics.push(Arc::new(|v| v));
+        stepped.optics.push(Passage::map(|v| v));
         for pace in [Pace::FINE, Pace::COARSE] {
             let (fast, slow) = (run(&lever, &freed, &release, pace), run(&lever, &stepped, &release, pace));
             // rounding of three thousand steps
@@ -242,7 +242,7 @@ mod tests {
             let inside = move |t: f64| t >= from * sample && t < to * sample;
             pushed.remaining_load.push(Arc::new(move |t| if inside(t) { 0.1 } else { 0.0 }));
             let mut stepped = pushed.clone();
-            stepped.optics.push(Arc::new(|v| v));
+            stepped.optics.push(Passage::map(|v| v));
             let (fast, slow) =
                 (run(&lever, &pushed, &release, Pace::FINE), run(&lever, &stepped, &release, Pace::FINE));
             let plain = run(&lever, &Effects::default(), &release, Pace::FINE);

@@ -1,9 +1,13 @@
 //! What causes change, as parts that add up in one simulation.
 
+mod passage;
+
 use std::fmt;
 use std::sync::Arc;
 
 use faer::c64;
+
+pub use passage::{Passage, SignalPath, StaticMap, pass};
 
 /// Motion of the lever at one instant, in volts of static deflection (deflection times sensitivity).
 #[derive(Debug, Clone, Copy)]
@@ -39,8 +43,6 @@ pub struct Instant {
 pub type RemainingLoad = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
 /// Any force: adds to the acceleration of each mode, V/s^2.
 pub type ForceLaw = Arc<dyn Fn(&Motion<'_>, &mut [f64]) + Send + Sync>;
-/// A static map, volts to volts: of the optics before the electronics, or of an input.
-pub type StaticMap = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
 /// Relative change of every mode's frequency at a place in the archive.
 pub type FrequencyChange = Arc<dyn Fn(&Instant) -> f64 + Send + Sync>;
 /// Volts added behind the electronics.
@@ -227,7 +229,7 @@ pub enum Intersample {
 
 /// Everything that causes add to a simulation; empty: nothing is wrong.
 ///
-/// Parts of one kind add up (forces, loads, volts) or follow one another in order (maps, sections), so that causes
+/// Parts of one kind add up (forces, loads, volts) or follow one another in order (passages, sections), so that causes
 /// compose.
 #[derive(Clone, Default)]
 pub struct Effects {
@@ -239,8 +241,9 @@ pub struct Effects {
     pub modal_force: Vec<ModalForce>,
     /// Further modes.
     pub extra_modes: Vec<ExtraMode>,
-    /// Maps of the deflection signal, before the electronics.
-    pub optics: Vec<StaticMap>,
+    /// What the deflection signal passes through in order, volts to volts, before the electronics. Paths act on the
+    /// samples of a stretch and begin at its first.
+    pub optics: Vec<Passage>,
     /// Sections of the electronics beside the detector's own.
     pub electronics: Vec<LinearSection>,
     /// Signal per load (both in V of static deflection) that bypasses the lever.
@@ -259,8 +262,8 @@ pub struct Effects {
     pub intensity: f64,
     /// Samples that were never stored: when since the record's start (s), how many.
     pub lost: Vec<(f64, usize)>,
-    /// Maps of a measured input.
-    pub input: Vec<StaticMap>,
+    /// What a measured input passes through in order. Paths act on its whole record, between samples too.
+    pub input: Vec<Passage>,
     /// How a measured input runs between samples; none: as the baseline has it.
     pub intersample: Option<Intersample>,
 }
@@ -308,9 +311,19 @@ impl Effects {
         self.remaining_load.iter().map(|load| load(t)).chain(decaying).sum()
     }
 
-    /// The deflection signal as the optics show it.
+    /// Whether what is seen, or what acts, depends on more than the value of that instant: releases are simulated
+    /// without such paths.
+    pub fn have_paths(&self) -> bool {
+        self.optics.iter().chain(&self.input).any(Passage::is_path)
+    }
+
+    /// The deflection signal as the maps of the optics show it; see [`pass`] for paths.
     pub fn seen(&self, volts: f64) -> f64 {
-        self.optics.iter().fold(volts, |v, map| map(v))
+        let through = |v: f64, passage: &Passage| match passage {
+            Passage::Map(map) => map(v),
+            Passage::Path(_) => v,
+        };
+        self.optics.iter().fold(volts, through)
     }
 }
 
@@ -321,7 +334,7 @@ impl fmt::Debug for Effects {
             .field("decaying_load", &self.decaying_load)
             .field("modal_force", &self.modal_force.len())
             .field("extra_modes", &self.extra_modes)
-            .field("optics", &self.optics.len())
+            .field("optics", &self.optics)
             .field("electronics", &self.electronics)
             .field("feedthrough", &self.feedthrough)
             .field("frequency", &self.frequency.len())
@@ -331,7 +344,7 @@ impl fmt::Debug for Effects {
             .field("delay_s", &self.delay_s)
             .field("intensity", &self.intensity)
             .field("lost", &self.lost)
-            .field("input", &self.input.len())
+            .field("input", &self.input)
             .field("intersample", &self.intersample)
             .finish()
     }
