@@ -98,6 +98,7 @@ fn usual() -> Scene {
         quality_factor: vec![40.8, 193.2, 358.0, 503.8],
         interval_s: 2e-7,
         window_s: 1.4e-3,
+        begin_s: 0.0,
         level_v: 0.87,
         input_level: 0.5,
         noise_v: 3.5e-4,

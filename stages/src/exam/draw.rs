@@ -265,6 +265,7 @@ fn scene(afm: &Afm, rng: &mut ChaCha8Rng) -> Scene {
         quality_factor: afm.quality_factors.clone(),
         interval_s: 1.0 / afm.sample_rate_hz,
         window_s: 8000.0 / afm.sample_rate_hz,
+        begin_s: 0.0,
         level_v: afm.adhesion_n / afm.stiffness_n_per_m * afm.sensitivity_v_per_m,
         input_level: 0.0,
         noise_v: afm.white_v / (afm.records as f64).sqrt(),

@@ -120,6 +120,8 @@ pub struct Scene {
     pub interval_s: f64,
     /// Length of an event's window, s.
     pub window_s: f64,
+    /// Time of its first sample since the record's first, s; 0 where there are several windows.
+    pub begin_s: f64,
     /// Mean static deflection before the release, V, absolute value.
     pub level_v: f64,
     /// Largest input of a general system, in the input's unit, absolute value; 0 where there is none.
@@ -166,8 +168,8 @@ pub trait Cause: Sync {
         0.0
     }
 
-    /// The parameter that says between which events the effect sets in: it has no slope, its trials are all there is,
-    /// and its error is the distance of those events.
+    /// The parameter that says when the effect sets in: between which events of an archive, whose trials are all there
+    /// is, or when in a record, where the best trial is refined. It has no slope.
     fn sets_in(&self) -> Option<usize> {
         None
     }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::data::{Bench, Part, PartStart, Record};
 use super::dynamics::Kind;
 use super::fit::{Blocks, FOLDS};
+use super::instants::instant_std;
 use super::lack_of_fit::Misfit;
 use super::options::DiagnosisOptions;
 use super::selection::{Choice, Chosen, Judged};
@@ -156,7 +157,11 @@ impl Findings<'_> {
         let places = last.fit.model.places(which);
         let one = |(i, parameter): (usize, &crate::causes::Parameter)| {
             let factor = self.factor(parameter.unit);
-            let std = (i < places.len()).then(|| covariance[places.start + i][places.start + i].sqrt() * factor);
+            let free = places.clone().zip(added.free()).find(|(_, own)| *own == i).map(|(place, _)| place);
+            let std = match free {
+                Some(place) => Some(covariance[place][place].sqrt() * factor),
+                None => instant_std(self.bench, &last.fit, which, i),
+            };
             let value = Value {
                 value: added.values.get(i).and_then(|value| finite(value * factor)),
                 std: std.and_then(finite),
@@ -175,6 +180,7 @@ impl Findings<'_> {
             "1/V" => 1.0 / y,
             "1/V^2" => y.powi(-2),
             "1/V^4" => y.powi(-4),
+            "s/V" => 1.0 / y,
             "input" => self.bench.input_scale,
             _ => 1.0,
         }

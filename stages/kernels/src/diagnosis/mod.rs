@@ -24,6 +24,7 @@ mod error;
 mod fit;
 #[cfg(test)]
 mod hidden_paths;
+mod instants;
 mod lack_of_fit;
 mod linear_only;
 mod options;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::data::Bench;
 use super::dynamics::{Model, is_choice};
 use super::fit::{Blocks, Cholesky, Fit, dot};
+use super::instants::refine;
 use super::lack_of_fit::Floor;
 use crate::causes::{Cause, Part, Scene};
 use crate::statistics::f_tail;
@@ -116,14 +117,15 @@ pub(super) fn screen(bench: &Bench, fit: &Fit, candidates: &[Candidate]) -> Vec<
         .collect();
     let with =
         |(candidate, trial): &(&Candidate, Vec<f64>)| fit.model.with(candidate.cause, &candidate.modes, trial.clone());
-    let changed = bench.simulate_all(&trials.iter().map(with).collect::<Vec<_>>());
-    let promises: Vec<Option<Promise>> = trials
-        .into_par_iter()
-        .zip(changed)
-        .map(|((candidate, trial), changed)| promise(bench, fit, &basis, candidate, trial, &changed))
-        .collect();
+    let judge = |trials: Vec<(&Candidate, Vec<f64>)>| -> Vec<Promise> {
+        let changed = bench.simulate_all(&trials.iter().map(with).collect::<Vec<_>>());
+        let promises = trials.into_par_iter().zip(changed);
+        let promises =
+            promises.map(|((candidate, trial), changed)| promise(bench, fit, &basis, candidate, trial, &changed));
+        promises.collect::<Vec<_>>().into_iter().flatten().collect()
+    };
     let mut best: Vec<Promise> = Vec::new();
-    for next in promises.into_iter().flatten() {
+    for next in judge(trials) {
         let same = |other: &&mut Promise| {
             other.candidate.id() == next.candidate.id() && other.candidate.modes == next.candidate.modes
         };
@@ -133,9 +135,19 @@ pub(super) fn screen(bench: &Bench, fit: &Fit, candidates: &[Candidate]) -> Vec<
             None => best.push(next),
         }
     }
-    best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let falling = |best: &mut Vec<Promise>| best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    falling(&mut best);
+    for promise in best.iter_mut().take(REFINED) {
+        refine(promise, &scene, |candidate, trials| {
+            judge(trials.into_iter().map(|trial| (candidate, trial)).collect())
+        });
+    }
+    falling(&mut best);
     best
 }
+
+/// Promises that are worth a search for when their causes set in: as many as are fitted.
+const REFINED: usize = 5;
 
 /// The frequency among a cause's values.
 fn frequency(cause: &dyn Cause, values: &[f64]) -> Option<f64> {
@@ -205,6 +217,7 @@ fn scene(bench: &Bench, fit: &Fit) -> Scene {
         quality_factor: modes().map(|mode| 1.0 / mode.loss).collect(),
         interval_s: bench.interval_s,
         window_s: bench.reference_s(),
+        begin_s: if let [stretch] = &bench.stretches[..] { stretch.first as f64 * bench.interval_s } else { 0.0 },
         level_v: 1.0,
         input_level: if bench.driven { 1.0 } else { 0.0 },
         noise_v: fit.rms(bench),

@@ -129,8 +129,8 @@ fn standing(
     error: impl Fn(&Chords) -> Option<f64>,
 ) -> Standing {
     let added = &last.model.causes[which];
-    let ratio = |(place, value): (usize, &f64)| value.abs() / covariance[place][place].sqrt();
-    let strength = last.model.places(which).zip(&added.values).map(ratio).fold(0.0, f64::max);
+    let ratio = |(place, value): (usize, f64)| value.abs() / covariance[place][place].sqrt();
+    let strength = last.model.places(which).zip(added.free_values()).map(ratio).fold(0.0, f64::max);
     let reached = reached.filter(|reached| reached.loss < PLAIN * last.loss);
     let without = reached.and_then(|reached| Some((error(&reached)?, reached.model)));
     Standing { strength: (!added.is_choice()).then_some(strength), without }

@@ -102,6 +102,7 @@ pub fn scene(problem: &Problem<'_>, fitted: &JointFit, common: &[f64]) -> Scene 
         quality_factor: modes.iter().map(|m| m.quality_factor).collect(),
         interval_s,
         window_s: problem.cut.samples as f64 * interval_s,
+        begin_s: 0.0,
         level_v: events.iter().map(|e| e.amplitude.abs()).sum::<f64>() / count,
         input_level: 0.0,
         noise_v: (problem.noise.white / count).sqrt(),

@@ -25,6 +25,18 @@ impl Added {
         is_choice(self.cause)
     }
 
+    /// Places of its values that are numbers to fit: all but choices and when it sets in, which have no slope.
+    pub(crate) fn free(&self) -> impl Iterator<Item = usize> + use<> {
+        let held = self.cause.sets_in();
+        let count = if self.is_choice() { 0 } else { self.values.len() };
+        (0..count).filter(move |i| Some(*i) != held)
+    }
+
+    /// Its values that are numbers to fit.
+    pub(crate) fn free_values(&self) -> impl Iterator<Item = f64> {
+        self.free().filter_map(|i| self.values.get(i).copied())
+    }
+
     /// Whether it is the same cause at the same place.
     pub(crate) fn is(&self, cause: &dyn Cause, modes: &[usize]) -> bool {
         self.id() == cause.about().id && self.modes == modes

@@ -37,7 +37,7 @@ impl Model {
     /// Numbers that all stretches share: the dynamics', those of the causes behind.
     pub fn vector(&self) -> Vec<f64> {
         let mut vector = self.dynamics.vector();
-        vector.extend(self.causes.iter().filter(|added| !added.is_choice()).flat_map(|added| added.values.clone()));
+        vector.extend(self.causes.iter().flat_map(Added::free_values));
         vector
     }
 
@@ -45,9 +45,12 @@ impl Model {
     pub fn at(&self, vector: &[f64]) -> Self {
         let mut next = vector.iter().copied();
         let mut model = Self { dynamics: self.dynamics.at(&mut next), ..self.clone() };
-        for added in model.causes.iter_mut().filter(|added| !added.is_choice()) {
-            for (value, parameter) in added.values.iter_mut().zip(added.cause.about().parameters) {
-                *value = next.next().unwrap_or(*value).clamp(parameter.low, parameter.high);
+        for added in &mut model.causes {
+            let parameters = added.cause.about().parameters;
+            for i in added.free() {
+                if let (Some(value), Some(parameter)) = (added.values.get_mut(i), parameters.get(i)) {
+                    *value = next.next().unwrap_or(*value).clamp(parameter.low, parameter.high);
+                }
             }
         }
         model
@@ -78,17 +81,17 @@ impl Model {
         model
     }
 
-    /// Places of a cause's parameters in the vector; empty for a choice.
+    /// Places of a cause's numbers to fit in the vector; empty for a choice.
     pub fn places(&self, cause: usize) -> std::ops::Range<usize> {
-        let count = |added: &Added| if added.is_choice() { 0 } else { added.values.len() };
+        let count = |added: &Added| added.free().count();
         let first = self.dynamics.vector().len() + self.causes.iter().take(cause).map(count).sum::<usize>();
         first..first + self.causes.get(cause).map_or(0, count)
     }
 
-    /// Parameters that describe the system: without its states, with its causes' choices.
+    /// Parameters that describe the system: without its states, with its causes' choices and when they set in.
     pub fn system_parameters(&self) -> usize {
-        let choices = self.causes.iter().filter(|added| added.is_choice()).count();
-        self.vector().len() + choices
+        let held = self.causes.iter().map(|added| added.values.len() - added.free().count()).sum::<usize>();
+        self.vector().len() + held
     }
 
     /// The model with one more cause.

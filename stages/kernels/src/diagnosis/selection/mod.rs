@@ -3,6 +3,7 @@
 use super::data::Bench;
 use super::dynamics::Model;
 use super::fit::{Blocks, Chords, Fit, Until, dot};
+use super::instants::instant;
 use super::lack_of_fit::{Floor, misfit};
 use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, Promise, Sample, screen, significance};
@@ -185,7 +186,7 @@ impl Search<'_> {
             return None;
         }
         let gain = |model: Model, loss: f64| {
-            let parameters = model.vector().len().saturating_sub(current.fit.model.vector().len()).max(1);
+            let parameters = model.system_parameters() - current.fit.model.system_parameters();
             let samples = self.bench.count as f64;
             let gain = 0.5 * samples * (current.fit.loss / loss).ln();
             (gain - 0.5 * parameters as f64 * samples.ln(), model)
@@ -281,10 +282,17 @@ impl Search<'_> {
         p_value < self.options.false_alarm_rate && share > self.options.least_gain && with.unseen() < without.unseen()
     }
 
-    /// Bonferroni over all candidates' trials; a frequency is searched among as many as the record resolves.
+    /// Bonferroni over all candidates' trials; a frequency is searched among as many as the record resolves, the time of
+    /// a change among all samples.
     fn corrected(&self, p_value: f64, cause: &dyn Cause) -> f64 {
-        let searched = cause.about().parameters.iter().any(|parameter| parameter.unit == "Hz");
-        let tries = self.trials * if searched { self.bench.layout.samples(0) / 2 } else { 1 };
+        let frequency = cause.about().parameters.iter().any(|parameter| parameter.unit == "Hz");
+        let samples = self.bench.layout.samples(0);
+        let searched = match (frequency, instant(cause)) {
+            (true, _) => samples / 2,
+            (false, Some(_)) => samples,
+            (false, None) => 1,
+        };
+        let tries = self.trials * searched;
         (p_value * tries as f64).min(1.0)
     }
 
