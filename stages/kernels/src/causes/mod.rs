@@ -11,19 +11,23 @@ mod ac_coupling;
 mod adc_nonlinearity;
 mod alignment_jitter;
 mod asymmetric_friction;
+mod backlash;
 mod baseline_drift;
 mod clipping;
 mod clock_error;
 mod constant_delay;
 mod coulomb_friction;
+mod creep;
 mod cubic_coupling;
 mod cubic_detector;
+mod dead_band;
 mod duffing;
 mod extra_mode;
 mod extra_pole;
 mod feedthrough;
 mod finite_rupture;
 mod frequency_drift;
+mod gain_step;
 mod hammerstein_curve;
 mod input_dead_zone;
 mod input_saturation;
@@ -50,6 +54,7 @@ mod quadratic_detector;
 mod quadratic_stiffness;
 mod quintic_stiffness;
 mod self_fringe;
+mod slew_rate;
 mod spurious_line;
 mod tether_tail;
 mod tip_sample_force;
@@ -66,19 +71,23 @@ pub const CATALOGUE: &[&dyn Cause] = &[
     &adc_nonlinearity::AdcNonlinearity,
     &alignment_jitter::AlignmentJitter,
     &asymmetric_friction::AsymmetricFriction,
+    &backlash::Backlash,
     &baseline_drift::BaselineDrift,
     &clipping::Clipping,
     &clock_error::ClockError,
     &constant_delay::ConstantDelay,
     &coulomb_friction::CoulombFriction,
+    &creep::Creep,
     &cubic_coupling::CubicCoupling,
     &cubic_detector::CubicDetector,
+    &dead_band::DeadBand,
     &duffing::Duffing,
     &extra_mode::ExtraModeCause,
     &extra_pole::ExtraPole,
     &feedthrough::Feedthrough,
     &finite_rupture::FiniteRupture,
     &frequency_drift::FrequencyDrift,
+    &gain_step::GainStep,
     &hammerstein_curve::HammersteinCurve,
     &input_dead_zone::InputDeadZone,
     &input_saturation::InputSaturation,
@@ -105,6 +114,7 @@ pub const CATALOGUE: &[&dyn Cause] = &[
     &quadratic_stiffness::QuadraticStiffness,
     &quintic_stiffness::QuinticStiffness,
     &self_fringe::SelfFringe,
+    &slew_rate::SlewRate,
     &spurious_line::SpuriousLine,
     &tether_tail::TetherTail,
     &tip_sample_force::TipSampleForce,

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::data::Bench;
 use super::fit::{Blocks, Cholesky, Fit, Moments, dot, paired};
+use super::limited_rates::limited;
 use super::score_test::{first_channel, peaks};
 use crate::effects::{Effects, Intersample, ModalForce, Passage, PowerLaw, Quantity, StaticMap};
 
@@ -59,9 +60,9 @@ pub(super) const RIDGE: f64 = 1e-6;
 /// # Method
 /// Regression, by folds of blocks, on what any smooth force or sensor would do to first order: all monomials up to
 /// degree five of deflection and rate, their absolute values and signs, once as forces through the oscillator and once
-/// directly; powers of the input; another course of the input between samples; slow polynomials in time and the
-/// residual's largest lines. Noise that does not depend on the motion cannot be predicted, so that no noise model is
-/// needed.
+/// directly; limited rates of what is seen; powers of the input; another course of the input between samples; slow
+/// polynomials in time and the residual's largest lines. Noise that does not depend on the motion cannot be predicted, so
+/// that no noise model is needed.
 /// # Source
 /// T. Hastie, R. Tibshirani, J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, section 7.10.
 pub(super) fn misfit(bench: &Bench, fit: &Fit, blocks: &Blocks) -> Misfit {
@@ -191,6 +192,7 @@ fn library(bench: &Bench, fit: &Fit) -> Vec<Vec<f64>> {
             changed.push(Effects { intersample: Some(kind), ..effects.clone() });
         }
     }
+    changed.extend(limited(bench, fit, &effects, SMALL));
     let moved = bench.simulate_each(&changed.iter().map(|effects| (model, effects)).collect::<Vec<_>>());
     let change = |moved: &Vec<f64>| fill(moved.iter().zip(&fit.simulated).map(|(a, b)| (a - b) / SMALL).collect());
     let through: Vec<Vec<f64>> = moved.par_iter().map(change).collect();

@@ -26,6 +26,7 @@ mod fit;
 mod hidden_paths;
 mod instants;
 mod lack_of_fit;
+mod limited_rates;
 mod linear_only;
 mod options;
 mod score_test;

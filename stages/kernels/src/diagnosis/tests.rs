@@ -88,8 +88,8 @@ fn simulated(seed: u64, hidden: &[(&str, Vec<f64>)], noise: f64) -> (Vec<f64>, V
     (sampled, output)
 }
 
-/// Values of a cause that change the output by some per cent; the oscillator swings over 2 to 4 V.
-fn drawn(id: &str, rng: &mut ChaCha8Rng) -> Vec<f64> {
+/// Values of a cause that change the output of oscillator `seed` by some per cent; it swings over 2 to 4 V.
+fn drawn(id: &str, seed: u64, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let size: f64 = 10f64.powf(rng.random_range(0.0..0.7));
     let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
     match id {
@@ -108,12 +108,21 @@ fn drawn(id: &str, rng: &mut ChaCha8Rng) -> Vec<f64> {
         "intersample" => vec![2.0],
         "offset" => vec![0.01 * size * sign],
         "baseline-drift" => vec![0.01 * size * sign, 0.004 * size, 0.0],
+        "dead-band" => vec![0.05 * size, rng.random_range(0.2..0.6)],
+        "gain-step" => vec![6e-3 * size * sign, rng.random_range(0.6..3.5)],
+        "slew-rate" => {
+            let (_, output) = simulated(seed, &[], 0.0);
+            let fastest = output.windows(2).fold(0.0, |most: f64, pair| most.max((pair[1] - pair[0]).abs() * RATE_HZ));
+            vec![1.0 / (fastest * (0.85 - 0.07 * size))]
+        }
+        "backlash" => vec![0.01 * size],
+        "creep" => vec![0.01 * size, 10f64.powf(rng.random_range(-2.5..-1.0))],
         "spurious-line" => vec![5e-3 * size, rng.random_range(100.0..400.0), 0.7],
         other => panic!("no strength for {other}"),
     }
 }
 
-const IDS: [&str; 16] = [
+const IDS: [&str; 21] = [
     "duffing",
     "quadratic-stiffness",
     "quintic-stiffness",
@@ -130,6 +139,11 @@ const IDS: [&str; 16] = [
     "offset",
     "baseline-drift",
     "spurious-line",
+    "dead-band",
+    "gain-step",
+    "slew-rate",
+    "backlash",
+    "creep",
 ];
 /// Noise of the output, V.
 const NOISE: f64 = 5e-3;
@@ -162,7 +176,7 @@ fn one_hidden_cause_is_named_with_its_parameters() {
         .par_iter()
         .map(|(seed, id)| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed + 77);
-            let values = drawn(id, &mut rng);
+            let values = drawn(id, *seed, &mut rng);
             let diagnosis = diagnosed(*seed, &[(id, values.clone())], &[]);
             let right = diagnosis.verdict == Verdict::Named && names(&diagnosis) == [*id];
             let about = find(id).expect("a cause").about();
@@ -209,7 +223,7 @@ fn two_hidden_causes_are_both_named() {
             let mut rng = ChaCha8Rng::seed_from_u64(seed + 4242);
             let first = rng.random_range(0..IDS.len());
             let second = (first + rng.random_range(1..IDS.len())) % IDS.len();
-            let hidden = [first, second].map(|i| (IDS[i], drawn(IDS[i], &mut rng)));
+            let hidden = [first, second].map(|i| (IDS[i], drawn(IDS[i], seed + 5000, &mut rng)));
             let diagnosis = diagnosed(seed + 5000, &hidden, &[]);
             let mut found = names(&diagnosis);
             let mut truth = hidden.clone().map(|(id, _)| id.to_owned()).to_vec();
