@@ -91,6 +91,7 @@ fn need_in_words(need: Need) -> &'static str {
         Need::Records => "several records",
         Need::OneChannel => "one channel",
         Need::OneRun => "one run at a time",
+        Need::ShortRun => "no more than 24,576 samples",
     }
 }
 

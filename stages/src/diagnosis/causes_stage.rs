@@ -12,7 +12,9 @@ use super::{closed_loop, several_inputs, steady};
 use crate::artifacts::{DataSet, Decays, Pair};
 use crate::causes::{Cause, catalogue, runs_have};
 use afmid_kernels::diagnosis::verdict::Diagnosis;
-use afmid_kernels::diagnosis::{Diagnosed, DiagnosisOptions, Part, PartStart, Record, Story, Stretch, diagnose};
+use afmid_kernels::diagnosis::{
+    Diagnosed, DiagnosisOptions, Part, PartStart, Record, Sensed, Story, Stretch, diagnose,
+};
 use afmid_kernels::signal::decimate;
 
 /// Says what a linear model gets wrong in a measured input and output, in free decays, in an axis under a controller,
@@ -60,6 +62,12 @@ pub struct CausesDiagnose {
     /// lowered. Why: five modes are followed at most, and the causes of one are its own. 0: all.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub highest_hz: f64,
+    /// What the output senses of the motion. None: what its unit says, accelerations (m/s^2, g) and rates (m/s, mm/s);
+    /// else a deflection. Why: the force of a cause is in an acceleration at once.
+    pub senses: Option<Sensed>,
+    /// Whether the answer always says how far a linear model of one input goes: its order, chosen by the data, and its
+    /// FIT on what was held out. Where nothing else accounts for the data, and under several inputs, it does so anyway.
+    pub linear_fit: bool,
     /// Rate of false alarms over all candidates together.
     #[schemars(range(min = 1e-6, max = 0.2))]
     pub false_alarm_rate: f64,
@@ -111,6 +119,8 @@ impl Default for CausesDiagnose {
             parts: Vec::new(),
             judged_hits: Vec::new(),
             highest_hz: 0.0,
+            senses: None,
+            linear_fit: false,
             false_alarm_rate: options.false_alarm_rate,
             least_gain: options.least_gain,
             tolerated_misfit: options.tolerated_misfit,
@@ -142,7 +152,7 @@ const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over
 impl Stage for CausesDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.causes",
-        version: 3,
+        version: 4,
         summary: "names what a linear model gets wrong in inputs and outputs, decays, servo axes, steady oscillations",
         inputs: &[PAIR.spec(), DECAYS.spec(), RECORDS.spec()],
         outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec()],
@@ -292,6 +302,10 @@ struct Measured<'a> {
     interval_s: f64,
     /// Whether each stretch has an offset of its own.
     free_offsets: bool,
+    /// By channel.
+    sensed: Vec<Sensed>,
+    /// Whether all channels have one unit.
+    one_unit: bool,
     output_unit: String,
     input_unit: String,
 }
@@ -316,6 +330,8 @@ impl CausesDiagnose {
             parts: self.parts.iter().map(part).collect(),
             interval_s: 1.0 / rate,
             free_offsets: false,
+            sensed: vec![self.sensed(&output_unit)],
+            one_unit: true,
             output_unit,
             input_unit,
         })
@@ -345,9 +361,16 @@ impl CausesDiagnose {
             records,
             interval_s: 1.0 / lowered.map_or(decays.sample_rate_hz, |lowered| lowered.rate_hz),
             free_offsets: true,
+            sensed: decays.sensors.iter().map(|sensor| self.sensed(&sensor.unit)).collect(),
+            one_unit: decays.sensors.windows(2).all(|pair| pair[0].unit == pair[1].unit),
             output_unit: decays.sensors.first().map_or(String::new(), |sensor| sensor.unit.clone()),
             input_unit: String::new(),
         })
+    }
+
+    /// What a channel of that unit senses.
+    fn sensed(&self, unit: &str) -> Sensed {
+        self.senses.unwrap_or_else(|| Sensed::of_unit(unit))
     }
 
     /// Whether a cause may be named.
@@ -380,6 +403,9 @@ impl CausesDiagnose {
             least_gain: self.least_gain,
             tolerated_misfit: self.tolerated_misfit,
             free_offsets: measured.free_offsets,
+            sensed: measured.sensed.clone(),
+            one_unit: measured.one_unit,
+            linear_fit: self.linear_fit,
             most_causes: self.most_causes,
             candidates: catalogue().into_iter().filter(usable).collect(),
             output_unit: measured.output_unit.clone(),

@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "backlash",
     physics: "gears, screws or joints have play: after each reversal of the input nothing acts on until the play is crossed",
     part: Part::Input,
-    needs: &[Need::Input],
+    needs: &[Need::Input, Need::ShortRun],
     parameters: &[Parameter { name: "width", unit: "input", meaning: "half width of the play", low: 0.0, high: 1e6 }],
     class: &["backlash"],
     resembles: "input-dead-zone: loses small inputs around zero, not after each reversal; coulomb-friction: resists the \

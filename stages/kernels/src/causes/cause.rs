@@ -38,6 +38,8 @@ pub enum Need {
     OneChannel,
     /// One run: it differs from run to run.
     OneRun,
+    /// No long records: what remembers is followed value by value from a record's beginning.
+    ShortRun,
 }
 
 /// One number of a cause.

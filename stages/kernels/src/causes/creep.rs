@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "creep",
     physics: "domains of a piezo actuator turn late: after a step of its drive it goes on as the logarithm of time",
     part: Part::Input,
-    needs: &[Need::Input],
+    needs: &[Need::Input, Need::ShortRun],
     parameters: &[
         Parameter {
             name: "share",

@@ -10,7 +10,7 @@ const ABOUT: About = About {
     id: "gain-step",
     physics: "a contact, a range switch or the light changes within the record: the gain of detector or amplifier jumps",
     part: Part::Detector,
-    needs: &[Need::Run, Need::OneChannel, Need::OneRun],
+    needs: &[Need::Run, Need::OneChannel, Need::OneRun, Need::ShortRun],
     parameters: &[
         Parameter { name: "change", unit: "1", meaning: "relative change of the gain", low: -0.9, high: 10.0 },
         Parameter {

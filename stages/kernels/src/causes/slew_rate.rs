@@ -11,7 +11,7 @@ const ABOUT: About = About {
     physics: "a stage of the amplifier charges a capacitor with a limited current: it follows no faster than so many volts \
               per second",
     part: Part::Detector,
-    needs: &[Need::Run, Need::OneChannel],
+    needs: &[Need::Run, Need::OneChannel, Need::ShortRun],
     parameters: &[Parameter {
         name: "inverse_rate",
         unit: "s/V",

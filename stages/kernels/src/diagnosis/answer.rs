@@ -156,7 +156,7 @@ impl Findings<'_> {
         let Some(added) = last.fit.model.causes.get(which) else { return BTreeMap::new() };
         let places = last.fit.model.places(which);
         let one = |(i, parameter): (usize, &crate::causes::Parameter)| {
-            let factor = self.factor(parameter.unit);
+            let factor = self.factor(parameter.unit, &added.modes);
             let free = places.clone().zip(added.free()).find(|(_, own)| *own == i).map(|(place, _)| place);
             let std = match free {
                 Some(place) => Some(covariance[place][place].sqrt() * factor),
@@ -172,9 +172,12 @@ impl Findings<'_> {
         added.cause.about().parameters.iter().enumerate().map(one).collect()
     }
 
-    /// A parameter's unit in the scaled problem, in the record's units.
-    fn factor(&self, unit: &str) -> f64 {
-        let y = self.scale();
+    /// A parameter's unit in the scaled problem, in the record's units: those of the channel that its mode is counted
+    /// in.
+    fn factor(&self, unit: &str, modes: &[usize]) -> f64 {
+        let own = self.choice.ladder.last().map_or(&[][..], |last| &last.fit.model.dynamics.own);
+        let channel = own.get(modes.first().copied().unwrap_or(0)).copied().unwrap_or(0);
+        let y = self.bench.output_scale.get(channel).copied().unwrap_or_else(|| self.scale());
         match unit {
             "V" => y,
             "1/V" => 1.0 / y,

@@ -124,6 +124,18 @@ fn a_cause_hidden_in_hits_of_two_modes_is_named() {
 }
 
 #[test]
+fn a_cause_that_takes_a_hundredth_of_the_error_is_named() {
+    // three times what can be seen at all; the linear model is as good as any
+    let faint: Hidden = ("duffing", vec![0.002], vec![0]);
+    let named = (0..4u64).into_par_iter().filter(|seed| {
+        let found = diagnosed(&simulated(seed + 2000, Some(&faint)));
+        println!("faint {seed}: {:?} {:?}", found.verdict, found.evidence);
+        found.verdict == Verdict::Named && found.causes.iter().any(|cause| cause.id == "duffing")
+    });
+    assert!(named.count() >= 3);
+}
+
+#[test]
 fn hits_of_two_linear_modes_are_clean() {
     let rounds: u64 = std::env::var("AFMID_ROUNDS").ok().and_then(|text| text.parse().ok()).unwrap_or(2);
     let alarms = (0..2 * rounds).into_par_iter().filter(|seed| {

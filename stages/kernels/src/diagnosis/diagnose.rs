@@ -3,7 +3,7 @@
 use super::answer::Findings;
 use super::baseline::{Baseline, baselines, blocks, criterion, starts};
 use super::chain::chain;
-use super::data::{Bench, Record, Thinned};
+use super::data::{Bench, Record, Stretch, Thinned};
 use super::dynamics::{Modal, Model};
 use super::error::DiagnosisError;
 use super::fit::Blocks;
@@ -82,21 +82,21 @@ pub fn diagnose(
     interval_s: f64,
     options: &DiagnosisOptions,
 ) -> Result<Diagnosed, DiagnosisError> {
-    let whole = Bench::new(records, &options.training, interval_s, 0.0)?;
+    let whole = Bench::new(records, &options.training, interval_s, 0.0, options.one_unit)?;
     options.parts.iter().try_for_each(|part| check_part(part, &whole, records))?;
     let sample = sampled(&whole, 1);
-    let starts = starts(records, &sample, options.free_offsets);
+    let starts = starts(records, &sample, options);
     let highest_hz = starts.linear.iter().map(Modal::highest_hz).fold(0.0, f64::max);
     let long = sample.layout.all_samples() < whole.layout.all_samples();
     let thinned = long.then(|| Thinned::new(records, &options.training, interval_s, highest_hz)).flatten();
     let found = match &thinned {
         Some(thinned) => {
             let kept = thinned.records();
-            let bench = Bench::new(&kept, &thinned.stretches, thinned.interval_s, highest_hz)?;
+            let bench = Bench::new(&kept, &thinned.stretches, thinned.interval_s, highest_hz, options.one_unit)?;
             let every = (thinned.interval_s / interval_s).round() as usize;
-            baselines(&kept, &sampled(&bench, every), &starts)?
+            baselines(&kept, &sampled(&bench, every), &starts, options)?
         }
-        None => baselines(records, &sample, &starts)?,
+        None => baselines(records, &sample, &starts, options)?,
     };
     let mut extended = Vec::new();
     for baseline in found {
@@ -141,11 +141,12 @@ pub fn diagnose(
             &options.parts,
         );
     }
-    if diagnosis.verdict == Verdict::Unexplained
+    let unexplained = diagnosis.verdict == Verdict::Unexplained;
+    if (unexplained || options.linear_fit)
         && let Some(linear) = alone(&bench, records, options)
     {
         // where no model that causes could extend was found, this one decides
-        if !diagnosis.baseline.adequate && linear.is_adequate(options.tolerated_misfit) {
+        if unexplained && !diagnosis.baseline.adequate && linear.is_adequate(options.tolerated_misfit) {
             let part = options.parts.first().map_or("held out", |part| &part.name[..]);
             diagnosis = linear.answer(part, &options.output_unit, options.tolerated_misfit, options.false_alarm_rate);
             after.clone_from(&before);
@@ -196,7 +197,9 @@ fn extend(baseline: Baseline, options: &DiagnosisOptions) -> Extended {
         candidates,
     };
     let choice = search.run(fit);
-    let adequate = choice.ladder.last().is_some_and(|last| adequacy.holds(criterion(&bench, &last.fit)));
+    // where the linear model is the best there is, what extends it need not pay for itself in blocks: F tests decide
+    let ends = [choice.ladder.first(), choice.ladder.last()];
+    let adequate = ends.iter().flatten().any(|model| adequacy.holds(criterion(&bench, &model.fit)));
     Extended { bench, blocks, choice, adequate }
 }
 
@@ -209,6 +212,7 @@ fn candidates(options: &DiagnosisOptions, bench: &Bench, model: &Model) -> Vec<C
     numbers.sort_unstable();
     numbers.dedup();
     let archive = numbers.len() >= ARCHIVE;
+    let samples: usize = options.training.iter().map(Stretch::samples).sum();
     let modes = model.dynamics.modes();
     let has = |need: Need| match need {
         Need::Release => false,
@@ -219,6 +223,7 @@ fn candidates(options: &DiagnosisOptions, bench: &Bench, model: &Model) -> Vec<C
         Need::Records => archive,
         Need::OneChannel => bench.layout.channels == 1,
         Need::OneRun => bench.layout.stretches() == 1,
+        Need::ShortRun => 2 * samples < 3 * SAMPLE,
     };
     let usable = |cause: &&&'static dyn Cause| {
         let about = cause.about();

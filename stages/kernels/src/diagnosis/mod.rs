@@ -41,7 +41,7 @@ pub mod verdict;
 
 pub use data::{Bench, FineInput, Part, PartStart, Record, Stretch};
 pub use diagnose::{Diagnosed, diagnose};
-pub use dynamics::{Added, Kind, Modal, Model, Section, State, Weights};
+pub use dynamics::{Added, Kind, Modal, Model, Section, Sensed, State, Weights};
 pub use error::DiagnosisError;
 pub use fit::Fit;
 pub use lack_of_fit::Misfit;

@@ -1,6 +1,7 @@
 //! What a diagnosis is asked for.
 
 use super::data::{Part, Stretch};
+use super::dynamics::Sensed;
 use crate::causes::Cause;
 
 /// Settings; the defaults suit a record whose noise is white.
@@ -19,6 +20,13 @@ pub struct DiagnosisOptions {
     /// Whether each stretch has an offset of its own, as decays that were cut from longer records do; else an offset is
     /// a cause.
     pub free_offsets: bool,
+    /// What each channel senses; deflections where it is not said.
+    pub sensed: Vec<Sensed>,
+    /// Whether all channels have one unit, the output's.
+    pub one_unit: bool,
+    /// Whether it is always said how far a linear model of one input goes, not only where nothing else accounts for the
+    /// data.
+    pub linear_fit: bool,
     /// Most causes.
     pub most_causes: usize,
     /// Causes that are tried, as far as the data have what they need.
@@ -27,6 +35,13 @@ pub struct DiagnosisOptions {
     pub output_unit: String,
     /// Unit of the input.
     pub input_unit: String,
+}
+
+impl DiagnosisOptions {
+    /// What a channel senses.
+    pub(crate) fn sensed(&self, channel: usize) -> Sensed {
+        self.sensed.get(channel).copied().unwrap_or_default()
+    }
 }
 
 impl Default for DiagnosisOptions {
@@ -38,6 +53,9 @@ impl Default for DiagnosisOptions {
             least_gain: 0.0005,
             tolerated_misfit: 0.25,
             free_offsets: false,
+            sensed: Vec::new(),
+            one_unit: true,
+            linear_fit: false,
             most_causes: 8,
             candidates: crate::causes::CATALOGUE.to_vec(),
             output_unit: "V".to_owned(),

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::data::Bench;
 use super::dynamics::{Model, is_choice};
-use super::fit::{Blocks, Cholesky, Fit, dot};
+use super::fit::{Blocks, Cholesky, Fit, all_products, dot, rows};
 use super::instants::refine;
 use super::lack_of_fit::Floor;
 use crate::causes::{Cause, Part, Scene};
@@ -80,9 +80,8 @@ impl Basis {
     /// Without the sensitivities to some numbers.
     pub fn without(fit: &Fit, left_out: std::ops::Range<usize>) -> Self {
         let columns: Vec<usize> = (0..fit.sensitivities.len()).filter(|i| !left_out.contains(i)).collect();
-        let of = |i: &usize| &fit.sensitivities[*i];
-        let curvature: Vec<Vec<f64>> =
-            columns.par_iter().map(|a| columns.iter().map(|b| dot(of(a), of(b))).collect()).collect();
+        let kept: Vec<&[f64]> = columns.iter().map(|i| &fit.sensitivities[*i][..]).collect();
+        let curvature = rows(&all_products(&kept));
         Self { columns, factor: Cholesky::new(&curvature, 1e-12) }
     }
 

@@ -6,7 +6,7 @@ use faer::c64;
 use rayon::prelude::*;
 
 use crate::diagnosis::data::{Bench, Record};
-use crate::diagnosis::dynamics::{Kind, Modal, Section, Weights};
+use crate::diagnosis::dynamics::{Kind, Modal, Section, Sensed, Weights};
 use crate::pem::{Experiment, Focus, NoiseModel, PemOptions, identify};
 
 /// Orders that are tried.
@@ -15,7 +15,7 @@ const ORDERS: [usize; 8] = [1, 2, 3, 4, 5, 6, 8, 10];
 const SAMPLES: usize = 20_000;
 
 /// Dynamics of every order with the poles of its fit.
-pub(super) fn starts(records: &[Record<'_>], bench: &Bench) -> Vec<Modal> {
+pub(super) fn starts(records: &[Record<'_>], bench: &Bench, sensed: Sensed) -> Vec<Modal> {
     if bench.layout.channels != 1 {
         return Vec::new();
     }
@@ -44,14 +44,14 @@ pub(super) fn starts(records: &[Record<'_>], bench: &Bench) -> Vec<Modal> {
             ..PemOptions::default()
         };
         let fit = identify(&experiments, bench.interval_s, &options).ok()?;
-        dynamics(&fit.model.sections.iter().flat_map(|section| section.poles()).collect::<Vec<c64>>(), bench)
+        dynamics(&fit.model.sections.iter().flat_map(|section| section.poles()).collect::<Vec<c64>>(), sensed, bench)
     };
     ORDERS.par_iter().filter_map(one).collect()
 }
 
 /// Continuous sections of a held input with those poles in z; none where one lies on the negative real axis or outside
 /// the unit circle.
-fn dynamics(poles: &[c64], bench: &Bench) -> Option<Modal> {
+fn dynamics(poles: &[c64], sensed: Sensed, bench: &Bench) -> Option<Modal> {
     let mut modes = Vec::new();
     let mut real: Vec<f64> = Vec::new();
     for z in poles {
@@ -71,7 +71,7 @@ fn dynamics(poles: &[c64], bench: &Bench) -> Option<Modal> {
     modes.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     real.sort_by(f64::total_cmp);
     modes.extend(real.iter().map(relaxation));
-    let mut modal = Modal::sum(modes, true, bench.interval_s);
+    let mut modal = Modal::sum(modes, sensed, true, bench.interval_s);
     modal.free = Weights::Rates;
     modal.through = Some(0.0);
     (!modal.sections.is_empty()).then_some(modal)

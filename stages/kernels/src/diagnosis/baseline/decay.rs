@@ -3,11 +3,12 @@
 use faer::c64;
 
 use crate::diagnosis::data::{Bench, Record};
-use crate::diagnosis::dynamics::{Kind, Modal, Section, Weights};
+use crate::diagnosis::dynamics::{Kind, Modal, Section, Sensed, Weights};
+use crate::diagnosis::options::DiagnosisOptions;
 use crate::ringdown::{ChannelOptions, RecordFit, follow_channels};
 
 /// Most modes of a structure: the library of general terms grows with their square.
-const MOST: usize = 5;
+const MOST: usize = 6;
 
 /// The strongest one, two, ... modes of all stretches together; none where no decay is found.
 ///
@@ -15,10 +16,15 @@ const MOST: usize = 5;
 /// followed by two exponentials, and it is that mode's law that has to be found.
 ///
 /// Beside them the least number of modes that a baseline needs: the strong ones, none of which can be made by another.
-pub(super) fn starts(records: &[Record<'_>], bench: &Bench) -> (Vec<Modal>, usize) {
-    let Some(Found { all, strength, amplitude }) = modes(records, bench) else { return (Vec::new(), 1) };
+pub(super) fn starts(records: &[Record<'_>], bench: &Bench, options: &DiagnosisOptions) -> (Vec<Modal>, usize) {
+    let Some(Found { all, strength, amplitude, shadow }) = modes(records, bench, options) else {
+        return (Vec::new(), 1);
+    };
     let mut order: Vec<usize> = (0..strength.len()).collect();
-    order.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]));
+    order.sort_by(|a, b| shadow[*a].cmp(&shadow[*b]).then(strength[*b].total_cmp(&strength[*a])));
+    // what looks like a shadow may be a mode after all: all together come last
+    let everything = order.clone();
+    order.retain(|mode| !shadow[*mode]);
     let overlap = |a: usize, b: usize| {
         let (a, b) = (&all.sections[a], &all.sections[b]);
         (a.frequency_hz - b.frequency_hz).abs() < 0.5 * (a.loss * a.frequency_hz + b.loss * b.frequency_hz)
@@ -38,6 +44,7 @@ pub(super) fn starts(records: &[Record<'_>], bench: &Bench) -> (Vec<Modal>, usiz
     if apart.len() < order.len() {
         starts.extend((2..=order.len().min(MOST)).map(|count| prefix(&order, count)));
     }
+    starts.extend((order.len() + 1..=everything.len().min(MOST)).map(|count| prefix(&everything, count)));
     let largest = amplitude.iter().copied().fold(0.0, f64::max);
     let mut needed: Vec<f64> = Vec::new();
     for mode in order.iter().filter(|mode| amplitude[**mode] > HARMONIC * largest) {
@@ -56,17 +63,19 @@ struct Found {
     strength: Vec<f64>,
     /// Amplitude of each at its largest, all channels together.
     amplitude: Vec<f64>,
+    /// Whether a stronger mode that moves may make it.
+    shadow: Vec<bool>,
 }
 
-fn modes(records: &[Record<'_>], bench: &Bench) -> Option<Found> {
+fn modes(records: &[Record<'_>], bench: &Bench, options: &DiagnosisOptions) -> Option<Found> {
     let hits: Vec<Vec<&[f64]>> = bench
         .stretches
         .iter()
         .map(|s| records[s.record].outputs.iter().map(|output| &output[s.first..s.end]).collect())
         .collect();
     let missing = hits.iter().map(|hit| hit.iter().map(|row| gaps(row)).collect()).collect();
-    let options = ChannelOptions { missing, ..ChannelOptions::default() };
-    let followed = follow_channels(&hits, &[], bench.interval_s, &options, false).ok()?;
+    let wanted = ChannelOptions { missing, ..ChannelOptions::default() };
+    let followed = follow_channels(&hits, &[], bench.interval_s, &wanted, false).ok()?;
     let found = &followed.fit;
     let channels = bench.layout.channels;
     // what each mode is in each channel, per unit of that channel, in its largest hit
@@ -78,9 +87,10 @@ fn modes(records: &[Record<'_>], bench: &Bench) -> Option<Found> {
         let record = found.records.iter().find(|r| r.event == largest && r.channel == channel);
         record.map_or(c64::new(0.0, 0.0), |r| r.residues[mode] / bench.output_scale[channel])
     };
-    let mut modal = Modal::sum(Vec::new(), false, bench.interval_s);
+    let mut modal = Modal::sum(Vec::new(), options.sensed(0), false, bench.interval_s);
     modal.offsets = true;
     modal.weights = vec![Vec::new(); channels];
+    modal.sensed = (0..channels).map(|channel| options.sensed(channel)).collect();
     modal.free = if channels > 1 { Weights::Shapes } else { Weights::Fixed };
     let moves = |mode: usize| followed.course.iter().any(|course| course.mode == mode && course.moves);
     let square = |mode: usize| (0..channels).map(|channel| residue(mode, channel).norm_sqr()).sum::<f64>();
@@ -105,10 +115,9 @@ fn modes(records: &[Record<'_>], bench: &Bench) -> Option<Found> {
             strength[of] > strength[mode] && moves(of) && is_shadow(hz[mode] / hz[of], weak)
         })
     };
-    let (mut energy, mut amplitude) = (Vec::new(), Vec::new());
-    for (mode, pole) in found.poles.iter().enumerate().filter(|(mode, _)| !follows(*mode)) {
-        energy.push(strength[mode]);
-        amplitude.push(together(mode).sqrt());
+    let shadow = (0..found.poles.len()).map(follows).collect();
+    let amplitude = (0..found.poles.len()).map(|mode| together(mode).sqrt()).collect();
+    for (mode, pole) in found.poles.iter().enumerate() {
         let (omega, loss) = (pole.norm(), -2.0 * pole.re / pole.norm());
         modal.sections.push(Section {
             kind: Kind::Oscillator,
@@ -122,10 +131,13 @@ fn modes(records: &[Record<'_>], bench: &Bench) -> Option<Found> {
         modal.own.push(own);
         for (channel, weights) in modal.weights.iter_mut().enumerate() {
             let ratio = if residues[own].norm() > 0.0 { residues[channel] / residues[own] } else { c64::new(0.0, 0.0) };
-            weights.push(if channel == own { [1.0, 0.0] } else { of_ratio(ratio, *pole) });
+            // per unit of what the own channel senses
+            let sensed = options.sensed(own);
+            let own_ratio = if sensed == Sensed::Rate { ratio * (*pole / pole.norm()) } else { ratio };
+            weights.push(if channel == own { sensed.weights() } else { of_ratio(own_ratio, *pole) });
         }
     }
-    (!modal.sections.is_empty()).then_some(Found { all: modal, strength: energy, amplitude })
+    (!modal.sections.is_empty()).then_some(Found { all: modal, strength, amplitude, shadow })
 }
 
 /// Whether an exponential at that ratio of frequencies follows a stronger mode that moves with its amplitude: beside it,
@@ -139,8 +151,9 @@ fn is_shadow(ratio: f64, weak: bool) -> bool {
 /// Amplitude over the stronger mode's up to which a harmonic is one: an interferometer's reach a tenth, and what is
 /// stronger at a multiple is a mode in internal resonance.
 const HARMONIC: f64 = 0.2;
-/// Distance in frequency, relative, that a moving mode's other exponentials keep.
-const BESIDE: f64 = 0.2;
+/// Distance in frequency, relative, within which a moving mode's other exponentials lie: a stiffness that changes by a
+/// fifth.
+const BESIDE: f64 = 0.1;
 /// Highest harmonic, and how near to it an exponential lies, relative.
 const HARMONICS: f64 = 6.0;
 const NEAR: f64 = 0.03;

@@ -21,7 +21,8 @@ pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
         return Some(model);
     }
     let count = start.sections.len();
-    let parts = if start.free == Weights::Rates { 2 } else { 1 };
+    let other = start.other_part();
+    let parts = if start.free == Weights::Rates { vec![1 - other, other] } else { vec![1 - other] };
     let response = |section: Option<usize>, part: usize| {
         let mut one = model.clone();
         one.dynamics.sections.iter_mut().for_each(|section| section.gain = 0.0);
@@ -35,9 +36,9 @@ pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
         column.iter_mut().zip(&bench.output).filter(|(_, y)| !y.is_finite()).for_each(|(v, _)| *v = 0.0);
         column
     };
-    let is_free = |s: usize, part: usize| part == 0 || start.sections[s].is_mode();
+    let is_free = |(s, part): &(usize, usize)| *part != other || start.sections[*s].is_mode();
     let places: Vec<(usize, usize)> =
-        (0..count).flat_map(|s| (0..parts).map(move |part| (s, part))).filter(|(s, part)| is_free(*s, *part)).collect();
+        (0..count).flat_map(|s| parts.iter().map(move |part| (s, *part))).filter(is_free).collect();
     let mut columns: Vec<Vec<f64>> = places.iter().map(|(s, part)| response(Some(*s), *part)).collect();
     if start.through.is_some() {
         columns.push(response(None, 0));
@@ -55,14 +56,14 @@ pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
         return None;
     }
     for ((s, part), value) in places.iter().zip(&x) {
-        if *part == 0 {
+        if *part != other {
             model.dynamics.sections[*s].gain = *value;
         } else {
             let gain = model.dynamics.sections[*s].gain;
             // a gain of nothing would leave the rate's weight without a scale
             let gain = if gain.abs() > 1e-9 * value.abs() { gain } else { 1e-9 * value.abs().max(f64::MIN_POSITIVE) };
             model.dynamics.sections[*s].gain = gain;
-            model.dynamics.weights[0][*s] = [1.0, value / gain];
+            model.dynamics.weights[0][*s][other] = value / gain;
         }
     }
     if let (Some(through), Some(value)) = (&mut model.dynamics.through, x.get(places.len())) {

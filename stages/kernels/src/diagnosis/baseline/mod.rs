@@ -9,6 +9,7 @@ use super::data::{Bench, Record};
 use super::dynamics::Modal;
 use super::error::DiagnosisError;
 use super::fit::{Blocks, Fit, Until};
+use super::options::DiagnosisOptions;
 
 /// A linear model that causes may extend, and how it was judged.
 pub(super) struct Baseline {
@@ -74,15 +75,15 @@ pub(super) struct Starts {
 /// Without an input: the strongest one, two, ... modes of the free decays, by [`crate::ringdown`], and one oscillator by
 /// a grid. With an input: one oscillator by a grid, and the poles of models of rising order by the prediction error
 /// method.
-pub(super) fn starts(records: &[Record<'_>], coarse: &Bench, free_offsets: bool) -> Starts {
+pub(super) fn starts(records: &[Record<'_>], coarse: &Bench, options: &DiagnosisOptions) -> Starts {
     let (mut starts, mut needed) = (Vec::new(), 1);
     let single = coarse.layout.channels == 1 && coarse.layout.stretches() == 1;
-    starts.extend(single.then(|| oscillator::best(coarse, free_offsets)).flatten().map(|fit| fit.model.dynamics));
+    starts.extend(single.then(|| oscillator::best(coarse, options)).flatten().map(|fit| fit.model.dynamics));
     let has_oscillator = !starts.is_empty();
     if coarse.driven {
-        starts.extend(black_box::starts(records, coarse));
+        starts.extend(black_box::starts(records, coarse, options.sensed(0)));
     } else {
-        let (modes, least) = decay::starts(records, coarse);
+        let (modes, least) = decay::starts(records, coarse, options);
         starts.extend(modes.into_iter().skip(usize::from(has_oscillator)));
         needed = least;
     }
@@ -98,9 +99,10 @@ pub(super) fn baselines(
     records: &[Record<'_>],
     coarse: &Bench,
     starts: &Starts,
+    options: &DiagnosisOptions,
 ) -> Result<Vec<Baseline>, DiagnosisError> {
     let mut tried: Vec<(Fit, Bench)> =
-        starts.linear.iter().filter_map(|start| fitted(records, coarse, start, start.highest_hz())).collect();
+        starts.linear.iter().filter_map(|start| fitted(records, coarse, start, options)).collect();
     tried.sort_by_key(|(fit, _)| fit.model.dynamics.order());
     let criteria: Vec<f64> = tried.iter().map(|(fit, bench)| criterion(bench, fit)).collect();
     let best = criteria.iter().copied().fold(f64::INFINITY, f64::min);
@@ -121,8 +123,9 @@ pub(super) fn baselines(
 }
 
 /// A start fitted to all stretches.
-fn fitted(records: &[Record<'_>], coarse: &Bench, start: &Modal, highest_hz: f64) -> Option<(Fit, Bench)> {
-    let bench = Bench::new(records, &coarse.stretches, coarse.interval_s, highest_hz).ok()?;
+fn fitted(records: &[Record<'_>], coarse: &Bench, start: &Modal, options: &DiagnosisOptions) -> Option<(Fit, Bench)> {
+    let (stretches, interval_s) = (&coarse.stretches, coarse.interval_s);
+    let bench = Bench::new(records, stretches, interval_s, start.highest_hz(), options.one_unit).ok()?;
     let model = linear::solved(&bench, start)?;
     let fit = Fit::new(&bench, &model, Until::steps(LINEAR_STEPS))?;
     Some((fit, bench))

@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use super::linear::{left, solved};
 use crate::diagnosis::data::Bench;
-use crate::diagnosis::dynamics::{Kind, Modal, Model, Section};
+use crate::diagnosis::dynamics::{Kind, Modal, Model, Section, Sensed};
 use crate::diagnosis::fit::{Fit, Until};
+use crate::diagnosis::options::DiagnosisOptions;
 
 /// Samples of the window that the grid is tried on: ten to a hundred periods of what a recording is made for.
 const WINDOW: usize = 256;
@@ -22,10 +23,11 @@ const STARTS: usize = 4;
 /// On the window of the largest output, every pair of a grid of frequencies and quality factors with gain and initial
 /// state by linear least squares; the best few different ones fitted on windows that grow fourfold until they reach the
 /// stretch's end, and then on all of it. The least error wins.
-pub(super) fn best(bench: &Bench, free_offsets: bool) -> Option<Fit> {
+pub(super) fn best(bench: &Bench, options: &DiagnosisOptions) -> Option<Fit> {
     let samples = bench.layout.samples(0);
     let window = WINDOW.min(samples);
     let first = bench.loudest(0, window);
+    let sensed = options.sensed(0);
     let loud = bench.cut(|_| (first, first + window));
     let mut grid: Vec<(f64, Model)> = (0..FREQUENCIES * QUALITIES.len())
         .into_par_iter()
@@ -34,7 +36,7 @@ pub(super) fn best(bench: &Bench, free_offsets: bool) -> Option<Fit> {
             // from one period in the window to 0.45 of the sample rate
             let (low, high) = (1.0 / window as f64, 0.45);
             let frequency_hz = low * (high / low).powf(place) / bench.interval_s;
-            let model = solved(&loud, &oscillator(bench, frequency_hz, 1.0 / QUALITIES[i % QUALITIES.len()]))?;
+            let model = solved(&loud, &oscillator(bench, sensed, frequency_hz, 1.0 / QUALITIES[i % QUALITIES.len()]))?;
             let left = left(&loud, &model);
             left.is_finite().then_some((left, model))
         })
@@ -47,7 +49,7 @@ pub(super) fn best(bench: &Bench, free_offsets: bool) -> Option<Fit> {
             starts.push(model);
         }
     }
-    starts.iter_mut().filter(|_| free_offsets).for_each(|start| {
+    starts.iter_mut().filter(|_| options.free_offsets).for_each(|start| {
         start.dynamics.offsets = true;
         start.states.iter_mut().for_each(|state| state.offsets = vec![0.0]);
     });
@@ -55,9 +57,9 @@ pub(super) fn best(bench: &Bench, free_offsets: bool) -> Option<Fit> {
     fits.into_iter().min_by(|a, b| a.loss.total_cmp(&b.loss))
 }
 
-fn oscillator(bench: &Bench, frequency_hz: f64, loss: f64) -> Modal {
+fn oscillator(bench: &Bench, sensed: Sensed, frequency_hz: f64, loss: f64) -> Modal {
     let section = Section { kind: Kind::Oscillator, frequency_hz, loss, gain: 0.0 };
-    Modal::sum(vec![section], bench.driven, bench.interval_s)
+    Modal::sum(vec![section], sensed, bench.driven, bench.interval_s)
 }
 
 /// Fits on growing windows, then on the whole stretch.

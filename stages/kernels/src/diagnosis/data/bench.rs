@@ -53,7 +53,8 @@ pub struct Bench {
 
 impl Bench {
     /// Scales records by the stretches that are learnt from; the input between samples is built for all three
-    /// assumptions, at a step that suits `highest_hz`.
+    /// assumptions, at a step that suits `highest_hz`. Channels of `one_unit` keep their sizes against one another, so
+    /// that the noise of small ones does not count for more.
     ///
     /// # Errors
     /// See [`DiagnosisError`].
@@ -62,11 +63,12 @@ impl Bench {
         stretches: &[Stretch],
         interval_s: f64,
         highest_hz: f64,
+        one_unit: bool,
     ) -> Result<Self, DiagnosisError> {
         check(records, stretches, interval_s)?;
         let channels = records[0].outputs.len();
         let layout = Layout::new(stretches, channels);
-        let (mut output_scale, mut output) = (Vec::new(), vec![f64::NAN; layout.values()]);
+        let mut output_scale = Vec::new();
         for channel in 0..channels {
             let of = |s: &Stretch| &records[s.record].outputs[channel][s.first..s.end];
             let scale = stretches.iter().map(|s| largest(of(s))).fold(0.0, f64::max);
@@ -77,11 +79,19 @@ impl Bench {
             if scale == 0.0 || !moves {
                 return Err(DiagnosisError::Silent { channel: channel + 1 });
             }
+            output_scale.push(scale);
+        }
+        if one_unit {
+            let common = output_scale.iter().copied().fold(0.0, f64::max);
+            output_scale.fill(common);
+        }
+        let mut output = vec![f64::NAN; layout.values()];
+        for (channel, scale) in output_scale.iter().enumerate() {
             for (e, stretch) in stretches.iter().enumerate() {
                 let place = layout.part(e, channel, 0, stretch.samples());
-                output[place].iter_mut().zip(of(stretch)).for_each(|(to, y)| *to = y / scale);
+                let measured = &records[stretch.record].outputs[channel][stretch.first..stretch.end];
+                output[place].iter_mut().zip(measured).for_each(|(to, y)| *to = y / scale);
             }
-            output_scale.push(scale);
         }
         let input = |s: &Stretch| records[s.record].input.get(s.first..s.end).map_or(0.0, largest);
         let input_scale = stretches.iter().map(input).fold(0.0, f64::max);

@@ -12,7 +12,7 @@ const REACH: usize = 32;
 const KAISER: f64 = 8.0;
 
 /// An input at the nodes of an integrator: for each interval between samples `2 steps + 1` values at equal distances,
-/// both ends included.
+/// both ends included; behind them the last sample, which begins no interval.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FineInput {
     /// The values, interval by interval.
@@ -44,13 +44,14 @@ impl FineInput {
                 });
             }
         }
+        nodes.extend(samples.last());
         Self { nodes, steps }
     }
 
-    /// Nodes of the intervals that begin at samples `first..end - 1`.
+    /// Nodes of the intervals that begin at samples `first..end - 1`, and the one at sample `end - 1`.
     pub fn part(&self, first: usize, end: usize) -> &[f64] {
         let width = 2 * self.steps + 1;
-        self.nodes.get(first * width..end.saturating_sub(1) * width).unwrap_or(&[])
+        self.nodes.get(first * width..=end.saturating_sub(1) * width).unwrap_or(&[])
     }
 
     /// The nodes of the intervals that begin before sample `end - 1`, through passages: all that a path remembers at
@@ -115,7 +116,7 @@ mod tests {
     fn a_constant_stays_itself_up_to_the_ends() {
         for kind in [Intersample::Held, Intersample::Linear, Intersample::BandLimited] {
             let fine = FineInput::new(&[2.5; 9], kind, 3);
-            assert_eq!(fine.nodes.len(), 8 * 7);
+            assert_eq!(fine.nodes.len(), 8 * 7 + 1);
             assert!(fine.nodes.iter().all(|u| (u - 2.5).abs() < 1e-12), "{kind:?}");
         }
     }

@@ -9,6 +9,7 @@ mod motion;
 mod outputs;
 mod propagator;
 mod section;
+mod sensed;
 #[cfg(test)]
 mod tests;
 
@@ -21,3 +22,4 @@ pub(super) use motion::Run;
 pub use motion::Span;
 pub(super) use outputs::{motions, outputs};
 pub use section::{Kind, Section};
+pub use sensed::Sensed;

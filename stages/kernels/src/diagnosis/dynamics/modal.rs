@@ -2,19 +2,22 @@
 
 use super::model::State;
 use super::section::Section;
+use super::sensed::Sensed;
 
 /// Which weights of the sections in the outputs are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Weights {
-    /// None: one output that is the sum of the deflections.
+    /// None: one output that senses the sum of the motions.
     Fixed,
-    /// Those of the rates: one output of any linear system, whose zeros may lie anywhere.
+    /// Those of the rates (of the deflections where the output is a rate): one output of any linear system, whose zeros
+    /// may lie anywhere.
     Rates,
     /// Both, in every channel but a section's own.
     Shapes,
 }
 
-/// `y_c = sum_s w_cs . x_s + through u`, x_s = (deflection, rate / omega) of section s.
+/// `y_c = sum_s w_cs . x_s + through u`, x_s = (deflection, rate / omega) of section s; an accelerometer has `- q'' /
+/// omega^2` in the place of the deflection.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Modal {
     /// Modes first, then real poles.
@@ -25,6 +28,8 @@ pub struct Modal {
     pub free: Weights,
     /// The channel of each section whose weights are given: its unit.
     pub own: Vec<usize>,
+    /// What each channel senses.
+    pub sensed: Vec<Sensed>,
     /// Direct feedthrough of the input, none where there is none.
     pub through: Option<f64>,
     /// Whether gains count: false where there is no input.
@@ -36,10 +41,11 @@ pub struct Modal {
 }
 
 impl Modal {
-    /// One output that is the sum of its sections' deflections.
-    pub fn sum(sections: Vec<Section>, driven: bool, interval_s: f64) -> Self {
-        let (weights, own) = (vec![vec![[1.0, 0.0]; sections.len()]], vec![0; sections.len()]);
-        Self { sections, weights, free: Weights::Fixed, own, through: None, driven, offsets: false, interval_s }
+    /// One output that senses the sum of its sections' motions.
+    pub fn sum(sections: Vec<Section>, sensed: Sensed, driven: bool, interval_s: f64) -> Self {
+        let (weights, own) = (vec![vec![sensed.weights(); sections.len()]], vec![0; sections.len()]);
+        let (free, sensed) = (Weights::Fixed, vec![sensed]);
+        Self { sections, weights, free, own, sensed, through: None, driven, offsets: false, interval_s }
     }
 
     /// Whether it is one oscillator seen by its deflection.
@@ -76,10 +82,15 @@ impl Modal {
         self.sections.iter().map(|s| s.frequency_hz).fold(f64::INFINITY, f64::min)
     }
 
+    /// The weight of one output that is not given.
+    pub(crate) fn other_part(&self) -> usize {
+        usize::from(self.sensed.first() != Some(&Sensed::Rate))
+    }
+
     fn is_free(&self, channel: usize, section: usize, part: usize) -> bool {
         match self.free {
             Weights::Fixed => false,
-            Weights::Rates => part == 1 && self.sections[section].is_mode(),
+            Weights::Rates => part == self.other_part() && self.sections[section].is_mode(),
             Weights::Shapes => channel != self.own[section] && part < self.sections[section].order(),
         }
     }

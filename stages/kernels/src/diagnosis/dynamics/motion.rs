@@ -96,8 +96,14 @@ pub(super) fn groups(runs: &[Run<'_>]) -> Vec<Vec<usize>> {
 
 /// What takes the states of all sections at each sample.
 pub(super) trait Sink {
-    /// States (deflection, rate / omega) by section at sample `k`.
-    fn take(&mut self, k: usize, states: &[[Lane; 2]]);
+    /// States (deflection, rate / omega) by section at sample `k`; behind them, where it is wanted, what an accelerometer
+    /// on each has in the place of the deflection.
+    fn take(&mut self, k: usize, states: &[[Lane; 2]], accelerations: &[Lane]);
+
+    /// Whether accelerations are wanted.
+    fn accelerates(&self) -> bool {
+        false
+    }
 }
 
 /// Runs of one kind, at most [`LANES`] of them, sample by sample into a sink.
@@ -127,7 +133,8 @@ pub(super) fn integrate(runs: &[&Run<'_>], sink: &mut impl Sink) {
         13..=MOST_SECTIONS => of_length::<MOST_SECTIONS, _>(runs, sink),
         more => {
             let samples = runs.iter().map(|run| run.span.samples).max().unwrap_or(0);
-            (0..samples).for_each(|k| sink.take(k, &vec![[Lane::splat(f64::NAN); 2]; more]));
+            let nothing = Lane::splat(f64::NAN);
+            (0..samples).for_each(|k| sink.take(k, &vec![[nothing; 2]; more], &vec![nothing; more]));
         }
     }
 }
@@ -155,6 +162,8 @@ impl<const N: usize, S: Sink> pulp::NullaryFnOnce for Whole<'_, '_, N, S> {
         let parts = if bent || input.is_some() { steps } else { 1 };
         let mut run = Sections::<N>::new(runs, runs[0].span.interval_s / parts as f64);
         let width = 2 * steps + 1;
+        let accelerates = sink.accelerates();
+        let mut accelerations = [Lane::default(); N];
         for k in 0..samples {
             for i in 0..if k > 0 { parts } else { 0 } {
                 let u = match &input {
@@ -167,7 +176,11 @@ impl<const N: usize, S: Sink> pulp::NullaryFnOnce for Whole<'_, '_, N, S> {
                     run.linear_step(&u);
                 }
             }
-            sink.take(k, &run.x[..run.sections]);
+            if accelerates {
+                let u = input.as_ref().map_or(Lane::default(), |input| input.at_sample(k, width));
+                accelerations = run.accelerations(u);
+            }
+            sink.take(k, &run.x[..run.sections], &accelerations[..run.sections]);
         }
     }
 }
@@ -209,12 +222,29 @@ impl<'r> Input<'r> {
     }
 }
 
+impl Input<'_> {
+    /// At a sample: where the next interval begins.
+    #[inline(always)]
+    fn at_sample(&self, k: usize, width: usize) -> Lane {
+        let of = |nodes: &[f64]| nodes.get(k * width).or(nodes.last()).copied().unwrap_or(0.0);
+        match self {
+            Self::Same(nodes) => Lane::splat(of(nodes)),
+            Self::Own(own) => Lane::of(|l| of(own[l])),
+        }
+    }
+}
+
 /// A 2 x 2 matrix of each run, by rows.
 type Matrix = [[Lane; 2]; 2];
 
 #[inline(always)]
 fn times(matrix: &Matrix, x: &[Lane; 2]) -> [Lane; 2] {
-    [matrix[0][0] * x[0] + matrix[0][1] * x[1], matrix[1][0] * x[0] + matrix[1][1] * x[1]]
+    [times_row(&matrix[0], x), times_row(&matrix[1], x)]
+}
+
+#[inline(always)]
+fn times_row(row: &[Lane; 2], x: &[Lane; 2]) -> Lane {
+    row[0] * x[0] + row[1] * x[1]
 }
 
 #[inline(always)]
@@ -234,6 +264,10 @@ struct Sections<'a, const N: usize> {
     last: [[Lane; 2]; N],
     gains: [Lane; N],
     omega: [Lane; N],
+    /// What an accelerometer shows per deflection and per rate / omega.
+    shown: [[Lane; 2]; N],
+    /// How much of what drives a section it shows at once: 1 of a mode, 0 of a relaxation.
+    at_once: [Lane; N],
     x: [[Lane; 2]; N],
     table: Table<N>,
 }
@@ -272,6 +306,10 @@ impl<'a, const N: usize> Sections<'a, N> {
             last: std::array::from_fn(|s| pair(s, &|p| p.last)),
             gains: std::array::from_fn(|s| each(s, &|section| section.gain, 0.0)),
             omega: std::array::from_fn(|s| each(s, &Section::omega, 1.0)),
+            shown: std::array::from_fn(|s| {
+                std::array::from_fn(|i| each(s, &|section| section.accelerometer()[i], 0.0))
+            }),
+            at_once: std::array::from_fn(|s| each(s, &|section| f64::from(u8::from(section.is_mode())), 0.0)),
             x: std::array::from_fn(|s| {
                 std::array::from_fn(|i| if s < sections { Lane::of(|l| state(s, i, l)) } else { Lane::default() })
             }),
@@ -288,6 +326,17 @@ impl<'a, const N: usize> Sections<'a, N> {
         }
         self.forces.add(states, &self.omega, &mut self.table, &mut drive);
         drive
+    }
+
+    /// What an accelerometer on each section shows, `- q'' / omega^2`.
+    #[inline(always)]
+    fn accelerations(&mut self, u: Lane) -> [Lane; N] {
+        let x = self.x;
+        let mut shown = self.drive(&x, u);
+        for s in 0..N {
+            shown[s] = times_row(&self.shown[s], &x[s]) - self.at_once[s] * shown[s];
+        }
+        shown
     }
 
     /// One step under the input at its beginning, middle and end, without forces.

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::lane::Lane;
 use super::motion::{Run, Sink, groups, integrate};
+use super::sensed::Sensed;
 use crate::effects::pass;
 
 /// Output of each run, channel by channel.
@@ -48,7 +49,7 @@ struct States(Vec<Vec<[Lane; 2]>>);
 
 impl Sink for States {
     #[inline(always)]
-    fn take(&mut self, _: usize, states: &[[Lane; 2]]) {
+    fn take(&mut self, _: usize, states: &[[Lane; 2]], _: &[Lane]) {
         self.0.push(states.to_vec());
     }
 }
@@ -57,6 +58,8 @@ impl Sink for States {
 struct Seen {
     /// By channel and section.
     weights: Vec<Vec<[Lane; 2]>>,
+    /// Channels of accelerometers.
+    accelerates: Vec<bool>,
     /// By channel and sample.
     sums: Vec<Vec<Lane>>,
 }
@@ -70,7 +73,9 @@ impl Seen {
             group.get(l).and_then(weight).unwrap_or(0.0)
         };
         let weight = |channel: usize, s: usize| std::array::from_fn(|i| Lane::of(|l| of(l, channel, s, i)));
+        let sensed = |channel: usize| group.first().and_then(|run| run.dynamics.sensed.get(channel));
         Self {
+            accelerates: (0..channels).map(|channel| sensed(channel) == Some(&Sensed::Acceleration)).collect(),
             weights: (0..channels).map(|channel| (0..sections).map(|s| weight(channel, s)).collect()).collect(),
             sums: vec![Vec::with_capacity(samples); channels],
         }
@@ -90,7 +95,6 @@ impl Seen {
             let begin = output.len();
             for (k, sum) in sums.iter().enumerate().take(span.samples) {
                 let direct = dynamics.through.zip(nodes.as_deref()).map_or(0.0, |(through, nodes)| {
-                    // the last sample is the end of the last interval
                     through * nodes.get(k * width).or(nodes.last()).copied().unwrap_or(0.0)
                 });
                 output.push(sum.0[l] + direct);
@@ -104,13 +108,24 @@ impl Seen {
 
 impl Sink for Seen {
     #[inline(always)]
-    fn take(&mut self, _: usize, states: &[[Lane; 2]]) {
-        for (weights, sums) in self.weights.iter().zip(&mut self.sums) {
+    fn take(&mut self, _: usize, states: &[[Lane; 2]], accelerations: &[Lane]) {
+        let channels = self.weights.iter().zip(&self.accelerates).zip(&mut self.sums);
+        for ((weights, accelerates), sums) in channels {
             let mut sum = Lane::default();
-            for (w, x) in weights.iter().zip(states) {
-                sum = sum + (w[0] * x[0] + w[1] * x[1]);
+            if *accelerates {
+                for ((w, x), a) in weights.iter().zip(states).zip(accelerations) {
+                    sum = sum + (w[0] * *a + w[1] * x[1]);
+                }
+            } else {
+                for (w, x) in weights.iter().zip(states) {
+                    sum = sum + (w[0] * x[0] + w[1] * x[1]);
+                }
             }
             sums.push(sum);
         }
+    }
+
+    fn accelerates(&self) -> bool {
+        self.accelerates.contains(&true)
     }
 }

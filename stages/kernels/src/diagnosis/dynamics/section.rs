@@ -54,6 +54,15 @@ impl Section {
         }
     }
 
+    /// What an accelerometer shows of its state, `- q'' / w^2` less what drives it; of a relaxation its deflection.
+    pub(crate) fn accelerometer(&self) -> [f64; 2] {
+        match self.kind {
+            Kind::Oscillator => [1.0, self.loss],
+            Kind::Axis => [0.0, self.loss],
+            Kind::Relaxation => [1.0, 0.0],
+        }
+    }
+
     /// The component of the state that the input acts on: the rate, or a relaxation's only one.
     pub(crate) fn acts_on(&self) -> usize {
         usize::from(self.is_mode())

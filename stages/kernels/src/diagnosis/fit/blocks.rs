@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::small::{Cholesky, dot};
+use super::products::{dot, products, rows};
+use super::small::Cholesky;
 use crate::diagnosis::data::Layout;
 
 /// Parts that take turns in being held out.
@@ -64,17 +65,14 @@ pub(crate) struct Moments {
 
 impl Moments {
     pub fn new(columns: &[Vec<f64>], residual: &[f64], blocks: &Blocks) -> Self {
+        let n = columns.len();
+        let together: Vec<&[f64]> = columns.iter().map(Vec::as_slice).chain([residual]).collect();
         let sums = |b: usize| {
-            let n = columns.len();
-            let mut curvature = vec![vec![0.0; n]; n];
-            for i in 0..n {
-                for j in 0..=i {
-                    curvature[i][j] = blocks.dot(b, &columns[i], &columns[j]);
-                    curvature[j][i] = curvature[i][j];
-                }
-            }
-            let score = columns.iter().map(|column| blocks.dot(b, column, residual)).collect();
-            (curvature, score, blocks.dot(b, residual, residual))
+            let mut curvature = rows(&products(&together, &blocks.places[b]));
+            let mut score = curvature.pop().unwrap_or_default();
+            let loss = score.pop().unwrap_or(0.0);
+            curvature.iter_mut().for_each(|row| row.truncate(n));
+            (curvature, score, loss)
         };
         let all: Vec<(Vec<Vec<f64>>, Vec<f64>, f64)> = (0..blocks.count()).into_par_iter().map(sums).collect();
         let mut moments =

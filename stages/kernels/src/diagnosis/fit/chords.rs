@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::own::{Along, Own};
-use super::small::{Cholesky, dot};
+use super::products::dot;
+use super::small::Cholesky;
 use super::{Until, moved, normal};
 use crate::diagnosis::data::Bench;
 use crate::diagnosis::dynamics::Model;

@@ -3,6 +3,7 @@
 mod blocks;
 mod chords;
 mod own;
+mod products;
 mod small;
 
 use rayon::prelude::*;
@@ -10,7 +11,8 @@ use rayon::prelude::*;
 pub(super) use blocks::{Blocks, FOLDS, Moments, paired};
 pub(super) use chords::Chords;
 pub(super) use own::Own;
-pub(super) use small::{Cholesky, dot};
+pub(super) use products::{all_products, dot, rows};
+pub(super) use small::Cholesky;
 
 use chords::Climb;
 use own::Along;
@@ -342,10 +344,7 @@ fn changes(bench: &Bench, moved: Vec<(f64, Model)>, simulated: &[f64]) -> Vec<Ve
 
 /// Products of columns with one another and with a residual.
 pub(super) fn normal(columns: &[Vec<f64>], residual: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
-    let n = columns.len();
-    let rows: Vec<Vec<f64>> =
-        (0..n).into_par_iter().map(|i| (0..=i).map(|j| dot(&columns[i], &columns[j])).collect()).collect();
-    let entry = |i: usize, j: usize| if j <= i { rows[i][j] } else { rows[j][i] };
-    let curvature = (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect();
+    let together: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let curvature = rows(&all_products(&together));
     (curvature, columns.par_iter().map(|column| dot(column, residual)).collect())
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::small::dot;
+use super::products::dot;
 use crate::diagnosis::data::Layout;
 
 /// Orthonormal directions that each stretch's own numbers can move its samples in.

@@ -52,17 +52,3 @@ impl Cholesky {
         (0..n).map(|j| self.solve(&(0..n).map(|i| f64::from(u8::from(i == j))).collect::<Vec<f64>>())).collect()
     }
 }
-
-/// `a . b`.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // four sums: the order is fixed, and the processor can add them side by side
-    let mut sums = [0.0; 4];
-    let (left, right) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = left.remainder().iter().zip(right.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in left.zip(right) {
-        for i in 0..4 {
-            sums[i] += a[i] * b[i];
-        }
-    }
-    sums[0] + sums[1] + sums[2] + sums[3] + rest
-}
