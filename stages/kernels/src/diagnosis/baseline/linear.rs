@@ -22,7 +22,6 @@ pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
     }
     let count = start.sections.len();
     let other = start.other_part();
-    let parts = if start.free == Weights::Rates { vec![1 - other, other] } else { vec![1 - other] };
     let response = |section: Option<usize>, part: usize| {
         let mut one = model.clone();
         one.dynamics.sections.iter_mut().for_each(|section| section.gain = 0.0);
@@ -36,10 +35,14 @@ pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
         column.iter_mut().zip(&bench.output).filter(|(_, y)| !y.is_finite()).for_each(|(v, _)| *v = 0.0);
         column
     };
-    let is_free = |(s, part): &(usize, usize)| *part != other || start.sections[*s].is_mode();
-    let places: Vec<(usize, usize)> =
-        (0..count).flat_map(|s| parts.iter().map(move |part| (s, *part))).filter(is_free).collect();
-    let mut columns: Vec<Vec<f64>> = places.iter().map(|(s, part)| response(Some(*s), *part)).collect();
+    // section, the part of its state that is seen, and whether that is the weight that is not given
+    let place = |s: usize| {
+        let is_mode = start.sections[s].is_mode();
+        let given = (s, if is_mode { 1 - other } else { 0 }, false);
+        [Some(given), (is_mode && start.free == Weights::Rates).then_some((s, other, true))]
+    };
+    let places: Vec<(usize, usize, bool)> = (0..count).flat_map(place).flatten().collect();
+    let mut columns: Vec<Vec<f64>> = places.iter().map(|(s, part, _)| response(Some(*s), *part)).collect();
     if start.through.is_some() {
         columns.push(response(None, 0));
     }
@@ -55,8 +58,8 @@ pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
     if !x.iter().all(|value| value.is_finite()) {
         return None;
     }
-    for ((s, part), value) in places.iter().zip(&x) {
-        if *part != other {
+    for ((s, _, is_other), value) in places.iter().zip(&x) {
+        if !is_other {
             model.dynamics.sections[*s].gain = *value;
         } else {
             let gain = model.dynamics.sections[*s].gain;

@@ -43,7 +43,9 @@ pub struct Modal {
 impl Modal {
     /// One output that senses the sum of its sections' motions.
     pub fn sum(sections: Vec<Section>, sensed: Sensed, driven: bool, interval_s: f64) -> Self {
-        let (weights, own) = (vec![vec![sensed.weights(); sections.len()]], vec![0; sections.len()]);
+        // a relaxation has no rate: it is seen as it is
+        let weights = |section: &Section| if section.is_mode() { sensed.weights() } else { [1.0, 0.0] };
+        let (weights, own) = (vec![sections.iter().map(weights).collect()], vec![0; sections.len()]);
         let (free, sensed) = (Weights::Fixed, vec![sensed]);
         Self { sections, weights, free, own, sensed, through: None, driven, offsets: false, interval_s }
     }

@@ -111,3 +111,20 @@ fn an_accelerometer_shows_the_force_at_once() {
         assert!((shown[k] - expected).abs() < 0.005, "{k}: {} {expected}", shown[k]);
     }
 }
+
+#[test]
+fn a_relaxation_is_seen_whatever_is_sensed() {
+    let nothing = effects(Vec::new());
+    let start = State { sections: vec![[1.0, 0.0]], offsets: Vec::new() };
+    let section = Section { kind: Kind::Relaxation, frequency_hz: 0.01, loss: 0.0, gain: 0.0 };
+    for sensed in [Sensed::Deflection, Sensed::Rate, Sensed::Acceleration] {
+        let mut seen = run(&start, &nothing, None, SAMPLES);
+        seen.dynamics = Cow::Owned(Modal::sum(vec![section], sensed, false, 1.0));
+        let shown = outputs(&[seen]).remove(0);
+        for (k, y) in shown.iter().enumerate() {
+            let expected = (-section.omega() * k as f64).exp();
+            // exact between samples but for rounding
+            assert!((y - expected).abs() < 1e-12, "{sensed:?} {k}: {y} {expected}");
+        }
+    }
+}
