@@ -24,7 +24,7 @@ pub fn page(cause: &dyn Cause) -> String {
         about.parameters.iter().map(|p| format!(", {} = ...", p.name)).collect::<String>(),
     ));
     text.push_str(&format!(
-        "\n## Not told from\n\n{}\n\n## Resembles\n\n{}.\n\n## Next measurement\n\n{}.\n\n## Source\n\n{}\n",
+        "\n## Cannot be distinguished from\n\n{}\n\n## Resembles\n\n{}.\n\n## Next measurement\n\n{}.\n\n## Source\n\n{}\n",
         about.class.join(", "),
         capital(about.resembles),
         capital(about.next_measurement),
@@ -91,7 +91,7 @@ fn need_in_words(need: Need) -> &'static str {
         Need::Records => "several records",
         Need::OneChannel => "one channel",
         Need::OneRun => "one run at a time",
-        Need::ShortRun => "no more than 24,576 samples",
+        Need::ShortRun => "no long record",
     }
 }
 

@@ -14,4 +14,4 @@ pub use draw::{Draw, Kind, Planted, draw};
 pub use judge::{Judged, Said, judge};
 pub use limits::{LIMIT_GAIN, Limits, limit};
 pub use score::Score;
-pub use statistics::{clopper_pearson, uniformity};
+pub use statistics::uniformity;

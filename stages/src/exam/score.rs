@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::draw::{Kind, Planted};
 use super::judge::Judged;
-use super::statistics::{clopper_pearson, uniformity};
+use super::statistics::uniformity;
+use afmid_kernels::statistics::clopper_pearson;
 
 /// So many of so many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]

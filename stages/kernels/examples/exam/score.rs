@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use afmid_kernels::causes::built_in;
 use afmid_kernels::diagnosis::verdict::{Diagnosis, Verdict};
-use afmid_kernels::statistics::binomial_tail;
+use afmid_kernels::statistics::clopper_pearson;
 
 use super::draw::Hidden;
 use super::system::System;
@@ -111,7 +111,7 @@ pub fn table(asked: Asked, sat: &[Sat]) -> String {
         format!(
             "| {name} | {hits} of {of} ({:.1} %) | {:.1} % |\n",
             100.0 * hits as f64 / of.max(1) as f64,
-            100.0 * lower(hits, of)
+            100.0 * clopper_pearson(hits, of, 0.95).0
         )
     };
     let what = match asked {
@@ -144,14 +144,4 @@ pub fn table(asked: Asked, sat: &[Sat]) -> String {
     let at = |part: f64| seconds.get(((seconds.len() as f64 - 1.0) * part).max(0.0) as usize).copied().unwrap_or(0.0);
     let _ = write!(text, "\n{:.1} s a diagnosis (median), {:.1} s at most, several at a time", at(0.5), at(1.0));
     text
-}
-
-/// The lower end of Clopper and Pearson's two-sided 95 % interval of a share.
-fn lower(hits: usize, of: usize) -> f64 {
-    let (mut low, mut high) = (0.0, hits as f64 / of.max(1) as f64);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if binomial_tail(hits, of, middle) < 0.025 { low = middle } else { high = middle }
-    }
-    low
 }

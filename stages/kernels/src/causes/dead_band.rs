@@ -29,7 +29,7 @@ impl Cause for DeadBand {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (share, width) = (values[0], values[1].abs());
-        effects.optics.push(Passage::map(move |v| v - share * v.clamp(-width, width)));
+        effects.optics.push(Passage::map(move |v| v - share * v.max(-width).min(width)));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -3,14 +3,15 @@
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, Passage};
 
-/// From an instant on the signal is `1 + change` times as large.
+/// From an instant on the signal is `1 + change` times as large. Under a measured input only: in a free decay a loss that
+/// is larger for a while leaves the same.
 pub struct GainStep;
 
 const ABOUT: About = About {
     id: "gain-step",
     physics: "a contact, a range switch or the light changes within the record: the gain of detector or amplifier jumps",
     part: Part::Detector,
-    needs: &[Need::Run, Need::OneChannel, Need::OneRun, Need::ShortRun],
+    needs: &[Need::Input, Need::OneChannel, Need::OneRun, Need::ShortRun],
     parameters: &[
         Parameter { name: "change", unit: "1", meaning: "relative change of the gain", low: -0.9, high: 10.0 },
         Parameter {

@@ -29,7 +29,7 @@ impl Cause for InputDeadZone {
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (share, width) = (values[0], values[1].abs());
-        effects.input.push(Passage::map(move |u| u - share * u.clamp(-width, width)));
+        effects.input.push(Passage::map(move |u| u - share * u.max(-width).min(width)));
     }
 
     fn trials(&self, scene: &Scene) -> Vec<Vec<f64>> {

@@ -16,8 +16,10 @@ mod beta;
 mod gamma;
 mod half_sample_mode;
 mod median;
+mod share;
 
 pub use beta::{binomial_tail, f_tail, incomplete_beta, student_limit, student_two_sided};
 pub use gamma::{chi_square_tail, gamma_tail, ln_gamma, normal_two_sided};
 pub use half_sample_mode::half_sample_mode;
 pub use median::{median, median_and_scale};
+pub use share::clopper_pearson;

@@ -5,34 +5,8 @@ use std::ops::Range;
 use faer::Mat;
 use rayon::prelude::*;
 
+pub(crate) use crate::linear_algebra::dot_in_lanes as dot;
 use crate::linear_algebra::product;
-
-/// `a . b`.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    pulp::Arch::new().dispatch(Dot(a, b))
-}
-
-/// Partial sums of a product: their order is fixed whatever vector unit adds them.
-const SUMS: usize = 16;
-
-/// Carries the product to the vector units.
-struct Dot<'a>(&'a [f64], &'a [f64]);
-
-impl pulp::NullaryFnOnce for Dot<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn call(self) -> f64 {
-        let ((a, a_rest), (b, b_rest)) = (self.0.as_chunks::<SUMS>(), self.1.as_chunks::<SUMS>());
-        let mut sums = [0.0; SUMS];
-        for (a, b) in a.iter().zip(b) {
-            for i in 0..SUMS {
-                sums[i] += a[i] * b[i];
-            }
-        }
-        sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
-    }
-}
 
 /// Samples of columns that are multiplied at a time: a hundred columns of them stay in the cache.
 const CHUNK: usize = 1024;

@@ -126,15 +126,6 @@ impl Search<'_> {
     /// (1978) 461.
     pub fn run(&self, baseline: Fit) -> Choice {
         let mut best = self.from(vec![Judged::new(baseline, self.bench, &self.blocks)], None);
-        // a step somewhere in the record may stand for a law that is missing: it stays if the search without it does worse
-        let causes = best.ladder.last().map_or(&[][..], |last| &last.fit.model.causes);
-        if let Some(place) = causes.iter().position(|added| added.cause.sets_in().is_some()) {
-            let step = Candidate { cause: causes[place].cause, modes: causes[place].modes.clone() };
-            let without = self.from(best.ladder[..=place].to_vec(), Some(&step));
-            if without.unseen() < best.unseen() {
-                best = without;
-            }
-        }
         let rest = |choice: &Choice| choice.ladder.last().map(|last| misfit(self.bench, &last.fit, &self.blocks));
         if rest(&best).is_none_or(|misfit| misfit.ratio < MUCH.min(self.options.tolerated_misfit)) {
             return best;
