@@ -23,9 +23,12 @@ pub fn page(cause: &dyn Cause) -> String {
         about.id,
         about.parameters.iter().map(|p| format!(", {} = ...", p.name)).collect::<String>(),
     ));
+    let others: Vec<&str> = about.class.iter().copied().filter(|id| *id != about.id).collect();
+    if !others.is_empty() {
+        text.push_str(&format!("\n## Cannot be distinguished from\n\n{}\n", others.join(", ")));
+    }
     text.push_str(&format!(
-        "\n## Cannot be distinguished from\n\n{}\n\n## Resembles\n\n{}.\n\n## Next measurement\n\n{}.\n\n## Source\n\n{}\n",
-        about.class.join(", "),
+        "\n## Resembles\n\n{}.\n\n## Next measurement\n\n{}.\n\n## Source\n\n{}\n",
         capital(about.resembles),
         capital(about.next_measurement),
         about.source,

@@ -59,7 +59,7 @@ pub struct CausesDiagnose {
     #[schemars(inner(range(min = 1, max = 1_000_000)))]
     pub judged_hits: Vec<usize>,
     /// Highest frequency of `decays` that is looked at, Hz: what lies above is filtered out first, and the sample rate
-    /// lowered. Why: five modes are followed at most, and the causes of one are its own. 0: all.
+    /// lowered. Why: six modes are followed at most, and the causes of one are its own. 0: all.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub highest_hz: f64,
     /// What the output senses of the motion. None: what its unit says, accelerations (m/s^2, g) and rates (m/s, mm/s);
