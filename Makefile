@@ -1,5 +1,5 @@
 # The two commands: `make demo` runs the main job, `make test` runs the tests.
-.PHONY: deps test-deps demo test test-interop test-slurm lint book fuzz deny sbom
+.PHONY: deps test-deps demo test accuracy test-interop test-slurm lint book fuzz deny sbom
 
 CMAKE_VERSION = 3.31.6
 MDBOOK_VERSION = 0.5.4
@@ -28,6 +28,10 @@ demo: deps
 test: test-deps
 	cargo test --workspace --locked
 
+# All tests with their full Monte Carlo tables, where `make test` draws a part: before a release (docs/performance.md).
+accuracy: test-deps
+	AFMID_ACCURACY=1 cargo test --workspace --locked
+
 # afmid with other programs, which `make test` does without: a real Slurm of two emulated nodes (root; installs
 # slurm-wlm and munge with apt where they are missing), Snakemake, a model and a plugin under Octave, a plugin with
 # scikit-rf, a result in H5Web (octave, chromium, nodejs and npm with apt where they are missing; H5Web from
@@ -40,7 +44,7 @@ test-interop: test-slurm test-deps
 
 # The part of it that .ci/run calls where Slurm can be had.
 test-slurm: deps .tools/snakemake/installed
-	cargo test --workspace --locked --test submit
+	cargo test --workspace --locked --test commands --no-run
 	tests/cluster/workflow.sh target/debug/afmid .tools/snakemake/bin/snakemake
 	tests/cluster/slurm.sh target/debug/afmid .tools/snakemake/bin/snakemake
 
@@ -54,8 +58,9 @@ lint: deps
 book: .tools/mdbook/bin/mdbook
 	.tools/mdbook/bin/mdbook build
 
+# Not optimised: it has some hundred pages to make, and compiles in half the time.
 .tools/mdbook/bin/mdbook:
-	cargo install --quiet --locked --root .tools/mdbook --no-default-features --features search --version $(MDBOOK_VERSION) mdbook
+	CARGO_PROFILE_RELEASE_OPT_LEVEL=0 cargo install --quiet --locked --root .tools/mdbook --no-default-features --features search --version $(MDBOOK_VERSION) mdbook
 
 # Every fuzz target for SECONDS s each, from the corpus in fuzz/corpus; prints a table, fails if something is found.
 # Needs g++ (docs/reliability.md).

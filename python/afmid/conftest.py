@@ -1,5 +1,5 @@
 """A result file for tests and examples: AFMID_RESULT, written by the program AFMID from a free-lever config
-(tests/python_reader.rs makes both).
+(tests/commands/python_reader.rs makes both).
 """
 
 import json

@@ -63,6 +63,12 @@ pub fn path_with(first: &[PathBuf]) -> OsString {
     std::env::join_paths(first.iter().cloned().chain(std::env::split_paths(&path))).expect("a PATH")
 }
 
+/// How often a test draws: `few` in every run of the tests, `all` where the variable `AFMID_ACCURACY` is set
+/// (`make accuracy`, before a release).
+pub fn few_or_all<T>(few: T, all: T) -> T {
+    if std::env::var_os("AFMID_ACCURACY").is_some() { all } else { few }
+}
+
 /// The program with arguments, in a folder.
 pub fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_afmid"));

@@ -143,7 +143,6 @@ fn results_pages_models_and_figures_replace_their_own_kind_only_and_none_that_wa
     kept(here, "crate/config.toml", &["export-crate", "out.h5", "-o", "crate", "--with-data"]);
     kept(here, "crate/inputs/r0.h5", &["export-crate", "out.h5", "-o", "crate", "--with-data"]);
     kept(here, "man/afmid-run.1", &["man", "man"]);
-    kept(here, "docs/causes/piezo-ring.md", &["docs", "docs"]);
     let drawn = tempfile::tempdir().expect("a folder");
     let pictures = drawn.path().display().to_string();
     afmid(here, &["report", "out.h5", "-o", "page.html", "--figures", &pictures, "--png"]);

@@ -11,7 +11,7 @@
 //! - where there is no AVX2 with fused multiply-add, products of large matrices are summed in blocks that fit the
 //!   processor's caches: stated by size.
 //!
-//! Threads, memory and the order in which stages end change nothing (`tests/threads.rs`).
+//! Threads, memory and the order in which stages end change nothing (`tests/commands/threads.rs`).
 
 use blake3::Hasher;
 

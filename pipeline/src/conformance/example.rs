@@ -7,16 +7,28 @@ use crate::stage::{DynStage, Entry, Example, example_inputs, instance, run_examp
 /// Checks that there is an example, that each runs with the declared ports and makes the declared ports, and that the
 /// truth comes out.
 pub fn examples_hold(entry: &Entry) -> Vec<String> {
+    of_each_example(entry, |example| holds(entry, example).map(drop))
+}
+
+/// The same, run on one thread, and that a second run, on four threads, gives the same bits.
+pub fn examples_hold_and_repeat(entry: &Entry) -> Vec<String> {
+    of_each_example(entry, |example| {
+        let one = on_threads(1, || holds(entry, example))?;
+        let four = on_threads(4, || run_example(entry, example))?;
+        match difference(&one, &four) {
+            Some(place) => Err(format!("other numbers the second time, on four threads: {place}")),
+            None => Ok(()),
+        }
+    })
+}
+
+fn of_each_example(entry: &Entry, check: impl Fn(&Example) -> Result<(), String>) -> Vec<String> {
     let examples = entry.examples();
     if examples.is_empty() {
         return vec!["there is no example".to_owned()];
     }
-    let mut violations = Vec::new();
-    for example in &examples {
-        let outcome = holds(entry, example).err();
-        violations.extend(outcome.map(|why| format!("example {:?}: {why}", example.title)));
-    }
-    violations
+    let wrong = |example: &Example| check(example).err().map(|why| format!("example {:?}: {why}", example.title));
+    examples.iter().filter_map(wrong).collect()
 }
 
 /// Checks that a parameter nobody knows is refused by its name.
@@ -35,32 +47,15 @@ pub fn unknown_key_refused(entry: &Entry) -> Vec<String> {
     violations
 }
 
-/// Checks that each example gives the same bits twice, and on one thread as on four.
-pub fn repeatable(entry: &Entry) -> Vec<String> {
-    let mut violations = Vec::new();
-    for example in entry.examples() {
-        let runs = [1, 4, 4].map(|threads| on_threads(threads, || run_example(entry, &example)));
-        let [Ok(one), Ok(four), Ok(again)] = runs else {
-            violations.push(format!("example {:?} does not always run", example.title));
-            continue;
-        };
-        if let Some(place) = difference(&four, &again) {
-            violations.push(format!("example {:?} gives other numbers the second time: {place}", example.title));
-        } else if let Some(place) = difference(&one, &four) {
-            violations.push(format!("example {:?} gives other numbers on one thread: {place}", example.title));
-        }
-    }
-    violations
-}
-
-fn holds(entry: &Entry, example: &Example) -> Result<(), String> {
+/// What an example makes, once it is what the stage declares and the truth.
+fn holds(entry: &Entry, example: &Example) -> Result<Ports, String> {
     let inputs = example_inputs(entry, example)?;
     as_declared("input", entry.spec.inputs, &inputs)?;
     let stage = instance(entry, example)?;
     resolved_parameters_are_parameters(entry, stage.as_ref())?;
     let outputs = run_in_folder(stage.as_ref(), &inputs)?;
     as_declared("output", entry.spec.outputs, &outputs)?;
-    (example.expect)(&outputs).map(|_| ())
+    (example.expect)(&outputs).map(|_| outputs)
 }
 
 /// Every artifact is on a declared port, has its shape and is whole; every required port has one.

@@ -31,9 +31,3 @@ use afmid_pipeline::Entry;
 /// The stages of this domain.
 pub const STAGES: &[Entry] =
     &[Entry::of::<CausesDiagnose>(), Entry::of::<ReleaseDiagnose>(), Entry::of::<ReleaseReplay>()];
-
-#[cfg(test)]
-#[test]
-fn examples_hold() {
-    crate::ensemble::example::run_examples(STAGES);
-}

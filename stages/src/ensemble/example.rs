@@ -71,28 +71,3 @@ pub(crate) fn pair_of(response: &[f64], standard_error: Option<f64>, sets: &[Dat
         .add(pair)
     })
 }
-
-/// Runs all examples of a list of stages on one context each.
-#[cfg(test)]
-pub(crate) fn run_examples(stages: &[afmid_pipeline::Entry]) {
-    for entry in stages {
-        let examples = entry.examples();
-        assert!(!examples.is_empty(), "{}: no example", entry.spec.name);
-        for example in examples {
-            let params = afmid_pipeline::toml::from_str(example.params).unwrap();
-            let stage = entry.parse(params).unwrap();
-            assert!(stage.faults().is_empty(), "{:?}", stage.faults());
-            let cx = afmid_pipeline::Context::alone(7);
-            let outputs = stage.run(&(example.inputs)().unwrap(), &cx).unwrap();
-            for (name, artifact) in outputs.iter() {
-                artifact.validate().unwrap_or_else(|error| panic!("{}.{name}: {error}", entry.spec.name));
-            }
-            let names: Vec<&str> = outputs.iter().map(|(name, _)| name).collect();
-            let declared: Vec<&str> = entry.spec.outputs.iter().map(|port| port.name).collect();
-            assert_eq!(names, declared, "{}", entry.spec.name);
-            let said = (example.expect)(&outputs);
-            assert!(said.is_ok(), "{} `{}`: {said:?}", entry.spec.name, example.title);
-            println!("{}: {} {:?}", entry.spec.name, said.unwrap(), cx.into_warnings());
-        }
-    }
-}

@@ -32,9 +32,3 @@ pub const STAGES: &[Entry] = &[Entry::of::<Average>(), Entry::of::<Drift>()];
 
 #[cfg(test)]
 mod streaming_tests;
-
-#[cfg(test)]
-#[test]
-fn examples_hold() {
-    example::run_examples(STAGES);
-}

@@ -15,9 +15,3 @@ use afmid_pipeline::Entry;
 
 /// The stages of this domain.
 pub const STAGES: &[Entry] = &[Entry::of::<Extrapolation>(), Entry::of::<ForceReconstruction>()];
-
-#[cfg(test)]
-#[test]
-fn examples_hold() {
-    crate::ensemble::example::run_examples(STAGES);
-}

@@ -65,9 +65,3 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<Harmonics>(),
     Entry::of::<ContactFit>(),
 ];
-
-#[cfg(test)]
-#[test]
-fn examples_hold() {
-    crate::ensemble::example::run_examples(STAGES);
-}

@@ -42,9 +42,3 @@ pub const STAGES: &[Entry] = &[
     Entry::of::<Thermal>(),
     Entry::of::<Welch>(),
 ];
-
-#[cfg(test)]
-#[test]
-fn examples_hold() {
-    crate::ensemble::example::run_examples(STAGES);
-}

@@ -37,7 +37,7 @@ fn torment<F: Format>(name: &str, whole: &[u8], flips: usize) {
         let at = if cut < 100 { cut * 3 } else { random.below(whole.len()) };
         read_all::<F>(&path, &whole[..at.min(whole.len())]);
     }
-    for _ in 0..flips {
+    for _ in 0..support::few_or_all(flips / 4, flips) {
         let mut copy = whole.to_vec();
         // Half of the damage to the first kilobyte, where it hurts.
         for _ in 0..=random.below(6) {

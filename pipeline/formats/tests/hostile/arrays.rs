@@ -1,7 +1,7 @@
 //! Whatever the bytes: no panic, no endless loop, little memory.
 
 use crate::mat_builder::{Order, compressed, level4};
-use crate::support::{Random, Temporary, peak_bytes, real, written};
+use crate::support::{Random, Temporary, few_or_all, peak_bytes, real, written};
 use afmid_formats::RawBinary;
 use afmid_formats::SampleType;
 use afmid_formats::matlab::Mat;
@@ -37,14 +37,14 @@ fn try_all(ending: &str, bytes: &[u8]) {
     assert!(began.elapsed() < LONGEST);
 }
 
-/// Truncated at up to 200 places, and 400 times with up to 8 bytes changed.
+/// Truncated at up to 200 places, and 100 times (400 in `make accuracy`) with up to 8 bytes changed.
 fn damage(ending: &str, bytes: &[u8], seed: u64) {
     let mut random = Random(seed);
-    for number in 0..bytes.len().min(200) {
-        let length = if bytes.len() <= 200 { number } else { random.below(bytes.len()) };
+    for number in 0..bytes.len().min(few_or_all(80, 200)) {
+        let length = if bytes.len() <= few_or_all(80, 200) { number } else { random.below(bytes.len()) };
         try_all(ending, &bytes[..length]);
     }
-    for _ in 0..400 {
+    for _ in 0..few_or_all(100, 400) {
         let mut bytes = bytes.to_vec();
         // Headers are at the beginning, directories at the end: half of the changes are there.
         let reach = if random.below(2) == 0 { bytes.len() } else { bytes.len().min(400) };
@@ -98,7 +98,7 @@ fn built_files_do_no_harm() {
     ];
     let object = little.array(2, &[1, 1], "s", &[fields, parts.concat()].concat());
     let mut random = Random(4714);
-    for _ in 0..2000 {
+    for _ in 0..few_or_all(500, 2000) {
         let mut inside = object.clone();
         for _ in 0..=random.below(4) {
             let at = random.below(inside.len());

@@ -10,6 +10,7 @@ use super::verdict::{Diagnosis, Verdict};
 use super::{DiagnosisOptions, Record, Stretch, diagnose};
 use crate::causes::{Cause, built_in as find};
 use crate::effects::{Effects, Instant, Intersample, Motion};
+use crate::fixture::few_or_all;
 
 const SAMPLES: usize = 4096;
 const RATE_HZ: f64 = 1000.0;
@@ -162,14 +163,15 @@ fn names(diagnosis: &Diagnosis) -> Vec<String> {
     diagnosis.causes.iter().map(|cause| cause.id.clone()).collect()
 }
 
-/// Rounds of all causes; `AFMID_ROUNDS` raises it for the figures of docs/results/input-output.md.
-fn rounds(default: u64) -> u64 {
-    std::env::var("AFMID_ROUNDS").ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+/// Rounds of all causes: one, or two in `make accuracy`; `AFMID_ROUNDS` raises it for the figures of
+/// docs/results/input-output.md.
+fn rounds() -> u64 {
+    std::env::var("AFMID_ROUNDS").ok().and_then(|text| text.parse().ok()).unwrap_or(few_or_all(1, 2))
 }
 
 #[test]
 fn one_hidden_cause_is_named_with_its_parameters() {
-    let jobs: Vec<(u64, &str)> = (0..rounds(2))
+    let jobs: Vec<(u64, &str)> = (0..rounds())
         .flat_map(|round| IDS.iter().enumerate().map(move |(i, id)| (1000 * round + i as u64, *id)))
         .collect();
     let results: Vec<(bool, usize, usize)> = jobs
@@ -216,7 +218,7 @@ fn one_hidden_cause_is_named_with_its_parameters() {
 
 #[test]
 fn two_hidden_causes_are_both_named() {
-    let count = rounds(2) * 10;
+    let count = rounds() * 10;
     let results: Vec<bool> = (0..count)
         .into_par_iter()
         .map(|seed| {
@@ -243,7 +245,7 @@ fn two_hidden_causes_are_both_named() {
 
 #[test]
 fn nothing_hidden_is_clean() {
-    let count = rounds(2) * 20;
+    let count = rounds() * 20;
     let alarms: Vec<u64> = (0..count)
         .into_par_iter()
         .filter(|seed| {
@@ -269,7 +271,7 @@ fn a_cause_left_out_of_the_catalogue_is_unexplained() {
         ("output-saturation", vec![0.9, 0.8], &["output-saturation"]),
         ("intersample", vec![2.0], &["intersample"]),
     ];
-    let count = rounds(1) * 2;
+    let count = rounds();
     let jobs: Vec<(u64, usize)> = (0..count).flat_map(|seed| (0..left_out.len()).map(move |i| (seed, i))).collect();
     let results: Vec<bool> = jobs
         .par_iter()

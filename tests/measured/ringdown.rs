@@ -1,8 +1,6 @@
 //! The joint fit through configs: one event, the noise of its own record.
 
-mod common;
-
-use common::{afmid, config, lever_a, number, shown};
+use crate::common::{afmid, config, lever_a, number, shown};
 
 #[test]
 fn one_event_of_a_record_gives_its_modes_with_errors_that_hold() {

@@ -1,11 +1,9 @@
 //! Results open in the readers that people use: h5py, xarray, nxcheck.
 
-mod common;
-
 use std::path::Path;
 use std::process::Command;
 
-use common::{ROOT, afmid, config, files, python_bin, simulated};
+use crate::common::{ROOT, afmid, config, files, python_bin, simulated};
 
 #[test]
 fn h5py_xarray_and_nxcheck_read_a_result() {

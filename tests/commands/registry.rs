@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use afmid_pipeline::conformance::{documented, examples_hold, repeatable, unknown_key_refused};
+use afmid_pipeline::conformance::{documented, examples_hold_and_repeat, unknown_key_refused};
 use afmid_pipeline::reference::config_schema;
 use afmid_pipeline::{Entry, Registry};
 use serde_json::{Value, json};
@@ -29,18 +29,13 @@ fn every_stage_is_documented_under_its_headings() {
 }
 
 #[test]
-fn every_example_runs_with_the_declared_ports_and_gives_the_known_truth() {
-    every_stage(examples_hold);
+fn every_example_gives_the_known_truth_and_the_same_bits_twice_on_any_number_of_threads() {
+    every_stage(examples_hold_and_repeat);
 }
 
 #[test]
 fn every_stage_refuses_an_unknown_parameter_by_name() {
     every_stage(unknown_key_refused);
-}
-
-#[test]
-fn every_example_gives_the_same_bits_twice_and_on_any_number_of_threads() {
-    every_stage(repeatable);
 }
 
 #[test]

@@ -1,10 +1,8 @@
 //! What `afmid new pipeline` makes of names that mislead, of rates that contradict, and what it advises.
 
-mod common;
-
 use std::path::Path;
 
-use self::common::said;
+use crate::common::{self, said};
 
 fn refused(here: &Path, arguments: &[&str]) -> String {
     let output = common::command(here, arguments).output().expect("afmid starts");

@@ -1,10 +1,8 @@
 //! Thermal spectra, frequency responses and reconstructed forces: whole runs of the shipped configs.
 
-mod common;
-
 use std::path::Path;
 
-use common::{afmid, config, files, lever_a, number, numbers, shown};
+use crate::common::{self, afmid, config, files, lever_a, number, numbers, shown};
 
 /// The measured thermal spectrum, or none.
 fn stored_spectrum() -> Option<String> {

@@ -1,11 +1,9 @@
 //! The tutorials' commands run as they stand there, in the order of `docs/tutorials/README.md`.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{ROOT, path_with, python_bin};
+use crate::common::{ROOT, path_with, python_bin};
 
 /// The files that the tutorials' first page refers to, in its order.
 fn pages() -> Vec<PathBuf> {

@@ -1,13 +1,12 @@
 //! Batches: one bad data set stops no other, nothing is done twice, a kill loses nothing, shards add up.
 
-mod common;
-
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::common;
+use crate::common::sets::Here;
 use afmid_pipeline::store::compare;
-use common::sets::Here;
 
 fn results_in(folder: &Path) -> usize {
     let entries = std::fs::read_dir(folder).expect("the cache");

@@ -1,11 +1,9 @@
 //! The Python reader (python/afmid) on a result of this program: its examples and tests, and the notebooks of docs/.
 
-mod common;
-
 use std::path::Path;
 use std::process::Command;
 
-use common::{ROOT, afmid, config, files, python_bin, simulated};
+use crate::common::{ROOT, afmid, config, files, python_bin, simulated};
 
 #[test]
 fn the_python_reader_reads_what_afmid_shows_and_the_notebooks_run() {

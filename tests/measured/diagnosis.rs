@@ -1,10 +1,8 @@
 //! Archives with something hidden in them, diagnosed by the shipped config: the right names, the right numbers, and nothing where nothing is.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{ROOT, afmid, config, files, lever_a, number, shown};
+use crate::common::{ROOT, afmid, config, files, lever_a, number, shown};
 use serde_json::Value;
 
 /// A recorded archive, or one that afmid's own simulator makes with the same cause hidden, counted in the output.

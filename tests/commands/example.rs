@@ -1,14 +1,12 @@
 //! The example programs: a stage of one's own beside the built-in ones, a cause of one's own in the catalogue.
 
-mod common;
-
 use std::path::Path;
 use std::process::Command;
 
-use common::ROOT;
+use crate::common::{self, ROOT};
 
 /// What `afmid new stage --rust` begins with: its own test runs with these.
-#[path = "../examples/new_stage.rs"]
+#[path = "../../examples/new_stage.rs"]
 #[allow(dead_code, reason = "its main is the example's")]
 mod new_stage;
 

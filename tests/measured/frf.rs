@@ -1,11 +1,9 @@
 //! Frequency responses, read and estimated: whole runs.
 
-mod common;
-
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use common::{afmid, config, measured_page, number, shown};
+use crate::common::{self, afmid, config, measured_page, number, shown};
 
 /// A pole driven by noise in a table, with noise on the output.
 fn columns(folder: &Path) {

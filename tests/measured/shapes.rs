@@ -1,12 +1,10 @@
 //! Mode shapes in a program of others.
 
-mod common;
-
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
 
-use common::{afmid, config, shapes_read_by_pyuff};
+use crate::common::{self, afmid, config, shapes_read_by_pyuff};
 
 /// Frequency, damping ratio and shape over three channels.
 const MODES: [(f64, f64, [f64; 3]); 2] = [(60.0, 0.01, [1.0, 0.7, 0.2]), (170.0, 0.008, [0.8, -0.6, -0.5])];

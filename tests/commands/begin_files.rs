@@ -1,11 +1,9 @@
 //! Configs for files that do not all go together, and for channels that do not.
 
-mod common;
-
 use std::path::Path;
 use std::process::Command;
 
-use self::common::said;
+use crate::common::{self, said};
 use serde_json::Value;
 
 /// A decay of 0.05 cycles a sample and Q = 20 from sample 300 on, of this amplitude, with noise of a hundredth of 1.

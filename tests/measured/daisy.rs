@@ -1,10 +1,8 @@
 //! Measured input and output in columns: the daisy configs as shipped, judged on the half that was not fitted.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{afmid, config, number, shown};
+use crate::common::{self, afmid, config, number, shown};
 
 /// The folder with `daisy/NAME`, or a stand-in below `scratch` of as many columns: a resonance driven by noise, counted
 /// in the output.

@@ -1,14 +1,12 @@
 //! Where results come from: differences, traces, repetitions, crates, and what the cache keeps.
 
-mod common;
-
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::Output;
 use std::time::{Duration, SystemTime};
 
+use crate::common::{afmid, command, config, files, python_bin, simulated};
 use afmid_pipeline::recording::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native};
-use common::{afmid, command, config, files, python_bin, simulated};
 use serde_json::Value;
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {

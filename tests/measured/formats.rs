@@ -1,13 +1,11 @@
 //! The same archive in other formats gives the same events and modes; `afmid inspect` tells what files hold.
 
-mod common;
-
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use crate::common::{self, ROOT, afmid, command, config, numbers, shown, simulated};
 use afmid_pipeline::Record;
 use afmid_pipeline::recording::{InputFiles, Wanted, open_native};
-use common::{ROOT, afmid, command, config, numbers, shown, simulated};
 use serde_json::Value;
 
 /// Files of the archive: enough for an average on each half.

@@ -1,8 +1,6 @@
 //! The paper's archive, 26 files of 3 MS, through the paper's pipeline: every figure's numbers against what was put in.
 
-mod common;
-
-use common::{afmid, config, files, number, shown};
+use crate::common::{afmid, config, files, number, shown};
 use serde_json::Value;
 
 #[test]

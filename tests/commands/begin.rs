@@ -1,12 +1,10 @@
 //! Beginnings: configs for recordings, completions, manual pages, the doctor.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use common::measured_page;
-use common::sets::write_set;
+use crate::common::sets::write_set;
+use crate::common::{self, measured_page};
 use serde_json::Value;
 
 fn afmid(here: &Path, arguments: &[&str]) -> Output {

@@ -1,12 +1,10 @@
 //! Sweeps: what is not swept is computed once, points are runs like others, one bad point stops no other.
 
-mod common;
-
 use std::path::Path;
 
+use crate::common::sets::{CENSUS, write_set};
+use crate::common::{afmid, command, config, files, number, simulated};
 use afmid_pipeline::store::compare;
-use common::sets::{CENSUS, write_set};
-use common::{afmid, command, config, files, number, simulated};
 use serde_json::Value;
 
 /// Exit code, what `--json` printed, and stderr.

@@ -1,12 +1,10 @@
 //! Plugins on the command line: the examples in Python, a new stage, the conformance test. Octave's and scikit-rf's are
 //! in `make test-interop`.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use common::{ROOT, number, path_with, python_bin};
+use crate::common::{ROOT, number, path_with, python_bin};
 use serde_json::Value;
 
 /// afmid with `bin` of the working folder and the Python of `make test-deps` first on the PATH.
@@ -88,7 +86,7 @@ fn a_new_stage_in_rust_is_a_crate_that_cargo_understands() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
     stdout(here, &["new", "stage", "end_noise", "--rust", "--sources", ROOT]);
-    // the program itself is examples/new_stage.rs, which cargo has built and tests/example.rs runs
+    // the program itself is examples/new_stage.rs, which cargo has built and tests/commands/example.rs runs
     let metadata = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
         .current_dir(here.join("end_noise"))

@@ -1,12 +1,10 @@
 //! Measured data, diagnosed by the configs that ship: an oscillator, a decay, an axis, an oscillation, a circuit.
 
-mod common;
-
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use common::{afmid, config, number, shown};
+use crate::common::{self, afmid, config, number, shown};
 use serde_json::Value;
 
 /// The root of the measured data, or a stand-in below `scratch` that `write` makes, counted in the output.

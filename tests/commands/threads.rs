@@ -1,8 +1,6 @@
 //! Same program, config and data: the same bits on one thread and on many.
 
-mod common;
-
-use common::{afmid, config, files, simulated};
+use crate::common::{afmid, config, files, simulated};
 
 #[test]
 fn a_result_is_the_same_bit_for_bit_on_one_thread_and_on_four() {

@@ -1,8 +1,6 @@
 //! The main job on an archive of an independent simulator: free lever and surface-coupled lever against the truth.
 
-mod common;
-
-use common::{afmid, config, files, lever_a, number, shown};
+use crate::common::{afmid, config, files, lever_a, number, shown};
 
 #[test]
 fn the_free_lever_comes_out_of_ordinary_force_curves() {

@@ -3,8 +3,6 @@
 //!
 //! Here sbatch is a script that writes down what it was given; tests/cluster/slurm.sh does the same on a real Slurm.
 
-mod common;
-
 use std::ffi::OsStr;
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
@@ -12,7 +10,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use common::sets::Here;
+use crate::common::sets::Here;
 use serde_json::Value;
 
 /// An sbatch that keeps its arguments and its folder, and counts jobs from 41.

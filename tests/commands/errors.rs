@@ -1,13 +1,11 @@
 //! Every error as people see it: `tests/errors/NAME.toml` is a command with its files, `NAME.txt` what it says
 //! (`UPDATE_EXPECTED=1` writes these again: read them).
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use common::sets::write_record;
+use crate::common::sets::write_record;
 use serde::Deserialize;
 
 /// A command that goes wrong, and what lies in its folder.

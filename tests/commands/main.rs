@@ -1,0 +1,23 @@
+//! Every command as a user runs it: configs written, run, batched, swept, submitted, shown, reported; errors, plugins,
+//! provenance, the registry, the tutorials.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod batch;
+mod begin;
+mod begin_advice;
+mod begin_files;
+mod command_line;
+mod errors;
+mod example;
+mod plugins;
+mod provenance;
+mod python_reader;
+mod readers;
+mod registry;
+mod report;
+mod submit;
+mod sweep;
+mod threads;
+mod tutorials;
