@@ -60,7 +60,7 @@ fn score(args: &ExamArgs, stages: &dyn Stages) -> Result<Score, Failure> {
         };
         let one = sit(&drawn, args, stages, folder.path())?;
         interrupt::check()?;
-        say(&told(&one));
+        say(&line(&one));
         judged.push(one);
     }
     Ok(Score::new(judged))
@@ -75,7 +75,7 @@ fn kind(only: ExamKind) -> Kind {
     }
 }
 
-fn told(one: &Judged) -> String {
+fn line(one: &Judged) -> String {
     let hidden: Vec<String> =
         one.planted.iter().map(|planted| format!("{} {:.1}x", planted.id, planted.times_limit())).collect();
     let hidden = if hidden.is_empty() { "nothing".to_owned() } else { hidden.join(" + ") };
@@ -121,8 +121,8 @@ fn keep(drawn: &Draw, verdict: &Value, base: &Path, folder: &Path) -> Result<(),
         let copied = |temporary: &Path| std::fs::copy(entry.path(), temporary).map(|_| ());
         filled.replace_with(&name, |_| false, copied).map_err(|error| failed(&error))?;
     }
-    let told = serde_json::json!({ "draw": drawn, "diagnosis": verdict });
-    let text = serde_json::to_string_pretty(&told).map_err(|error| failed(&error))?;
+    let kept = serde_json::json!({ "draw": drawn, "diagnosis": verdict });
+    let text = serde_json::to_string_pretty(&kept).map_err(|error| failed(&error))?;
     filled.write("exam.json", |_| false, (text + "\n").as_bytes()).map_err(|error| failed(&error))
 }
 

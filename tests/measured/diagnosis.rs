@@ -55,6 +55,24 @@ fn nothing_is_found_where_nothing_is_hidden() {
     assert!(number(&found, "/p_value") > 0.01);
 }
 
+/// A pole that decays within a sample acts as a delay and a little feedthrough: the model's third pole, far from its
+/// nominal value, takes it, and no cause is named for it.
+#[test]
+fn a_detector_pole_beyond_the_nyquist_frequency_is_no_cause() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    for (seed, pole_hz) in [(31, "3.2e6"), (32, "6e6")] {
+        let archive = format!(
+            "[pipeline]\nname = 'archive'\n[[stage]]\nid = 'archive'\nuses = 'simulate.afm'\n[stage.params]\n\
+             out = 'archive-{seed}'\nseed = {seed}\nrecords = 10\nsamples = 200000\nsnap_offs = 10\nramp_hz = 2.79\n\
+             ramp_m = 4e-7\nsurface_m = -1e-7\ndetector_poles_hz = [1.3e6, 1.9e6, {pole_hz}]\n"
+        );
+        std::fs::write(scratch.path().join("archive.toml"), archive).expect("a config");
+        afmid(scratch.path(), &["run", "archive.toml", "-o", "s.h5", "--cache", "cache"]);
+        let found = diagnosed(scratch.path(), &scratch.path().join(format!("archive-{seed}")));
+        assert_eq!(found["verdict"], "clean", "{pole_hz} Hz: {found:#}");
+    }
+}
+
 #[test]
 fn a_bent_photodiode_is_named_with_its_strength() {
     let scratch = tempfile::tempdir().expect("a folder");

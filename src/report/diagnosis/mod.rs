@@ -1,9 +1,10 @@
 //! The story of a diagnosis on one page: what is wrong, the picture that gave it away, what every further cause bought.
 //!
 //! ```text
-//! told.rs (what a stage says) -> words.rs, overlay.rs, telling.rs + panels, tiles.rs, ladder.rs, modes.rs -> section.rs
+//! diagnosed.rs (what a stage says) -> words.rs, overlay.rs, telling.rs + panels, tiles.rs, ladder.rs, modes.rs -> section.rs
 //! ```
 
+mod diagnosed;
 mod ladder;
 mod modes;
 mod overlay;
@@ -11,7 +12,6 @@ mod panels;
 mod section;
 mod telling;
 mod tiles;
-mod told;
 mod words;
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
 //! What was measured with both models over it, and what they leave below.
 
-use super::told::{Curve, Told};
+use super::diagnosed::{Curve, Diagnosed};
 use crate::report::figure::{Axis, Band, Colour, Figure, Mark, Panel, Row, Stroke};
 
 pub(super) const MEASURED: &str = "measured";
 pub(super) const LINEAR: &str = "linear model";
 pub(super) const EXTENDED: &str = "extended model";
 
-/// Periods of the first mode that the overlay shows: more cannot be told apart on a page.
+/// Periods of the first mode that the overlay shows: more cannot be distinguished on a page.
 const PERIODS: f64 = 8.0;
 
 /// The line of either model, everywhere on the page.
@@ -16,12 +16,12 @@ pub(super) fn strokes(width: f64) -> [(&'static str, Stroke); 2] {
 }
 
 /// The overlay of the mean event, or of an output where it is largest.
-pub(super) fn figure(told: &Told<'_>) -> Option<Figure> {
-    let event = told.curve("time", "linear").is_some();
-    let measured = told.curve("time", "measured")?;
+pub(super) fn figure(diagnosed: &Diagnosed<'_>) -> Option<Figure> {
+    let event = diagnosed.curve("time", "linear").is_some();
+    let measured = diagnosed.curve("time", "measured")?;
     let models = if event { ["linear", "extended"] } else { ["before", "after"] };
-    let [linear, extended] = models.map(|name| told.curve("time", name));
-    let (low, high) = shown(told, measured, event)?;
+    let [linear, extended] = models.map(|name| diagnosed.curve("time", name));
+    let (low, high) = shown(diagnosed, measured, event)?;
     let unit = measured.unit;
     let (title, x) = if event {
         ("Mean event, weighted by amplitude", "Time after the release")
@@ -33,25 +33,25 @@ pub(super) fn figure(told: &Told<'_>) -> Option<Figure> {
     let m = measured.between(low, high);
     over = over.with(Mark::line(MEASURED, m.x, m.y, Stroke::solid(Colour::Ink, 2.6)));
     let mut rest = Panel::new("What the models leave of it", Axis::new(x, "s"), Axis::new("Residual", unit));
-    if let Some(band) = noise(told, m.x) {
+    if let Some(band) = noise(diagnosed, m.x) {
         rest = rest.with(band);
     }
     for ((series, stroke), model) in strokes(1.2).into_iter().zip([linear, extended]) {
-        let Some(model) = model.filter(|_| series == LINEAR || told.extended()) else { continue };
+        let Some(model) = model.filter(|_| series == LINEAR || diagnosed.extended()) else { continue };
         let model = model.between(low, high);
-        let dashed = Stroke { dashed: series == LINEAR && told.extended(), width: 1.4, ..stroke };
+        let dashed = Stroke { dashed: series == LINEAR && diagnosed.extended(), width: 1.4, ..stroke };
         over = over.with(Mark::line(series, model.x, model.y, dashed));
         let left: Vec<f64> = m.y.iter().zip(model.y).map(|(y, s)| y - s).collect();
         rest = rest.with(Mark::line(series, m.x, &left, stroke));
     }
-    let caption = caption(told, event);
-    let id = format!("diagnosis-{}-overlay", told.slug());
+    let caption = caption(diagnosed, event);
+    let id = format!("diagnosis-{}-overlay", diagnosed.slug());
     Some(Figure::new(&id, "Before and after", &caption).row(Row::one(230.0, over)).row(Row::one(150.0, rest)))
 }
 
-fn caption(told: &Told<'_>, event: bool) -> String {
+fn caption(diagnosed: &Diagnosed<'_>, event: bool) -> String {
     let what = if event {
-        let events = told.curve("event", "amplitude").map_or(0, |curve| curve.y.len());
+        let events = diagnosed.curve("event", "amplitude").map_or(0, |curve| curve.y.len());
         format!(
             "Mean of {events} events, each less its own offset and slope, put on one release to the sample; the first periods of the first mode."
         )
@@ -63,14 +63,14 @@ fn caption(told: &Told<'_>, event: bool) -> String {
     } else {
         " Below on its own scale."
     };
-    let models = if told.extended() { "" } else { " There is one model: nothing has been added." };
+    let models = if diagnosed.extended() { "" } else { " There is one model: nothing has been added." };
     format!("{what}{below}{models}")
 }
 
 /// Some periods of the first mode: from the release on, or round the largest output.
-fn shown(told: &Told<'_>, measured: Curve<'_>, event: bool) -> Option<(f64, f64)> {
+fn shown(diagnosed: &Diagnosed<'_>, measured: Curve<'_>, event: bool) -> Option<(f64, f64)> {
     let (first, last) = (*measured.x.first()?, *measured.x.last()?);
-    let periods = told.answer.modes_before.first().map(|mode| PERIODS / mode.frequency_hz);
+    let periods = diagnosed.answer.modes_before.first().map(|mode| PERIODS / mode.frequency_hz);
     let span =
         periods.filter(|span| span.is_finite() && *span > 0.0).unwrap_or(0.125 * (last - first)).min(last - first);
     if event {
@@ -83,8 +83,8 @@ fn shown(told: &Told<'_>, measured: Curve<'_>, event: bool) -> Option<(f64, f64)
 }
 
 /// Two standard errors of the mean event: the noise's density summed over all frequencies.
-fn noise(told: &Told<'_>, time: &[f64]) -> Option<Mark> {
-    let density = told.curve("frequency", "spectrum_noise")?;
+fn noise(diagnosed: &Diagnosed<'_>, time: &[f64]) -> Option<Mark> {
+    let density = diagnosed.curve("frequency", "spectrum_noise")?;
     let width = density.x.get(1)? - density.x.first()?;
     let deviation = 2.0 * (density.y.iter().sum::<f64>() * width).sqrt();
     Some(Mark::Band(Band {

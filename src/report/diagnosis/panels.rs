@@ -1,26 +1,26 @@
 //! The residuals' small multiples: by frequency, over time, event by event, by size.
 
+use super::diagnosed::{Curve, Diagnosed};
 use super::overlay::{EXTENDED, LINEAR, strokes};
-use super::told::{Curve, Told};
 use crate::report::figure::{Axis, Band, Colour, Mark, Marker, Panel, Points, Stroke};
 
 /// The spectrum of the residual with the places where causes show.
-pub(super) fn spectrum(told: &Told<'_>) -> Option<Panel> {
-    let before = told.curve("frequency", "spectrum_before")?;
+pub(super) fn spectrum(diagnosed: &Diagnosed<'_>) -> Option<Panel> {
+    let before = diagnosed.curve("frequency", "spectrum_before")?;
     let y = Axis::new("Density", before.unit).log();
     let x = Axis { label: "Frequency".to_owned(), ..Axis::frequency() };
     let mut panel = Panel::new("Spectrum of the residual", x, y);
     for (name, (series, stroke)) in ["spectrum_before", "spectrum_after"].into_iter().zip(strokes(1.0)) {
-        if let Some(density) = told.curve("frequency", name).filter(|_| series == LINEAR || told.extended()) {
+        if let Some(density) = diagnosed.curve("frequency", name).filter(|_| series == LINEAR || diagnosed.extended()) {
             panel = panel.with(Mark::line(series, density.x, &smoothed(density.y), stroke));
         }
     }
     for (name, series) in [("spectrum_noise", "noise level"), ("spectrum_output", "output")] {
-        if let Some(level) = told.curve("frequency", name) {
+        if let Some(level) = diagnosed.curve("frequency", name) {
             panel = panel.with(Mark::line(series, level.x, level.y, Stroke::solid(Colour::Ink, 1.1)));
         }
     }
-    Some(marks(told).into_iter().fold(panel, |panel, (at, label)| panel.with(Mark::at_x(at, &label))))
+    Some(marks(diagnosed).into_iter().fold(panel, |panel, (at, label)| panel.with(Mark::at_x(at, &label))))
 }
 
 /// Most bins on either side that a drawn density is averaged over, and the bins of which that is one: a periodogram
@@ -39,8 +39,8 @@ fn smoothed(density: &[f64]) -> Vec<f64> {
 }
 
 /// Modes, combinations of the first two, and frequencies that a named cause has.
-fn marks(told: &Told<'_>) -> Vec<(f64, String)> {
-    let modes: Vec<f64> = told.answer.modes_before.iter().map(|mode| mode.frequency_hz).collect();
+fn marks(diagnosed: &Diagnosed<'_>) -> Vec<(f64, String)> {
+    let modes: Vec<f64> = diagnosed.answer.modes_before.iter().map(|mode| mode.frequency_hz).collect();
     let mut out: Vec<(f64, String)> =
         modes.iter().enumerate().map(|(m, f)| (*f, format!("f{}", subscript(m + 1)))).collect();
     if let Some(first) = modes.first() {
@@ -51,7 +51,7 @@ fn marks(told: &Told<'_>) -> Vec<(f64, String)> {
             out.push((second + first, "f₂ + f₁".to_owned()));
         }
     }
-    for cause in &told.answer.causes {
+    for cause in &diagnosed.answer.causes {
         let own = cause.parameters.values().filter(|value| value.unit == "Hz").filter_map(|value| value.value);
         out.extend(own.map(|f| (f, cause.id.clone())));
     }
@@ -64,14 +64,16 @@ fn subscript(number: usize) -> String {
 }
 
 /// The residual over the whole window or record.
-pub(super) fn over_time(told: &Told<'_>) -> Option<Panel> {
-    let event = told.curve("time", "linear").is_some();
+pub(super) fn over_time(diagnosed: &Diagnosed<'_>) -> Option<Panel> {
+    let event = diagnosed.curve("time", "linear").is_some();
     let x = Axis::new(if event { "Time after the release" } else { "Time" }, "s");
-    let before = told.curve("time", "before")?;
+    let before = diagnosed.curve("time", "before")?;
     let mut panel = Panel::new("Residual over time", x, Axis::new("Residual", before.unit));
-    let measured = told.curve("time", "measured");
+    let measured = diagnosed.curve("time", "measured");
     for (name, (series, stroke)) in ["before", "after"].into_iter().zip(strokes(0.8)) {
-        let Some(curve) = told.curve("time", name).filter(|_| series == LINEAR || told.extended()) else { continue };
+        let Some(curve) = diagnosed.curve("time", name).filter(|_| series == LINEAR || diagnosed.extended()) else {
+            continue;
+        };
         // of a system the models are stored, of events their residuals
         let left: Vec<f64> = match measured.filter(|_| !event) {
             Some(measured) => measured.y.iter().zip(curve.y).map(|(y, s)| y - s).collect(),
@@ -83,9 +85,9 @@ pub(super) fn over_time(told: &Told<'_>) -> Option<Panel> {
 }
 
 /// The frequency that each event asks of the linear model.
-pub(super) fn detuning(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
-    let (shift, std) = (told.curve("event", "frequency_shift")?, told.curve("event", "frequency_shift_std")?);
-    let (x, axis) = abscissa(told, shift, by_amplitude)?;
+pub(super) fn detuning(diagnosed: &Diagnosed<'_>, by_amplitude: bool) -> Option<Panel> {
+    let (shift, std) = (diagnosed.curve("event", "frequency_shift")?, diagnosed.curve("event", "frequency_shift_std")?);
+    let (x, axis) = abscissa(diagnosed, shift, by_amplitude)?;
     let ppm = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| 1e6 * value).collect() };
     let (y, y_error) = (ppm(shift.y), ppm(std.y));
     let titles = (0..y.len()).map(|k| format!("event {}: {:.0} ± {:.0} ppm", k + 1, y[k], y_error[k])).collect();
@@ -98,26 +100,26 @@ pub(super) fn detuning(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
 }
 
 /// The mean residual where the recorded signal stood at one level.
-pub(super) fn by_level(told: &Told<'_>) -> Option<Panel> {
-    course(told, "level", "level", ["Residual by level", "Level at the converter", "Mean residual"])
+pub(super) fn by_level(diagnosed: &Diagnosed<'_>) -> Option<Panel> {
+    course(diagnosed, "level", "level", ["Residual by level", "Level at the converter", "Mean residual"])
 }
 
 /// The free level where the piezo stood at one position, nothing assumed of its course.
-pub(super) fn by_position(told: &Told<'_>) -> Option<Panel> {
-    course(told, "position", "free", ["Free level by position", "Position of the piezo", "Free level"])
+pub(super) fn by_position(diagnosed: &Diagnosed<'_>) -> Option<Panel> {
+    course(diagnosed, "position", "free", ["Free level by position", "Position of the piezo", "Free level"])
 }
 
 /// Values before and after with their errors along an axis; title, names of the axes.
-fn course(told: &Told<'_>, axis: &str, name: &str, [title, x, y]: [&str; 3]) -> Option<Panel> {
-    let before = told.curve(axis, &format!("{name}_before"))?;
+fn course(diagnosed: &Diagnosed<'_>, axis: &str, name: &str, [title, x, y]: [&str; 3]) -> Option<Panel> {
+    let before = diagnosed.curve(axis, &format!("{name}_before"))?;
     let mut panel = Panel::new(title, Axis::new(x, before.x_unit), Axis::new(y, before.unit));
     for (when, series, marker, colour) in
         [("before", LINEAR, Marker::Dot, Colour::Vermillion), ("after", EXTENDED, Marker::Ring, Colour::Blue)]
     {
-        let std = told.curve(axis, &format!("{name}_{when}_std"));
+        let std = diagnosed.curve(axis, &format!("{name}_{when}_std"));
         // causes of whole records are taken out without a rung of the ladder
-        let shown = series == LINEAR || told.extended() || !told.answer.causes.is_empty();
-        let rest = told.curve(axis, &format!("{name}_{when}")).filter(|_| shown);
+        let shown = series == LINEAR || diagnosed.extended() || !diagnosed.answer.causes.is_empty();
+        let rest = diagnosed.curve(axis, &format!("{name}_{when}")).filter(|_| shown);
         let Some((rest, std)) = rest.zip(std) else { continue };
         let (series, x, y, y_error) = (series.to_owned(), rest.x.to_vec(), rest.y.to_vec(), std.y.to_vec());
         panel = panel.with(Mark::Points(Points { series, x, y, y_error, titles: Vec::new(), marker, colour }));
@@ -126,15 +128,17 @@ fn course(told: &Told<'_>, axis: &str, name: &str, [title, x, y]: [&str; 3]) -> 
 }
 
 /// The rms residual of each event.
-pub(super) fn event_rms(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
-    let before = told.curve("event", "event_rms_before")?;
-    let (x, axis) = abscissa(told, before, by_amplitude)?;
+pub(super) fn event_rms(diagnosed: &Diagnosed<'_>, by_amplitude: bool) -> Option<Panel> {
+    let before = diagnosed.curve("event", "event_rms_before")?;
+    let (x, axis) = abscissa(diagnosed, before, by_amplitude)?;
     let mut panel = Panel::new("Each event's residual", axis, Axis::new("Rms residual", before.unit));
     for (name, series, marker, colour) in [
         ("event_rms_before", LINEAR, Marker::Dot, Colour::Vermillion),
         ("event_rms_after", EXTENDED, Marker::Ring, Colour::Blue),
     ] {
-        let Some(rms) = told.curve("event", name).filter(|_| series == LINEAR || told.extended()) else { continue };
+        let Some(rms) = diagnosed.curve("event", name).filter(|_| series == LINEAR || diagnosed.extended()) else {
+            continue;
+        };
         let (series, x, y) = (series.to_owned(), x.clone(), rms.y.to_vec());
         panel =
             panel.with(Mark::Points(Points { series, x, y, y_error: Vec::new(), titles: Vec::new(), marker, colour }));
@@ -142,9 +146,9 @@ pub(super) fn event_rms(told: &Told<'_>, by_amplitude: bool) -> Option<Panel> {
     Some(panel)
 }
 
-fn abscissa(told: &Told<'_>, of: Curve<'_>, by_amplitude: bool) -> Option<(Vec<f64>, Axis)> {
+fn abscissa(diagnosed: &Diagnosed<'_>, of: Curve<'_>, by_amplitude: bool) -> Option<(Vec<f64>, Axis)> {
     if by_amplitude {
-        let amplitude = told.curve("event", "amplitude")?;
+        let amplitude = diagnosed.curve("event", "amplitude")?;
         let (low, high) = padded(amplitude.y.iter().copied());
         return Some((amplitude.y.to_vec(), Axis::new("Amplitude of the event", amplitude.unit).limits(low, high)));
     }
@@ -162,12 +166,12 @@ fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// The error by the size of the output.
-pub(super) fn by_size(told: &Told<'_>) -> Option<Panel> {
-    let before = told.curve("output", "rms_before")?;
+pub(super) fn by_size(diagnosed: &Diagnosed<'_>) -> Option<Panel> {
+    let before = diagnosed.curve("output", "rms_before")?;
     let y = Axis::new("Rms error", before.unit).log();
     let mut panel = Panel::new("Error by the output's size", Axis::new("Output", before.x_unit), y);
     for (name, (series, stroke)) in ["rms_before", "rms_after"].into_iter().zip(strokes(1.6)) {
-        if let Some(curve) = told.curve("output", name).filter(|_| series == LINEAR || told.extended()) {
+        if let Some(curve) = diagnosed.curve("output", name).filter(|_| series == LINEAR || diagnosed.extended()) {
             panel = panel.with(Mark::line(series, curve.x, curve.y, stroke));
         }
     }
@@ -175,8 +179,8 @@ pub(super) fn by_size(told: &Told<'_>) -> Option<Panel> {
 }
 
 /// The error over the time of each part that judges.
-pub(super) fn parts(told: &Told<'_>) -> Vec<Panel> {
-    let Some(table) = told.table("part") else { return Vec::new() };
+pub(super) fn parts(diagnosed: &Diagnosed<'_>) -> Vec<Panel> {
+    let Some(table) = diagnosed.table("part") else { return Vec::new() };
     let columns =
         (table.text("part"), table.real("time_s"), table.real("output"), table.real("before"), table.real("after"));
     let (Ok(part), Ok(time), Ok(output), Ok(before), Ok(after)) = columns else { return Vec::new() };
@@ -199,7 +203,7 @@ pub(super) fn parts(told: &Told<'_>) -> Vec<Panel> {
         let y = Axis::new("Rms error", unit).log();
         let mut panel = Panel::new(&format!("Part “{name}”"), Axis::new("Time", "s"), y).with(Mark::Band(muted));
         for (values, (series, stroke)) in [before, after].into_iter().zip(strokes(1.2)) {
-            if series == LINEAR || told.extended() {
+            if series == LINEAR || diagnosed.extended() {
                 panel = panel.with(Mark::line(series, &x, &own(values), stroke));
             }
         }

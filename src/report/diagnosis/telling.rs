@@ -3,8 +3,8 @@
 use afmid_stages::causes::{self, Part};
 use afmid_stages::diagnosis::{Diagnosis, Verdict};
 
+use super::diagnosed::Diagnosed;
 use super::panels;
-use super::told::Told;
 use crate::report::figure::{Figure, Panel, Row};
 
 /// A view of the residual.
@@ -24,15 +24,15 @@ impl View {
     const ALL: [Self; 7] =
         [Self::Spectrum, Self::Time, Self::Sizes, Self::Events, Self::Amplitudes, Self::Levels, Self::Positions];
 
-    fn panel(self, told: &Told<'_>) -> Option<Panel> {
+    fn panel(self, diagnosed: &Diagnosed<'_>) -> Option<Panel> {
         match self {
-            Self::Spectrum => panels::spectrum(told),
-            Self::Time => panels::over_time(told),
-            Self::Events => panels::detuning(told, false),
-            Self::Amplitudes => panels::event_rms(told, true),
-            Self::Levels => panels::by_level(told),
-            Self::Positions => panels::by_position(told),
-            Self::Sizes => panels::by_size(told),
+            Self::Spectrum => panels::spectrum(diagnosed),
+            Self::Time => panels::over_time(diagnosed),
+            Self::Events => panels::detuning(diagnosed, false),
+            Self::Amplitudes => panels::event_rms(diagnosed, true),
+            Self::Levels => panels::by_level(diagnosed),
+            Self::Positions => panels::by_position(diagnosed),
+            Self::Sizes => panels::by_size(diagnosed),
         }
     }
 
@@ -92,22 +92,22 @@ pub(super) fn main_cause(answer: &Diagnosis) -> Option<&str> {
 }
 
 /// The views of the residual, the telling one first.
-pub(super) fn figure(told: &Told<'_>) -> Option<Figure> {
-    let cause = main_cause(&told.answer);
+pub(super) fn figure(diagnosed: &Diagnosed<'_>) -> Option<Figure> {
+    let cause = main_cause(&diagnosed.answer);
     let first = cause.map_or(View::Spectrum, telling);
     let order = std::iter::once(first).chain(View::ALL.into_iter().filter(|view| *view != first));
-    let mut panels = order.filter_map(|view| Some((view, view.panel(told)?)));
+    let mut panels = order.filter_map(|view| Some((view, view.panel(diagnosed)?)));
     let (shown, large) = panels.next()?;
     let small: Vec<(f64, Panel)> = panels.map(|(_, panel)| (1.0, panel)).collect();
     let reading = shown.reading();
     let rest = "The panels below are other views of the same residual.";
-    let caption = match (told.answer.verdict, cause) {
+    let caption = match (diagnosed.answer.verdict, cause) {
         (Verdict::Clean, _) => "Nothing stands out: the residual lies at the noise in every view.".to_owned(),
         (Verdict::Named, Some(id)) if shown == first => format!("What gave {id} away: {reading}. {rest}"),
         (Verdict::Named, _) => format!("Look for {reading}. {rest}"),
         (Verdict::Unexplained, _) => format!("What no cause accounts for. Look for {reading}. {rest}"),
     };
-    let id = format!("diagnosis-{}-telling", told.slug());
+    let id = format!("diagnosis-{}-telling", diagnosed.slug());
     let mut figure = Figure::new(&id, "The picture that gave it away", &caption).row(Row::one(270.0, large));
     // rows of equal length, three at most
     let in_row = small.len().div_ceil(small.len().div_ceil(3).max(1)).max(1);
@@ -118,14 +118,14 @@ pub(super) fn figure(told: &Told<'_>) -> Option<Figure> {
 }
 
 /// Errors over the time of the parts that judge.
-pub(super) fn parts(told: &Told<'_>) -> Option<Figure> {
-    let panels = panels::parts(told);
+pub(super) fn parts(diagnosed: &Diagnosed<'_>) -> Option<Figure> {
+    let panels = panels::parts(diagnosed);
     if panels.is_empty() {
         return None;
     }
     let caption =
         "Free-run error over the parts that added no name, each point the rms of a stretch; grey: the output itself.";
-    let id = format!("diagnosis-{}-parts", told.slug());
+    let id = format!("diagnosis-{}-parts", diagnosed.slug());
     Some(
         panels
             .into_iter()

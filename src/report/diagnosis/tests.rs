@@ -23,7 +23,7 @@ fn section(page: &str) -> String {
 }
 
 #[test]
-fn a_named_cause_is_told_with_its_numbers_and_figures() {
+fn a_named_cause_is_shown_with_its_numbers_and_figures() {
     let whole = page(&release(named()));
     let page = section(&whole);
     for text in [

@@ -2,7 +2,7 @@
 
 use afmid_pipeline::Table;
 
-use super::told::Told;
+use super::diagnosed::Diagnosed;
 use crate::report::figure::{Axis, Band, Colour, Figure, Mark, Panel, Row};
 
 /// Energy over the noise's from which on a tile is drawn, its word, its colour, and how many layers make it stand out.
@@ -15,14 +15,14 @@ const LEVELS: [(f64, &str, Colour, usize); 3] = [
 const CHANCE: f64 = 1e-3;
 
 /// One panel for each model.
-pub(super) fn figure(told: &Told<'_>) -> Option<Figure> {
-    let table = told.table("excess_before")?;
+pub(super) fn figure(diagnosed: &Diagnosed<'_>) -> Option<Figure> {
+    let table = diagnosed.table("excess_before")?;
     let mut panels = vec![(1.0, panel("Linear model", table, "before")?)];
-    if told.extended() {
+    if diagnosed.extended() {
         panels.push((1.0, panel("Extended model", table, "after")?));
     }
     let caption = "Energy of the residual common to all events over that of the noise, in tiles of time and frequency. Drawn is what noise does less than once in 1000 tiles.";
-    let id = format!("diagnosis-{}-tiles", told.slug());
+    let id = format!("diagnosis-{}-tiles", diagnosed.slug());
     Some(Figure::new(&id, "Time and frequency", caption).row(Row { height: 200.0, panels }))
 }
 

@@ -4,7 +4,7 @@ use afmid_pipeline::RunResult;
 use afmid_stages::causes;
 use afmid_stages::diagnosis::{Diagnosis, NamedCause, RunnerUp, Verdict};
 
-use super::told::told;
+use super::diagnosed::diagnoses;
 use crate::report::number::{UNKNOWN, number, quantity, rounded};
 use crate::report::view::{CauseView, Fact, Head, StoryView, TableView, Tile};
 
@@ -28,7 +28,7 @@ pub(crate) fn verdict_tiles(run: &RunResult) -> Vec<Tile> {
         };
         Tile { label: "diagnosis".to_owned(), value, note }
     };
-    told(run).iter().map(|told| tile(&told.answer)).collect()
+    diagnoses(run).iter().map(|diagnosed| tile(&diagnosed.answer)).collect()
 }
 
 fn counted(causes: usize) -> String {
@@ -103,7 +103,7 @@ fn facts(cause: &NamedCause) -> Vec<Fact> {
         Fact::new("residual there, without → with", format!("{} → {}", rms(gain.rms_before), rms(gain.rms_after))),
         Fact::new("gain of the log likelihood there", signed(gain.log_likelihood)),
         Fact::new("runner-up", cause.runner_up.as_ref().map_or_else(|| "none tried".to_owned(), runner_up)),
-        Fact::new("can't be told from", class),
+        Fact::new("can't be distinguished from", class),
     ];
     // whole records have channels without a held-out part
     facts.retain(|fact| {

@@ -1,16 +1,16 @@
 //! The catalogue of causes: the built-in ones of the kernels, those that others add, and their pages.
 
 mod catalogue;
-mod needs;
 mod page;
 
-pub use afmid_kernels::causes::{About, CATALOGUE, Cause, Identifiable, Need, Parameter, Part, Scene, within_limits};
+pub use afmid_kernels::causes::{
+    About, CATALOGUE, Cause, Identifiable, Need, Parameter, Part, Scene, releases_have, runs_have, within_limits,
+};
 pub use afmid_kernels::effects::{
     Added, DecayingLoad, Effects, ExtraMode, FrequencyChange, Instant, Intersample, LinearSection, ModalForce, Motion,
     Passage, RemainingLoad, SignalPath, StaticMap,
 };
 pub use catalogue::{CauseError, add, added, catalogue, find};
-pub use needs::{releases_have, runs_have};
 pub use page::{as_json, index, page};
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! The stage `diagnosis.causes`.
 
-use afmid_pipeline::config::nearest;
 use afmid_pipeline::{
     Array, Axis, Context, Document, Example, Faults, Port, Ports, Recording, Spec, Stage, StageError, Table,
 };
@@ -8,17 +7,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::causes_story::{error_array, error_table, ladder};
+use super::chosen::{check_ids, wanted};
+use super::runs::{Lowered, Restored};
 use super::{closed_loop, several_inputs, steady};
-use crate::artifacts::{DataSet, Decays, Pair};
-use crate::causes::{Cause, catalogue, runs_have};
+use crate::artifacts::{Decays, Pair};
 use afmid_kernels::diagnosis::verdict::Diagnosis;
-use afmid_kernels::diagnosis::{
-    Diagnosed, DiagnosisOptions, Part, PartStart, Record, Sensed, Story, Stretch, diagnose,
-};
-use afmid_kernels::signal::decimate;
+use afmid_kernels::diagnosis::{DiagnosisOptions, Sensed, Story};
 
-/// Says what a linear model gets wrong in a measured input and output, in free decays, in an axis under a controller,
-/// or in a steady oscillation: names the causes, extends the model, measures the gain.
+/// Says what a linear model gets wrong in a measured input and output, in free decays, in an axis under a
+/// controller, or in a steady oscillation: names the causes, extends the model, measures the gain.
 ///
 /// # Model
 /// Modes `q'' + (w/Q) q' + w^2 q = w^2 g u(t)` and real poles, as many as identification finds by itself, free-running
@@ -26,9 +23,9 @@ use afmid_kernels::signal::decimate;
 /// catalogue (`afmid causes`): stiffness, damping, friction and couplings of the modes, static maps of input and
 /// output, another course of the input between samples, offset, drift, lines. Without an input it is a free decay. With
 /// a `reference` the drive depends on the output: an axis `M v' + Fv v + Fc sgn v + F0 = G u` under a controller that
-/// is identified too, the loop simulated from its reference. `records` hold a steady oscillation: harmonics against a
-/// detector's static curves. Under several inputs no cause is tried: the answer is whether a linear model of all of
-/// them is adequate.
+/// is identified too, the loop simulated from its reference. `records` alone hold a steady oscillation: harmonics
+/// against a detector's static curves. Under several inputs no cause is tried: the answer is whether a linear model of
+/// all of them is adequate.
 /// # Method
 /// Least squares of the free-run error on what is learnt from; causes by score test, joint refits, F tests by blocks
 /// against the part of the residual that no general term predicts, corrected for all trials, each of which has to lower
@@ -39,7 +36,7 @@ use afmid_kernels::signal::decimate;
 /// hit where there are several; `errors` by frequency and by the output's size; `judged` by stretches of time of the
 /// parts.
 /// # Units
-/// Those of `pair` or `decays`; seconds, Hz.
+/// Those of `pair`, `decays` or `records`; seconds, Hz.
 /// # Accuracy
 /// Right names, errors and false alarms over many seeds, and measured benchmarks: docs/diagnosis.md.
 /// # Errors
@@ -80,6 +77,10 @@ pub struct CausesDiagnose {
     /// Why: six per cent of the squared residual; more on measured data whose noise is far below any model.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub tolerated_misfit: f64,
+    /// What a single law that no cause is may do beside the named ones, over what they do together, as root mean
+    /// squares. Why: names that miss more than a seventh of what they describe stand in for something else.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub tolerated_law: f64,
     /// Causes that are left out of the catalogue.
     pub without: Vec<String>,
     /// Most causes.
@@ -124,6 +125,7 @@ impl Default for CausesDiagnose {
             false_alarm_rate: options.false_alarm_rate,
             least_gain: options.least_gain,
             tolerated_misfit: options.tolerated_misfit,
+            tolerated_law: options.tolerated_law,
             most_causes: options.most_causes,
             candidates: Vec::new(),
             without: Vec::new(),
@@ -152,8 +154,8 @@ const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over
 impl Stage for CausesDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.causes",
-        version: 4,
-        summary: "names what a linear model gets wrong in inputs and outputs, decays, servo axes, steady oscillations",
+        version: 6,
+        summary: "names what a linear model gets wrong: inputs and outputs, decays, servo axes, steady oscillations",
         inputs: &[PAIR.spec(), DECAYS.spec(), RECORDS.spec()],
         outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec()],
         source: "J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28",
@@ -167,22 +169,7 @@ impl Stage for CausesDiagnose {
                 part.name, part.first, part.end
             )));
         }
-        let all = catalogue();
-        let known: Vec<&str> = all.iter().map(|cause| cause.about().id).collect();
-        for (list, ids) in [("candidates", &self.candidates), ("without", &self.without)] {
-            for id in ids.iter().filter(|id| !known.contains(&id.as_str())) {
-                let help = match nearest(id, known.iter().copied()) {
-                    Some(name) => format!("did you mean `{name}`?"),
-                    None => "`afmid causes` lists them".to_owned(),
-                };
-                faults.add(StageError::new(format!("`{list}` names `{id}`, which is no cause")).help(help));
-            }
-        }
-        if let Some(id) = self.candidates.iter().find(|id| self.without.contains(id)) {
-            faults.add(
-                StageError::new(format!("`{id}` is in `candidates` and in `without`")).help("leave it out of one"),
-            );
-        }
+        check_ids(&self.candidates, &self.without, faults);
     }
 
     fn depends_on(&self) -> Vec<String> {
@@ -233,57 +220,20 @@ impl Stage for CausesDiagnose {
     }
 
     fn examples() -> Vec<Example> {
-        super::example::examples()
+        vec![super::example::example()]
+    }
+}
+
+impl CausesDiagnose {
+    /// Whether a cause may be named.
+    pub(super) fn wants(&self, id: &str) -> bool {
+        wanted(id, &self.candidates, &self.without)
     }
 }
 
 /// Why what was taken off matters.
 const ZERO: &str = "where a spring, a sensor or a friction is straight is not known any more; set `remove = \"none\"` \
                     in io.columns";
-
-/// Input and output with the means that were taken off them: a curve has its zero where the record has.
-struct Restored {
-    input: Vec<f64>,
-    output: Vec<f64>,
-}
-
-/// Hits at a lower rate, without what lies above the frequencies that are looked at.
-struct Lowered {
-    hits: Vec<Vec<Vec<f64>>>,
-    rate_hz: f64,
-}
-
-impl Lowered {
-    /// None where all is looked at. Errors: hits shorter than the filter.
-    fn new(decays: &Decays<'_>, highest_hz: f64) -> Result<Option<Self>, StageError> {
-        let rate_hz = decays.sample_rate_hz;
-        let mut every = None;
-        let mut hits = Vec::new();
-        for hit in decays.hits.iter().filter(|_| highest_hz > 0.0) {
-            let mut rows = Vec::new();
-            for row in hit {
-                let lower = decimate(row, rate_hz, highest_hz).ok_or_else(|| {
-                    let wanted =
-                        format!("wanted more samples than the filter has, and a rate of 10 times {highest_hz} Hz");
-                    StageError::new(format!("`highest_hz`: {} samples at {rate_hz} Hz, {wanted}", row.len()))
-                        .help("take a higher `highest_hz` for short decays, or 0 for all frequencies")
-                })?;
-                every = Some(lower.every);
-                rows.push(lower.samples);
-            }
-            hits.push(rows);
-        }
-        Ok(every.map(|every| Self { hits, rate_hz: rate_hz / every as f64 }))
-    }
-}
-
-impl Restored {
-    fn new(pair: &Pair<'_>) -> Result<Self, StageError> {
-        let [input, output] = pair.levels().unwrap_or_default();
-        let with = |values: &[f64], level: f64| values.iter().map(|value| value + level).collect();
-        Ok(Self { input: with(pair.force(DataSet::All)?, input), output: with(pair.response(DataSet::All)?, output) })
-    }
-}
 
 /// What every way of diagnosing gives.
 pub(super) struct Answer {
@@ -292,155 +242,6 @@ pub(super) struct Answer {
     pub simulation: Array,
     /// Unit of the output.
     pub unit: String,
-}
-
-/// What was measured, as the kernel takes it.
-struct Measured<'a> {
-    records: Vec<Record<'a>>,
-    training: Vec<Stretch>,
-    parts: Vec<Part>,
-    interval_s: f64,
-    /// Whether each stretch has an offset of its own.
-    free_offsets: bool,
-    /// By channel.
-    sensed: Vec<Sensed>,
-    /// Whether all channels have one unit.
-    one_unit: bool,
-    output_unit: String,
-    input_unit: String,
-}
-
-impl CausesDiagnose {
-    /// A measured input and output.
-    fn forced<'a>(&self, pair: &Pair<'_>, whole: &'a Restored) -> Result<Measured<'a>, StageError> {
-        let (rate, input, output) = (pair.sample_rate_hz()?, &whole.input[..], &whole.output[..]);
-        let learnt = identification(pair, rate)?;
-        let [input_unit, output_unit] = pair.units()?.map(str::to_owned);
-        let part = |part: &JudgedPart| Part {
-            name: part.name.clone(),
-            stretch: Stretch { record: 0, first: part.first, end: part.end },
-            start: match part.state_samples {
-                0 => PartStart::GoesOn,
-                count => PartStart::FirstSamples(count),
-            },
-        };
-        Ok(Measured {
-            records: vec![Record { input, outputs: vec![output] }],
-            training: vec![Stretch { record: 0, first: learnt.start, end: learnt.end }],
-            parts: self.parts.iter().map(part).collect(),
-            interval_s: 1.0 / rate,
-            free_offsets: false,
-            sensed: vec![self.sensed(&output_unit)],
-            one_unit: true,
-            output_unit,
-            input_unit,
-        })
-    }
-
-    /// Free decays: all hits but the judged ones are learnt from.
-    fn decays<'a>(&self, decays: &Decays<'a>, lowered: Option<&'a Lowered>) -> Result<Measured<'a>, StageError> {
-        let of = |hit: &'a Vec<Vec<f64>>| Record { input: &[], outputs: hit.iter().map(Vec::as_slice).collect() };
-        let records: Vec<Record<'a>> = match lowered {
-            Some(lowered) => lowered.hits.iter().map(of).collect(),
-            None => decays.hits.iter().map(|hit| Record { input: &[], outputs: hit.clone() }).collect(),
-        };
-        if let Some(number) = self.judged_hits.iter().find(|number| !(1..=records.len()).contains(*number)) {
-            let found = StageError::new(format!("`judged_hits` names hit {number} of {}", records.len()));
-            return Err(found.help(format!("name hits from 1 to {}", records.len())));
-        }
-        let whole = |record: usize| Stretch { record, first: 0, end: records[record].samples() };
-        let judged = |number: &usize| Part {
-            name: format!("hit {number}"),
-            stretch: whole(number - 1),
-            start: PartStart::Whole,
-        };
-        let training = (0..records.len()).filter(|r| !self.judged_hits.contains(&(r + 1))).map(whole).collect();
-        Ok(Measured {
-            training,
-            parts: self.judged_hits.iter().map(judged).collect(),
-            records,
-            interval_s: 1.0 / lowered.map_or(decays.sample_rate_hz, |lowered| lowered.rate_hz),
-            free_offsets: true,
-            sensed: decays.sensors.iter().map(|sensor| self.sensed(&sensor.unit)).collect(),
-            one_unit: decays.sensors.windows(2).all(|pair| pair[0].unit == pair[1].unit),
-            output_unit: decays.sensors.first().map_or(String::new(), |sensor| sensor.unit.clone()),
-            input_unit: String::new(),
-        })
-    }
-
-    /// What a channel of that unit senses.
-    fn sensed(&self, unit: &str) -> Sensed {
-        self.senses.unwrap_or_else(|| Sensed::of_unit(unit))
-    }
-
-    /// Whether a cause may be named.
-    pub(super) fn wants(&self, id: &str) -> bool {
-        (self.candidates.is_empty() || self.candidates.iter().any(|wanted| wanted == id))
-            && !self.without.iter().any(|banned| banned == id)
-    }
-
-    /// The linear model of what was measured, extended.
-    fn extended(&self, measured: &Measured<'_>) -> Result<Answer, StageError> {
-        let options = self.options(measured);
-        let found = diagnose(&measured.records, measured.interval_s, &options).map_err(StageError::from_error)?;
-        Ok(Answer {
-            simulation: measured.simulation(&found),
-            diagnosis: found.diagnosis,
-            story: found.story,
-            unit: options.output_unit,
-        })
-    }
-
-    fn options(&self, measured: &Measured<'_>) -> DiagnosisOptions {
-        let usable = |cause: &&'static dyn Cause| {
-            let about = cause.about();
-            about.is_met(runs_have) && self.wants(about.id)
-        };
-        DiagnosisOptions {
-            training: measured.training.clone(),
-            parts: measured.parts.clone(),
-            false_alarm_rate: self.false_alarm_rate,
-            least_gain: self.least_gain,
-            tolerated_misfit: self.tolerated_misfit,
-            free_offsets: measured.free_offsets,
-            sensed: measured.sensed.clone(),
-            one_unit: measured.one_unit,
-            linear_fit: self.linear_fit,
-            most_causes: self.most_causes,
-            candidates: catalogue().into_iter().filter(usable).collect(),
-            output_unit: measured.output_unit.clone(),
-            input_unit: measured.input_unit.clone(),
-        }
-    }
-}
-
-impl Measured<'_> {
-    /// The largest stretch's first channel, measured and simulated.
-    fn simulation(&self, found: &Diagnosed) -> Array {
-        let channels = self.records.first().map_or(1, |record| record.outputs.len());
-        let mut begin = 0;
-        let mut largest = (0.0, 0..0, 0.0);
-        for stretch in &self.training {
-            let place = begin..begin + stretch.samples();
-            let size =
-                found.output[place.clone()].iter().filter(|y| y.is_finite()).fold(0.0, |m: f64, y| m.max(y.abs()));
-            if size > largest.0 {
-                largest = (size, place, stretch.first as f64 * self.interval_s);
-            }
-            begin += stretch.samples() * channels;
-        }
-        let (_, place, from) = largest;
-        let time = (0..place.len()).map(|k| from + k as f64 * self.interval_s).collect();
-        let part = |values: &[f64]| values[place.clone()].to_vec();
-        simulation(time, &self.output_unit, [part(&found.output), part(&found.before), part(&found.after)])
-    }
-}
-
-/// Samples of the identification stretch, counted from the first of all.
-pub(super) fn identification(pair: &Pair<'_>, rate_hz: f64) -> Result<std::ops::Range<usize>, StageError> {
-    let own = pair.own_time(DataSet::Identification)?;
-    let first = own.first().zip(pair.time()?.first()).map_or(0.0, |(a, b)| ((a - b) * rate_hz).round()) as usize;
-    Ok(first..first + own.len())
 }
 
 /// Measured, simulated by the linear model, simulated with the causes.

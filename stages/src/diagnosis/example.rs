@@ -1,4 +1,4 @@
-//! The example of `diagnosis.causes`: an oscillator with a cubic spring.
+//! The example of `diagnosis.causes` under an input: an oscillator with a cubic spring.
 
 use afmid_pipeline::{Array, Axis, Document, Example, Port, Ports};
 
@@ -9,14 +9,14 @@ const STIFFENING: f64 = 0.3;
 const SAMPLES: usize = 2048;
 const RATE_HZ: f64 = 1000.0;
 
-pub(super) fn examples() -> Vec<Example> {
-    vec![Example {
+pub(super) fn example() -> Example {
+    Example {
         title: "an oscillator of 80 Hz whose stiffness grows by 0.3 per square volt",
         params: "",
         inputs: || Ok(Ports::new().with(&PAIR, pair())),
         expect: |outputs| {
-            let told = |error: afmid_pipeline::StageError| error.to_string();
-            let found = &outputs.get(&SUMMARY).map_err(told)?.0;
+            let text = |error: afmid_pipeline::StageError| error.to_string();
+            let found = &outputs.get(&SUMMARY).map_err(text)?.0;
             let cause = &found["causes"][0];
             let k3 = &cause["parameters"]["k3"];
             let (value, std) = (k3["value"].as_f64().unwrap_or(f64::NAN), k3["std"].as_f64().unwrap_or(f64::NAN));
@@ -27,7 +27,7 @@ pub(super) fn examples() -> Vec<Example> {
                 Err(found.to_string())
             }
         },
-    }]
+    }
 }
 
 /// The oscillator under a held sum of sines in a little noise, by explicit Euler steps so short that their error is far

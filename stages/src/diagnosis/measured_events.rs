@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use afmid_pipeline::{Recording, StageError};
 
-use super::release::{Cut, EventWindow};
 use crate::artifacts::deflection;
+use afmid_kernels::diagnosis::release::{Cut, EventWindow};
 use afmid_kernels::effects::Instant;
 
 /// Room on either side of a window, within which its onset may move.

@@ -2,11 +2,10 @@
 
 mod causes_stage;
 mod causes_story;
+mod chosen;
 mod closed_loop;
 mod example;
 mod measured_events;
-pub mod records;
-pub mod release;
 mod release_example;
 mod release_model;
 mod release_stage;
@@ -16,6 +15,7 @@ mod replay_example;
 mod replay_stage;
 #[cfg(test)]
 mod replay_tests;
+mod runs;
 mod several_inputs;
 mod steady;
 

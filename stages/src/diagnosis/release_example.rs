@@ -3,9 +3,9 @@
 use afmid_pipeline::recording::Raw;
 use afmid_pipeline::{Array, Axis, Document, Example, Port, Ports, Recording, Shaped};
 
-use super::release::{Lever, LeverMode};
 use crate::io::{memory_channel, memory_record};
 use crate::simulate::example::{BEND, DETECTOR_POLE_HZ, MODES, NOISE_V, RATE_HZ, RECORDS};
+use afmid_kernels::diagnosis::release::{Lever, LeverMode};
 
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict");
 /// First sample after the release.
@@ -18,8 +18,8 @@ pub(super) fn examples() -> Vec<Example> {
         params: "modes = 2\ndetector_poles_hz = [1.5e6]\nwindow_samples = 4000",
         inputs: || Ok(inputs()),
         expect: |outputs| {
-            let told = |error: afmid_pipeline::StageError| error.to_string();
-            let found = &outputs.get(&SUMMARY).map_err(told)?.0;
+            let text = |error: afmid_pipeline::StageError| error.to_string();
+            let found = &outputs.get(&SUMMARY).map_err(text)?.0;
             let cause = &found["causes"][0];
             let a2 = &cause["parameters"]["a2"];
             let (value, std) = (a2["value"].as_f64().unwrap_or(f64::NAN), a2["std"].as_f64().unwrap_or(f64::NAN));

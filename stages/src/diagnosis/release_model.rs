@@ -3,34 +3,26 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use super::release::{JointFit, Naming, Problem};
 use crate::causes::find;
 use crate::simulate::{
     Estimated, LeverModel, LinearPart, ModelAmplitude, ModelCause, ModelMode, ModelNoise, ModelThermal, ModelWander,
 };
-use afmid_kernels::diagnosis::verdict::{Diagnosis, NamedCause, Verdict};
+use afmid_kernels::diagnosis::release::{Cut, DiagnosedReleases, JointFit, LeverMode};
+use afmid_kernels::diagnosis::verdict::NamedCause;
+use afmid_kernels::ringdown::RingdownNoise;
 
 /// Baseline, extension and noise as an artifact; the extension is that of the answer: none unless causes are named.
-pub(super) fn lever_model(
-    problem: &Problem<'_>,
-    naming: &Naming,
-    found: &Diagnosis,
-    records: usize,
-) -> Option<LeverModel> {
-    let baseline = naming.fits.first()?;
-    let extended = match found.verdict {
-        Verdict::Named => naming.fits.last()?,
-        Verdict::Clean | Verdict::Unexplained => baseline,
-    };
-    Some(LeverModel {
-        sample_rate_hz: 1.0 / problem.cut.interval_s,
+pub(super) fn lever_model(found: &DiagnosedReleases, cut: &Cut, records: usize) -> LeverModel {
+    let extended = found.extended.as_ref().unwrap_or(&found.baseline);
+    LeverModel {
+        sample_rate_hz: 1.0 / cut.interval_s,
         records,
-        baseline: linear(baseline),
+        baseline: linear(&found.baseline),
         extended: linear(extended),
-        causes: found.causes.iter().filter_map(cause).collect(),
-        noise: noise(problem),
+        causes: found.diagnosis.causes.iter().filter_map(cause).collect(),
+        noise: noise(&found.noise),
         amplitude: amplitude(extended),
-    })
+    }
 }
 
 /// Lever and detector with errors from the fit's covariance: ln w and ln Q per mode, shares of all modes but the first,
@@ -52,7 +44,7 @@ fn linear(fitted: &JointFit) -> LinearPart {
         };
         Estimated { value, std }
     };
-    let mode = |(m, mode): (usize, &super::release::LeverMode)| ModelMode {
+    let mode = |(m, mode): (usize, &LeverMode)| ModelMode {
         frequency_hz: relative(mode.omega / TAU, 2 * m),
         quality_factor: relative(mode.quality_factor, 2 * m + 1),
         share: share(m, mode.share),
@@ -86,8 +78,7 @@ fn cause(named: &NamedCause) -> Option<ModelCause> {
     Some(ModelCause { id: named.id.clone(), parameters, assumed })
 }
 
-fn noise(problem: &Problem<'_>) -> ModelNoise {
-    let noise = &problem.noise;
+fn noise(noise: &RingdownNoise) -> ModelNoise {
     let thermal = noise.thermal.iter();
     let wander = noise.wander.iter();
     ModelNoise {

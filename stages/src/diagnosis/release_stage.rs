@@ -7,22 +7,17 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::causes_story::ladder;
+use super::chosen::{check_ids, wanted};
 use super::measured_events::{check_cut, cut_out};
-use super::records::{
-    Begun, CHANNELS, JudgeOptions, RecordEvent, RecordInput, RecordSign, RecordSummary, Resonance, abstentions,
-    summarise, without_droop,
-};
-use super::release::{
-    Cut, EventWindow, Lever, LeverMode, Naming, NamingOptions, Prepared, Problem, answer, name_causes, start, story,
-    without_lines,
-};
 use super::release_model::lever_model;
 use super::release_story::{residual_array, tile_table};
 use crate::artifacts::{Ensemble, deflection, piezo};
-use crate::causes::{added, catalogue, find};
+use crate::causes::{added, catalogue};
 use crate::model::ModeNumber;
 use crate::simulate::LEVER_MODEL;
-use afmid_kernels::diagnosis::verdict::Verdict;
+use afmid_kernels::diagnosis::records::{RecordEvent, RecordInput, RecordSummary, summarise};
+use afmid_kernels::diagnosis::release::{Cut, EventWindow, ReleaseOptions, Releases, diagnose};
 use afmid_kernels::events::EventKind;
 
 /// Says what a linear lever and detector get wrong in snap-off events: names the causes, extends the model, measures
@@ -34,7 +29,7 @@ use afmid_kernels::events::EventKind;
 /// # Method
 /// Whole records first: codes, lines, piezo position. Then the events, jointly: score screen of all causes with the
 /// joint distribution of all scores, the strongest fitted in full, judged on held-out halves and against the best of
-/// another class, greedily; names that later ones make needless are taken back. At last three tests for causes outside
+/// another class, greedily; names that later ones make superfluous are taken back. At last three tests for causes outside
 /// the catalogue: of the residual common to all events, of the events' own frequencies, and whether a named strength
 /// changes with the amplitude. Foreign lines that the records show are taken off the events where these don't end
 /// clean.
@@ -72,8 +67,10 @@ pub struct ReleaseDiagnose {
     /// Probability of any other verdict than `clean` where nothing is wrong.
     #[schemars(range(min = 1e-6, max = 0.5))]
     pub false_alarm_rate: f64,
-    /// Causes that are not considered, by id.
+    /// Causes that are left out of the catalogue, by id.
     pub without: Vec<String>,
+    /// Ids of the causes that are tried. Empty: all that releases can show.
+    pub candidates: Vec<String>,
     /// Most causes named from the events' shapes.
     #[schemars(range(min = 1, max = 8))]
     pub most_causes: usize,
@@ -92,7 +89,8 @@ impl Default for ReleaseDiagnose {
             detector_pole_std: 0.15,
             false_alarm_rate: 0.01,
             without: Vec::new(),
-            most_causes: 4,
+            candidates: Vec::new(),
+            most_causes: 8,
             piezo_m_per_unit: 1e-8,
         }
     }
@@ -102,6 +100,7 @@ const RECORDS: Port<Recording> =
     Port::new("records", "records", "records with channel `deflection`, `piezo` if there is one");
 const ENSEMBLE: Port<Array> = Port::new("ensemble", "ensemble", "snap-off events of these records");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "the verdict: causes, evidence, gains, ladder");
+const LADDER: Port<Table> = Port::new("ladder", "model-ladder", "models, each with one more cause");
 const RESIDUALS: Port<Array> = Port::new(
     "residuals",
     "diagnosis-residuals",
@@ -109,23 +108,19 @@ const RESIDUALS: Port<Array> = Port::new(
 );
 const TILES: Port<Table> =
     Port::new("tiles", "diagnosis-tiles", "energy of the residual common to all events over time and frequency");
-
 const MODEL: Port<Document> =
     Port::new("model", LEVER_MODEL, "lever, detector, noise and named causes: what later configs simulate with");
 
 /// Samples of free stretches that the noise is estimated from: 24 MB.
 const FREE_SAMPLES: usize = 3_000_000;
-/// Shares of the false-alarm rate: shapes of the events, each channel of the records.
-const SHAPES_SHARE: f64 = 0.5;
-const CHANNEL_SHARE: f64 = 0.5 / CHANNELS as f64;
 
 impl Stage for ReleaseDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.release",
-        version: 12,
+        version: 13,
         summary: "names what a linear lever and detector get wrong in snap-off events",
         inputs: &[RECORDS.spec(), ENSEMBLE.spec()],
-        outputs: &[SUMMARY.spec(), RESIDUALS.spec(), TILES.spec(), MODEL.spec()],
+        outputs: &[SUMMARY.spec(), LADDER.spec(), RESIDUALS.spec(), TILES.spec(), MODEL.spec()],
         seeded: true,
         source: "C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50",
         ..Spec::STORED
@@ -136,10 +131,7 @@ impl Stage for ReleaseDiagnose {
         faults.require((1..=12).contains(&modes), || format!("`modes` is {modes}, wanted 1 to 12"));
         faults.require((1..=8).contains(&poles), || format!("`detector_poles_hz` has {poles}, wanted 1 to 8"));
         faults.take(check_cut(self.window_samples, self.before_samples));
-        for id in self.without.iter().filter(|id| find(id).is_none()) {
-            let unknown = StageError::new(format!("`without` names `{id}`, which is no cause"));
-            faults.add(unknown.help("`afmid causes` lists them"));
-        }
+        check_ids(&self.candidates, &self.without, faults);
     }
 
     fn depends_on(&self) -> Vec<String> {
@@ -151,70 +143,33 @@ impl Stage for ReleaseDiagnose {
         let rate = ensemble.sample_rate_hz()?;
         let cut = Cut { before: self.before_samples, samples: self.window_samples, interval_s: 1.0 / rate };
         let onsets = ensemble.places()?;
-        let mut windows = self.windows(recording, &onsets, &cut)?;
-        let summaries = self.record_summaries(recording, &onsets, rate)?;
-        let (summaries, free): (Vec<RecordSummary>, Vec<Vec<f64>>) = summaries.into_iter().unzip();
-        let mut options =
-            JudgeOptions { false_alarm_rate: CHANNEL_SHARE * self.false_alarm_rate, ..JudgeOptions::default() };
-        let begun = Begun::judge(&summaries, &options);
-        let mut free = free;
-        if let Some(corner_hz) = begun.coupling_hz().filter(|_| self.may_name("ac-coupling")) {
-            // the lever's own motion is before the capacitor: no event can tell this slow droop from its own slope
-            windows.iter_mut().for_each(|w| w.values = without_droop(&w.values, corner_hz, cut.interval_s));
-            let whole = |record: &Vec<f64>| -> Vec<f64> {
-                let parts = record.chunks_exact(self.window_samples);
-                parts.flat_map(|part| without_droop(part, corner_hz, cut.interval_s)).collect()
-            };
-            free = free.iter().map(whole).collect();
-        }
-        let lent: Vec<&[f64]> = free.iter().flat_map(|record| record.chunks_exact(self.window_samples)).collect();
-        let poles: Vec<f64> = self.detector_poles_hz.iter().map(|f| std::f64::consts::TAU * f).collect();
-        let naming_options = NamingOptions {
-            false_alarm_rate: SHAPES_SHARE * self.false_alarm_rate,
-            without: self.without.clone(),
-            most: self.most_causes,
+        let windows = self.windows(recording, &onsets, &cut)?;
+        let (summaries, free) = self.record_summaries(recording, &onsets, rate)?.into_iter().unzip();
+        let options = ReleaseOptions {
+            modes: self.mode_number(),
+            detector_poles_hz: self.detector_poles_hz.clone(),
+            detector_pole_std: self.detector_pole_std,
+            false_alarm_rate: self.false_alarm_rate,
+            most_causes: self.most_causes,
+            candidates: catalogue()
+                .into_iter()
+                .filter(|cause| wanted(cause.about().id, &self.candidates, &self.without))
+                .collect(),
             seed: cx.seed(),
-            ..NamingOptions::default()
         };
-        let mut lines_are_off = false;
-        loop {
-            let begin = start(&windows, &lent, &cut, self.mode_number(), &poles).map_err(StageError::from_error)?;
-            let problem = Problem {
-                windows: &windows,
-                cut,
-                noise: begin.noise,
-                nominal_poles: poles.clone(),
-                pole_std: self.detector_pole_std,
-                seen: begin.seen,
-                prepared: Prepared::default(),
-            };
-            let naming = name_causes(&problem, begin.state, begin.starts, &catalogue(), &naming_options)
-                .map_err(StageError::from_error)?;
-            // only the lever's own: a foreign line may ring with them through every event
-            options.resonances = naming.fits.first().map_or_else(Vec::new, |fit| resonances(&fit.state.lever));
-            let signs = begun.clone().finish(&summaries, &options);
-            if naming.verdict != Verdict::Clean && !std::mem::replace(&mut lines_are_off, true) {
-                let lines: Vec<f64> = signs.iter().filter_map(RecordSign::line_hz).collect();
-                if let Some(less) = without_lines(&problem, &naming.fits[0], &lines) {
-                    windows = less;
-                    continue;
-                }
-            }
-            return self.ports(&problem, &naming, signs, &begun, &summaries);
-        }
+        let releases = Releases { windows, cut, summaries, free };
+        let found = diagnose(&releases, &options).map_err(StageError::from_error)?;
+        Ok(Ports::new()
+            .with(&SUMMARY, Document::new(&found.diagnosis)?)
+            .with(&LADDER, ladder(&found.diagnosis))
+            .with(&RESIDUALS, residual_array(&found.story, &cut, &found.course))
+            .with(&TILES, tile_table(&found.story))
+            .with(&MODEL, Document::new(&lever_model(&found, &cut, releases.summaries.len()))?))
     }
 
     fn examples() -> Vec<Example> {
         super::release_example::examples()
     }
-}
-
-fn resonances(lever: &Lever) -> Vec<Resonance> {
-    let one = |mode: &LeverMode| Resonance {
-        frequency_hz: mode.omega / std::f64::consts::TAU,
-        quality_factor: mode.quality_factor,
-    };
-    lever.modes.iter().map(one).collect()
 }
 
 impl ReleaseDiagnose {
@@ -247,34 +202,6 @@ impl ReleaseDiagnose {
             .help("shorten `window_samples`, or look for more events"));
         }
         Ok(windows)
-    }
-
-    /// What the diagnosis hands on.
-    fn ports(
-        &self,
-        problem: &Problem<'_>,
-        naming: &Naming,
-        signs: Vec<RecordSign>,
-        begun: &Begun,
-        summaries: &[RecordSummary],
-    ) -> Result<Ports, StageError> {
-        let (signs, left_out): (Vec<RecordSign>, Vec<RecordSign>) =
-            signs.into_iter().partition(|sign| self.may_name(sign.id));
-        let mut found = answer(problem, naming, &signs, &left_out, self.false_alarm_rate);
-        let not_asked = abstentions(summaries).into_iter().filter(|one| self.may_name(one.id));
-        found.evidence.extend(not_asked.map(|one| format!("not looked for: {}, since {}", one.id, one.reason)));
-        let story = story(problem, naming).ok_or_else(|| StageError::new("the search ended without a fit"))?;
-        let model = lever_model(problem, naming, &found, summaries.len())
-            .ok_or_else(|| StageError::new("the diagnosis ended without any fit"))?;
-        Ok(Ports::new()
-            .with(&SUMMARY, Document::new(&found)?)
-            .with(&RESIDUALS, residual_array(&story, &problem.cut, begun.course()))
-            .with(&TILES, tile_table(&story))
-            .with(&MODEL, Document::new(&model)?))
-    }
-
-    fn may_name(&self, cause: &str) -> bool {
-        !self.without.iter().any(|id| id == cause)
     }
 
     /// Every record's summary, and whole windows of its free stretches one after the other.

@@ -2,8 +2,8 @@
 
 use afmid_pipeline::{Array, Axis, Table};
 
-use super::records::PositionCourse;
-use super::release::{Cut, EventStory, LevelStory, Story};
+use afmid_kernels::diagnosis::records::PositionCourse;
+use afmid_kernels::diagnosis::release::{Cut, EventStory, LevelStory, Story};
 
 /// Residuals, spectra and numbers of single events.
 pub(super) fn residual_array(story: &Story, cut: &Cut, course: &[PositionCourse]) -> Array {

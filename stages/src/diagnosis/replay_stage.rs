@@ -8,10 +8,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::measured_events::{check_cut, cut_out};
-use super::release::{Cut, EventWindow};
 use super::replay::{ReplayedEvent, Replayer};
 use crate::artifacts::{Ensemble, deflection, piezo};
 use crate::simulate::{LeverModel, MODEL};
+use afmid_kernels::diagnosis::release::{Cut, EventWindow};
 use afmid_kernels::effects::Instant;
 
 /// Simulates every measured snap-off again, by the lever alone and with the named causes, and shows what either leaves.

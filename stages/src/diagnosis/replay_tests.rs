@@ -6,11 +6,11 @@ use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Axis, Context, Document, Port, Ports, Recording, Stage};
 use serde_json::Value;
 
-use super::release::{Cut, EventWindow};
 use super::replay::Replayer;
 use super::{ReleaseDiagnose, ReleaseReplay};
 use crate::causes::find;
 use crate::simulate::{Afm, AfmOfModel, Hidden, LeverModel, MODEL};
+use afmid_kernels::diagnosis::release::{Cut, EventWindow};
 use afmid_kernels::effects::Instant;
 use afmid_kernels::simulate::{Cut as SimulatedCut, Place};
 
@@ -20,7 +20,7 @@ const TRUTH: Port<Document> = Port::new("truth", "truth", "truth");
 const SUMMARY: Port<Document> = Port::new("summary", "summary", "summary");
 const RATE_HZ: f64 = 5e6;
 
-/// Records of a simulation and its counted snap-offs, each told to half a sample.
+/// Records of a simulation and its counted snap-offs, each placed to half a sample.
 fn wired(simulated: &Ports) -> Ports {
     let truth = &simulated.get(&TRUTH).expect("truth").0;
     let (mut records, mut onsets) = (Vec::new(), Vec::new());

@@ -3,7 +3,8 @@
 use afmid_kernels::diagnosis::{Story, halves, linear_only};
 use afmid_pipeline::{Context, StageError};
 
-use super::causes_stage::{Answer, CausesDiagnose, identification, simulation};
+use super::causes_stage::{Answer, CausesDiagnose, simulation};
+use super::runs::identification;
 use crate::artifacts::Pair;
 use crate::watched::Watched;
 

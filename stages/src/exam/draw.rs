@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::levers::lever;
 use super::limits::{Count, Limits, limit};
 use crate::causes::{About, Cause, Identifiable, Parameter, Scene, releases_have};
+use crate::diagnosis::ReleaseDiagnose;
 use crate::simulate::{Afm, Hidden};
 
 /// What is hidden in an archive.
@@ -28,11 +29,11 @@ pub enum Kind {
 pub struct Planted {
     /// Its id.
     pub id: String,
-    /// What it can't be told from.
+    /// What it can't be distinguished from.
     pub class: Vec<String>,
     /// Its parameters' names and values; the first is the main one.
     pub parameters: Vec<(String, f64)>,
-    /// Strength at which the expected gain is [`super::LIMIT_GAIN`].
+    /// Strength at which the expected gain is [`super::LIMIT_GAIN`], beside what else is hidden; infinite if none is.
     pub limit: f64,
 }
 
@@ -54,7 +55,7 @@ pub struct Draw {
     pub planted: Vec<Planted>,
     /// Ids that the diagnosis may not use.
     pub without: Vec<String>,
-    /// Detector poles as the diagnosis is told, up to 15 % off, Hz.
+    /// Nominal detector poles that the diagnosis begins with, up to 15 % off, Hz.
     pub nominal_poles_hz: Vec<f64>,
     /// The simulation.
     pub afm: Afm,
@@ -160,6 +161,10 @@ fn archive(seed: u64, rng: &mut ChaCha8Rng) -> (Afm, usize) {
         quality_factors: lever.quality_factors,
         tip_shares: lever.tip_shares,
         detector_shares: lever.detector_shares,
+        // as a diagnosis takes it where nothing else is said
+        piezo_m_per_v: ReleaseDiagnose::default().piezo_m_per_unit,
+        // one bit more at the same step: what a cause adds must not clip, which would be a cause of its own
+        adc_bits: base.adc_bits + 1,
         compression: 0,
         seed: Some(seed),
         ..base.clone()
@@ -198,7 +203,8 @@ fn plant(
         return Some(planted);
     }
     let count = Count { events: releases, records: afm.records };
-    let limits = Limits::new(&afm.microscope(), count, afm.samples, afm.surface_m)?;
+    let beside = |others| Limits::new(&afm.microscope(), count, afm.samples, afm.surface_m, others);
+    let limits = beside(Vec::new())?;
     let candidates: Vec<&'static dyn Cause> = catalogue.iter().copied().filter(|cause| nameable(*cause)).collect();
     for _ in 0..ATTEMPTS {
         if planted.len() == wanted || candidates.is_empty() {
@@ -236,7 +242,17 @@ fn plant(
         values[0] = values[0].signum() * (times * limit).min(highest);
         planted.push((cause, values, limit));
     }
-    (planted.len() == wanted).then_some(planted)
+    (planted.len() == wanted).then(|| {
+        let with_limit = |(i, (cause, values, alone)): (usize, &Chosen)| {
+            let others: Vec<_> =
+                (0..wanted).filter(|j| *j != i).map(|j| (planted[j].0, planted[j].1.clone())).collect();
+            let own =
+                if others.is_empty() { Some(*alone) } else { beside(others).and_then(|l| limit(&l, *cause, values)) };
+            // beside the others it may not show at any strength
+            (*cause, values.clone(), own.unwrap_or(f64::INFINITY))
+        };
+        planted.iter().enumerate().map(with_limit).collect()
+    })
 }
 
 /// Periods of a line in a record.
@@ -287,7 +303,9 @@ mod tests {
             afmid_pipeline::stage::check(&one.afm).unwrap();
             assert_eq!(one.planted.len(), one.afm.hidden.len());
             for planted in &one.planted {
-                assert!(planted.times_limit() > 0.0 && planted.times_limit() <= STRONGEST * 1.0001, "{planted:?}");
+                // beside others a limit is another one
+                let most = if one.kind == Kind::Mixture { f64::INFINITY } else { 1.0001 * STRONGEST };
+                assert!((0.0..=most).contains(&planted.times_limit()), "{planted:?}");
             }
             for (nominal, pole) in one.nominal_poles_hz.iter().zip(&one.afm.detector_poles_hz) {
                 assert!((nominal / pole - 1.0).abs() <= POLES_OFF);

@@ -3,11 +3,11 @@
 use crate::causes::Cause;
 use afmid_kernels::effects::Effects;
 use afmid_kernels::linear_algebra::dot;
-use afmid_kernels::ringdown::internals::Whitener;
+use afmid_kernels::ringdown::Whitener;
 use afmid_kernels::ringdown::{RingdownNoise, ThermalMode};
 use afmid_kernels::simulate::{BOLTZMANN_J_PER_K, Cut, Microscope, Place};
 
-/// Expected gain of the log likelihood over the archive at the limit, after what numbers found anew in every record
+/// Expected gain of the log likelihood over the archive at the limit, after what numbers found in every record
 /// cost.
 pub const LIMIT_GAIN: f64 = 10.0;
 
@@ -50,22 +50,43 @@ pub struct Limits {
     variance_v2: f64,
     /// Height of the surface on the ramp's scale, m.
     surface_m: f64,
-    /// Releases with nothing hidden, one after the other.
+    /// Causes that are there as well, with their values.
+    beside: Vec<(&'static dyn Cause, Vec<f64>)>,
+    /// Releases with those only, one after the other.
     plain: Vec<f64>,
     /// Orthonormal.
     followed: Vec<Vec<f64>>,
 }
 
 impl Limits {
-    /// For an archive of so many events and records of so many samples, above a surface at that height, m; nothing if
-    /// the microscope never releases its tip.
-    pub fn new(microscope: &Microscope, count: Count, samples: usize, surface_m: f64) -> Option<Self> {
-        let plain = releases(microscope, &Effects::default(), count)?;
+    /// For an archive of so many events and records of so many samples, above a surface at that height, m, with those
+    /// causes in it, whose parameters are followed as well; nothing if the microscope never releases its tip.
+    pub fn new(
+        microscope: &Microscope,
+        count: Count,
+        samples: usize,
+        surface_m: f64,
+        beside: Vec<(&'static dyn Cause, Vec<f64>)>,
+    ) -> Option<Self> {
+        let there = effects_of(&beside);
+        let plain = releases(microscope, &there, count)?;
         let mut followed = event_columns(&plain);
+        let mut follow =
+            |up: Vec<f64>, down: Vec<f64>| followed.push(up.iter().zip(&down).map(|(u, d)| u - d).collect());
         for perturbed in perturbations(microscope) {
             let (up, down) = (perturbed(1.0), perturbed(-1.0));
-            let (up, down) = (releases(&up, &Effects::default(), count)?, releases(&down, &Effects::default(), count)?);
-            followed.push(up.iter().zip(&down).map(|(u, d)| u - d).collect());
+            follow(releases(&up, &there, count)?, releases(&down, &there, count)?);
+        }
+        for (which, (cause, values)) in beside.iter().enumerate() {
+            for (i, parameter) in cause.about().parameters.iter().enumerate().take(values.len()) {
+                let moved = |sign: f64| {
+                    let mut moved = beside.clone();
+                    let value = &mut moved[which].1[i];
+                    *value = (*value * (1.0 + 1e-3 * sign)).clamp(parameter.low, parameter.high);
+                    releases(microscope, &effects_of(&moved), count)
+                };
+                follow(moved(1.0)?, moved(-1.0)?);
+            }
         }
         let whitener = whitener(microscope);
         followed.iter_mut().for_each(|column| whiten(&whitener, column));
@@ -78,21 +99,23 @@ impl Limits {
             samples,
             surface_m,
             variance_v2,
+            beside,
             plain,
             followed: orthonormal(followed),
         })
     }
 
-    /// Expected gain of the log likelihood if `effects` are hidden and explained; nothing if the tip is not released.
-    /// `degree`: what a record's level may do by itself, as a polynomial in time.
-    pub fn gain(&self, effects: &Effects, degree: i32) -> Option<f64> {
-        let with = releases(&self.microscope, effects, self.count)?;
+    /// Expected gain of the log likelihood if a cause of those values is hidden and explained; nothing if the tip is
+    /// not released. `degree`: what a record's level may do by itself, as a polynomial in time.
+    pub fn gain(&self, cause: &'static dyn Cause, values: &[f64], degree: i32) -> Option<f64> {
+        let own = [(cause, values.to_vec())];
+        let with = releases(&self.microscope, &effects_of(&[&self.beside[..], &own].concat()), self.count)?;
         let mut left: Vec<f64> = with.iter().zip(&self.plain).map(|(a, b)| a - b).collect();
         whiten(&self.whitener, &mut left);
         project_out(&mut left, &self.followed);
         let squares = left.iter().map(|v| v * v).sum::<f64>();
         let windows = 0.5 * squares * self.count.events as f64 / PLACES as f64;
-        Some(windows + self.record_gain(effects, degree))
+        Some(windows + self.record_gain(&effects_of(&own), degree))
     }
 
     /// The same of what is added to whole records while the lever is free, where each record has a polynomial in time
@@ -152,21 +175,19 @@ impl Limits {
 /// # Method
 /// Secant steps on the logarithms of gain and strength, halved intervals where those leave the bracket (a gain may jump
 /// where a release passes a sample), up to 16, to 5 %.
-pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> {
+pub fn limit(limits: &Limits, cause: &'static dyn Cause, values: &[f64]) -> Option<f64> {
     let about = cause.about();
     let (parameter, first) = (about.parameters.first()?, *values.first()?);
     let (sign, highest) = (first.signum(), if first < 0.0 { -parameter.low } else { parameter.high });
-    // held out, a number that is found anew in every record costs half a unit there
-    let found_anew = 0.5 * (limits.count.events * cause.free_in_each_record()) as f64;
+    // held out, a number that is found in every record costs half a unit there
+    let found_in_each = 0.5 * (limits.count.events * cause.free_in_each_record()) as f64;
     // a sine of a phase of its own is sought beside all that a slow contact or a fringe can do: a cubic; other shapes
     // beside an offset and a drift
-    let degree = if found_anew > 0.0 { 3 } else { 1 };
+    let degree = if found_in_each > 0.0 { 3 } else { 1 };
     let gain = |strength: f64| {
         let mut values = values.to_vec();
         values[0] = sign * strength;
-        let mut effects = Effects::default();
-        cause.add(&values, &mut effects);
-        limits.gain(&effects, degree).map(|gain| gain * LIMIT_GAIN / (LIMIT_GAIN + found_anew))
+        limits.gain(cause, &values, degree).map(|gain| gain * LIMIT_GAIN / (LIMIT_GAIN + found_in_each))
     };
     // gains grow as the square of a strength; a rupture's time as the fourth power
     let (mut strength, mut power, mut last) = (first.abs().min(highest), 2.0, None::<(f64, f64)>);
@@ -206,6 +227,12 @@ pub fn limit(limits: &Limits, cause: &dyn Cause, values: &[f64]) -> Option<f64> 
         strength = next;
     }
     None
+}
+
+fn effects_of(causes: &[(&'static dyn Cause, Vec<f64>)]) -> Effects {
+    let mut effects = Effects::default();
+    causes.iter().for_each(|(cause, values)| cause.add(values, &mut effects));
+    effects
 }
 
 /// White, converter's and thermal noise of releases.
@@ -329,6 +356,7 @@ mod tests {
             Count { events: 12, records: 12 },
             200_000,
             Afm::default().surface_m,
+            Vec::new(),
         )
         .unwrap();
         for (id, values, low, high) in [

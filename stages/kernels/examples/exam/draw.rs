@@ -2,15 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use afmid_kernels::causes::{Cause, built_in};
-use afmid_kernels::diagnosis::Sensed;
+use afmid_kernels::causes::{Cause, Part, built_in};
 use afmid_kernels::effects::Effects;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::limit::Limits;
-use super::system::{Drive, Mode, Run, System};
+use super::rivals::rivals;
+use super::system::{Drive, Mode, Run, Sensed, System};
 
 /// What kind of measurement.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -42,10 +42,7 @@ impl Hidden {
 
 fn placed(cause: &dyn Cause, modes: &[usize], values: &[f64]) -> Effects {
     let mut effects = Effects::default();
-    cause.add(values, &mut effects);
-    if !modes.is_empty() {
-        effects.modal_force.iter_mut().for_each(|force| force.place(modes));
-    }
+    effects.add_at(modes, |effects| cause.add(values, effects));
     effects
 }
 
@@ -69,6 +66,17 @@ const OF_ONE_CHANNEL: [&str; 5] =
 /// Of an input and an output.
 const OF_INPUT: [&str; 7] =
     ["input-saturation", "input-dead-zone", "intersample", "offset", "baseline-drift", "spurious-line", "gain-step"];
+
+/// Causes that may not be named where one is left out: its class, and the free curves that hold it as a special case.
+pub fn left_out(cause: &dyn Cause) -> Vec<&'static str> {
+    let about = cause.about();
+    let curves: &[&str] = match about.part {
+        Part::Detector => &["wiener-curve", "wiener-hammerstein-curve", "self-fringe"],
+        Part::Input => &["hammerstein-curve", "wiener-hammerstein-curve"],
+        _ => &[],
+    };
+    about.class.iter().chain(curves).copied().collect()
+}
 
 /// Strengths reach from twice the limit to this many times.
 const STRONGEST: f64 = 30.0;
@@ -151,9 +159,11 @@ pub fn system(measured: Measured, rng: &mut ChaCha8Rng) -> System {
     system
 }
 
-/// A cause that the system's motion shows, between [`WEAKEST`] and [`STRONGEST`] times its limit.
-pub fn hide(measured: Measured, system: &System, weakest: f64, rng: &mut ChaCha8Rng) -> Option<Hidden> {
-    let limits = Limits::new(system);
+/// A cause that the system's motion shows, between `weakest` and [`STRONGEST`] times its limit; where its class may not
+/// be named, beyond what all that may be named could follow.
+pub fn hide(measured: Measured, system: &System, weakest: f64, without: bool, rng: &mut ChaCha8Rng) -> Option<Hidden> {
+    let plain = Limits::new(system);
+    let rivals = if without { rivals(system, &system.motion(&Effects::default())) } else { Vec::new() };
     let mut ids: Vec<&str> = OF_DECAYS.to_vec();
     match measured {
         Measured::Decays if system.runs.len() >= 4 => ids.extend(OF_RECORDS),
@@ -181,6 +191,7 @@ pub fn hide(measured: Measured, system: &System, weakest: f64, rng: &mut ChaCha8
             modes.sort_unstable();
         }
         let rest = further(id, system, rng);
+        let limits = if without { plain.beside(&rivals, &left_out(cause)) } else { plain.clone() };
         if id == "intersample" {
             // a choice: there or not
             if matches!(system.drive, Some(Drive::Held(_))) {
@@ -245,6 +256,6 @@ fn further(id: &str, system: &System, rng: &mut ChaCha8Rng) -> Vec<f64> {
     }
 }
 
-fn largest_input(system: &System) -> f64 {
+pub fn largest_input(system: &System) -> f64 {
     system.input().iter().fold(0.0, |a: f64, u| a.max(u.abs()))
 }

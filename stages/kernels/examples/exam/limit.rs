@@ -1,9 +1,10 @@
-//! How much of an effect no linear model can follow.
+//! How much of an effect no linear model can follow, nor any cause that may be named.
 
 use afmid_kernels::effects::Effects;
 use afmid_kernels::linear_algebra::dot;
 
-use super::system::{Mode, Moved, System};
+use super::rivals::Rival;
+use super::system::{Mode, Moved, Sensed, System};
 
 /// Expected gain of the log likelihood at the limit of a strength.
 pub const LIMIT_GAIN: f64 = 10.0;
@@ -12,6 +13,7 @@ const STEP: f64 = 1e-5;
 
 /// A system's motion with nothing hidden and what its linear model follows by itself, to first order: each run's state
 /// and offsets; frequencies, losses, gains and shapes of all runs.
+#[derive(Clone)]
 pub struct Limits<'a> {
     system: &'a System,
     plain: Vec<Vec<f64>>,
@@ -48,18 +50,29 @@ impl<'a> Limits<'a> {
         let plain: Vec<Vec<f64>> = moved.iter().map(|moved| in_noise(system, &moved.outputs)).collect();
         let own = Self::own(system);
         let mut limits = Self { system, plain, own, shared: Vec::new() };
-        for column in limits.columns(&moved) {
-            let mut column = column;
-            let before = limits.length(&column);
-            limits.take_out_all(&mut column);
-            limits.take_out_all(&mut column);
-            let length = limits.length(&column);
-            if length > 1e-7 * before {
-                column.iter_mut().flatten().for_each(|v| *v /= length);
-                limits.shared.push(column);
-            }
+        limits.columns(&moved).into_iter().for_each(|column| limits.share(column));
+        limits
+    }
+
+    /// With what all causes but those left out could follow counted as followed.
+    pub fn beside(&self, rivals: &[Rival], left_out: &[&str]) -> Self {
+        let mut limits = self.clone();
+        for rival in rivals.iter().filter(|rival| !left_out.contains(&rival.cause.about().id)) {
+            limits.share(rival.outputs.iter().map(|outputs| in_noise(self.system, outputs)).collect());
         }
         limits
+    }
+
+    /// Takes a column among what is followed.
+    fn share(&mut self, mut column: Vec<Vec<f64>>) {
+        let before = self.length(&column);
+        self.take_out_all(&mut column);
+        self.take_out_all(&mut column);
+        let length = self.length(&column);
+        if length > 1e-7 * before {
+            column.iter_mut().flatten().for_each(|v| *v /= length);
+            self.shared.push(column);
+        }
     }
 
     fn length(&self, column: &[Vec<f64>]) -> f64 {
@@ -127,12 +140,14 @@ impl<'a> Limits<'a> {
                 columns.push(up.iter().zip(&down).map(|(up, down)| difference(up, down, STEP)).collect());
             }
         }
-        // shapes, in and out of phase: of one sensor under an input, the zeros
+        // shapes, in and out of phase: of one sensor under an input, the zeros by the part of the state that it does not
+        // sense
+        let sensed = usize::from(system.sensed == Sensed::Rate);
         for m in 0..system.modes.len() {
             for c in 0..system.channels() {
                 for part in 0..2 {
                     let own = system.channels() > 1 && system.modes[m].shape[c].abs() == 1.0;
-                    if own || (system.channels() == 1 && (part == 0 || system.drive.is_none())) {
+                    if own || (system.channels() == 1 && (part == sensed || system.drive.is_none())) {
                         continue;
                     }
                     let of = |moved: &Moved| {
@@ -144,6 +159,10 @@ impl<'a> Limits<'a> {
                     columns.push(moved.iter().map(of).collect());
                 }
             }
+        }
+        // what of the input is seen at once
+        if system.drive.is_some() && system.channels() == 1 {
+            columns.push(vec![in_noise(system, &[system.input()])]);
         }
         columns
     }

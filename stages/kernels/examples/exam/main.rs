@@ -4,6 +4,7 @@
 
 mod draw;
 mod limit;
+mod rivals;
 mod score;
 mod system;
 
@@ -50,7 +51,11 @@ fn main() -> ExitCode {
 fn sit(measured: Measured, asked: Asked, seed: u64, weakest: f64) -> Option<Sat> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let system = system(measured, &mut rng);
-    let hidden = if asked == Asked::Clean { None } else { Some(hide(measured, &system, weakest, &mut rng)?) };
+    let hidden = if asked == Asked::Clean {
+        None
+    } else {
+        Some(hide(measured, &system, weakest, asked == Asked::LeftOut, &mut rng)?)
+    };
     let effects = hidden.as_ref().map_or_else(Effects::default, Hidden::effects);
     let mut outputs: Vec<Vec<Vec<f64>>> = system.motion(&effects).into_iter().map(|moved| moved.outputs).collect();
     for output in outputs.iter_mut().flatten().flatten() {
@@ -77,9 +82,9 @@ fn diagnosed(
         .map(|channels| Record { input, outputs: channels.iter().map(Vec::as_slice).collect() })
         .collect();
     let training = (0..records.len()).map(|record| Stretch { record, first: 0, end: system.samples }).collect();
-    let class = without.map_or(&[][..], |hidden| hidden.cause.about().class);
+    let left_out = without.map_or(Vec::new(), |hidden| draw::left_out(hidden.cause));
     let candidates: Vec<&'static dyn Cause> =
-        CATALOGUE.iter().copied().filter(|cause| !class.contains(&cause.about().id)).collect();
+        CATALOGUE.iter().copied().filter(|cause| !left_out.contains(&cause.about().id)).collect();
     let options = DiagnosisOptions {
         training,
         candidates,

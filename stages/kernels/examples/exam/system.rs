@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use afmid_kernels::diagnosis::Sensed;
+pub use afmid_kernels::diagnosis::Sensed;
 use afmid_kernels::effects::{Effects, Instant, Intersample, Motion, pass};
 
 /// Steps of the integrator between samples: 0.1 rad of the highest mode at most.
-const STEPS: usize = 16;
+pub const STEPS: usize = 16;
 
 /// A mode `q'' + loss w q' + w^2 q = w^2 gain u`.
 #[derive(Clone)]
@@ -90,19 +90,42 @@ impl System {
         (0..self.runs.len()).map(|run| self.run(run, effects)).collect()
     }
 
+    /// Angular frequencies of the modes, rad/s.
+    pub fn omega(&self) -> Vec<f64> {
+        self.modes.iter().map(|mode| TAU * mode.frequency_hz).collect()
+    }
+
+    /// Deflections, then rates, of a run at every step, the end of the last sample's too.
+    pub fn course(&self, run: usize) -> Vec<Vec<f64>> {
+        let mut course = Vec::with_capacity(self.samples * STEPS + 1);
+        self.followed(run, &Effects::default(), |x| course.push(x.to_vec()));
+        course
+    }
+
     fn run(&self, run: usize, effects: &Effects) -> Moved {
+        self.followed(run, effects, |_| {})
+    }
+
+    fn followed(&self, run: usize, effects: &Effects, mut follow: impl FnMut(&[f64])) -> Moved {
         let place = run as f64 / (self.runs.len() - 1).max(1) as f64;
         let factor = 1.0 + effects.frequency_change(&Instant { record: run, place, time_s: 0.0, piezo_m: 0.0 });
-        let omega: Vec<f64> = self.modes.iter().map(|mode| TAU * mode.frequency_hz * factor).collect();
+        let omega: Vec<f64> = self.omega().into_iter().map(|omega| omega * factor).collect();
         let n = self.modes.len();
         // deflections, then rates
         let mut x: Vec<f64> = self.runs[run].state.iter().map(|s| s[0]).collect();
         x.extend(self.runs[run].state.iter().zip(&omega).map(|(s, w)| s[1] * w));
         let held = effects.intersample.unwrap_or_default() == Intersample::Held;
-        let through = |u: f64| {
-            let mut value = [u];
-            pass(&effects.input, |_| 0.0, &mut value);
-            value[0]
+        // at every half step, or sample by sample
+        let fine = if held { 1 } else { 2 * STEPS };
+        let course = self.drive.as_ref().map(|drive| {
+            let time = |i: usize| i as f64 / (fine as f64 * self.rate_hz);
+            let mut course: Vec<f64> = (0..=fine * self.samples).map(|i| drive.at(time(i), self.rate_hz)).collect();
+            pass(&effects.input, time, &mut course);
+            course
+        });
+        let drive = |sample: usize, half_step: usize| {
+            let place = if held { sample } else { fine * sample + half_step };
+            course.as_ref().and_then(|course| course.get(place)).copied().unwrap_or(0.0)
         };
         let mut moved = Moved { outputs: vec![Vec::new(); self.channels()], states: vec![Vec::new(); n] };
         let rates = |x: &[f64], u: f64| {
@@ -121,9 +144,7 @@ impl System {
             let (t, at) = (k as f64 / self.rate_hz, k as f64 / self.samples as f64);
             let instant = Instant { record: run, place: at, time_s: t, piezo_m: 0.0 };
             let added: f64 = effects.added.iter().map(|added| added(&instant)).sum();
-            let drive = self.drive.as_ref();
-            let first = drive.map_or(0.0, |drive| drive.at(t, self.rate_hz));
-            let slope = rates(&x, through(first));
+            let slope = rates(&x, drive(k, 0));
             let sensed = |m: usize| match self.sensed {
                 Sensed::Deflection => x[m],
                 Sensed::Rate => x[n + m] / omega[m],
@@ -137,11 +158,8 @@ impl System {
             }
             (0..n).for_each(|m| moved.states[m].push([x[m], x[n + m] / omega[m]]));
             for i in 0..STEPS {
-                let input = |part: f64| match drive {
-                    Some(drive) if !held => through(drive.at(t + (i as f64 + part) * h, self.rate_hz)),
-                    _ => through(first),
-                };
-                let (u0, u1, u2) = (input(0.0), input(0.5), input(1.0));
+                follow(&x);
+                let [u0, u1, u2] = [0, 1, 2].map(|half| drive(k, 2 * i + half));
                 let to =
                     |slope: &[f64], by: f64| -> Vec<f64> { x.iter().zip(slope).map(|(x, s)| x + by * s).collect() };
                 let k1 = rates(&x, u0);
@@ -152,6 +170,7 @@ impl System {
                 x = to(&sum, h / 6.0);
             }
         }
+        follow(&x);
         moved
     }
 }

@@ -158,7 +158,7 @@ pub trait Cause: Sync {
         false
     }
 
-    /// Numbers that differ from record to record by chance, a line's phase among them: each must be found anew in every
+    /// Numbers that differ from record to record by chance, a line's phase among them: each must be found in every
     /// record.
     fn free_in_each_record(&self) -> usize {
         0

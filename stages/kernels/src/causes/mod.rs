@@ -5,6 +5,7 @@
 //! afterwards.
 
 mod cause;
+mod needs;
 
 mod absolute_stiffness;
 mod ac_coupling;
@@ -63,6 +64,7 @@ mod wiener_curve;
 mod wiener_hammerstein_curve;
 
 pub use cause::{About, Cause, Identifiable, Need, Parameter, Part, Scene, within_limits};
+pub use needs::{releases_have, runs_have};
 
 /// Every built-in cause, by id.
 pub const CATALOGUE: &[&dyn Cause] = &[

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use super::data::{Bench, Part, PartStart, Record};
 use super::dynamics::Kind;
-use super::fit::{Blocks, FOLDS};
+use super::fit::{Blocks, FOLDS, Fit};
 use super::instants::instant_std;
 use super::lack_of_fit::Misfit;
 use super::options::DiagnosisOptions;
 use super::selection::{Choice, Chosen, Judged};
+use super::unnamed_law::UnnamedLaw;
 use super::validation::{free_run_rms, held_out, pooled_rms};
 use super::verdict::{
     BaselineSummary, DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
@@ -22,6 +23,8 @@ pub(super) struct Findings<'a> {
     pub blocks: Blocks,
     pub choice: Choice,
     pub misfit: Misfit,
+    /// What the extended model lacks and no cause is.
+    pub unnamed: Option<UnnamedLaw>,
     /// Whether the extended model describes as much as any linear model does.
     pub adequate: bool,
 }
@@ -68,7 +71,21 @@ impl Findings<'_> {
     }
 
     fn systematic(&self) -> bool {
-        self.misfit.is_systematic(self.options.tolerated_misfit)
+        self.misfit.is_systematic(self.options.tolerated_misfit) || self.lacking().is_some()
+    }
+
+    /// What the causes take of the squared residual, together.
+    fn explained(&self) -> f64 {
+        let ends = self.choice.ladder.first().zip(self.choice.ladder.last());
+        ends.map_or(0.0, |(first, last)| (first.fit.loss - last.fit.loss).max(0.0))
+    }
+
+    /// A law that is lacking to a degree that no name stands beside it.
+    fn lacking(&self) -> Option<&UnnamedLaw> {
+        let last = &self.choice.ladder.last()?.fit;
+        let least =
+            (self.options.tolerated_law.powi(2) * self.explained()).max(2.0 * self.options.least_gain * last.loss);
+        self.unnamed.as_ref().filter(|law| law.gain > least || law.beats(self.bench, last))
     }
 
     fn verdict(&self) -> Verdict {
@@ -262,6 +279,28 @@ impl Findings<'_> {
         nearest
     }
 
+    /// What is seen of a law that no cause is.
+    fn said_of(&self, law: &UnnamedLaw, last: &Fit) -> String {
+        let (words, share) = (&law.words, 100.0 * law.gain / last.loss);
+        if let Some(alone) = law.alone.filter(|_| law.beats(self.bench, last)) {
+            let [alone, all] = [alone, last.loss].map(|loss| self.rms(loss).unwrap_or(0.0));
+            let unit = &self.options.output_unit;
+            return format!(
+                "{words} alone leaves {alone:.4e} {unit}, all causes together {all:.4e}, and no cause that was tried is \
+                 such a law"
+            );
+        }
+        let explained = match self.explained() {
+            0.0 => String::new(),
+            explained => format!(", {:.1} % of what all causes take together", 100.0 * law.gain / explained),
+        };
+        format!(
+            "{words} would take another {share:.1} % of the squared residual{explained} (p = {:.1e}), and no cause that \
+             was tried is such a law",
+            law.p_value
+        )
+    }
+
     fn evidence(&self, verdict: Verdict) -> Vec<String> {
         let unit = &self.options.output_unit;
         let mut lines: Vec<String> = self
@@ -280,7 +319,7 @@ impl Findings<'_> {
         for chosen in self.choice.chosen.iter().filter(|chosen| chosen.tied) {
             let rival = chosen.runner_up.map_or("nothing", |(id, _)| id);
             lines.push(format!(
-                "{} can't be told from {rival}: their losses differ by less than 4 variances of the noise",
+                "{} can't be distinguished from {rival}: their losses differ by less than 4 variances of the noise",
                 chosen.id
             ));
         }
@@ -295,6 +334,11 @@ impl Findings<'_> {
                     "which is tolerated"
                 }
             ));
+        }
+        if let Some((law, last)) = self.lacking().zip(self.choice.ladder.last())
+            && verdict == Verdict::Unexplained
+        {
+            lines.push(self.said_of(law, &last.fit));
         }
         if let Some((id, share)) = self.choice.nearest.first().filter(|_| verdict == Verdict::Named) {
             lines.push(format!("not named: {id} would take {:.2} % of the squared residual", 100.0 * share));

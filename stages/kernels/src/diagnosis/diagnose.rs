@@ -13,6 +13,7 @@ use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, trials};
 use super::selection::{Choice, Search};
 use super::story::{Story, story};
+use super::unnamed_law::unnamed_law;
 use super::validation::check_part;
 use super::verdict::{Diagnosis, Verdict};
 use crate::Unwatched;
@@ -113,6 +114,14 @@ pub fn diagnose(
         last.on_all(records, interval_s, options).ok_or(DiagnosisError::NoBaseline)?;
     let Some(last) = choice.ladder.last() else { return Err(DiagnosisError::NoBaseline) };
     let misfit = misfit(&bench, &last.fit, &blocks);
+    let unnamed = unnamed_law(
+        &bench,
+        [&choice.ladder[0].fit, &last.fit],
+        &blocks,
+        &candidates(options, &bench, &last.fit.model),
+        // of alarms that come beside those of the causes
+        0.5 * options.false_alarm_rate,
+    );
     let first = &choice.ladder[0].fit;
     let linear = first.model.clone();
     let simulated = [&first.simulated[..], &last.fit.simulated];
@@ -129,7 +138,7 @@ pub fn diagnose(
     };
     let (before, mut after) = (in_units(&choice.ladder[0].fit.simulated), in_units(&last.fit.simulated));
     let (output, model) = (in_units(&bench.output), last.fit.model.clone());
-    let findings = Findings { bench: &bench, records, options, blocks, choice, misfit, adequate };
+    let findings = Findings { bench: &bench, records, options, blocks, choice, misfit, unnamed, adequate };
     let mut diagnosis = findings.answer();
     if let Some(chain) = chain(&bench, records, options, &before, &mut diagnosis) {
         after = chain.after;
@@ -194,6 +203,7 @@ fn extend(baseline: Baseline, options: &DiagnosisOptions) -> Extended {
         blocks: blocks.clone(),
         options,
         trials: trials(&bench, &fit, &candidates),
+        end: bench.work() + WORK,
         candidates,
     };
     let choice = search.run(fit);
@@ -202,6 +212,10 @@ fn extend(baseline: Baseline, options: &DiagnosisOptions) -> Extended {
     let adequate = ends.iter().flatten().any(|model| adequacy.holds(criterion(&bench, &model.fit)));
     Extended { bench, blocks, choice, adequate }
 }
+
+/// Steps of sections that a search may take, ten seconds of two cores: single causes take a tenth of it, five causes of
+/// a measured system a half.
+const WORK: u64 = 5_000_000_000;
 
 /// Fewest records that show a change from one to the next: its slope, and whether it is one.
 const ARCHIVE: usize = 4;

@@ -3,13 +3,15 @@
 //! [`diagnose`] is the front door. In reading order: data (runs, stretches, parts to judge on), dynamics (what is
 //! simulated), fit (least squares of the free-run error, blocks, folds), baseline (the linear model, found by itself),
 //! score_test (which causes could make what is left), selection (forward steps, backward elimination, exchange),
-//! lack_of_fit (whether anything systematic remains), chain (linear parts around a static curve, where no causes
+//! library (general terms, whatever the cause), lack_of_fit (whether they predict what remains), unnamed_law (whether one
+//! of them does more than the names miss), chain (linear parts around a static curve, where no causes
 //! account for the data), linear_only (how far a linear model goes, where none can be extended), validation (parts that
 //! chose nothing), story (what a person looks at), answer.
 //!
-//! Two kinds of measurement have equations of their own: an axis under a feedback controller ([`closed_loop`]), whose
-//! drive depends on its output, and a steady oscillation ([`steady`]), which says nothing of a decay but everything of
-//! the detector's curve.
+//! Three kinds of measurement have equations of their own: an axis under a feedback controller ([`closed_loop`]), whose
+//! drive depends on its output; a steady oscillation ([`steady`]), which says nothing of a decay but everything of the
+//! detector's curve; and releases of a lever from a load ([`release`]), events of instants of their own in coloured
+//! noise, cut from records that have much to say as a whole ([`records`]).
 
 mod answer;
 mod baseline;
@@ -22,13 +24,17 @@ mod diagnose;
 mod dynamics;
 mod error;
 mod fit;
+mod general_laws;
 #[cfg(test)]
 mod hidden_paths;
 mod instants;
 mod lack_of_fit;
+mod library;
 mod limited_rates;
 mod linear_only;
 mod options;
+pub mod records;
+pub mod release;
 mod score_test;
 mod selection;
 mod settled;
@@ -36,6 +42,7 @@ pub mod steady;
 mod story;
 #[cfg(test)]
 mod tests;
+mod unnamed_law;
 mod validation;
 pub mod verdict;
 

@@ -17,6 +17,8 @@ pub struct DiagnosisOptions {
     pub least_gain: f64,
     /// Remaining misfit over the rest of the residual, both root mean squares, up to which causes are named.
     pub tolerated_misfit: f64,
+    /// What a single law that no name covers may do over what all names do together, both root mean squares.
+    pub tolerated_law: f64,
     /// Whether each stretch has an offset of its own, as decays that were cut from longer records do; else an offset is
     /// a cause.
     pub free_offsets: bool,
@@ -52,6 +54,7 @@ impl Default for DiagnosisOptions {
             false_alarm_rate: 0.01,
             least_gain: 0.0005,
             tolerated_misfit: 0.25,
+            tolerated_law: 0.15,
             free_offsets: false,
             sensed: Vec::new(),
             one_unit: true,

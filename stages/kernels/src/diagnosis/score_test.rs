@@ -255,8 +255,8 @@ pub(super) fn peaks(residual: &[f64], interval_s: f64) -> Vec<f64> {
 pub(super) struct Significance {
     /// Probability of so large a gain without the cause, before any correction.
     pub p_value: f64,
-    /// How much longer the score's scatter between blocks is than white residuals would make it, as a ratio of
-    /// variances.
+    /// How much larger the score's scatter between blocks is than white residuals would make it, as a ratio of
+    /// variances; at least 1.
     pub inflation: f64,
 }
 
@@ -290,17 +290,26 @@ pub(super) fn significance(sample: &Sample<'_>, model: &Model, which: usize, gai
     let stationary = added.cause.about().part == Part::Record;
     let noise = if stationary { &fit.residual } else { &sample.floor.residual };
     let scores: Vec<f64> = (0..blocks.count()).map(|b| blocks.dot(b, &direction, noise)).collect();
-    let count = blocks.count() as f64;
-    let mean = scores.iter().sum::<f64>() / count;
-    let scatter = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() * count / (count - 1.0);
+    let sum = scores.iter().sum::<f64>();
+    // a residual that has the cause in it scatters about the blocks' shares of it: a drift is larger at its ends
+    let shares: Vec<f64> = if stationary {
+        (0..blocks.count()).map(|b| blocks.dot(b, &direction, &direction) / length).collect()
+    } else {
+        vec![1.0 / blocks.count() as f64; blocks.count()]
+    };
+    // as many blocks as would have it in equal shares
+    let count = shares.iter().map(|share| share * share).sum::<f64>().recip();
+    let rest = |(score, share): (&f64, &f64)| (score - share * sum).powi(2);
+    let scatter = scores.iter().zip(&shares).map(rest).sum::<f64>() * count / (count - 1.0);
     let mean_square = sample.floor.mean_square;
     if !(length > 0.0 && mean_square > 0.0 && length.is_finite()) {
         return Significance { p_value: 1.0, inflation: 1.0 };
     }
     let parameters = model.places(which).len().max(1) as f64;
-    let inflation = (scatter / (mean_square * length)).max(1e-3);
+    // never less than white: the general terms have taken most of the noise where a decay is large
+    let inflation = (scatter / (mean_square * length)).max(1.0);
     // what the others' refit takes along is no sign of a line
     // (in a fit that has the cause the scores add up to nothing)
-    let gain = if stationary && !known { gain.min((mean * count).powi(2) / length) } else { gain };
+    let gain = if stationary && !known { gain.min(sum.powi(2) / length) } else { gain };
     Significance { p_value: f_tail(gain / (parameters * mean_square * inflation), parameters, count - 1.0), inflation }
 }

@@ -14,7 +14,7 @@ use super::validation::{held_out, pooled_rms};
 /// The fit to all samples of a model between the baseline and the last: its error is shown, not used.
 const PASSED: Until = Until::steps(3);
 /// The fit without a cause, for comparison.
-const COMPARED: Until = Until { steps: 6, gain: 1e-3 };
+const COMPARED: Until = Until { gain: 1e-3, ..Until::steps(6) };
 /// Ratio of losses without and with a cause from which on it needs no further test.
 const PLAIN: f64 = 1.5;
 /// Standard errors that a strength must reach.

@@ -293,3 +293,31 @@ fn a_cause_left_out_of_the_catalogue_is_unexplained() {
     println!("left out: {right} of {} unexplained", results.len());
     assert!(right as f64 >= 0.9 * results.len() as f64 - 2.0);
 }
+
+#[test]
+fn a_law_without_a_name_is_said() {
+    // some per cent of the output, as causes are named at; the words are those of the law that was hidden
+    let laws: [(&str, f64, &str); 3] = [
+        ("duffing", 0.02, "deflection^3 of mode 1"),
+        ("quadratic-stiffness", 0.03, "deflection^2 of mode 1"),
+        ("nonlinear-damping", 0.02, "deflection^2 of mode 1 times rate of mode 1"),
+    ];
+    let jobs: Vec<(u64, usize)> =
+        (0..few_or_all(1, 4)).flat_map(|seed| (0..laws.len()).map(move |i| (seed, i))).collect();
+    let results: Vec<(bool, bool)> = jobs
+        .par_iter()
+        .map(|(seed, i)| {
+            let (id, strength, words) = laws[*i];
+            let diagnosis = diagnosed(seed + 30_000, &[(id, vec![strength])], &[id]);
+            let said = format!("a force on mode 1 by {words} ");
+            let is_said = diagnosis.evidence.iter().any(|line| line.starts_with(&said));
+            println!("{id}, {seed}: {:?} {:?} {:?}", diagnosis.verdict, names(&diagnosis), diagnosis.evidence.last());
+            (diagnosis.verdict == Verdict::Unexplained, is_said)
+        })
+        .collect();
+    let unexplained = results.iter().filter(|(unexplained, _)| *unexplained).count();
+    let said = results.iter().filter(|(_, said)| *said).count();
+    println!("left out at the strength of names: {unexplained} of {} unexplained, the law said in {said}", jobs.len());
+    // all twelve are reached; one of each may miss
+    assert!(unexplained + 1 >= jobs.len() && said + 1 >= jobs.len());
+}

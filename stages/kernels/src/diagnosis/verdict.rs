@@ -57,7 +57,7 @@ pub struct RunnerUp {
 pub struct NamedCause {
     /// Its id.
     pub id: String,
-    /// What it can't be told from, itself included.
+    /// What it can't be distinguished from, itself included.
     pub class: Vec<String>,
     /// Probability of so large a sign without any cause, all candidates considered.
     pub p_value: Option<f64>,

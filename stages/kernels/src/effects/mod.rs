@@ -269,6 +269,14 @@ pub struct Effects {
 }
 
 impl Effects {
+    /// Whether an input passes through the same as under others: the same passages, not such as act alike.
+    pub fn have_the_input_of(&self, others: &Self) -> bool {
+        let same = |(own, other): (&Passage, &Passage)| own.is(other);
+        self.intersample == others.intersample
+            && self.input.len() == others.input.len()
+            && self.input.iter().zip(&others.input).all(same)
+    }
+
     /// Whether the motion itself is no longer that of a linear lever under the load.
     pub fn bend_the_motion(&self) -> bool {
         !self.modal_force.is_empty()
@@ -300,6 +308,15 @@ impl Effects {
     /// Relative change of all frequencies there and then.
     pub fn frequency_change(&self, at: &Instant) -> f64 {
         self.frequency.iter().map(|change| change(at)).sum()
+    }
+
+    /// Adds what sees modes `order` as its first, second, ...; empty: in their own order.
+    pub fn add_at(&mut self, order: &[usize], add: impl FnOnce(&mut Self)) {
+        let before = self.modal_force.len();
+        add(self);
+        if !order.is_empty() {
+            self.modal_force[before..].iter_mut().for_each(|force| force.place(order));
+        }
     }
 
     /// Share of the load that acts `t` seconds after the release, before it for t < 0.

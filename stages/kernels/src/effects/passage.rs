@@ -29,6 +29,15 @@ impl Passage {
         Self::Path(Arc::new(path))
     }
 
+    /// Whether it is another's clone.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Map(own), Self::Map(other)) => Arc::ptr_eq(own, other),
+            (Self::Path(own), Self::Path(other)) => Arc::ptr_eq(own, other),
+            _ => false,
+        }
+    }
+
     /// Whether it depends on more than the value.
     pub fn is_path(&self) -> bool {
         matches!(self, Self::Path(_))

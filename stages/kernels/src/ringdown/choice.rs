@@ -115,8 +115,8 @@ pub fn fit_counted_ringdowns(
     Ok(CountedRingdown { fit, modes: chosen + 1, seen })
 }
 
-/// [`fit_ringdowns`] with as many modes, up to `most`, as lower the BIC under white noise: all that rings, whatever its
-/// reason. Errors: those of that.
+/// [`fit_ringdowns`] with as many modes, up to `most`, as lower the BIC under white noise, or the most below that can be
+/// fitted: all that rings, whatever its reason. Errors: those of that.
 pub fn fit_all_that_rings(
     events: &[&[f64]],
     free: &[&[f64]],
@@ -127,7 +127,14 @@ pub fn fit_all_that_rings(
     check(most, options)?;
     let all = Data { events, free, interval_s };
     let ladder = ladder(&all, most, BEYOND_RINGING, options, NEARLY)?;
-    all.fitted(&ladder.steps[ladder.best], options, BEGUN)
+    let mut failed = None;
+    for step in ladder.steps[..=ladder.best].iter().rev() {
+        match all.fitted(step, options, BEGUN) {
+            Ok(fitted) => return Ok(fitted),
+            Err(error) => failed = failed.or(Some(error)),
+        }
+    }
+    Err(failed.unwrap_or(ModelError::Degenerate("no exponentials")))
 }
 
 fn check(most: usize, options: &RingdownOptions) -> Result<(), ModelError> {

@@ -87,8 +87,7 @@ mod whitener;
 mod whittle;
 
 /// What the diagnosis shares with the fit: whitening, the basis, normal equations.
-#[doc(hidden)]
-pub mod internals {
+pub(crate) mod internals {
     pub use super::choice::fit_all_that_rings;
     pub use super::coordinates::{pole_of, slopes};
     pub use super::estimate::mode;
@@ -112,3 +111,4 @@ pub use modal_form::{EventParameters, Exponential};
 pub use noise::{RingdownNoise, ThermalMode, Wander};
 pub use normal::Prior;
 pub use options::{NoiseSource, RingdownOptions};
+pub use whitener::Whitener;

@@ -150,7 +150,7 @@ impl Whitener {
         }
     }
 
-    /// Whitens up to [`LANES`] signals of one length in place.
+    /// Whitens up to 8 signals of one length in place.
     pub fn apply(&self, signals: &mut [&mut [f64]]) {
         pulp::Arch::new().dispatch(|| self.filter(signals));
     }

@@ -3,8 +3,8 @@
 use afmid_pipeline::StageError;
 
 use super::fit::least_squares;
-use crate::diagnosis::release::{Cut, EventWindow};
 use crate::simulate::{Afm, LeverModel, LinearPart};
+use afmid_kernels::diagnosis::release::{Cut, EventWindow};
 use afmid_kernels::effects::{Effects, Instant};
 use afmid_kernels::simulate::{Cut as SimulatedCut, Microscope, Release};
 

@@ -9,12 +9,18 @@ use crate::effects::Effects;
 ///
 /// Weights of several channels stay as they are: they come with the poles.
 pub(super) fn solved(bench: &Bench, start: &Modal) -> Option<Model> {
-    let model = with_gains(bench, start)?;
+    let model = with_gains(bench, start, |_| true)?;
     Some(with_own(bench, &model))
 }
 
-/// Gains, rates' weights and feedthrough, where there is an input.
-pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
+/// The same with a section that the input does not drive.
+pub(super) fn solved_undriven(bench: &Bench, start: &Modal, section: usize) -> Option<Model> {
+    let model = with_gains(bench, start, |s| s != section)?;
+    Some(with_own(bench, &model))
+}
+
+/// Gains and rates' weights of the driven sections, feedthrough, where there is an input.
+fn with_gains(bench: &Bench, start: &Modal, is_driven: impl Fn(usize) -> bool) -> Option<Model> {
     let states = vec![start.at_rest(); bench.layout.stretches()];
     let mut model = Model { dynamics: start.clone(), states, causes: Vec::new() };
     if !bench.driven {
@@ -41,7 +47,8 @@ pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
         let given = (s, if is_mode { 1 - other } else { 0 }, false);
         [Some(given), (is_mode && start.free == Weights::Rates).then_some((s, other, true))]
     };
-    let places: Vec<(usize, usize, bool)> = (0..count).flat_map(place).flatten().collect();
+    let driven = (0..count).filter(|s| is_driven(*s));
+    let places: Vec<(usize, usize, bool)> = driven.flat_map(place).flatten().collect();
     let mut columns: Vec<Vec<f64>> = places.iter().map(|(s, part, _)| response(Some(*s), *part)).collect();
     if start.through.is_some() {
         columns.push(response(None, 0));
@@ -58,6 +65,7 @@ pub(super) fn with_gains(bench: &Bench, start: &Modal) -> Option<Model> {
     if !x.iter().all(|value| value.is_finite()) {
         return None;
     }
+    (0..count).filter(|s| !is_driven(*s)).for_each(|s| model.dynamics.sections[s].gain = 0.0);
     for ((s, _, is_other), value) in places.iter().zip(&x) {
         if !is_other {
             model.dynamics.sections[*s].gain = *value;

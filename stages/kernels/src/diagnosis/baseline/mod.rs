@@ -6,7 +6,7 @@ mod linear;
 mod oscillator;
 
 use super::data::{Bench, Record};
-use super::dynamics::Modal;
+use super::dynamics::{Kind, Modal};
 use super::error::DiagnosisError;
 use super::fit::{Blocks, Fit, Until};
 use super::options::DiagnosisOptions;
@@ -122,15 +122,40 @@ pub(super) fn baselines(
     Ok(tried.into_iter().zip(kept).filter(|(_, keep)| *keep).map(|(found, _)| of(found)).collect())
 }
 
-/// A start fitted to all stretches.
+/// A start fitted to all stretches, without the modes that a line in the record asked for ([`undriven`]).
 fn fitted(records: &[Record<'_>], coarse: &Bench, start: &Modal, options: &DiagnosisOptions) -> Option<(Fit, Bench)> {
     let (stretches, interval_s) = (&coarse.stretches, coarse.interval_s);
-    let bench = Bench::new(records, stretches, interval_s, start.highest_hz(), options.one_unit).ok()?;
-    let model = linear::solved(&bench, start)?;
-    let fit = Fit::new(&bench, &model, Until::steps(LINEAR_STEPS))?;
-    Some((fit, bench))
+    let mut start = start.clone();
+    loop {
+        let bench = Bench::new(records, stretches, interval_s, start.highest_hz(), options.one_unit).ok()?;
+        let model = linear::solved(&bench, &start)?;
+        let fit = Fit::new(&bench, &model, Until::steps(LINEAR_STEPS))?;
+        let Some(line) = undriven(&bench, &fit) else { return Some((fit, bench)) };
+        let others: Vec<usize> = (0..start.sections.len()).filter(|section| *section != line).collect();
+        start = fit.model.dynamics.of(&others);
+    }
 }
 
+/// A mode that does not decay within a stretch and owes nothing to the input: a line in the record, which is a cause.
+fn undriven(bench: &Bench, fit: &Fit) -> Option<usize> {
+    let dynamics = &fit.model.dynamics;
+    if !bench.driven || dynamics.sections.len() < 2 {
+        return None;
+    }
+    let longest = (0..bench.layout.stretches()).map(|e| bench.layout.samples(e)).max()?;
+    let lasts_s = longest as f64 * bench.interval_s;
+    let bar = fit.loss * (1.0 + DRIVEN / bench.count as f64);
+    let goes_on = |s: &usize| {
+        let section = dynamics.sections[*s];
+        section.kind == Kind::Oscillator && 0.5 * section.omega() * section.loss * lasts_s < 1.0
+    };
+    let without = |s: usize| Some(linear::left(bench, &linear::solved_undriven(bench, dynamics, s)?));
+    (0..dynamics.sections.len()).filter(goes_on).find(|s| without(*s).is_some_and(|left| left < bar))
+}
+
+/// Variances of the residual that the input's share in a mode takes of the loss at least: far more than chance, far
+/// less than a mode that the input drives.
+const DRIVEN: f64 = 20.0;
 /// Steps of a linear fit from identified poles.
 const LINEAR_STEPS: usize = 20;
 

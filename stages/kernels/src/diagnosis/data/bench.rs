@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
@@ -49,6 +50,8 @@ pub struct Bench {
     inputs: Arc<Vec<[FineInput; 3]>>,
     /// Steps of the integrator between samples.
     steps: usize,
+    /// Steps of sections that were simulated, by all that come from one bench.
+    work: Arc<AtomicU64>,
 }
 
 impl Bench {
@@ -124,7 +127,13 @@ impl Bench {
             reference_s: longest as f64 * interval_s,
             inputs: Arc::new(if driven { records.iter().map(fine).collect() } else { Vec::new() }),
             steps,
+            work: Arc::default(),
         })
+    }
+
+    /// Steps of sections that were simulated so far: what a search has cost, the same on any machine.
+    pub(crate) fn work(&self) -> u64 {
+        self.work.load(Ordering::Relaxed)
     }
 
     /// The same with every stretch cut down to its samples `range(e)`, counted from its beginning.
@@ -205,14 +214,32 @@ impl Bench {
 
     /// Output of several models, each over the stretches: side by side, which takes little longer than one alone.
     pub(crate) fn simulate_all(&self, models: &[Model]) -> Vec<Vec<f64>> {
-        let effects: Vec<Effects> = models.iter().map(Model::effects).collect();
+        let effects = effects_of_all(models);
         self.simulate_each(&models.iter().zip(&effects).collect::<Vec<_>>())
     }
 
     /// Output of several models under effects, each over the stretches.
     pub(crate) fn simulate_each(&self, models: &[(&Model, &Effects)]) -> Vec<Vec<f64>> {
-        let runs: Vec<Run<'_>> =
-            models.par_iter().flat_map_iter(|(model, effects)| self.runs(model, effects)).collect();
+        // what several motions have for an input passes only once
+        let mut distinct: Vec<&Effects> = Vec::new();
+        let mut which = Vec::with_capacity(models.len());
+        for (_, effects) in models {
+            let known = distinct.iter().position(|other| other.have_the_input_of(effects));
+            which.push(known.unwrap_or(distinct.len()));
+            if known.is_none() {
+                distinct.push(effects);
+            }
+        }
+        let pass = |effects: &&Effects| -> Vec<Option<Cow<'_, [f64]>>> {
+            self.stretches.iter().map(|stretch| self.nodes(stretch, effects)).collect()
+        };
+        let inputs: Vec<Vec<Option<Cow<'_, [f64]>>>> = distinct.par_iter().map(pass).collect();
+        let runs = models.iter().zip(&which).flat_map(|((model, effects), which)| {
+            let stretches = self.stretches.iter().zip(&model.states).zip(&inputs[*which]);
+            stretches.map(|((stretch, state), input)| self.run(model, state, stretch, effects, input.as_deref()))
+        });
+        let runs: Vec<Run<'_>> = runs.collect();
+        self.work.fetch_add(runs.iter().map(Run::work).sum(), Ordering::Relaxed);
         let mut parts = outputs(&runs).into_iter();
         let lengths = models.iter().map(|(model, _)| model.states.len().min(self.stretches.len()));
         lengths.map(|stretches| parts.by_ref().take(stretches).collect::<Vec<_>>().concat()).collect()
@@ -221,15 +248,18 @@ impl Bench {
     /// The model's output over any stretch of the records from a state there, channel by channel.
     pub(crate) fn simulate_stretch(&self, model: &Model, state: &State, stretch: &Stretch) -> Vec<f64> {
         let effects = model.effects();
-        outputs(&[self.run(model, state, stretch, &effects)]).pop().unwrap_or_default()
+        let nodes = self.nodes(stretch, &effects);
+        outputs(&[self.run(model, state, stretch, &effects, nodes.as_deref())]).pop().unwrap_or_default()
     }
 
-    fn runs<'a>(&'a self, model: &'a Model, effects: &'a Effects) -> impl Iterator<Item = Run<'a>> {
-        let stretches = self.stretches.iter().zip(&model.states);
-        stretches.map(move |(stretch, state)| self.run(model, state, stretch, effects))
-    }
-
-    fn run<'a>(&'a self, model: &'a Model, state: &'a State, stretch: &Stretch, effects: &'a Effects) -> Run<'a> {
+    fn run<'a>(
+        &'a self,
+        model: &'a Model,
+        state: &'a State,
+        stretch: &Stretch,
+        effects: &'a Effects,
+        nodes: Option<&'a [f64]>,
+    ) -> Run<'a> {
         let span = Span {
             interval_s: self.interval_s,
             begin_s: stretch.first as f64 * self.interval_s,
@@ -238,13 +268,7 @@ impl Bench {
             steps: self.steps,
             samples: stretch.samples(),
         };
-        Run {
-            dynamics: self.dynamics(model, stretch, effects),
-            state,
-            nodes: self.nodes(stretch, effects),
-            effects,
-            span,
-        }
+        Run { dynamics: self.dynamics(model, stretch, effects), state, nodes, effects, span }
     }
 
     /// A model's dynamics as they are in the record of a stretch.
@@ -264,7 +288,11 @@ impl Bench {
     /// Motion of the modes over the stretches: by stretch, mode and sample.
     pub(crate) fn motion(&self, model: &Model) -> Vec<Vec<Vec<[f64; 2]>>> {
         let effects = model.effects();
-        motions(&self.runs(model, &effects).collect::<Vec<_>>())
+        let nodes: Vec<_> = self.stretches.iter().map(|stretch| self.nodes(stretch, &effects)).collect();
+        let stretches = self.stretches.iter().zip(&model.states).zip(&nodes);
+        let runs =
+            stretches.map(|((stretch, state), nodes)| self.run(model, state, stretch, &effects, nodes.as_deref()));
+        motions(&runs.collect::<Vec<_>>())
     }
 
     /// Output less simulation; 0 where the output is missing.
@@ -293,6 +321,23 @@ impl Bench {
         pass(&effects.input, |_| 0.0, &mut nodes);
         Some(Cow::Owned(nodes))
     }
+}
+
+/// What the causes of each model add; those whose causes of the input have the same values share what it passes
+/// through.
+fn effects_of_all(models: &[Model]) -> Vec<Effects> {
+    let mut known: Vec<(&Model, Vec<Passage>)> = Vec::new();
+    let of = |model| {
+        let mut effects = Model::effects(model);
+        if !effects.input.is_empty() {
+            match known.iter().find(|(other, _)| other.drives_as(model)) {
+                Some((_, input)) => effects.input.clone_from(input),
+                None => known.push((model, effects.input.clone())),
+            }
+        }
+        effects
+    };
+    models.iter().map(of).collect()
 }
 
 /// Steps of the integrator between samples.

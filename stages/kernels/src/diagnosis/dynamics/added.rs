@@ -44,14 +44,7 @@ impl Added {
 
     /// Adds its effects.
     pub(super) fn add(&self, effects: &mut Effects) {
-        if self.modes.is_empty() {
-            return self.cause.add(&self.values, effects);
-        }
-        let before = effects.modal_force.len();
-        self.cause.add(&self.values, effects);
-        for force in &mut effects.modal_force[before..] {
-            force.place(&self.modes);
-        }
+        effects.add_at(&self.modes, |effects| self.cause.add(&self.values, effects));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::added::Added;
 use super::modal::Modal;
-use crate::causes::Cause;
+use crate::causes::{Cause, Part};
 use crate::effects::Effects;
 
 /// What a stretch has of its own: where its motion begins, where its zero lies.
@@ -108,6 +108,13 @@ impl Model {
             model.causes.remove(cause);
         }
         model
+    }
+
+    /// Whether the causes that another has of its input are its own, with the same values.
+    pub(crate) fn drives_as(&self, other: &Self) -> bool {
+        let acts = |added: &&Added| added.cause.about().part == Part::Input;
+        let (own, its) = (self.causes.iter().filter(acts), other.causes.iter().filter(acts));
+        own.map(|added| (added.id(), &added.values)).eq(its.map(|added| (added.id(), &added.values)))
     }
 
     /// Whether it has that cause at that place.

@@ -54,7 +54,7 @@ pub(crate) struct Run<'a> {
     pub state: &'a State,
     /// The input at the integrator's nodes: `2 steps + 1` per interval (see [`crate::diagnosis::FineInput`]); none: no
     /// input.
-    pub nodes: Option<Cow<'a, [f64]>>,
+    pub nodes: Option<&'a [f64]>,
     pub effects: &'a Effects,
     pub span: Span,
 }
@@ -69,6 +69,13 @@ impl Run<'_> {
 
     fn is_bent(&self) -> bool {
         !self.effects.modal_force.is_empty()
+    }
+
+    /// Steps of its sections, those of a motion that forces bend four times.
+    pub fn work(&self) -> u64 {
+        let Span { samples, steps, .. } = self.span;
+        let bent = if self.is_bent() { 4 } else { 1 };
+        (samples * steps * self.sections().len() * bent) as u64
     }
 
     /// Modes come first.
@@ -194,7 +201,7 @@ enum Input<'r> {
 
 impl<'r> Input<'r> {
     fn new(runs: &[&'r Run<'_>]) -> Option<Self> {
-        let nodes = |l: usize| runs.get(l).or(runs.first()).and_then(|run| run.nodes.as_deref());
+        let nodes = |l: usize| runs.get(l).or(runs.first()).and_then(|run| run.nodes);
         let first = nodes(0)?;
         let own: [&[f64]; LANES] = std::array::from_fn(|l| nodes(l).unwrap_or(&[]));
         let same = own.iter().all(|nodes| std::ptr::eq(*nodes, first));

@@ -17,7 +17,7 @@ fn state(level: f64) -> State {
 
 fn run<'a>(state: &'a State, effects: &'a Effects, input: Option<&'a [f64]>, samples: usize) -> Run<'a> {
     let span = Span { interval_s: 1.0, begin_s: 0.0, reference_s: 1.0, record: 0, steps: 2, samples };
-    Run { dynamics: Cow::Owned(modes()), state, nodes: input.map(Cow::Borrowed), effects, span }
+    Run { dynamics: Cow::Owned(modes()), state, nodes: input, effects, span }
 }
 
 /// Products of every quantity, up to five factors, of one mode and of two.

@@ -1,5 +1,9 @@
 //! Which causes to add: greedily, then each again against its rivals.
 
+mod choice;
+
+pub(crate) use choice::{Choice, Chosen, Judged};
+
 use super::data::Bench;
 use super::dynamics::Model;
 use super::fit::{Blocks, Chords, Fit, Until, dot};
@@ -7,7 +11,7 @@ use super::instants::instant;
 use super::lack_of_fit::{Floor, misfit};
 use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, Promise, Sample, screen, significance};
-use crate::causes::{Cause, built_in};
+use crate::causes::Cause;
 
 /// Candidates that are fitted at each step.
 const REFITTED: usize = 5;
@@ -15,6 +19,8 @@ const REFITTED: usize = 5;
 const WORK: usize = 160_000;
 /// Times that a model may be changed after its causes were held against their rivals.
 const ROUNDS: usize = 4;
+/// Causes that are held against their rivals, all times together, after which no exchange follows.
+const EXAMINED: usize = 12;
 /// Share of the largest gain from which on a candidate may be the best.
 const NEAR: f64 = 0.8;
 /// Share of the loss below which a step of a fit that only has to be compared is its last.
@@ -31,77 +37,7 @@ const MUCH: f64 = 1.0;
 /// Last causes that another search goes on without.
 const AGAIN: usize = 1;
 /// Two models tie whose losses differ by less than this many variances of the floor: a likelihood ratio of 7.
-const TIE: f64 = 4.0;
-
-/// A model with what it loses on folds that it has not seen, block by block.
-#[derive(Clone)]
-pub(crate) struct Judged {
-    pub fit: Fit,
-    pub held_out: Vec<f64>,
-}
-
-impl Judged {
-    pub fn new(fit: Fit, bench: &Bench, blocks: &Blocks) -> Self {
-        let held_out = fit.moments(bench, blocks).held_out(0.0);
-        Self { fit, held_out }
-    }
-
-    /// Loss on folds that were not seen.
-    pub fn unseen(&self) -> f64 {
-        self.held_out.iter().sum()
-    }
-}
-
-/// A cause that was chosen, and what it was held against.
-#[derive(Clone)]
-pub(crate) struct Chosen {
-    /// Its id.
-    pub id: &'static str,
-    /// Its place among the model's causes.
-    pub place: usize,
-    /// Corrected for all candidates and their trials.
-    pub p_value: f64,
-    /// Ratio of the score's scatter between blocks to that of white residuals.
-    pub inflation: f64,
-    /// The best model with another cause in its place: id, share of the gain.
-    pub runner_up: Option<(&'static str, f64)>,
-    /// Whether the two can't be told apart.
-    pub tied: bool,
-    /// Error without it on what did not choose it, all others refitted; none where it is far from the error with it.
-    pub left_out: Option<f64>,
-}
-
-impl Chosen {
-    /// Whether the data distinguish it from its rival, or both act in the same place and make its class.
-    pub fn has_a_name(&self) -> bool {
-        let part = |id| built_in(id).map(|cause| cause.about().part);
-        !self.tied || self.runner_up.is_some_and(|(rival, _)| part(rival) == part(self.id))
-    }
-
-    /// What these data can't distinguish from it, itself included.
-    pub fn class(&self) -> Vec<String> {
-        let own = built_in(self.id).map_or(&[][..], |cause| cause.about().class);
-        let rival = self.runner_up.map(|(id, _)| id).filter(|id| self.tied && !own.contains(id));
-        own.iter().copied().chain(rival).map(str::to_owned).collect()
-    }
-}
-
-/// What the search found.
-pub(crate) struct Choice {
-    /// The baseline and each model with one more cause, in order: rung n has n causes.
-    pub ladder: Vec<Judged>,
-    /// The causes of the last.
-    pub chosen: Vec<Chosen>,
-    /// What came nearest where nothing was added: id, share of the squared residual that it would take.
-    pub nearest: Vec<(&'static str, f64)>,
-}
-
-impl Choice {
-    /// Loss of its last model on folds that it has not seen.
-    fn unseen(&self) -> f64 {
-        self.ladder.last().map_or(f64::INFINITY, Judged::unseen)
-    }
-}
+pub(super) const TIE: f64 = 4.0;
 
 /// All that a step of the search looks at.
 pub(crate) struct Search<'a> {
@@ -111,6 +47,8 @@ pub(crate) struct Search<'a> {
     pub candidates: Vec<Candidate>,
     /// Trials of all candidates together.
     pub trials: usize,
+    /// The bench's work at which the search ends, with what it has then.
+    pub end: u64,
 }
 
 impl Search<'_> {
@@ -127,7 +65,8 @@ impl Search<'_> {
     pub fn run(&self, baseline: Fit) -> Choice {
         let mut best = self.from(vec![Judged::new(baseline, self.bench, &self.blocks)], None);
         let rest = |choice: &Choice| choice.ladder.last().map(|last| misfit(self.bench, &last.fit, &self.blocks));
-        if rest(&best).is_none_or(|misfit| misfit.ratio < MUCH.min(self.options.tolerated_misfit)) {
+        let good = rest(&best).is_none_or(|misfit| misfit.ratio < MUCH.min(self.options.tolerated_misfit));
+        if good || self.is_full(&best.ladder) {
             return best;
         }
         // the first step is seldom wrong; the cause that helps most alone may be in the way of two that help together
@@ -143,14 +82,24 @@ impl Search<'_> {
         best
     }
 
+    /// Whether a ladder has as many causes as it may, or the search has taken as long as it may: what needs so many, or
+    /// so long, is not in the catalogue.
+    fn is_full(&self, ladder: &[Judged]) -> bool {
+        ladder.len() > self.options.most_causes || self.bench.work() > self.end
+    }
+
     /// The search from a ladder on, without a candidate.
     fn from(&self, mut ladder: Vec<Judged>, banned: Option<&Candidate>) -> Choice {
         let mut chosen = Vec::new();
         let mut nearest = Vec::new();
-        // an exchange lowers the loss, so that this ends; the bound is for ties by rounding
+        let mut examined = 0;
+        // an exchange lowers the loss, so that this ends; the bounds are for ties by rounding and for many causes that
+        // stand in for one that is not in the catalogue
         for round in 0..ROUNDS {
             nearest = self.climb(&mut ladder, banned);
-            match self.examined(&ladder, round + 1 < ROUNDS) {
+            examined += ladder.len() - 1;
+            let may_change = round + 1 < ROUNDS && examined < EXAMINED && !self.is_full(&ladder);
+            match self.examined(&ladder, may_change) {
                 Examined::Stands(causes) => {
                     chosen = causes;
                     break;
@@ -168,7 +117,7 @@ impl Search<'_> {
             let mut promises = screen(self.bench, &current.fit, &self.candidates);
             promises.retain(|promise| !banned.is_some_and(|banned| banned.is(&promise.candidate)));
             let nearest = promises.iter().take(3).map(|p| (p.candidate.id(), p.gain / current.fit.loss)).collect();
-            if current.fit.model.causes.len() >= self.options.most_causes {
+            if self.is_full(ladder) {
                 return nearest;
             }
             match self.best(&current, &promises) {
@@ -218,7 +167,7 @@ impl Search<'_> {
         let sample = self.sample(&current.fit);
         for (_, model) in tried.into_iter().filter(|(gain, _)| gain.is_finite()) {
             // one that diverges leaves the others
-            let Some(fit) = Fit::new(self.bench, &model, Until::MINIMUM) else { continue };
+            let Some(fit) = Fit::new(self.bench, &model, Until::JUDGED) else { continue };
             let next = Judged::new(fit, self.bench, &self.blocks);
             let which = next.fit.model.causes.len() - 1;
             if self.passes(&sample, &next, which, current) {
@@ -246,7 +195,7 @@ impl Search<'_> {
     }
 
     fn compared_until(&self) -> Until {
-        Until { steps: self.few(), gain: SLOW.min(0.25 * self.options.least_gain) }
+        Until { steps: self.few(), gain: SLOW.min(0.25 * self.options.least_gain), ..Until::JUDGED }
     }
 
     fn sample<'b>(&'b self, fit: &'b Fit) -> Sample<'b> {
@@ -304,6 +253,11 @@ impl Search<'_> {
         let sample = self.sample(&here.fit);
         let mut chosen = Vec::new();
         for which in 0..here.fit.model.causes.len() {
+            // without rivals where time is up: what is left decides
+            if self.bench.work() > self.end {
+                chosen.push(self.unopposed(&sample, ladder, which));
+                continue;
+            }
             let without = self
                 .compared(&here.fit.model.without(which))
                 .filter(|without| without.fit.loss > here.fit.loss)
@@ -338,6 +292,12 @@ impl Search<'_> {
             chosen.push(found);
         }
         Examined::Stands(chosen)
+    }
+
+    /// A cause as it was added, held against nothing.
+    fn unopposed(&self, sample: &Sample<'_>, ladder: &[Judged], which: usize) -> Chosen {
+        let with = &ladder[which + 1];
+        self.audit(sample, with, which, &ladder[which], None)
     }
 
     /// The best model with another cause in the place of `which`, of another class.
@@ -375,13 +335,13 @@ impl Search<'_> {
             let promise = screen(self.bench, &current.fit, &[again]).into_iter().next();
             let asked = promise.into_iter().flat_map(|promise| [promise.values, promise.trial]);
             let next = asked.chain([added.values.clone()]).find_map(|values| {
-                Fit::new(self.bench, &current.fit.model.with(added.cause, &added.modes, values), Until::MINIMUM)
+                Fit::new(self.bench, &current.fit.model.with(added.cause, &added.modes, values), Until::JUDGED)
             });
             let Some(next) = next else { break };
             ladder.push(Judged::new(next, self.bench, &self.blocks));
         }
         // the last from where it was found, if that is the better
-        let found = Fit::new(self.bench, model, Until::MINIMUM);
+        let found = Fit::new(self.bench, model, Until::JUDGED);
         if let (Some(last), Some(found)) = (ladder.last_mut(), found)
             && last.fit.model.causes.len() == model.causes.len()
             && found.loss < last.fit.loss

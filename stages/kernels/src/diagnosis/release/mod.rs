@@ -1,0 +1,64 @@
+//! Diagnosis of releases: what a linear lever and detector leave unexplained in snap-off events, and why.
+
+mod align;
+mod answer;
+mod backward_elimination;
+mod basis;
+mod change;
+mod contest;
+mod detuning;
+mod diagnose;
+mod exponent;
+mod foreign_line;
+mod halves;
+mod joint;
+mod last_tests;
+mod lever;
+mod lever_modes;
+mod merge;
+mod normal;
+mod prepared;
+mod problem;
+mod residuals;
+mod round;
+mod screen;
+mod search;
+mod seeking;
+mod signals;
+mod silent_modes;
+mod start;
+mod state;
+mod stepper;
+mod story;
+mod story_events;
+mod story_levels;
+mod story_spectra;
+mod subset;
+mod swap;
+mod thermal_peaks;
+mod trials;
+mod window;
+
+pub use align::{aligned, in_phase, suggested};
+pub use detuning::Detuning;
+pub use diagnose::{DiagnosedReleases, ReleaseOptions, Releases, diagnose};
+pub use exponent::Exponent;
+pub use foreign_line::without_lines;
+pub use joint::{JointFit, fit};
+pub use lever::{Lever, LeverMode};
+pub use prepared::Prepared;
+pub use problem::{Problem, SeenMode};
+pub use residuals::{Tile, common, peaks, residuals, tiles, whitened};
+pub use screen::{Screen, Sign, screen};
+pub use search::{Named, Naming, NamingOptions, name_causes, scene};
+pub use start::{Start, start};
+pub use state::{Hold, Hypothesis, State};
+pub use stepper::{Pace, Release, differences};
+pub use story::{Story, story};
+pub use story_events::EventStory;
+pub use story_levels::LevelStory;
+pub use story_spectra::MeanSpectra;
+pub use window::{Cut, EventWindow};
+
+#[cfg(test)]
+mod classes_tests;

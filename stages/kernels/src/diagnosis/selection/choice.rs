@@ -1,0 +1,75 @@
+//! What a search found: models, and the causes that were chosen.
+
+use crate::causes::built_in;
+use crate::diagnosis::data::Bench;
+use crate::diagnosis::fit::{Blocks, Fit};
+
+/// A model with what it loses on folds that it has not seen, block by block.
+#[derive(Clone)]
+pub(crate) struct Judged {
+    pub fit: Fit,
+    pub held_out: Vec<f64>,
+}
+
+impl Judged {
+    pub fn new(fit: Fit, bench: &Bench, blocks: &Blocks) -> Self {
+        let held_out = fit.moments(bench, blocks).held_out(0.0);
+        Self { fit, held_out }
+    }
+
+    /// Loss on folds that were not seen.
+    pub fn unseen(&self) -> f64 {
+        self.held_out.iter().sum()
+    }
+}
+
+/// A cause that was chosen, and what it was held against.
+#[derive(Clone)]
+pub(crate) struct Chosen {
+    /// Its id.
+    pub id: &'static str,
+    /// Its place among the model's causes.
+    pub place: usize,
+    /// Corrected for all candidates and their trials.
+    pub p_value: f64,
+    /// Ratio of the score's scatter between blocks to that of white residuals.
+    pub inflation: f64,
+    /// The best model with another cause in its place: id, share of the gain.
+    pub runner_up: Option<(&'static str, f64)>,
+    /// Whether the two can't be distinguished.
+    pub tied: bool,
+    /// Error without it on what did not choose it, all others refitted; none where it is far from the error with it.
+    pub left_out: Option<f64>,
+}
+
+impl Chosen {
+    /// Whether the data distinguish it from its rival, or both act in the same place and make its class.
+    pub fn has_a_name(&self) -> bool {
+        let part = |id| built_in(id).map(|cause| cause.about().part);
+        !self.tied || self.runner_up.is_some_and(|(rival, _)| part(rival) == part(self.id))
+    }
+
+    /// What these data can't distinguish from it, itself included.
+    pub fn class(&self) -> Vec<String> {
+        let own = built_in(self.id).map_or(&[][..], |cause| cause.about().class);
+        let rival = self.runner_up.map(|(id, _)| id).filter(|id| self.tied && !own.contains(id));
+        own.iter().copied().chain(rival).map(str::to_owned).collect()
+    }
+}
+
+/// What the search found.
+pub(crate) struct Choice {
+    /// The baseline and each model with one more cause, in order: rung n has n causes.
+    pub ladder: Vec<Judged>,
+    /// The causes of the last.
+    pub chosen: Vec<Chosen>,
+    /// What came nearest where nothing was added: id, share of the squared residual that it would take.
+    pub nearest: Vec<(&'static str, f64)>,
+}
+
+impl Choice {
+    /// Loss of its last model on folds that it has not seen.
+    pub(super) fn unseen(&self) -> f64 {
+        self.ladder.last().map_or(f64::INFINITY, Judged::unseen)
+    }
+}

@@ -1,0 +1,134 @@
+//! A law that no cause covers: each general term alone, held against what the causes leave.
+
+use rayon::prelude::*;
+
+use super::data::Bench;
+use super::fit::{Blocks, Fit, Moments, Until, dot};
+use super::lack_of_fit::clean;
+use super::library::{Law, library};
+use super::score_test::{Basis, Candidate, screen};
+use super::selection::TIE;
+use crate::effects::{Effects, ModalForce};
+use crate::statistics::f_tail;
+
+/// A general term that a model lacks.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct UnnamedLaw {
+    /// What it is.
+    pub words: String,
+    /// What it would take of the squared residual of folds that are held out.
+    pub gain: f64,
+    /// Probability of so large a gain by chance, all terms considered.
+    pub p_value: f64,
+    /// What the linear model leaves with it alone; none where it is no force, or a named cause's own.
+    pub alone: Option<f64>,
+}
+
+/// Laws that are fitted in the place of all causes.
+const FITTED: usize = 2;
+
+/// The term of the library that would take most of a fit's residual, of those that are significant; or, where names are
+/// many, one of the largest that alone does better than all of them.
+///
+/// # Method
+/// Score test of each term, what the fit's own numbers can make taken out; the scatter of its score between blocks with
+/// the term itself fitted, so that whatever else is left counts as noise; an F ratio of one and one fewer than the
+/// blocks, by Bonferroni for all terms; and it has to gain on folds that did not fit it. Aimed at one term each it sees
+/// what a prediction from all of them drowns in their number. Of the largest that are forces, before any cause came and
+/// after the last, the linear model with that force alone is fitted too: where several causes stand in for a law that no
+/// one has named they come close together, and the law comes closer.
+/// # Source
+/// C. R. Rao, Linear Statistical Inference and Its Applications, 2nd ed., 1973, section 6e.
+pub(super) fn unnamed_law(
+    bench: &Bench,
+    [baseline, fit]: [&Fit; 2],
+    blocks: &Blocks,
+    candidates: &[Candidate],
+    false_alarm_rate: f64,
+) -> Option<UnnamedLaw> {
+    let mut found = significant(bench, fit, blocks, false_alarm_rate);
+    let unnamed = |force: &Candidate| !candidates.iter().any(|own| same(own, force));
+    let fitted = |found: &mut Vec<(UnnamedLaw, Option<Candidate>)>| {
+        let forces = found.iter_mut().filter_map(|(law, force)| Some((law, force.as_ref()?)));
+        for (law, force) in forces.filter(|(_, force)| unnamed(force)).take(FITTED) {
+            law.alone = alone(bench, baseline, force);
+        }
+    };
+    if !fit.model.causes.is_empty() {
+        fitted(&mut found);
+    }
+    if fit.model.causes.len() > 1 {
+        // what several names share is seen whole before any of them came
+        let mut first = significant(bench, baseline, blocks, false_alarm_rate);
+        fitted(&mut first);
+        first.retain(|(law, _)| law.beats(bench, fit));
+        found.extend(first);
+    }
+    let place = found.iter().position(|(law, _)| law.beats(bench, fit)).unwrap_or(0);
+    (place < found.len()).then(|| found.swap_remove(place).0)
+}
+
+impl UnnamedLaw {
+    /// Whether it alone describes more than all causes of a fit together.
+    pub fn beats(&self, bench: &Bench, fit: &Fit) -> bool {
+        let variance = fit.loss / bench.count as f64;
+        self.alone.is_some_and(|loss| loss < fit.loss - TIE * variance)
+    }
+}
+
+/// Significant terms by falling gain, with the force that each is.
+fn significant(
+    bench: &Bench,
+    fit: &Fit,
+    blocks: &Blocks,
+    false_alarm_rate: f64,
+) -> Vec<(UnnamedLaw, Option<Candidate>)> {
+    let rest = clean(bench, fit);
+    let basis = Basis::new(fit);
+    let laws = library(bench, fit);
+    let terms: usize = laws.iter().map(|law| law.searched).sum();
+    let white = dot(&rest, &rest) / bench.count as f64;
+    let test = |law: Law| {
+        let whole = dot(&law.column, &law.column);
+        let direction = basis.beyond(bench, fit, law.column);
+        let (length, along) = (dot(&direction, &direction), dot(&direction, &rest));
+        // what is left of a direction that the model makes itself is rounding
+        if !(length > 1e-10 * whole && length.is_finite()) {
+            return None;
+        }
+        // by blocks, with the term fitted
+        let moments = Moments::new(&[direction], &rest, blocks);
+        let count = blocks.count() as f64;
+        let scores = moments.score.iter().zip(&moments.curvature);
+        let scatter: f64 = scores.map(|(score, square)| (score[0] - along / length * square[0][0]).powi(2)).sum();
+        let variance = (scatter * count / (count - 1.0)).max(white * length);
+        let p_value = (terms as f64 * f_tail(along * along / variance, 1.0, count - 1.0)).min(1.0);
+        let gain = moments.loss.iter().sum::<f64>() - moments.held_out(0.0).iter().sum::<f64>();
+        let found = UnnamedLaw { words: law.words, gain, p_value, alone: None };
+        (p_value < false_alarm_rate && found.gain > 0.0).then_some((found, law.force))
+    };
+    let mut found: Vec<(UnnamedLaw, Option<Candidate>)> = laws.into_par_iter().filter_map(test).collect();
+    found.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+    found
+}
+
+/// Whether a candidate is the same force as another.
+fn same(own: &Candidate, other: &Candidate) -> bool {
+    let forces = |candidate: &Candidate| {
+        let mut effects = Effects::default();
+        let unit = candidate.cause.about().parameters.iter().map(|_| 1.0).collect::<Vec<_>>();
+        effects.add_at(&candidate.modes, |effects| candidate.cause.add(&unit, effects));
+        let power = |force: ModalForce| if let ModalForce::Power(law) = force { Some(law) } else { None };
+        effects.modal_force.into_iter().map(power).collect::<Option<Vec<_>>>()
+    };
+    forces(own).is_some_and(|own| !own.is_empty() && forces(other) == Some(own))
+}
+
+/// What the linear model leaves with a force added, from the strength that it asks for or from a trial's.
+fn alone(bench: &Bench, baseline: &Fit, force: &Candidate) -> Option<f64> {
+    let promise = screen(bench, baseline, std::slice::from_ref(force)).into_iter().next()?;
+    let fitted = |values: Vec<f64>| {
+        Fit::new(bench, &baseline.model.with(force.cause, &force.modes, values), Until::MINIMUM).map(|fit| fit.loss)
+    };
+    [promise.values, promise.trial].into_iter().filter_map(fitted).min_by(f64::total_cmp)
+}
