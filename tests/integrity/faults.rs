@@ -9,14 +9,14 @@ use super::common::{config, files, sets, simulated};
 use super::leftovers::{Place, below, count};
 
 /// The file system that a test wants, made by the ways that a machine may allow.
-struct Mounts {
+pub struct Mounts {
     /// What goes before `sh -c`.
     private: Option<&'static [&'static str]>,
 }
 
 impl Mounts {
     /// Tries a namespace of mounts of its own: as any user, then as root.
-    fn new() -> Self {
+    pub fn new() -> Self {
         let ways: [&'static [&'static str]; 2] = [&["unshare", "--map-root-user", "--mount"], &["unshare", "--mount"]];
         let works = |way: &&&'static [&'static str]| {
             let mut command = Command::new(way[0]);
@@ -28,20 +28,30 @@ impl Mounts {
 
     /// Runs afmid with `mount` (a shell command) done before it, where that is possible: none if it is not.
     fn run(&self, place: &Place, mount: &str, arguments: &[&str]) -> Option<Output> {
-        let way = self.private?;
-        let mut command = Command::new(way[0]);
-        command.current_dir(place.folder()).env("TMPDIR", place.path("tmp")).env("AFMID_CACHE", place.path("cache"));
         let script = format!(
             "{mount} || exit 99; \"$0\" \"$@\"; code=$?; echo left: $(ls -A cache disk 2>/dev/null) >&2; exit $code"
         );
-        command.args(&way[1..]).args(["sh", "-c", &script, env!("CARGO_BIN_EXE_afmid")]).args(arguments);
+        self.shell(place, &script, arguments)
+    }
+
+    /// Runs a script, whose `$0` is afmid, where something can be mounted; it exits with 99 where a mount fails.
+    pub fn script(&self, place: &Place, script: &str) -> Option<Output> {
+        self.shell(place, script, &[])
+    }
+
+    fn shell(&self, place: &Place, script: &str, arguments: &[&str]) -> Option<Output> {
+        let way = self.private?;
+        let mut command = Command::new(way[0]);
+        command.current_dir(place.folder()).env("TMPDIR", place.path("tmp")).env("AFMID_CACHE", place.path("cache"));
+        command.args(&way[1..]).args(["sh", "-c", script, env!("CARGO_BIN_EXE_afmid")]).args(arguments);
         let output = command.output().expect("unshare starts");
         assert_ne!(output.status.code(), Some(99), "{}", stderr(&output));
         Some(output)
     }
 }
 
-fn stderr(output: &Output) -> String {
+/// What a program said on stderr.
+pub fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 

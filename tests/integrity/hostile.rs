@@ -162,6 +162,17 @@ fn collections(bytes: &[u8]) -> (Vec<usize>, usize) {
     (found, largest)
 }
 
+/// The first bytes of a heap collection: its header, then those of objects with these numbers and sizes.
+fn heap(bytes: u64, objects: &[(u16, u64)]) -> Vec<u8> {
+    let mut heap = [b"GCOL\x01\0\0\0".as_slice(), &bytes.to_le_bytes()].concat();
+    for (number, size) in objects {
+        heap.extend([&number.to_le_bytes()[..], &[0; 6], &size.to_le_bytes()].concat());
+        // a text of up to 8 bytes
+        heap.extend(if *number > 0 { vec![b'x'; 8] } else { Vec::new() });
+    }
+    heap
+}
+
 #[test]
 fn results_that_were_sealed_again_are_bounded() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -184,35 +195,32 @@ fn results_that_were_sealed_again_are_bounded() {
         .find(|&at| (0..3000).all(|row| is_argument(&whole, at + 16 * row)))
         .expect("three thousand references in a row");
     let file = folder.path().join("hostile.h5");
-    let damaged = |name: &str, damage: &dyn Fn(&mut Vec<u8>)| {
+    let damaged = |damage: &dyn Fn(&mut Vec<u8>)| {
         let mut bytes = whole.clone();
         damage(&mut bytes);
         fs::write(&file, sealed(unsealed(bytes))).expect("it is written");
-        println!("{name}");
         every_command(folder.path(), &file);
+        let output = command(folder.path(), &["show", "hostile.h5", "--json"]).output().expect("afmid starts");
+        String::from_utf8_lossy(&output.stderr).into_owned()
     };
-    damaged("every argument is the config", &|bytes| {
+    // every argument is the config
+    damaged(&|bytes| {
         (0..3000).for_each(|row| bytes[first + 16 * row..first + 16 * row + 16].copy_from_slice(&reference));
     });
-    damaged("a small heap without end", &|bytes| bytes[heaps[0] + 16..heaps[0] + 32].fill(0));
-    damaged("a large heap without end", &|bytes| bytes[largest..largest + 16].fill(0));
-    damaged("an object whose size overflows", &|bytes| {
-        bytes[largest + 8..largest + 16].copy_from_slice(&(16_u64.wrapping_neg()).to_le_bytes());
+    // within the text of the config, where the library sees letters: the guard refuses the file all the same
+    let text = largest + 16;
+    let said = damaged(&|bytes| {
+        let small = heap(4096, &[(1, 3), (0, 8)]);
+        bytes[text..text + small.len()].copy_from_slice(&small);
     });
-    damaged("heaps over one another", &|bytes| {
-        let end = largest + 16 + (size as usize) / 16 * 16;
-        for at in (largest + 16..end - 4096).step_by(64) {
-            bytes[at..at + 8].copy_from_slice(b"GCOL\x01\0\0\0");
-            bytes[at + 8..at + 16].copy_from_slice(&((end - at) as u64).to_le_bytes());
-            bytes[at + 16..at + 24].copy_from_slice(&1_u64.to_le_bytes());
-            bytes[at + 24..at + 32].copy_from_slice(&u64::from(length).to_le_bytes());
-        }
-        for row in 0..3000 {
-            let heap = (largest + 16 + 64 * row) as u64;
-            bytes[first + 16 * row + 4..first + 16 * row + 12].copy_from_slice(&heap.to_le_bytes());
-            bytes[first + 16 * row + 12..first + 16 * row + 16].copy_from_slice(&1_u32.to_le_bytes());
+    assert!(said.contains("is smaller than its header"), "{said}");
+    let said = damaged(&|bytes| {
+        let end = text + size as usize;
+        for at in (text..end - 4096).step_by(64) {
+            bytes[at..at + 16].copy_from_slice(&heap((end - at) as u64, &[]));
         }
     });
+    assert!(said.contains("lie over one another"), "{said}");
     // what was not damaged is shown
     afmid(folder.path(), &["show", "a.h5"]);
     afmid(folder.path(), &["diff", "a.h5", "a.h5"]);
@@ -310,9 +318,9 @@ fn archives_that_inflate_to_much_are_bounded() {
 #[test]
 fn the_files_of_the_attack_are_bounded() {
     let data = std::env::var_os("AFMID_DATA").map_or_else(|| Path::new(ROOT).join("../shared/data"), PathBuf::from);
-    let files = ["hang.h5", "rss.h5", "bomb.npz", "bomb.mat"].map(|name| data.join("hostile").join(name));
+    let files = ["bomb.npz", "bomb.mat"].map(|name| data.join("hostile").join(name));
     if !files.iter().all(|file| file.is_file()) {
-        println!("stand-in: 4 hostile files are not here, the other tests make their like");
+        println!("stand-in: 2 hostile files are not here, the other tests make their like");
         return;
     }
     for file in files {

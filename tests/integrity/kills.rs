@@ -6,19 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::common::{config, files, sets, simulated};
 use super::leftovers::Place;
-
-/// xorshift: the same moments every time, as far as the machine is equally fast.
-struct Random(u64);
-
-impl Random {
-    /// From 0 to 1.
-    fn share(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
+use super::random::Random;
 
 /// How long a command takes that nobody kills.
 fn whole(place: &Place, arguments: &[&str]) -> Duration {

@@ -31,13 +31,7 @@ impl FilledFolder {
     /// A folder that exists; removes what killed runs left there. Errors: its list cannot be read.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
         sweep(folder);
-        let list = folder.join(LIST);
-        let bytes = match fs::read(&list) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
-            Err(error) => return Err(StoreError::io("cannot be read", &list, &error)),
-        };
-        Ok(Self { folder: folder.to_owned(), listed: Mutex::new(parse(&String::from_utf8_lossy(&bytes))) })
+        Ok(Self { folder: folder.to_owned(), listed: Mutex::new(read_list(folder)?) })
     }
 
     /// The folder.
@@ -72,11 +66,21 @@ impl FilledFolder {
         if metadata.len() == 0 {
             return Ok(());
         }
-        let Some(hashes) = self.listed().get(name).cloned() else {
-            return if earlier(&path) { Ok(()) } else { Err(refused("exists, and afmid did not write it")) };
-        };
         let now = hash(&path).map_err(|error| StoreError::io("cannot be read", &path, &error))?;
-        if hashes.contains(&now) { Ok(()) } else { Err(refused("was changed since afmid wrote it")) }
+        let is_listed = |listed: &HashMap<String, Vec<String>>| listed.get(name).map(|hashes| hashes.contains(&now));
+        if is_listed(&self.listed()) == Some(true) {
+            return Ok(());
+        }
+        // another process may have written it meanwhile: its line came before its file
+        let now_listed = read_list(&self.folder)?;
+        let found = is_listed(&now_listed);
+        *self.listed() = now_listed;
+        match found {
+            Some(true) => Ok(()),
+            Some(false) => Err(refused("was changed since afmid wrote it")),
+            None if earlier(&path) => Ok(()),
+            None => Err(refused("exists, and afmid did not write it")),
+        }
     }
 
     /// Writes a file, whole or not at all, synced, and lists it. `fill` gets a name of its own in the same folder and
@@ -147,6 +151,16 @@ impl FilledFolder {
     }
 }
 
+/// Hashes by name, as they stand in the folder's list now; none where there is no list. Errors: it cannot be read.
+fn read_list(folder: &Path) -> Result<HashMap<String, Vec<String>>, StoreError> {
+    let list = folder.join(LIST);
+    match fs::read(&list) {
+        Ok(bytes) => Ok(parse(&String::from_utf8_lossy(&bytes))),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(HashMap::new()),
+        Err(error) => Err(StoreError::io("cannot be read", &list, &error)),
+    }
+}
+
 /// As `b3sum` has it: a name with a backslash or the end of a line in it is escaped, and its line begins with a
 /// backslash.
 fn line(name: &str, hash: &str) -> String {
@@ -202,9 +216,12 @@ mod tests {
         let own = FilledFolder::open(&folder.0).unwrap();
         own.write("a.csv", nobody, b"1").unwrap();
         own.write("a.csv", nobody, b"2").unwrap();
-        // another process
+        // another process, which began earlier than the last change
         let again = FilledFolder::open(&folder.0).unwrap();
         again.write("a.csv", nobody, b"3").unwrap();
+        own.write("a.csv", nobody, b"2").unwrap();
+        again.write("new.csv", nobody, b"1").unwrap();
+        own.write("new.csv", nobody, b"2").unwrap();
         fs::write(folder.file("a.csv"), "2").unwrap();
         again.write("a.csv", nobody, b"4").unwrap();
         fs::write(folder.file("a.csv"), "mine").unwrap();
@@ -224,7 +241,7 @@ mod tests {
         let mut names: Vec<String> =
             fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
-        assert_eq!(names, [LIST, "a.csv", "b.csv", "c", "link", "reserved"]);
+        assert_eq!(names, [LIST, "a.csv", "b.csv", "c", "link", "new.csv", "reserved"]);
     }
 
     #[test]

@@ -1,10 +1,10 @@
-//! A guard against damage that keeps the HDF5 library busy for ever, or makes it read a stretch of a file many times
-//! over.
+//! A guard for the HDF5 library: files are looked through before they are opened.
 //!
-//! Texts of variable length lie in global heap collections. The library walks a collection object by object, and object
-//! 0 (the free space) takes as many bytes as it states: with 0 bytes stated the walk never ends (HDF5 2.0,
-//! H5HGcache.c). Collections have no checksum and may overlap, so that a small file can hold thousands of large ones.
-//! Files of others are looked through before they are opened.
+//! Texts of variable length lie in global heap collections (HDF5 File Format Specification, version 3, III.E), which
+//! have no checksum. On some damaged ones the library (HDF5 2.0) did not come back, or took far longer than the file
+//! is large. The guard refuses what the format does not allow, whether the library would survive it or
+//! not: objects that are smaller than their own header, collections that take more room than the file has, lengths of an
+//! unknown size.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -57,21 +57,21 @@ pub(crate) struct Vetted {
 /// Why the library must not be let at a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// It would walk for ever.
-    Endless,
-    /// It would read the same bytes over and over.
+    /// An object of a heap collection takes less than its own header.
+    SmallObject,
+    /// Heap collections take more room than the file has.
     Overlapping,
     /// Lengths of neither 2, 4 nor 8 bytes.
     OddLengths,
 }
 
 impl Refusal {
-    const ALL: [Self; 3] = [Self::Endless, Self::Overlapping, Self::OddLengths];
+    const ALL: [Self; 3] = [Self::SmallObject, Self::Overlapping, Self::OddLengths];
 
     /// For people.
     pub(crate) fn text(self) -> &'static str {
         match self {
-            Self::Endless => "damaged: a heap collection of the HDF5 file never ends",
+            Self::SmallObject => "damaged: an object of a heap collection of the HDF5 file is smaller than its header",
             Self::Overlapping => "damaged: the heap collections of the HDF5 file lie over one another",
             Self::OddLengths => "damaged: the HDF5 file states lengths of neither 2, 4 nor 8 bytes",
         }
@@ -230,10 +230,10 @@ impl HeapGuard {
             return Some(Walk { next: walk.next + HEADER, end: Some(end) });
         };
         let is_free_space = header[0] == 0 && header[1] == 0;
-        // rounded up to multiples of 8, with the library's own overflow
+        // rounded up to multiples of 8, modulo 2^64
         let taken = if is_free_space { length } else { (length.wrapping_add(7) & !7).wrapping_add(HEADER) };
-        if taken == 0 {
-            self.refuse(Refusal::Endless);
+        if taken < HEADER {
+            self.refuse(Refusal::SmallObject);
             return None;
         }
         let next = walk.next.checked_add(taken).filter(|&next| next <= end)?;
@@ -308,14 +308,14 @@ mod tests {
     }
 
     #[test]
-    fn what_takes_no_bytes_is_found_wherever_it_lies() {
+    fn what_is_smaller_than_its_header_is_found_wherever_it_lies() {
         let (large, rest) = (600_000_u64, 4096 - 16 - (16 + 8) - (16 + 16));
         let cases = [
             (collection(&[(1, 3), (2, 12), (0, rest)], 4096), Ok(12)),
-            (collection(&[(1, 3), (2, 12), (0, 0)], 4096), Err(Refusal::Endless)),
-            // 2^64 - 16 bytes and their header: the sum overflows to none
-            (collection(&[(1, 3), (2, 16_u64.wrapping_neg())], 4096), Err(Refusal::Endless)),
-            (collection(&[(1, large), (0, 0)], 700_000), Err(Refusal::Endless)),
+            (collection(&[(1, 3), (2, 12), (0, 8)], 4096), Err(Refusal::SmallObject)),
+            // 2^64 - 8 bytes and their header: the sum overflows
+            (collection(&[(1, 3), (2, 8_u64.wrapping_neg())], 4096), Err(Refusal::SmallObject)),
+            (collection(&[(1, large), (0, 8)], 700_000), Err(Refusal::SmallObject)),
             (collection(&[(1, large), (0, 700_000 - 16 - 16 - large)], 700_000), Ok(large)),
             (SIGNATURE.to_vec(), Ok(0)),
             ([SIGNATURE.as_slice(), &[0xff; 100]].concat(), Ok(0)),
@@ -346,9 +346,9 @@ mod tests {
 
     #[test]
     fn lengths_are_as_long_as_the_file_says() {
-        let free = collection(&[(0, 0xff_0000_0000)], 4096);
+        let free = collection(&[(0, 0xff_0000_0008)], 4096);
         for (length, at, expected) in
-            [(4_u8, 0, Err(Refusal::Endless)), (8, 512, Ok(())), (16, 0, Err(Refusal::OddLengths))]
+            [(4_u8, 0, Err(Refusal::SmallObject)), (8, 512, Ok(())), (16, 0, Err(Refusal::OddLengths))]
         {
             let mut file = vec![0; at];
             file.extend(FILE_SIGNATURE);
@@ -361,7 +361,7 @@ mod tests {
     #[test]
     fn findings_are_kept_as_text() {
         let vetted = Vetted { file_bytes: 17, largest_text: 4 };
-        for finding in [Ok(vetted), Err(Refusal::Endless), Err(Refusal::Overlapping), Err(Refusal::OddLengths)] {
+        for finding in [Ok(vetted), Err(Refusal::SmallObject), Err(Refusal::Overlapping), Err(Refusal::OddLengths)] {
             assert_eq!(parse_finding(&finding_text(&finding)), Some(finding));
         }
         assert!(parse_finding("whole").is_none() && parse_finding("1").is_none());

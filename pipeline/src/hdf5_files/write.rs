@@ -10,7 +10,20 @@ use hdf5::{Dataset, File, Group, H5Type, Location};
 use super::library;
 use crate::error::{Result, StoreError};
 
-/// Creates an HDF5 file whose bytes depend on its contents alone. Errors: it exists, or the folder cannot be written.
+/// Bytes of a dataset's values that the library keeps to write them later. None: values that wait are written when the
+/// dataset's handle is dropped, where an error of the disk is seen by nobody; written at once, it is an error of the
+/// call.
+const WRITE_BUFFER_BYTES: usize = 0;
+
+/// How much the library weighs chunks that were read or written whole when it looks for one to let go: its own default.
+/// No chunk stays.
+const CHUNK_PREEMPTION: f64 = 0.75;
+
+/// Creates an HDF5 file whose bytes depend on its contents alone. Values are with the system when a call that writes
+/// them returns; what describes them is when the file is closed. Both say so where they fail: a disk that is full for a
+/// moment loses nothing silently.
+///
+/// Errors: it exists, or the folder cannot be written.
 ///
 /// The format is HDF5 1.8's (checksummed object headers, attributes of any size): every reader of the last fifteen
 /// years.
@@ -18,7 +31,8 @@ pub(crate) fn create_file(path: &Path) -> Result<File> {
     File::with_options()
         .with_fapl(|access| {
             // the earliest close would leave the file writable while a handle lives: here that is an error
-            access.fclose_degree(FileCloseDegree::Semi).libver_bounds(LibraryVersion::V18, LibraryVersion::V110)
+            access.fclose_degree(FileCloseDegree::Semi).libver_bounds(LibraryVersion::V18, LibraryVersion::V110);
+            access.sieve_buf_size(WRITE_BUFFER_BYTES).chunk_cache(1, WRITE_BUFFER_BYTES, CHUNK_PREEMPTION)
         })
         .with_fcpl(|creation| creation.obj_track_times(false))
         .create_excl(path)
