@@ -23,6 +23,7 @@ mod leftovers;
 mod limits;
 mod ownership;
 mod paths;
+mod patterns;
 mod random;
 mod scaling;
 mod seeds;

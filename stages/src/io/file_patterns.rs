@@ -5,20 +5,21 @@ use std::path::{Path, PathBuf};
 
 use afmid_pipeline::recording::recognised;
 use afmid_pipeline::{InputFiles, StageError};
-use glob::{MatchOptions, Pattern, glob_with};
 use rayon::prelude::*;
 
 use super::natural_order::natural_order;
+use super::pattern_walk::{MOST_FOLDERS, Parts, matches};
 
 /// The files that match `patterns`, relative to `base`, each once: patterns in their order, the matches of each in
 /// natural order.
 ///
 /// # Method
-/// `*`, `?`, `[...]` and `**` as in a shell, names that begin with a dot not matched by them; a pattern that names a
-/// folder means its `*.h5` or, if there are none, its files of any format that is recognised.
+/// `*`, `?`, `[...]` and `**` as in a shell, names that begin with a dot not matched by them, links to folders not
+/// followed by `**`; a pattern that names a folder means its `*.h5` or, if there are none, its files of any format that
+/// is recognised.
 /// # Errors
-/// A pattern that is none, a folder that cannot be read, or one without a match: with the pattern, the folder that was
-/// looked at, and what is there.
+/// A pattern that is none, a folder that cannot be read, more folders than are searched, or a pattern without a match:
+/// with the pattern, the folder that was looked at, and what is there.
 pub fn matching_files(patterns: &[String], base: &Path, files: &InputFiles) -> Result<Vec<Match>, StageError> {
     let mut all = Vec::new();
     for pattern in patterns {
@@ -60,37 +61,24 @@ fn matches_of(pattern: &str, base: &Path, files: &InputFiles) -> Result<Vec<Matc
     if whole.is_file() {
         return Ok(Match::of(whole, files).into_iter().collect());
     }
-    // special characters in the folder of the config are no pattern; an absolute pattern replaces the folder
-    let text = match Path::new(pattern).is_absolute() {
-        true => pattern.to_owned(),
-        false => format!("{}/{pattern}", Pattern::escape(&base.to_string_lossy())),
-    };
     if whole.is_dir() {
-        let folder = Pattern::escape(&whole.to_string_lossy());
-        let native = files_of(&format!("{folder}/*.h5"), pattern, files)?;
+        let native = files_of(&whole, "*.h5", pattern, files)?;
         if !native.is_empty() {
             return Ok(native);
         }
-        let all = files_of(&format!("{folder}/*"), pattern, files)?;
+        let all = files_of(&whole, "*", pattern, files)?;
         return Ok(all.into_iter().filter(|file| recognised(&file.path)).collect());
     }
-    files_of(&text, pattern, files)
+    files_of(base, pattern, pattern, files)
 }
 
-/// The files that a whole pattern matches, in natural order; `pattern` is what the user wrote.
-fn files_of(text: &str, pattern: &str, files: &InputFiles) -> Result<Vec<Match>, StageError> {
-    let options =
-        MatchOptions { require_literal_leading_dot: true, require_literal_separator: true, ..MatchOptions::new() };
-    let paths = glob_with(text, options)
-        .map_err(|error| StageError::new(format!("`{pattern}` is no file pattern: {}", error.msg)).caused_by(error))?;
-    let mut found = Vec::new();
-    for path in paths {
-        let path = path.map_err(|error| {
-            let place = error.path().to_owned();
-            StageError::new(format!("a folder of the pattern `{pattern}` cannot be read: {}", error.error())).at(place)
-        })?;
-        found.push((path.to_string_lossy().into_owned(), path));
-    }
+/// The files that a pattern below a folder matches, in natural order; `written` is what the user wrote.
+fn files_of(folder: &Path, pattern: &str, written: &str, files: &InputFiles) -> Result<Vec<Match>, StageError> {
+    let parts = Parts::new(folder, pattern)
+        .map_err(|error| StageError::new(format!("`{written}` is no file pattern: {}", error.msg)).caused_by(error))?;
+    let paths = matches(&parts, written, MOST_FOLDERS)?;
+    let mut found: Vec<(String, PathBuf)> =
+        paths.into_iter().map(|path| (path.to_string_lossy().into_owned(), path)).collect();
     // looked at afterwards: numbered files were mostly made in this order, and lie so in the file system
     found.par_sort_by(|(a, _), (b, _)| natural_order(a, b));
     Ok(found.into_par_iter().filter_map(|(_, path)| Match::of(path, files)).collect())

@@ -11,6 +11,7 @@ pub mod frf;
 mod memory;
 mod natural_order;
 mod overview;
+mod pattern_walk;
 mod records;
 mod records_example;
 mod shared_data;

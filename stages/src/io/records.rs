@@ -35,15 +35,17 @@ use crate::artifacts::{DEFLECTION, PIEZO, SENSOR};
 /// # Accuracy
 /// Codes stay codes; 64-bit integers are rounded beyond 2^53.
 /// # Errors
-/// A pattern without a match; files that are of no format, cut short or damaged; a missing channel; a rate or unit that
-/// neither the file nor a parameter states, or that differ; a rate too low for a ringdown.
+/// A pattern without a match, or into more than 50,000 folders; files that are of no format, cut short or damaged; a
+/// missing channel; a rate or unit that neither the file nor a parameter states, or that differ; a rate too low for a
+/// ringdown.
 /// # Source
 /// The CF conventions for scale_factor and add_offset; docs/archives.md for the formats.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Records {
-    /// Files, as patterns relative to the config file (`archive/*.h5`); a folder means its `*.h5` or, if there are
-    /// none, its files of any recognised format. Patterns that begin with `../../shared/data/` begin at the variable
+    /// Files, as patterns relative to the config file (`archive/*.h5`; `archive/**/*.h5` with all folders below, but not
+    /// through links to folders); a folder means its `*.h5` or, if there are none, its files of any recognised format.
+    /// Patterns that begin with `../../shared/data/` begin at the variable
     /// `AFMID_DATA` where that is set. Required.
     pub files: Vec<String>,
     /// The deflection signal, as the file names it: a dataset, channel, column or variable.
@@ -63,7 +65,7 @@ pub struct Records {
     /// (LVM, CSV), `raw`.
     pub format: String,
     /// Samples per second in Hz, of files that state none. Absent: an error where a file states another.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 1e-9, max = 1e15))]
     pub sample_rate_hz: Option<f64>,
     /// Unit of the deflection in files that state none. Absent: an error where a file states another.
     pub unit: Option<String>,

@@ -38,8 +38,8 @@ use crate::io::shared_data::moved;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Frf {
-    /// Files, as patterns relative to the config file (`beam/*.txt`); patterns that begin with `../../shared/data/` begin
-    /// at the variable `AFMID_DATA` where that is set. Required.
+    /// Files, as patterns relative to the config file (`beam/*.txt`), with the rules of `io.records`; patterns that begin
+    /// with `../../shared/data/` begin at the variable `AFMID_DATA` where that is set. Required.
     pub files: Vec<String>,
     /// The files' format: `auto` for what their bytes and names say, or a name as for `io.records`.
     pub format: String,
