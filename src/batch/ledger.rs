@@ -1,5 +1,6 @@
 //! The ledger: what became of each data set, a small file each, so that processes share neither lock nor database.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::files::{read_regular, replace_with, sweep};
@@ -87,8 +88,10 @@ impl Ledger {
     pub fn write(&self, entry: &Entry) -> Result<(), String> {
         let text = serde_json::to_vec_pretty(entry).map_err(|error| error.to_string())?;
         let place = self.place(&entry.name);
-        if std::fs::read(&place).is_ok_and(|there| !there.is_empty() && !there.starts_with(HEAD)) {
-            return Err(format!("{} is no entry of a ledger: it is not replaced", place.display()));
+        match read_regular(&place, MOST_BYTES) {
+            Ok(there) if there.is_empty() || there.starts_with(HEAD) => {}
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            _ => return Err(format!("{} is no entry of a ledger: it is not replaced", place.display())),
         }
         replace_with(&place, |temporary| std::fs::write(temporary, &text)).map_err(|error| error.to_string())
     }

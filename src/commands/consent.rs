@@ -5,6 +5,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::Config;
+use afmid_pipeline::files::read_regular;
 use afmid_pipeline::plugin::{Ask, Candidate, Host, Plugins, Rule, Trust, is_seal};
 
 use crate::batch::shell::quoted;
@@ -91,9 +92,13 @@ pub fn seals(agreed: &[Candidate]) -> String {
     text
 }
 
+/// The largest list of seals: a million of them with what they stand for.
+const MOST_BYTES: u64 = 1 << 30;
+
 fn read(file: &Path) -> Result<BTreeSet<String>, Failure> {
     let shown = file.display();
-    let text = std::fs::read_to_string(file)
+    let text = read_regular(file, MOST_BYTES)
+        .and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other))
         .map_err(|error| Failure::usage(format!("the plugins agreed to, {shown}, cannot be read: {error}"), None))?;
     let lines = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
     lines

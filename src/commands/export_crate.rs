@@ -9,7 +9,7 @@ use afmid_pipeline::files::{FilledFolder, LIST, open_regular};
 use serde_json::{Value, json};
 
 use super::diff::open;
-use super::target::{make_folder, require_folder};
+use super::target::{make_folder, require_folder, text_of};
 use crate::cli::CrateArgs;
 use crate::failure::Failure;
 use crate::output::print;
@@ -104,7 +104,7 @@ struct Held {
 
 impl Held {
     fn open(folder: &Path) -> Result<Self, Failure> {
-        let metadata = fs::read_to_string(folder.join(METADATA)).unwrap_or_default();
+        let metadata = text_of(&folder.join(METADATA));
         let earlier = metadata.contains("\"SoftwareApplication\"") && metadata.contains("\"name\": \"afmid\"");
         Ok(Self { folder: FilledFolder::open(folder).map_err(failed)?, earlier })
     }

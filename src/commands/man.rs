@@ -6,6 +6,7 @@ use afmid_pipeline::files::FilledFolder;
 use clap::Command;
 use clap_mangen::Man;
 
+use super::target::text_of;
 use crate::cli::command;
 use crate::failure::Failure;
 use crate::output::print;
@@ -23,7 +24,7 @@ pub fn run(folder: Option<&Path>) -> Result<(), Failure> {
     let pages = pages(command, "afmid")?;
     let filled = FilledFolder::open(folder).map_err(|error| Failure::failed(&error, None))?;
     // a page of a version that kept no list
-    let earlier = |path: &Path| std::fs::read_to_string(path).is_ok_and(|page| page.contains(".TH afmid"));
+    let earlier = |path: &Path| text_of(path).contains(".TH afmid");
     for (name, text) in &pages {
         let written = filled.write(name, earlier, text.as_bytes());
         written.map_err(|error| Failure::failed(&error, error.help.clone()))?;

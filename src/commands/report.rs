@@ -10,7 +10,7 @@ use afmid_pipeline::store::read_result;
 use serde_json::json;
 
 use super::open::require_result;
-use super::target::{Target, make_folder, prepare};
+use super::target::{Target, make_folder, prepare, text_of};
 use crate::cli::ReportArgs;
 use crate::failure::Failure;
 use crate::output::print;
@@ -96,5 +96,5 @@ const FIGURE: &[u8] =
 
 /// A figure that a version without lists wrote.
 fn of_earlier_version(path: &Path) -> bool {
-    fs::read(path).is_ok_and(|bytes| bytes.starts_with(FIGURE))
+    text_of(path).as_bytes().starts_with(FIGURE)
 }

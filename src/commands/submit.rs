@@ -15,6 +15,7 @@ use serde_json::json;
 use super::batch::{data_sets, ledger, planned, whole};
 use super::consent;
 use super::run::cache_folder;
+use super::target::text_of;
 use crate::batch::dataset::DataSet;
 use crate::batch::manifest;
 use crate::batch::shard::Shard;
@@ -98,7 +99,7 @@ fn write(here: &Path, jobs: &Jobs, sets: &[DataSet], config: &str, agreed: &[Can
     std::fs::create_dir_all(here.join(LOG)).map_err(|error| failed(&error))?;
     let manifest = manifest::write(sets).map_err(|error| failed(&error))?;
     // a version that kept no list is known by its script
-    let earlier = std::fs::read_to_string(here.join(SUBMIT)).is_ok_and(|script| script.contains(ARRAY));
+    let earlier = text_of(&here.join(SUBMIT)).contains(ARRAY);
     let filled = FilledFolder::open(here).map_err(|error| failed(&error))?;
     for name in [MANIFEST, CONFIG, ARRAY, COLLECT, SUBMIT] {
         filled.require_own(name, |_| earlier).map_err(|error| failed(&error))?;

@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::files::{has_mark, open_regular, probe, states_mark, sweep_beside};
+use afmid_pipeline::files::{has_mark, open_regular, probe, read_regular, states_mark, sweep_beside};
 use afmid_pipeline::store::{FileKind, Written, file_kind, written};
 
 use crate::batch::shell::quoted;
@@ -148,6 +148,15 @@ fn existing(path: &Path, metadata: &Metadata, target: Target, inputs: &[Input]) 
         )),
     }
 }
+
+/// The text of a file, as far as it is one; nothing of what is no regular file, or cannot be read.
+pub fn text_of(path: &Path) -> String {
+    let bytes = read_regular(path, MOST_TEXT_BYTES).unwrap_or_default();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// The largest text of an earlier version that is known by what it says: pages, scripts and figures come to less.
+const MOST_TEXT_BYTES: u64 = 1 << 28;
 
 /// As much of a file as tells a page or an exported file.
 fn head(path: &Path) -> std::io::Result<Vec<u8>> {

@@ -112,3 +112,49 @@ fn at_most_a_hundred_problems_are_printed() {
     assert_eq!(json[0]["problems"].as_array().map(Vec::len), Some(100));
     assert_eq!(json[0]["more_problems"], 1134);
 }
+
+/// What is kept about input files between runs is a file of the cache like any other: nobody waits for one that is none.
+#[test]
+fn a_file_of_stamps_that_is_a_fifo_is_passed_over() {
+    let place = super::small::folder(2, 20_000);
+    let here = place.path();
+    // files that were just written are not stamped
+    std::thread::sleep(Duration::from_millis(2200));
+    let run = ["run", super::small::CONFIG, "-o", "a.h5", "--cache", "cache"];
+    assert!(ends(here, &run).status.success());
+    let stamps: Vec<_> = fs::read_dir(here.join("cache/stamps")).expect("stamps").flatten().collect();
+    assert!(!stamps.is_empty());
+    for stamp in &stamps {
+        fs::remove_file(stamp.path()).expect("removed");
+        assert!(Command::new("mkfifo").arg(stamp.path()).status().expect("mkfifo is there").success());
+    }
+    for arguments in [&run[..], &["explain", super::small::CONFIG, "--cache", "cache"], &["gc", "--cache", "cache"]] {
+        let output = ends(here, arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+/// Lists of what was written to a folder, and files that are known by what they say.
+#[test]
+fn a_fifo_in_a_folder_that_is_filled_is_neither_waited_for_nor_replaced() {
+    let place = super::small::folder(1, 20_000);
+    let here = place.path();
+    assert!(ends(here, &["run", super::small::CONFIG, "-o", "a.h5", "--cache", "cache"]).status.success());
+    let cases: &[(&str, &str, &[&str])] = &[
+        ("man", ".afmid-files", &["man", "man"]),
+        ("man", "afmid.1", &["man", "man"]),
+        ("figures", ".afmid-files", &["report", "a.h5", "-o", "a.html", "--figures", "figures"]),
+        ("crate", "ro-crate-metadata.json", &["export-crate", "a.h5", "-o", "crate"]),
+        ("out/ledger", "archive.json", &["batch", super::small::CONFIG, "archive", "-o", "out", "--cache", "cache"]),
+    ];
+    for (folder, name, arguments) in cases {
+        let path = here.join(folder).join(name);
+        fs::create_dir_all(here.join(folder)).expect("a folder");
+        assert!(Command::new("mkfifo").arg(&path).status().expect("mkfifo is there").success());
+        let Output { status, stderr, .. } = ends(here, arguments);
+        let message = String::from_utf8_lossy(&stderr);
+        assert!(matches!(status.code(), Some(1..=3)), "afmid {arguments:?}: {status}\n{message}");
+        assert!(!fs::symlink_metadata(&path).expect("it is there").is_file(), "{} is still a FIFO", path.display());
+        fs::remove_file(&path).expect("removed");
+    }
+}

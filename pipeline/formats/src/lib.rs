@@ -58,7 +58,7 @@ pub use rate::{Clue, agreed_rate, rate_in};
 pub use raw::Raw;
 pub use raw_binary::{RawBinary, SampleType};
 pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};
-pub use regular::{open_regular, read_regular};
+pub use regular::{append_regular, open_regular, read_regular};
 pub use responses::{Degree, FoundResponse, Frequencies, Parts, responses, says_frequencies, unit_ratio};
 pub use text_table::even_step;
 

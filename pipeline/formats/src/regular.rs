@@ -18,6 +18,20 @@ pub fn open_regular(path: &Path) -> Result<File> {
     Ok(file)
 }
 
+/// Opens a file for reading and for writing at its end; makes it if it is not there. Errors: as [`open_regular`].
+pub fn append_regular(path: &Path) -> Result<File> {
+    match std::fs::metadata(path) {
+        Ok(metadata) => check(metadata.file_type())?,
+        Err(error) if error.kind() == ErrorKind::NotFound => {}
+        Err(error) => return Err(error),
+    }
+    let mut options = OpenOptions::new();
+    options.read(true).append(true).create(true).custom_flags(OFlags::NONBLOCK.bits().cast_signed());
+    let file = options.open(path)?;
+    check(file.metadata()?.file_type())?;
+    Ok(file)
+}
+
 /// The bytes of a regular file of at most `most`. Errors: as [`open_regular`]; it is larger.
 pub fn read_regular(path: &Path, most: u64) -> Result<Vec<u8>> {
     let file = open_regular(path)?;
@@ -67,7 +81,13 @@ mod tests {
         ] {
             let error = read_regular(&file, 4).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
+            if word != "more than the 4 bytes" {
+                assert!(append_regular(&file).is_err(), "{word}");
+            }
         }
+        std::io::Write::write_all(&mut append_regular(&path("new")).unwrap(), b"1").unwrap();
+        std::io::Write::write_all(&mut append_regular(&path("new")).unwrap(), b"2").unwrap();
+        assert_eq!(read_regular(&path("new"), 5).unwrap(), b"12");
         // it states no size
         assert!(read_regular(Path::new("/proc/self/status"), 4).is_err());
     }

@@ -2,7 +2,7 @@
 //! ever replaced.
 
 use std::collections::HashMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
@@ -10,11 +10,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::replace::Replacement;
 use super::temporary::sweep;
+use super::{append_regular, open_regular, read_regular};
 use crate::error::StoreError;
 
 /// The list in such a folder: a line per file, BLAKE3 hash and name, as `b3sum --check` takes them. A name may have
 /// several lines: what was written there before.
 pub const LIST: &str = ".afmid-files";
+
+/// The largest list that is read: a million files, each written ten times.
+const MOST_LIST_BYTES: u64 = 1 << 30;
 
 /// A folder that this program fills with files.
 ///
@@ -135,7 +139,7 @@ impl FilledFolder {
         }
         let path = self.folder.join(LIST);
         let append = || -> std::io::Result<()> {
-            let mut file = OpenOptions::new().read(true).append(true).create(true).open(&path)?;
+            let mut file = append_regular(&path)?;
             // a line that a kill left half written spoils no other
             let mut last = [b'\n'];
             if let Some(end) = file.metadata()?.len().checked_sub(1) {
@@ -154,7 +158,7 @@ impl FilledFolder {
 /// Hashes by name, as they stand in the folder's list now; none where there is no list. Errors: it cannot be read.
 fn read_list(folder: &Path) -> Result<HashMap<String, Vec<String>>, StoreError> {
     let list = folder.join(LIST);
-    match fs::read(&list) {
+    match read_regular(&list, MOST_LIST_BYTES) {
         Ok(bytes) => Ok(parse(&String::from_utf8_lossy(&bytes))),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(HashMap::new()),
         Err(error) => Err(StoreError::io("cannot be read", &list, &error)),
@@ -197,7 +201,7 @@ fn unescaped(name: &str) -> String {
 
 fn hash(path: &Path) -> std::io::Result<String> {
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(File::open(path)?)?;
+    hasher.update_reader(open_regular(path)?)?;
     Ok(hasher.finalize().to_hex().to_string())
 }
 

@@ -5,7 +5,7 @@
 //! hundred thousand of them opens one.
 
 use std::collections::HashMap;
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::hash::{DefaultHasher, Hasher};
 use std::io::Write;
 use std::ops::Range;
@@ -13,7 +13,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{FileState, read_regular, replace_unsynced};
+use super::{FileState, append_regular, read_regular, replace_unsynced};
 
 /// Begins the text of every line, though it is not written: another layout gets another number, and with it other
 /// hashes.
@@ -80,7 +80,7 @@ impl KnownHashes {
         let append = || -> std::io::Result<()> {
             fs::create_dir_all(&self.folder)?;
             // in one piece: other runs append too
-            OpenOptions::new().create(true).append(true).open(self.place(parent))?.write_all(line.as_bytes())
+            append_regular(&self.place(parent))?.write_all(line.as_bytes())
         };
         let _ = append();
     }
@@ -184,6 +184,21 @@ mod tests {
             assert_eq!(known(false).find(&path, &state), None, "cut at {end}");
             assert_eq!(known(false).find(&other, &state).as_deref(), Some("first"), "cut at {end}");
         }
+    }
+
+    #[test]
+    fn what_is_no_regular_file_is_neither_waited_for_nor_replaced() {
+        let folder = Folder::new("odd-stamps");
+        let known = || KnownHashes::new(&folder.file("stamps"), false);
+        let path = folder.file("a.h5");
+        fs::write(&path, "x").unwrap();
+        let state = FileState::at(&path).unwrap();
+        let place = known().place(path.parent().unwrap());
+        fs::create_dir(folder.file("stamps")).unwrap();
+        rustix::fs::mknodat(rustix::fs::CWD, &place, rustix::fs::FileType::Fifo, 0o600.into(), 0).unwrap();
+        known().keep(&path, &state, "x");
+        assert_eq!(known().find(&path, &state), None);
+        assert!(!fs::metadata(&place).unwrap().is_file(), "it is still there");
     }
 
     #[test]

@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+use super::read_regular;
+
 /// Stands before the digits. Short: the header of a MATLAB file has room for little more.
 pub const MARK: &str = "afmid BLAKE3 ";
 
@@ -22,12 +24,12 @@ pub fn marked(with: impl FnOnce(&str) -> Vec<u8>) -> Option<Vec<u8>> {
 
 /// Whether a file states a mark that fits: it is as this program wrote it. Errors: it cannot be read.
 pub fn has_mark(path: &Path) -> std::io::Result<bool> {
-    Ok(fits(&std::fs::read(path)?))
+    Ok(fits(&read_regular(path, u64::MAX)?))
 }
 
 /// Whether a file states a mark, whether it fits or not. Errors: it cannot be read.
 pub fn states_mark(path: &Path) -> std::io::Result<bool> {
-    Ok(memchr::memmem::find(&std::fs::read(path)?, MARK.as_bytes()).is_some())
+    Ok(memchr::memmem::find(&read_regular(path, u64::MAX)?, MARK.as_bytes()).is_some())
 }
 
 /// The last mark counts: what is shown in a page may quote one.

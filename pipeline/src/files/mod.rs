@@ -12,7 +12,7 @@ mod replace;
 mod result_mark;
 mod temporary;
 
-pub use afmid_formats::{open_regular, read_regular};
+pub use afmid_formats::{append_regular, open_regular, read_regular};
 pub(crate) use file_state::FileState;
 pub use filled_folder::{FilledFolder, LIST};
 pub(crate) use known_hashes::KnownHashes;

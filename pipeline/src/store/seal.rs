@@ -63,7 +63,7 @@ pub(super) enum Seal {
 
 /// Errors: the file cannot be read.
 pub(super) fn look_at_seal(path: &Path) -> std::io::Result<Seal> {
-    let mut file = File::open(path)?;
+    let mut file = open_regular(path)?;
     let Some((body, last)) = seal_line(&mut file)? else { return Ok(Seal::None) };
     let hash = hash_start(&mut file, body, |_| {})?;
     Ok(if last == format!("{SEAL}{hash}\n") { Seal::Fits } else { Seal::DoesNotFit })

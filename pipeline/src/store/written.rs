@@ -1,12 +1,11 @@
 //! Whether a file may be replaced by a result: only one that this program wrote, as it wrote it.
 
-use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 use super::file_kind::{FileKind, file_kind};
 use super::seal::{Seal, look_at_seal};
-use crate::files::SEAL;
+use crate::files::{SEAL, open_regular};
 
 /// What lies where a result is going to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +37,7 @@ pub fn written(path: &Path) -> std::io::Result<Written> {
 /// Whether an HDF5 file ends before the end that its superblock states, or within the seal behind that. Programs that
 /// change a file write a new end.
 fn is_cut_short(path: &Path) -> std::io::Result<bool> {
-    let file = File::open(path)?;
+    let file = open_regular(path)?;
     let length = file.metadata()?.len();
     let mut head = [0; 48];
     if length < head.len() as u64 {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Candidate;
 use crate::error::StoreError;
-use crate::files::replace_with;
+use crate::files::{open_regular, replace_with};
 use crate::plugin::message::Introduction;
 
 /// Begins every file; another layout gets another number.
@@ -74,7 +74,7 @@ impl Trust {
 
     /// What was agreed to under a seal; none if the file is missing or damaged.
     pub fn find(&self, seal: &str) -> Option<Trusted> {
-        let file = fs::File::open(self.place(seal)?).ok()?;
+        let file = open_regular(&self.place(seal)?).ok()?;
         let mut text = String::new();
         file.take(MOST_BYTES).read_to_string(&mut text).ok()?;
         let (body, hash) = text.strip_suffix('\n')?.rsplit_once('\n')?;
