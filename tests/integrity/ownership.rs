@@ -119,14 +119,59 @@ fn a_simulation_keeps_the_measurements_of_its_folder() {
     // a name with a dot in it keeps all of it
     afmid(here, &["run", "sim.toml", "-o", "t.h5", "--cache", "cache", "--set", "archive.out='lever.2005'"]);
     assert!(here.join("lever.2005.truth.json").exists());
-    // another archive over the own one, of a version that kept no list too
+    // another archive over the own one
     afmid(here, &[&arguments[..], &["--set", "archive.seed=6"]].concat());
-    fs::remove_file(here.join("simulated/.afmid-files")).expect("the list");
     afmid(here, &arguments);
     assert!(fs::read(&path).expect("a record") == whole, "the same archive again");
-    fs::remove_file(here.join("simulated/.afmid-files")).expect("the list");
-    fs::write(&truth, "my notes").expect("written");
-    assert!(refused(here, &arguments).contains("truth.json"));
+}
+
+/// Without its list a folder's files may be another program's, whatever they look like: only the same bytes pass.
+#[test]
+fn a_simulation_without_its_list_replaces_nothing_that_is_not_the_same() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    fs::write(here.join("sim.toml"), SIMULATE).expect("the config");
+    let arguments = ["run", "sim.toml", "-o", "s.h5", "--cache", "cache"];
+    afmid(here, &arguments);
+    let (list, path, truth) =
+        (here.join("simulated/.afmid-files"), here.join("simulated/record_0001.h5"), here.join("simulated.truth.json"));
+    let (whole, text) = (fs::read(&path).expect("a record"), fs::read(&truth).expect("the truth"));
+    // a folder that was copied without its list
+    fs::remove_file(&list).expect("the list");
+    afmid(here, &[&arguments[..], &["--fresh"]].concat());
+    assert!(list.exists() && fs::read(&path).expect("a record") == whole, "the same archive again");
+    // of another seed: same names, starts and channels, as another simulator writes them
+    for file in [&path, &truth] {
+        fs::remove_file(&list).expect("the list");
+        let other = [&arguments[..], &["--set", "archive.seed=6", "--set", "archive.out='other'", "--fresh"]].concat();
+        afmid(here, &other);
+        let name = if file == &truth { "other.truth.json".to_owned() } else { "other/record_0001.h5".to_owned() };
+        fs::copy(here.join(name), file).expect("copied");
+        let message = refused(here, &[&arguments[..], &["--fresh"]].concat());
+        let named = file.file_name().expect("a name").to_string_lossy().into_owned();
+        assert!(message.contains(&named) && message.contains("not replaced"), "{message}");
+        fs::write(&path, &whole).expect("written");
+        fs::write(&truth, &text).expect("written");
+        let _ = fs::remove_file(&list);
+        afmid(here, &[&arguments[..], &["--fresh"]].concat());
+    }
+    // one whose samples somebody edited, and notes
+    for (file, others) in [(&path, &edited(&whole)[..]), (&truth, b"my notes")] {
+        fs::remove_file(&list).expect("the list");
+        fs::write(file, others).expect("written");
+        refused(here, &[&arguments[..], &["--fresh"]].concat());
+        fs::write(&path, &whole).expect("written");
+        fs::write(&truth, &text).expect("written");
+        let _ = fs::remove_file(&list);
+        afmid(here, &[&arguments[..], &["--fresh"]].concat());
+    }
+}
+
+/// The bytes with the middle one changed.
+fn edited(whole: &[u8]) -> Vec<u8> {
+    let mut edited = whole.to_vec();
+    edited[whole.len() / 2] ^= 1;
+    edited
 }
 
 #[test]

@@ -113,7 +113,43 @@ impl FilledFolder {
         replacement.take(written)
     }
 
-    /// The same for files that are none of the store's. Errors: those of `fill`, and as there.
+    /// The same; a file that the list does not have stays, and is listed, if it has the bytes that `fill` makes: it may
+    /// be of a version that kept no list, or copied without it, and nothing is lost.
+    ///
+    /// Errors: as there; such a file has other bytes.
+    pub fn replace_or_same(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&Path) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
+        let Err(refused) = self.require_own(name, |_| false) else {
+            return self.replace(name, |_| false, fill);
+        };
+        let path = self.folder.join(name);
+        let unknown = !self.listed().contains_key(name);
+        if !(unknown && fs::symlink_metadata(&path).is_ok_and(|metadata| metadata.is_file())) {
+            return Err(refused);
+        }
+        let replacement = Replacement::new(&path)?;
+        fill(replacement.temporary()).map_err(|error| replacement.named(error))?;
+        let hash = |path: &Path| hash(path).map_err(|error| StoreError::io("cannot be read", path, &error));
+        let (wanted, found) = (hash(replacement.temporary())?, hash(&path)?);
+        if wanted != found {
+            let problem =
+                format!("exists, {LIST} does not list it, and it is not what would be written: it is not replaced");
+            return Err(StoreError { problem, ..refused });
+        }
+        self.list(name, wanted)
+    }
+
+    /// The same with these bytes. Errors: as there.
+    pub fn write_or_same(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
+        let path = self.folder.join(name);
+        let io = |error: std::io::Error| StoreError::io("cannot be written", &path, &error);
+        self.replace_or_same(name, |temporary| fs::write(temporary, bytes).map_err(io))
+    }
+
+    /// As [`FilledFolder::replace`] for files that are none of the store's. Errors: those of `fill`, and as there.
     pub fn replace_with(
         &self,
         name: &str,
@@ -246,6 +282,23 @@ mod tests {
             fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
         assert_eq!(names, [LIST, "a.csv", "b.csv", "c", "link", "new.csv", "reserved"]);
+    }
+
+    #[test]
+    fn what_no_list_knows_stays_unless_it_is_the_same() {
+        let folder = Folder::new("same");
+        let own = FilledFolder::open(&folder.0).unwrap();
+        let put = |bytes: &[u8]| own.write_or_same("a", bytes);
+        fs::write(folder.file("a"), "other").unwrap();
+        let error = put(b"mine").unwrap_err();
+        assert!(error.problem.contains("not what would be written") && error.help.is_some(), "{error}");
+        assert_eq!(fs::read(folder.file("a")).unwrap(), b"other");
+        put(b"other").unwrap();
+        // it is listed now
+        put(b"mine").unwrap();
+        fs::write(folder.file("a"), "edited").unwrap();
+        assert!(put(b"edited").unwrap_err().problem.contains("changed since"));
+        assert_eq!(fs::read_dir(&folder.0).unwrap().count(), 2, "the file and the list");
     }
 
     #[test]

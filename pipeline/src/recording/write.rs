@@ -68,17 +68,16 @@ pub fn write_native(path: &Path, record: &NativeRecord, storage: RecordStorage) 
 }
 
 /// The same into a folder that this program fills: the file is listed there, and one that this program did not write,
-/// or that was changed since, is not replaced. `earlier` knows files of versions that kept no list.
+/// or that was changed since, is not replaced. One that is not listed has to be the same, byte for byte.
 ///
 /// Errors: as [`write_native`]; the file is another's.
 pub fn write_native_in(
     folder: &FilledFolder,
     name: &str,
-    earlier: impl FnOnce(&Path) -> bool,
     record: &NativeRecord,
     storage: RecordStorage,
 ) -> Result<(), StoreError> {
-    folder.replace(name, earlier, |temporary| {
+    folder.replace_or_same(name, |temporary| {
         write_file(temporary, record, storage).map_err(|error| error.file(&folder.folder().join(name)))
     })
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::error::StoreError;
-use afmid_pipeline::files::{FilledFolder, sweep_beside};
+use afmid_pipeline::files::{FilledFolder, read_regular, sweep_beside};
 use afmid_pipeline::recording::{
     Codes, InputFiles, NativeChannel, NativeRecord, RecordStorage, Wanted, open_native, write_native_in,
 };
@@ -13,6 +13,7 @@ use afmid_pipeline::{
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::hidden::{Hidden, effects};
 use afmid_kernels::simulate::{
@@ -40,7 +41,8 @@ use afmid_kernels::simulate::{
 /// No integration error with nothing hidden, below 1 % of a hidden effect otherwise. The inertia of the moving base is
 /// left out; crossings of a threshold and back within one sample are missed.
 /// # Errors
-/// Parameters out of range, an unknown cause, event totals out of reach, a folder that holds other records already.
+/// Parameters out of range, an unknown cause, event totals out of reach, a folder that holds other records already,
+/// or files of the same names that are not in its list `.afmid-files` and not the same.
 /// # Source
 /// Stark et al., Rev. Sci. Instrum. 2005, Fig. 1 and section Setup; C. F. Van Loan, IEEE Trans. Automat. Contr. 23
 /// (1978) 395.
@@ -57,6 +59,7 @@ pub struct Afm {
     #[schemars(range(min = 1))]
     pub samples: usize,
     /// Sample rate in Hz, above twice the highest mode. Why: the paper's.
+    #[schemars(range(min = 1e-9, max = 1e15))]
     pub sample_rate_hz: f64,
     /// Total number of counted snap-ins; absent: as the phases come.
     pub snap_ins: Option<usize>,
@@ -234,8 +237,10 @@ impl Stage for Afm {
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let folder = cx.base().join(&self.out);
         let names: Vec<String> = (0..self.records).map(|record| format!("record_{record:04}.h5")).collect();
-        let filled = prepare(&folder, &names)?;
         let seed = self.seed.unwrap_or_else(|| cx.seed());
+        let parameters = serde_json::to_value(self)
+            .map_err(|error| StageError::new(format!("parameters cannot be written as JSON: {error}")))?;
+        let filled = prepare(&folder, &names, &parameters, seed)?;
         let (microscope, layout) = (self.microscope(), self.layout(seed));
         let effects = effects(&self.hidden)?;
         let archive = Archive::plan(&microscope, &layout).map_err(StageError::from_error)?;
@@ -254,8 +259,7 @@ impl Stage for Afm {
         archive.verify(&events).map_err(StageError::from_error)?;
         let records = names.iter().zip(&written).enumerate();
         let truth = Truth {
-            parameters: serde_json::to_value(self)
-                .map_err(|error| StageError::new(format!("parameters cannot be written as JSON: {error}")))?,
+            parameters,
             seed,
             counted_means: format!(
                 "at least {} samples from both ends of the record and from any other event",
@@ -391,7 +395,7 @@ impl Afm {
             0 => RecordStorage::Raw,
             level => RecordStorage::Deflate(level),
         };
-        write_native_in(filled, name, |path| is_simulated(path, number), &native, storage)?;
+        write_native_in(filled, name, &native, storage)?;
         let opened = open_native(&InputFiles::new(), &filled.folder().join(name), &CHANNELS)?;
         Ok((opened, record.events, record.saturated))
     }
@@ -409,8 +413,8 @@ const CHANNELS: [Wanted<'static>; 2] = [
     Wanted { role: "piezo", location: "/piezo", required: true },
 ];
 
-/// Whether a file is a simulated record of this number, by what it says of itself: versions that kept no list of what
-/// they wrote are known by it.
+/// Whether a file may be a simulated record of this number, by what it says of itself. One that no list knows must have
+/// the bytes of the record, too, which are known when it is simulated.
 fn is_simulated(path: &Path, number: usize) -> bool {
     let named = |record: &Record, role, name| record.channel(role).is_ok_and(|channel| channel.long_name == name);
     open_native(&InputFiles::new(), path, &CHANNELS).is_ok_and(|record| {
@@ -424,8 +428,9 @@ const DEFLECTION: &str = "photodiode signal";
 const PIEZO: &str = "z piezo monitor";
 
 /// Makes the folder; refuses one that holds records of another archive, which a pattern would pick up together with the
-/// new ones, and files under the names of the new ones that no simulation wrote.
-fn prepare(folder: &Path, names: &[String]) -> Result<FilledFolder, StageError> {
+/// new ones, and files under the names of the new ones that this program did not write. Of those that no list knows
+/// only that is refused here which cannot be the same: the truth of other `parameters` or another `seed` among them.
+fn prepare(folder: &Path, names: &[String], parameters: &Value, seed: u64) -> Result<FilledFolder, StageError> {
     let failed = |error: std::io::Error| StageError::new(format!("the folder cannot be used: {error}")).at(folder);
     std::fs::create_dir_all(folder).map_err(failed)?;
     for entry in std::fs::read_dir(folder).map_err(failed)? {
@@ -444,7 +449,7 @@ fn prepare(folder: &Path, names: &[String]) -> Result<FilledFolder, StageError> 
         .par_iter()
         .map(|(number, name)| filled.require_own(name, |path| is_simulated(path, *number)).map_err(own))
         .collect::<Result<(), StageError>>()?;
-    filled.require_own(&truth_name(folder), is_truth).map_err(own)?;
+    filled.require_own(&truth_name(folder), |path| is_truth(path, parameters, seed)).map_err(own)?;
     Ok(filled)
 }
 
@@ -454,18 +459,21 @@ fn truth_name(folder: &Path) -> String {
     format!("../{}.truth.json", name.to_string_lossy())
 }
 
-/// Whether a file is the truth of an archive, by what it holds.
-fn is_truth(path: &Path) -> bool {
-    let json: Option<serde_json::Value> =
-        std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
-    json.is_some_and(|json| ["parameters", "seed", "counted_means", "counts"].iter().all(|key| json.get(key).is_some()))
+/// Whether a file may be the truth of this archive, by what it holds.
+fn is_truth(path: &Path, parameters: &Value, seed: u64) -> bool {
+    let json: Option<Value> =
+        read_regular(path, MOST_TRUTH_BYTES).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    json.is_some_and(|json| json.get("parameters") == Some(parameters) && json.get("seed") == Some(&seed.into()))
 }
+
+/// The largest file that may be a truth: a hundred thousand records with a hundred events each come to less.
+const MOST_TRUTH_BYTES: u64 = 1 << 31;
 
 fn write_truth(filled: &FilledFolder, truth: &Truth) -> Result<(), StageError> {
     let mut text = serde_json::to_string_pretty(truth)
         .map_err(|error| StageError::new(format!("the truth cannot be written as JSON: {error}")))?;
     text.push('\n');
-    Ok(filled.write(&truth_name(filled.folder()), is_truth, text.as_bytes())?)
+    Ok(filled.write_or_same(&truth_name(filled.folder()), text.as_bytes())?)
 }
 
 #[cfg(test)]
