@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use afmid_pipeline::toml;
 
+use crate::relative::literally;
+
 /// What one run of a batch reads.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DataSet {
@@ -80,9 +82,7 @@ pub fn absolute(pattern: &str) -> Result<String, String> {
         return Ok(whole.to_string_lossy().into_owned());
     }
     // special characters above the pattern are none of the pattern's
-    let escape = |c: char| if matches!(c, '*' | '?' | '[' | ']') { format!("[{c}]") } else { c.to_string() };
-    let above: String = here.to_string_lossy().chars().map(escape).collect();
-    Ok(format!("{above}/{pattern}"))
+    Ok(format!("{}/{pattern}", literally(&here.to_string_lossy())))
 }
 
 /// Sets in the order of their names. Errors: names that occur twice.

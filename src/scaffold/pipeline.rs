@@ -13,7 +13,7 @@ use super::stated;
 use crate::cli::{Goal, RecordsAre};
 use crate::inspect::Channel;
 use crate::printable::one_line;
-use crate::relative::relative;
+use crate::relative::{literally, relative};
 
 /// What the user says of recordings beside what they hold.
 #[derive(Debug, Clone, Copy)]
@@ -188,7 +188,7 @@ pub fn segment_samples(samples: usize) -> usize {
 /// The `params` of the stage `frf`.
 fn responses(source: &Source, wanted: Wanted<'_>, folder: &Path) -> String {
     let text = |text: &str| Value::String(text.to_owned());
-    let files = source.patterns.iter().map(|pattern| text(&relative(pattern, folder).to_string_lossy()));
+    let files = source.patterns.iter().map(|pattern| path(pattern, folder));
     let mut params = Table::new();
     params.insert("files".to_owned(), Value::Array(files.collect()));
     if let Some(unit) = wanted.unit {
@@ -197,9 +197,16 @@ fn responses(source: &Source, wanted: Wanted<'_>, folder: &Path) -> String {
     format!("params = {}\n", Value::Table(params))
 }
 
-/// A file or pattern as a config in `folder` names it.
+/// A file or pattern as a config in `folder` names it. Of a pattern only the last part is one.
 pub fn path(of: &Path, folder: &Path) -> Value {
-    Value::String(relative(of, folder).to_string_lossy().into_owned())
+    let seen = relative(of, folder);
+    let whole = || seen.to_string_lossy().into_owned();
+    Value::String(match (seen.parent(), seen.file_name()) {
+        (Some(above), Some(last)) if !of.exists() => {
+            Path::new(&literally(&above.to_string_lossy())).join(last).to_string_lossy().into_owned()
+        }
+        _ => whole(),
+    })
 }
 
 /// The `params` of a stage `io.columns` that reads a `file`, or several `files`.

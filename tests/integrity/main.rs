@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod begun_configs;
 mod cache_files;
 mod corpus;
 mod earlier_results;
