@@ -10,9 +10,10 @@ use crate::inspect::{Inspected, Outcome, file_text, files_of, folder_text, inspe
 use crate::output::print;
 use crate::show::pretty;
 
-/// Looks at files, and at the files of folders. Errors: some could not be read; all are reported before.
+/// Looks at files, and at the files of folders. Errors: some could not be read; all are reported before. What is no
+/// recording is an error where it was named itself; beside the recordings of a folder it is listed.
 pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
-    let mut looked = Vec::new();
+    let (mut looked, mut refused) = (Vec::new(), 0);
     for path in paths {
         let cannot =
             |error: std::io::Error| Failure::failed(format!("{} cannot be listed: {error}", path.display()), None);
@@ -22,13 +23,17 @@ pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
         if !as_json {
             print(&text(path, &inspected))?;
         }
+        let is_error = |inspected: &&Inspected| match inspected.outcome {
+            Outcome::Refused { no_recording, .. } => !(no_recording && path.is_dir()),
+            Outcome::Read(_) | Outcome::Own => false,
+        };
+        refused += inspected.iter().filter(is_error).count();
         looked.extend(inspected);
     }
     if as_json {
         let files: Vec<Value> = looked.iter().map(inspected_json).collect();
         print(&pretty(&json!({ "files": files }))?)?;
     }
-    let refused = looked.iter().filter(|inspected| matches!(inspected.outcome, Outcome::Refused { .. })).count();
     match refused {
         0 => Ok(()),
         _ => Err(Failure::failed(format!("{refused} of {} files could not be read", looked.len()), None)),

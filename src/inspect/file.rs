@@ -1,12 +1,15 @@
 //! A file that was looked at.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::StageError;
-use afmid_pipeline::recording::{InputFiles, Reading, open_unpacked};
+use afmid_pipeline::files::open_regular;
+use afmid_pipeline::recording::{InputFiles, Reading, open_unpacked, recognised};
 
 use super::channel::Channel;
 use super::config::stage;
+use super::ringing::NO_RATE;
 use super::verdict::{Verdict, of_file};
 
 /// Channels that are read through; more are listed.
@@ -46,6 +49,8 @@ pub enum Outcome {
         problem: String,
         /// What to do.
         help: Option<String>,
+        /// Whether it is of no format that is known, such as notes beside the recordings.
+        no_recording: bool,
     },
 }
 
@@ -54,13 +59,22 @@ pub fn inspect(path: &Path) -> Inspected {
     let size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
     let outcome = match InputFiles::new().is_result(path) {
         Ok(true) => Outcome::Own,
-        _ => read(path).map_or_else(refused, |holdings| Outcome::Read(Box::new(holdings))),
+        _ => read(path).map_or_else(|error| refused(path, error), |holdings| Outcome::Read(Box::new(holdings))),
     };
     Inspected { file: path.to_owned(), size_bytes, outcome }
 }
 
-fn refused(error: StageError) -> Outcome {
-    Outcome::Refused { problem: error.problem, help: error.help }
+fn refused(path: &Path, error: StageError) -> Outcome {
+    Outcome::Refused { problem: error.problem, help: error.help, no_recording: is_no_recording(path) }
+}
+
+/// Whether a file can be read and is of no format that is known. What is empty or packed may be a recording that was
+/// damaged.
+fn is_no_recording(path: &Path) -> bool {
+    const GZIP: &[u8] = &[0x1f, 0x8b];
+    let mut head = Vec::new();
+    let read = open_regular(path).and_then(|file| file.take(GZIP.len() as u64).read_to_end(&mut head));
+    read.is_ok() && !head.is_empty() && head != GZIP && !recognised(path)
 }
 
 fn read(path: &Path) -> Result<Holdings, StageError> {
@@ -69,8 +83,12 @@ fn read(path: &Path) -> Result<Holdings, StageError> {
     let channels = contents.channels.iter().enumerate();
     let channels: Vec<Channel> =
         channels.map(|(index, found)| Channel::of(found, index < MOST_READ)).collect::<Result<_, _>>()?;
-    let ringdown = of_file(&channels, &contents.channels);
+    let mut ringdown = of_file(&channels, &contents.channels);
     let best = ringdown.channel.and_then(|index| channels.get(index));
+    // a rate that is stated and is none
+    if let Some(why) = best.and_then(|channel| contents.why_no_rate(&channel.location)) {
+        ringdown.reason = ringdown.reason.replace(NO_RATE, why);
+    }
     Ok(Holdings {
         format: match opened.format {
             "native" => format!("native record ({})", contents.format),

@@ -10,7 +10,7 @@ pub fn inspected_json(inspected: &Inspected) -> Value {
     let (holdings, own, refused) = match &inspected.outcome {
         Outcome::Read(holdings) => (Some(holdings), false, Value::Null),
         Outcome::Own => (None, true, Value::Null),
-        Outcome::Refused { problem, help } => (None, false, json!({ "problem": problem, "help": help })),
+        Outcome::Refused { problem, help, .. } => (None, false, json!({ "problem": problem, "help": help })),
     };
     let ringdown = holdings.map(|holdings| {
         let verdict = &holdings.ringdown;
@@ -31,6 +31,7 @@ pub fn inspected_json(inspected: &Inspected) -> Value {
         "ringdown": ringdown,
         "stage": holdings.and_then(|holdings| holdings.stage.as_ref()),
         "own_result": own,
+        "no_recording": matches!(inspected.outcome, Outcome::Refused { no_recording: true, .. }),
         "error": refused,
     })
 }

@@ -76,8 +76,11 @@ fn of_search(search: &DecaySearch, rate: f64, since: usize) -> (Answer, String) 
     }
 }
 
+/// In the reasons of channels without a rate.
+pub const NO_RATE: &str = "the file states no sample rate";
+
 fn without_rate(search: &DecaySearch, since: usize) -> (Answer, String) {
-    let unknown = "the file states no sample rate: give `sample_rate_hz`";
+    let unknown = format!("{NO_RATE}: give `sample_rate_hz`");
     match (search.decays.first(), search.steady.first()) {
         (Some(_), _) if search.random => (Answer::No, RANDOM.to_owned()),
         (Some(first), _) => {

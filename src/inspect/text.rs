@@ -17,7 +17,7 @@ pub fn file_text(inspected: &Inspected) -> String {
     let file = one_line(&inspected.file.display().to_string());
     match &inspected.outcome {
         Outcome::Own => format!("{file}{size}\n  a result of afmid's, no recording: `afmid show` shows it\n"),
-        Outcome::Refused { problem, help } => {
+        Outcome::Refused { problem, help, .. } => {
             let help = help.as_deref().map(help_line).unwrap_or_default();
             format!("{file}{size}\n  refused: {}\n{help}", one_line(problem))
         }
@@ -144,6 +144,7 @@ fn line(inspected: &Inspected) -> Line {
     };
     match &inspected.outcome {
         Outcome::Own => short("a result of afmid's", ""),
+        Outcome::Refused { no_recording: true, problem, .. } => short("no recording", problem),
         Outcome::Refused { problem, .. } => short("refused", problem),
         Outcome::Read(holdings) => {
             let best = holdings.ringdown.channel.and_then(|index| holdings.channels.get(index));

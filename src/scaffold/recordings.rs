@@ -136,6 +136,6 @@ fn source(
             format!("{} is a result of afmid's, no recording", first.display()),
             Some("give the folder of the recordings".to_owned()),
         )),
-        Outcome::Refused { problem, help } => Err((format!("{}: {problem}", first.display()), help)),
+        Outcome::Refused { problem, help, .. } => Err((format!("{}: {problem}", first.display()), help)),
     }
 }

@@ -1,5 +1,7 @@
 //! What a file states of its samples, and what the user has to: sample rate and unit.
 
+use afmid_pipeline::recording::{WANTED_RATE, brief_number, is_rate};
+
 use super::choice::Question;
 use super::pipeline::Wanted;
 use super::recordings::Source;
@@ -8,6 +10,9 @@ use crate::inspect::Channel;
 
 /// The sample rate to be written; none where the file states it. Errors: neither states one; both do, and differ.
 pub fn rate(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool) -> Result<Option<f64>, Question> {
+    if let Some(odd) = wanted.rate_hz.filter(|rate| !is_rate(*rate)) {
+        return Err((format!("--rate is {}, wanted {WANTED_RATE}", brief_number(odd)), None));
+    }
     match (channel.sample_rate_hz, wanted.rate_hz) {
         (Some(_), None) => Ok(None),
         (None, Some(rate)) => Ok(Some(rate)),

@@ -158,3 +158,34 @@ fn a_fifo_in_a_folder_that_is_filled_is_neither_waited_for_nor_replaced() {
         fs::remove_file(&path).expect("removed");
     }
 }
+
+#[test]
+fn notes_beside_recordings_are_listed_and_no_failure() {
+    let place = super::small::folder(2, 20_000);
+    let here = place.path();
+    for (name, text) in [("README", "about these files\n"), ("notes.md", "# Notes\n"), ("x.txt", "some words\n")] {
+        fs::write(here.join("archive").join(name), text).expect("a note");
+    }
+    let Output { status, stdout, stderr } = ends(here, &["inspect", "archive"]);
+    let shown = String::from_utf8_lossy(&stdout).into_owned();
+    assert_eq!(status.code(), Some(0), "{shown}{}", String::from_utf8_lossy(&stderr));
+    assert!(shown.contains("no recording") && shown.contains("README"), "{shown}");
+    let Output { status, stdout, .. } = ends(here, &["inspect", "archive", "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&stdout).expect("JSON");
+    let of = |name: &str| {
+        let mut files = json["files"].as_array().expect("files").iter();
+        files.find(|file| file["file"].as_str().is_some_and(|file| file.ends_with(name))).expect("the file").clone()
+    };
+    assert_eq!(status.code(), Some(0));
+    assert_eq!((&of("README")["no_recording"], &of("r0.h5")["no_recording"]), (&true.into(), &false.into()));
+    assert!(of("README")["error"].is_object());
+    // named by itself, or a recording that is damaged
+    assert_eq!(ends(here, &["inspect", "archive/README"]).status.code(), Some(1));
+    let whole = fs::read(here.join("archive/r0.h5")).expect("a record");
+    for damaged in [&whole[..whole.len() / 2], b""] {
+        fs::write(here.join("archive/cut.h5"), damaged).expect("written");
+        let Output { status, stderr, .. } = ends(here, &["inspect", "archive"]);
+        let said = String::from_utf8_lossy(&stderr).into_owned();
+        assert!(status.code() == Some(1) && said.contains("1 of 6 files"), "{said}");
+    }
+}

@@ -26,6 +26,7 @@ mod ownership;
 mod paths;
 mod patterns;
 mod random;
+mod rates;
 mod scaling;
 mod seeds;
 mod small;

@@ -54,7 +54,7 @@ pub use grid::numbers_in_file;
 pub use labels::{Labels, lane_names};
 pub use lanes::Lanes;
 pub use number::Number;
-pub use rate::{Clue, agreed_rate, rate_in};
+pub use rate::{Clue, LEAST_RATE_HZ, MOST_RATE_HZ, WANTED_RATE, agreed_rate, brief_number, is_rate, rate_in};
 pub use raw::Raw;
 pub use raw_binary::{RawBinary, SampleType};
 pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};

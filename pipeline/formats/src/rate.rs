@@ -1,5 +1,6 @@
 //! The sampling rate, from numbers that are named like one.
 
+use crate::Contents;
 use crate::facts::RATE_FROM;
 use std::collections::HashMap;
 
@@ -42,6 +43,59 @@ const INTERVALS: [&str; 10] = [
     "sampling_interval",
     "SamplingInterval",
 ];
+
+/// The least rate that is one: a sample every thirty years. Slower series are no recordings.
+pub const LEAST_RATE_HZ: f64 = 1e-9;
+
+/// The largest rate that is one: a sample every femtosecond, a thousand times as many as any converter takes. Squares
+/// and products of rates far beyond it would leave the range of numbers.
+pub const MOST_RATE_HZ: f64 = 1e15;
+
+/// What a rate must be, in words that follow «wanted».
+pub const WANTED_RATE: &str = "1e-9 to 1e15 samples per second";
+
+/// Whether a number can be a sample rate in Hz: neither 0, negative, infinite nor NaN, nor beyond what is sampled.
+pub fn is_rate(rate_hz: f64) -> bool {
+    (LEAST_RATE_HZ..=MOST_RATE_HZ).contains(&rate_hz)
+}
+
+/// A number that may be of any size, in few digits.
+pub fn brief_number(number: f64) -> String {
+    let plain = number == 0.0 || !number.is_finite() || (1e-5..1e16).contains(&number.abs());
+    if plain { number.to_string() } else { format!("{number:e}") }
+}
+
+impl Contents {
+    /// Takes rates away that are none, with a remark on each.
+    pub fn refuse_odd_rates(&mut self) {
+        for channel in &mut self.channels {
+            let Some(rate) = channel.sample_rate_hz.filter(|rate| !is_rate(*rate)) else { continue };
+            channel.sample_rate_hz = None;
+            let (location, found) = (&channel.location, brief_number(rate));
+            let remark = format!("{location}: no sample rate: {found} Hz follows from the file, wanted {WANTED_RATE}");
+            self.remarks.push(remark);
+        }
+    }
+
+    /// What the reader said of a channel's rate, if it has none: that of the channel itself, else of the whole file.
+    pub fn why_no_rate(&self, location: &str) -> Option<&str> {
+        let mut said = self.remarks.iter().filter(|remark| {
+            [NO_RATE, "gives no sample rate", UNKNOWN_RATE].iter().any(|words| remark.contains(words))
+        });
+        let of_another = |remark: &&String| {
+            let mut others = self.channels.iter().filter(|channel| channel.location != location);
+            others.any(|channel| !channel.is_axis && remark.starts_with(&channel.location))
+        };
+        let own = said.clone().find(|remark| remark.starts_with(location));
+        own.or_else(|| said.find(|remark| !of_another(remark))).map(String::as_str)
+    }
+}
+
+/// In remarks on channels without a rate.
+const NO_RATE: &str = "no sample rate";
+
+/// In remarks on clues that give no rate.
+const UNKNOWN_RATE: &str = "the sampling rate is left unknown";
 
 /// Two statements of a rate agree if they differ by less: rates are often written with six digits.
 const AGREE: f64 = 1e-5;
@@ -94,7 +148,7 @@ impl Clue {
 
     fn rate_hz(&self) -> Option<f64> {
         let rate = if self.interval { 1.0 / self.value } else { self.value };
-        (self.value.is_finite() && rate.is_finite() && rate > 0.0).then_some(rate)
+        (self.value.is_finite() && is_rate(rate)).then_some(rate)
     }
 }
 
@@ -115,22 +169,41 @@ pub fn rate_in(scope: &str, clues: &HashMap<String, Vec<Clue>>) -> (Option<f64>,
 
 /// The rate that clues give, and what to say of it; none if they disagree or give none.
 pub fn agreed_rate(clues: &[Clue]) -> (Option<f64>, Option<String>) {
-    let named: Vec<String> = clues.iter().map(|clue| format!("{} = {}", clue.location, clue.value)).collect();
+    let named: Vec<String> =
+        clues.iter().map(|clue| format!("{} = {}", clue.location, brief_number(clue.value))).collect();
     let named = named.join(", ");
     let Some(rates) = clues.iter().map(Clue::rate_hz).collect::<Option<Vec<f64>>>() else {
-        return (None, Some(format!("the sampling rate is left unknown: no rate follows from {named}")));
+        return (None, Some(format!("{UNKNOWN_RATE}: no rate follows from {named}, wanted {WANTED_RATE}")));
     };
     let first = rates.first().copied().unwrap_or_default();
     if rates.iter().all(|rate| (rate - first).abs() <= AGREE * first) {
         (Some(first), Some(format!("{RATE_FROM} {named}: {first} samples per second")))
     } else {
-        (None, Some(format!("the sampling rate is left unknown because these disagree: {named}")))
+        (None, Some(format!("{UNKNOWN_RATE} because these disagree: {named}")))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_rate_lies_in_its_range_and_clues_say_what_they_found() {
+        for rate in [1e-9, 0.1, 5e6, 1e15] {
+            assert!(is_rate(rate), "{rate:e}");
+        }
+        for rate in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300, 1.1e15, 9e-10, 1e-300] {
+            assert!(!is_rate(rate), "{rate:e}");
+            let clue = Clue::of("fs", "/g/fs", rate).unwrap();
+            let (found, remark) = agreed_rate(&[clue]);
+            let stated = format!("/g/fs = {},", brief_number(rate));
+            assert!(found.is_none() && remark.unwrap().contains(&stated), "{stated}");
+        }
+        assert_eq!(
+            (brief_number(1e300), brief_number(-1.0), brief_number(5e6)),
+            ("1e300".into(), "-1".into(), "5000000".into())
+        );
+    }
 
     #[test]
     fn steps_of_single_precision_are_the_decimal_number_that_was_meant() {

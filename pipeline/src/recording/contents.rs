@@ -24,7 +24,7 @@ pub fn open_contents(
 ) -> Result<(&'static str, Contents), StageError> {
     reading.check()?;
     let name = format_of(files, path, reading)?;
-    let contents = match (name, &reading.raw) {
+    let mut contents = match (name, &reading.raw) {
         (NATIVE | HDF5, _) => foreign_hdf5::open(files, path)?,
         (RAW, Some(raw)) => raw.open(path).map_err(|error| error.in_file(path))?,
         _ => match formats().iter().find(|known| known.name == name) {
@@ -32,6 +32,7 @@ pub fn open_contents(
             None => return Err(StageError::new(format!("there is no format `{name}`")).at(path)),
         },
     };
+    contents.refuse_odd_rates();
     Ok((name, contents))
 }
 

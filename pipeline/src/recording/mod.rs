@@ -38,8 +38,9 @@ pub use series::{read_number_attribute, read_series};
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native, write_native_in};
 
 pub use afmid_formats::{
-    Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Source, contradiction,
-    even_step, formats, hertz, is_fact, lane_names, mean_rate, most_inflated, responses, says_frequencies, unit_ratio,
+    Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Source, WANTED_RATE,
+    brief_number, contradiction, even_step, formats, hertz, is_fact, is_rate, lane_names, mean_rate, most_inflated,
+    responses, says_frequencies, unit_ratio,
 };
 pub use contents::{UnpackedContents, is_hdf5_file, open_contents, open_unpacked};
 pub use how::{How, Reading};

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use afmid_formats::Number;
+use afmid_formats::{Number, WANTED_RATE, brief_number, is_rate};
 use hdf5::dataset::Layout;
 use hdf5::datatype::ByteOrder;
 use hdf5::filters::Filter;
@@ -67,8 +67,12 @@ fn read_record(
             .at(path)
             .help("native records state it as a file attribute: h5py.File(name, 'a').attrs['sample_rate_hz'] = 5e6")
     })?;
-    if !(sample_rate_hz.is_finite() && sample_rate_hz > 0.0) {
-        return Err(StageError::new(format!("sample_rate_hz is {sample_rate_hz}, wanted a positive number")).at(path));
+    if !is_rate(sample_rate_hz) {
+        let found = brief_number(sample_rate_hz);
+        let problem = format!("the attribute sample_rate_hz is {found}, wanted {WANTED_RATE}");
+        return Err(StageError::new(problem)
+            .at(path)
+            .help("write the rate into the file, or read it as any HDF5: format = \"hdf5\" and sample_rate_hz = HZ"));
     }
     let mut channels = Vec::with_capacity(wanted.len());
     for channel in wanted {

@@ -4,6 +4,8 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+use afmid_formats::{WANTED_RATE, brief_number, is_rate};
+
 use super::contents::{format_of, is_hdf5_file, is_recognised};
 use super::how::{AUTO, HDF5, How, NATIVE, Reading};
 use super::input_files::InputFiles;
@@ -48,7 +50,8 @@ pub fn open_records(files: &InputFiles, path: &Path, wanted: &[Wanted], how: &Ho
         _ => (None, format_of(files, path, &how.reading)?),
     };
     if let Some(record) = native {
-        agreed_rate(Some(record.sample_rate_hz), how.sample_rate_hz, "the file").map_err(|error| error.at(path))?;
+        agreed_rate(Some(record.sample_rate_hz), how.sample_rate_hz, ("the file", None))
+            .map_err(|error| error.at(path))?;
         for wanted in wanted {
             if let Ok(channel) = record.channel(wanted.role) {
                 agreed_unit(&channel.unit, how, wanted).map_err(|error| error.at(path))?;
@@ -89,7 +92,8 @@ impl File<'_> {
         }
         let mut rate = None;
         for (_, channel) in &found {
-            let own = agreed_rate(channel.sample_rate_hz, how.sample_rate_hz, &channel.location)?;
+            let said = self.contents.why_no_rate(&channel.location);
+            let own = agreed_rate(channel.sample_rate_hz, how.sample_rate_hz, (&channel.location, said))?;
             if let Some((first, other)) = rate.filter(|(_, rate)| differ(*rate, own)) {
                 return Err(StageError::new(format!(
                     "{} has {own} samples per second, {first} has {other}: one record wants one rate",
@@ -183,16 +187,28 @@ fn differ(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() > SAME_RATE
 }
 
-/// The rate that the part of a file called `what` states, or that is given. Errors: neither, or both and they differ.
-pub fn agreed_rate(stated: Option<f64>, given: Option<f64>, what: &str) -> Result<f64, StageError> {
+/// The rate that the part of a file called `what` states, or that is given; `said` is what its reader said of a rate
+/// that it does not take. Errors: neither, or both and they differ; the one that is given can be none.
+pub fn agreed_rate(
+    stated: Option<f64>,
+    given: Option<f64>,
+    (what, said): (&str, Option<&str>),
+) -> Result<f64, StageError> {
+    if let Some(odd) = given.filter(|rate| !is_rate(*rate)) {
+        let problem = format!("`sample_rate_hz` is given as {}, wanted {WANTED_RATE}", brief_number(odd));
+        return Err(StageError::new(problem));
+    }
     match (stated, given) {
         (Some(stated), Some(given)) if differ(stated, given) => {
             Err(StageError::new(format!("`sample_rate_hz` is given as {given}, {what} states {stated}"))
                 .help("leave `sample_rate_hz` out: it is for files that state no rate"))
         }
         (Some(rate), _) | (None, Some(rate)) => Ok(rate),
-        (None, None) => Err(StageError::new(format!("{what}: the file states no sample rate"))
-            .help("give it, in Hz: sample_rate_hz = 5e6")),
+        (None, None) => Err(StageError::new(match said {
+            Some(said) => format!("{what} has no sample rate: {said}"),
+            None => format!("{what}: the file states no sample rate"),
+        })
+        .help("give it, in Hz: sample_rate_hz = 5e6")),
     }
 }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use afmid_pipeline::{Array, Attribute, Axis, StageError, Values};
 use serde::{Deserialize, Serialize};
 
-use super::SAMPLE_RATE_HZ;
+use super::{SAMPLE_RATE_HZ, sample_rate_of};
 
 const SIGNAL: &str = "signal";
 const SAMPLE: &str = "sample";
@@ -59,7 +59,7 @@ impl<'a> Decays<'a> {
             Err(_) => Vec::new(),
         };
         let numbers = (0..hits.len()).collect();
-        Ok(Self { sample_rate_hz: array.number(SAMPLE_RATE_HZ)?, sensors, hits, numbers, quiet })
+        Ok(Self { sample_rate_hz: sample_rate_of(array)?, sensors, hits, numbers, quiet })
     }
 
     /// Leaves out hits with fewer than `least` samples that are there in any channel; their numbers.

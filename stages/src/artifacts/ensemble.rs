@@ -4,7 +4,7 @@ use afmid_kernels::events::EventKind;
 use afmid_pipeline::rows::RowView;
 use afmid_pipeline::{Array, Axis, StageError, Values};
 
-use super::{KIND, SAMPLE_RATE_HZ, copy_attributes, event_kind};
+use super::{KIND, SAMPLE_RATE_HZ, copy_attributes, event_kind, sample_rate_of};
 
 const SIGNAL: &str = "signal";
 const RECORD: &str = "record";
@@ -23,9 +23,9 @@ impl<'a> Ensemble<'a> {
         Self { array }
     }
 
-    /// Samples per second. Errors: not stated.
+    /// Samples per second. Errors: not stated, or what is no rate.
     pub fn sample_rate_hz(&self) -> Result<f64, StageError> {
-        self.array.number(SAMPLE_RATE_HZ)
+        sample_rate_of(self.array)
     }
 
     /// Time after the onset.

@@ -56,10 +56,21 @@ pub(crate) use shapes::{shape_array, shaped_mode};
 pub(crate) use transfer::{NewTransfer, Transfer};
 
 use afmid_kernels::events::EventKind;
-use afmid_pipeline::{Array, Attribute};
+use afmid_pipeline::recording::{WANTED_RATE, brief_number, is_rate};
+use afmid_pipeline::{Array, Attribute, StageError};
 
 /// Samples per second.
 pub(crate) const SAMPLE_RATE_HZ: &str = "sample_rate_hz";
+
+/// The rate that an array states: also one of a plugin or of Python. Errors: it states none, or what is none.
+pub(crate) fn sample_rate_of(array: &Array) -> Result<f64, StageError> {
+    let rate = array.number(SAMPLE_RATE_HZ)?;
+    if is_rate(rate) {
+        return Ok(rate);
+    }
+    Err(StageError::new(format!("{SAMPLE_RATE_HZ} is {}, wanted {WANTED_RATE}", brief_number(rate))))
+}
+
 const KIND: &str = "kind";
 
 /// The event that an array is about; none where it states none or another.

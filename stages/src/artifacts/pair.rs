@@ -2,7 +2,7 @@
 
 use afmid_pipeline::{Array, Attribute, Axis, StageError, Values};
 
-use super::{DataSet, KIND, SAMPLE_RATE_HZ, copy_attributes};
+use super::{DataSet, KIND, SAMPLE_RATE_HZ, copy_attributes, sample_rate_of};
 
 const FORCE: &str = "force";
 const FORCE_NEWTON: &str = "force_newton";
@@ -36,7 +36,7 @@ impl<'a> Pair<'a> {
 
     /// Samples per second. Errors: not stated.
     pub fn sample_rate_hz(&self) -> Result<f64, StageError> {
-        self.array.number(SAMPLE_RATE_HZ)
+        sample_rate_of(self.array)
     }
 
     /// First samples of its records, where several lie in a row; none of one.

@@ -3,7 +3,7 @@
 use afmid_pipeline::{Array, Attribute, Axis, StageError};
 use num_complex::Complex64;
 
-use super::SAMPLE_RATE_HZ;
+use super::{SAMPLE_RATE_HZ, sample_rate_of};
 
 const FREQUENCY_HZ: &str = "frequency_hz";
 const TRANSFER: &str = "transfer";
@@ -36,7 +36,7 @@ impl<'a> Transfer<'a> {
                 variance.len()
             )));
         }
-        Ok(Self { array, sample_rate_hz: array.number(SAMPLE_RATE_HZ)?, frequency_hz, transfer, variance })
+        Ok(Self { array, sample_rate_hz: sample_rate_of(array)?, frequency_hz, transfer, variance })
     }
 
     /// Whether it is the ratio of differences: a drift is a constant then.

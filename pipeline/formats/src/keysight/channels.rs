@@ -55,7 +55,18 @@ pub(super) fn of(file: &Opened, waveforms: Vec<Waveform>, remarks: &mut Vec<Stri
         }
     }
     let mut seen: HashMap<String, usize> = HashMap::new();
-    parts.into_iter().filter_map(|part| channel(part, &mut seen)).collect()
+    let mut channels = Vec::new();
+    for part in parts {
+        let (step, known) = (part.first.step, part.first.rate_hz.is_some());
+        let Some(channel) = channel(part, &mut seen) else { continue };
+        if !known {
+            let location = &channel.location;
+            remarks
+                .push(format!("{location}: no sample rate: the axis has steps of {step}, wanted steps in s above 0"));
+        }
+        channels.push(channel);
+    }
+    channels
 }
 
 fn channel(part: Part, seen: &mut HashMap<String, usize>) -> Option<FoundChannel> {

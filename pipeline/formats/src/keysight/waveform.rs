@@ -25,6 +25,8 @@ pub(super) struct Waveform {
     pub(super) frame: String,
     pub(super) unit: &'static str,
     pub(super) rate_hz: Option<f64>,
+    /// From sample to sample along the axis, in its unit.
+    pub(super) step: f64,
     pub(super) started_at: Option<String>,
     /// 0 if it is no segment.
     pub(super) segment: u32,
@@ -79,6 +81,7 @@ impl Waveform {
             frame: fields.text(88, 24),
             unit,
             rate_hz: in_seconds.then(|| of_step(shortest(step))),
+            step,
             started_at: moment(&fields.text(56, 16), &fields.text(72, 16)),
             segment: fields.u32(136),
             buffers,

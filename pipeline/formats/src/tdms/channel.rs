@@ -81,6 +81,9 @@ fn channel(
     if object.timing.uneven {
         remarks.push(format!("{location}: wf_increment changes on the way, so that it has no one sample rate"));
     }
+    if let Some(odd) = timing::odd_increment(&object.properties) {
+        remarks.push(format!("{location}: no sample rate: wf_increment is {odd}, wanted a number above 0"));
+    }
     let rate = timing::increment_s(&object.properties).map(f64::recip).filter(|_| !object.timing.uneven);
     let (scale_factor, add_offset) = scaling.line().unwrap_or((1.0, 0.0));
     let curve = scaling.line().is_none().then_some(scaling);

@@ -83,6 +83,11 @@ pub(super) fn increment_s(properties: &Properties) -> Option<f64> {
     properties.number("wf_increment").filter(|i| i.is_finite() && *i > 0.0)
 }
 
+/// What is stated as seconds between samples and is no interval.
+pub(super) fn odd_increment(properties: &Properties) -> Option<f64> {
+    properties.number("wf_increment").filter(|increment| !(increment.is_finite() && *increment > 0.0))
+}
+
 /// The waveform's start; where that is relative, when the Express VI wrote it.
 fn start(properties: &Properties) -> Option<Stamp> {
     ["wf_start_time", "NI_ExpStartTimeStamp", "NI_ExpTimeStamp"].iter().find_map(|name| properties.time(name))

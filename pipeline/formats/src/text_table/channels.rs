@@ -187,6 +187,9 @@ fn clock(
     {
         return Clock { rate_hz: None, axis: Some(0) };
     }
+    if let Some(words) = rows.stated.odd() {
+        remarks.push(format!("no sample rate: the header says «{words}», wanted a number above 0"));
+    }
     let without_unit = titles.first().is_some_and(|title| title.unit.is_empty());
     let counter = rows.columns.first().filter(|_| rows.columns.len() > 1 && without_unit);
     let even = counter.and_then(|column| axis::even_between(column, &rows.starts, None).ok());

@@ -170,8 +170,14 @@ fn step(
         remark(format!("{title} runs over {dimension}, not over time: no sample rate"));
         return None;
     }
-    let stated = section.tags.number("Delta_X", at, file.decimal).filter(|step| *step > 0.0);
-    let Some(x) = x else { return stated };
+    let delta = section.tags.number("Delta_X", at, file.decimal);
+    let stated = delta.filter(|step| *step > 0.0);
+    let Some(x) = x else {
+        if let (Some(odd), None) = (delta, stated) {
+            remark(format!("{title}: no sample rate: Delta_X is {odd}, wanted a number above 0"));
+        }
+        return stated;
+    };
     let coarse = |step: f64| x.values.last().is_some_and(|last| x.printed.unit_of(*last) > 0.25 * step);
     if let Some(step) = stated {
         if axis::even(x, stated).is_ok() {

@@ -54,6 +54,8 @@ enum Key {
 pub(super) struct Stated {
     /// Seconds between samples, and the words that say so.
     steps: Vec<(f64, String)>,
+    /// Words that state an interval or a rate which is none.
+    odd: Option<String>,
     /// The unit of the axis of time; empty if none is stated.
     pub(super) time_unit: String,
     /// Units and the fields they stand in.
@@ -102,13 +104,20 @@ impl Stated {
                         (_, "") => Some(number),
                         (_, unit) => seconds(unit).map(|seconds| number * seconds),
                     };
-                    let step = step.filter(|step| step.is_finite() && *step > 0.0);
-                    if let Some(step) = step.filter(|_| self.steps.len() < MOST) {
-                        self.steps.push((step, format!("{} {}", brief(bare_key(name), 40), brief(value.trim(), 40))));
+                    let words = || format!("{} {}", brief(bare_key(name), 40), brief(value.trim(), 40));
+                    match step.filter(|step| step.is_finite() && *step > 0.0) {
+                        Some(step) if self.steps.len() < MOST => self.steps.push((step, words())),
+                        None if step.is_some() && self.odd.is_none() => self.odd = Some(words()),
+                        _ => {}
                     }
                 }
             }
         }
+    }
+
+    /// The words of a statement that is no interval, where no other statement is one.
+    pub(super) fn odd(&self) -> Option<&str> {
+        self.odd.as_deref().filter(|_| self.steps.is_empty())
     }
 
     /// The interval all statements agree on, in seconds, and the words of the first. Errors: what to say of

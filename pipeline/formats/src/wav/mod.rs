@@ -55,6 +55,9 @@ impl Format for Wav {
         if !coding.number.is_float() {
             remarks.push("the samples are fractions of full scale: the file states no unit".to_owned());
         }
+        if coding.rate_hz == 0 {
+            remarks.push("no sample rate: the header says 0, wanted a number above 0".to_owned());
+        }
         let channel = |number: u64| {
             let grid = Grid {
                 store: Store::File(file.pinned().clone()),

@@ -1,7 +1,9 @@
 //! The channels of one file: inputs, outputs, their rate and units.
 
 use afmid_pipeline::StageError;
-use afmid_pipeline::recording::{FoundChannel, WholeFile, agreed_rate, contradiction, even_step, lane_names};
+use afmid_pipeline::recording::{
+    FoundChannel, WANTED_RATE, WholeFile, agreed_rate, brief_number, contradiction, even_step, is_rate, lane_names,
+};
 
 use super::selection::Column;
 use super::stage::Columns;
@@ -131,12 +133,13 @@ impl<'a> Channels<'a> {
             stated.filter_map(|(channel, rate)| rate.map(|rate| (channel, rate))).collect();
         let first = stated.first().map(|(_, rate)| *rate);
         for (channel, rate) in &stated {
-            agreed_rate(Some(*rate), first, &channel.location)?;
+            agreed_rate(Some(*rate), first, (&channel.location, None))?;
         }
         if let (None, None, Some(column)) = (first, wanted.sample_rate_hz, &wanted.time) {
             return spaced_equally(column, file);
         }
-        agreed_rate(first, wanted.sample_rate_hz, self.first_output()).map_err(|error| match first {
+        let said = file.contents().why_no_rate(self.first_output());
+        agreed_rate(first, wanted.sample_rate_hz, (self.first_output(), said)).map_err(|error| match first {
             Some(_) => error,
             None => error.help("give `sample_rate_hz` (1 for cycles per sample) or the channel `time`"),
         })
@@ -172,11 +175,18 @@ fn names(channels: &[&FoundChannel]) -> Vec<String> {
 /// The rate of a channel of times. Errors: there is none; they are not equally spaced.
 fn spaced_equally(column: &Column, file: &WholeFile) -> Result<f64, StageError> {
     let times = file.read(column.of(file.contents())?)?;
-    equal_spacing(&times).or_else(|| even_step(&times).ok().map(f64::recip)).ok_or_else(|| {
+    let uneven = || {
         let problem = "are not equally spaced, ascending and complete to 1 % or to their last digit";
         StageError::new(format!("the times in channel {column} {problem}"))
             .help("resample the record, or give `sample_rate_hz` if they are only a coarse clock")
-    })
+    };
+    let rate = equal_spacing(&times).or_else(|| even_step(&times).ok().map(f64::recip)).ok_or_else(uneven)?;
+    if is_rate(rate) {
+        return Ok(rate);
+    }
+    let found = brief_number(rate);
+    Err(StageError::new(format!("the times in channel {column} give {found} Hz, wanted {WANTED_RATE}"))
+        .help("give `sample_rate_hz`, or times in seconds"))
 }
 
 /// Samples per unit of an equally spaced series.

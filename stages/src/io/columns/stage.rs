@@ -47,7 +47,8 @@ pub struct Columns {
     /// `AFMID_DATA` where that is set. Required, or `files`.
     pub file: String,
     /// Several files with the same channels, instead of `file`: hits or takes, each recorded by itself, as patterns
-    /// likewise. Default: none. Why: `spectrum.measured_frf` averages over all; other stages take one record.
+    /// likewise, with the rules of `io.records`. Default: none. Why: `spectrum.measured_frf` averages over all; other
+    /// stages take one record.
     pub files: Vec<String>,
     /// Channels of the inputs, at least one. Default: the first.
     pub inputs: Vec<Column>,
@@ -63,7 +64,7 @@ pub struct Columns {
     pub raw: Option<RawBinary>,
     /// Sample rate in Hz, of a file that states none. Absent: the file's, or from `time`. Where it is not known, 1
     /// makes frequencies cycles per sample.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 1e-9, max = 1e15))]
     pub sample_rate_hz: Option<f64>,
     /// Channel of the time in seconds, for the sample rate; equally spaced to 1 %, or to half a unit of its last
     /// digit. For files whose time axis is not titled as one.
