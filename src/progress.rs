@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::batch::work::Done;
 use crate::interrupt;
 use crate::output::say;
-use crate::printable::one_line;
+use crate::printable::{few, one_line};
 use afmid_pipeline::runner::Observer;
 use afmid_pipeline::stage::{NoProgress, Progress};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -121,6 +121,6 @@ impl Drop for Bar<'_> {
 
 fn lines(id: &str, cached: bool, took: Duration, warnings: &[String]) -> String {
     let what = if cached { "reused".to_owned() } else { format!("{:.2} s", took.as_secs_f64()) };
-    let warnings: String = warnings.iter().map(|warning| format!("  warning: {}\n", one_line(warning))).collect();
+    let warnings: String = few(warnings).iter().map(|warning| format!("  warning: {warning}\n")).collect();
     format!("{}: {what}\n{warnings}", one_line(id))
 }

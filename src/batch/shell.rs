@@ -3,12 +3,15 @@
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 
-/// A word that bash reads as exactly these bytes. It is printable ASCII or UTF-8 on one line, whatever they are.
+use crate::printable::acts;
+
+/// A word that bash reads as exactly these bytes. It is printable ASCII or UTF-8 on one line, whatever they are; what
+/// acts or is not seen is an escape.
 pub fn quoted(word: impl AsRef<OsStr>) -> String {
     let bytes = word.as_ref().as_bytes();
     match std::str::from_utf8(bytes) {
         Ok(text) if !text.is_empty() && text.bytes().all(is_plain) => text.to_owned(),
-        Ok(text) if !text.chars().any(char::is_control) => format!("'{}'", text.replace('\'', r"'\''")),
+        Ok(text) if !text.chars().any(|c| c.is_control() || acts(c)) => format!("'{}'", text.replace('\'', r"'\''")),
         _ => {
             let escaped = |&byte: &u8| match byte {
                 b'\'' | b'\\' => format!("\\{}", char::from(byte)),
@@ -41,11 +44,12 @@ mod tests {
             // bytes of no encoding, each before a digit that could be taken for its own
             b"\xff0\x01a\x7f'\\".to_vec(),
             b"-n".to_vec(),
+            "a\u{202e}\u{200b}'1".as_bytes().to_vec(),
             (1..=255).collect(),
         ];
         for word in words {
             let text = quoted(OsStr::from_bytes(&word));
-            assert!(!text.contains(char::is_control), "{text:?}");
+            assert!(!text.contains(|c: char| c.is_control() || acts(c)), "{text:?}");
             let script = format!("set -f; w={text}; printf %s \"$w\"; printf '|%s' {text} b");
             let read = std::process::Command::new("bash").arg("-c").arg(script).output().expect("bash starts");
             let wanted = [&word[..], b"|", &word[..], b"|b"].concat();

@@ -13,6 +13,7 @@ use super::ledger::Entry;
 use super::work::in_the_way;
 use super::{parquet, trends};
 use crate::failure::Failure;
+use crate::printable::printable;
 
 /// A row per data set and mode; a set without modes has one row.
 pub fn table(entries: &[Entry]) -> Table {
@@ -216,9 +217,11 @@ fn field(values: &ColumnValues, row: usize) -> String {
     .unwrap_or_default()
 }
 
-/// Text that is no formula to a spreadsheet: one that begins as a formula, and is no number, gets an apostrophe.
+/// Text that is no formula to a spreadsheet: one that begins as a formula, and is no number, gets an apostrophe. What
+/// acts or is not seen is an escape, as on a terminal: tables are printed, too.
 fn cell(text: &str) -> String {
-    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
+    let text = &*printable(text);
+    let formula = text.starts_with(['=', '+', '-', '@', '\t']) && text.parse::<f64>().is_err();
     if formula { format!("'{text}") } else { text.to_owned() }
 }
 
@@ -228,9 +231,10 @@ mod tests {
 
     #[test]
     fn a_spreadsheet_finds_no_formula() {
-        for text in ["=1+1", "+SUM(A1)", "-2+3", "@x", "\t=1", "\r=1", "-"] {
+        for text in ["=1+1", "+SUM(A1)", "-2+3", "@x", "\t=1", "-"] {
             assert_eq!(cell(text), format!("'{text}"));
         }
+        assert_eq!((cell("\r=1"), cell("a\u{202e}b\u{200b}")), ("\\x0d=1".into(), "a\\u{202e}b\\u{200b}".into()));
         for text in ["", "a=b", "-2.5", "+3e4", "'=1", "lever-1"] {
             assert_eq!(cell(text), text);
         }

@@ -9,6 +9,9 @@ use crate::show::{grid, number};
 /// Datasets that are listed for one stage; `--json` has all.
 const MOST: usize = 40;
 
+/// Lines of configs and warnings that are listed for each side; `--json` has all.
+const MOST_LINES: usize = 200;
+
 /// Differences as text, the first file on the left.
 pub fn diff_text(diff: &Diff) -> String {
     let (a, b) = (one_line(&diff.a), one_line(&diff.b));
@@ -59,8 +62,12 @@ fn lines(head: &str, lines: &Lines, text: &mut String) {
     }
     text.push_str(&format!("{head}:\n"));
     let indent = " ".repeat(head.len() - head.trim_start().len());
-    lines.lines_only_in_a.iter().for_each(|line| text.push_str(&format!("{indent}  - {}\n", one_line(line))));
-    lines.lines_only_in_b.iter().for_each(|line| text.push_str(&format!("{indent}  + {}\n", one_line(line))));
+    for (sign, only) in [('-', &lines.lines_only_in_a), ('+', &lines.lines_only_in_b)] {
+        only.iter().take(MOST_LINES).for_each(|line| text.push_str(&format!("{indent}  {sign} {}\n", one_line(line))));
+        if only.len() > MOST_LINES {
+            text.push_str(&format!("{indent}  {sign} ... {} more: see --json\n", only.len() - MOST_LINES));
+        }
+    }
     if lines.lines_only_in_a.is_empty() && lines.lines_only_in_b.is_empty() {
         text.push_str(&format!("{indent}  the same lines in another order\n"));
     }

@@ -21,7 +21,7 @@ use super::origin::{Origin, of_a_lever};
 use super::palette;
 use super::paper;
 use super::view::{Fact, Head, Picture, Section, StageView, TableView, Tile};
-use crate::printable::printable;
+use crate::printable::{few, printable};
 
 /// Bytes that the figures of the sections, and of the stages, may take together, so that the page stays under 5 MB.
 const SECTION_FIGURES: usize = 2_500_000;
@@ -72,7 +72,7 @@ pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportE
         .stages
         .iter()
         .filter(|stage| !stage.result.warnings.is_empty())
-        .map(|stage| (stage.id.clone(), stage.result.warnings.clone()))
+        .map(|stage| (stage.id.clone(), few(&stage.result.warnings)))
         .collect();
     let mut environment = Environment::new();
     environment.set_formatter(shown_text);

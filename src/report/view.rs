@@ -146,6 +146,8 @@ pub(crate) struct StageView {
     pub facts: Vec<Fact>,
     pub params: String,
     pub warnings: Vec<String>,
+    /// How many there are.
+    pub warned: usize,
     pub sources: TableView,
     pub artifacts: Vec<ArtifactView>,
 }

@@ -5,7 +5,7 @@ use afmid_pipeline::{StageRecord, Unfinished};
 use serde_json::{Value, json};
 
 use super::grid::grid;
-use crate::printable::one_line;
+use crate::printable::{few, one_line};
 
 /// The run, its stages with their artifacts, and all warnings; before these `found`, what the run is about.
 pub fn overview_text(file: &ResultFile, found: &str) -> String {
@@ -48,12 +48,7 @@ pub fn incomplete(unfinished: &[Unfinished]) -> String {
 
 fn warnings(stage: &StageSummary) -> Vec<String> {
     let record = &stage.record;
-    record
-        .result
-        .warnings
-        .iter()
-        .map(|warning| format!("  {}: {}\n", one_line(&record.id), one_line(warning)))
-        .collect()
+    few(&record.result.warnings).iter().map(|warning| format!("  {}: {warning}\n", one_line(&record.id))).collect()
 }
 
 /// The same for scripts.
@@ -88,8 +83,8 @@ pub fn stage_head(record: &StageRecord) -> String {
     for (port, stage, output) in &record.wires {
         text.push_str(&format!("  {}\n", one_line(&format!("{port} <- {stage}.{output}"))));
     }
-    for warning in &record.result.warnings {
-        text.push_str(&format!("  warning: {}\n", one_line(warning)));
+    for warning in few(&record.result.warnings) {
+        text.push_str(&format!("  warning: {warning}\n"));
     }
     text
 }

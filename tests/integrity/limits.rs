@@ -159,6 +159,60 @@ fn a_fifo_in_a_folder_that_is_filled_is_neither_waited_for_nor_replaced() {
     }
 }
 
+/// A plugin that warns `count` times.
+fn loud(count: usize) -> String {
+    let describe = r#"{"id":1,"result":{"name":"loud","version":"1","summary":"s","source":"none","inputs":[],"outputs":[{"name":"document","shape":"document"}],"parameters":{"type":"object","properties":{},"additionalProperties":false},"deterministic":true,"seeded":false}}"#;
+    format!(
+        "#!/bin/sh\n\
+         echo '{{\"afmid_stage\":1,\"protocol\":{{\"min\":1,\"max\":1}},\"name\":\"loud\",\"version\":\"1\"}}'\n\
+         while read -r line; do\n\
+         id=$(printf %s \"$line\" | sed 's/.*\"id\": *\\([0-9]*\\).*/\\1/')\n\
+         case \"$line\" in\n\
+         *describe*) echo '{describe}' | sed \"s/\\\"id\\\":1/\\\"id\\\":$id/\";;\n\
+         *shutdown*) exit 0;;\n\
+         *) printf '{{\"id\":%s,\"result\":{{\"outputs\":{{\"document\":{{\"shape\":\"document\",\"value\":1}}}},\"warnings\":[' \"$id\"\n\
+         seq -s , 1 {count} | sed 's/[0-9][0-9]*/\"warning &\"/g' | tr -d '\\n'\n\
+         printf ']}}}}\\n';;\n\
+         esac\ndone\n"
+    )
+}
+
+#[test]
+fn the_first_of_very_many_warnings_are_shown_and_a_limit_is_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    fs::write(
+        here.join("c.toml"),
+        "[pipeline]\nname = \"a\"\nseed = 1\n\n[plugins]\nloud = \"sh loud.sh\"\n\n\
+         [[stage]]\nid = \"x\"\nuses = \"exec:loud\"\n",
+    )
+    .expect("a config");
+    let run = ["run", "c.toml", "-o", "a.h5", "--cache", "cache", "--allow-plugins"];
+    for (count, kept) in [(100, 100), (100_000, 10_001)] {
+        fs::write(here.join("loud.sh"), loud(count)).expect("a script");
+        let Output { status, stdout, stderr } = ends(here, &run);
+        let said = String::from_utf8_lossy(&[stdout, stderr].concat()).into_owned();
+        assert!(status.success(), "{said}");
+        assert!(said.contains("warning 20\n") && !said.contains("warning 21\n"), "{said}");
+        assert!(said.contains(&format!("and {} more", kept - 20)), "{said}");
+        for arguments in [&["show", "a.h5"][..], &["show", "a.h5", "x"]] {
+            let shown = String::from_utf8_lossy(&ends(here, arguments).stdout).into_owned();
+            assert!(shown.contains("warning 20\n") && shown.lines().count() < 60, "{arguments:?}: {shown}");
+        }
+        // more than a pipe holds
+        let json = command(here, &["show", "a.h5", "--json"]).output().expect("afmid starts").stdout;
+        let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+        let all = json["stages"][0]["warnings"].as_array().expect("warnings").clone();
+        assert_eq!(all.len(), kept);
+        if kept < count {
+            assert!(all[kept - 1].as_str().is_some_and(|last| last.contains("90000 more")), "{}", all[kept - 1]);
+        }
+        assert!(ends(here, &["report", "a.h5", "-o", "a.html"]).status.success());
+        let page = fs::read_to_string(here.join("a.html")).expect("a page");
+        assert!(page.matches("warning 1").count() < 50, "the page has them all");
+    }
+}
+
 #[test]
 fn notes_beside_recordings_are_listed_and_no_failure() {
     let place = super::small::folder(2, 20_000);

@@ -10,8 +10,9 @@ use serde_json::json;
 
 use super::leftovers::Place;
 
-/// Renames the window, erases the screen, turns text round, ends the paragraph.
-const EVIL: &str = "\u{1b}]0;x\u{7}\u{9b}2J\u{202e}\u{2066}\u{61c}\u{200f}\u{2028}\u{7f}\u{8}";
+/// Renames the window, erases the screen, turns text round, ends the paragraph, has no width.
+const EVIL: &str =
+    "\u{1b}]0;x\u{7}\u{9b}2J\u{202e}\u{2066}\u{61c}\u{200f}\u{2028}\u{7f}\u{8}\u{200b}\u{2060}\u{feff}\u{ad}";
 
 /// Whether text holds something that acts on a terminal; written a second time here, byte by byte.
 fn acting(bytes: &[u8]) -> Option<usize> {
@@ -19,16 +20,18 @@ fn acting(bytes: &[u8]) -> Option<usize> {
     (0..bytes.len()).find(|&k| match at(k) {
         b'\n' | b'\t' => false,
         0..=0x1f | 0x7f => true,
-        // U+0080 to U+009F
-        0xc2 => (0x80..=0x9f).contains(&at(k + 1)),
+        // U+0080 to U+009F, U+00AD
+        0xc2 => matches!(at(k + 1), 0x80..=0x9f | 0xad),
         // U+061C
         0xd8 => at(k + 1) == 0x9c,
-        // U+200E, U+200F, U+2028 to U+202E; U+2066 to U+2069
+        // U+200B to U+200F, U+2028 to U+202E; U+2060 to U+206F
         0xe2 => match at(k + 1) {
-            0x80 => matches!(at(k + 2), 0x8e | 0x8f | 0xa8..=0xae),
-            0x81 => matches!(at(k + 2), 0xa6..=0xa9),
+            0x80 => matches!(at(k + 2), 0x8b..=0x8f | 0xa8..=0xae),
+            0x81 => matches!(at(k + 2), 0xa0..=0xaf),
             _ => false,
         },
+        // U+FEFF
+        0xef => (at(k + 1), at(k + 2)) == (0xbb, 0xbf),
         // no UTF-8 at all
         0x80..=0xc1 | 0xf5.. => k == 0 || at(k - 1) < 0x80,
         _ => false,
@@ -270,6 +273,49 @@ fn pages_and_figures_show_what_a_stranger_s_result_says() {
     harmless(&place, &["show", "strange.h5"], "\\x1b]0;x");
     harmless(&place, &["show", "strange.h5", "strange"], "\\x1b]0;x");
     harmless(&place, &["show", "strange.h5", "strange", "--json"], "\\u001b]0;x");
+}
+
+/// What `trust` lists is what somebody agrees to: two commands that look alike must not be two.
+#[test]
+fn consent_is_asked_for_what_is_seen() {
+    let place = Place::new();
+    let hidden = "a\u{202e}b\u{200b}c\u{2060}\u{feff}\u{ad}";
+    let config = format!(
+        "[pipeline]\nname = \"a\"\n\n[plugins]\n\
+         one = {{ command = [\"sh\", \"-c\", \"exit 1\", \"{0}\"], environment = {{ X = \"{0}\" }} }}\n\n\
+         [[stage]]\nid = \"x\"\nuses = \"exec:one\"\n",
+        escaped(hidden)
+    );
+    let folder = format!("set{hidden}");
+    std::fs::create_dir(place.path(&folder)).expect("a folder");
+    std::fs::write(place.path(&folder).join("c.toml"), config).expect("a config");
+    let file = format!("{folder}/c.toml");
+    // as the bytes that bash reads
+    let shown = "a\\xe2\\x80\\xaeb\\xe2\\x80\\x8bc";
+    for arguments in [&["trust", &file][..], &["run", &file, "-o", "x.h5"]] {
+        let mut command = place.command(arguments);
+        let output = command.env("AFMID_TRUST", place.path("trust")).output().expect("afmid starts");
+        let all = [output.stdout, output.stderr].concat();
+        assert_harmless(&format!("{arguments:?}"), &all);
+        let all = String::from_utf8_lossy(&all).into_owned();
+        assert!(all.contains(if arguments[0] == "trust" { shown } else { "\\u{202e}" }), "{arguments:?}: {all}");
+    }
+    harmless(&place, &["trust", &file, "--json"], "\\u202e");
+}
+
+#[test]
+fn tables_of_a_batch_show_names_and_do_not_obey_them() {
+    let place = Place::new();
+    let name = "l\u{202e}ever\u{200b}";
+    std::fs::write(place.path("census.toml"), super::common::sets::CENSUS).expect("a config");
+    super::common::sets::write_set(&place.path("sets").join(name), 1, 3000);
+    let set = format!("sets/{name}");
+    harmless(&place, &["batch", "census.toml", "-o", "out", &set], "\\u{202e}");
+    for table in ["summary.csv", "trends.csv"] {
+        assert_harmless(table, &std::fs::read(place.path("out").join(table)).expect("a table"));
+    }
+    let table = std::fs::read_to_string(place.path("out/summary.csv")).expect("a table");
+    assert!(table.contains("l\\u{202e}ever\\u{200b},"), "{table}");
 }
 
 #[test]

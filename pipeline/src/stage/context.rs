@@ -7,6 +7,9 @@ use crate::artifact::RowWriter;
 use crate::recording::InputFiles;
 use crate::rows::Scratch;
 
+/// Warnings that the result of a stage keeps: a few of every record of a large archive.
+pub const MOST_WARNINGS: usize = 10_000;
+
 /// What a stage may ask of the runner: its seed, its folder, a place for warnings and progress.
 pub struct Context<'a> {
     base: PathBuf,
@@ -115,8 +118,14 @@ impl<'a> Context<'a> {
         self.progress.tick();
     }
 
-    /// The warnings so far.
+    /// The warnings so far; beyond [`MOST_WARNINGS`] how many there were.
     pub fn into_warnings(self) -> Vec<String> {
-        self.warnings.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner)
+        let mut warnings = self.warnings.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if warnings.len() > MOST_WARNINGS {
+            let beyond = warnings.len() - MOST_WARNINGS;
+            warnings.truncate(MOST_WARNINGS);
+            warnings.push(format!("{beyond} more warnings: a result keeps {MOST_WARNINGS} of each stage"));
+        }
+        warnings
     }
 }

@@ -9,6 +9,7 @@ use super::document::document_view;
 use super::model::model_view;
 use super::recording::recording_view;
 use super::table::{ROWS, table_view};
+use crate::printable::few;
 use crate::report::figure::{Figure, slug};
 use crate::report::number::{bytes, duration};
 use crate::report::view::{ArtifactView, Fact, Head, StageView, TableView};
@@ -37,7 +38,8 @@ pub(crate) fn stage_view(run: &RunResult, stage: &StageRecord) -> (StageView, Ve
         cached: timing.is_some_and(|(_, _, cached)| *cached),
         facts,
         params: serde_json::to_string_pretty(&stated(&stage.params)).unwrap_or_default(),
-        warnings: stage.result.warnings.clone(),
+        warnings: few(&stage.result.warnings),
+        warned: stage.result.warnings.len(),
         sources: sources(stage),
         artifacts,
     };
