@@ -3,6 +3,7 @@
 // the macros panic where a pipe is closed or a disk full: `output` is the one place that prints
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+mod address_space;
 mod batch;
 mod cli;
 mod commands;
@@ -44,6 +45,7 @@ pub fn main(registry: &Registry) -> ExitCode {
     if let Some(code) = afmid_pipeline::plugin::host_main() {
         return code;
     }
+    address_space::fit();
     if let Err(error) = interrupt::listen() {
         // a signal ends the program as the system does it
         output::say(&format!("warning: signals cannot be caught: {error}\n"));

@@ -98,7 +98,7 @@ const CRATES: [Crate; 5] = [
         name: "afmid",
         src: "src",
         floors: &[
-            &["printable", "relative", "export"],
+            &["address_space", "printable", "relative", "export"],
             &["failure", "diagnostic"],
             &["output"],
             &["interrupt", "show"],

@@ -243,3 +243,63 @@ fn notes_beside_recordings_are_listed_and_no_failure() {
         assert!(status.code() == Some(1) && said.contains("1 of 6 files"), "{said}");
     }
 }
+
+const SIMULATED: &str = r#"[pipeline]
+name = "simulated"
+seed = 3
+
+[[stage]]
+id = "archive"
+uses = "simulate.afm"
+params = { out = "archive", records = 2, samples = 600000, ramp_hz = 6.0, snap_offs = 2, margin_samples = 30000, seed = 5 }
+"#;
+
+const RINGDOWN: &str = r#"[pipeline]
+name = "ringdown"
+seed = 3
+
+[[stage]]
+id = "records"
+uses = "io.records"
+params = { files = ["archive/*.h5"] }
+
+[[stage]]
+id = "events"
+uses = "events.correlation"
+inputs = { records = "records" }
+params = { kind = "snap-off" }
+
+[[stage]]
+id = "ringdown"
+uses = "model.ringdown"
+inputs = { ensemble = "events.ensemble" }
+"#;
+
+/// A limit of the address space, as clusters set it, in kB: of what is reserved little is ever used.
+#[test]
+fn small_inputs_need_little_address_space() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    fs::write(here.join("simulated.toml"), SIMULATED).expect("a config");
+    fs::write(here.join("ringdown.toml"), RINGDOWN).expect("a config");
+    let commands: &[&[&str]] = &[
+        &["run", "simulated.toml", "-o", "s.h5", "--fresh", "--cache", "cache"],
+        &["check", "ringdown.toml"],
+        &["inspect", "archive"],
+        &["run", "ringdown.toml", "-o", "r.h5", "--fresh", "--cache", "cache"],
+        &["show", "r.h5"],
+        &["report", "r.h5", "-o", "r.html"],
+        &["diff", "r.h5", "r.h5"],
+        &["batch", "ringdown.toml", "archive", "-o", "out", "--cache", "cache"],
+    ];
+    for limit_kb in ["500000", "300000"] {
+        for arguments in commands {
+            let mut limited = Command::new("sh");
+            limited.current_dir(here).args(["-c", "ulimit -v $1; shift; exec \"$@\"", "sh", limit_kb]);
+            limited.arg(env!("CARGO_BIN_EXE_afmid")).args(*arguments);
+            let Output { status, stderr, .. } = limited.output().expect("a shell");
+            let said = String::from_utf8_lossy(&stderr);
+            assert!(status.success(), "afmid {arguments:?} in {limit_kb} kB: {status}\n{said}");
+        }
+    }
+}
