@@ -61,7 +61,7 @@ pub fn is_rate(rate_hz: f64) -> bool {
 
 /// A number that may be of any size, in few digits.
 pub fn brief_number(number: f64) -> String {
-    let plain = number == 0.0 || !number.is_finite() || (1e-5..1e16).contains(&number.abs());
+    let plain = number == 0.0 || !number.is_finite() || (1e-15..1e16).contains(&number.abs());
     if plain { number.to_string() } else { format!("{number:e}") }
 }
 
