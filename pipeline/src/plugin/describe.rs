@@ -50,6 +50,11 @@ pub(super) fn checked(shaken: &Handshake, answer: &Value) -> Result<(Description
         let before = format!("`{} {}`", shaken.name, shaken.version);
         return Err(wrong(format!("it is `{name} {version}`, its handshake said {before}")));
     }
+    for (what, text) in [("name", &description.name), ("version", &description.version)] {
+        if text.contains(char::is_control) {
+            return Err(wrong(format!("its `{what}` is {text:?}, wanted no control characters")));
+        }
+    }
     if description.summary.trim().is_empty() {
         return Err(wrong("its `summary` is empty".to_owned()));
     }
@@ -62,16 +67,34 @@ pub(super) fn checked(shaken: &Handshake, answer: &Value) -> Result<(Description
         return Err(wrong(format!("output `{}` is a recording: plugins read recordings and make none", port.name)));
     }
     let schema = Schema::new(&description.parameters).map_err(|what| wrong(format!("`parameters`: {what}")))?;
+    let unfit = |name: &&str| name.is_empty() || name.len() > MOST_NAME_BYTES || name.contains(char::is_control);
+    if let Some(name) = schema.names().find(unfit) {
+        let rule = format!("wanted names of 1 to {MOST_NAME_BYTES} printable bytes");
+        return Err(wrong(format!("`parameters` has the property {name:?}, {rule}")));
+    }
     Ok((description, schema))
 }
+
+/// Bytes of the name of a port. Why: it stands in wires, tables and messages.
+const MOST_PORT_BYTES: usize = 60;
+
+/// Bytes of a tag and of the name of a parameter. Why: the names of a stage's parameters share one header of its
+/// result.
+const MOST_NAME_BYTES: usize = 200;
 
 fn ports(what: &str, ports: &[PortDescription]) -> Result<(), String> {
     let letters =
         |name: &str| name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
     for (index, port) in ports.iter().enumerate() {
         let name = &port.name;
-        if name.is_empty() || name.len() > 60 || !letters(name) {
+        if name.is_empty() || name.len() > MOST_PORT_BYTES || !letters(name) {
             return Err(format!("{what} `{name}`: wanted a name of lowercase letters, digits and `_`"));
+        }
+        if port.tag.len() > MOST_NAME_BYTES || port.tag.contains(char::is_control) {
+            let tag = &port.tag;
+            return Err(format!(
+                "{what} `{name}`: its tag is {tag:?}, wanted at most {MOST_NAME_BYTES} printable bytes"
+            ));
         }
         if ports[..index].iter().any(|other| other.name == *name) {
             return Err(format!("it has two {what}s `{name}`"));

@@ -18,7 +18,7 @@ use crate::outcome::{Ports, RunInfo, RunResult, StageRecord, StageResult, Unfini
 use crate::recording::{HashedFile, InputFiles};
 use crate::rows::Scratch;
 use crate::stage::{Caching, Context, Progress};
-use crate::store::{PendingResult, RunHead, StageIdentity, Written, write_result, written};
+use crate::store::{PendingResult, RunHead, StageIdentity, Written, check_storable, write_result, written};
 
 /// Who watches a run. Called from several threads.
 pub trait Observer: Send + Sync {
@@ -318,7 +318,7 @@ fn check_outputs(node: &Node, outputs: &Ports) -> Result<(), StageError> {
     for port in spec.outputs {
         match outputs.artifact(port.name) {
             Some(artifact) if artifact.shape() == port.shape => {
-                artifact.validate().map_err(|error| error.on(port.name))?
+                artifact.validate().and_then(|()| check_storable(artifact)).map_err(|error| error.on(port.name))?
             }
             Some(artifact) => {
                 let (found, wanted) = (artifact.shape().name(), port.shape.name());

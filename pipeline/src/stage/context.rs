@@ -92,9 +92,12 @@ impl<'a> Context<'a> {
     /// Keeps a warning as data: it is stored with the result and shown. Say what was found, with numbers, and what to
     /// do.
     ///
-    /// Call it in a fixed order (not from parallel work): warnings are part of the result.
+    /// Call it in a fixed order (not from parallel work): warnings are part of the result. A NUL in one, at which it
+    /// would end in HDF5, becomes U+FFFD.
     pub fn warn(&self, text: impl Into<String>) {
-        self.warnings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text.into());
+        let text: String = text.into();
+        let text = if text.contains('\0') { text.replace('\0', "\u{fffd}") } else { text };
+        self.warnings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text);
     }
 
     /// Keeps what a process of another program said, beside the times of the run: a record for people, no part of the

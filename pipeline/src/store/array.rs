@@ -44,6 +44,14 @@ const REAL: &str = "_real";
 const IMAGINARY: &str = "_imag";
 const MAGNITUDE: &str = "_magnitude";
 
+/// The names of the datasets of a variable.
+pub(super) fn stored_names(variable: &Variable) -> Vec<String> {
+    match variable.values {
+        Values::Complex(_) => [REAL, IMAGINARY, MAGNITUDE].map(|part| format!("{}{part}", variable.name)).to_vec(),
+        _ => vec![variable.name.clone()],
+    }
+}
+
 /// Writes an array as the NXdata group `name`. Errors: it is not valid, two names clash, text with a NUL.
 pub(super) fn write_array(parent: &Group, name: &str, array: &Array) -> Result<Group> {
     array.validate().map_err(|error| StoreError::new(error.to_string()).at(write::path_of(parent, name)))?;

@@ -14,9 +14,26 @@ use crate::hdf5_files::{read, write};
 /// The attribute that holds a layout.
 const LAYOUT: &str = "afmid_layout";
 
+/// The attribute that names an artifact's shape.
+pub(super) const SHAPE: &str = "afmid_shape";
+
+/// Begins the names of attributes that are stored under another name than their own.
+const RENAMED: &str = "afmid_attribute_";
+
 /// Attribute names that NeXus, netCDF or this store use on groups.
-const RESERVED: [&str; 10] =
-    [LAYOUT, "NX_class", "axes", "auxiliary_signals", "default", "long_name", "signal", "title", "units", "name"];
+const RESERVED: [&str; 11] = [
+    LAYOUT,
+    SHAPE,
+    "NX_class",
+    "axes",
+    "auxiliary_signals",
+    "default",
+    "long_name",
+    "signal",
+    "title",
+    "units",
+    "name",
+];
 
 /// An attribute of an artifact, as stored on its group.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,8 +73,11 @@ pub(super) fn write_attributes(
     attributes
         .iter()
         .map(|(name, value)| {
-            let taken = RESERVED.contains(&name.as_str()) || name.ends_with("_indices") || name.is_empty();
-            let stored_as = taken.then(|| format!("afmid_attribute_{name}"));
+            let taken = RESERVED.contains(&name.as_str())
+                || name.ends_with("_indices")
+                || name.starts_with(RENAMED)
+                || name.is_empty();
+            let stored_as = taken.then(|| format!("{RENAMED}{name}"));
             let place = stored_as.as_deref().unwrap_or(name);
             let kind = match value {
                 Attribute::Flag(flag) => write::attribute(group, place, &i8::from(*flag)).map(|()| Kind::Flag),

@@ -35,6 +35,7 @@ mod run_info;
 mod seal;
 mod stage_file;
 mod state_space;
+mod storable;
 mod table;
 mod written;
 
@@ -56,4 +57,5 @@ pub(crate) use rows::write_rows;
 pub(crate) use seal::seal;
 pub(crate) use stage_file::write_unsealed_stage;
 pub use stage_file::{StageIdentity, read_stage, write_stage};
+pub(crate) use storable::check_storable;
 pub use written::{Written, written};

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::array::{read_array, write_array};
 use super::document::{read_document, write_document};
+use super::layout::SHAPE;
 use super::names::{TAKEN_BY_STAGE, group_names};
 use super::recording::{read_recording, write_recording};
 use super::rows::Backing;
@@ -20,8 +21,6 @@ use crate::recording::InputFiles;
 
 /// The attribute that lists a stage's ports in order.
 const PORTS: &str = "afmid_ports";
-/// The attribute that names an artifact's shape.
-const SHAPE: &str = "afmid_shape";
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct StoredPort {

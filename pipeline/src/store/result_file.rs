@@ -182,10 +182,15 @@ pub(super) type WireColumn = (&'static str, fn(&Wire) -> &str);
 pub(super) const WIRES: [WireColumn; 3] =
     [("input_port", |wire| &wire.0), ("input_stage", |wire| &wire.1), ("input_output", |wire| &wire.2)];
 
-/// Scalar parameters as attributes as well: what people see at once in a viewer.
+/// Scalar parameters as attributes as well: what people see at once in a viewer. The text of all has those whose names
+/// or values HDF5 does not take.
 fn write_params(owner: &hdf5::Location, params: &Value) -> Result<()> {
     for (name, value) in params.as_object().into_iter().flatten() {
+        if name.is_empty() || name.contains('\0') {
+            continue;
+        }
         match value {
+            Value::String(text) if text.contains('\0') => Ok(()),
             Value::Bool(flag) => write::attribute(owner, name, &i8::from(*flag)),
             Value::Number(number) => match number.as_i64() {
                 Some(whole) => write::attribute(owner, name, &whole),

@@ -2,6 +2,7 @@
 
 mod consent;
 mod containment;
+mod names;
 
 use std::cell::Cell;
 use std::fs;

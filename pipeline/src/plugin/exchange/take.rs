@@ -16,6 +16,7 @@ use crate::artifact::{
 use crate::plugin::message::{
     Kind, Numbers, SentArray, SentColumn, SentDocument, SentStateSpace, SentTable, SentVariable,
 };
+use crate::store::check_storable;
 
 /// What a port may take.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +41,26 @@ pub(in crate::plugin) fn take(sent: &Value, file: &Path, wanted: Wanted) -> Resu
         Shape::Recording => return Err("is a recording: plugins read recordings and make none".to_owned()),
     };
     artifact.validate().map_err(|error| format!("does not fit together: {error}"))?;
+    check_storable(&artifact).map_err(|error| error.to_string())?;
+    printable(&artifact)?;
     Ok(artifact)
+}
+
+/// Errors: a name with a control character, which terminals and tables would not show.
+fn printable(artifact: &Artifact) -> Result<(), String> {
+    let (names, attributes): (Vec<&String>, _) = match artifact {
+        Artifact::Array(array) => {
+            let axes = array.axes.iter().map(|axis| &axis.name);
+            (axes.chain(array.variables.iter().map(|variable| &variable.name)).collect(), &array.attributes)
+        }
+        Artifact::Table(table) => (table.columns.iter().map(|column| &column.name).collect(), &table.attributes),
+        Artifact::StateSpace(model) => (model.parameter_names.iter().collect(), &model.attributes),
+        Artifact::Document(_) | Artifact::Recording(_) => return Ok(()),
+    };
+    match names.into_iter().chain(attributes.keys()).find(|name| name.contains(char::is_control)) {
+        Some(name) => Err(format!("has the name {name:?}, wanted names without control characters")),
+        None => Ok(()),
+    }
 }
 
 fn read<T: DeserializeOwned>(sent: &Value) -> Result<T, String> {

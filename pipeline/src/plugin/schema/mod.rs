@@ -47,9 +47,14 @@ impl Schema {
         properties(&self.0).into_iter().flatten().filter_map(of).collect()
     }
 
+    /// The names of the parameters.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        properties(&self.0).into_iter().flatten().map(|(name, _)| name.as_str())
+    }
+
     /// Its parameters in a line.
     pub(super) fn manual(&self) -> String {
-        let names: Vec<&str> = properties(&self.0).into_iter().flatten().map(|(name, _)| name.as_str()).collect();
+        let names: Vec<&str> = self.names().collect();
         match names.as_slice() {
             [] => "the plugin has no parameters".to_owned(),
             names => format!("the plugin's parameters are {}", list(names.iter().copied())),
