@@ -1,7 +1,9 @@
 //! Data sets: what one run of a batch reads.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::runner::failed_place;
 use afmid_pipeline::toml;
 
 use crate::relative::literally;
@@ -65,7 +67,7 @@ pub fn check_name(name: &str) -> Result<(), String> {
     if name.starts_with('.') || !name.chars().all(plain) {
         return Err(format!("`{name}` cannot be the name of a data set: wanted no `/`, no `.` in front"));
     }
-    if RESERVED.contains(&name) {
+    if RESERVED.iter().any(|reserved| name.eq_ignore_ascii_case(reserved)) {
         return Err(format!("`{name}` is the name of a file of the batch itself, wanted another for the data set"));
     }
     Ok(())
@@ -85,17 +87,48 @@ pub fn absolute(pattern: &str) -> Result<String, String> {
     Ok(format!("{}/{pattern}", literally(&here.to_string_lossy())))
 }
 
-/// Sets in the order of their names. Errors: names that occur twice.
+/// Sets in the order of their names. Errors: two whose results would take one another's place, with both names.
 pub fn sorted(mut sets: Vec<DataSet>) -> Result<Vec<DataSet>, Vec<String>> {
     sets.sort_by(|a, b| a.name.cmp(&b.name));
-    let twice = sets.windows(2).filter(|pair| pair[0].name == pair[1].name);
-    let problems: Vec<String> = twice
-        .map(|pair| {
-            let [one, other] = [&pair[0], &pair[1]].map(|set| set.files.join(", "));
-            format!("two data sets have the name `{}`: {one} and {other}; wanted one", pair[0].name)
-        })
-        .collect();
+    let (mut problems, mut taken) = (Vec::new(), HashMap::with_capacity(sets.len()));
+    for set in &sets {
+        if let Some(other) = taken.insert(place(&result_name(&set.name)), set) {
+            problems.push(collision(other, set));
+        }
+    }
+    for set in &sets {
+        if let Some(other) = taken.get(&place(&failed_place(&result_name(&set.name)))) {
+            let (name, files, theirs) = (&set.name, set.files.join(", "), other.files.join(", "));
+            problems.push(format!(
+                "the data set `{}` ({theirs}) has the name under which a failed run of `{name}` ({files}) is kept; \
+                 wanted another: a manifest gives data sets names",
+                other.name
+            ));
+        }
+    }
     if problems.is_empty() { Ok(sets) } else { Err(problems) }
+}
+
+/// The file of a data set's result, in the folder of the batch.
+pub fn result_name(name: &str) -> PathBuf {
+    PathBuf::from(format!("{name}.h5"))
+}
+
+/// What two files of one folder may not have in common: file systems of some machines take `A` for `a`.
+fn place(file: &Path) -> String {
+    file.to_string_lossy().to_lowercase()
+}
+
+fn collision(one: &DataSet, other: &DataSet) -> String {
+    let [files, theirs] = [one, other].map(|set| set.files.join(", "));
+    match one.name == other.name {
+        true => format!("two data sets have the name `{}`: {files} and {theirs}; wanted one", one.name),
+        false => format!(
+            "the names of the data sets `{}` ({files}) and `{}` ({theirs}) differ in capitals alone: where file systems \
+             do not tell them apart one result would replace the other; wanted another name",
+            one.name, other.name
+        ),
+    }
 }
 
 #[cfg(test)]
@@ -111,7 +144,7 @@ mod tests {
         for good in ["a", "lever 1, 2005-03-01", "µ"] {
             assert_eq!(check_name(good), Ok(()));
         }
-        for bad in ["", ".", "..", ".a", "a/b", "a\\b", "a\nb", "summary", &"x".repeat(181)] {
+        for bad in ["", ".", "..", ".a", "a/b", "a\\b", "a\nb", "summary", "Ledger", &"x".repeat(181)] {
             assert!(check_name(bad).is_err(), "{bad:?}");
         }
     }
@@ -127,5 +160,18 @@ mod tests {
         assert_eq!(names(sorted(vec![set("b"), set("a")]).unwrap()), ["a", "b"]);
         let problems = sorted(vec![set("b"), set("a"), set("b")]).unwrap_err();
         assert!(problems.len() == 1 && problems[0].contains("`b`"), "{problems:?}");
+    }
+
+    #[test]
+    fn names_whose_files_are_one_are_refused_with_both() {
+        for (one, other) in [("a", "a.failed"), ("a.failed", "a.failed.failed"), ("Lever", "lever"), ("B", "b.Failed")]
+        {
+            let problems = sorted(vec![set(other), set("c"), set(one)]).unwrap_err();
+            let [problem] = &problems[..] else { panic!("{problems:?}") };
+            assert!([one, other].iter().all(|name| problem.contains(&format!("`{name}`"))), "{problem}");
+        }
+        for (one, other) in [("a", "b.failed"), ("a", "afailed"), ("a.b", "a.failed"), ("a", "a.failed.b")] {
+            assert_eq!(sorted(vec![set(one), set(other)]).unwrap().len(), 2, "{one} and {other}");
+        }
     }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use afmid_pipeline::files::{read_regular, replace_with, sweep};
 use serde::{Deserialize, Serialize};
 
+use super::dataset::result_name;
 use super::harvest::Harvest;
 
 /// What became of a data set.
@@ -70,7 +71,7 @@ impl Ledger {
 
     /// Where the result of a data set lies.
     pub fn result(&self, name: &str) -> PathBuf {
-        self.folder.join(format!("{name}.h5"))
+        self.folder.join(result_name(name))
     }
 
     fn place(&self, name: &str) -> PathBuf {

@@ -18,7 +18,7 @@ use crate::outcome::{Ports, RunInfo, RunResult, StageRecord, StageResult, Unfini
 use crate::recording::{HashedFile, InputFiles};
 use crate::rows::Scratch;
 use crate::stage::{Caching, Context, Progress};
-use crate::store::{PendingResult, RunHead, StageIdentity, Written, check_storable, write_result, written};
+use crate::store::{PendingResult, ResultFile, RunHead, StageIdentity, Written, check_storable, write_result, written};
 
 /// Who watches a run. Called from several threads.
 pub trait Observer: Send + Sync {
@@ -83,7 +83,8 @@ pub fn run(plan: &Plan, options: &Options<'_>) -> Result<RunResult, Vec<RunError
 
 /// As [`run`], and writes the result file, each stage as soon as those before it are written: whole or not at all, as
 /// [`crate::store::write_result`]. Where stages fail, the results of the others go to [`failed_place`], which says what
-/// is missing; `path` is not touched. A run that goes through removes that file.
+/// is missing; `path` is not touched. A run that goes through removes that file. The result of a run that went through,
+/// written there by its user, stays as it is.
 ///
 /// Errors: those of [`run`]; the file cannot be written.
 pub fn run_to_file(plan: &Plan, options: &Options<'_>, path: &Path) -> Result<RunResult, Failed> {
@@ -100,14 +101,14 @@ pub fn run_to_file(plan: &Plan, options: &Options<'_>, path: &Path) -> Result<Ru
     let Performed { result, errors, file } = perform(plan, options, Some(begin));
     let failed = failed_place(path);
     if !errors.is_empty() {
-        let write = || write_result(&failed, &result).map(|()| failed);
+        let write = || require_no_whole_run(&failed).and_then(|()| write_result(&failed, &result)).map(|()| failed);
         let kept = (!result.stages.is_empty()).then(write);
         return Err(Failed::Stages { errors, kept });
     }
     if let Some(file) = file {
         file.and_then(|file| file.finish(&result.info)).map_err(Failed::File)?;
     }
-    if matches!(written(&failed), Ok(Written::AsWritten)) {
+    if matches!(written(&failed), Ok(Written::AsWritten)) && require_no_whole_run(&failed).is_ok() {
         // one that stays says itself when it was made
         let _ = std::fs::remove_file(&failed);
     }
@@ -117,6 +118,18 @@ pub fn run_to_file(plan: &Plan, options: &Options<'_>, path: &Path) -> Result<Ru
 /// Where the results of a failed run go that was to be written to `path`: `a.failed.h5` for `a.h5`.
 pub fn failed_place(path: &Path) -> PathBuf {
     path.with_extension("failed.h5")
+}
+
+/// Errors: the result of a run that went through lies there, which no failed run left.
+fn require_no_whole_run(place: &Path) -> Result<(), StoreError> {
+    // what cannot be read is for the writer to complain about
+    let is_whole = ResultFile::open(place).is_ok_and(|file| file.run().info.unfinished.is_empty());
+    if !is_whole {
+        return Ok(());
+    }
+    let problem =
+        "exists and is the result of a run that went through: what is left of a failed one does not replace it";
+    Err(StoreError::new(problem).file(place).help("give the output another name with -o"))
 }
 
 /// A run that has ended.
