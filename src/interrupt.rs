@@ -3,14 +3,14 @@
 //!
 //! A run looks at [`caught`] before each of its stages and ends by itself, what has succeeded kept in the cache. What
 //! takes longer than [`GRACE`], or does not look, is ended from here: processes are killed, what the command has under
-//! way in the folders that it named ([`writes_in`]) is removed.
+//! way under temporary names is removed, in whatever folder, and in those that it named ([`writes_in`]).
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use afmid_pipeline::files::sweep_own;
+use afmid_pipeline::files::{sweep_all_own, sweep_own};
 use afmid_pipeline::plugin::kill_children;
 use afmid_pipeline::runner::Observer;
 use afmid_pipeline::stage::{NoProgress, Progress};
@@ -77,12 +77,11 @@ fn ignored() -> u64 {
 /// Tidies up and ends, whatever other threads do.
 fn end(signal: i32) -> ! {
     report(Failure::Interrupted(signal));
-    let mut folders = STATE.folders.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    folders.push(std::env::temp_dir());
+    let folders = STATE.folders.lock().unwrap_or_else(PoisonError::into_inner).clone();
     // threads that have not noticed may have begun something in between
     for _ in 0..PASSES {
         kill_children();
-        let found = folders.iter().map(|folder| sweep_own(folder)).fold(false, |found, one| found | one);
+        let found = folders.iter().map(|folder| sweep_own(folder)).fold(sweep_all_own(), |found, one| found | one);
         if !found {
             break;
         }

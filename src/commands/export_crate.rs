@@ -4,8 +4,9 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::InputFiles;
 use afmid_pipeline::error::StoreError;
-use afmid_pipeline::files::{FilledFolder, LIST, open_regular};
+use afmid_pipeline::files::{FilledFolder, LIST, is_temporary, open_regular, sweep_below};
 use serde_json::{Value, json};
 
 use super::diff::open;
@@ -23,6 +24,9 @@ use crate::show::pretty;
 pub fn run(args: &CrateArgs) -> Result<(), Failure> {
     let file = open(&args.result)?;
     let folder = args.output.clone().unwrap_or_else(|| default_output(&args.result));
+    if is_crate(&folder) {
+        sweep_below(&folder);
+    }
     require_crate(&folder)?;
     let finder = Finder::new(&file.run().info, &args.data);
     let find = |source: &_| match finder.find(source) {
@@ -46,11 +50,14 @@ pub fn run(args: &CrateArgs) -> Result<(), Failure> {
     let metadata = metadata(&file, &result, &inputs, &stated).map_err(unread)?;
     make_folder(&folder)?;
     let held = Held::open(&folder)?;
-    let mut copies: Vec<(&Path, &str)> = vec![(&args.result, &result)];
-    copies.extend(inputs.iter().filter_map(|input| Some((input.found.as_deref()?, input.copy.as_deref()?))));
-    copies.iter().try_for_each(|(_, name)| held.require_own(name))?;
+    let hash = InputFiles::new().hash(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    let mut copies = vec![Copied { from: &args.result, name: &result, blake3: &hash }];
+    copies.extend(inputs.iter().filter_map(|input| {
+        Some(Copied { from: input.found.as_deref()?, name: input.copy.as_deref()?, blake3: &input.source.blake3 })
+    }));
+    copies.iter().try_for_each(|copied| held.require_own(copied.name))?;
     [CONFIG, METADATA].iter().try_for_each(|name| held.require_own(name))?;
-    copies.iter().try_for_each(|(from, name)| held.copy(from, name))?;
+    copies.iter().try_for_each(|copied| held.copy(copied))?;
     held.write(CONFIG, &file.run().config)?;
     // last: a folder without it is no crate
     held.write(METADATA, &text(&metadata)?)?;
@@ -81,11 +88,18 @@ fn text(metadata: &Value) -> Result<String, Failure> {
     serde_json::to_string_pretty(metadata).map(|text| text + "\n").map_err(|error| Failure::failed(error, None))
 }
 
-/// Sees to it that a folder may become a crate. Errors, usage: it is a file; the folder above it is not there; it holds
-/// something and is no crate.
+/// Whether a folder is a crate, or one in the making.
+fn is_crate(folder: &Path) -> bool {
+    [METADATA, LIST].iter().any(|name| folder.join(name).is_file())
+}
+
+/// Sees to it that a folder may become a crate. What a killed export left under temporary names before its first file
+/// was whole is nobody's. Errors, usage: it is a file; the folder above it is not there; it holds something else and is
+/// no crate.
 fn require_crate(folder: &Path) -> Result<(), Failure> {
-    match fs::read_dir(folder).map(|mut entries| entries.next().is_some()) {
-        Ok(true) if ![METADATA, LIST].iter().any(|name| folder.join(name).is_file()) => Err(Failure::usage(
+    let others = |entries: fs::ReadDir| entries.flatten().any(|entry| !is_temporary(&entry.path()));
+    match fs::read_dir(folder).map(others) {
+        Ok(true) if !is_crate(folder) => Err(Failure::usage(
             format!("{} holds other things than a crate: only a crate is replaced", folder.display()),
             Some("give another place with -o".to_owned()),
         )),
@@ -93,6 +107,15 @@ fn require_crate(folder: &Path) -> Result<(), Failure> {
         Err(error) if error.kind() == ErrorKind::NotFound => require_folder(folder_of(folder)),
         Err(_) => require_folder(folder),
     }
+}
+
+/// A file that is copied into a crate.
+struct Copied<'a> {
+    from: &'a Path,
+    /// In the crate.
+    name: &'a str,
+    /// BLAKE3 hash of its bytes, in hexadecimal.
+    blake3: &'a str,
 }
 
 /// What lies in a crate's folder.
@@ -117,7 +140,8 @@ impl Held {
         self.folder.write(name, |_| self.earlier, text.as_bytes()).map_err(failed)
     }
 
-    fn copy(&self, from: &Path, name: &str) -> Result<(), Failure> {
+    /// Copies a file; one that an export which was ended has copied already stays. Errors: it cannot be copied.
+    fn copy(&self, Copied { from, name, blake3 }: &Copied) -> Result<(), Failure> {
         let to = self.folder.folder().join(name);
         if let Some(folder) = to.parent() {
             fs::create_dir_all(folder).map_err(|error| {
@@ -126,7 +150,7 @@ impl Held {
         }
         // a crate may be made of a result that lies in it
         let same = |path: &Path| fs::canonicalize(path).ok();
-        if same(from).is_some() && same(from) == same(&to) {
+        if same(from).is_some() && same(from) == same(&to) || self.folder.holds(name, blake3) {
             return Ok(());
         }
         let copied =

@@ -8,6 +8,7 @@ mod batch_names;
 mod begun_configs;
 mod cache_files;
 mod corpus;
+mod crates;
 mod earlier_results;
 mod entrances;
 mod failed_runs;

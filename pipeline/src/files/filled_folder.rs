@@ -1,11 +1,11 @@
 //! Folders that this program fills with files: what it wrote there is listed with its hash, so that nothing else is
 //! ever replaced.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
 use std::os::unix::fs::FileExt;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::replace::Replacement;
@@ -29,13 +29,39 @@ pub struct FilledFolder {
     folder: PathBuf,
     /// Hashes of what was written under a name.
     listed: Mutex<HashMap<String, Vec<String>>>,
+    /// Levels below the folder from which was removed what killed runs left.
+    swept: Mutex<HashSet<PathBuf>>,
 }
 
 impl FilledFolder {
-    /// A folder that exists; removes what killed runs left there. Errors: its list cannot be read.
+    /// A folder that exists; removes what killed runs left there and where the files lie that it lists. Errors: its
+    /// list cannot be read.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
         sweep(folder);
-        Ok(Self { folder: folder.to_owned(), listed: Mutex::new(read_list(folder)?) })
+        let filled = Self { folder: folder.to_owned(), listed: Mutex::new(read_list(folder)?), swept: Mutex::default() };
+        let names: Vec<String> = filled.listed().keys().cloned().collect();
+        names.iter().for_each(|name| filled.sweep_level(name));
+        Ok(filled)
+    }
+
+    /// Removes what killed runs left in the folder of a name, once; of levels below this folder alone.
+    fn sweep_level(&self, name: &str) {
+        let Some(level) = Path::new(name).parent().filter(|level| !level.as_os_str().is_empty()) else { return };
+        let is_below = level.components().all(|part| matches!(part, Component::Normal(_)));
+        let mut swept = self.swept.lock().unwrap_or_else(PoisonError::into_inner);
+        if is_below && swept.insert(level.to_owned()) {
+            sweep(&self.folder.join(level));
+        }
+    }
+
+    /// Whether the file with this name lies there as it was written here, with this BLAKE3 hash in hexadecimal: it need
+    /// not be written again.
+    pub fn holds(&self, name: &str, blake3: &str) -> bool {
+        let path = self.folder.join(name);
+        let listed = self.listed().get(name).is_some_and(|hashes| hashes.iter().any(|hash| hash == blake3));
+        listed
+            && fs::symlink_metadata(&path).is_ok_and(|found| found.is_file())
+            && hash(&path).is_ok_and(|h| h == blake3)
     }
 
     /// The folder.
@@ -98,6 +124,7 @@ impl FilledFolder {
         fill: impl FnOnce(&Path) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
         self.require_own(name, earlier)?;
+        self.sweep_level(name);
         let path = self.folder.join(name);
         let replacement = Replacement::new(&path)?;
         let temporary = replacement.temporary();
@@ -299,6 +326,28 @@ mod tests {
         fs::write(folder.file("a"), "edited").unwrap();
         assert!(put(b"edited").unwrap_err().problem.contains("changed since"));
         assert_eq!(fs::read_dir(&folder.0).unwrap().count(), 2, "the file and the list");
+    }
+
+    #[test]
+    fn what_lies_there_as_it_was_written_is_held_and_the_levels_of_its_files_are_swept() {
+        let folder = Folder::new("held");
+        fs::create_dir(folder.file("below")).unwrap();
+        let own = FilledFolder::open(&folder.0).unwrap();
+        own.write("below/a", nobody, b"1").unwrap();
+        let one = blake3::hash(b"1").to_hex();
+        assert!(own.holds("below/a", &one) && !own.holds("below/a", &blake3::hash(b"2").to_hex()));
+        fs::write(folder.file("b"), "1").unwrap();
+        assert!(!own.holds("b", &one), "nobody listed it");
+        let left = folder.file(&format!("below/.a.{}.4194999.0.tmp", crate::files::host()));
+        fs::write(&left, "x").unwrap();
+        FilledFolder::open(&folder.0).unwrap();
+        assert!(!left.exists());
+        fs::write(&left, "x").unwrap();
+        fs::remove_file(folder.file(LIST)).unwrap();
+        FilledFolder::open(&folder.0).unwrap().write("below/c", nobody, b"1").unwrap();
+        assert!(!left.exists());
+        fs::write(folder.file("below/a"), "2").unwrap();
+        assert!(!own.holds("below/a", &one), "somebody edited it");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::path::Path;
 use rustix::process::{Pid, test_kill_process};
 use tempfile::TempDir;
 
-use super::temporary::{TemporaryName, host};
+use super::temporary::{TemporaryName, host, own_folders};
 
 /// Begins the names of folders in the system's one for temporary files.
 const TITLE: &str = "afmid-";
@@ -30,6 +30,12 @@ pub fn sweep_own(folder: &Path) -> bool {
         |name| TemporaryName::parse(name).is_some_and(|name| name.is_own()),
         |name| folder_of(name) == Some(own),
     )
+}
+
+/// The same in all folders where this process has put files under temporary names so far, and in the system's one.
+pub fn sweep_all_own() -> bool {
+    let folders = own_folders().into_iter().chain([std::env::temp_dir()]);
+    folders.map(|folder| sweep_own(&folder)).fold(false, |found, one| found | one)
 }
 
 /// Removes the folders of [`temporary_folder`] whose owner is dead.

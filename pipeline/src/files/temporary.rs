@@ -1,9 +1,10 @@
 //! Names of temporary files: whose they are, and which of them nobody will finish.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{LazyLock, Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use rustix::process::{Pid, test_kill_process};
@@ -23,9 +24,22 @@ fn file_name(path: &Path) -> String {
     path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
+/// Folders where this process has or had files under temporary names. A process has one set of them: whatever ends it
+/// sweeps them all.
+static FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
 /// A path beside `path` that nobody else uses; [`sweep`] removes what a dead process left there.
 pub(crate) fn temporary_path(path: &Path) -> PathBuf {
-    folder_of(path).join(temporary_name(path))
+    let folder = folder_of(path);
+    // the working directory does not change, but absolute paths are the same folder once
+    let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    FOLDERS.lock().unwrap_or_else(PoisonError::into_inner).insert(whole);
+    folder.join(temporary_name(path))
+}
+
+/// The folders where this process has made temporary names so far.
+pub(super) fn own_folders() -> Vec<PathBuf> {
+    FOLDERS.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
 }
 
 /// `.NAME.HOST.PID-STARTED.COUNT.tmp`: no other attempt has it, on this machine, in another container on it, or on
@@ -132,6 +146,21 @@ pub fn sweep_beside(path: &Path) {
     sweep_where(folder_of(path), |target| target == own);
 }
 
+/// As [`sweep`], for a folder and all folders below it; links are not followed.
+pub fn sweep_below(folder: &Path) {
+    sweep(folder);
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            sweep_below(&entry.path());
+        }
+    }
+}
+
+/// Whether a file has exactly a temporary name of this program's: it is under way, or left behind.
+pub fn is_temporary(path: &Path) -> bool {
+    path.file_name().and_then(|name| name.to_str()).and_then(TemporaryName::parse).is_some()
+}
+
 fn sweep_where(folder: &Path, of: impl Fn(&str) -> bool) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -225,5 +254,26 @@ mod tests {
         assert!(go.iter().all(|name| !folder.file(name).exists()));
         assert!(stay.iter().all(|name| folder.file(name).exists()) && recent.exists());
         assert_eq!(again.exists(), begun == 0);
+    }
+
+    #[test]
+    fn folders_below_are_swept_and_what_links_lead_to_is_not() {
+        let (folder, other) = (Folder::new("below"), Folder::new("elsewhere"));
+        let name = format!(".a.h5.{}.{NOBODY}.0.tmp", host());
+        fs::create_dir_all(folder.file("a/b")).unwrap();
+        std::os::unix::fs::symlink(&other.0, folder.file("link")).unwrap();
+        let go = [folder.file(&name), folder.file("a").join(&name), folder.file("a/b").join(&name)];
+        go.iter().for_each(|path| fs::write(path, "x").unwrap());
+        fs::write(other.file(&name), "x").unwrap();
+        sweep_below(&folder.0);
+        assert!(go.iter().all(|path| !path.exists()) && other.file(&name).exists());
+        assert!(is_temporary(&go[0]) && !is_temporary(Path::new("a.h5")));
+    }
+
+    #[test]
+    fn every_folder_of_a_temporary_name_is_known() {
+        let folder = Folder::new("known-folders");
+        temporary_path(&folder.file("a/b.h5"));
+        assert!(own_folders().contains(&folder.file("a")));
     }
 }
