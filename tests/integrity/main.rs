@@ -7,6 +7,7 @@ mod common;
 mod batch_names;
 mod begun_configs;
 mod cache_files;
+mod cache_rows;
 mod corpus;
 mod crates;
 mod earlier_results;

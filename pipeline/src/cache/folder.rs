@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use super::names::{Kind, STAMPS, kind_of};
 use super::origin::Origin;
@@ -12,7 +12,7 @@ use crate::error::StoreError;
 use crate::files::{open_regular, sweep};
 use crate::outcome::StageResult;
 use crate::recording::InputFiles;
-use crate::store::{StageIdentity, read_stage};
+use crate::store::{StageIdentity, read_untouched_stage};
 
 /// A folder of stage results by key.
 #[derive(Debug)]
@@ -77,20 +77,23 @@ impl Cache {
     /// The result of this stage with this key, marked as used. A file that is damaged, or the result of something else,
     /// counts as absent: it is removed, and [`Cache::take_notes`] says so.
     ///
-    /// What comes back is in memory, or in the file, held open: removing it afterwards takes nothing from a run.
+    /// What comes back is in memory, or in the file, held open: removing it afterwards takes nothing from a run, and
+    /// changing it makes reading it an error.
     /// Recordings in it are read through `files`.
     pub fn get(&self, identity: &StageIdentity, files: &InputFiles) -> Option<StageResult> {
         let path = self.path(identity.key);
         if !path.is_file() {
             return None;
         }
-        let read = || read_stage(&path, identity, files);
+        let read = || read_untouched_stage(&path, identity, files);
         // twice: another process may remove the file and put it again between looking and reading
         match read().or_else(|_| read()) {
-            Ok(result) => {
+            Ok(Some(result)) => {
                 mark_used(&path);
                 Some(result)
             }
+            // others are at it: it is computed instead
+            Ok(None) => None,
             // another process removed it in between
             Err(_) if !path.exists() => None,
             Err(error) => {
@@ -173,8 +176,22 @@ impl Cache {
     }
 }
 
-/// A result's time of modification is that of its last use: times of access are switched off on many machines. Where a
-/// file may only be read the time stays: the cache works all the same, it only forgets in another order.
+/// A result that was marked as used is not marked again before. Why: a process that reads it meanwhile has to begin
+/// again, and what is freed is chosen by hours and days.
+const MARK_AGAIN: Duration = Duration::from_secs(60);
+
+/// A result's time of modification is that of its last use, to a minute: times of access are switched off on many
+/// machines. Where a file may only be read the time stays: the cache works all the same, it only forgets in another
+/// order.
 fn mark_used(path: &Path) {
-    let _ = open_regular(path).and_then(|file| file.set_modified(SystemTime::now()));
+    let mark = || -> std::io::Result<()> {
+        let (file, now) = (open_regular(path)?, SystemTime::now());
+        let marked = file.metadata()?.modified()?;
+        // a time to come is a clock's that was wrong
+        match now.duration_since(marked) {
+            Ok(age) if age < MARK_AGAIN => Ok(()),
+            _ => file.set_modified(now),
+        }
+    };
+    let _ = mark();
 }

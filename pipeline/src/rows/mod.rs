@@ -6,6 +6,7 @@
 //! in memory at once; a slice (`Array::real`) reads all of them.
 
 mod blocks;
+mod pinned;
 mod scratch;
 mod source;
 mod stored;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use super::RowSource;
+use super::pinned::Pinned;
 use super::source::no_such_row;
 use crate::error::StageError;
 
@@ -13,7 +14,8 @@ use crate::error::StageError;
 /// cheap.
 ///
 /// The file is held open: removing or replacing it takes nothing away. If it is cut short all the same, reading says
-/// so.
+/// so. Of a file that others can open, every read sees that the bytes are those that it held when it was opened
+/// ([`StoredRows::pinned`]), whatever its size and times say.
 #[derive(Debug, Clone)]
 pub struct StoredRows(Arc<Inner>);
 
@@ -25,6 +27,8 @@ struct Inner {
     offset: u64,
     rows: usize,
     row_length: usize,
+    /// What blocks of rows hashed to when the file was opened; none of a file without a name, which is nobody else's.
+    pinned: Option<Pinned>,
     /// All values, once somebody has asked for them.
     whole: OnceLock<Vec<f64>>,
 }
@@ -32,7 +36,22 @@ struct Inner {
 impl StoredRows {
     /// Rows that begin at byte `offset` of an open file; `path` is its name in messages.
     pub(crate) fn new(file: File, path: &Path, offset: u64, rows: usize, row_length: usize) -> Self {
-        Self(Arc::new(Inner { file, path: path.to_owned(), offset, rows, row_length, whole: OnceLock::new() }))
+        let (path, whole) = (path.to_owned(), OnceLock::new());
+        Self(Arc::new(Inner { file, path, offset, rows, row_length, pinned: None, whole }))
+    }
+
+    /// The same of a file that others can change: reads it once. The caller sees that nobody changed it meanwhile.
+    /// Errors: it cannot be read.
+    pub(crate) fn pinned(
+        file: File,
+        path: &Path,
+        offset: u64,
+        rows: usize,
+        row_length: usize,
+    ) -> std::io::Result<Self> {
+        let pinned = Pinned::of(&file, offset, rows, row_length)?;
+        let (path, whole) = (path.to_owned(), OnceLock::new());
+        Ok(Self(Arc::new(Inner { file, path, offset, rows, row_length, pinned: Some(pinned), whole })))
     }
 
     /// All values, row-major. The first call reads them, and they stay in memory: what goes by rows uses
@@ -75,17 +94,19 @@ impl RowSource for StoredRows {
     }
 
     fn read(&self, row: usize, into: &mut [f64]) -> Result<(), StageError> {
-        let Inner { file, path, offset, rows, row_length, .. } = &*self.0;
+        let Inner { path, rows, row_length, .. } = &*self.0;
         if row >= *rows || into.len() != *row_length {
             return Err(no_such_row(row, *rows, *row_length, into.len()));
         }
-        let mut bytes = vec![0; size_of_val(into)];
-        let start = offset + (row * bytes.len()) as u64;
-        file.read_exact_at(&mut bytes, start).map_err(|error| {
+        let bytes = self.0.row(row).map_err(|error| {
             let what = match error.kind() {
                 std::io::ErrorKind::UnexpectedEof => {
                     format!("the file was cut short: row {row} of {rows} is not there")
                 }
+                std::io::ErrorKind::InvalidData => format!(
+                    "the file was changed while it was read: row {row} of {rows} has other bytes than when it was \
+                     opened; nothing made from it is kept"
+                ),
                 _ => format!("row {row} of {rows} cannot be read: {error}"),
             };
             StageError::new(what).at(path).help("run it again; something changes files that a run still needs")
@@ -94,6 +115,25 @@ impl RowSource for StoredRows {
             *value = f64::from_le_bytes(*bytes);
         }
         Ok(())
+    }
+}
+
+impl Inner {
+    /// The bytes of a row. Errors: the system's; `InvalidData`: they are not those that were pinned.
+    fn row(&self, row: usize) -> std::io::Result<Vec<u8>> {
+        let length = self.row_length * size_of::<f64>();
+        let Some(pinned) = &self.pinned else {
+            let mut bytes = vec![0; length];
+            self.file.read_exact_at(&mut bytes, self.offset + (row * length) as u64)?;
+            return Ok(bytes);
+        };
+        let (first, mut bytes) = pinned.block_with(row, self.rows, length);
+        self.file.read_exact_at(&mut bytes, self.offset + (first * length) as u64)?;
+        if !pinned.holds(row, &bytes) {
+            return Err(std::io::ErrorKind::InvalidData.into());
+        }
+        bytes.truncate((row + 1 - first) * length);
+        Ok(bytes.split_off((row - first) * length))
     }
 }
 

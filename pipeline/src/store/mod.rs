@@ -55,7 +55,7 @@ pub(crate) use result_file::RunHead;
 pub use result_reader::{ResultFile, StageSummary, read_result};
 pub(crate) use rows::write_rows;
 pub(crate) use seal::seal;
-pub(crate) use stage_file::write_unsealed_stage;
 pub use stage_file::{StageIdentity, read_stage, write_stage};
+pub(crate) use stage_file::{read_untouched_stage, write_unsealed_stage};
 pub(crate) use storable::check_storable;
 pub use written::{Written, written};

@@ -3,7 +3,6 @@
 //! A contiguous dataset of little-endian doubles is what rows in a file are: they are read where it lies.
 
 use std::fs::File;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use hdf5::datatype::ByteOrder;
@@ -12,7 +11,7 @@ use hdf5::{Dataset, Group};
 use ndarray::{ArrayView2, s};
 
 use crate::error::{Result, StoreError};
-use crate::files::open_regular;
+use crate::files::{FileState, open_regular};
 use crate::hdf5_files::read::Node;
 use crate::hdf5_files::{read, write};
 use crate::rows::{RowSource, Scratch, StoredRows, in_blocks};
@@ -36,22 +35,24 @@ pub(crate) fn write_rows(parent: &Group, name: &str, shape: &[usize], rows: &Sto
     Ok(dataset)
 }
 
-/// A stage file, held open beside HDF5's own handle.
+/// A stage file, held open beside HDF5's own handle, in the state in which it was opened.
 pub(super) struct Backing {
     file: File,
     path: PathBuf,
+    state: FileState,
 }
 
 impl Backing {
     pub(super) fn open(path: &Path) -> Result<Self> {
-        let file = open_regular(path).map_err(|error| StoreError::io("cannot be opened", path, &error))?;
-        Ok(Self { file, path: path.to_owned() })
+        let open = || open_regular(path).and_then(|file| Ok((FileState::of(&file)?, file)));
+        let (state, file) = open().map_err(|error| StoreError::io("cannot be opened", path, &error))?;
+        Ok(Self { file, path: path.to_owned(), state })
     }
 
-    /// Whether the path still names this file: HDF5 opens by name, and another process may have replaced it in between.
-    fn is_current(&self) -> bool {
-        let id = |metadata: &std::fs::Metadata| (metadata.dev(), metadata.ino());
-        matches!((self.file.metadata(), std::fs::metadata(&self.path)), (Ok(own), Ok(now)) if id(&own) == id(&now))
+    /// Whether the path names this file and nobody has touched it since it was opened: HDF5 opens by name, and what was
+    /// read by name since was read from these bytes.
+    pub(super) fn is_untouched(&self) -> bool {
+        FileState::at(&self.path).is_ok_and(|now| now == self.state)
     }
 }
 
@@ -63,7 +64,7 @@ pub(super) fn read_rows(parent: &Node, name: &str, backing: &Backing) -> Result<
     let bytes = rows.saturating_mul(row_length).saturating_mul(size_of::<f64>());
     let plain = read::descriptor(&dataset)? == TypeDescriptor::Float(FloatSize::U8)
         && dataset.dtype()?.byte_order() == ByteOrder::LittleEndian;
-    if bytes <= Scratch::default().limit_bytes() || !plain || !backing.is_current() {
+    if bytes <= Scratch::default().limit_bytes() || !plain {
         return Ok(None);
     }
     read::check_samples(&dataset, size_of::<f64>(), dataset.allowance())
@@ -72,5 +73,6 @@ pub(super) fn read_rows(parent: &Node, name: &str, backing: &Backing) -> Result<
     let Some(offset) = dataset.offset() else { return Ok(None) };
     let file =
         backing.file.try_clone().map_err(|error| StoreError::io("cannot be held open", &backing.path, &error))?;
-    Ok(Some(StoredRows::new(file, &backing.path, offset, rows, row_length)))
+    let rows = StoredRows::pinned(file, &backing.path, offset, rows, row_length);
+    rows.map(Some).map_err(|error| StoreError::io("cannot be read", &backing.path, &error))
 }

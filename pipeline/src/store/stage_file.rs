@@ -64,25 +64,57 @@ fn write_contents(file: &File, identity: &StageIdentity, result: &StageResult) -
     write_ports(&write::group(file, GROUP)?, &result.outputs)
 }
 
-/// Reads a stage's result. Large arrays over two axes stay in the file, which is held open for them.
+/// Reads a stage's result. Large arrays over two axes stay in the file, which is held open for them: later reads see
+/// that their bytes are still those that were sealed.
 ///
-/// Errors: there is no file, it is damaged, of another version, or the result of something else than `identity`.
+/// Errors: there is no file, it is damaged, of another version, or the result of something else than `identity`;
+/// another process touches it all the time.
 pub fn read_stage(
     path: &Path,
     identity: &StageIdentity,
     files: &InputFiles,
 ) -> std::result::Result<StageResult, StoreError> {
-    let vetted = check_seal(path)?;
-    read_hdf5(path, &vetted, identity, files).map_err(|error| error.file(path))
+    let touched = || StoreError::new("another process changes the file again and again").file(path);
+    read_untouched_stage(path, identity, files)?.ok_or_else(touched)
 }
 
-fn read_hdf5(path: &Path, vetted: &Vetted, identity: &StageIdentity, files: &InputFiles) -> Result<StageResult> {
-    let backing = Backing::open(path)?;
+/// How often a file is read that another process touches meanwhile: it says that it uses it, too, or puts an equal one
+/// in its place. Why: both are rare (`cache::Cache::get`), and what is not had from the file is computed.
+const MOST_READS: usize = 5;
+
+/// The same; none if another process touched the file each time that it was read: what was read may be of two states.
+pub(crate) fn read_untouched_stage(
+    path: &Path,
+    identity: &StageIdentity,
+    files: &InputFiles,
+) -> std::result::Result<Option<StageResult>, StoreError> {
+    for _ in 0..MOST_READS {
+        let backing = Backing::open(path)?;
+        let read = || -> std::result::Result<StageResult, StoreError> {
+            let vetted = check_seal(path)?;
+            read_hdf5(path, &vetted, &backing, identity, files).map_err(|error| error.file(path))
+        };
+        let result = read();
+        // an error, too, may be that of a file that is written at this moment
+        if backing.is_untouched() {
+            return result.map(Some);
+        }
+    }
+    Ok(None)
+}
+
+fn read_hdf5(
+    path: &Path,
+    vetted: &Vetted,
+    backing: &Backing,
+    identity: &StageIdentity,
+    files: &InputFiles,
+) -> Result<StageResult> {
     let root = read::open_file(path, vetted)?.root();
     check_format(&root, KIND)?;
     check_identity(&root, identity)?;
     let warnings = read::texts(&root, WARNINGS)?;
-    Ok(StageResult { outputs: read_ports(&read::group(&root, GROUP)?, files, Some(&backing))?, warnings })
+    Ok(StageResult { outputs: read_ports(&read::group(&root, GROUP)?, files, Some(backing))?, warnings })
 }
 
 /// Errors: the file is the result of another stage, another version or other inputs; its ports are not the declared
