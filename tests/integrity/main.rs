@@ -8,6 +8,7 @@ mod batch_names;
 mod begun_configs;
 mod cache_files;
 mod cache_rows;
+mod copies;
 mod corpus;
 mod crates;
 mod earlier_results;

@@ -3,6 +3,7 @@
 mod chunk;
 mod chunk_cache;
 mod contents;
+mod equal;
 mod errors;
 mod foreign_hdf5;
 mod how;
@@ -43,6 +44,7 @@ pub use afmid_formats::{
     responses, says_frequencies, unit_ratio,
 };
 pub use contents::{UnpackedContents, is_hdf5_file, open_contents, open_unpacked};
+pub use equal::{SamplePrint, equal_samples};
 pub use how::{How, Reading};
 pub use open::{Opened, agreed_rate, open_records, recognised};
 pub use responses::{FileResponse, read_responses};

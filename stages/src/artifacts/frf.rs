@@ -179,6 +179,26 @@ pub(crate) struct NewFrf {
 }
 
 impl NewFrf {
+    /// Leaves out rows, each with the earlier one that it is a copy of, ascending: of a driving point that is left out
+    /// the other one takes the place.
+    pub fn leave_out(&mut self, copies: &[(usize, usize)]) {
+        let is_copy = |row: usize| copies.iter().any(|(copy, _)| *copy == row);
+        if copies.is_empty() {
+            return;
+        }
+        let width = self.frequency_hz.len().max(1);
+        keep_rows(&mut self.frf, width, is_copy);
+        [&mut self.variance, &mut self.coherence, &mut self.input_noise]
+            .into_iter()
+            .flatten()
+            .for_each(|values| keep_rows(values, width, is_copy));
+        keep_rows(&mut self.responses, 1, is_copy);
+        if let Some(row) = &mut self.driving_point {
+            *row = copies.iter().find(|(copy, _)| copy == row).map_or(*row, |(_, of)| *of);
+            *row -= copies.iter().filter(|(copy, _)| copy < row).count();
+        }
+    }
+
     /// The artifact.
     pub fn array(self) -> Result<Array, StageError> {
         let names = serde_json::to_string(&self.responses).map_err(StageError::from_error)?;
@@ -214,6 +234,15 @@ impl NewFrf {
     }
 }
 
+fn keep_rows<T>(values: &mut Vec<T>, width: usize, is_copy: impl Fn(usize) -> bool) {
+    let mut place = 0;
+    values.retain(|_| {
+        let row = place / width;
+        place += 1;
+        !is_copy(row)
+    });
+}
+
 fn squared(unit: &str) -> String {
     match unit {
         "" | "1" => unit.to_owned(),
@@ -240,6 +269,23 @@ mod tests {
             driving_point: Some(0),
             ..NewFrf::default()
         }
+    }
+
+    #[test]
+    fn rows_that_are_left_out_take_all_their_parts_with_them() {
+        let rows = |rows: &[f64]| rows.iter().flat_map(|row| [*row; 3]).collect::<Vec<f64>>();
+        let response = |output: &str| ResponseOf { output: point(output, None), input: point("1", None), run: 0 };
+        let mut frf = NewFrf {
+            responses: ["1", "2", "3", "4"].map(response).to_vec(),
+            frf: rows(&[1.0, 2.0, 3.0, 4.0]).into_iter().map(Complex64::from).collect(),
+            variance: Some(rows(&[1.0, 2.0, 3.0, 4.0])),
+            driving_point: Some(3),
+            ..two_responses()
+        };
+        frf.leave_out(&[(1, 0), (3, 2)]);
+        let left: Vec<Complex64> = rows(&[1.0, 3.0]).into_iter().map(Complex64::from).collect();
+        assert_eq!((frf.frf, frf.variance), (left, Some(rows(&[1.0, 3.0]))));
+        assert_eq!((frf.responses[1].output.name.as_str(), frf.driving_point), ("3", Some(1)));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use afmid_pipeline::recording::lane_names;
+use afmid_pipeline::recording::{SamplePrint, equal_samples, lane_names};
 use afmid_pipeline::{
     Array, Channel, Context, Document, Example, Port, Ports, Record, Recording, Spec, Stage, StageError, Table,
 };
@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::artifacts::{PIEZO, Sensor, decay_array};
+use crate::io::{CopyOf, warn_of_copies};
 use afmid_kernels::events::decay::{DecayEnd, DecaySearch, DecaySearchOptions, DismissedReason, FreeDecay};
 use afmid_kernels::harmonics::find_decays_beside_lines;
 
@@ -24,7 +25,9 @@ use afmid_kernels::harmonics::find_decays_beside_lines;
 /// quiet line before; the end is where the ringing is smaller than the noise, or the next start; the first free sample is
 /// the one from which later samples foretell the earlier ones backwards. Clipped samples are missing. Where a steady line
 /// hides all decays (hum), they are sought in what is left without it and its harmonics; the line stays in the decays, as
-/// one of the lines that `model.decay` fits beside the modes.
+/// one of the lines that `model.decay` fits beside the modes. A hit with the samples of an earlier one, and a sensor
+/// with those of another in every record, count once (more than 100 samples, not all of one value); a warning names
+/// them.
 /// Shapes: `decays` has a row per hit and channel, whose samples follow each other, and likewise the last 16,384 that
 /// were quiet before each hit; `events` a row per decay, steady oscillation and start that is neither.
 /// Units: the channels' own; Hz; s.
@@ -73,7 +76,7 @@ impl Stage for Decay {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.decay",
-        version: 6,
+        version: 7,
         summary: "finds free decays in records: where they begin, where they drown in the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -84,7 +87,7 @@ impl Stage for Decay {
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let records = &inputs.get(&RECORDS)?.records;
         let rate = super::correlation::common_rate(records)?;
-        let groups = self.groups(records)?;
+        let groups = self.each_once(self.groups(records)?, cx);
         let sensors = sensors(&groups)?;
         cx.expect(groups.len());
         let searched = groups
@@ -153,6 +156,38 @@ impl Decay {
     }
 }
 
+impl Decay {
+    /// The groups with what was recorded once in them once: of hits those that have the samples of an earlier one are
+    /// left out, of sensors those that have them in every group. Says which.
+    fn each_once<'a>(&self, mut groups: Vec<Group<'a>>, cx: &Context) -> Vec<Group<'a>> {
+        if self.records_are == RecordsAre::Hits {
+            let mut prints: Vec<SamplePrint> = groups.iter().filter_map(|group| group.print(0)).collect();
+            let equal = if prints.len() == groups.len() { equal_samples(&mut prints) } else { Vec::new() };
+            let copy =
+                |(copy, of): (usize, &Option<usize>)| Some((groups.get(copy)?.name(0), groups.get((*of)?)?.name(0)));
+            let copies: Vec<CopyOf> = equal.iter().enumerate().filter_map(copy).collect();
+            warn_of_copies(cx, &copies, "all their samples are equal");
+            let mut stay = equal.iter().map(Option::is_none);
+            groups.retain(|_| stay.next().unwrap_or(true));
+            return groups;
+        }
+        let Some(first) = groups.first().filter(|first| first.channels.len() > 1) else { return groups };
+        let mut common: Vec<Option<usize>> = first.equal_channels();
+        for group in &groups[1..] {
+            if common.iter().all(Option::is_none) {
+                return groups;
+            }
+            let own = group.equal_channels();
+            common.iter_mut().zip(&own).filter(|(of, own)| of != own).for_each(|(of, _)| *of = None);
+        }
+        let copy = |(copy, of): (usize, &Option<usize>)| of.map(|of| (first.name(copy), first.name(of)));
+        let copies: Vec<CopyOf> = common.iter().enumerate().filter_map(copy).collect();
+        warn_of_copies(cx, &copies, "all their samples are equal in every record");
+        groups.iter_mut().for_each(|group| group.keep(&common));
+        groups
+    }
+}
+
 /// The sensors of all groups. Errors: groups of different numbers of channels, or of different units.
 fn sensors(groups: &[Group]) -> Result<Vec<Sensor>, StageError> {
     let Some(first) = groups.first() else { return Err(StageError::new("there is no record")) };
@@ -185,6 +220,32 @@ fn sensors(groups: &[Group]) -> Result<Vec<Sensor>, StageError> {
 }
 
 impl Group<'_> {
+    /// What the samples of a channel hash to, as far as they are read.
+    fn print(&self, number: usize) -> Option<SamplePrint> {
+        self.channels.get(number).map(|channel| SamplePrint::new(channel))
+    }
+
+    /// For each channel the first one before it with the same samples.
+    fn equal_channels(&self) -> Vec<Option<usize>> {
+        equal_samples(&mut (0..self.channels.len()).filter_map(|number| self.print(number)).collect::<Vec<_>>())
+    }
+
+    /// A channel's name in messages.
+    fn name(&self, number: usize) -> String {
+        match (self.records.get(number), self.channels.get(number)) {
+            (Some(record), Some(channel)) => format!("{} {}", record.name, channel.location),
+            _ => String::new(),
+        }
+    }
+
+    /// Leaves out channels that are copies.
+    fn keep(&mut self, copies: &[Option<usize>]) {
+        let stays = |number: usize| copies.get(number).copied().flatten().is_none();
+        let (mut record, mut channel) = (0.., 0..);
+        self.records.retain(|_| record.next().is_none_or(stays));
+        self.channels.retain(|_| channel.next().is_none_or(stays));
+    }
+
     fn search(&self, rate: f64, options: &DecaySearchOptions) -> Result<Searched, StageError> {
         let samples = self.channels.first().map_or(0, |channel| channel.samples);
         if samples > LONGEST {

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::consistency::{Consistency, check_consistency};
 use super::file_patterns::{Match, matching_files};
+use super::repeats::{Printed, each_once};
 use super::shared_data::moved;
 use crate::artifacts::{DEFLECTION, PIEZO, SENSOR};
 
@@ -23,10 +24,13 @@ use crate::artifacts::{DEFLECTION, PIEZO, SENSOR};
 /// `started_at` and one dataset per channel; other formats are recognised by their first bytes and their name (`afmid
 /// inspect FILE`, docs/archives.md).
 /// # Method
-/// Files in natural order; nothing but headers is read here (tables of text are parsed), samples are streamed by the
-/// stages that need them. Sample rate and unit must agree over all files; other lengths are reported. What a file does
-/// not state is given as a parameter; what it states is not overruled. Results of afmid's own that a pattern matches
+/// Files in natural order; headers and first samples are read here (tables of text are parsed), samples are streamed by
+/// the stages that need them. Sample rate and unit must agree over all files; other lengths are reported. What a file
+/// does not state is given as a parameter; what it states is not overruled. Results of afmid's own that a pattern matches
 /// are left out and counted in a warning, as are remarks of readers but for mere facts (`afmid inspect` shows those).
+/// What was recorded once counts once: of files with the same bytes, and of records all of whose channels but the
+/// piezo's have equal samples (more than 100, not all of one value; as stored or in their units, whatever format and
+/// attributes), the first stays, and a warning names the others. Records that differ cost a thousand samples each.
 /// # Shapes
 /// One record per file, with the roles `deflection` and, where the file has it, `piezo`; where a recording was
 /// interrupted (restarts, lost buffers), one per uninterrupted stretch, `file.tdms[1]`, `file.tdms[2]`.
@@ -96,7 +100,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many record
 impl Stage for Records {
     const SPEC: Spec = Spec {
         name: "io.records",
-        version: 4,
+        version: 5,
         summary: "opens records of any format by pattern and checks that they belong together",
         inputs: &[],
         outputs: &[RECORDS.spec(), SUMMARY.spec()],
@@ -141,15 +145,19 @@ impl Stage for Records {
             cx.warn(format!("{count} of those that match {are} of afmid's, no record: left out ({})", first.display()));
         }
         cx.expect(paths.len());
-        let opened: Vec<Result<Opened, StageError>> = paths
+        let several = paths.len() > 1;
+        let opened: Vec<Result<Printed, StageError>> = paths
             .par_iter()
             .map(|path| {
-                let record = self.open(path, cx);
+                let opened = self.open(path, cx);
                 cx.tick();
-                record
+                opened.map(|opened| {
+                    let begin = several && opened.format != NATIVE;
+                    Printed::new(opened, begin)
+                })
             })
             .collect();
-        let opened = self.readable(opened, cx)?;
+        let opened = each_once(self.readable(opened, cx)?, cx);
         said_once(&opened).into_iter().for_each(|remark| cx.warn(remark));
         let records: Vec<Record> = opened.into_iter().flat_map(|opened| opened.records).collect();
         let consistency = check_consistency(&records)?;
@@ -208,7 +216,7 @@ impl Records {
     }
 
     /// The files that could be opened. Errors: some could not, and these are not to be skipped; or none could.
-    fn readable(&self, opened: Vec<Result<Opened, StageError>>, cx: &Context) -> Result<Vec<Opened>, StageError> {
+    fn readable(&self, opened: Vec<Result<Printed, StageError>>, cx: &Context) -> Result<Vec<Printed>, StageError> {
         let total = opened.len();
         let (mut records, mut failures) = (Vec::new(), Vec::new());
         for result in opened {
@@ -232,6 +240,9 @@ impl Records {
         Err(first)
     }
 }
+
+/// The format of afmid's own records: opening one again costs nothing.
+const NATIVE: &str = "native";
 
 /// Kinds of remarks that are said; more are counted.
 const MOST_REMARKS: usize = 20;

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::joined::Joining;
-use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf, Understood};
-use crate::io::{FRF, Roving};
+use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf, Understood, rows_of};
+use crate::io::{FRF, Roving, same_values, varies};
 use afmid_kernels::spectra::{
     Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, common_hit_samples, frequency_response,
     hit_spacing, hits, segments, with_hits,
@@ -23,7 +23,8 @@ use afmid_kernels::spectra::{
 /// Auto and cross spectra over blocks: half-overlapping Hann segments of the record, or hits of a hammer. `h1` is
 /// `Syu / Suu`, `h2` is `Syy / Suy`, `hv` their geometric mean; several inputs: `h1 = Syu Suu^-1`. Offsets are removed.
 /// The band in which the input has power is found and kept. Of several records (`files` of `io.columns`) the blocks of each
-/// are averaged, none over the end of one; a record without a hit is left out.
+/// are averaged, none over the end of one; a record without a hit is left out. Two responses with equal values are one
+/// recording, which a warning says.
 /// # Shapes
 /// A row for each input of the pair, output after output, over the bins of the band, under the names of the channels; zero
 /// hertz is left out. Rows of `before` come first, over the bins that both have: responses of a structure that was
@@ -156,6 +157,20 @@ fn apart<'a>(record: &Block<'a>, starts: &[usize]) -> Vec<Block<'a>> {
     starts.iter().copied().zip(ends).map(block).collect()
 }
 
+/// Says of the first row with the values of an earlier one (more than a hundred, not all equal) that both are one
+/// recording, named as two channels or two points.
+fn remark_on_copies(frf: &NewFrf) -> Option<String> {
+    let rows = rows_of(&frf.frf, frf.responses.len());
+    let same = |copy: usize| (0..copy).find(|of| varies(rows[copy]) && same_values(rows[copy], rows[*of]));
+    let (copy, of) = (0..rows.len()).find_map(|copy| Some((copy, same(copy)?)))?;
+    Some(format!(
+        "responses {} and {} have equal values: they are one recording, and count as two, so that errors of what is fitted \
+         to both are too small; measure the second one, or leave it out",
+        of + 1,
+        copy + 1
+    ))
+}
+
 /// Share of the largest force from which a hit is one.
 const HIT: f64 = 0.1;
 /// Segments in a record, if they did not overlap: see `block_samples`.
@@ -215,6 +230,7 @@ impl Stage for MeasuredFrf {
             frf = before.join(frf)?;
             before.remark(&frf).into_iter().for_each(|remark| cx.warn(remark));
         }
+        remark_on_copies(&frf).into_iter().for_each(|remark| cx.warn(remark));
         Ok(Ports::new().with(&FRF, frf.array()?).with(&SUMMARY, summary))
     }
 

@@ -7,6 +7,7 @@ use afmid_pipeline::recording::{
 
 use super::selection::Column;
 use super::stage::Columns;
+use crate::io::repeats::{same_values, varies};
 
 /// Inputs and outputs of one file in their units, NaN where missing.
 pub(super) struct Part {
@@ -81,6 +82,16 @@ impl Part {
             outputs,
             samples,
         })
+    }
+
+    /// Whether both are one recording: all samples of all channels are equal.
+    pub fn is_copy_of(&self, other: &Self) -> bool {
+        let same = |own: &[Vec<f64>], theirs: &[Vec<f64>]| {
+            own.len() == theirs.len() && own.iter().zip(theirs).all(|(own, theirs)| same_values(own, theirs))
+        };
+        self.outputs.iter().any(|output| varies(output))
+            && same(&self.outputs, &other.outputs)
+            && same(&self.inputs, &other.inputs)
     }
 
     /// Itself, if its rate and units are those of the first file. Errors: they differ.

@@ -12,6 +12,7 @@ use super::selection::Column;
 use super::series::Series;
 use super::stretch::Removal;
 use crate::io::file_patterns::matching_files;
+use crate::io::repeats::{CopyOf, each_file_once, name_beside, warn_of_copies};
 use crate::io::shared_data::moved;
 
 /// Reads measured input and output from the channels of a file, and splits them into a stretch to fit and one to judge
@@ -24,7 +25,9 @@ use crate::io::shared_data::moved;
 /// Two stretches of time, identification and verification. Mean or line are taken off with the constants of the
 /// identification stretch alone, also from the other, which so stays unseen. Missing samples (empty, NaN, the given
 /// codes) stay missing: nothing is interpolated. Of several files each is a record: from each its own mean or line is
-/// taken off; the first is the identification stretch, the last the verification.
+/// taken off; the first is the identification stretch, the last the verification. Of files with the same bytes, or with
+/// equal samples of all channels (more than 100, an output that varies), the first counts, and a warning names the
+/// others.
 /// # Shapes
 /// `response`, `force` over `time`, the whole record; the same with `_identification` and `_verification` over axes of
 /// their own, which may differ in length. With several inputs `force` is over (`input`, time), with several outputs
@@ -122,7 +125,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Columns {
     const SPEC: Spec = Spec {
         name: "io.columns",
-        version: 6,
+        version: 7,
         summary: "reads measured input and output from the channels of a file of any format",
         inputs: &[],
         outputs: &[PAIR.spec(), SUMMARY.spec()],
@@ -176,14 +179,7 @@ impl Stage for Columns {
     }
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
-        let mut parts = Vec::new();
-        for path in self.paths(cx.base(), cx.files())? {
-            let file = WholeFile::open(cx.files(), &path, &Reading::of(&self.format, self.raw.clone()))?;
-            let part = Part::read(self, &file).and_then(|part| part.like(parts.first()));
-            let part = part.map_err(|error| error.at(&path))?;
-            part.contradicted_rate.iter().for_each(|problem| cx.warn(problem.clone()));
-            parts.push(part);
-        }
+        let parts = self.parts(cx)?;
         let series = Series::of(self, parts)?;
         let (pair, summary) = series.split(self)?;
         series.warnings().into_iter().for_each(|warning| cx.warn(warning));
@@ -196,6 +192,26 @@ impl Stage for Columns {
 }
 
 impl Columns {
+    /// What the files hold, each recording once: says which copies are left out. Errors: see the stage.
+    fn parts(&self, cx: &Context) -> Result<Vec<Part>, StageError> {
+        let paths = each_file_once(self.paths(cx.base(), cx.files())?, cx)?;
+        let mut parts: Vec<(PathBuf, Part)> = Vec::with_capacity(paths.len());
+        let mut copies: Vec<CopyOf> = Vec::new();
+        for path in paths {
+            let file = WholeFile::open(cx.files(), &path, &Reading::of(&self.format, self.raw.clone()))?;
+            let part = Part::read(self, &file).and_then(|part| part.like(parts.first().map(|(_, first)| first)));
+            let part = part.map_err(|error| error.at(&path))?;
+            if let Some((of, _)) = parts.iter().find(|(_, earlier)| part.is_copy_of(earlier)) {
+                copies.push((name_beside(&path, of), name_beside(of, &path)));
+                continue;
+            }
+            part.contradicted_rate.iter().for_each(|problem| cx.warn(problem.clone()));
+            parts.push((path, part));
+        }
+        warn_of_copies(cx, &copies, "all samples of their channels are equal");
+        Ok(parts.into_iter().map(|(_, part)| part).collect())
+    }
+
     /// The channels of the outputs, one at least.
     pub(super) fn all_outputs(&self) -> &[Column] {
         if self.outputs.is_empty() { std::slice::from_ref(&self.output) } else { &self.outputs }

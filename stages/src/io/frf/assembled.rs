@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::stage::{Frf, Roving};
 use crate::artifacts::{NewFrf, Point, ResponseOf, Understood};
+use crate::io::repeats::{CopyOf, name_beside, same_values, varies};
 
 /// What frequencies of two responses may differ by, in steps: what is printed to seven digits.
 const SAME: f64 = 1e-3;
@@ -16,11 +17,18 @@ const SAME: f64 = 1e-3;
 pub(super) struct Assembled {
     pub frf: NewFrf,
     pub remarks: Vec<String>,
+    /// Responses that are left out, since each is a copy of another one.
+    pub copies: Vec<CopyOf>,
 }
 
 impl Assembled {
-    /// Errors: see the stage.
-    pub fn new(wanted: &Frf, paths: &[PathBuf], read: Vec<Vec<FileResponse>>) -> Result<Self, StageError> {
+    /// Of files with these hashes. Errors: see the stage.
+    pub fn new(
+        wanted: &Frf,
+        paths: &[PathBuf],
+        hashes: &[String],
+        read: Vec<Vec<FileResponse>>,
+    ) -> Result<Self, StageError> {
         let all = named(paths, read);
         let frequency_hz = common_frequencies(&all)?;
         check_lengths(wanted, all.len())?;
@@ -32,7 +40,10 @@ impl Assembled {
             }
         }
         let responses = points(wanted, &all);
-        remarks.extend(repeated(&responses));
+        let copies = copies(wanted, &all, hashes);
+        let is_copy = |row: &usize| copies.iter().any(|(copy, _)| copy == row);
+        let once: Vec<&ResponseOf> = (0..).zip(&responses).filter(|(row, _)| !is_copy(row)).map(|(_, of)| of).collect();
+        remarks.extend(repeated(&once));
         let driving_point = wanted
             .driving_point
             .map(|number| number - 1)
@@ -48,7 +59,7 @@ impl Assembled {
         }
         let rows: Option<Vec<&Vec<f64>>> = all.iter().map(|named| named.response.coherence.as_ref()).collect();
         let coherence = rows.map(|rows| rows.iter().flat_map(|row| row[kept.clone()].to_vec()).collect());
-        let frf = NewFrf {
+        let mut frf = NewFrf {
             frequency_hz: frequency_hz[kept].to_vec(),
             responses,
             frf,
@@ -58,7 +69,11 @@ impl Assembled {
             driving_point,
             ..NewFrf::default()
         };
-        Ok(Self { frf, remarks })
+        frf.leave_out(&copies);
+        let named =
+            |(copy, of): &(usize, usize)| Some((all.get(*copy)?.beside(all.get(*of)?), all.get(*of)?.name.clone()));
+        let copies = copies.iter().filter_map(named).collect();
+        Ok(Self { frf, remarks, copies })
     }
 
     /// What is shown of it.
@@ -86,22 +101,53 @@ impl Assembled {
 struct Named<'a> {
     name: String,
     path: &'a Path,
+    /// Number of its file, and its own among the responses of that.
+    place: [usize; 2],
     response: FileResponse,
+}
+
+impl Named<'_> {
+    /// Its name, with its folder where the other one has the same.
+    fn beside(&self, other: &Self) -> String {
+        if self.name == other.name { name_beside(self.path, other.path) } else { self.name.clone() }
+    }
+}
+
+/// The responses that were measured once and lie there again, each with the first that it is a copy of: of files with
+/// the same bytes, or with equal values, unless files or `positions_m` say that their points are others.
+fn copies(wanted: &Frf, all: &[Named<'_>], hashes: &[String]) -> Vec<(usize, usize)> {
+    let apart = |one: &Option<Degree>, other: &Option<Degree>| one.is_some() && other.is_some() && one != other;
+    let is_copy = |(row, copy): (usize, &Named<'_>), (of, first): (usize, &Named<'_>)| {
+        let [[file, number], [other, its]] = [copy.place, first.place];
+        if file != other && hashes.get(file) == hashes.get(other) {
+            return number == its;
+        }
+        let (one, two) = (&copy.response, &first.response);
+        let elsewhere = apart(&one.output, &two.output)
+            || apart(&one.input, &two.input)
+            || wanted.positions_m.get(row) != wanted.positions_m.get(of);
+        !elsewhere && varies(&one.values) && same_values(&one.values, &two.values)
+    };
+    let earlier = |(row, copy): (usize, &Named<'_>)| {
+        let of = all[..row].iter().enumerate().find(|first| is_copy((row, copy), *first));
+        of.map(|(of, _)| (row, of))
+    };
+    all.iter().enumerate().filter_map(earlier).collect()
 }
 
 fn named(paths: &[PathBuf], read: Vec<Vec<FileResponse>>) -> Vec<Named<'_>> {
     let one_file = paths.len() == 1;
     let mut all = Vec::new();
-    for (path, responses) in paths.iter().zip(read) {
+    for (number, (path, responses)) in paths.iter().zip(read).enumerate() {
         let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let several = responses.len() > 1;
-        for response in responses {
+        for (own, response) in responses.into_iter().enumerate() {
             let name = match (several, one_file) {
                 (false, _) => file.clone(),
                 (true, true) => response.location.clone(),
                 (true, false) => format!("{file}:{}", response.location),
             };
-            all.push(Named { name, path, response });
+            all.push(Named { name, path, place: [number, own], response });
         }
     }
     all
@@ -150,7 +196,7 @@ fn check_lengths(wanted: &Frf, responses: usize) -> Result<(), StageError> {
 /// The unit of all. Errors: units that differ, or are not the one that is given.
 fn unit(wanted: &Frf, all: &[Named<'_>]) -> Result<String, StageError> {
     let mut unit = wanted.unit.clone().unwrap_or_default();
-    for Named { name, path, response } in all.iter().filter(|named| !named.response.unit.is_empty()) {
+    for Named { name, path, response, .. } in all.iter().filter(|named| !named.response.unit.is_empty()) {
         if unit.is_empty() {
             unit.clone_from(&response.unit);
         }
@@ -163,7 +209,7 @@ fn unit(wanted: &Frf, all: &[Named<'_>]) -> Result<String, StageError> {
 }
 
 /// Responses that are of the points of an earlier one: a fit counts them as independent points.
-fn repeated(responses: &[ResponseOf]) -> Option<String> {
+fn repeated(responses: &[&ResponseOf]) -> Option<String> {
     let same = |a: &ResponseOf, b: &ResponseOf| a.output.is(&b.output) && a.input.is(&b.input);
     let (row, first) = responses
         .iter()
@@ -239,8 +285,8 @@ mod tests {
     fn two_responses_of_the_same_points_are_found() {
         let point = |name: &str| Point { name: name.to_owned(), ..Point::default() };
         let of = |output: &str| ResponseOf { output: point(output), input: point("1"), run: 0 };
-        assert_eq!(repeated(&[of("1"), of("2"), of("3")]), None);
-        let remark = repeated(&[of("1"), of("2"), of("3"), of("2")]).unwrap();
+        assert_eq!(repeated(&[&of("1"), &of("2"), &of("3")]), None);
+        let remark = repeated(&[&of("1"), &of("2"), &of("3"), &of("2")]).unwrap();
         assert!(remark.contains("responses 2 and 4 are both of output 2 and input 1"), "{remark}");
     }
 }

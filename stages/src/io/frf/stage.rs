@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::assembled::Assembled;
 use crate::artifacts::Quantity;
 use crate::io::file_patterns::{Match, matching_files};
+use crate::io::repeats::warn_of_copies;
 use crate::io::shared_data::moved;
 
 /// Reads measured frequency responses from files of any format.
@@ -22,7 +23,8 @@ use crate::io::shared_data::moved;
 /// among them), universal files 58 and 58b (functions 4 and 5), complex arrays beside frequencies in MATLAB files,
 /// records of complex numbers in HDF5; each also packed with gzip. Titles say what columns are, `values` where there
 /// are none. Times, frequencies and counters are axes and never a response. All responses must have the same
-/// frequencies.
+/// frequencies. Of files with the same bytes, and of responses with equal values (more than 100, not all equal) unless
+/// files or `positions_m` say that their points are others, the first counts, and a warning names the rest.
 /// # Shapes
 /// A row for each response, files in natural order and responses in each file's order, over the frequencies in `band_hz`.
 /// # Units
@@ -134,7 +136,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Frf {
     const SPEC: Spec = Spec {
         name: "io.frf",
-        version: 3,
+        version: 4,
         summary: "reads measured frequency responses from files of any format",
         inputs: &[],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -192,7 +194,9 @@ impl Stage for Frf {
                 responses
             })
             .collect::<Result<_, _>>()?;
-        let assembled = Assembled::new(self, &paths, read)?;
+        let hashes = paths.par_iter().map(|path| cx.files().hash(path)).collect::<Result<Vec<String>, _>>()?;
+        let assembled = Assembled::new(self, &paths, &hashes, read)?;
+        warn_of_copies(cx, &assembled.copies, "their values are equal");
         assembled.remarks.iter().for_each(|remark| cx.warn(remark));
         let summary = assembled.summary()?;
         Ok(Ports::new().with(&FRF, assembled.frf.array()?).with(&SUMMARY, summary))
