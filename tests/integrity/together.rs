@@ -49,13 +49,21 @@ fn assert_alike(place: &Place, [made, like]: [&str; 2], results: &[String], tabl
     }
 }
 
+const SETS: [&str; 3] = ["set-0", "set-1", "set-2"];
+
+fn batch(out: &str) -> Vec<&str> {
+    [&["batch", "census.toml", "-o", out][..], &SETS].concat()
+}
+
+fn sweep(out: &str) -> [&str; 6] {
+    ["run", "swept.toml", "--set", "records.files=['set-0']", "-o", out]
+}
+
 #[test]
 fn ten_batches_of_one_folder_all_end_well() {
     let place = place();
-    let sets = ["set-0", "set-1", "set-2"];
-    let batch = |out| [&["batch", "census.toml", "-o", out][..], &sets].concat();
     assert!(place.command(&batch("whole")).status().expect("afmid starts").success());
-    let results = sets.map(|set| format!("{set}.h5"));
+    let results = SETS.map(|set| format!("{set}.h5"));
     for round in 0..ROUNDS {
         let out = format!("out-{round}");
         all_at_once(&place, &batch(&out));
@@ -70,7 +78,6 @@ fn ten_batches_of_one_folder_all_end_well() {
 #[test]
 fn ten_sweeps_and_ten_crates_of_one_folder_all_end_well() {
     let place = place();
-    let sweep = |out| ["run", "swept.toml", "--set", "records.files=['set-0']", "-o", out];
     assert!(place.command(&sweep("whole")).status().expect("afmid starts").success());
     let points = [1, 2].map(|point| format!("point_{point:05}.h5"));
     for round in 0..5 {

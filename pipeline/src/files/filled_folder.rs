@@ -38,7 +38,8 @@ impl FilledFolder {
     /// list cannot be read.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
         sweep(folder);
-        let filled = Self { folder: folder.to_owned(), listed: Mutex::new(read_list(folder)?), swept: Mutex::default() };
+        let filled =
+            Self { folder: folder.to_owned(), listed: Mutex::new(read_list(folder)?), swept: Mutex::default() };
         let names: Vec<String> = filled.listed().keys().cloned().collect();
         names.iter().for_each(|name| filled.sweep_level(name));
         Ok(filled)

@@ -10,12 +10,6 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// What a Monte Carlo test draws: `few` in every run of the tests, `all` where the variable `AFMID_ACCURACY` is set
-/// (`make accuracy`, before a release).
-pub(crate) fn few_or_all<T>(few: T, all: T) -> T {
-    if std::env::var_os("AFMID_ACCURACY").is_some() { all } else { few }
-}
-
 /// A lever with its detector: everything that the tests compare estimates with.
 #[derive(Debug, Clone)]
 pub(crate) struct Lever {

@@ -71,4 +71,6 @@ pub use faer::{Mat, c64};
 pub use monitor::{Monitor, Unwatched};
 
 #[cfg(test)]
+mod draws;
+#[cfg(test)]
 mod fixture;

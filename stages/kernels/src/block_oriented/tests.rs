@@ -2,7 +2,8 @@ use faer::c64;
 use rayon::prelude::*;
 
 use super::*;
-use crate::fixture::{few_or_all, white_noise};
+use crate::draws::few_or_all;
+use crate::fixture::white_noise;
 use crate::monitor::Unwatched;
 
 /// Noise with most of its power below a tenth of the sample rate.

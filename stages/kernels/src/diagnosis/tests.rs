@@ -9,8 +9,8 @@ use super::hidden_paths::{actuator, detector, through};
 use super::verdict::{Diagnosis, Verdict};
 use super::{DiagnosisOptions, Record, Stretch, diagnose};
 use crate::causes::{Cause, built_in as find};
+use crate::draws::few_or_all;
 use crate::effects::{Effects, Instant, Intersample, Motion};
-use crate::fixture::few_or_all;
 
 const SAMPLES: usize = 4096;
 const RATE_HZ: f64 = 1000.0;

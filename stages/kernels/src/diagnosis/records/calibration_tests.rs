@@ -6,7 +6,7 @@
 
 use super::archive::Archive;
 use super::{JudgeOptions, RecordSign, judge};
-use crate::fixture::few_or_all;
+use crate::draws::few_or_all;
 
 fn signs(archive: &Archive, seed: u64) -> Vec<RecordSign> {
     judge(&archive.summaries(seed), &JudgeOptions::default())

@@ -6,7 +6,8 @@ use faer::c64;
 use rayon::prelude::*;
 
 use super::*;
-use crate::fixture::{few_or_all, white_noise};
+use crate::draws::few_or_all;
+use crate::fixture::white_noise;
 use crate::model::ModelError;
 use crate::ringdown::{NoiseSource, RingdownOptions, fit_ringdowns};
 
