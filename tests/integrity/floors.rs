@@ -70,7 +70,7 @@ const CRATES: [Crate; 5] = [
         name: "afmid-kernels",
         src: "stages/kernels/src",
         floors: &[
-            &["fixture", "linear_algebra", "signal", "statistics", "effects", "monitor"],
+            &["fixture", "draws", "linear_algebra", "signal", "statistics", "effects", "monitor"],
             &["optimise"],
             &["events"],
             &["calibration", "causes", "force", "harmonics", "model", "simulate"],
