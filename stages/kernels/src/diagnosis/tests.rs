@@ -218,7 +218,7 @@ fn one_hidden_cause_is_named_with_its_parameters() {
 
 #[test]
 fn two_hidden_causes_are_both_named() {
-    let count = rounds() * 10;
+    let count = rounds() * few_or_all(6, 10);
     let results: Vec<bool> = (0..count)
         .into_par_iter()
         .map(|seed| {
@@ -245,7 +245,7 @@ fn two_hidden_causes_are_both_named() {
 
 #[test]
 fn nothing_hidden_is_clean() {
-    let count = rounds() * 20;
+    let count = rounds() * few_or_all(10, 20);
     let alarms: Vec<u64> = (0..count)
         .into_par_iter()
         .filter(|seed| {
@@ -257,8 +257,8 @@ fn nothing_hidden_is_clean() {
         })
         .collect();
     println!("clean: {} false alarms of {count}", alarms.len());
-    // at 1 % more than 3 of 40 have a probability of 1e-3
-    assert!(alarms.len() as f64 <= 3.0 + 0.01 * count as f64);
+    // at 1 % more than 3 of 40 have a probability of 1e-3, more than one of ten of 4e-3
+    assert!(alarms.len() as f64 <= few_or_all(1.0, 3.0) + 0.01 * count as f64);
 }
 
 #[test]
@@ -272,7 +272,8 @@ fn a_cause_left_out_of_the_catalogue_is_unexplained() {
         ("intersample", vec![2.0], &["intersample"]),
     ];
     let count = rounds();
-    let jobs: Vec<(u64, usize)> = (0..count).flat_map(|seed| (0..left_out.len()).map(move |i| (seed, i))).collect();
+    let kinds = few_or_all(3, left_out.len());
+    let jobs: Vec<(u64, usize)> = (0..count).flat_map(|seed| (0..kinds).map(move |i| (seed, i))).collect();
     let results: Vec<bool> = jobs
         .par_iter()
         .map(|(seed, i)| {
@@ -291,7 +292,8 @@ fn a_cause_left_out_of_the_catalogue_is_unexplained() {
         .collect();
     let right = results.iter().filter(|right| **right).count();
     println!("left out: {right} of {} unexplained", results.len());
-    assert!(right as f64 >= 0.9 * results.len() as f64 - 2.0);
+    // nine of ten are wanted; one more may miss, of ten two
+    assert!(right as f64 >= 0.9 * results.len() as f64 - few_or_all(1.0, 2.0));
 }
 
 #[test]
