@@ -15,7 +15,7 @@ use crate::error::StageError;
 ///
 /// The file is held open: removing or replacing it takes nothing away. If it is cut short all the same, reading says
 /// so. Of a file that others can open, every read sees that the bytes are those that it held when it was opened
-/// ([`StoredRows::pinned`]), whatever its size and times say.
+/// (`pinned`), whatever its size and times say.
 #[derive(Debug, Clone)]
 pub struct StoredRows(Arc<Inner>);
 

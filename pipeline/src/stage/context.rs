@@ -121,7 +121,7 @@ impl<'a> Context<'a> {
         self.progress.tick();
     }
 
-    /// The warnings so far; beyond [`MOST_WARNINGS`] how many there were.
+    /// The warnings so far; beyond 10,000 of them, how many there were.
     pub fn into_warnings(self) -> Vec<String> {
         let mut warnings = self.warnings.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
         if warnings.len() > MOST_WARNINGS {
