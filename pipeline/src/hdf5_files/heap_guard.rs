@@ -1,8 +1,8 @@
 //! A guard for the HDF5 library: files are looked through before they are opened.
 //!
 //! Texts of variable length lie in global heap collections (HDF5 File Format Specification, version 3, III.E), which
-//! have no checksum. On some damaged ones the library (HDF5 2.0) did not come back, or took far longer than the file
-//! is large. The guard refuses what the format does not allow, whether the library would survive it or
+//! have no checksum. On some damaged ones the library (HDF5 2.0) did not come back, or took far longer than a file of
+//! that size should. The guard refuses what the format does not allow, whether the library would survive it or
 //! not: objects that are smaller than their own header, collections that take more room than the file has, lengths of an
 //! unknown size.
 
