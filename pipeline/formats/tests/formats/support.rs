@@ -50,9 +50,11 @@ impl Temporary {
     }
 }
 
-/// Writes a file for a test, in a folder of the process.
+/// Writes a file for a test, in a folder of its own: tests that run at once may choose the same name.
 pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("afmid-formats-{}", std::process::id()));
+    static FILES: AtomicUsize = AtomicUsize::new(0);
+    let count = FILES.fetch_add(1, Ordering::Relaxed);
+    let folder = std::env::temp_dir().join(format!("afmid-formats-{}", std::process::id())).join(count.to_string());
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join(name);
     std::fs::write(&path, bytes).unwrap();
