@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs fuzz targets, one after the other, and prints a table: fuzz/run.sh SECONDS [TARGET...] (`make fuzz` installs cargo-fuzz before).
 # New inputs go to fuzz/found, findings to fuzz/artifacts; neither is kept in the project. Exit code 1: something was found.
-# A finding is made small with `RUSTC_BOOTSTRAP=1 cargo fuzz tmin --fuzz-dir fuzz TARGET FILE`, and goes to fuzz/corpus/TARGET under a name that says what
+# A finding is made small with `AFMID_ENTRANCE=TARGET RUSTC_BOOTSTRAP=1 cargo fuzz tmin --fuzz-dir fuzz entrance FILE`, and goes to fuzz/corpus/TARGET under a name that says what
 # it is, with the mending: `cargo test --test integrity corpus` replays it ever after.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -17,7 +17,7 @@ if ! command -v c++ >/dev/null; then
     exit 2
 fi
 if [ $# -eq 0 ]; then
-    for target in fuzz/fuzz_targets/*.rs; do set -- "$@" "$(basename "$target" .rs)"; done
+    for target in fuzz/corpus/*; do set -- "$@" "$(basename "$target")"; done
 fi
 host=$(rustc -vV | sed -n 's/^host: //p')
 # cargo-fuzz asks for flags of the nightly toolchain, which this one has under lock
@@ -42,7 +42,7 @@ for target in "$@"; do
     case $target in native_record | foreign_hdf5 | inspect | stage_file | result_file) asked_mb=2000000000 ;; esac
     log=$scratch/$target.log
     code=0
-    "fuzz/target/$host/release/$target" -max_total_time="$seconds" -timeout=$limit_s -rss_limit_mb=$limit_mb -malloc_limit_mb=$asked_mb \
+    AFMID_ENTRANCE=$target "fuzz/target/$host/release/entrance" -max_total_time="$seconds" -timeout=$limit_s -rss_limit_mb=$limit_mb -malloc_limit_mb=$asked_mb \
         -max_len=65536 -print_final_stats=1 -print_funcs=0 -artifact_prefix="fuzz/artifacts/$target/" "fuzz/found/$target" "fuzz/corpus/$target" >"$log" 2>&1 || code=$?
     executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log" | tail -1)
     coverage=$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$log" | tail -1)

@@ -16,27 +16,14 @@ use afmid_pipeline::store::StageIdentity;
 use afmid_pipeline::{InputFiles, Registry, Shape, plugin};
 
 /// A way in.
-pub struct Entrance {
+struct Entrance {
     /// Its name: that of the fuzz target and of its folder in `fuzz/corpus`.
-    pub name: &'static str,
+    name: &'static str,
     enter: fn(&[u8]),
 }
 
-/// All of them.
-pub const ENTRANCES: &[Entrance] = &[
-    Entrance { name: "tdms", enter: |bytes| reader("tdms", bytes) },
-    Entrance { name: "npy", enter: |bytes| reader("npy", bytes) },
-    Entrance { name: "npz", enter: |bytes| reader("npz", bytes) },
-    Entrance { name: "jpk", enter: |bytes| reader("jpk", bytes) },
-    Entrance { name: "nanoscope", enter: |bytes| reader("nanoscope", bytes) },
-    Entrance { name: "uff", enter: |bytes| reader("uff", bytes) },
-    Entrance { name: "mat", enter: |bytes| reader("mat", bytes) },
-    Entrance { name: "ibw", enter: |bytes| reader("ibw", bytes) },
-    Entrance { name: "wav", enter: |bytes| reader("wav", bytes) },
-    Entrance { name: "lecroy", enter: |bytes| reader("lecroy", bytes) },
-    Entrance { name: "keysight", enter: |bytes| reader("keysight", bytes) },
-    Entrance { name: "isf", enter: |bytes| reader("isf", bytes) },
-    Entrance { name: "text", enter: |bytes| reader("text", bytes) },
+/// Those beside the readers of single formats.
+const OTHERS: &[Entrance] = &[
     Entrance { name: "responses", enter: responses },
     Entrance { name: "raw_binary", enter: raw_binary },
     Entrance { name: "native_record", enter: native_record },
@@ -49,13 +36,20 @@ pub const ENTRANCES: &[Entrance] = &[
     Entrance { name: "plugin_lines", enter: plugin_lines },
 ];
 
+/// The names of all entrances: the formats, whose readers are asked whatever the first bytes say, and the others.
+pub fn entrances() -> Vec<&'static str> {
+    formats().iter().map(|known| known.row.name).chain(OTHERS.iter().map(|entrance| entrance.name)).collect()
+}
+
 /// Takes bytes in by the entrance `name`.
 ///
 /// # Panics
 /// There is no such entrance; a promise is broken.
 pub fn enter(name: &str, bytes: &[u8]) {
-    let entrance = ENTRANCES.iter().find(|entrance| entrance.name == name).expect("an entrance of this name");
-    (entrance.enter)(bytes);
+    match OTHERS.iter().find(|entrance| entrance.name == name) {
+        Some(entrance) => (entrance.enter)(bytes),
+        None => reader(name, bytes),
+    }
 }
 
 /// Samples read of one file: more is the same code again.
@@ -90,7 +84,7 @@ fn file(name: &str, bytes: &[u8]) -> PathBuf {
 
 /// One format's reader, whatever the first bytes say.
 fn reader(format: &str, bytes: &[u8]) {
-    let known = formats().iter().find(|known| known.name == format).expect("a format of this name");
+    let known = formats().iter().find(|known| known.row.name == format).expect("an entrance of this name");
     let path = file(&format!("input.{format}"), bytes);
     let head = &bytes[..bytes.len().min(4096)];
     let recognised = known.recognises(head, &path);

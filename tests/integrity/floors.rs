@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use super::common::ROOT;
-use super::paths::arrows;
+use super::paths::{arrows, sources, without_tests};
 
 /// A crate and its folders, from the ground up. What stands in one row may not know of each other.
 struct Crate {
@@ -29,22 +29,7 @@ const CRATES: [Crate; 5] = [
             &["archive", "axes", "joined", "responses"],
             &["labels"],
             &["listing"],
-            &[
-                "igor",
-                "jpk",
-                "keysight",
-                "lecroy",
-                "matlab",
-                "nanoscope",
-                "numpy",
-                "raw_binary",
-                "tdms",
-                "tektronix",
-                "text_table",
-                "uff",
-                "wav",
-            ],
-            &["registry"],
+            &["readers"],
         ],
     },
     Crate {
@@ -136,6 +121,25 @@ fn no_folder_names_one_that_lies_beside_or_above_it() {
         }
     }
     assert!(wrong.is_empty(), "\n{wrong}");
+}
+
+/// Readers of files stand in one folder, each by itself.
+#[test]
+fn no_reader_of_a_format_names_another() {
+    let found = arrows(&Path::new(ROOT).join("pipeline/formats/src/readers"));
+    let wrong: Vec<String> = found
+        .iter()
+        .flat_map(|((from, to), places)| {
+            // the front door of the readers is found by its path from the crate
+            let named = places.iter().filter(move |_| to != "mod");
+            named.map(move |place| format!("{from} uses {to}: {place}"))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+    for file in sources(&Path::new(ROOT).join("pipeline/formats/src/readers")) {
+        let code = without_tests(&fs::read_to_string(&file).expect("a source file"));
+        assert!(!code.contains("crate::readers"), "{} names a reader", file.display());
+    }
 }
 
 #[test]

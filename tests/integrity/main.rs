@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod archives;
 mod batch_names;
 mod begun_configs;
 mod cache_files;

@@ -152,7 +152,7 @@ fn without_texts(text: &str) -> String {
 }
 
 /// The code without items that only tests have: each `#[cfg(test)]` with what it stands before.
-fn without_tests(code: &str) -> String {
+pub fn without_tests(code: &str) -> String {
     let mut kept = String::new();
     let mut rest = code;
     while let Some(at) = rest.find("#[cfg(test)]") {
@@ -183,7 +183,7 @@ fn closing(code: &str, open: usize) -> usize {
 }
 
 /// The source files of a crate without those that only tests have.
-fn sources(src: &Path) -> Vec<PathBuf> {
+pub fn sources(src: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(src).expect("a folder").map(|entry| entry.expect("an entry").path()) {
         let name = entry.file_name().unwrap_or_default().to_string_lossy().into_owned();

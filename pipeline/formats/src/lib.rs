@@ -13,35 +13,22 @@ mod fail;
 mod fields;
 mod frequency;
 mod grid;
-pub mod igor;
 mod inflating;
 mod joined;
-pub mod jpk;
-pub mod keysight;
 mod labels;
 mod lanes;
-pub mod lecroy;
 mod listing;
-pub mod matlab;
-pub mod nanoscope;
 mod number;
-pub mod numpy;
 mod opened;
 mod packed;
 mod pinned;
 mod rate;
 mod raw;
-pub mod raw_binary;
-mod registry;
+pub mod readers;
 mod regular;
 mod responses;
 mod straight;
-pub mod tdms;
-pub mod tektronix;
 mod text;
-pub mod text_table;
-pub mod uff;
-pub mod wav;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -56,11 +43,11 @@ pub use lanes::Lanes;
 pub use number::Number;
 pub use rate::{Clue, LEAST_RATE_HZ, MOST_RATE_HZ, WANTED_RATE, agreed_rate, brief_number, is_rate, rate_in};
 pub use raw::Raw;
-pub use raw_binary::{RawBinary, SampleType};
-pub use registry::{HEAD_BYTES, Known, formats, head_of, recognise};
+pub use readers::raw_binary::{RawBinary, SampleType};
+pub use readers::text_table::even_step;
+pub use readers::{HEAD_BYTES, Known, formats, head_of, recognise};
 pub use regular::{append_regular, open_regular, read_regular};
 pub use responses::{Degree, FoundResponse, Frequencies, Parts, responses, says_frequencies, unit_ratio};
-pub use text_table::even_step;
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
 ///
@@ -180,8 +167,30 @@ impl FormatError {
     }
 }
 
+/// What is told of a format, to people and to programs: its only description, from which the registry, the fuzz
+/// targets and the table in docs/archives.md are made.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// How it is asked for (`format = "tdms"`), and the name of its fuzz target and corpus.
+    pub name: &'static str,
+    /// What it is, for people.
+    pub title: &'static str,
+    /// What of it is read.
+    pub reads: &'static str,
+    /// What is refused or left out.
+    pub leaves_out: &'static str,
+    /// Who describes it.
+    pub described_by: &'static str,
+    /// Where a file of it can state rate and times; empty if it cannot.
+    pub clock: &'static str,
+    /// Where a file of it can state the unit of its values; empty if it cannot.
+    pub unit: &'static str,
+}
+
 /// What every format's module offers.
 pub trait Format {
+    /// What is told of it.
+    const ROW: Row;
     /// Whether a file's first bytes (up to [`HEAD_BYTES`]) and its name say that it is of this format.
     fn recognises(head: &[u8], path: &Path) -> bool;
     /// Opens it: everything but the samples. Errors: no such file, not of this format, damaged.

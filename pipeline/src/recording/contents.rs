@@ -27,7 +27,7 @@ pub fn open_contents(
     let mut contents = match (name, &reading.raw) {
         (NATIVE | HDF5, _) => foreign_hdf5::open(files, path)?,
         (RAW, Some(raw)) => raw.open(path).map_err(|error| error.in_file(path))?,
-        _ => match formats().iter().find(|known| known.name == name) {
+        _ => match formats().iter().find(|known| known.row.name == name) {
             Some(known) => known.open(path)?,
             None => return Err(StageError::new(format!("there is no format `{name}`")).at(path)),
         },
@@ -83,7 +83,7 @@ pub(super) fn format_of(files: &InputFiles, path: &Path, reading: &Reading) -> R
     if is_hdf5(&head) {
         return Ok(if is_native(files, path) { NATIVE } else { HDF5 });
     }
-    recognise(&head, path).map(|known| known.name).ok_or_else(|| unknown(path, &head))
+    recognise(&head, path).map(|known| known.row.name).ok_or_else(|| unknown(path, &head))
 }
 
 /// Whether a file is of a format that somebody recognises.
@@ -106,7 +106,7 @@ fn unknown(path: &Path, head: &[u8]) -> StageError {
         return StageError::new("the file is empty").at(path);
     }
     let begins = head.get(..8.min(head.len())).unwrap_or_default().escape_ascii();
-    let known: Vec<&str> = formats().iter().map(|known| known.title).collect();
+    let known: Vec<&str> = formats().iter().map(|known| known.row.title).collect();
     StageError::new(format!(
         "not a readable HDF5 file, and of no other format that is known; it begins with «{begins}»"
     ))

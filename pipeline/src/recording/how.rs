@@ -51,8 +51,7 @@ impl Reading {
 
     /// All names of formats.
     pub fn names() -> Vec<&'static str> {
-        let known = super::formats().iter().map(|known| known.name);
-        [AUTO, NATIVE, HDF5].into_iter().chain(known).chain([RAW]).collect()
+        [AUTO].into_iter().chain(super::rows().map(|row| row.name)).collect()
     }
 
     /// Errors: no such format; a description of raw binary without that format, or the other way round; one that is out

@@ -14,6 +14,7 @@ mod native;
 mod open;
 mod opened_files;
 mod responses;
+mod rows;
 mod series;
 mod source;
 mod stretches;
@@ -39,7 +40,7 @@ pub use series::{read_number_attribute, read_series};
 pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native, write_native_in};
 
 pub use afmid_formats::{
-    Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Source, WANTED_RATE,
+    Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Row, Source, WANTED_RATE,
     brief_number, contradiction, even_step, formats, hertz, is_fact, is_rate, lane_names, mean_rate, most_inflated,
     responses, says_frequencies, unit_ratio,
 };
@@ -48,6 +49,7 @@ pub use equal::{SamplePrint, equal_samples};
 pub use how::{How, Reading};
 pub use open::{Opened, agreed_rate, open_records, recognised};
 pub use responses::{FileResponse, read_responses};
+pub use rows::rows;
 pub use whole::WholeFile;
 
 use crate::error::StageError;

@@ -64,9 +64,8 @@ pub struct Records {
     pub min_sample_rate_hz: f64,
     /// Leave out files that cannot be opened, with a warning, instead of stopping.
     pub skip_unreadable: bool,
-    /// The files' format: `auto` for what their bytes and names say, `native`, `hdf5` (any layout), `tdms`, `npy`,
-    /// `npz`, `jpk`, `nanoscope`, `uff`, `mat`, `ibw`, `wav`, `lecroy`, `keysight` (and Rigol), `isf` (Tektronix), `text`
-    /// (LVM, CSV), `raw`.
+    /// The files' format: `auto` for what their bytes and names say, or a name of docs/archives.md (`native`, `hdf5`,
+    /// `tdms`, `text`, `raw`, ...).
     pub format: String,
     /// Samples per second in Hz, of files that state none. Absent: an error where a file states another.
     #[schemars(range(min = 1e-9, max = 1e15))]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::support::*;
-use afmid_formats::igor::IgorWave;
+use afmid_formats::readers::igor::IgorWave;
 use afmid_formats::{Format, Raw};
 
 /// A wave to write; fields as in Igor's headers.

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::support::*;
-use afmid_formats::jpk::JpkForce;
+use afmid_formats::readers::jpk::JpkForce;
 use afmid_formats::{Format, Raw};
 use flate2::Crc;
 use flate2::write::DeflateEncoder;

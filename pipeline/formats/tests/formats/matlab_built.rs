@@ -2,7 +2,7 @@
 
 use crate::mat_builder::{Order, compressed, level4};
 use crate::support::{Temporary, channel, locations, remarked, samples};
-use afmid_formats::matlab::Mat;
+use afmid_formats::readers::matlab::Mat;
 use afmid_formats::{Contents, Format, FormatError};
 
 fn open(bytes: &[u8]) -> Result<Contents, FormatError> {

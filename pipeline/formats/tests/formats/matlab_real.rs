@@ -4,7 +4,7 @@
 #![allow(clippy::approx_constant)]
 
 use crate::support::{channel, locations, real, remarked, samples};
-use afmid_formats::matlab::Mat;
+use afmid_formats::readers::matlab::Mat;
 use afmid_formats::{Contents, Format, FormatError};
 
 fn open(name: &str) -> Option<Result<Contents, FormatError>> {

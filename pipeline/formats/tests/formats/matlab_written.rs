@@ -2,7 +2,7 @@
 
 use crate::support::{channel, locations, remarked, samples, written};
 use afmid_formats::Format;
-use afmid_formats::matlab::Mat;
+use afmid_formats::readers::matlab::Mat;
 
 #[test]
 fn picoscope_exports_have_their_rate_from_tinterval() {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::support::*;
-use afmid_formats::nanoscope::Nanoscope;
+use afmid_formats::readers::nanoscope::Nanoscope;
 use afmid_formats::{Format, Raw};
 
 /// Data begin here in built files.

@@ -1,7 +1,7 @@
 //! NPY files and archives put together byte by byte.
 
 use crate::support::{Temporary, locations, remarked, samples, written};
-use afmid_formats::numpy::{Npy, Npz};
+use afmid_formats::readers::numpy::{Npy, Npz};
 use afmid_formats::{Contents, Format, FormatError};
 
 fn npy(version: u8, dictionary: &str, data: &[u8]) -> Vec<u8> {

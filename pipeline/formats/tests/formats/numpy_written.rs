@@ -1,7 +1,7 @@
 //! Files that NumPy 2.4.6 wrote (tests/make_npy.py, where the numbers are).
 
 use crate::support::{channel, locations, remarked, samples, written};
-use afmid_formats::numpy::{Npy, Npz};
+use afmid_formats::readers::numpy::{Npy, Npz};
 use afmid_formats::{Contents, Format};
 
 fn npy(name: &str) -> Contents {

@@ -5,12 +5,12 @@ use afmid_formats::{formats, head_of, recognise};
 use std::path::Path;
 
 fn known(path: &Path) -> Option<&'static str> {
-    recognise(&head_of(path).unwrap(), path).map(|known| known.name)
+    recognise(&head_of(path).unwrap(), path).map(|known| known.row.name)
 }
 
 #[test]
 fn tables_of_text_are_asked_last_and_names_are_distinct() {
-    let names: Vec<&str> = formats().iter().map(|known| known.name).collect();
+    let names: Vec<&str> = formats().iter().map(|known| known.row.name).collect();
     assert_eq!(names.last(), Some(&"text"));
     let mut sorted = names.clone();
     sorted.sort_unstable();

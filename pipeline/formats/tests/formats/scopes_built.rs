@@ -2,9 +2,9 @@
 
 use crate::scope_files::{Trace, bin_file, isf_file};
 use crate::support::{channel, locations, open, remarked, values};
-use afmid_formats::keysight::Keysight;
-use afmid_formats::lecroy::LeCroy;
-use afmid_formats::tektronix::TektronixIsf;
+use afmid_formats::readers::keysight::Keysight;
+use afmid_formats::readers::lecroy::LeCroy;
+use afmid_formats::readers::tektronix::TektronixIsf;
 use afmid_formats::{Contents, Format, FormatError};
 use std::path::Path;
 

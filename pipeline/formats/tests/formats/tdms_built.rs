@@ -2,7 +2,7 @@
 
 use crate::support::{channel, locations, open, remarked, values};
 use crate::tdms_file::*;
-use afmid_formats::tdms::Tdms;
+use afmid_formats::readers::tdms::Tdms;
 use afmid_formats::{Contents, Format, FormatError, Raw};
 
 const ALL: u32 = META | NEW_LIST | RAW;

@@ -2,7 +2,7 @@
 //! `float(np.sum(c[:], dtype=float))`, `c[0]`, `c[1]`, `c[len // 2]`, `c[-1]` and `c.properties`.
 
 use crate::support::{assert_sum, channel, locations, real, values};
-use afmid_formats::tdms::Tdms;
+use afmid_formats::readers::tdms::Tdms;
 use afmid_formats::{Contents, Format, Raw};
 
 fn opened(name: &str) -> Option<Contents> {

@@ -1,7 +1,7 @@
 //! LVM files and plain tables: built ones, and real ones against lvm_read 1.26.
 
 use crate::support::{assert_sum, channel, locations, open, real, remarked, values};
-use afmid_formats::text_table::TextTable;
+use afmid_formats::readers::text_table::TextTable;
 use afmid_formats::{Contents, Format, FormatError};
 use std::path::Path;
 

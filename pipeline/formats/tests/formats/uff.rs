@@ -1,7 +1,7 @@
 //! Universal files: built ones, and real ones against pyuff 2.5.8.
 
 use crate::support::{assert_sum, locations, open, real, remarked, scope, values};
-use afmid_formats::uff::Uff;
+use afmid_formats::readers::uff::Uff;
 use afmid_formats::{Contents, Format, FormatError, Raw};
 
 /// What a test varies in a dataset 58.

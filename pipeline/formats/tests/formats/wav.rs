@@ -1,7 +1,7 @@
 //! WAV files: written by SciPy, built here, and as the crate hound reads them.
 
 use crate::support::{Temporary, codes, locations, open, remarked, values, written};
-use afmid_formats::wav::Wav;
+use afmid_formats::readers::wav::Wav;
 use afmid_formats::{Contents, Format};
 
 /// The decay of tests/make_wav.py.

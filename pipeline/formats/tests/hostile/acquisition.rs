@@ -5,8 +5,8 @@ use crate::scope_files::{Trace, bin_file, isf_file};
 use crate::support::{self, Random, peak_bytes};
 use crate::tdms_file::*;
 use afmid_formats::Format;
-use afmid_formats::{keysight::Keysight, lecroy::LeCroy, tdms::Tdms, tektronix::TektronixIsf};
-use afmid_formats::{text_table::TextTable, uff::Uff, wav::Wav};
+use afmid_formats::readers::{keysight::Keysight, lecroy::LeCroy, tdms::Tdms, tektronix::TektronixIsf};
+use afmid_formats::readers::{text_table::TextTable, uff::Uff, wav::Wav};
 use std::path::Path;
 use std::time::{Duration, Instant};
 

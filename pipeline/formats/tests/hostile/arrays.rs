@@ -4,8 +4,8 @@ use crate::mat_builder::{Order, compressed, level4};
 use crate::support::{Random, Temporary, few_or_all, peak_bytes, real, written};
 use afmid_formats::RawBinary;
 use afmid_formats::SampleType;
-use afmid_formats::matlab::Mat;
-use afmid_formats::numpy::{Npy, Npz};
+use afmid_formats::readers::matlab::Mat;
+use afmid_formats::readers::numpy::{Npy, Npz};
 use afmid_formats::{Contents, Format, FormatError};
 use std::time::{Duration, Instant};
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_formats::Format;
-use afmid_formats::matlab::Mat;
+use afmid_formats::readers::matlab::Mat;
 
 use super::*;
 use crate::monitor::Unwatched;
