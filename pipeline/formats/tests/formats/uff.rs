@@ -180,6 +180,80 @@ fn binary_in_both_byte_orders_and_precisions() {
     }
 }
 
+/// As pyuff 2.5.8 writes 58b: double precision throughout, and as many bytes stated as the points take as single numbers
+/// of the type that is stated.
+fn of_pyuff(kind: u32, even: bool, rows: &[&[f64]]) -> Vec<u8> {
+    let complex = kind > 4;
+    let stated = rows.len() * if matches!(kind, 4 | 6) { 8 } else { 4 };
+    let mut text = format!("    -1\n    58b{:6}{:6}{:12}{stated:12}{:6}{:6}{:12}{:12}\n", 1, 2, 11, 0, 0, 0, 0);
+    for line in ["id1", "NONE", "NONE", "NONE", "NONE"] {
+        text += &format!("{line:80}\n");
+    }
+    let (function, quantity) = if complex { (4, 18) } else { (1, 17) };
+    text += &format!("{function:5}{:10}{:5}{:10}       NONE{:10}{:4}       NONE{:10}{:4}\n", 0, 0, 0, 1, 1, 2, 1);
+    let step = if even { "2.50000e-04" } else { "0.00000e+00" };
+    text += &format!("{kind:10}{:10}{:10}  0.00000e+00  {step}  0.00000e+00\n", rows.len(), u8::from(even));
+    for quantity in [quantity, 8, 13, 0] {
+        text += &format!("{quantity:10}{:5}{:5}{:5} {:20} {:20}\n", 0, 0, 0, "NONE", "NONE");
+    }
+    let data = rows.iter().flat_map(|row| row.iter().skip(usize::from(even))).flat_map(|number| number.to_le_bytes());
+    let mut bytes = text.into_bytes();
+    bytes.extend(data);
+    bytes.extend(b"    -1\n");
+    bytes
+}
+
+#[test]
+fn the_byte_counts_of_pyuff_are_made_good() {
+    // abscissa, ordinate, imaginary part
+    let real: [&[f64]; 3] = [&[0.0, -1.0], &[1e-3, 0.5], &[2.5e-3, 2.0]];
+    let complex: [&[f64]; 3] = [&[0.0, -1.0, 3.0], &[1.0, 0.5, 0.1], &[2.5, 2.0, -7.0]];
+    for kind in [2, 4, 5, 6] {
+        for even in [true, false] {
+            let rows = if kind > 4 { &complex } else { &real };
+            let once = of_pyuff(kind, even, rows);
+            let found = contents("pyuff", &[once.clone(), once].concat());
+            let column = |at: usize| rows.iter().map(|row| row[at]).collect::<Vec<f64>>();
+            let case = format!("type {kind}, even {even}");
+            let miscounted = found.remarks.iter().filter(|remark| remark.contains("bytes of data and has")).count();
+            assert_eq!(miscounted, if (kind, even) == (4, true) { 0 } else { 2 }, "{case}: {:?}", found.remarks);
+            let single = found.remarks.iter().filter(|remark| remark.contains("single precision is stated")).count();
+            assert_eq!(single, if matches!(kind, 2 | 5) { 2 } else { 0 }, "{case}: {:?}", found.remarks);
+            if kind > 4 {
+                assert_eq!(found.responses.len(), 2, "{case}");
+                let [re, im] = &found.responses[1].values;
+                assert_eq!((values(re), values(im)), (column(1), column(2)), "{case}");
+                assert_eq!(re.stored_as, "float64");
+            } else {
+                let ordinate = &found.channels[if even { 1 } else { 2 }];
+                assert_eq!((values(ordinate), ordinate.stored_as), (column(1), "float64"), "{case}");
+                assert_eq!(ordinate.sample_rate_hz, even.then_some(4000.0), "{case}");
+                if !even {
+                    assert_eq!(values(&found.channels[3]), column(0), "{case}");
+                }
+            }
+        }
+    }
+    // what is no multiple of the count, or is not followed by another dataset, is refused as before
+    let good = of_pyuff(4, false, &real);
+    let stated = |count: &str| String::from_utf8_lossy(&good).replacen("          24     0", count, 1).into_bytes();
+    assert_ne!(stated("          20     0"), stated("          24     0"));
+    assert!(error("pyuff-20", &stated("          20     0")).problem.contains("36 or 48 by type"));
+    let followed = [good, b"something else".to_vec()].concat();
+    assert!(error("pyuff-else", &followed).problem.contains("something else is there"));
+}
+
+#[test]
+fn padding_is_less_than_a_point() {
+    let padded = |extra: usize| {
+        let mut data: Vec<u8> = [1.5_f32, -2.5, 3.5].iter().flat_map(|v| v.to_le_bytes()).collect();
+        data.extend(vec![0; extra]);
+        contents("padded", &bytes(&Dataset { id: binary_id(1, data.len()), ..time(&data, 2, 3) }))
+    };
+    assert_eq!(values(&padded(2).channels[0]), [1.5, -2.5, 3.5]);
+    assert!(remarked(&padded(4), "do not match"));
+}
+
 #[test]
 fn spectra_other_datasets_and_second_responses() {
     let one = b" 1.00000E+00\n";

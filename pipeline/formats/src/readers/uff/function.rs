@@ -1,6 +1,7 @@
 //! From datasets to channels.
 
 use super::header::Header;
+use super::layout::Layout;
 use super::samples::{Picked, Text};
 use super::scan::{Data, Dataset, Scanned};
 use crate::grid::{Grid, Store};
@@ -27,7 +28,10 @@ pub(super) fn contents(scanned: Scanned, pinned: &Pinned) -> Contents {
         let location = if *times == 1 { name } else { format!("{name}[{times}]") };
         if dataset.header.complex && dataset.header.is_response() {
             match response(dataset, &location, pinned) {
-                Ok(found) => responses.push(found),
+                Ok(found) => {
+                    remarks.extend(doubles(dataset, &location));
+                    responses.push(found);
+                }
                 Err(why) => remarks.push(format!("the frequency response {location} is left out: {why}")),
             }
             continue;
@@ -70,6 +74,7 @@ fn function(
         return Err("it has no values".to_owned());
     }
     let (mut ordinates, abscissa) = sources(dataset, pinned)?;
+    remarks.extend(doubles(dataset, location));
     let ordinate = ordinates.pop().ok_or("it has no values")?;
     let rate = rate(header, location, remarks);
     let mut long_name = header.identification.join(", ");
@@ -94,11 +99,17 @@ fn function(
 }
 
 fn stored_as(dataset: &Dataset) -> &'static str {
-    match (dataset.data, dataset.header.double) {
+    match (dataset.data, dataset.layout.is_some_and(Layout::is_double)) {
         (Data::Text, _) => "text",
         (_, true) => "float64",
         (_, false) => "float32",
     }
+}
+
+/// What to say where the data take the bytes of double precision and single is stated.
+fn doubles(dataset: &Dataset, location: &str) -> Option<String> {
+    let doubles = dataset.layout.is_some_and(Layout::is_double) && !dataset.header.double;
+    doubles.then(|| format!("{location}: single precision is stated, its data take the bytes of double: read as that"))
 }
 
 /// A frequency response. Errors: why there is none.
@@ -184,32 +195,22 @@ fn sources(dataset: &Dataset, pinned: &Pinned) -> Result<(Vec<Arc<dyn Source>>, 
         let abscissa: Abscissa = if header.even { None } else { Some((pick(0), "text")) };
         return Ok(((every - header.numbers()..every).map(pick).collect(), abscissa));
     }
-    let width = if header.double { 8 } else { 4 };
-    // The abscissa is single precision by the standard; some writers make it as wide as the ordinate.
-    let abscissa_widths: &[u64] = if header.even { &[0] } else { &[4, 8] };
-    let fits = |x: &&u64| points.checked_mul(parts * width + **x) == Some(bytes);
-    let padded = |x: &&u64| points.checked_mul(parts * width + **x).is_some_and(|wanted| wanted <= bytes);
-    let Some(&abscissa_width) =
-        abscissa_widths.iter().find(fits).or_else(|| abscissa_widths.iter().find(padded).filter(|_| header.even))
-    else {
+    let Some(layout) = dataset.layout else {
         return Err(format!("{points} points are stated, which its {bytes} bytes of data do not match"));
     };
-    let step = parts * width + abscissa_width;
-    let big_endian = dataset.data == Data::BigEndian;
-    let samples = points as usize;
-    let source = |first, double| Grid {
+    let source = |first, width| Grid {
         store: Store::File(pinned.clone()),
-        first,
-        step,
-        samples,
-        number: if double { Number::F64 } else { Number::F32 },
-        big_endian,
+        first: dataset.from + first,
+        step: layout.point(),
+        samples: points as usize,
+        number: if width == 8 { Number::F64 } else { Number::F32 },
+        big_endian: dataset.data == Data::BigEndian,
     };
     let part = |part: u64| -> Arc<dyn Source> {
-        Arc::new(source(dataset.from + abscissa_width + part * width, header.double))
+        Arc::new(source(layout.abscissa + part * layout.ordinate, layout.ordinate))
     };
-    let wide = abscissa_width == 8;
-    let stored_as = if wide { "float64" } else { "float32" };
-    let abscissa: Abscissa = if header.even { None } else { Some((Arc::new(source(dataset.from, wide)), stored_as)) };
+    let stored_as = if layout.abscissa == 8 { "float64" } else { "float32" };
+    let abscissa: Abscissa =
+        if header.even { None } else { Some((Arc::new(source(0, layout.abscissa)), stored_as)) };
     Ok(((0..parts).map(part).collect(), abscissa))
 }

@@ -10,6 +10,9 @@
 //!   of response and reference; they are no channels.
 //! - Other complex functions and other datasets are left out: a remark says so.
 //! - The data of 58b are read as they are asked for; text is parsed on the first read and kept.
+//! - The number of data bytes that 58b states is wrong in files of the Python package pyuff where values are complex or
+//!   the abscissa is uneven: type, spacing and number of points give it as well. Where the dataset ends there and not
+//!   behind the number stated, a remark says so.
 //!
 //! Source: Structural Dynamics Research Corporation, "Universal Dataset Number 58" and University of Cincinnati SDRL,
 //! "The Binary 58 Universal File Format", www.sdrl.uc.edu/sdrl/referenceinfo/universalfileformats.
@@ -17,6 +20,7 @@
 mod fixed;
 mod function;
 mod header;
+mod layout;
 mod samples;
 mod scan;
 
