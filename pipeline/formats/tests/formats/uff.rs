@@ -88,7 +88,8 @@ fn a_sound_recorded_as_58b() {
     );
     assert_eq!(locations(&found), ["Mic 01"]);
     let c = &found.channels[0];
-    assert_eq!((c.unit.as_str(), c.sample_rate_hz, c.stored_as), ("Pa", Some(1.52588e-05_f64.recip()), "float32"));
+    assert_eq!((c.unit.as_str(), c.sample_rate_hz, c.stored_as), ("Pa", Some(65_536.0), "float32"));
+    // the header's step is 1.52588e-05
     assert!(c.long_name.contains("Mic 01.0Scalar") && found.remarks.is_empty());
     let all = values(c);
     assert_eq!(all.len(), 79_292);
@@ -241,6 +242,68 @@ fn the_byte_counts_of_pyuff_are_made_good() {
     assert!(error("pyuff-20", &stated("          20     0")).problem.contains("36 or 48 by type"));
     let followed = [good, b"something else".to_vec()].concat();
     assert!(error("pyuff-else", &followed).problem.contains("something else is there"));
+}
+
+/// The only channel of a dataset whose step or times are printed so.
+fn rate_of(dataset: &Dataset) -> (Option<f64>, Contents) {
+    let found = contents("rate", &bytes(dataset));
+    (found.channels[0].sample_rate_hz, found)
+}
+
+#[test]
+fn the_rate_is_the_round_one_that_a_printed_step_allows() {
+    for rate in [51_200.0, 65_536.0, 44_100.0, 48_828.125, 2560.0, 102_400.0, 3e5, 1000.0 / 3.0, 2.5e9] {
+        let (found, _) = rate_of(&Dataset { step: 1.0 / rate, ..time(b"  1.00000E+00\n", 2, 1) });
+        // thirds have no end: to twelve digits
+        assert!(
+            (found.unwrap() / rate - 1.0).abs() < if rate.fract() > 0.3 { 1e-11 } else { 1e-15 },
+            "{rate} {found:?}"
+        );
+    }
+    // a step that is round itself, and a rate that is not round beyond its six digits
+    assert_eq!(rate_of(&Dataset { step: 3e-4, ..time(b"  1.00000E+00\n", 2, 1) }).0, Some(3333.333_333_33));
+    let odd = rate_of(&Dataset { step: 1.234_57e-5, ..time(b"  1.00000E+00\n", 2, 1) }).0.unwrap();
+    assert!((odd * 1.234_57e-5 - 1.0).abs() <= 0.5e-5 / 1.234_57, "{odd}");
+    // frequency responses have the step that was meant, too
+    let third = Dataset { function: 4, step: 1.0 / 3.0, abscissa: (18, "Frequency", "Hz"), ..time(b"", 5, 2) };
+    let data = b"  1.00000E+00  0.00000E+00  1.00000E+00  0.00000E+00\n".to_vec();
+    let found = contents("third", &bytes(&Dataset { data, ..third }));
+    let step = format!("{:?}", found.responses[0].frequencies);
+    assert_eq!(step, format!("Even(0.0, {:?})", 1.0 / 3.0));
+}
+
+/// Uneven data of a rate, times printed as E13.5.
+fn printed_times(rate: f64, points: usize) -> Dataset {
+    let line = |k: usize| format!("  {:.5E}  {:.5E}\n", k as f64 / rate, 1.0);
+    let text: String = (0..points).map(line).collect();
+    Dataset { even: false, ..time(text.replace("E0", "E+00").replace("E-", "E-0").as_bytes(), 2, points) }
+}
+
+#[test]
+fn stored_times_that_run_evenly_to_within_their_printing_are_a_rate() {
+    for rate in [2560.0, 4096.0, 1000.0, 48_828.125, 51_200.0] {
+        // the last time is below 0.1 s: half a step and more is seen
+        let points = (rate * 0.09) as usize;
+        let (found, contents) = rate_of(&printed_times(rate, points));
+        assert_eq!(found, Some(rate), "{:?}", contents.remarks);
+        assert_eq!(locations(&contents), ["12-Y"]);
+        assert!(remarked(&contents, "12-Y/abscissa is given as the sample rate"), "{:?}", contents.remarks);
+    }
+    // a lost sample
+    let mut lost = printed_times(2560.0, 200);
+    let at = lost.data.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(150).unwrap().0;
+    let line = lost.data.iter().skip(at + 1).position(|byte| *byte == b'\n').unwrap() + 1;
+    lost.data.drain(at + 1..at + 1 + line);
+    let (found, contents) = rate_of(&Dataset { points: 199, ..lost });
+    assert!(found.is_none() && remarked(&contents, "steps off") && contents.channels.len() == 2);
+    // times that repeat: neighbours 0 or 1e-5 s apart, at 51.2 kHz behind the first second
+    let (found, contents) = rate_of(&printed_times(102_400.0, 110_000));
+    if let Some(rate) = found {
+        assert_eq!(rate, 102_400.0, "{:?}", contents.remarks);
+    }
+    // what is not time is no rate
+    let (found, contents) = rate_of(&Dataset { abscissa: (18, "Frequency", "Hz"), ..printed_times(2560.0, 20) });
+    assert!(found.is_none() && contents.channels.len() == 2 && remarked(&contents, "point by point"));
 }
 
 #[test]
