@@ -150,6 +150,16 @@ fn what_cannot_be_read_is_refused_with_the_reason() {
 }
 
 #[test]
+fn bytes_per_second_that_contradict_the_rate_leave_it_unknown() {
+    let mut about = format(1, 2, 8000, 16, false);
+    about[8..12].copy_from_slice(&48_000_u32.to_le_bytes());
+    let bytes = file(b"RIFF", &[chunk(b"fmt ", &about, false), chunk(b"data", &[0; 8], false)]);
+    let (contents, _) = first(&bytes);
+    assert_eq!(contents.channels[0].sample_rate_hz, None);
+    assert!(remarked(&contents, "8000 frames of 4 bytes and 48000 bytes per second, wanted 32000"));
+}
+
+#[test]
 fn rates_that_are_not_stated_are_unknown() {
     let bytes = file(b"RIFF", &[chunk(b"fmt ", &format(3, 1, 0, 32, false), false), chunk(b"data", &[0; 8], false)]);
     assert_eq!(first(&bytes).0.channels[0].sample_rate_hz, None);

@@ -23,6 +23,8 @@ pub(super) struct Coding {
     pub(super) channels: u16,
     /// 0 if it is not stated.
     pub(super) rate_hz: u32,
+    /// 0 if it is not stated.
+    byte_rate: u32,
     /// Bytes from a sample to the next one of its channel.
     pub(super) frame_bytes: u64,
     /// Bits of the container of a sample.
@@ -63,10 +65,36 @@ impl Coding {
         if valid_bits > bits {
             return wrong(format!("found {valid_bits} valid bits in samples of {bits}, wanted at most as many"));
         }
-        let mut coding =
-            Self { number, channels, rate_hz, frame_bytes, bits, valid_bits, scale_factor: 1.0, add_offset: 0.0 };
+        let mut coding = Self {
+            number,
+            channels,
+            rate_hz,
+            byte_rate: fields.u32(8),
+            frame_bytes,
+            bits,
+            valid_bits,
+            scale_factor: 1.0,
+            add_offset: 0.0,
+        };
         coding.scale_to(bits);
         Ok(coding)
+    }
+
+    /// Samples per second; none, with a remark, if they are not stated or bytes per second state others.
+    pub(super) fn sample_rate_hz(&self, remarks: &mut Vec<String>) -> Option<f64> {
+        if self.rate_hz == 0 {
+            remarks.push("no sample rate: the header says 0, wanted a number above 0".to_owned());
+            return None;
+        }
+        let wanted = u64::from(self.rate_hz) * self.frame_bytes;
+        if self.byte_rate != 0 && wanted != u64::from(self.byte_rate) {
+            remarks.push(format!(
+                "no sample rate: the header says {} frames of {} bytes and {} bytes per second, wanted {wanted}",
+                self.rate_hz, self.frame_bytes, self.byte_rate
+            ));
+            return None;
+        }
+        Some(f64::from(self.rate_hz))
     }
 
     /// Takes the full scale of so many bits for 1.

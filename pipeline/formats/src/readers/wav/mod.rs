@@ -77,9 +77,7 @@ impl Format for Wav {
         if !coding.number.is_float() {
             remarks.push("the samples are fractions of full scale: the file states no unit".to_owned());
         }
-        if coding.rate_hz == 0 {
-            remarks.push("no sample rate: the header says 0, wanted a number above 0".to_owned());
-        }
+        let sample_rate_hz = coding.sample_rate_hz(&mut remarks);
         let channel = |number: u64| {
             let grid = Grid {
                 store: Store::File(file.pinned().clone()),
@@ -91,7 +89,7 @@ impl Format for Wav {
             };
             FoundChannel {
                 long_name: format!("channel {number} of {}", coding.channels),
-                sample_rate_hz: (coding.rate_hz > 0).then(|| f64::from(coding.rate_hz)),
+                sample_rate_hz,
                 scale_factor: coding.scale_factor,
                 add_offset: coding.add_offset,
                 ..FoundChannel::new(format!("/channel[{number}]"), samples, coding.number.name(), Arc::new(grid))
