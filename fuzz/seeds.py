@@ -238,6 +238,34 @@ def uff():
     write("uff", "unknown-set.uff", "    -1\n   151\nmodel\n    -1\n".encode() + dataset("    58", 4, 4, True, numbers))
 
 
+# classic netCDF: records of two variables, one of two lanes, and an axis with its unit
+def netcdf():
+    def name(text, size):
+        return struct.pack(">" + size, len(text)) + text + b"\0" * (-len(text) % 4)
+
+    def attribute(key, kind, data, count, size):
+        return name(key, size) + struct.pack(">i" + size, kind, count) + data + b"\0" * (-len(data) % 4)
+
+    def listed(tag, parts, size):
+        return struct.pack(">i" + size, tag if parts else 0, len(parts)) + b"".join(parts)
+
+    for version, size, offset in [(1, "i", "i"), (2, "i", "q"), (5, "q", "q")]:
+        def header(begins):
+            units = [attribute(b"units", 2, b"ms", 2, size), attribute(b"scale_factor", 6, struct.pack(">d", 0.5), 1, size)]
+            variables = [(b"t", [0], units, 6, 8), (b"y", [0, 1], units[1:], 3, 4), (b"fs", [], [], 5, 4)]
+            entries = []
+            for (key, dims, about, kind, bytes_), begin in zip(variables, begins):
+                entry = name(key, size) + struct.pack(">" + size, len(dims)) + b"".join(struct.pack(">" + size, dim) for dim in dims)
+                entries.append(entry + listed(12, about, size) + struct.pack(">i" + size + offset, kind, bytes_, begin))
+            dimensions = [name(b"t", size) + struct.pack(">" + size, 0), name(b"lane", size) + struct.pack(">" + size, 2)]
+            rate = [attribute(b"sampling_rate", 6, struct.pack(">d", 1000.0), 1, size)]
+            return b"CDF" + bytes([version]) + struct.pack(">" + size, len(SAMPLES)) + listed(10, dimensions, size) + listed(12, rate, size) + listed(11, entries, size)
+
+        length = len(header([0, 0, 0]))
+        records = b"".join(struct.pack(">d2h", i * 1.0, value, -value) for i, value in enumerate(SAMPLES))
+        write("netcdf", f"cdf{version}.nc", header([length + 4, length + 12, length]) + struct.pack(">f", 1000.0) + records)
+
+
 # text
 def text():
     write("text", "comma.csv", "time [s],deflection [V]\n" + "".join(f"{i * 1e-3:.3f},{value / 8}\n" for i, value in enumerate(SAMPLES)))
@@ -484,5 +512,5 @@ def inspected():
     write("inspect", "decay.csv", "time [s],y [V]\n" + "".join(f"{i * 1e-5:.5f},{value}\n" for i, value in enumerate(decay)))
 
 
-for make in (tdms, arrays, mat, ibw, nanoscope, jpk, uff, text, scope_tables, wav, scopes, raw, foreign, configs, plugins, responses, inspected):
+for make in (tdms, arrays, mat, ibw, nanoscope, jpk, uff, netcdf, text, scope_tables, wav, scopes, raw, foreign, configs, plugins, responses, inspected):
     make()

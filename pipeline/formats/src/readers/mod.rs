@@ -15,6 +15,7 @@ pub mod keysight;
 pub mod lecroy;
 pub mod matlab;
 pub mod nanoscope;
+pub mod netcdf;
 pub mod numpy;
 pub mod raw_binary;
 pub mod tdms;
@@ -63,6 +64,7 @@ const FORMATS: &[Known] = &[
     Known::of::<lecroy::LeCroy>(),
     Known::of::<keysight::Keysight>(),
     Known::of::<tektronix::TektronixIsf>(),
+    Known::of::<netcdf::NetCdf>(),
     Known::of::<uff::Uff>(),
     Known::of::<matlab::Mat>(),
     Known::of::<igor::IgorWave>(),

@@ -329,6 +329,8 @@ fn lengths_that_lie_are_refused_with_the_byte() {
     };
     assert_eq!(refusal(&with(4, -1)).at_byte, Some(4));
     assert!(refusal(&with(4, 320)).problem.contains("room for 0 bytes"));
+    // three points of four bytes in room for three of eight
+    assert!(refusal(&with(4, 344)).problem.contains("found 24 bytes of samples, wanted 12 for 3 points of float32"));
     assert!(refusal(&with(132, 4)).problem.contains("wanted a product of 3 points"));
     assert!(refusal(&with(76, 1 << 30)).problem.contains("product"));
     let mut huge = with(76, 1 << 30);

@@ -282,10 +282,16 @@ fn what_is_no_channel_of_numbers_is_remarked() {
         assert!(contents.channels.is_empty() && remarked(&contents, what), "{what}: {:?}", contents.remarks);
     }
     let short = remark(scaling.to_owned(), &[0, 1, 0]);
-    assert!(
-        short.channels[0].samples == 1
-            && remarked(&short, "found 3 bytes, that is 1 samples of int16; its segment announces 2")
-    );
+    let said = "/segments/0/x is left out: found 3 bytes, that is 1 samples of int16; its segment announces 2";
+    assert!(short.channels.is_empty() && remarked(&short, said), "{:?}", short.remarks);
+    // twice the points, or points of twice the width: left out; other numbers of points: no rate
+    let wide = remark(scaling.to_owned(), &[0; 8]);
+    assert!(wide.channels.is_empty() && remarked(&wide, "4 samples of int16; its segment announces 2"));
+    let more = remark(scaling.to_owned(), &[0; 6]);
+    assert_eq!((more.channels[0].samples, more.channels[0].sample_rate_hz), (3, None));
+    assert!(remarked(&more, "/segments/0/x: no sample rate: found 6 bytes"), "{:?}", more.remarks);
+    let other = remark(format!("{scaling}channel.x.data.type=integer-data\n"), &[0; 4]);
+    assert!(other.channels.is_empty() && remarked(&other, "its type is `integer-data` and its encoder `signedshort`"));
     let timeless = remark(format!("{scaling}force-segment-header.duration=0\n"), &[0, 1, 0, 2]);
     assert!(timeless.channels[0].sample_rate_hz.is_none() && remarked(&timeless, "no sample rate"));
 

@@ -7,6 +7,8 @@ mod matlab_built;
 mod matlab_real;
 mod matlab_written;
 mod nanoscope;
+mod netcdf;
+mod netcdf_builder;
 mod numpy_built;
 mod numpy_written;
 mod raw_binary;

@@ -152,6 +152,19 @@ fn what_is_no_force_curve_is_refused_with_a_reason() {
 }
 
 #[test]
+fn versions_that_are_not_known_are_not_read_and_samples_lie_behind_the_header() {
+    let sound = String::from_utf8_lossy(&file(FORCE, LIST, &words(&[1, 2, 3, 4, 5]))).into_owned();
+    for version in ["0x03000000", "0x42000000"] {
+        let error = refusal(sound.replace("0x08150308", version).as_bytes());
+        assert!(error.problem.starts_with("not read: this file is of Nanoscope version"), "{error:?}");
+        assert!(!error.help.unwrap().contains("damaged"));
+    }
+    assert!(open(sound.replace("0x08150308", "0x10000000").as_bytes()).channels.len() == 2);
+    let error = refusal(sound.replace("Data offset: 2048", "Data offset: 0100").as_bytes());
+    assert!(error.problem.contains("found samples from byte 100, wanted them behind the header"), "{error:?}");
+}
+
+#[test]
 fn a_header_without_data_is_refused() {
     let Some(path) = real("spm/bruker_data_header.000") else { return };
     assert!(Nanoscope::recognises(&std::fs::read(&path).unwrap()[..4096], &path));

@@ -44,13 +44,27 @@ fn lecroy_files_that_hold_no_signal_are_refused() {
     let cases = [
         (Trace { record_type: 5, ..Trace::default() }, "complex numbers"),
         (Trace { record_type: 2, ..Trace::default() }, "a histogram"),
-        (Trace { template: "LECROY_1_0", ..Trace::default() }, "found the template «LECROY_1_0»"),
+        (Trace { template: "LECROY_1_0", ..Trace::default() }, "not read: this waveform has the template «LECROY_1_0»"),
         (Trace { codes: Vec::new(), ..Trace::default() }, "found no samples"),
     ];
     for (trace, words) in cases {
         let error = error(&trace);
         assert!(error.problem.contains(words) && error.at_byte.is_some() && error.help.is_some(), "{words}: {error:?}");
     }
+    // headers that contradict themselves: byte order, more samples than the array holds, words counted as bytes
+    let changed = |trace: Trace, at: usize, word: &[u8]| {
+        let mut bytes = trace.file();
+        bytes[11 + at..11 + at + word.len()].copy_from_slice(word);
+        open::<LeCroy>("contradicts.trc", &bytes).unwrap_err()
+    };
+    let older = changed(Trace::default(), 16, b"LECROY_1_0");
+    assert!(!older.help.unwrap().contains("damaged"));
+    let order = changed(Trace::default(), 34, &[2, 0]);
+    assert!(order.problem.contains("found the byte order 512"), "{order:?}");
+    let more = changed(Trace::default(), 116, &[7, 0]);
+    assert!(more.problem.contains("found 7 samples of 2 bytes in an array of 12 bytes"), "{more:?}");
+    let words = changed(Trace { words: false, ..Trace::default() }, 116, &[3, 0]);
+    assert!(words.problem.contains("found 3 samples of 1 bytes in an array of 6 bytes"), "{words:?}");
     let whole = Trace::default().file();
     let cut = open::<LeCroy>("cut.trc", &whole[..whole.len() - 1]).unwrap_err();
     assert!(cut.problem.contains("wanted 12 bytes from byte 363"), "{cut:?}");
@@ -118,6 +132,10 @@ fn damaged_keysight_files_are_refused() {
         let error = error(&bytes);
         assert!(error.problem.contains(words) && error.at_byte.is_some() && error.help.is_some(), "{words}: {error:?}");
     }
+    // two points stated and eight bytes there; three points and eight bytes contradict each other
+    assert_eq!(open::<Keysight>("points.bin", &changed(24, 2)).unwrap().channels.len(), 1);
+    let contents = open::<Keysight>("points.bin", &changed(24, 3)).unwrap();
+    assert!(contents.channels.is_empty() && remarked(&contents, "it has 8 bytes, wanted 12 for the 3 points stated"));
 }
 
 const LONG: &str = ":WFMPRE:BYT_NR 2;BIT_NR 16;ENCDG BIN;BN_FMT RI;BYT_OR MSB;NR_PT 3;\
@@ -130,7 +148,7 @@ fn tektronix_waveforms_in_all_codings() {
     let words = |big: bool| [4_i16, -2, 0].map(|code| word(big, code)).concat();
     let floats = [4_f32, -2.0, 0.0].map(f32::to_le_bytes).concat();
     let little = LONG.replace("BYT_OR MSB", "BYT_OR LSB");
-    let float = little.replace("BYT_NR 2", "BYT_NR 4").replace("BN_FMT RI", "BN_FMT FP");
+    let float = little.replace("BYT_NR 2;BIT_NR 16", "BYT_NR 4;BIT_NR 32").replace("BN_FMT RI", "BN_FMT FP");
     let short = ":WFMP:NR_P 3;:WFMP:BYT_N 1;BIT_N 8;ENC BIN;BN_F RI;BYT_O MSB;WFI \"Ch2, DC\";PT_F Y;XUN \"s\";\
         XIN 10.0E-6;XZE 0;PT_O 0;YUN \"V\";YMU 500.0E-3;YOF 2;YZE 1.0E+0";
     let curve = |bytes: &[u8]| [format!("#1{}", bytes.len()).into_bytes(), bytes.to_vec()].concat();
@@ -167,6 +185,9 @@ fn tektronix_envelopes_cuts_and_refusals() {
         (isf_file(&LONG.replace("YMULT 0.5", "YMULT x"), b"#12\x00\x01"), "found YMU «x»"),
         (isf_file(&LONG.replace("YMULT 0.5", "YMULT 0"), b"#12\x00\x01"), "found YMULT 0"),
         (isf_file(LONG, b"12"), "wanted a block of bytes"),
+        (isf_file(&LONG.replace("BIT_NR 16", "BIT_NR 8"), b"#12\x00\x01"), "found BIT_NR 8 and BYT_NR 2"),
+        (isf_file(&LONG.replace("BYT_OR MSB", "BYT_OR XSB"), b"#12\x00\x01"), "found the byte order «XSB»"),
+        (isf_file(LONG, b"#13\x00\x01\x02"), "found BYT_NR 2 and 3 points in a block of 3 bytes"),
         (isf_file(LONG, b"#10"), "found no samples"),
         (LONG.as_bytes().to_vec(), "found no «CURVE»"),
         (isf_file(&LONG.replace("ENCDG BIN", "ENCDG ASC"), b"4,x"), "found «x» as code 2"),

@@ -88,7 +88,8 @@ fn a_sound_recorded_as_58b() {
     );
     assert_eq!(locations(&found), ["Mic 01"]);
     let c = &found.channels[0];
-    assert_eq!((c.unit.as_str(), c.sample_rate_hz, c.stored_as), ("Pa", Some(1.52588e-05_f64.recip()), "float32"));
+    assert_eq!((c.unit.as_str(), c.sample_rate_hz, c.stored_as), ("Pa", Some(65_536.0), "float32"));
+    // the header's step is 1.52588e-05
     assert!(c.long_name.contains("Mic 01.0Scalar") && found.remarks.is_empty());
     let all = values(c);
     assert_eq!(all.len(), 79_292);
@@ -178,6 +179,142 @@ fn binary_in_both_byte_orders_and_precisions() {
         assert_eq!(values(&found.channels[0]), expected);
         assert_eq!(matches!(found.channels[0].source.read(0, 1), Ok(Raw::Float32(_))), kind == 2);
     }
+}
+
+/// As pyuff 2.5.8 writes 58b: double precision throughout, and as many bytes stated as the points take as single numbers
+/// of the type that is stated.
+fn of_pyuff(kind: u32, even: bool, rows: &[&[f64]]) -> Vec<u8> {
+    let complex = kind > 4;
+    let stated = rows.len() * if matches!(kind, 4 | 6) { 8 } else { 4 };
+    let mut text = format!("    -1\n    58b{:6}{:6}{:12}{stated:12}{:6}{:6}{:12}{:12}\n", 1, 2, 11, 0, 0, 0, 0);
+    for line in ["id1", "NONE", "NONE", "NONE", "NONE"] {
+        text += &format!("{line:80}\n");
+    }
+    let (function, quantity) = if complex { (4, 18) } else { (1, 17) };
+    text += &format!("{function:5}{:10}{:5}{:10}       NONE{:10}{:4}       NONE{:10}{:4}\n", 0, 0, 0, 1, 1, 2, 1);
+    let step = if even { "2.50000e-04" } else { "0.00000e+00" };
+    text += &format!("{kind:10}{:10}{:10}  0.00000e+00  {step}  0.00000e+00\n", rows.len(), u8::from(even));
+    for quantity in [quantity, 8, 13, 0] {
+        text += &format!("{quantity:10}{:5}{:5}{:5} {:20} {:20}\n", 0, 0, 0, "NONE", "NONE");
+    }
+    let data = rows.iter().flat_map(|row| row.iter().skip(usize::from(even))).flat_map(|number| number.to_le_bytes());
+    let mut bytes = text.into_bytes();
+    bytes.extend(data);
+    bytes.extend(b"    -1\n");
+    bytes
+}
+
+#[test]
+fn the_byte_counts_of_pyuff_are_made_good() {
+    // abscissa, ordinate, imaginary part
+    let real: [&[f64]; 3] = [&[0.0, -1.0], &[1e-3, 0.5], &[2.5e-3, 2.0]];
+    let complex: [&[f64]; 3] = [&[0.0, -1.0, 3.0], &[1.0, 0.5, 0.1], &[2.5, 2.0, -7.0]];
+    for kind in [2, 4, 5, 6] {
+        for even in [true, false] {
+            let rows = if kind > 4 { &complex } else { &real };
+            let once = of_pyuff(kind, even, rows);
+            let found = contents("pyuff", &[once.clone(), once].concat());
+            let column = |at: usize| rows.iter().map(|row| row[at]).collect::<Vec<f64>>();
+            let case = format!("type {kind}, even {even}");
+            let miscounted = found.remarks.iter().filter(|remark| remark.contains("bytes of data and has")).count();
+            assert_eq!(miscounted, if (kind, even) == (4, true) { 0 } else { 2 }, "{case}: {:?}", found.remarks);
+            let single = found.remarks.iter().filter(|remark| remark.contains("single precision is stated")).count();
+            assert_eq!(single, if matches!(kind, 2 | 5) { 2 } else { 0 }, "{case}: {:?}", found.remarks);
+            if kind > 4 {
+                assert_eq!(found.responses.len(), 2, "{case}");
+                let [re, im] = &found.responses[1].values;
+                assert_eq!((values(re), values(im)), (column(1), column(2)), "{case}");
+                assert_eq!(re.stored_as, "float64");
+            } else {
+                let ordinate = &found.channels[if even { 1 } else { 2 }];
+                assert_eq!((values(ordinate), ordinate.stored_as), (column(1), "float64"), "{case}");
+                assert_eq!(ordinate.sample_rate_hz, even.then_some(4000.0), "{case}");
+                if !even {
+                    assert_eq!(values(&found.channels[3]), column(0), "{case}");
+                }
+            }
+        }
+    }
+    // what is no multiple of the count, or is not followed by another dataset, is refused as before
+    let good = of_pyuff(4, false, &real);
+    let stated = |count: &str| String::from_utf8_lossy(&good).replacen("          24     0", count, 1).into_bytes();
+    assert_ne!(stated("          20     0"), stated("          24     0"));
+    assert!(error("pyuff-20", &stated("          20     0")).problem.contains("36 or 48 by type"));
+    let followed = [good, b"something else".to_vec()].concat();
+    assert!(error("pyuff-else", &followed).problem.contains("something else is there"));
+}
+
+/// The only channel of a dataset whose step or times are printed so.
+fn rate_of(dataset: &Dataset) -> (Option<f64>, Contents) {
+    let found = contents("rate", &bytes(dataset));
+    (found.channels[0].sample_rate_hz, found)
+}
+
+#[test]
+fn the_rate_is_the_round_one_that_a_printed_step_allows() {
+    for rate in [51_200.0, 65_536.0, 44_100.0, 48_828.125, 2560.0, 102_400.0, 3e5, 1000.0 / 3.0, 2.5e9] {
+        let (found, _) = rate_of(&Dataset { step: 1.0 / rate, ..time(b"  1.00000E+00\n", 2, 1) });
+        // thirds have no end: to twelve digits
+        assert!(
+            (found.unwrap() / rate - 1.0).abs() < if rate.fract() > 0.3 { 1e-11 } else { 1e-15 },
+            "{rate} {found:?}"
+        );
+    }
+    // a step that is round itself, and a rate that is not round beyond its six digits
+    assert_eq!(rate_of(&Dataset { step: 3e-4, ..time(b"  1.00000E+00\n", 2, 1) }).0, Some(3333.333_333_33));
+    let odd = rate_of(&Dataset { step: 1.234_57e-5, ..time(b"  1.00000E+00\n", 2, 1) }).0.unwrap();
+    assert!((odd * 1.234_57e-5 - 1.0).abs() <= 0.5e-5 / 1.234_57, "{odd}");
+    // frequency responses have the step that was meant, too
+    let third = Dataset { function: 4, step: 1.0 / 3.0, abscissa: (18, "Frequency", "Hz"), ..time(b"", 5, 2) };
+    let data = b"  1.00000E+00  0.00000E+00  1.00000E+00  0.00000E+00\n".to_vec();
+    let found = contents("third", &bytes(&Dataset { data, ..third }));
+    let step = format!("{:?}", found.responses[0].frequencies);
+    assert_eq!(step, format!("Even(0.0, {:?})", 1.0 / 3.0));
+}
+
+/// Uneven data of a rate, times printed as E13.5.
+fn printed_times(rate: f64, points: usize) -> Dataset {
+    let line = |k: usize| format!("  {:.5E}  {:.5E}\n", k as f64 / rate, 1.0);
+    let text: String = (0..points).map(line).collect();
+    Dataset { even: false, ..time(text.replace("E0", "E+00").replace("E-", "E-0").as_bytes(), 2, points) }
+}
+
+#[test]
+fn stored_times_that_run_evenly_to_within_their_printing_are_a_rate() {
+    for rate in [2560.0, 4096.0, 1000.0, 48_828.125, 51_200.0] {
+        // the last time is below 0.1 s: half a step and more is seen
+        let points = (rate * 0.09) as usize;
+        let (found, contents) = rate_of(&printed_times(rate, points));
+        assert_eq!(found, Some(rate), "{:?}", contents.remarks);
+        assert_eq!(locations(&contents), ["12-Y"]);
+        assert!(remarked(&contents, "12-Y/abscissa is given as the sample rate"), "{:?}", contents.remarks);
+    }
+    // a lost sample
+    let mut lost = printed_times(2560.0, 200);
+    let at = lost.data.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(150).unwrap().0;
+    let line = lost.data.iter().skip(at + 1).position(|byte| *byte == b'\n').unwrap() + 1;
+    lost.data.drain(at + 1..at + 1 + line);
+    let (found, contents) = rate_of(&Dataset { points: 199, ..lost });
+    assert!(found.is_none() && remarked(&contents, "steps off") && contents.channels.len() == 2);
+    // times that repeat: neighbours 0 or 1e-5 s apart, at 51.2 kHz behind the first second
+    let (found, contents) = rate_of(&printed_times(102_400.0, 110_000));
+    if let Some(rate) = found {
+        assert_eq!(rate, 102_400.0, "{:?}", contents.remarks);
+    }
+    // what is not time is no rate
+    let (found, contents) = rate_of(&Dataset { abscissa: (18, "Frequency", "Hz"), ..printed_times(2560.0, 20) });
+    assert!(found.is_none() && contents.channels.len() == 2 && remarked(&contents, "point by point"));
+}
+
+#[test]
+fn padding_is_less_than_a_point() {
+    let padded = |extra: usize| {
+        let mut data: Vec<u8> = [1.5_f32, -2.5, 3.5].iter().flat_map(|v| v.to_le_bytes()).collect();
+        data.extend(vec![0; extra]);
+        contents("padded", &bytes(&Dataset { id: binary_id(1, data.len()), ..time(&data, 2, 3) }))
+    };
+    assert_eq!(values(&padded(2).channels[0]), [1.5, -2.5, 3.5]);
+    assert!(remarked(&padded(4), "do not match"));
 }
 
 #[test]

@@ -150,7 +150,66 @@ fn what_cannot_be_read_is_refused_with_the_reason() {
 }
 
 #[test]
+fn bytes_per_second_that_contradict_the_rate_leave_it_unknown() {
+    let mut about = format(1, 2, 8000, 16, false);
+    about[8..12].copy_from_slice(&48_000_u32.to_le_bytes());
+    let bytes = file(b"RIFF", &[chunk(b"fmt ", &about, false), chunk(b"data", &[0; 8], false)]);
+    let (contents, _) = first(&bytes);
+    assert_eq!(contents.channels[0].sample_rate_hz, None);
+    assert!(remarked(&contents, "8000 frames of 4 bytes and 48000 bytes per second, wanted 32000"));
+}
+
+#[test]
 fn rates_that_are_not_stated_are_unknown() {
     let bytes = file(b"RIFF", &[chunk(b"fmt ", &format(3, 1, 0, 32, false), false), chunk(b"data", &[0; 8], false)]);
     assert_eq!(first(&bytes).0.channels[0].sample_rate_hz, None);
+}
+
+/// A file of one channel of 32 bits; of the extensible form if valid bits are given.
+fn words(valid_bits: Option<u16>, codes: &[i32]) -> (Contents, Vec<f64>) {
+    let mut about = format(if valid_bits.is_some() { 0xFFFE } else { 1 }, 1, 8000, 32, false);
+    if let Some(valid) = valid_bits {
+        about.extend([22_u16, valid].into_iter().flat_map(u16::to_le_bytes));
+        about.extend([0; 4]);
+        about.extend([1, 0, 0, 0, 0, 0, 0x10, 0, 0x80, 0, 0, 0xAA, 0, 0x38, 0x9B, 0x71]);
+    }
+    let data: Vec<u8> = codes.iter().flat_map(|code| code.to_le_bytes()).collect();
+    first(&file(b"RIFF", &[chunk(b"fmt ", &about, false), chunk(b"data", &data, false)]))
+}
+
+#[test]
+fn bits_at_the_lower_end_of_a_word_are_recognised_by_what_is_stated_and_by_the_peak() {
+    const FULL: i32 = 1 << 23;
+    let (lower, upper) = ("full scale is that of 24 bits", "the scale is uncertain");
+    // valid bits, codes, bits of full scale, words of the remark
+    let cases: [(Option<u16>, &[i32], i32, Option<&str>); 13] = [
+        (None, &[FULL - 1, -FULL, 3], 24, Some(lower)),
+        (None, &[FULL / 2, 1], 24, Some(lower)),
+        (Some(32), &[FULL / 2 + 5, 1], 24, Some(lower)),
+        // a quiet signal of 32 bits, or of 24
+        (None, &[FULL / 2 - 1, -5], 32, Some(upper)),
+        (None, &[1, -1], 32, Some(upper)),
+        (None, &[FULL, 3], 32, None),
+        (None, &[-FULL - 1, 3], 32, None),
+        // at the upper end: the lowest bits are 0
+        (None, &[256, -512], 32, None),
+        (None, &[0, 0], 32, None),
+        (Some(24), &[256, -512], 32, None),
+        // stated, and at the lower end however quiet
+        (Some(24), &[257, -3], 24, Some(lower)),
+        (Some(24), &[FULL, 3], 32, Some("the samples use more")),
+        (Some(20), &[4097, -3], 20, Some("full scale is that of 20 bits")),
+    ];
+    for (valid, codes, bits, remark) in cases {
+        let (contents, found) = words(valid, codes);
+        let wanted: Vec<f64> = codes.iter().map(|code| f64::from(*code) * 2_f64.powi(1 - bits)).collect();
+        assert_eq!(found, wanted, "{valid:?} {codes:?}");
+        let said = contents.remarks.iter().filter(|remark| !remark.contains("states no unit")).collect::<Vec<_>>();
+        assert_eq!(said.len(), usize::from(remark.is_some()), "{said:?}");
+        assert!(remark.is_none_or(|words| said[0].contains(words)), "{said:?}");
+    }
+    // the last of many decides
+    let mut long = vec![FULL - 1; 300_000];
+    *long.last_mut().unwrap() = FULL;
+    assert_eq!(words(None, &long).1[0], f64::from(FULL - 1) / 2_f64.powi(31));
 }

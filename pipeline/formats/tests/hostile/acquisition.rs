@@ -5,7 +5,7 @@ use crate::scope_files::{Trace, bin_file, isf_file};
 use crate::support::{self, Random, peak_bytes};
 use crate::tdms_file::*;
 use afmid_formats::Format;
-use afmid_formats::readers::{keysight::Keysight, lecroy::LeCroy, tdms::Tdms, tektronix::TektronixIsf};
+use afmid_formats::readers::{keysight::Keysight, lecroy::LeCroy, netcdf::NetCdf, tdms::Tdms, tektronix::TektronixIsf};
 use afmid_formats::readers::{text_table::TextTable, uff::Uff, wav::Wav};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -149,6 +149,14 @@ fn waveforms_of_oscilloscopes() {
 fn wav_files() {
     for name in ["u1", "i2", "f8"] {
         torment::<Wav>(&format!("{name}.wav"), &std::fs::read(support::written(&format!("{name}.wav"))).unwrap(), 400);
+    }
+}
+
+#[test]
+fn netcdf_files() {
+    for name in ["records", "fixed", "single", "wide"] {
+        let whole = std::fs::read(support::written(&format!("{name}.netcdf"))).unwrap();
+        torment::<NetCdf>(&format!("{name}.nc"), &whole, 400);
     }
 }
 

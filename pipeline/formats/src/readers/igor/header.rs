@@ -206,6 +206,18 @@ impl Header {
                 "the header is damaged: copy or export the wave again",
             ));
         }
+        if wanted < self.data.bytes {
+            return Err(fail::at(
+                if self.version == 5 { 4 } else { 2 },
+                format!(
+                    "found {} bytes of samples, wanted {wanted} for {} points of {}",
+                    self.data.bytes,
+                    self.points,
+                    code.name()
+                ),
+                "the header is damaged: copy or export the wave again",
+            ));
+        }
         if self.data.at + wanted > file_bytes {
             return Err(fail::truncated("samples", self.data.at, wanted, file_bytes));
         }

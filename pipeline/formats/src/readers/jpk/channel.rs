@@ -39,6 +39,11 @@ pub(super) fn encoding(properties: &Properties<'_>, channel: &str) -> Result<Enc
             ));
         }
     };
+    let width = ["short", "integer", "long"].iter().find(|width| kind.starts_with(**width));
+    if let Some(width) = width.filter(|width| !encoder.contains(**width)) {
+        let (kind, encoder) = (text::brief(kind, 40), text::brief(encoder, 40));
+        return Err(format!("its type is `{kind}` and its encoder `{encoder}`, wanted one of {width}"));
+    }
     let own = format!("channel.{channel}.data.encoder.scaling");
     let key = if properties.get(&format!("{own}.multiplier")).is_some() {
         own

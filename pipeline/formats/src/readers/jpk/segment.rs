@@ -63,8 +63,8 @@ pub(super) fn channels(
 ) -> Result<(), FormatError> {
     let folder = segment.folder();
     let points = properties.get("force-segment-header.num-points").and_then(text::number).filter(|&n| n >= 0.0);
-    let sample_rate_hz = sample_rate_hz(properties, points);
-    if sample_rate_hz.is_none() {
+    let segment_rate_hz = sample_rate_hz(properties, points);
+    if segment_rate_hz.is_none() {
         remarks.push(format!("{folder}: no number of points and duration above 0 in its header: no sample rate"));
     }
     let style = properties
@@ -95,13 +95,22 @@ pub(super) fn channels(
         };
         let Encoding { code, line, unit } = encoding;
         let samples = entry.bytes / code.bytes();
+        let mut sample_rate_hz = segment_rate_hz;
         if points.is_some_and(|points| points != samples as f64) || entry.bytes % code.bytes() != 0 {
             let points = points.unwrap_or(f64::NAN);
-            remarks.push(format!(
-                "{whose}: found {} bytes, that is {samples} samples of {}; its segment announces {points}",
+            let found = format!(
+                "found {} bytes, that is {samples} samples of {}; its segment announces {points}",
                 entry.bytes,
                 code.name()
-            ));
+            );
+            // as many points of another width: the encoder and the samples contradict each other
+            let of_width = |width: &f64| *width != code.bytes() as f64 && width * points == entry.bytes as f64;
+            if entry.bytes % code.bytes() != 0 || [1.0, 2.0, 4.0, 8.0].iter().any(of_width) {
+                remarks.push(format!("{whose} is left out: {found}"));
+                continue;
+            }
+            remarks.push(format!("{whose}: no sample rate: {found}"));
+            sample_rate_hz = None;
         }
         let source = archive::source(archive, &entry, code)?;
         let long_name = format!("{name}{style}");

@@ -108,6 +108,11 @@ fn grid(file: &Opened, waveform: &Waveform, buffer: Buffer) -> Result<Grid, Stri
     if samples == 0 {
         return Err("it has no samples".to_owned());
     }
+    let wanted = u64::from(waveform.points) * number.bytes();
+    if waveform.points > 0 && buffer.bytes != wanted {
+        let found = buffer.bytes;
+        return Err(format!("it has {found} bytes, wanted {wanted} for the {} points stated", waveform.points));
+    }
     let store = Store::File(file.pinned().clone());
     Ok(Grid { store, first: buffer.from, step: number.bytes(), samples, number, big_endian: false })
 }

@@ -21,6 +21,8 @@ const SECOND: u32 = 2;
 #[derive(Debug)]
 pub(super) struct Waveform {
     pub(super) kind: u32,
+    /// Points of each buffer; 0 if it is not stated.
+    pub(super) points: u32,
     pub(super) label: String,
     pub(super) frame: String,
     pub(super) unit: &'static str,
@@ -77,6 +79,7 @@ impl Waveform {
         let unit = UNITS.get(fields.u32(52) as usize).copied().unwrap_or_default();
         Ok(Self {
             kind: fields.u32(4),
+            points: fields.u32(12),
             label: fields.text(112, 16),
             frame: fields.text(88, 24),
             unit,

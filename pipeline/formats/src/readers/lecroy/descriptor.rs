@@ -55,10 +55,16 @@ impl Descriptor {
         let wrong = |at: u64, problem: String| Err(fail::at(begin + at, problem, fail::COPY_AGAIN));
         let template = fields.text(16, 16);
         if !template.starts_with("LECROY_2_") {
-            return wrong(
-                16,
-                format!("found the template «{}», wanted LECROY_2_3 or an earlier 2", brief(&template, 16)),
+            let problem = format!(
+                "not read: this waveform has the template «{}», wanted LECROY_2_3 or an earlier 2",
+                brief(&template, 16)
             );
+            let help = "save it again with newer software of the maker, as binary of template 2, or as text";
+            return Err(fail::at(begin + 16, problem, help));
+        }
+        let byte_order = fields.u16(34);
+        if byte_order != u16::from(order == Order::Little) {
+            return wrong(34, format!("found the byte order {byte_order}, wanted 0 (big-endian) or 1 (little-endian)"));
         }
         let number = match fields.u16(32) {
             0 => Number::I8,
@@ -114,6 +120,14 @@ impl Descriptor {
         let end = self.samples_from.saturating_add(self.array_bytes);
         if end > file.bytes() {
             return Err(fail::truncated("samples", self.samples_from, self.array_bytes, file.bytes()));
+        }
+        let stated = self.count.saturating_mul(size);
+        if stated > self.array_bytes || (self.number == Number::I8 && self.array_bytes == 2 * stated && stated > 0) {
+            let problem = format!(
+                "found {} samples of {size} bytes in an array of {} bytes, wanted as many as it holds",
+                self.count, self.array_bytes
+            );
+            return Err(fail::at(self.samples_from.min(file.bytes()), problem, fail::COPY_AGAIN));
         }
         // The count leaves out what was sent to fill up a block.
         let samples = (self.array_bytes / size).min(if self.count == 0 { u64::MAX } else { self.count });

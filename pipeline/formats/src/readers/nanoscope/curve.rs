@@ -41,6 +41,10 @@ pub(super) fn channels(
         ));
     };
     let bytes = list.integer("Data length").unwrap_or_default();
+    if at < header.end {
+        let problem = format!("found samples from byte {at}, wanted them behind the header, from byte {}", header.end);
+        return Err(fail::at(list.at, problem, "the header is damaged: copy the file again from the instrument"));
+    }
     if at.checked_add(bytes).is_none_or(|end| end > file.bytes()) {
         return Err(fail::truncated("samples", at, bytes, file.bytes()));
     }

@@ -25,7 +25,12 @@ pub(super) struct Section {
 #[derive(Debug)]
 pub(super) struct Header {
     pub(super) sections: Vec<Section>,
+    /// Byte behind the header's last line.
+    pub(super) end: u64,
 }
+
+/// Major versions whose headers are known: the first with CIAO parameters, and the last that was looked at.
+const MAJOR_VERSIONS: std::ops::RangeInclusive<u32> = 4..=10;
 
 /// Whether these are a header's first bytes.
 pub(super) fn is_header(head: &[u8]) -> bool {
@@ -59,7 +64,8 @@ impl Header {
                 return Err(no_header(&bytes));
             }
             if let Some(end) = bytes.windows(END.len()).position(|w| w.eq_ignore_ascii_case(END)) {
-                return Ok(Self { sections: sections(bytes.get(..end).unwrap_or_default()) });
+                let sections = sections(bytes.get(..end).unwrap_or_default());
+                return Ok(Self { sections, end: (end + END.len()) as u64 });
             }
             if wanted >= file.bytes().min(MOST_BYTES) {
                 return Err(fail::at(
@@ -85,6 +91,19 @@ impl Header {
     /// The first value of a key in any section.
     pub(super) fn anywhere(&self, key: &str) -> Option<&str> {
         self.sections.iter().find_map(|s| s.value(key))
+    }
+
+    /// Errors: a version whose headers are not known.
+    pub(super) fn check_version(&self) -> Result<(), FormatError> {
+        let stated = self.anywhere("Version").and_then(|version| version.strip_prefix("0x"));
+        let major = stated.and_then(|digits| digits.get(..2)).and_then(|major| major.parse::<u32>().ok());
+        if major.is_none_or(|major| MAJOR_VERSIONS.contains(&major)) {
+            return Ok(());
+        }
+        let (first, last) = (MAJOR_VERSIONS.start(), MAJOR_VERSIONS.end());
+        let problem =
+            format!("not read: this file is of Nanoscope version {}, wanted {first} to {last}", self.version());
+        Err(fail::at(0, problem, "convert or export it with the Nanoscope software"))
     }
 
     /// `8.15 (0x08150308)`: two decimal digits of the major and two of the minor version.

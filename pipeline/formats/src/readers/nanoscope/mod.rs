@@ -51,6 +51,7 @@ impl Format for Nanoscope {
     fn open(path: &Path) -> Result<Contents, FormatError> {
         let file = Opened::new(path)?;
         let header = Header::read(&file)?;
+        header.check_version()?;
         let lists = header.all("Ciao force image list");
         check_data_present(&header, file.bytes())?;
         if lists.is_empty() {

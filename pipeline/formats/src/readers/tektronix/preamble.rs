@@ -142,8 +142,9 @@ impl Preamble {
                 return Err(fail::at(0, problem, "save it in binary with 1 or 2 bytes a point"));
             }
         };
-        let big_endian = !self.get("BYT_O").unwrap_or("MSB").eq_ignore_ascii_case("LSB");
+        let big_endian = self.is_big_endian()?;
         let (from, stated) = block(file, self.curve_at)?;
+        self.check_width(number, stated)?;
         let there = file.bytes().saturating_sub(from);
         let stated = stated.unwrap_or(there);
         if stated > there {
@@ -155,6 +156,40 @@ impl Preamble {
             remarks.push(format!("the preamble says {points} points, there are {count}"));
         }
         Ok(Data::Codes { number, big_endian, from, count })
+    }
+
+    /// Errors: neither of the two byte orders.
+    fn is_big_endian(&self) -> Result<bool, FormatError> {
+        let order = self.get("BYT_O").unwrap_or("MSB").to_ascii_uppercase();
+        match order.as_str() {
+            "MSB" => Ok(true),
+            "LSB" => Ok(false),
+            _ => {
+                let problem =
+                    format!("found the byte order «{}» in the preamble, wanted MSB or LSB", brief(&order, 10));
+                Err(fail::at(0, problem, fail::COPY_AGAIN))
+            }
+        }
+    }
+
+    /// Errors: the bits or the number of points say that codes have another width than the bytes do.
+    fn check_width(&self, number: Number, block_bytes: Option<u64>) -> Result<(), FormatError> {
+        let bytes = number.bytes();
+        let stated = |key| self.get(key).and_then(crate::text::number);
+        let problem = match (stated("BIT_N"), stated("NR_P"), block_bytes) {
+            (Some(bits), ..) if bits != 8.0 * bytes as f64 => {
+                format!("found BIT_NR {bits} and BYT_NR {bytes} in the preamble, wanted {} bits", 8 * bytes)
+            }
+            (_, Some(points), Some(block))
+                if !self.envelope
+                    && points > 0.0
+                    && [1.0, 2.0, 4.0].iter().any(|&w| w != bytes as f64 && w * points == block as f64) =>
+            {
+                format!("found BYT_NR {bytes} and {points} points in a block of {block} bytes, wanted {bytes} a point")
+            }
+            _ => return Ok(()),
+        };
+        Err(fail::at(0, problem, fail::COPY_AGAIN))
     }
 
     /// Codes as text, set apart by commas.

@@ -24,3 +24,9 @@ pub(super) fn number(field: &[u8]) -> Option<f64> {
     let field = std::str::from_utf8(field.trim_ascii()).ok()?;
     if field.contains(['d', 'D']) { field.replace(['d', 'D'], "E").parse().ok() } else { field.parse().ok() }
 }
+
+/// Digits that a number is printed to, from the first that is not 0.
+pub(super) fn digits(field: &[u8]) -> usize {
+    let mantissa = field.iter().take_while(|b| !b.eq_ignore_ascii_case(&b'e') && !b.eq_ignore_ascii_case(&b'd'));
+    mantissa.filter(|b| b.is_ascii_digit()).skip_while(|b| **b == b'0').count()
+}

@@ -1,11 +1,14 @@
 //! From datasets to channels.
 
 use super::header::Header;
+use super::layout::Layout;
 use super::samples::{Picked, Text};
 use super::scan::{Data, Dataset, Scanned};
+use crate::facts::AS_RATE;
 use crate::grid::{Grid, Store};
 use crate::number::Number;
 use crate::pinned::Pinned;
+use crate::rate::of_step;
 use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts, Source, unit_ratio};
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
@@ -27,7 +30,10 @@ pub(super) fn contents(scanned: Scanned, pinned: &Pinned) -> Contents {
         let location = if *times == 1 { name } else { format!("{name}[{times}]") };
         if dataset.header.complex && dataset.header.is_response() {
             match response(dataset, &location, pinned) {
-                Ok(found) => responses.push(found),
+                Ok(found) => {
+                    remarks.extend(doubles(dataset, &location));
+                    responses.push(found);
+                }
                 Err(why) => remarks.push(format!("the frequency response {location} is left out: {why}")),
             }
             continue;
@@ -70,8 +76,11 @@ fn function(
         return Err("it has no values".to_owned());
     }
     let (mut ordinates, abscissa) = sources(dataset, pinned)?;
+    remarks.extend(doubles(dataset, location));
     let ordinate = ordinates.pop().ok_or("it has no values")?;
-    let rate = rate(header, location, remarks);
+    let times = abscissa.as_ref().and_then(|(source, _)| stored_rate(header, source.as_ref(), location, remarks));
+    let rate = if header.even { even_rate(header, location, remarks) } else { times };
+    let abscissa = abscissa.filter(|_| times.is_none());
     let mut long_name = header.identification.join(", ");
     if long_name.is_empty() {
         header.ordinate.label.clone_into(&mut long_name);
@@ -94,11 +103,17 @@ fn function(
 }
 
 fn stored_as(dataset: &Dataset) -> &'static str {
-    match (dataset.data, dataset.header.double) {
+    match (dataset.data, dataset.layout.is_some_and(Layout::is_double)) {
         (Data::Text, _) => "text",
         (_, true) => "float64",
         (_, false) => "float32",
     }
+}
+
+/// What to say where the data take the bytes of double precision and single is stated.
+fn doubles(dataset: &Dataset, location: &str) -> Option<String> {
+    let doubles = dataset.layout.is_some_and(Layout::is_double) && !dataset.header.double;
+    doubles.then(|| format!("{location}: single precision is stated, its data take the bytes of double: read as that"))
 }
 
 /// A frequency response. Errors: why there is none.
@@ -114,7 +129,7 @@ fn response(dataset: &Dataset, location: &str, pinned: &Pinned) -> Result<FoundR
     let listed = |(source, stored_as)| {
         Frequencies::Listed(FoundChannel::new(format!("{location}/abscissa"), samples, stored_as, source))
     };
-    let even = Frequencies::Even(header.abscissa_start, header.abscissa_step);
+    let even = Frequencies::Even(header.abscissa_start, header.step());
     let [output, input] = header.degrees.clone();
     Ok(FoundResponse {
         location: location.to_owned(),
@@ -130,14 +145,11 @@ fn response(dataset: &Dataset, location: &str, pinned: &Pinned) -> Result<FoundR
     })
 }
 
-fn rate(header: &Header, location: &str, remarks: &mut Vec<String>) -> Option<f64> {
-    let what = if header.abscissa.label.is_empty() { "its abscissa" } else { &header.abscissa.label };
+/// The rate of an even abscissa.
+fn even_rate(header: &Header, location: &str, remarks: &mut Vec<String>) -> Option<f64> {
     let (start, step, unit) = (header.abscissa_start, header.abscissa_step, &header.abscissa.unit);
-    if !header.even {
-        remarks.push(format!("{location} has no sample rate: {what} is stored point by point, in {location}/abscissa"));
-        return None;
-    }
     let Some(seconds) = header.seconds() else {
+        let what = header.abscissa_name();
         remarks.push(format!(
             "{location} has no sample rate: {what} is not time; it runs from {start} in steps of {step} {unit}"
         ));
@@ -150,7 +162,47 @@ fn rate(header: &Header, location: &str, remarks: &mut Vec<String>) -> Option<f6
     if start != 0.0 {
         remarks.push(format!("{location} begins at {start} {unit}"));
     }
-    Some((step * seconds).recip())
+    Some(of_step(header.step() * seconds))
+}
+
+/// Abscissae of more points are not looked at: they are read whole.
+const MOST_TIMES: usize = 1 << 22;
+
+/// The rate of an abscissa that is stored point by point and runs evenly to within its printing.
+fn stored_rate(header: &Header, abscissa: &dyn Source, location: &str, remarks: &mut Vec<String>) -> Option<f64> {
+    let what = header.abscissa_name();
+    let none = |why: &str| {
+        format!("{location} has no sample rate: {what} is stored point by point, in {location}/abscissa{why}")
+    };
+    let Some(seconds) = header.seconds() else {
+        remarks.push(none(""));
+        return None;
+    };
+    match stored_step(abscissa, header.points as usize) {
+        Ok((step, start)) => {
+            let unit = &header.abscissa.unit;
+            remarks.push(format!(
+                "{location}/abscissa is {AS_RATE}: its {} values run evenly from {start} {unit} in steps of {step} \
+                 {unit}",
+                header.points
+            ));
+            Some(of_step(step * seconds))
+        }
+        Err(why) => {
+            remarks.push(none(&format!(": {why}")));
+            None
+        }
+    }
+}
+
+/// Step and first value of a stored abscissa, fitted to all of it: neighbours are printed alike or differ by the printing.
+/// Errors: why it is not even.
+fn stored_step(abscissa: &dyn Source, points: usize) -> Result<(f64, f64), String> {
+    if points > MOST_TIMES {
+        return Err(format!("its {points} values are too many to look at, wanted at most {MOST_TIMES}"));
+    }
+    let times = abscissa.read(0, points).map_err(|error| error.to_string())?.widened();
+    Ok((crate::even_step(&times)?, times.first().copied().unwrap_or_default()))
 }
 
 type Abscissa = Option<(Arc<dyn Source>, &'static str)>;
@@ -184,32 +236,20 @@ fn sources(dataset: &Dataset, pinned: &Pinned) -> Result<(Vec<Arc<dyn Source>>, 
         let abscissa: Abscissa = if header.even { None } else { Some((pick(0), "text")) };
         return Ok(((every - header.numbers()..every).map(pick).collect(), abscissa));
     }
-    let width = if header.double { 8 } else { 4 };
-    // The abscissa is single precision by the standard; some writers make it as wide as the ordinate.
-    let abscissa_widths: &[u64] = if header.even { &[0] } else { &[4, 8] };
-    let fits = |x: &&u64| points.checked_mul(parts * width + **x) == Some(bytes);
-    let padded = |x: &&u64| points.checked_mul(parts * width + **x).is_some_and(|wanted| wanted <= bytes);
-    let Some(&abscissa_width) =
-        abscissa_widths.iter().find(fits).or_else(|| abscissa_widths.iter().find(padded).filter(|_| header.even))
-    else {
+    let Some(layout) = dataset.layout else {
         return Err(format!("{points} points are stated, which its {bytes} bytes of data do not match"));
     };
-    let step = parts * width + abscissa_width;
-    let big_endian = dataset.data == Data::BigEndian;
-    let samples = points as usize;
-    let source = |first, double| Grid {
+    let source = |first, width| Grid {
         store: Store::File(pinned.clone()),
-        first,
-        step,
-        samples,
-        number: if double { Number::F64 } else { Number::F32 },
-        big_endian,
+        first: dataset.from + first,
+        step: layout.point(),
+        samples: points as usize,
+        number: if width == 8 { Number::F64 } else { Number::F32 },
+        big_endian: dataset.data == Data::BigEndian,
     };
-    let part = |part: u64| -> Arc<dyn Source> {
-        Arc::new(source(dataset.from + abscissa_width + part * width, header.double))
-    };
-    let wide = abscissa_width == 8;
-    let stored_as = if wide { "float64" } else { "float32" };
-    let abscissa: Abscissa = if header.even { None } else { Some((Arc::new(source(dataset.from, wide)), stored_as)) };
+    let part =
+        |part: u64| -> Arc<dyn Source> { Arc::new(source(layout.abscissa + part * layout.ordinate, layout.ordinate)) };
+    let stored_as = if layout.abscissa == 8 { "float64" } else { "float32" };
+    let abscissa: Abscissa = if header.even { None } else { Some((Arc::new(source(0, layout.abscissa)), stored_as)) };
     Ok(((0..parts).map(part).collect(), abscissa))
 }

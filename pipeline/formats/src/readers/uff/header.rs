@@ -1,12 +1,18 @@
 //! The eleven header records of dataset 58.
 
-use super::fixed::{number, stated, text};
+use super::fixed::{digits, number, stated, text};
 use crate::Degree;
 use crate::FormatError;
 use crate::fail;
+use crate::rate::roundest_step;
 
 /// Number of header records.
 pub(super) const RECORDS: usize = 11;
+
+/// Digits of the step in the standard's format E13.5. Fewer are those of a number that ends with zeros.
+const STEP_DIGITS: usize = 6;
+/// A printed number is off by half a unit of its last digit at most; a bit more, for 1/51200 = 1.953125E-05 ends there.
+const HALF_UNIT: f64 = 0.500_01;
 
 /// A header record and its byte.
 #[derive(Debug, Clone)]
@@ -33,6 +39,8 @@ pub(super) struct Header {
     pub(super) even: bool,
     pub(super) abscissa_start: f64,
     pub(super) abscissa_step: f64,
+    /// Digits that the step is printed to; a format of FORTRAN prints six.
+    step_digits: usize,
     pub(super) abscissa: Axis,
     pub(super) ordinate: Axis,
     /// What the ordinate is divided by.
@@ -59,7 +67,7 @@ impl Header {
                 fail::COPY_AGAIN,
             ));
         };
-        let [kind, points, spacing, start, step] = form_fields(form)?;
+        let ([kind, points, spacing, start, step], step_digits) = form_fields(form)?;
         let (complex, double) = match kind as i64 {
             2 => (false, false),
             4 => (false, true),
@@ -82,6 +90,7 @@ impl Header {
             even: spacing as i64 != 0,
             abscissa_start: start,
             abscissa_step: step,
+            step_digits,
             abscissa: axis(abscissa),
             ordinate: axis(ordinate),
             denominator: axis(denominator),
@@ -108,6 +117,11 @@ impl Header {
         usize::try_from(self.function).ok().and_then(|f| NAMES.get(f).copied()).unwrap_or("function")
     }
 
+    /// What runs along the abscissa, for people.
+    pub(super) fn abscissa_name(&self) -> &str {
+        if self.abscissa.label.is_empty() { "its abscissa" } else { &self.abscissa.label }
+    }
+
     /// Whether it is output over input: a frequency response or a transmissibility.
     pub(super) fn is_response(&self) -> bool {
         matches!(self.function, 4 | 5)
@@ -116,6 +130,19 @@ impl Header {
     /// Numbers of one value.
     pub(super) fn numbers(&self) -> usize {
         if self.complex { 2 } else { 1 }
+    }
+
+    /// The step of an even abscissa: of the numbers that are printed like it, that which is rounder, or whose inverse is.
+    /// A step of 1/51200 is printed as 1.95313E-05.
+    pub(super) fn step(&self) -> f64 {
+        let step = self.abscissa_step;
+        if !(step.is_finite() && step > 0.0) {
+            return step;
+        }
+        // digits behind the first, and half a unit of the last of them
+        let behind = self.step_digits.clamp(STEP_DIGITS, 17) - 1;
+        let unit = 10_f64.powi(step.log10().floor() as i32 - behind as i32);
+        roundest_step(step, HALF_UNIT * unit / step)
     }
 
     /// Seconds in the abscissa's unit, if it is time.
@@ -138,19 +165,19 @@ impl Header {
     }
 }
 
-/// Type, points, spacing, first abscissa and step: at their columns, or else between blanks.
-fn form_fields(record: &Record) -> Result<[f64; 5], FormatError> {
+/// Type, points, spacing, first abscissa and step, and the digits of the step: at their columns, or else between blanks.
+fn form_fields(record: &Record) -> Result<([f64; 5], usize), FormatError> {
     let columns = [(0, 10), (10, 20), (20, 30), (30, 43), (43, 56)];
-    let at_columns =
-        columns.map(|(from, to)| number(record.line.get(from..to.min(record.line.len())).unwrap_or_default()));
-    let mut words = record.line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).map(number);
-    let between_blanks = [(); 5].map(|()| words.next().flatten());
+    let at_columns = columns.map(|(from, to)| record.line.get(from..to.min(record.line.len())).unwrap_or_default());
+    let mut words = record.line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+    let between_blanks = [(); 5].map(|()| words.next().unwrap_or_default());
     for fields in [at_columns, between_blanks] {
-        if let [Some(kind), Some(points), Some(spacing), Some(start), Some(step)] = fields
+        if let [Some(kind), Some(points), Some(spacing), Some(start), Some(step)] = fields.map(number)
             // Exact in float64, and far more than a file holds.
             && (0.0..9e15).contains(&points)
         {
-            return Ok([kind, points, spacing, start, step]);
+            let [.., printed] = fields;
+            return Ok(([kind, points, spacing, start, step], digits(printed)));
         }
     }
     let found = text(&record.line, 0, 80);

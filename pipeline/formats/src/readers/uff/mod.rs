@@ -4,12 +4,17 @@
 //! - Real functions, single or double precision, are channels: the location is the response's name (`Mic 01`) or node
 //!   and direction (`12+X`), with `[2]` for the second of a name.
 //! - An even abscissa that is time gives the sample rate. Over another quantity (a spectrum over frequency) there is
-//!   none: a remark states the abscissa.
-//! - An uneven abscissa is a channel of its own, `…/abscissa`; then there is no rate, and a remark.
+//!   none: a remark states the abscissa. The step is printed with six digits: of the rates that it allows, that with
+//!   the fewest digits is taken.
+//! - An uneven abscissa is a channel of its own, `…/abscissa`; then there is no rate, and a remark. Times that run evenly
+//!   to within their printing give the rate instead, from all of them.
 //! - Complex frequency responses and transmissibilities (functions 4 and 5) are listed as such, with node and direction
 //!   of response and reference; they are no channels.
 //! - Other complex functions and other datasets are left out: a remark says so.
 //! - The data of 58b are read as they are asked for; text is parsed on the first read and kept.
+//! - The number of data bytes that 58b states is wrong in files of the Python package pyuff where values are complex or
+//!   the abscissa is uneven: type, spacing and number of points give it as well. Where the dataset ends there and not
+//!   behind the number stated, a remark says so.
 //!
 //! Source: Structural Dynamics Research Corporation, "Universal Dataset Number 58" and University of Cincinnati SDRL,
 //! "The Binary 58 Universal File Format", www.sdrl.uc.edu/sdrl/referenceinfo/universalfileformats.
@@ -17,6 +22,7 @@
 mod fixed;
 mod function;
 mod header;
+mod layout;
 mod samples;
 mod scan;
 
@@ -35,7 +41,7 @@ impl Format for Uff {
         reads: "58 and 58b: real functions, single and double precision, text and binary; texts in UTF-8 or Latin-1; complex frequency responses and transmissibilities for `io.frf`",
         leaves_out: "other complex functions and other datasets: left out",
         described_by: "University of Cincinnati SDRL, \"Universal File Formats\"",
-        clock: "abscissa spacing",
+        clock: "abscissa spacing; stored times",
         unit: "ordinate's unit",
     };
 

@@ -23,8 +23,14 @@ pub(super) struct Coding {
     pub(super) channels: u16,
     /// 0 if it is not stated.
     pub(super) rate_hz: u32,
+    /// 0 if it is not stated.
+    byte_rate: u32,
     /// Bytes from a sample to the next one of its channel.
     pub(super) frame_bytes: u64,
+    /// Bits of the container of a sample.
+    pub(super) bits: u16,
+    /// Bits of it that are in use, as stated by the extensible form; else all.
+    pub(super) valid_bits: u16,
     /// 1 is full scale.
     pub(super) scale_factor: f64,
     pub(super) add_offset: f64,
@@ -41,6 +47,8 @@ impl Coding {
         }
         let (tag, channels, rate_hz) = (fields.u16(0), fields.u16(2), fields.u32(4));
         let (frame_bytes, bits) = (u64::from(fields.u16(12)), fields.u16(14));
+        let stated = if tag == EXTENSIBLE && chunks.format.len() >= 20 { fields.u16(18) } else { 0 };
+        let valid_bits = if stated == 0 { bits } else { stated };
         let tag = if tag == EXTENSIBLE { inner_tag(&chunks.format, &fields).unwrap_or(tag) } else { tag };
         let Some(number) = number(tag, bits) else {
             let problem = format!("found samples of {bits} bits, {}; wanted plain integers or floats", name_of(tag));
@@ -54,13 +62,49 @@ impl Coding {
             let samples = format!("{channels} samples of {} bytes", number.bytes());
             return wrong(format!("found frames of {frame_bytes} bytes, wanted {wanted}: {samples}"));
         }
+        if valid_bits > bits {
+            return wrong(format!("found {valid_bits} valid bits in samples of {bits}, wanted at most as many"));
+        }
+        let mut coding = Self {
+            number,
+            channels,
+            rate_hz,
+            byte_rate: fields.u32(8),
+            frame_bytes,
+            bits,
+            valid_bits,
+            scale_factor: 1.0,
+            add_offset: 0.0,
+        };
+        coding.scale_to(bits);
+        Ok(coding)
+    }
+
+    /// Samples per second; none, with a remark, if they are not stated or bytes per second state others.
+    pub(super) fn sample_rate_hz(&self, remarks: &mut Vec<String>) -> Option<f64> {
+        if self.rate_hz == 0 {
+            remarks.push("no sample rate: the header says 0, wanted a number above 0".to_owned());
+            return None;
+        }
+        let wanted = u64::from(self.rate_hz) * self.frame_bytes;
+        if self.byte_rate != 0 && wanted != u64::from(self.byte_rate) {
+            remarks.push(format!(
+                "no sample rate: the header says {} frames of {} bytes and {} bytes per second, wanted {wanted}",
+                self.rate_hz, self.frame_bytes, self.byte_rate
+            ));
+            return None;
+        }
+        Some(f64::from(self.rate_hz))
+    }
+
+    /// Takes the full scale of so many bits for 1.
+    pub(super) fn scale_to(&mut self, bits: u16) {
         let full_scale = 2_f64.powi(i32::from(bits) - 1);
-        let (scale_factor, add_offset) = match number {
+        (self.scale_factor, self.add_offset) = match self.number {
             Number::F32 | Number::F64 => (1.0, 0.0),
             Number::U8 => (1.0 / 128.0, -1.0),
             _ => (full_scale.recip(), 0.0),
         };
-        Ok(Self { number, channels, rate_hz, frame_bytes, scale_factor, add_offset })
     }
 }
 

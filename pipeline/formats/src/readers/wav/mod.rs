@@ -5,6 +5,7 @@
 //!   extensible form, by its GUID. Compressed samples are refused.
 //! - A channel per track: `/channel[0]`, `/channel[1]`, ...
 //! - Integers are scaled so that full scale is 1 (8-bit ones are unsigned, 128 is zero); the file states no unit.
+//! - Samples of 24 bits at the lower end of words of 32 are recognised (`alignment`), and said.
 //! - The data may end early: a recorder that lost its power did not write the chunk's size, or wrote more than there is.
 //!   What is there is read, up to the last whole frame.
 //!
@@ -15,6 +16,7 @@
 //! Source: Microsoft and IBM, "Multimedia Programming Interface and Data Specifications 1.0" (RIFF); Microsoft,
 //! "Multiple Channel Audio Data and WAVE Files" (WAVE_FORMAT_EXTENSIBLE); EBU Tech 3306 (RF64).
 
+mod alignment;
 mod chunks;
 mod coding;
 
@@ -35,7 +37,7 @@ impl Format for Wav {
     const ROW: Row = Row {
         name: "wav",
         title: "Waveform audio",
-        reads: "RIFF, RIFX, RF64, BW64; 8 to 64-bit integers as fractions of full scale, float32, float64, the extensible form; files that end early",
+        reads: "RIFF, RIFX, RF64, BW64; 8 to 64-bit integers as fractions of full scale, float32, float64, the extensible form; 24 bits at either end of 32; files that end early",
         leaves_out: "compressed samples (A-law, ADPCM, MPEG)",
         described_by: "Microsoft and IBM, \"Multimedia Programming Interface and Data Specifications 1.0\"; EBU Tech 3306",
         clock: "samples per second",
@@ -50,7 +52,7 @@ impl Format for Wav {
         let file = Opened::new(path)?;
         let mut remarks = Vec::new();
         let chunks = Chunks::read(&file, &mut remarks)?;
-        let coding = Coding::of(&chunks)?;
+        let mut coding = Coding::of(&chunks)?;
         let frames = chunks.data_bytes / coding.frame_bytes;
         let rest = chunks.data_bytes % coding.frame_bytes;
         if rest > 0 {
@@ -62,12 +64,20 @@ impl Format for Wav {
                 format!("found {} bytes of data, wanted a frame of {}", chunks.data_bytes, coding.frame_bytes);
             return Err(fail::at(chunks.data_from, problem, fail::COPY_AGAIN));
         }
+        let beside = Grid {
+            store: Store::File(file.pinned().clone()),
+            first: chunks.data_from,
+            step: coding.number.bytes(),
+            samples: samples.saturating_mul(usize::from(coding.channels)),
+            number: coding.number,
+            big_endian: chunks.big_endian,
+        };
+        let bits = alignment::full_scale_bits(&coding, &beside, &mut remarks)?;
+        coding.scale_to(bits);
         if !coding.number.is_float() {
             remarks.push("the samples are fractions of full scale: the file states no unit".to_owned());
         }
-        if coding.rate_hz == 0 {
-            remarks.push("no sample rate: the header says 0, wanted a number above 0".to_owned());
-        }
+        let sample_rate_hz = coding.sample_rate_hz(&mut remarks);
         let channel = |number: u64| {
             let grid = Grid {
                 store: Store::File(file.pinned().clone()),
@@ -79,7 +89,7 @@ impl Format for Wav {
             };
             FoundChannel {
                 long_name: format!("channel {number} of {}", coding.channels),
-                sample_rate_hz: (coding.rate_hz > 0).then(|| f64::from(coding.rate_hz)),
+                sample_rate_hz,
                 scale_factor: coding.scale_factor,
                 add_offset: coding.add_offset,
                 ..FoundChannel::new(format!("/channel[{number}]"), samples, coding.number.name(), Arc::new(grid))
