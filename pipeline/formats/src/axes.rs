@@ -400,7 +400,12 @@ fn even(channel: &FoundChannel) -> Result<Even, String> {
     if !(step.is_finite() && step > 0.0) {
         return Err("it does not rise".to_owned());
     }
-    let epsilon = if channel.stored_as == "float32" { f64::from(f32::EPSILON) } else { f64::EPSILON };
+    let epsilon = match channel.stored_as {
+        // 10 bits behind the point
+        "float16" => 1.0 / 1024.0,
+        "float32" => f64::from(f32::EPSILON),
+        _ => f64::EPSILON,
+    };
     // rounding of both times, and of the arithmetic that made them
     let rounding = 4.0 * epsilon * first.abs().max(last.abs());
     if rounding > COARSEST * step {

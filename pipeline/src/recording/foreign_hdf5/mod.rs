@@ -16,12 +16,14 @@
 //!   attributes of the group: `encoder.scaling.multiplier`, `encoder.scaling.offset`, `encoder.scaling.unit.unit`.
 //! - Texts of MATLAB beside an array (`units`, cells `names`) are units and long names of its channels where no other array
 //!   can be meant.
-//! - Other text, structs, references, complex and half-precision numbers are remarks.
+//! - Other text, structs, references, complex numbers and numbers of two bytes that are not IEEE 754's are remarks.
 //!
 //! Source: The HDF Group, "HDF5 File Format Specification", version 3; pycroscopy, "USID" and "NSID" data models
 //! (<https://pycroscopy.github.io/USID>, <https://pycroscopy.github.io/pyNSID>); MathWorks, "MAT-File Versions" (7.3 is
 //! HDF5); PyTables, "File format"; pandas writes `DataFrame.to_hdf` by it, fixed and as a table.
 
+#[cfg(test)]
+mod half_tests;
 mod labels;
 mod matrix;
 mod pandas;

@@ -12,11 +12,12 @@ use super::scope::Scopes;
 use super::times::Times;
 use super::walk::Found;
 use crate::error::StageError;
+use crate::hdf5_files::floats_are_ieee;
 use crate::hdf5_files::read::{Allowance, check_samples};
 use crate::recording::InputFiles;
 use crate::recording::input_files::HashedHdf5;
 use crate::recording::native::{
-    Part, check_filters, has_attribute, number_attribute, open_source, sample_type, text_attribute,
+    ODD_FLOATS, Part, check_filters, has_attribute, number_attribute, open_source, sample_type, text_attribute,
 };
 
 /// A dataset of numbers.
@@ -68,14 +69,18 @@ impl Variable {
     pub(super) fn of(found: &Found, matlab: bool, allowance: &Allowance, times: &Times) -> Result<Self, String> {
         let dataset = &found.dataset;
         let shape = dataset.get_shape().map_err(|error| format!("damaged: {error}"))?;
-        let descriptor = dataset.dtype().and_then(|dtype| dtype.to_descriptor());
+        let dtype = dataset.dtype();
+        if dtype.as_ref().is_ok_and(|dtype| !floats_are_ieee(dtype)) {
+            return Err(ODD_FLOATS.to_owned());
+        }
+        let descriptor = dtype.and_then(|dtype| dtype.to_descriptor());
         if let (Ok(TypeDescriptor::Compound(record)), &[_]) = (&descriptor, shape.as_slice()) {
             return table(found, record, &shape, allowance).map(Self::Series);
         }
         let number = descriptor.as_ref().ok().and_then(number).ok_or_else(|| {
             descriptor.map_or_else(
                 |_| "its values are of a type without a common name".to_owned(),
-                |descriptor| format!("its values are {descriptor}, wanted integers, float32 or float64"),
+                |descriptor| format!("its values are {descriptor}, wanted integers, float16, float32 or float64"),
             )
         })?;
         if matlab {
@@ -226,7 +231,8 @@ impl Series {
         let optional =
             |name: &str| has_attribute(dataset, name).then(|| number_attribute(dataset, location, name)).transpose();
         let (scale, offset) = (optional("scale_factor")?, optional("add_offset")?);
-        let codes = !matches!(self.number, Number::F32 | Number::F64) && scale.is_none() && offset.is_none();
+        let codes =
+            !matches!(self.number, Number::F16 | Number::F32 | Number::F64) && scale.is_none() && offset.is_none();
         let mut described = Described {
             unit: text(&["units", "unit"]),
             long_name: text(&["long_name", "quantity"]),
