@@ -14,7 +14,8 @@
 //! - Arrays of times (`/time`, the index of pandas, dimension scales in a unit of time) are axes: [`settle_axes`].
 //! - Integers in a unit but without a scale are codes, of which the unit is not known. JPK's files state the scale in
 //!   attributes of the group: `encoder.scaling.multiplier`, `encoder.scaling.offset`, `encoder.scaling.unit.unit`.
-//! - Time series of NWB state rate, scale and unit in places of their own: `nwb`.
+//! - Time series of NWB and waveforms of Keysight's Infiniium state rate, scale and unit in places of their own: `nwb`
+//!   and `infiniium`.
 //! - Texts of MATLAB beside an array (`units`, cells `names`) are units and long names of its channels where no other array
 //!   can be meant.
 //! - Other text, structs, references, complex numbers and numbers of two bytes that are not IEEE 754's are remarks.
@@ -25,6 +26,7 @@
 
 #[cfg(test)]
 mod half_tests;
+mod infiniium;
 mod labels;
 mod matrix;
 mod nwb;

@@ -2,7 +2,7 @@
 
 use hdf5::{Dataset, Group};
 
-use super::nwb;
+use super::{infiniium, nwb};
 use crate::hdf5_files::read::Allowance;
 
 /// A dataset and its group.
@@ -48,7 +48,7 @@ impl Stated {
 
 /// What the group of a dataset states of it, if it is laid out as one of these programs has it.
 pub(super) fn of(here: Here) -> Option<Stated> {
-    nwb::of(here)
+    nwb::of(here).or_else(|| infiniium::of(here))
 }
 
 /// The symbol of a unit that is given by its name; empty for words that state none, and other text as it is.

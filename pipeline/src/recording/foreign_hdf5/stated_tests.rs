@@ -1,11 +1,14 @@
-//! Time series of NWB.
+//! Time series of NWB and waveforms of Infiniium oscilloscopes.
 
 use hdf5::types::VarLenUnicode;
 use hdf5::{Group, Location};
 use ndarray::{Array1, Array2};
 
 use super::super::{InputFiles, Reading, open_contents};
+use super::infiniium;
+use super::stated::{Here, Stated};
 use crate::files::fixture::Folder;
+use crate::hdf5_files::read::open_file;
 use afmid_formats::{Contents, FoundChannel};
 
 fn number(owner: &Location, name: &str, value: f64) {
@@ -145,4 +148,89 @@ fn times_of_nwb_are_the_rate_of_their_series() {
     let wanted = ["/acquisition/acc/data[0]", "/acquisition/acc/data[1]"].map(|name| (name, 400, Some(1000.0), "m"));
     assert_eq!(found, wanted, "{:?}", contents.remarks);
     assert_eq!(values(&contents.channels[1])[..3], [2.0, 4.0, 6.0]);
+}
+
+/// A waveform of 300 samples with these units.
+fn waveform(file: &hdf5::File, name: &str, units: (&str, &str), points: f64) -> Group {
+    let group = file.create_group(&format!("Waveforms/{name}")).unwrap();
+    for (name, value) in [("XInc", 2e-4), ("XOrg", -0.01), ("YInc", 0.25), ("YOrg", 1.5), ("NumPoints", points)] {
+        number(&group, name, value);
+    }
+    text(&group, "XUnits", units.0);
+    text(&group, "YUnits", units.1);
+    group
+}
+
+#[test]
+fn infiniium_scales_codes_and_leaves_values_as_they_are() {
+    let codes = Array1::from_shape_fn(300, |sample| sample as i16 - 7);
+    let volts = Array1::from_shape_fn(300, |sample| sample as f32 / 8.0);
+    let contents = opened("infiniium", |file| {
+        let put = |group: &Group, name: &str| group.new_dataset_builder().with_data(&codes).create(name).unwrap();
+        put(&waveform(file, "Channel 1", ("Second", "Volt"), 300.0), "Channel 1Data");
+        let memory = waveform(file, "Memory 1", ("Second", "Amp"), 300.0);
+        memory.new_dataset_builder().with_data(&volts).create("Memory 1Data").unwrap();
+        let segments = waveform(file, "Channel 2", ("Second", "Volt"), 300.0);
+        put(&segments, "Channel 2 Seg1Data");
+        put(&segments, "Channel 2 Seg2Data");
+        put(&waveform(file, "Meas Spectrum", ("Hertz", "dB"), 300.0), "Meas SpectrumData");
+        put(&waveform(file, "Function 1", ("Second", "Unknown"), 150.0), "Function 1Data");
+        let other = waveform(file, "Channel 3", ("Second", "Volt"), 300.0);
+        number(&other, "YReference", 128.0);
+        put(&other, "Channel 3Data");
+    });
+    let found: Vec<_> = contents
+        .channels
+        .iter()
+        .map(|channel| {
+            let name = channel.location.rsplit('/').next().unwrap();
+            (name, channel.unit.as_str(), channel.scale_factor, channel.add_offset, channel.sample_rate_hz)
+        })
+        .collect();
+    let wanted = [
+        ("Channel 1Data", "V", 0.25, 1.5, Some(5000.0)),
+        ("Channel 2 Seg1Data", "V", 0.25, 1.5, Some(5000.0)),
+        ("Channel 2 Seg2Data", "V", 0.25, 1.5, Some(5000.0)),
+        ("Channel 3Data", "", 1.0, 0.0, Some(5000.0)),
+        ("Function 1Data", "", 0.25, 1.5, None),
+        ("Meas SpectrumData", "dB", 0.25, 1.5, None),
+        ("Memory 1Data", "A", 1.0, 0.0, Some(5000.0)),
+    ];
+    assert_eq!(found, wanted, "{:?}", contents.remarks);
+    assert_eq!(values(&contents.channels[0])[..2], [-0.25, 0.0]);
+    for words in ["NumPoints is 150", "XUnits is «Hertz»", "YReference is 128"] {
+        assert!(says(&contents, words), "{words}: {:?}", contents.remarks);
+    }
+}
+
+#[test]
+fn a_segment_has_a_start_of_its_own() {
+    let folder = Folder::new("segments");
+    let path = folder.file("made.h5");
+    {
+        let file = hdf5::File::create(&path).unwrap();
+        let group = waveform(&file, "Channel 2", ("Second", "Volt"), 3.0);
+        let first = group.new_dataset_builder().with_data(&[1_i16, 2, 3]).create("Channel 2 Seg1Data").unwrap();
+        number(&first, "SegmentedXOrg", -0.5);
+        group.new_dataset_builder().with_data(&[1_i16, 2, 3]).create("Channel 2 Seg2Data").unwrap();
+    }
+    let hashed = InputFiles::new().inspect_hdf5(&path).unwrap();
+    let file = open_file(&path, &hashed.vetted).unwrap();
+    let start = |name: &str| -> Stated {
+        let group = file.group("Waveforms/Channel 2").unwrap();
+        let dataset = group.dataset(name).unwrap();
+        let location = format!("/Waveforms/Channel 2/{name}");
+        let place = "/Waveforms/Channel 2";
+        infiniium::of(Here {
+            group: &group,
+            path: place,
+            dataset: &dataset,
+            name,
+            location: &location,
+            allowance: file.allowance(),
+        })
+        .unwrap()
+    };
+    let starts = ["Channel 2 Seg1Data", "Channel 2 Seg2Data"].map(|name| start(name).start_s);
+    assert_eq!(starts, [Some(-0.5), Some(-0.01)]);
 }
