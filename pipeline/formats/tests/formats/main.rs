@@ -9,6 +9,7 @@ mod matlab_written;
 mod nanoscope;
 mod numpy_built;
 mod numpy_written;
+mod parquet;
 mod raw_binary;
 mod raw_order;
 mod registry;
