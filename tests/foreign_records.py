@@ -52,7 +52,7 @@ def main():
     write(folder, "array-attributes", attributes={"scale_factor": np.array([0.5]), "units": np.array(["V"], object)})
     write(folder, "partly-written", None)
     write(folder, "unreadable-lzf", chunks=(4096,), compression="lzf")
-    write(folder, "unreadable-half", CODES.astype("f2"))
+    write(folder, "unreadable-complex", CODES.astype("c8"))
     write(folder, "unreadable-int64", CODES.astype("i8"))
 
 

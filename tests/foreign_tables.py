@@ -82,6 +82,22 @@ def main():
         group.attrs["encoder.scaling.multiplier"], group.attrs["encoder.scaling.offset"] = 1e-9, 0.5
         group.attrs["encoder.scaling.unit.unit"] = np.bytes_("V")
         group["y"] = np.round(1e9 * (Y - 0.5)).astype("i4")
+    # half precision in both byte orders, and another number of two bytes
+    with h5py.File(folder / "half.h5", "w") as file:
+        file["little"], file["big"] = Y.astype("<f2"), Y.astype(">f2")
+        file.create_dataset("big_deflated", data=Y.astype(">f2"), chunks=(64,), compression="gzip", shuffle=True)
+        file.create_dataset("rows", data=np.stack([Y, -Y]).astype(">f2"), chunks=(1, 100), compression="gzip")
+        file["columns"] = np.stack([Y] * 40, axis=1).astype(">f2")
+        file["time"] = T
+        records = np.zeros(500, dtype=[("y", ">f2"), ("z", ">f2")])
+        records["y"] = Y
+        file["records"] = records
+        brain = h5py.h5t.IEEE_F16LE.copy()
+        brain.set_fields(15, 7, 8, 0, 7)
+        brain.set_ebias(127)
+        space = h5py.h5s.create_simple((500,))
+        made = h5py.h5d.create(file.id, b"brain", brain, space)
+        made.write(h5py.h5s.ALL, h5py.h5s.ALL, Y)
     # MATLAB 7.3: a struct with an array, the names of its columns in a cell array, and their unit
     with h5py.File(folder / "struct.mat", "w", userblock_size=512) as file:
         matlab(file, "Test/acc", np.stack([Y, -Y]), "double")

@@ -251,6 +251,10 @@ pub fn names_times(name: &str) -> bool {
 /// What kind of axis a channel is by its name and those beside it.
 fn kind(channel: &FoundChannel, place: &Place, places: &HashMap<Key, usize>) -> Option<Kind> {
     let lower = place.name.to_lowercase();
+    // what the file states goes before what the name says
+    if let Some(seconds) = seconds(&channel.unit).filter(|_| channel.is_axis) {
+        return Some(Kind::Time(Some(seconds)));
+    }
     if is_of_frequencies(channel, &lower) {
         return Some(Kind::Frequency);
     }
@@ -263,7 +267,7 @@ fn kind(channel: &FoundChannel, place: &Place, places: &HashMap<Key, usize>) -> 
         return Some(Kind::Time(Some(seconds)));
     }
     if channel.is_axis {
-        return Some(seconds(&channel.unit).map_or(Kind::Unnamed, |seconds| Kind::Time(Some(seconds))));
+        return Some(Kind::Unnamed);
     }
     let partner = ordinate(place.name).map(|name| place.key(&name, place.cell, channel.samples));
     if partner.is_some_and(|key| places.contains_key(&key)) {
@@ -400,7 +404,12 @@ fn even(channel: &FoundChannel) -> Result<Even, String> {
     if !(step.is_finite() && step > 0.0) {
         return Err("it does not rise".to_owned());
     }
-    let epsilon = if channel.stored_as == "float32" { f64::from(f32::EPSILON) } else { f64::EPSILON };
+    let epsilon = match channel.stored_as {
+        // 10 bits behind the point
+        "float16" => 1.0 / 1024.0,
+        "float32" => f64::from(f32::EPSILON),
+        _ => f64::EPSILON,
+    };
     // rounding of both times, and of the arithmetic that made them
     let rounding = 4.0 * epsilon * first.abs().max(last.abs());
     if rounding > COARSEST * step {

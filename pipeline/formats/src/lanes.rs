@@ -33,6 +33,18 @@ impl Lanes {
         }
     }
 
+    /// As the file's program has it: time is the first axis however long it is, neighbours along the last are neighbours
+    /// in the file.
+    ///
+    /// None if there is no axis, a size is 0, or the number of elements overflows.
+    pub fn down(shape: &[usize]) -> Option<Self> {
+        let (&samples, others) = shape.split_first()?;
+        let axes = strided(others, false)?;
+        let step = others.iter().try_fold(1_u64, |step, &size| step.checked_mul(size as u64))?;
+        step.checked_mul(samples as u64).filter(|&elements| elements > 0)?;
+        Some(Self { samples, step, wide: false, others: axes })
+    }
+
     /// Number of channels.
     pub fn count(&self) -> usize {
         self.others.iter().map(|&(size, _)| size).product()
@@ -118,5 +130,19 @@ mod tests {
         assert_eq!(Lanes::of(&[0, 5], true), None);
         assert_eq!(Lanes::of(&[usize::MAX, 5], false), None);
         assert_eq!(Lanes::of(&[], false).unwrap().samples, 1);
+    }
+
+    #[test]
+    fn time_is_the_first_axis_where_the_program_says_so() {
+        let down = |shape: &[usize]| {
+            let lanes = Lanes::down(shape)?;
+            Some((lanes.samples, lanes.step, lanes.each(0).collect::<Vec<_>>()))
+        };
+        let named =
+            |names: &[(&str, u64)]| names.iter().map(|(name, at)| ((*name).to_owned(), *at)).collect::<Vec<_>>();
+        assert_eq!(down(&[1, 3]), Some((1, 3, named(&[("[0]", 0), ("[1]", 1), ("[2]", 2)]))));
+        assert_eq!(down(&[5]), Some((5, 1, named(&[("", 0)]))));
+        assert_eq!(down(&[5, 1]), Some((5, 1, named(&[("", 0)]))));
+        assert_eq!((down(&[]), down(&[0, 3]), down(&[4, 0]), down(&[usize::MAX, 3])), (None, None, None, None));
     }
 }

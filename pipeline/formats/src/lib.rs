@@ -13,6 +13,7 @@ mod fail;
 mod fields;
 mod frequency;
 mod grid;
+mod half;
 mod inflating;
 mod joined;
 mod labels;

@@ -1,6 +1,7 @@
 //! How one stored number is coded.
 
 use crate::Raw;
+use crate::half::half_precision;
 
 /// Byte order of stored numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +49,8 @@ pub enum Number {
     I64,
     /// Unsigned, 64 bits.
     U64,
+    /// IEEE half precision.
+    F16,
     /// IEEE single precision.
     F32,
     /// IEEE double precision.
@@ -59,7 +62,7 @@ impl Number {
     pub const fn bytes(self) -> u64 {
         match self {
             Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
+            Self::I16 | Self::U16 | Self::F16 => 2,
             Self::I24 => 3,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
@@ -78,6 +81,7 @@ impl Number {
             Self::U32 => "uint32",
             Self::I64 => "int64",
             Self::U64 => "uint64",
+            Self::F16 => "float16",
             Self::F32 => "float32",
             Self::F64 => "float64",
         }
@@ -90,7 +94,7 @@ impl Number {
 
     /// Whether it has a fraction and an exponent.
     pub(crate) fn is_float(self) -> bool {
-        matches!(self, Self::F32 | Self::F64)
+        matches!(self, Self::F16 | Self::F32 | Self::F64)
     }
 
     /// Reads `count` numbers that lie side by side: `fill` gets as many bytes as they take. Errors: those of `fill`.
@@ -136,6 +140,7 @@ impl Number {
             Self::U32 => Raw::Float64(each(bytes, big, |b| f64::from(u32::from_le_bytes(b)))),
             Self::I64 => Raw::Float64(each(bytes, big, |b| i64::from_le_bytes(b) as f64)),
             Self::U64 => Raw::Float64(each(bytes, big, |b| u64::from_le_bytes(b) as f64)),
+            Self::F16 => Raw::Float32(each(bytes, big, |b| half_precision(u16::from_le_bytes(b)))),
             Self::F32 => Raw::Float32(each(bytes, big, f32::from_le_bytes)),
             Self::F64 => Raw::Float64(each(bytes, big, f64::from_le_bytes)),
         }

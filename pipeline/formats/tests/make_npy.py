@@ -28,7 +28,7 @@ fields["in"]["z"] = np.arange(40) / 8
 np.save(data / "fields.npy", fields)
 
 for name, array in {
-    "half": ramp.astype("f2"), "complex": ramp.astype("c16"), "text": np.array(["a", "bc"]),
+    "half": ramp.astype("f2"), "big_half": (np.arange(40) * 0.37).astype(">f2"), "quadruple": ramp.astype("f16"), "complex": ramp.astype("c16"), "text": np.array(["a", "bc"]),
     "objects": np.array([1, None], dtype=object), "dates": np.array(["2024-01-01"], dtype="M8[D]"),
 }.items():
     np.save(data / f"{name}.npy", array, allow_pickle=True)

@@ -5,7 +5,7 @@
 //! is in this file.
 #![allow(unsafe_code)]
 
-use std::ffi::{CString, c_char, c_int, c_void};
+use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::sync::OnceLock;
 
 use hdf5::plist::link_create::CharEncoding;
@@ -20,7 +20,11 @@ use hdf5_sys::h5l::{H5L_type_t, H5Lunregister};
 use hdf5_sys::h5o::H5O_type_t;
 use hdf5_sys::h5p::{H5P_CLS_GROUP_CREATE, H5P_DEFAULT, H5Pcreate, H5Pset_obj_track_times};
 use hdf5_sys::h5s::H5S_ALL;
-use hdf5_sys::h5t::{H5T_bkg_t, H5T_cdata_t, H5T_class_t, H5T_cmd_t, H5T_pers_t, H5Tcreate, H5Tget_size, H5Tregister};
+use hdf5_sys::h5t::{
+    H5T_bkg_t, H5T_cdata_t, H5T_class_t, H5T_cmd_t, H5T_norm_t, H5T_order_t, H5T_pers_t, H5Tclose, H5Tcreate,
+    H5Tget_class, H5Tget_ebias, H5Tget_fields, H5Tget_member_type, H5Tget_nmembers, H5Tget_norm, H5Tget_offset,
+    H5Tget_order, H5Tget_precision, H5Tget_size, H5Tget_super, H5Tregister,
+};
 
 unsafe extern "C" {
     // the high-level part of the library has no wrapper
@@ -77,6 +81,64 @@ pub(crate) fn is_attribute(container: &Container) -> bool {
 
 /// A reference to a text in a heap: the text's length, the heap's place (8 bytes), its number there.
 pub(crate) const REFERENCE_BYTES: usize = 16;
+
+/// Records in records beyond this are not looked into.
+const DEEPEST_TYPE: usize = 32;
+
+/// Whether all floating point numbers of a type, those of records and arrays included, are coded as IEEE 754 has it for
+/// their size of 2, 4 or 8 bytes. Others have the same sizes: bfloat16, those of the VAX.
+pub(crate) fn floats_are_ieee(kind: &Datatype) -> bool {
+    // SAFETY: the handle is live; the lock is held.
+    hdf5::sync::sync(|| unsafe { has_ieee_floats(kind.id(), 0) })
+}
+
+/// # Safety
+/// The handle is that of a type, and live; the library's lock is held.
+unsafe fn has_ieee_floats(kind: hid_t, depth: usize) -> bool {
+    // SAFETY: a member's handle is the caller's, and is closed once.
+    let inner = |member: hid_t| unsafe {
+        let fine = member >= 0 && depth < DEEPEST_TYPE && has_ieee_floats(member, depth + 1);
+        if member >= 0 {
+            H5Tclose(member);
+        }
+        fine
+    };
+    // SAFETY: the handle is live, and members are asked for by numbers below their count.
+    unsafe {
+        match H5Tget_class(kind) {
+            H5T_class_t::H5T_FLOAT => is_ieee_float(kind),
+            H5T_class_t::H5T_ARRAY => inner(H5Tget_super(kind)),
+            H5T_class_t::H5T_COMPOUND => {
+                (0..H5Tget_nmembers(kind)).all(|number| inner(H5Tget_member_type(kind, number as c_uint)))
+            }
+            _ => true,
+        }
+    }
+}
+
+/// # Safety
+/// The handle is that of a floating point type, and live; the library's lock is held.
+unsafe fn is_ieee_float(kind: hid_t) -> bool {
+    let [mut sign, mut exponent, mut exponent_bits, mut fraction, mut fraction_bits] = [0_usize; 5];
+    // SAFETY: the handle is live, and there is room for each answer.
+    let (bits, bias, plain) = unsafe {
+        let fields =
+            H5Tget_fields(kind, &mut sign, &mut exponent, &mut exponent_bits, &mut fraction, &mut fraction_bits);
+        let ordered = matches!(H5Tget_order(kind), H5T_order_t::H5T_ORDER_LE | H5T_order_t::H5T_ORDER_BE);
+        let normal = H5Tget_norm(kind) == H5T_norm_t::H5T_NORM_IMPLIED && H5Tget_offset(kind) == 0;
+        let bits = 8 * H5Tget_size(kind);
+        (bits, H5Tget_ebias(kind), fields >= 0 && ordered && normal && H5Tget_precision(kind) == bits)
+    };
+    let wanted = match bits {
+        16 => (5, 15),
+        32 => (8, 127),
+        64 => (11, 1023),
+        _ => return false,
+    };
+    plain
+        && (exponent_bits, bias) == wanted
+        && (fraction, fraction_bits, exponent, sign) == (0, bits - 1 - wanted.0, bits - 1 - wanted.0, bits - 1)
+}
 
 /// The lengths of `count` texts of variable length, as their references state them. Reading the texts would ask for as
 /// much memory before the library looks whether there are any. Errors: the library refuses; references of another size

@@ -11,3 +11,4 @@ pub(crate) mod write;
 pub(crate) use dimension_scale::Scales;
 pub use hdf5::library_version;
 pub(crate) use heap_guard::{HeapGuard, Refusal, Vetted, finding_text, parse_finding, vet};
+pub(crate) use library::floats_are_ieee;

@@ -104,6 +104,31 @@ fn tables_and_times_of_pandas_pytables_and_others_are_columns_and_rates() {
         assert_eq!(channel.source.read(499, 1).unwrap().widened().len(), 1);
         assert!(channel.source.read(500, 1).is_err());
     }
+    let (found, contents) = described(&folder.file("half.h5"));
+    let columns = (0..40).map(|column| format!("/columns[{column}] 1000"));
+    let others = ["/little 1000", "/records.y 1000", "/records.z 1000", "/rows[0] 1000", "/rows[1] 1000"];
+    let wanted = ["/big 1000", "/big_deflated 1000"].into_iter().map(str::to_owned).chain(columns);
+    let wanted: Vec<String> = wanted.chain(owned(&others)).collect();
+    assert_eq!(found, wanted, "{:?}", contents.remarks);
+    let odd = |remark: &String| remark.starts_with("/brain is left out") && remark.contains("IEEE 754");
+    assert!(contents.remarks.iter().any(odd), "{:?}", contents.remarks);
+    for channel in &contents.channels {
+        assert_eq!(channel.stored_as, "float16");
+        let sign = if channel.location == "/rows[1]" { -1.0 } else { 1.0 };
+        let values = channel.source.read(0, 500).unwrap().widened();
+        assert_eq!(values[3..300], channel.source.read(3, 297).unwrap().widened());
+        for (sample, value) in values.iter().enumerate() {
+            let t = sample as f64 * 1e-3;
+            let truth = if channel.location == "/records.z" {
+                0.0
+            } else {
+                sign * (-8.0 * t).exp() * (2.0 * std::f64::consts::PI * 50.0 * t).cos()
+            };
+            // half a unit of the 11th digit, or of the smallest number
+            let tolerance = (truth.abs() / 2048.0).max(0.5_f64.powi(25));
+            assert!((value - truth).abs() <= tolerance, "{}: {value}, not {truth}", channel.location);
+        }
+    }
     let (found, contents) = described(&folder.file("struct.mat"));
     assert_eq!(found, ["/Test/acc[1] 1000 m/s^2", "/Test/acc[2] 1000 m/s^2"], "{:?}", contents.remarks);
     let names: Vec<&str> = contents.channels.iter().map(|channel| channel.long_name.as_str()).collect();

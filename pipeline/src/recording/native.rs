@@ -17,6 +17,7 @@ use super::source::{ChunkPlace, Hdf5Source, Item, Place};
 use super::{Channel, Reading, Record};
 use crate::error::StageError;
 use crate::files::FileState;
+use crate::hdf5_files::floats_are_ieee;
 use crate::hdf5_files::links::require_own_values;
 use crate::hdf5_files::read::{Allowance, Opened, check_samples, open_file, read_texts};
 
@@ -187,6 +188,9 @@ fn open_channel(
     })
 }
 
+/// Of floating point numbers that the readers would take for others.
+pub(super) const ODD_FLOATS: &str = "its floating point numbers are not those of IEEE 754 of 2, 4 or 8 bytes";
+
 /// A number in the records of a dataset.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Part {
@@ -233,6 +237,9 @@ fn describe(
         return Err(fail(format!("found {found}, wanted one dimension, time")));
     };
     let dtype = dataset.dtype().map_err(hdf5)?;
+    if !floats_are_ieee(&dtype) {
+        return Err(fail(ODD_FLOATS.to_owned()).help("store the numbers as float32 or float64"));
+    }
     let (kind, offset) = match part {
         Some(part) => (part.number, part.offset),
         None => (number_of(&dtype).map_err(|error| fail(error.problem).help(error.help.unwrap_or_default()))?, 0),
@@ -273,7 +280,7 @@ fn number_of(dtype: &Datatype) -> Result<Number, StageError> {
     descriptor.as_ref().ok().and_then(sample_type).ok_or_else(|| {
         let odd = |_| format!("an unusual number of {} bytes", dtype.size());
         let found = descriptor.map_or_else(odd, |descriptor| descriptor.to_string());
-        let wanted = "int8 to int32, uint8 to uint32, float32 or float64";
+        let wanted = "int8 to int32, uint8 to uint32, float16, float32 or float64";
         StageError::new(format!("the samples are {found}, wanted {wanted}"))
             .help("store the converter's codes as int16 with scale_factor and add_offset")
     })
@@ -313,6 +320,7 @@ pub(super) fn sample_type(descriptor: &TypeDescriptor) -> Option<Number> {
         T::Unsigned(IntSize::U2) => Number::U16,
         T::Integer(IntSize::U4) => Number::I32,
         T::Unsigned(IntSize::U4) => Number::U32,
+        T::Float(FloatSize::U2) => Number::F16,
         T::Float(FloatSize::U4) => Number::F32,
         T::Float(FloatSize::U8) => Number::F64,
         _ => return None,
@@ -412,12 +420,8 @@ pub(super) fn number_attribute(owner: &Location, place: &str, name: &str) -> Res
     let fail = |problem: String| StageError::new(format!("{place}: the attribute `{name}` {problem}"));
     let attribute = owner.attr(name).map_err(|_| fail("is missing".to_owned()))?;
     let kind = attribute.dtype().and_then(|dtype| dtype.to_descriptor());
-    let numeric = matches!(
-        kind,
-        Ok(TypeDescriptor::Integer(_)
-            | TypeDescriptor::Unsigned(_)
-            | TypeDescriptor::Float(FloatSize::U4 | FloatSize::U8))
-    );
+    let numeric =
+        matches!(kind, Ok(TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) | TypeDescriptor::Float(_)));
     if !numeric || attribute.size() != 1 {
         return Err(fail("is not a single number".to_owned()));
     }

@@ -191,7 +191,7 @@ impl Hdf5Source {
         Ok(match self.kind {
             Number::I8 | Number::U8 | Number::I16 => slices!(i16, Int16),
             Number::U16 | Number::I24 | Number::I32 => slices!(i32, Int32),
-            Number::F32 => slices!(f32, Float32),
+            Number::F16 | Number::F32 => slices!(f32, Float32),
             Number::U32 | Number::I64 | Number::U64 | Number::F64 => slices!(f64, Float64),
         })
     }

@@ -17,6 +17,7 @@ pub mod matlab;
 pub mod nanoscope;
 pub mod netcdf;
 pub mod numpy;
+pub mod parquet;
 pub mod raw_binary;
 pub mod tdms;
 pub mod tektronix;
@@ -58,6 +59,7 @@ const FORMATS: &[Known] = &[
     Known::of::<tdms::Tdms>(),
     Known::of::<numpy::Npy>(),
     Known::of::<numpy::Npz>(),
+    Known::of::<parquet::Parquet>(),
     Known::of::<jpk::JpkForce>(),
     Known::of::<nanoscope::Nanoscope>(),
     Known::of::<wav::Wav>(),

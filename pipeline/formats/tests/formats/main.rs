@@ -11,6 +11,7 @@ mod netcdf;
 mod netcdf_builder;
 mod numpy_built;
 mod numpy_written;
+mod parquet;
 mod raw_binary;
 mod raw_order;
 mod registry;

@@ -93,9 +93,20 @@ fn every_numeric_field_is_a_channel() {
 }
 
 #[test]
+fn half_precision_is_exact_in_both_byte_orders() {
+    let half = npy("half.npy");
+    assert_eq!(samples(&half.channels[0]), (-20..20).map(f64::from).collect::<Vec<f64>>());
+    let big = npy("big_half.npy");
+    assert_eq!(big.channels[0].stored_as, "float16");
+    // np.float16(0.37 * n) for n = 1, 2, 39
+    let found = samples(&big.channels[0]);
+    assert_eq!([found[1], found[2], found[39]], [0.370_117_187_5, 0.740_234_375, 14.429_687_5]);
+}
+
+#[test]
 fn what_is_no_channel_is_refused() {
     let cases = [
-        ("half", "16-bit floating"),
+        ("quadruple", "128-bit floating"),
         ("complex", "complex"),
         ("text", "texts of 2"),
         ("objects", "Python objects"),

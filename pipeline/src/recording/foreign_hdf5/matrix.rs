@@ -142,7 +142,7 @@ impl Source for Lane {
         let samples = match matrix.number {
             Number::I8 | Number::U8 | Number::I16 => Raw::Int16(matrix.read(selection, start, end)?),
             Number::U16 | Number::I24 | Number::I32 => Raw::Int32(matrix.read(selection, start, end)?),
-            Number::F32 => Raw::Float32(matrix.read(selection, start, end)?),
+            Number::F16 | Number::F32 => Raw::Float32(matrix.read(selection, start, end)?),
             Number::U32 | Number::I64 | Number::U64 | Number::F64 => Raw::Float64(matrix.read(selection, start, end)?),
         };
         // the library opened it by name

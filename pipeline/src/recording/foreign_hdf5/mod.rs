@@ -14,18 +14,27 @@
 //! - Arrays of times (`/time`, the index of pandas, dimension scales in a unit of time) are axes: [`settle_axes`].
 //! - Integers in a unit but without a scale are codes, of which the unit is not known. JPK's files state the scale in
 //!   attributes of the group: `encoder.scaling.multiplier`, `encoder.scaling.offset`, `encoder.scaling.unit.unit`.
+//! - Time series of NWB and waveforms of Keysight's Infiniium state rate, scale and unit in places of their own: `nwb`
+//!   and `infiniium`.
 //! - Texts of MATLAB beside an array (`units`, cells `names`) are units and long names of its channels where no other array
 //!   can be meant.
-//! - Other text, structs, references, complex and half-precision numbers are remarks.
+//! - Other text, structs, references, complex numbers and numbers of two bytes that are not IEEE 754's are remarks.
 //!
 //! Source: The HDF Group, "HDF5 File Format Specification", version 3; pycroscopy, "USID" and "NSID" data models
 //! (<https://pycroscopy.github.io/USID>, <https://pycroscopy.github.io/pyNSID>); MathWorks, "MAT-File Versions" (7.3 is
 //! HDF5); PyTables, "File format"; pandas writes `DataFrame.to_hdf` by it, fixed and as a table.
 
+#[cfg(test)]
+mod half_tests;
+mod infiniium;
 mod labels;
 mod matrix;
+mod nwb;
 mod pandas;
 mod scope;
+mod stated;
+#[cfg(test)]
+mod stated_tests;
 mod times;
 mod variable;
 mod walk;
@@ -99,7 +108,11 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
     let native = states_rate(&file);
     let mut channels = Vec::new();
     for (found, series) in &variables {
-        let (rate, remark) = scopes.rate_of(found);
+        let (rate, remark) = match found.stated.as_ref().and_then(|stated| stated.sample_rate_hz) {
+            Some(rate) => (Some(rate), None),
+            None => scopes.rate_of(found),
+        };
+        remarks.extend(found.stated.iter().flat_map(|stated| stated.remarks.clone()));
         remarks.extend(remark.filter(|remark| !remarks.contains(remark)));
         for series in series {
             if channels.len() + series.lanes() > MOST_CHANNELS {

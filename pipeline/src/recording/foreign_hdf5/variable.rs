@@ -12,11 +12,12 @@ use super::scope::Scopes;
 use super::times::Times;
 use super::walk::Found;
 use crate::error::StageError;
+use crate::hdf5_files::floats_are_ieee;
 use crate::hdf5_files::read::{Allowance, check_samples};
 use crate::recording::InputFiles;
 use crate::recording::input_files::HashedHdf5;
 use crate::recording::native::{
-    Part, check_filters, has_attribute, number_attribute, open_source, sample_type, text_attribute,
+    ODD_FLOATS, Part, check_filters, has_attribute, number_attribute, open_source, sample_type, text_attribute,
 };
 
 /// A dataset of numbers.
@@ -68,14 +69,18 @@ impl Variable {
     pub(super) fn of(found: &Found, matlab: bool, allowance: &Allowance, times: &Times) -> Result<Self, String> {
         let dataset = &found.dataset;
         let shape = dataset.get_shape().map_err(|error| format!("damaged: {error}"))?;
-        let descriptor = dataset.dtype().and_then(|dtype| dtype.to_descriptor());
+        let dtype = dataset.dtype();
+        if dtype.as_ref().is_ok_and(|dtype| !floats_are_ieee(dtype)) {
+            return Err(ODD_FLOATS.to_owned());
+        }
+        let descriptor = dtype.and_then(|dtype| dtype.to_descriptor());
         if let (Ok(TypeDescriptor::Compound(record)), &[_]) = (&descriptor, shape.as_slice()) {
             return table(found, record, &shape, allowance).map(Self::Series);
         }
         let number = descriptor.as_ref().ok().and_then(number).ok_or_else(|| {
             descriptor.map_or_else(
                 |_| "its values are of a type without a common name".to_owned(),
-                |descriptor| format!("its values are {descriptor}, wanted integers, float32 or float64"),
+                |descriptor| format!("its values are {descriptor}, wanted integers, float16, float32 or float64"),
             )
         })?;
         if matlab {
@@ -90,7 +95,9 @@ impl Variable {
         if shape.len() > 2 {
             return Err(format!("it has the shape {shape:?}, wanted one or two dimensions"));
         }
-        let lanes = if times.first_axis(&found.group, &shape) {
+        let lanes = if found.stated.as_ref().is_some_and(|stated| stated.time_first) {
+            Lanes::down(&shape)
+        } else if times.first_axis(&found.group, &shape) {
             Lanes::of(&shape, false)
         } else {
             // the last axis is time, as if the axes came in the other order with the first one fastest
@@ -181,7 +188,7 @@ impl Series {
             unit: described.unit.clone(),
             long_name: described.long_name.clone(),
             sample_rate_hz: about.sample_rate_hz,
-            scale_factor: described.scale_factor,
+            scale_factor: described.scale_factor * found.stated.as_ref().map_or(1.0, |stated| stated.factor(lane)),
             add_offset: described.add_offset,
             fill_code: described.fill_code,
             is_axis: described.is_axis,
@@ -225,10 +232,14 @@ impl Series {
             |names: &[&str]| names.iter().find_map(|name| text_attribute(dataset, name, allowance)).unwrap_or_default();
         let optional =
             |name: &str| has_attribute(dataset, name).then(|| number_attribute(dataset, location, name)).transpose();
-        let (scale, offset) = (optional("scale_factor")?, optional("add_offset")?);
-        let codes = !matches!(self.number, Number::F32 | Number::F64) && scale.is_none() && offset.is_none();
+        let own = (optional("scale_factor")?, optional("add_offset")?);
+        let stated = found.stated.as_ref();
+        let (scale, offset) =
+            stated.and_then(|stated| stated.scale).map_or(own, |(factor, offset)| (Some(factor), Some(offset)));
+        let codes =
+            !matches!(self.number, Number::F16 | Number::F32 | Number::F64) && scale.is_none() && offset.is_none();
         let mut described = Described {
-            unit: text(&["units", "unit"]),
+            unit: stated.map_or_else(|| text(&["units", "unit"]), |stated| stated.unit.clone()),
             long_name: text(&["long_name", "quantity"]),
             scale_factor: scale.unwrap_or(1.0),
             add_offset: offset.unwrap_or(0.0),

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use hdf5::{Dataset, Group, LinkType, LocationType};
 
 use super::scope::Scopes;
+use super::stated::{self, Here, Stated};
 use crate::hdf5_files::links::require_own_values;
 use crate::hdf5_files::read::Allowance;
 
@@ -23,6 +24,8 @@ pub(super) struct Found {
     /// Path of its group; empty for the file.
     pub(super) group: String,
     pub(super) name: String,
+    /// What its group states of it.
+    pub(super) stated: Option<Stated>,
 }
 
 /// Datasets of a file, in the order of their names, group by group; attributes of groups go to `scopes`.
@@ -98,7 +101,13 @@ impl Walk<'_> {
         match group.loc_type_by_name(&name) {
             Ok(LocationType::Dataset) => match group.dataset(&name) {
                 Ok(dataset) => match require_own_values(&dataset) {
-                    Ok(()) => self.found.push(Found { dataset, location, group: path.to_owned(), name }),
+                    Ok(()) => {
+                        let (allowance, path_of, at) = (self.allowance, path, location.as_str());
+                        let here =
+                            Here { group, path: path_of, dataset: &dataset, name: &name, location: at, allowance };
+                        let stated = stated::of(here);
+                        self.found.push(Found { dataset, location, group: path.to_owned(), name, stated });
+                    }
                     Err(error) => {
                         self.remarks.push(format!("{location} is left out: it is a dataset {}", error.problem));
                     }

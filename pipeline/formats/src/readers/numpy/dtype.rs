@@ -140,6 +140,7 @@ fn simple(code: &str) -> Result<(Part, u64), String> {
         ('u', 4) => Number::U32,
         ('i', 8) => Number::I64,
         ('u', 8) => Number::U64,
+        ('f', 2) => Number::F16,
         ('f', 4) => Number::F32,
         ('f', 8) => Number::F64,
         ('c', 8) => return Ok((Part::Complex(Number::F32, order == '>'), size)),

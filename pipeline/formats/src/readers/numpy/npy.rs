@@ -19,8 +19,8 @@ impl Format for Npy {
     const ROW: Row = Row {
         name: "npy",
         title: "NumPy array",
-        reads: "versions 1 to 3, integers, float32, float64, structured arrays, C and Fortran order",
-        leaves_out: "half precision, objects, dates, complex numbers",
+        reads: "versions 1 to 3, integers, float16 to float64, structured arrays, C and Fortran order",
+        leaves_out: "objects, dates, complex numbers",
         described_by: "NumPy, \"NEP 1\" and `numpy.lib.format`",
         clock: "",
         unit: "",
@@ -49,7 +49,7 @@ impl Format for Npy {
             && let Part::Other(what) = &field.what
         {
             let problem =
-                format!("the array holds {what}; integers or 32- or 64-bit floating point numbers were wanted");
+                format!("the array holds {what}; integers or 16-, 32- or 64-bit floating point numbers were wanted");
             return Err(fail::at(0, problem, "convert it in Python with astype and save it again"));
         }
         let mut listing = Listing::default();

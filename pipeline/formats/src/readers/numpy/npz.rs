@@ -22,7 +22,7 @@ impl Format for Npz {
         name: "npz",
         title: "NumPy archive",
         reads: "as NPY, deflated or not; objects leave the other arrays as they are; complex arrays for `io.frf`",
-        leaves_out: "half precision, objects, dates",
+        leaves_out: "objects, dates",
         described_by: "NumPy, \"NEP 1\" and `numpy.lib.format`",
         clock: "arrays of times; numbers named `fs`, `dt`, ...",
         unit: "",
