@@ -26,8 +26,6 @@ use self::resonance::resonances;
 
 /// Twice the gain in log-likelihood that decides for a sign.
 const LEAST_GAIN: f64 = 50.0;
-/// The same once delays are fitted, too, for what has already decided without them: they make up for part of the gain.
-const LEAST_GAIN_DELAYED: f64 = 35.0;
 
 /// Resonances of a response that show its sign.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -70,7 +68,7 @@ pub fn sign_counts(frequency_hz: &[f64], response: &[c64]) -> SignCounts {
     for stretch in resonances(frequency_hz, response) {
         let gain = local::gain(&stretch);
         counts.positive += usize::from(gain > LEAST_GAIN);
-        let negative = gain < -LEAST_GAIN && local::gain_with_delays(&stretch) < -LEAST_GAIN_DELAYED;
+        let negative = gain < -LEAST_GAIN && local::gain_with_delays(&stretch) < -LEAST_GAIN;
         counts.negative += usize::from(negative);
     }
     counts
