@@ -44,10 +44,23 @@ pub fn inputs<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Vec<&'a Cha
     };
     match found.is_empty() {
         false => Ok(found),
-        true => {
-            let signals: Vec<&Channel> = source.channels.iter().filter(usable).collect();
+        true => Err(no_input(source)),
+    }
+}
+
+/// Why a file has no input: no signals, a single one, or none that is named so.
+fn no_input(source: &Source) -> Question {
+    let signals: Vec<&Channel> = source.channels.iter().filter(usable).collect();
+    let file = source.file.display();
+    match signals[..] {
+        [] => nothing(source),
+        [only] => {
+            let problem = format!("{file}: {} is its only signal, wanted an input and an output", only.location);
+            (problem, Some("--goal names what to find in one signal".to_owned()))
+        }
+        _ => {
             let help = format!("say with --input which of {} drives the others", listed(&signals));
-            Err((format!("{} does not say which channel is the input", source.file.display()), Some(help)))
+            (format!("{file} does not say which channel is the input"), Some(help))
         }
     }
 }

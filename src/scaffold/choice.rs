@@ -80,7 +80,10 @@ fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, 
         Some(Goal::Decay) => decay(file, wanted, false),
         Some(goal @ Goal::InputOutput) => input_output(file, wanted, Some(goal)),
         Some(Goal::Frf) if wanted.inputs.is_empty() && file.has_responses(true) => Ok(responses(source)),
-        Some(goal @ Goal::Frf) => input_output(file, wanted, Some(goal)),
+        Some(goal @ Goal::Frf) => match file.no_responses().filter(|_| wanted.inputs.is_empty()) {
+            Some(question) => Err(question),
+            None => input_output(file, wanted, Some(goal)),
+        },
         Some(goal) => one_channel(source, wanted, goal, String::new()),
     }
 }

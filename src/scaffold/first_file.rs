@@ -6,8 +6,8 @@ use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, find_decays}
 use afmid_kernels::harmonics::find_decays_beside_lines;
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
 use afmid_pipeline::recording::{
-    Contents, FoundChannel, FoundResponse, InputFiles, Reading, UnpackedContents, contradiction, mean_rate,
-    open_unpacked, responses, says_frequencies,
+    Contents, FoundChannel, FoundResponse, InputFiles, Reading, UnpackedContents, contradiction, gains_without_phase,
+    mean_rate, open_unpacked, responses, says_frequencies,
 };
 
 use super::channels::{some_of, usable};
@@ -47,6 +47,14 @@ impl<'a> FirstFile<'a> {
         self.opened().is_ok_and(|opened| holds_responses(&opened.contents, guessed))
     }
 
+    /// Why a file over frequencies holds no responses; none where it holds some, or nothing says that it has frequencies.
+    pub fn no_responses(&self) -> Option<Question> {
+        let contents = &self.opened().ok()?.contents;
+        contents.channels.iter().find(|channel| says_frequencies(channel))?;
+        let error = responses(contents, None).err()?;
+        Some((format!("{}: {}", self.source.file.display(), error.problem), error.help))
+    }
+
     /// That the file holds spectra and no record over time, and what reads them; none where it holds a record.
     pub fn spectrum(&self) -> Option<Question> {
         let contents = &self.opened().ok()?.contents;
@@ -57,6 +65,12 @@ impl<'a> FirstFile<'a> {
         }
         let (axis, spectra) = self.spectra(false)?;
         let file = self.source.file.display();
+        let gains = gains_without_phase(contents);
+        if !gains.is_empty() {
+            let problem = format!("{file}: {} over {axis} without a phase: no frequency response", some_of(&gains));
+            let help = "write the phase with it, as a column such as «Phase (deg)»: modes need both";
+            return Some((problem, Some(help.to_owned())));
+        }
         let problem =
             format!("{file}: {} over the frequencies {axis}: a spectrum, no record over time", some_of(&spectra));
         let responses = "--goal frf reads complex numbers, real and imaginary part, amplitude and phase of responses";

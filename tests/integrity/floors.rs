@@ -59,7 +59,7 @@ const CRATES: [Crate; 5] = [
             &["optimise"],
             &["events"],
             &["calibration", "causes", "force", "harmonics", "model", "simulate"],
-            &["spectra", "modes", "ringdown", "subspace", "vector_fitting"],
+            &["spectra", "modes", "ringdown", "subspace", "vector_fitting", "phase_sign"],
             &["contact", "pem"],
             &["block_oriented", "grey", "stabilisation", "validation"],
             &["diagnosis", "frf_modes"],

@@ -48,7 +48,9 @@ pub use readers::raw_binary::{RawBinary, SampleType};
 pub use readers::text_table::even_step;
 pub use readers::{HEAD_BYTES, Known, formats, head_of, recognise};
 pub use regular::{append_regular, open_regular, read_regular};
-pub use responses::{Degree, FoundResponse, Frequencies, Parts, responses, says_frequencies, unit_ratio};
+pub use responses::{
+    Degree, FoundResponse, Frequencies, Parts, gains_without_phase, responses, says_frequencies, unit_ratio,
+};
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
 ///

@@ -162,6 +162,7 @@ impl Listing {
                 unit: String::new(),
                 output: None,
                 input: None,
+                remarks: Vec::new(),
             });
         }
     }

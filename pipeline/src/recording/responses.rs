@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use afmid_formats::{Degree, FoundResponse, Parts, hertz, responses};
+use afmid_formats::{Degree, FoundChannel, FoundResponse, Parts, hertz, responses};
 use num_complex::Complex64;
 
 use super::how::Reading;
@@ -15,7 +15,7 @@ use crate::error::StageError;
 pub struct FileResponse {
     /// How the file names it.
     pub location: String,
-    /// Ascending.
+    /// Ascending, sorted if the file has them otherwise.
     pub frequency_hz: Vec<f64>,
     /// NaN where the file has none.
     pub values: Vec<Complex64>,
@@ -38,7 +38,8 @@ const VALUES: &str = "`--set <this stage>.values=amplitude-degrees` if the colum
 
 /// Reads all frequency responses of a file. `parts` says what its columns are; none: their titles say it.
 ///
-/// Errors: as [`WholeFile`]; none is found; columns that may be one or the other; frequencies that do not ascend.
+/// Errors: as [`WholeFile`]; none is found; columns that may be one or the other; a frequency that is
+/// there twice. Lines that do not ascend are sorted, with a remark.
 pub fn read_responses(
     files: &InputFiles,
     path: &Path,
@@ -64,18 +65,19 @@ fn read(file: &WholeFile, found: &FoundResponse) -> Result<FileResponse, StageEr
         remarks.push(format!("the frequencies {} have no unit that is known: taken as hertz", channel.location));
         1.0
     });
-    let frequency_hz: Vec<f64> = file.read(&channel)?.into_iter().map(|frequency| frequency * hz).collect();
-    let ascending = |pair: &[f64]| pair[0] < pair[1];
-    if let Some(at) = frequency_hz.windows(2).position(|pair| !ascending(pair)) {
-        let (one, next) = (frequency_hz[at], frequency_hz[at + 1]);
-        return Err(StageError::new(format!(
-            "the frequencies of {} go from {one} to {next} Hz at line {}, wanted ascending ones",
-            found.location,
-            at + 2
-        ))
-        .help("sort the lines, or write each sweep to a file of its own"));
+    let stored_hz: Vec<f64> = file.read(&channel)?.into_iter().map(|frequency| frequency * hz).collect();
+    let order = ascending(&stored_hz, &found.location)?;
+    remarks.extend(found.remarks.iter().cloned());
+    if let Some((_, remark)) = &order {
+        remarks.push(remark.clone());
     }
-    let [first, second] = [file.read(&found.values[0])?, file.read(&found.values[1])?];
+    let sorted = |values: Vec<f64>| match &order {
+        Some((order, _)) => order.iter().filter_map(|line| values.get(*line).copied()).collect(),
+        None => values,
+    };
+    let read_sorted = |channel: &FoundChannel| file.read(channel).map(sorted);
+    let frequency_hz = sorted(stored_hz);
+    let [first, second] = [read_sorted(&found.values[0])?, read_sorted(&found.values[1])?];
     if found.guessed {
         if first.iter().all(|value| *value >= 0.0) {
             return Err(StageError::new(format!(
@@ -91,7 +93,7 @@ fn read(file: &WholeFile, found: &FoundResponse) -> Result<FileResponse, StageEr
         ));
     }
     let values = first.iter().zip(&second).map(|(a, b)| value(found.parts, *a, *b)).collect();
-    let coherence = found.coherence.as_ref().map(|channel| file.read(channel)).transpose()?;
+    let coherence = found.coherence.as_ref().map(read_sorted).transpose()?;
     Ok(FileResponse {
         location: found.location.clone(),
         frequency_hz,
@@ -102,6 +104,33 @@ fn read(file: &WholeFile, found: &FoundResponse) -> Result<FileResponse, StageEr
         input: found.input.clone(),
         remarks,
     })
+}
+
+/// The lines in the order of their frequencies, and that they were not; none where they ascend. Errors: a frequency that
+/// is none, or is there twice.
+fn ascending(frequency_hz: &[f64], name: &str) -> Result<Option<(Vec<usize>, String)>, StageError> {
+    let help = "write each sweep to a file of its own";
+    if let Some(line) = frequency_hz.iter().position(|frequency| !frequency.is_finite()) {
+        let problem = format!("the frequency of {name} at line {} is no number", line + 1);
+        return Err(StageError::new(problem).help("leave out lines without a frequency"));
+    }
+    if frequency_hz.is_sorted_by(|one, next| one < next) {
+        return Ok(None);
+    }
+    let mut order: Vec<usize> = (0..frequency_hz.len()).collect();
+    order.sort_by(|a, b| frequency_hz[*a].total_cmp(&frequency_hz[*b]));
+    if let Some(pair) = order.windows(2).find(|pair| frequency_hz[pair[0]] == frequency_hz[pair[1]]) {
+        let (one, other) = (pair[0].min(pair[1]), pair[0].max(pair[1]));
+        let problem = format!(
+            "the frequencies of {name} have {} Hz twice, at lines {} and {}, wanted each once",
+            frequency_hz[one],
+            one + 1,
+            other + 1
+        );
+        return Err(StageError::new(problem).help(help));
+    }
+    let how = if frequency_hz.is_sorted_by(|one, next| one > next) { "descend" } else { "do not ascend" };
+    Ok(Some((order, format!("the frequencies of {name} {how}: the lines are sorted"))))
 }
 
 fn value(parts: Parts, first: f64, second: f64) -> Complex64 {

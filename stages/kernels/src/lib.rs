@@ -19,13 +19,14 @@
 //! | [`contact`] | poles in contact and free | contact stiffness and damping |
 //! | [`events::decay`] | records | where free decays begin and end |
 //! | [`harmonics`] | a steady oscillation | frequency, amplitudes and phases of its harmonics |
+//! | [`phase_sign`] | a frequency response | whether its imaginary parts have the sign of `exp(+i w t)` |
 //! | [`modes`] | a model with its covariance | frequencies, quality factors, static shares, zeros |
 //! | [`simulate`] | a lever, a contact, a detector | records with their truth |
 //!
 //! From the ground up, each using only those before it:
 //! [`linear_algebra`], [`signal`], [`statistics`], [`effects`], [`Monitor`] - [`optimise`] - [`events`] -
 //! [`calibration`], [`causes`], [`force`], [`harmonics`], [`model`], [`simulate`] - [`spectra`], [`modes`], [`ringdown`],
-//! [`subspace`], [`vector_fitting`] - [`contact`], [`pem`] - [`block_oriented`], [`grey`], [`stabilisation`],
+//! [`subspace`], [`vector_fitting`], [`phase_sign`] - [`contact`], [`pem`] - [`block_oriented`], [`grey`], [`stabilisation`],
 //! [`validation`] - [`diagnosis`], [`frf_modes`]. Kernels that fit many times take a [`Monitor`]:
 //! [`ringdown::fit_counted_ringdowns`], [`validation::choose_order`], [`validation::bootstrap`],
 //! [`block_oriented::fit_block_oriented`].
@@ -57,6 +58,7 @@ pub mod modes;
 mod monitor;
 pub mod optimise;
 pub mod pem;
+pub mod phase_sign;
 pub mod ringdown;
 pub mod signal;
 pub mod simulate;

@@ -36,16 +36,26 @@ pub fn responses(contents: &Contents, parts: Option<Parts>) -> Result<Vec<FoundR
 }
 
 /// The axis that has a response's frequencies: of as many values, the one whose location has the longest beginning in
-/// common with that of the response.
+/// common with that of the response; of one folder those that are titled so, before a counter of lines.
 pub(super) fn frequencies_for<'a>(
     location: &str,
     samples: usize,
     channels: &'a [FoundChannel],
 ) -> Option<&'a FoundChannel> {
-    let common = |other: &str| location.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    let common = |one: &str, other: &str| one.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
     let fitting = |channel: &&FoundChannel| is_frequency(channel) && channel.samples == samples;
+    let nearness = |channel: &&FoundChannel| {
+        let other = channel.location.as_str();
+        let titled = role(channel).0 == Some(Role::Frequency);
+        (common(folder(location), folder(other)), titled, common(location, other))
+    };
     // the first of several alike
-    channels.iter().rev().filter(fitting).max_by_key(|channel| common(&channel.location))
+    channels.iter().rev().filter(fitting).max_by_key(nearness)
+}
+
+/// What a location begins with, without its own name.
+fn folder(location: &str) -> &str {
+    location.rsplit_once(['/', '.']).map_or("", |(folder, _)| folder)
 }
 
 /// Whether a channel holds frequencies: titled so, or an axis without a title.
@@ -75,6 +85,8 @@ struct Pair<'a> {
     parts: Parts,
     guessed: bool,
     coherence: Option<&'a FoundChannel>,
+    /// What is left out beside it.
+    remarks: Vec<String>,
 }
 
 impl Pair<'_> {
@@ -101,6 +113,7 @@ impl Pair<'_> {
             unit,
             output: None,
             input: None,
+            remarks: self.remarks.clone(),
         };
         let frequency = found.frequency_channel(channels)?;
         found.frequency_unit.clone_from(&frequency.unit);
@@ -109,9 +122,11 @@ impl Pair<'_> {
     }
 }
 
-/// Pairs by what titles say.
+/// Pairs by what titles say. Amplitudes without a phase are left out if others have one: instruments list the level of
+/// their generator beside the gain.
 fn by_title(mut columns: Vec<Column<'_>>) -> Result<Vec<Pair<'_>>, FormatError> {
     let mut pairs = Vec::new();
+    let mut without: Vec<(&FoundChannel, Role)> = Vec::new();
     for at in 0..columns.len() {
         let Some(column) = columns.get(at).filter(|column| !column.used) else { continue };
         let wanted = match column.role {
@@ -122,29 +137,79 @@ fn by_title(mut columns: Vec<Column<'_>>) -> Result<Vec<Pair<'_>>, FormatError> 
             _ => continue,
         };
         let (first, decibels) = (column.channel, column.role == Some(Role::Decibels));
-        let Some(second) = take(&mut columns, at, wanted) else {
-            let problem = format!("{} has no column of its {}", first.location, said(wanted));
-            return Err(fail::plain(problem, "title both parts of each response, or say what the columns are"));
+        let second = if has_rival(&columns, at) { None } else { take(&mut columns, at, wanted) };
+        let Some(second) = second else {
+            without.push((first, wanted));
+            continue;
         };
         let coherence = take(&mut columns, at, Role::Coherence);
         let parts = match wanted {
             Role::Phase => Parts::AmplitudePhase { decibels, degrees: degrees(second).ok_or_else(|| unclear(second))? },
             _ => Parts::RealImaginary,
         };
-        pairs.push(Pair { values: [first, second], parts, guessed: false, coherence });
+        pairs.push(Pair { values: [first, second], parts, guessed: false, coherence, remarks: Vec::new() });
+    }
+    let has_phase = pairs.iter().any(|pair: &Pair| matches!(pair.parts, Parts::AmplitudePhase { .. }));
+    for (first, wanted) in without {
+        if !(wanted == Role::Phase && has_phase) {
+            let problem = format!("{} has no column of its {}", first.location, said(wanted));
+            return Err(fail::plain(problem, "title both parts of each response, or say what the columns are"));
+        }
+        if let Some(pair) = pairs.first_mut() {
+            pair.remarks.push(format!("{} is left out: it has no phase", first.location));
+        }
     }
     Ok(pairs)
 }
 
-/// The column of this role that belongs to column `at`: of the same name, or else the next without a name of its own.
+/// Whether the phase that column `at` would take is that of another amplitude: of those of its name, or without one,
+/// there are fewer phases than amplitudes, and the other one is in decibels where this one is not, or stands nearer before
+/// the phase.
+fn has_rival(columns: &[Column<'_>], at: usize) -> bool {
+    let Some(own) = columns.get(at) else { return false };
+    let is_size = |column: &Column| matches!(column.role, Some(Role::Amplitude | Role::Decibels));
+    let is_phase = |column: &Column| !column.used && column.role == Some(Role::Phase);
+    let name_of_phase = |column: &Column| {
+        let named = columns.iter().any(|phase| is_phase(phase) && phase.name == column.name);
+        if named { column.name.clone() } else { String::new() }
+    };
+    let name = name_of_phase(own);
+    let rivals = |column: &&Column| !column.used && is_size(column) && name_of_phase(column) == name;
+    let sizes = columns.iter().filter(rivals).count();
+    let phases = columns.iter().filter(|column| is_phase(column) && column.name == name).count();
+    let next = columns.iter().skip(at + 1).find(rivals);
+    is_size(own)
+        && phases < sizes
+        && next.is_some_and(|next| own.role == next.role || next.role == Some(Role::Decibels))
+}
+
+/// The column of this role that belongs to column `at`: of the same name, or else the next without a name of its own, or
+/// else the only one there is for the only amplitude.
 fn take<'a>(columns: &mut [Column<'a>], at: usize, wanted: Role) -> Option<&'a FoundChannel> {
     let name = columns.get(at).map(|column| column.name.clone()).unwrap_or_default();
     let fits = |column: &Column| !column.used && column.role == Some(wanted);
     let named = columns.iter().position(|column| fits(column) && column.name == name);
     let next = columns.iter().enumerate().position(|(k, column)| k > at && fits(column) && column.name.is_empty());
-    let found = columns.get_mut(named.or(next)?)?;
+    let found = columns.get_mut(named.or(next).or_else(|| only(columns, wanted))?)?;
     found.used = true;
     Some(found.channel)
+}
+
+/// The only phase of a file with a single amplitude: some instruments number their traces, not their responses.
+fn only(columns: &[Column<'_>], wanted: Role) -> Option<usize> {
+    let count = |roles: &[Role]| columns.iter().filter(|c| c.role.is_some_and(|role| roles.contains(&role))).count();
+    let single = count(&[Role::Amplitude, Role::Decibels]) == 1 && count(&[Role::Phase]) == 1;
+    let at = columns.iter().position(|column| !column.used && column.role == Some(wanted))?;
+    (wanted == Role::Phase && single && columns.len() == 2).then_some(at)
+}
+
+/// The gains in decibels of a file that has no phase: neither responses nor power densities.
+pub fn gains_without_phase(contents: &Contents) -> Vec<String> {
+    let of = |wanted: Role| contents.channels.iter().filter(move |channel| role(channel).0 == Some(wanted));
+    match of(Role::Phase).next() {
+        None => of(Role::Decibels).map(|channel| channel.location.clone()).collect(),
+        Some(_) => Vec::new(),
+    }
 }
 
 /// Pairs of neighbours.
@@ -156,7 +221,13 @@ fn in_turn<'a>(columns: Vec<Column<'a>>, parts: Option<Parts>) -> Result<Vec<Pai
         return Err(fail::plain(problem, "leave out what is no part of a response, or give the columns titles"));
     }
     let (chosen, guessed) = (parts.unwrap_or(Parts::RealImaginary), parts.is_none());
-    let pair = |values: &[&'a FoundChannel; 2]| Pair { values: *values, parts: chosen, guessed, coherence: None };
+    let pair = |values: &[&'a FoundChannel; 2]| Pair {
+        values: *values,
+        parts: chosen,
+        guessed,
+        coherence: None,
+        remarks: Vec::new(),
+    };
     Ok(left.as_chunks().0.iter().map(pair).collect())
 }
 

@@ -3,13 +3,14 @@
 //! - A reader that knows complex numbers lists them as [`FoundResponse`]s beside the channels.
 //! - Of columns of real numbers, [`responses`] makes them: a column of frequencies, then real and imaginary part, or
 //!   amplitude and phase, of each response. Titles say which (`Re(H)`, `Imaginary`, `Mag (dB)`, `Phase [deg]`,
-//!   `Coherence`); where there are none, the columns are taken in turn.
+//!   `Coherence`, `CH2 Gain (dB)`); where there are none, the columns are taken in turn. The generator's amplitude and
+//!   other columns of amplitudes without a phase are left out of a Bode table.
 //! - Times, frequencies and counters are axes and never a response.
 
 mod columns;
 mod role;
 
-pub use columns::{responses, says_frequencies};
+pub use columns::{gains_without_phase, responses, says_frequencies};
 
 use crate::{FormatError, FoundChannel, Raw, Source, fail};
 
@@ -72,6 +73,8 @@ pub struct FoundResponse {
     pub output: Option<Degree>,
     /// What is excited.
     pub input: Option<Degree>,
+    /// What is left out beside it.
+    pub remarks: Vec<String>,
 }
 
 /// The unit of output over input.

@@ -26,6 +26,9 @@ const WORDS: [(Role, &[&str]); 7] = [
     (Role::Frequency, &["frequency", "frequencies", "freq", "freqs", "hz", "khz"]),
 ];
 
+/// Words beside them in titles that are no name.
+const BESIDE: [&str; 6] = ["deg", "degree", "degrees", "rad", "radians", "shift"];
+
 /// The role that title or unit state, and what is left of the title: the name of the response.
 pub(super) fn role(channel: &FoundChannel) -> (Option<Role>, String) {
     let split = |text: &str| -> Vec<String> {
@@ -40,8 +43,9 @@ pub(super) fn role(channel: &FoundChannel) -> (Option<Role>, String) {
     }
     let (titled, unit) = (said(&words), channel.unit.to_lowercase());
     let by_unit = match unit.as_str() {
-        "db" => Some(Role::Decibels),
-        "deg" | "°" | "rad" | "degree" | "degrees" => Some(Role::Phase),
+        // of volts, of milliwatts, «dB re 1 m/N»: of the same shape
+        unit if unit.starts_with("db") => Some(Role::Decibels),
+        "deg" | "°" | "º" | "rad" | "degree" | "degrees" | "radian" | "radians" => Some(Role::Phase),
         _ if hertz(&channel.unit).is_some() => Some(Role::Frequency),
         _ => None,
     };
@@ -50,7 +54,9 @@ pub(super) fn role(channel: &FoundChannel) -> (Option<Role>, String) {
         (Some(Role::Amplitude), Some(Role::Decibels)) => Some(Role::Decibels),
         (titled, by_unit) => titled.or(by_unit),
     };
-    let known = |word: &&String| WORDS.iter().any(|(_, known)| known.contains(&word.as_str())) || *word == "deg";
+    let known = |word: &&String| {
+        WORDS.iter().any(|(_, known)| known.contains(&word.as_str())) || BESIDE.contains(&word.as_str())
+    };
     (found, words.iter().filter(|word| !known(word)).cloned().collect::<Vec<String>>().join(" "))
 }
 
@@ -58,7 +64,7 @@ pub(super) fn role(channel: &FoundChannel) -> (Option<Role>, String) {
 pub(super) fn degrees(channel: &FoundChannel) -> Option<bool> {
     let says = format!("{} {}", channel.unit, channel.long_name).to_lowercase();
     let has = |words: &[&str]| words.iter().any(|word| says.contains(word));
-    match (has(&["deg", "°"]), has(&["rad"])) {
+    match (has(&["deg", "°", "º"]), has(&["rad"])) {
         (true, false) => Some(true),
         (false, true) => Some(false),
         _ => None,

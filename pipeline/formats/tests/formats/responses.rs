@@ -2,7 +2,7 @@
 
 use crate::mat_builder::{Order, compressed, level4};
 use crate::support::{Temporary, real_hammer, values};
-use afmid_formats::{Contents, FormatError, FoundResponse, Parts, head_of, recognise, responses};
+use afmid_formats::{Contents, FormatError, FoundResponse, Parts, gains_without_phase, head_of, recognise, responses};
 use std::f64::consts::TAU;
 
 /// Real and imaginary part of an oscillator's receptance.
@@ -120,6 +120,70 @@ fn amplitude_and_phase_with_coherence_of_several_points_in_one_table() {
     assert!(responses(&unclear, None).unwrap_err().problem.contains("degrees or in radians"));
     let alone = contents("csv", &table("Frequency (Hz),Amplitude,Level\n", ",", cartesian));
     assert!(responses(&alone, None).unwrap_err().problem.contains("no column of its phase"));
+}
+
+/// Heads of Bode tables as instruments write them (Bode 100, WaveForms, Keysight, Siglent and Teledyne scopes, Red
+/// Pitaya), and what is left out of them.
+const BODE_HEADS: [(&str, &str); 12] = [
+    ("Frequency (Hz),Gain (dB),Phase (deg)", ""),
+    ("Frequency [Hz],Gain [dB],Phase [deg]", ""),
+    ("Frequency (Hz),Magnitude (dB),Phase (degrees)", ""),
+    ("Frequency (Hz),CH2 Gain (dB),CH2 Phase (°)", ""),
+    ("Frequency(Hz),CH1 Amplitude(dB),CH1 Phase(Deg)", ""),
+    ("Frequency (Hz);Trace 1: Gain: Magnitude (dB);Trace 2: Gain: Phase (°)", ""),
+    ("freq,mag_db,phase_deg", ""),
+    ("Frequency (Hz),Gain (dB),Phase Shift (°)", ""),
+    ("#, Frequency (Hz), Amplitude (Vpp), Gain (dB), Phase (°)", "Amplitude"),
+    ("#,Frequency (Hz),Gain (dB),Amplitude (Vpp),Phase (°)", "Amplitude"),
+    ("Frequency (Hz),Channel 1 Magnitude (dB),Channel 2 Magnitude (dB),Channel 2 Phase (deg)", "Channel 1 Magnitude"),
+    ("Frequency (Hz),Input (dB),Magnitude (dBV),Phase (°)", "Input"),
+];
+
+#[test]
+fn bode_tables_of_instruments_are_responses_with_the_gain_in_decibels() {
+    for (head, left_out) in BODE_HEADS {
+        let separator = if head.contains(';') { ";" } else { "," };
+        let titles: Vec<String> = head.split(separator).map(str::to_lowercase).collect();
+        let lines: String = (0..LINES)
+            .map(|k| {
+                let f = 0.5 * (k + 1) as f64;
+                let (amplitude, phase) = polar(f);
+                let field = |title: &String| match title.trim() {
+                    "#" => (k + 1) as f64,
+                    title if title.starts_with("freq") => f,
+                    title if title.contains("pha") => phase.to_degrees(),
+                    title if left_out.is_empty() || !title.starts_with(&left_out.to_lowercase()) => {
+                        20.0 * amplitude.log10()
+                    }
+                    _ => 0.2,
+                };
+                titles.iter().map(|title| format!("{:.12e}", field(title))).collect::<Vec<_>>().join(separator) + "\n"
+            })
+            .collect();
+        let found = contents("csv", format!("{head}\n{lines}").as_bytes());
+        let all = responses(&found, None).unwrap_or_else(|error| panic!("{head}: {error}"));
+        assert_eq!(all.len(), 1, "{head}");
+        assert_eq!(all[0].parts, Parts::AmplitudePhase { decibels: true, degrees: true }, "{head}");
+        let said = all[0].remarks.join("; ");
+        assert!(said.contains("left out") != left_out.is_empty() && said.contains(left_out), "{head}: {said}");
+        let read = read(&found, &all[0]);
+        assert_eq!(read.len(), LINES, "{head}");
+        for (k, (f, gain, phase)) in read.into_iter().enumerate() {
+            assert_eq!(f, 0.5 * (k + 1) as f64, "{head}");
+            let wanted = polar(f);
+            // printed to 13 digits
+            assert!((10_f64.powf(gain / 20.0) / wanted.0 - 1.0).abs() < 1e-10, "{head}: {gain} at {f}");
+            assert!((phase.to_radians() - wanted.1).abs() < 1e-10, "{head}");
+        }
+        assert!(gains_without_phase(&found).is_empty());
+    }
+}
+
+#[test]
+fn a_gain_without_a_phase_is_no_response() {
+    let found = contents("csv", &table("Frequency (Hz),CH2 Gain (dB)\n", ",", |f| vec![20.0 * polar(f).0.log10()]));
+    assert!(responses(&found, None).unwrap_err().problem.contains("CH2 Gain has no column of its phase"));
+    assert_eq!(gains_without_phase(&found), ["CH2 Gain"]);
 }
 
 #[test]

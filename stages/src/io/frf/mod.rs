@@ -2,9 +2,10 @@
 
 mod assembled;
 mod example;
+mod sign;
 mod stage;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use stage::FRF;
-pub use stage::{Frf, ResponseForm, Roving};
+pub use stage::{Frf, PhaseSign, ResponseForm, Roving};

@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::assembled::Assembled;
+use super::sign::{self, OtherSign};
 use crate::artifacts::Quantity;
 use crate::io::file_patterns::{Match, matching_files};
 use crate::io::repeats::warn_of_copies;
@@ -22,7 +23,9 @@ use crate::io::shared_data::moved;
 /// Frequencies with real and imaginary part, or with amplitude and phase, in tables of text (SignalCalc and CutPro
 /// among them), universal files 58 and 58b (functions 4 and 5), complex arrays beside frequencies in MATLAB files,
 /// records of complex numbers in HDF5; each also packed with gzip. Titles say what columns are, `values` where there
-/// are none. Times, frequencies and counters are axes and never a response. All responses must have the same
+/// are none. Times, frequencies and counters are axes and never a response. Lines that do not ascend are sorted, with a
+/// warning. Where the resonances of a file's responses decay only with the other sign of the imaginary parts, these are
+/// turned, with a warning; responses in a ratio of like units are not. All responses must have the same
 /// frequencies. Of files with the same bytes, and of responses with equal values (more than 100, not all equal) unless
 /// files or `positions_m` say that their points are others, the first counts, and a warning names the rest.
 /// # Shapes
@@ -33,8 +36,8 @@ use crate::io::shared_data::moved;
 /// # Accuracy
 /// Values as stored; coherence where the files have it. No errors of the values are known: files do not state them.
 /// # Errors
-/// A pattern without a match; a file without frequencies or with columns that may be one thing or another; frequencies
-/// that do not ascend or differ between responses; lists of another length than the responses.
+/// A pattern without a match; a file without frequencies or with columns that may be one thing or another; a frequency
+/// that is there twice; frequencies that differ between responses; responses of both signs in a file; lists of another length than the responses.
 /// # Source
 /// SDRC, Universal Dataset Number 58; D. J. Ewins, Modal Testing, 2000, sections 1.4 and 3.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -48,6 +51,10 @@ pub struct Frf {
     /// What two columns of each response hold: `auto` (what their titles say), `real-imaginary`, `amplitude-degrees`,
     /// `amplitude-radians`, `decibels-degrees` (20 lg), `decibels-radians`. Why: titles say it in most tables.
     pub values: ResponseForm,
+    /// Sign of the imaginary parts: `auto` (turned where resonances decay only with the other sign, in all responses of
+    /// the file), `as-stored`, or `turned` for responses of `exp(-i w t)`. Why: some programs write the conjugate, and
+    /// no mode fits it.
+    pub phase: PhaseSign,
     /// What goes from point to point where files do not name the points: the `hammer` (the sensor stays) or the
     /// `sensor`. Why: with one sensor it is the hammer that is easier to move.
     pub roving: Roving,
@@ -100,6 +107,19 @@ impl ResponseForm {
     }
 }
 
+/// Sign of the imaginary parts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PhaseSign {
+    /// What lets the resonances decay.
+    #[default]
+    Auto,
+    /// As the file has it.
+    AsStored,
+    /// The other one.
+    Turned,
+}
+
 /// What goes from point to point.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -117,6 +137,7 @@ impl Default for Frf {
             files: Vec::new(),
             format: "auto".to_owned(),
             values: ResponseForm::Auto,
+            phase: PhaseSign::Auto,
             roving: Roving::Hammer,
             quantity: None,
             unit: None,
@@ -136,7 +157,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Frf {
     const SPEC: Spec = Spec {
         name: "io.frf",
-        version: 4,
+        version: 5,
         summary: "reads measured frequency responses from files of any format",
         inputs: &[],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -186,16 +207,17 @@ impl Stage for Frf {
         let paths = self.sources(cx.base(), cx.files())?;
         cx.expect(paths.len());
         let reading = Reading::of(&self.format, None);
-        let read: Vec<Vec<FileResponse>> = paths
-            .par_iter()
-            .map(|path| {
-                let responses = read_responses(cx.files(), path, &reading, self.values.parts());
-                cx.tick();
-                responses
-            })
-            .collect::<Result<_, _>>()?;
+        let one = |path: &PathBuf| -> Result<(Vec<FileResponse>, Option<OtherSign>), StageError> {
+            let mut responses = read_responses(cx.files(), path, &reading, self.values.parts())?;
+            let sign = sign::settle(path, &mut responses, self.phase)?;
+            cx.tick();
+            Ok((responses, sign))
+        };
+        let read = paths.par_iter().map(one).collect::<Result<Vec<_>, StageError>>()?;
+        let (read, signs): (Vec<Vec<FileResponse>>, Vec<Option<OtherSign>>) = read.into_iter().unzip();
         let hashes = paths.par_iter().map(|path| cx.files().hash(path)).collect::<Result<Vec<String>, _>>()?;
         let assembled = Assembled::new(self, &paths, &hashes, read)?;
+        sign::remarks(&paths, &signs).iter().for_each(|remark| cx.warn(remark));
         warn_of_copies(cx, &assembled.copies, "their values are equal");
         assembled.remarks.iter().for_each(|remark| cx.warn(remark));
         let summary = assembled.summary()?;

@@ -142,6 +142,7 @@ fn response(dataset: &Dataset, location: &str, pinned: &Pinned) -> Result<FoundR
         unit: unit_ratio(&header.ordinate.unit, &header.denominator.unit),
         output,
         input,
+        remarks: Vec::new(),
     })
 }
 
