@@ -108,4 +108,5 @@ def main():
     print(json.dumps({"modes": MODES, "files": asked}))
 
 
-main()
+if __name__ == "__main__":
+    main()

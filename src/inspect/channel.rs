@@ -15,12 +15,18 @@ pub struct Channel {
     pub location: String,
     pub samples: usize,
     pub sample_rate_hz: Option<f64>,
+    /// Whether that is of times without a unit, taken as seconds.
+    pub rate_is_guess: bool,
+    /// Standard error of the rate, relative.
+    pub rate_std: f64,
     pub unit: String,
     pub stored_as: &'static str,
     /// Samples before which the recording was interrupted.
     pub gaps: Vec<usize>,
     /// Whether it is an axis and no signal.
     pub is_axis: bool,
+    /// Why it is no sensor: a clock, a function of others.
+    pub no_sensor: Option<String>,
     /// What the samples are; none for channels behind the first ones of a file with very many, which are listed only.
     pub values: Option<Values>,
 }
@@ -49,10 +55,13 @@ impl Channel {
             location: found.location.clone(),
             samples: found.samples,
             sample_rate_hz: found.sample_rate_hz,
+            rate_is_guess: found.rate_is_guess,
+            rate_std: found.rate_relative_std,
             unit: found.unit.clone(),
             stored_as: found.stored_as,
             gaps: found.gaps.clone(),
             is_axis: found.is_axis,
+            no_sensor: None,
             values,
         })
     }

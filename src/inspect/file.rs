@@ -9,6 +9,7 @@ use afmid_pipeline::recording::{InputFiles, Reading, open_unpacked, recognised};
 
 use super::channel::Channel;
 use super::config::stage;
+use super::no_sensor::tell;
 use super::ringing::NO_RATE;
 use super::verdict::{Verdict, of_file};
 
@@ -81,8 +82,9 @@ fn read(path: &Path) -> Result<Holdings, StageError> {
     let opened = open_unpacked(&InputFiles::new(), path, &Reading::of("auto", None))?;
     let contents = &opened.contents;
     let channels = contents.channels.iter().enumerate();
-    let channels: Vec<Channel> =
+    let mut channels: Vec<Channel> =
         channels.map(|(index, found)| Channel::of(found, index < MOST_READ)).collect::<Result<_, _>>()?;
+    tell(&mut channels, &contents.channels);
     let mut ringdown = of_file(&channels, &contents.channels);
     let best = ringdown.channel.and_then(|index| channels.get(index));
     // a rate that is stated and is none

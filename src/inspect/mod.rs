@@ -5,6 +5,7 @@ mod config;
 mod file;
 mod folder;
 mod json;
+mod no_sensor;
 mod ringing;
 mod text;
 mod verdict;

@@ -39,6 +39,11 @@ fn holdings_text(holdings: &Holdings) -> String {
     }
     text.extend(holdings.remarks.iter().take(MOST_ROWS).map(|remark| format!("  note: {}\n", one_line(remark))));
     text += &more(holdings.remarks.len(), "notes");
+    let why =
+        |channel: &Channel| channel.no_sensor.as_ref().map(|why| format!("{} is no sensor: {why}", channel.location));
+    text.extend(
+        holdings.channels.iter().filter_map(why).take(MOST_ROWS).map(|why| format!("  note: {}\n", one_line(&why))),
+    );
     let verdict = &holdings.ringdown;
     let channel = verdict.channel.and_then(|index| holdings.channels.get(index));
     let of = channel.map(|channel| format!("{}: ", channel.location)).unwrap_or_default();

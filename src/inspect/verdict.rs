@@ -78,6 +78,9 @@ fn unusable(channel: &Channel) -> Option<String> {
     if channel.is_axis {
         return Some("it is an axis, no signal".to_owned());
     }
+    if let Some(why) = &channel.no_sensor {
+        return Some(format!("it is no sensor: it is {why}").replace("it is rises", "it rises"));
+    }
     let longest = longest_stretch(channel.samples, &channel.gaps).len();
     if longest < LEAST_SAMPLES {
         return Some(format!("{longest} samples without interruption, wanted at least {LEAST_SAMPLES}"));

@@ -117,6 +117,7 @@ fn records() -> StageRecord {
         blake3: format!("{k:064x}"),
         sample_rate_hz: RATE,
         started_at: "2005-06-01T12:00:00Z".to_owned(),
+        rate_relative_std: 0.0,
         first_sample: 0,
         reading: afmid_pipeline::recording::Reading::default(),
         channels: Vec::new(),

@@ -150,7 +150,7 @@ fn last_name(location: &str) -> &str {
 /// Whether a channel holds a signal.
 pub fn usable(channel: &&Channel) -> bool {
     let signal = |values: &Values| values.codes >= LEAST_CODES && values.missing == 0;
-    !channel.is_axis && channel.values.as_ref().is_some_and(signal)
+    !channel.is_axis && channel.no_sensor.is_none() && channel.values.as_ref().is_some_and(signal)
 }
 
 /// That a file has no signal.

@@ -12,7 +12,7 @@ use super::lever::{force_curve, is_of_a_lever};
 use super::pipeline::{Wanted, segment_samples};
 use super::recordings::Source;
 use super::sensors::{Sensors, left_out, like, sensors};
-use super::stated::does_without_unit;
+use super::stated::{does_without_unit, of_rate};
 use super::steps;
 use crate::cli::{Goal, RecordsAre};
 use crate::inspect::{Channel, counted};
@@ -63,6 +63,7 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
     if choice.channels.first().is_some_and(|channel| does_without_unit(choice.goal, channel, wanted)) {
         choice.notes.push("no unit is stated: amplitudes are as in the file; --unit UNIT says theirs".to_owned());
     }
+    choice.notes.extend(choice.channels.first().and_then(|channel| of_rate(channel, wanted)));
     let contradicted = choice.channels.first().and_then(|channel| file.contradicted_rate(channel, wanted));
     choice.notes.extend(contradicted.map(|problem| format!("{problem}: is --rate right?")));
     Ok(choice)

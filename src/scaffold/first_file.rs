@@ -128,7 +128,7 @@ impl<'a> FirstFile<'a> {
 
     /// The rate that the file states or the user. Errors: neither.
     pub fn rate(&self, channel: &Channel, wanted: &Wanted<'_>) -> Result<f64, Question> {
-        let rate = channel.sample_rate_hz.or(wanted.rate_hz);
+        let rate = wanted.rate_hz.or(channel.sample_rate_hz);
         rate.ok_or_else(|| {
             let (problem, help) = missing(self.source, channel, wanted, true);
             let more = self.mean_rate(channel).into_iter().chain(self.hammer());

@@ -246,10 +246,13 @@ mod tests {
             location: "/g/ch 0".to_owned(),
             samples: 900_000,
             sample_rate_hz: rate,
+            rate_is_guess: false,
+            rate_std: 0.0,
             unit: unit.to_owned(),
             stored_as: "int16",
             gaps: Vec::new(),
             is_axis: false,
+            no_sensor: None,
             values: None,
         };
         Source {
@@ -296,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn what_files_do_not_say_is_asked_for_and_what_they_say_is_not_overruled() {
+    fn what_files_do_not_say_is_asked_for_and_the_users_rate_overrules_theirs() {
         let ask = |source: Source, wanted: Wanted<'_>| of_first(&source, wanted, "/lab").expect_err("a question");
         let goal = wanted(Goal::Ringdown);
         assert!(ask(source(None, "V"), goal).1.expect("help").contains("--rate"));
@@ -305,7 +308,9 @@ mod tests {
             both.0.contains("no sample rate and no unit") && both.1.expect("help").contains("--rate HZ --unit UNIT")
         );
         assert!(ask(source(Some(5e6), ""), goal).1.expect("help").contains("--unit"));
-        assert!(ask(source(Some(5e6), "V"), Wanted { rate_hz: Some(1e6), ..goal }).0.contains("5000000"));
+        let overruled =
+            of_first(&source(Some(5e6), "V"), Wanted { rate_hz: Some(1e6), ..goal }, "/lab").expect("a config");
+        assert!(overruled.contains("sample_rate_hz = 1000000.0"), "{overruled}");
         assert!(ask(source(Some(5e6), "V"), Wanted { unit: Some("nm"), ..goal }).0.contains("unit V"));
         let other = ["ch".to_owned()];
         let question = choose(&source(Some(5e6), "V"), &Wanted { channels: &other, ..goal }).expect_err("a question");

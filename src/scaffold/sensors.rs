@@ -126,7 +126,9 @@ fn why(channel: &Channel, first: &Channel, drives: bool) -> String {
         true => "without a unit".to_owned(),
         false => format!("in {}", channel.unit),
     };
-    if drives {
+    if let Some(why) = &channel.no_sensor {
+        why.clone()
+    } else if drives {
         format!("an excitation by its name or unit: --input {}", channel.location)
     } else if channel.samples != first.samples {
         format!("{} samples, not {}", channel.samples, first.samples)

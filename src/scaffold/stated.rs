@@ -8,7 +8,8 @@ use super::recordings::Source;
 use crate::cli::Goal;
 use crate::inspect::Channel;
 
-/// The sample rate to be written; none where the file states it. Errors: neither states one; both do, and differ.
+/// The sample rate to be written: the user's, which overrules the file's; none where the file's is taken. Errors:
+/// neither states one.
 pub fn rate(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool) -> Result<Option<f64>, Question> {
     if let Some(odd) = wanted.rate_hz.filter(|rate| !is_rate(*rate)) {
         return Err((format!("--rate is {}, wanted {WANTED_RATE}", brief_number(odd)), None));
@@ -17,11 +18,22 @@ pub fn rate(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool)
         (Some(_), None) => Ok(None),
         (None, Some(rate)) => Ok(Some(rate)),
         (Some(rate), Some(other)) if same_rate(rate, other) => Ok(None),
-        (Some(rate), Some(_)) => {
-            let problem = format!("{} states {rate} samples per second", source.file.display());
-            Err((problem, Some("leave --rate out".to_owned())))
-        }
+        (Some(_), Some(given)) => Ok(Some(given)),
         (None, None) => Err(question(source, channel, wanted, unit)),
+    }
+}
+
+/// What is to be said of a channel's rate: that the user's takes the place of the file's, or that it is a guess.
+pub fn of_rate(channel: &Channel, wanted: &Wanted<'_>) -> Option<String> {
+    let stated = channel.sample_rate_hz?;
+    match (wanted.rate_hz, channel.rate_is_guess) {
+        (None, false) => None,
+        (None, true) => Some(format!(
+            "the times have no unit and are taken as seconds: {stated} samples a second; --rate HZ says another rate"
+        )),
+        (Some(given), _) if same_rate(stated, given) || (given / stated - 1.0).abs() <= 4.0 * channel.rate_std => None,
+        (Some(given), true) => Some(format!("--rate {given} takes the place of {stated}, the times taken as seconds")),
+        (Some(given), false) => Some(format!("warning: --rate {given} holds, though the file states {stated}")),
     }
 }
 

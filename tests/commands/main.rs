@@ -8,6 +8,7 @@ mod batch;
 mod begin;
 mod begin_advice;
 mod begin_files;
+mod clocks;
 mod command_line;
 mod errors;
 mod example;

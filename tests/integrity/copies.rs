@@ -221,7 +221,7 @@ fn frequency_responses_that_are_copies_count_once_and_those_of_other_points_do_n
     let here = scratch.path();
     fs::write(here.join("frf.toml"), FRF).expect("a config");
     let lines = |point: f64| -> String {
-        let value = |f: f64| [1e4 - f * f, point * f].map(|part| part / ((1e4 - f * f).powi(2) + (point * f).powi(2)));
+        let value = |f: f64| [1e4 - f * f, -point * f].map(|part| part / ((1e4 - f * f).powi(2) + (point * f).powi(2)));
         (1..=150)
             .map(|k| (f64::from(k), value(f64::from(k))))
             .map(|(f, [re, im])| format!("{f}\t{re:?}\t{im:?}\n"))

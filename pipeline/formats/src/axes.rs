@@ -4,47 +4,34 @@
 //! `Out.Time`, `frequency`; or `xData` beside a `yData` of the same length, or cells beside cells of the same length, if
 //! it rises evenly (a cell from zero on). What is named `f` or is in hertz is an axis if it rises throughout: a force, a
 //! frequency over time do not. It is never a signal.
-//! Times that run evenly give their rate to the arrays of their length that lie in the same group or struct, or deeper:
+//! Times that run evenly give rate, start and gaps to the arrays of their length that lie in the same group or struct, or
+//! deeper:
 //! a cell `{3}` of times to the cell `{3}` beside it; of the cells of one array the first of times to the first of
 //! signals. Nothing else gets that rate.
 
+use crate::evenness::{Even, Stretches, Times, of_gaps};
 use crate::facts::{OF_ITS_LENGTH, TAKEN_AS_SECONDS};
 use crate::frequency::{hertz, perhaps_frequencies};
+use crate::guess::why_no_seconds;
+use crate::printed::Printed;
 use crate::rate::{fewest_digits, of_step};
+use crate::time_units::{seconds, time_name};
 use crate::{Contents, FoundChannel};
 use std::collections::HashMap;
 
 mod mean_rate;
 pub use mean_rate::{contradiction, mean_rate};
 
-/// Names of arrays of times, in lower case. A capital `T` is a temperature or a period.
-const TIMES: [&str; 11] = [
-    "time",
-    "times",
-    "zeit",
-    "temps",
-    "tout",
-    "tvec",
-    "timestamp",
-    "timestamps",
-    "time_axis",
-    // what pandas calls them in HDF5: of a table or a series, and of a fixed frame
-    "index",
-    "axis1",
-];
-/// Ends of such names that state the unit.
-const UNITS: [(&str, f64); 5] = [("_s", 1.0), ("_ms", 1e-3), ("_us", 1e-6), ("_ns", 1e-9), ("_sec", 1.0)];
 /// Names of arrays of frequencies, in lower case, but for the unit at their ends.
 const FREQUENCIES: [&str; 4] = ["frequency", "frequencies", "freq", "freqs"];
 /// Ends of such names that state the unit, in lower case, and the unit.
 const HERTZ: [(&str, &str); 4] = [("_hz", "Hz"), ("_khz", "kHz"), ("_mhz", "MHz"), ("_ghz", "GHz")];
 
-/// Largest deviation from evenness, in steps. Times are often saved in few digits; a missing sample is a whole step.
-const TOLERANCE: f64 = 1e-2;
 /// Deviations above this are remarked: a millionth of a step is rounding.
 const REMARKED: f64 = 1e-6;
-/// Coarsest rounding, in steps, that still shows a lost sample beyond doubt.
-const COARSEST: f64 = 0.25;
+/// Of axes that are too long to be read whole: largest deviation from evenness, in steps, and coarsest rounding.
+const LONG_OFF_STEPS: f64 = 1e-2;
+const LONG_COARSEST_STEPS: f64 = 0.25;
 /// Two statements of a rate agree if they differ by less: rates are often written with six digits.
 const AGREE: f64 = 1e-5;
 
@@ -77,14 +64,26 @@ enum Kind {
     Cell,
 }
 
-/// An axis, and the step of its times in seconds.
+/// An axis, and what its times say.
 #[derive(Debug)]
 struct Axis {
     at: usize,
     kind: Kind,
-    step_s: Option<f64>,
-    /// How far the step may be from the true one, relative.
+    clock: Option<Clock>,
+}
+
+/// What even times say of the samples beside them.
+#[derive(Debug, Clone)]
+struct Clock {
+    step_s: f64,
+    start_s: f64,
+    /// How far the step may be from the true one, relative: bound, and standard deviation.
     uncertainty: f64,
+    relative_std: f64,
+    /// Whether their unit is not stated.
+    guessed: bool,
+    /// Samples before which they jump.
+    gaps: Vec<usize>,
 }
 
 /// What axes are found by: parent, name where it matters, cell, samples.
@@ -138,22 +137,33 @@ pub fn settle(contents: &mut Contents) {
 
 /// Gives a channel the rate of its axis. Whether the axis is said by that.
 fn give(channel: &mut FoundChannel, axis: &Axis, name: &str, remarks: &mut Vec<String>) -> bool {
-    let Some(step_s) = axis.step_s else {
+    let Some(clock) = &axis.clock else {
         if axis.kind == Kind::Frequency {
             // its samples follow one another along another axis than time
             channel.sample_rate_hz = None;
         }
         return false;
     };
-    let rate = fewest_digits(of_step(step_s), axis.uncertainty);
+    let step_s = clock.step_s;
+    let rate = fewest_digits(of_step(step_s), clock.uncertainty);
     let stated = channel.sample_rate_hz;
-    if let Some(stated) = stated.filter(|stated| (stated - rate).abs() > AGREE * rate) {
+    let agree = AGREE.max(clock.uncertainty + channel.rate_relative_std);
+    if let Some(stated) = stated.filter(|stated| (stated - rate).abs() > agree * rate) {
         channel.sample_rate_hz = None;
         let what = format!("{} has no sample rate", channel.location);
         remarks.push(format!("{what}: the file says {stated} Hz, {name} steps by {step_s} s"));
         return false;
     }
+    if stated.is_none() {
+        (channel.rate_relative_std, channel.rate_is_guess) = (clock.relative_std, clock.guessed);
+    }
     channel.sample_rate_hz = Some(stated.unwrap_or(rate));
+    channel.start_s = Some(clock.start_s);
+    if !clock.gaps.is_empty() {
+        channel.gaps.extend(&clock.gaps);
+        channel.gaps.sort_unstable();
+        channel.gaps.dedup();
+    }
     true
 }
 
@@ -219,11 +229,14 @@ impl Axes {
         None
     }
 
-    /// The first axis that gives a rate: there may be a counter beside the times. Without one the first of all.
+    /// The first axis that gives a rate by a stated unit, else one that gives a rate: there may be a counter beside the
+    /// times. Without one the first of all.
     fn best(&self, numbers: &[usize]) -> Option<usize> {
         let no_cell = || numbers.iter().copied().filter(|number| !self.is_cell(*number));
-        let gives = |number: &usize| self.all.get(*number).is_some_and(|axis| axis.step_s.is_some());
-        no_cell().find(gives).or_else(|| no_cell().next())
+        let clock = |number: &usize| self.all.get(*number).and_then(|axis| axis.clock.as_ref());
+        let states = |number: &usize| clock(number).is_some_and(|clock| !clock.guessed);
+        let gives = |number: &usize| clock(number).is_some();
+        no_cell().find(states).or_else(|| no_cell().find(gives)).or_else(|| no_cell().next())
     }
 
     fn is_cell(&self, number: usize) -> bool {
@@ -235,17 +248,10 @@ impl Axes {
     }
 
     fn same_step(&self, numbers: &[usize]) -> bool {
-        let mut steps = numbers.iter().filter_map(|number| self.all.get(*number)?.step_s);
+        let mut steps = numbers.iter().filter_map(|number| Some(self.all.get(*number)?.clock.as_ref()?.step_s));
         let first = steps.next().unwrap_or_default();
         steps.all(|step| (step - first).abs() <= AGREE * first)
     }
-}
-
-/// Whether an array of this name holds times.
-pub fn names_times(name: &str) -> bool {
-    let lower = name.to_lowercase();
-    let bare = UNITS.iter().find_map(|(end, _)| lower.strip_suffix(end)).unwrap_or(&lower);
-    TIMES.contains(&lower.as_str()) || TIMES.contains(&bare) || (bare == "t" && name.starts_with('t'))
 }
 
 /// What kind of axis a channel is by its name and those beside it.
@@ -258,13 +264,9 @@ fn kind(channel: &FoundChannel, place: &Place, places: &HashMap<Key, usize>) -> 
     if is_of_frequencies(channel, &lower) {
         return Some(Kind::Frequency);
     }
-    let is_time = |name: &str| TIMES.contains(&name) || (name == "t" && place.name.starts_with('t'));
-    if is_time(&lower) {
-        return Some(Kind::Time(None));
-    }
-    let unit = UNITS.iter().find_map(|(end, seconds)| Some((lower.strip_suffix(end)?, *seconds)));
-    if let Some((_, seconds)) = unit.filter(|(name, _)| is_time(name)) {
-        return Some(Kind::Time(Some(seconds)));
+    match time_name(place.name, false) {
+        Some(name) if name.label.is_none() || rises(channel) => return Some(Kind::Time(name.seconds)),
+        _ => {}
     }
     if channel.is_axis {
         return Some(Kind::Unnamed);
@@ -323,24 +325,25 @@ fn axis(at: usize, kind: Kind, channel: &FoundChannel, remarks: &mut Vec<String>
     let unit_s = match kind {
         Kind::Frequency => {
             remarks.push(format!("{location} is an axis of frequencies, no signal"));
-            return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
+            return Some(Axis { at, kind, clock: None });
         }
         Kind::Unnamed => {
             remarks.push(format!("{location} is an axis, no signal"));
-            return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
+            return Some(Axis { at, kind, clock: None });
         }
         Kind::Time(unit_s) => unit_s,
         Kind::Abscissa | Kind::Cell => None,
     };
-    let stated = unit_s.or_else(|| seconds(&channel.unit));
-    let Even { first, step, off, uncertainty } = match even(channel) {
-        Ok(even) => even,
+    let stated = seconds(&channel.unit).or(unit_s);
+    let found = match even(channel) {
+        Ok(found) => found,
         Err(_) if matches!(kind, Kind::Abscissa | Kind::Cell) => return None,
         Err(why) => {
             remarks.push(format!("{location} is an axis of times and gives no sample rate: {why}"));
-            return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
+            return Some(Axis { at, kind, clock: None });
         }
     };
+    let (first, step) = (found.even.first, found.even.step);
     // What has no name is an axis only if it begins at zero as recordings do: a ramp begins anywhere.
     if kind == Kind::Cell && first.abs() > step {
         return None;
@@ -350,44 +353,31 @@ fn axis(at: usize, kind: Kind, channel: &FoundChannel, remarks: &mut Vec<String>
         remarks.push(format!(
             "{location} is an axis, evenly by {step} from {first}, of times or of frequencies: it gives no sample rate"
         ));
-        return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
+        return Some(Axis { at, kind, clock: None });
     }
-    let unknown = stated.is_none() && !channel.unit.is_empty();
-    // Without a unit, whole numbers count samples, or ticks of a clock.
-    let counts = stated.is_none() && step.fract() == 0.0;
-    if unknown || counts {
-        let unit =
-            if unknown { format!("in «{}»", channel.unit) } else { "in whole numbers without a unit".to_owned() };
-        remarks.push(format!("{location} is an axis, evenly by {step} {unit}: it gives no sample rate"));
-        return Some(Axis { at, kind, step_s: None, uncertainty: 0.0 });
+    if let Some(why) = why_no_seconds(stated, &channel.unit, first, step) {
+        remarks.push(format!("{location} is an axis, evenly by {step} {why}: it gives no sample rate"));
+        return Some(Axis { at, kind, clock: None });
     }
     let unit = if stated.is_none() { format!(" {TAKEN_AS_SECONDS}") } else { String::new() };
+    let off = found.even.off_steps;
     let rounded = if off > REMARKED { format!(", to {off:.1e} of a step") } else { String::new() };
     remarks.push(format!("{location}{unit} runs evenly by {step}{rounded}: {OF_ITS_LENGTH}"));
-    Some(Axis { at, kind, step_s: Some(step * stated.unwrap_or(1.0)), uncertainty })
-}
-
-fn seconds(unit: &str) -> Option<f64> {
-    Some(match unit.to_lowercase().as_str() {
-        "s" | "sec" | "second" | "seconds" => 1.0,
-        "ms" | "millisecond" | "milliseconds" => 1e-3,
-        "us" | "µs" | "μs" | "microsecond" | "microseconds" => 1e-6,
-        "ns" | "nanosecond" | "nanoseconds" => 1e-9,
-        _ => return None,
-    })
-}
-
-/// Times that run evenly: the first, the step, the largest deviation in steps, and the step's relative uncertainty.
-#[derive(Debug, Clone, Copy)]
-struct Even {
-    first: f64,
-    step: f64,
-    off: f64,
-    uncertainty: f64,
+    remarks.extend(of_gaps(location, &found));
+    let unit_s = stated.unwrap_or(1.0);
+    let clock = Clock {
+        step_s: step * unit_s,
+        start_s: first * unit_s,
+        uncertainty: found.even.uncertainty,
+        relative_std: found.even.relative_std(),
+        guessed: stated.is_none(),
+        gaps: found.gaps,
+    };
+    Some(Axis { at, kind, clock: Some(clock) })
 }
 
 /// Errors: why times do not run evenly.
-fn even(channel: &FoundChannel) -> Result<Even, String> {
+fn even(channel: &FoundChannel) -> Result<Stretches, String> {
     let samples = channel.samples;
     if samples < 3 {
         return Err(format!("it has {samples} values"));
@@ -398,21 +388,40 @@ fn even(channel: &FoundChannel) -> Result<Even, String> {
         raw.scale_into(channel.scale_factor, channel.add_offset, &mut values);
         Ok(values)
     };
-    let end = |at: usize| read(at, 1)?.first().copied().ok_or_else(|| "it is empty".to_owned());
-    let (first, last) = (end(0)?, end(samples - 1)?);
-    let step = (last - first) / (samples - 1) as f64;
-    if !(step.is_finite() && step > 0.0) {
-        return Err("it does not rise".to_owned());
-    }
     let epsilon = match channel.stored_as {
         // 10 bits behind the point
         "float16" => 1.0 / 1024.0,
         "float32" => f64::from(f32::EPSILON),
         _ => f64::EPSILON,
     };
+    if samples > READ {
+        return even_by_pieces(samples, epsilon, read);
+    }
+    let values = read(0, samples)?;
+    let times = Times { epsilon, ..Times::exact(&values) };
+    // times that were saved in few digits
+    let printed = |_| {
+        let printed = Printed::of(&values);
+        Times { printed: Some(&printed), ..times }.stretches(None)
+    };
+    times.even(None).map(Stretches::from).or_else(printed)
+}
+
+/// The same of an axis that is too long to be read whole.
+fn even_by_pieces(
+    samples: usize,
+    epsilon: f64,
+    read: impl Fn(usize, usize) -> Result<Vec<f64>, String>,
+) -> Result<Stretches, String> {
+    let end = |at: usize| read(at, 1)?.first().copied().ok_or_else(|| "it is empty".to_owned());
+    let (first, last) = (end(0)?, end(samples - 1)?);
+    let step = (last - first) / (samples - 1) as f64;
+    if !(step.is_finite() && step > 0.0) {
+        return Err("it does not rise".to_owned());
+    }
     // rounding of both times, and of the arithmetic that made them
     let rounding = 4.0 * epsilon * first.abs().max(last.abs());
-    if rounding > COARSEST * step {
+    if rounding > LONG_COARSEST_STEPS * step {
         return Err(format!("its type is too coarse to show steps of {step:e}"));
     }
     let mut worst = 0.0_f64;
@@ -422,7 +431,7 @@ fn even(channel: &FoundChannel) -> Result<Even, String> {
         let start = piece * PIECE;
         for (row, time) in (start..).zip(read(start, PIECE.min(samples - start))?) {
             let off = (time - (first + row as f64 * step)).abs();
-            if off.is_nan() || off > TOLERANCE * step + rounding {
+            if off.is_nan() || off > LONG_OFF_STEPS * step + rounding {
                 return Err(format!("value {row} is {:.3e} steps off", off / step));
             }
             worst = worst.max(off / step);
@@ -430,7 +439,7 @@ fn even(channel: &FoundChannel) -> Result<Even, String> {
     }
     // both ends may be off by the largest deviation
     let uncertainty = (2.0 * worst + rounding / step) / (samples - 1) as f64;
-    Ok(Even { first, step, off: worst, uncertainty })
+    Ok(Stretches::from(Even { first, step, rounded: worst > REMARKED, off_steps: worst, uncertainty }))
 }
 
 #[cfg(test)]

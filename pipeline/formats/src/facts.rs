@@ -14,11 +14,13 @@ pub(crate) const ONE_TEXT: &str = "is the text";
 pub(crate) const RATE_FROM: &str = "the sampling rate is taken from";
 /// Of the first line of MAT-files.
 pub(crate) const HEADER_SAYS: &str = "the file's header says";
+/// Of channels that begin at different instants: what puts them together takes that out.
+pub(crate) const BEGINS_LATER: &str = "s after the first channel";
 /// What was taken for granted: no mere fact.
 pub(crate) const TAKEN_AS_SECONDS: &str = "(no unit: taken as seconds)";
 
 /// Whether a remark of a reader states a mere fact of the file: `afmid inspect` shows it, a run need not warn of it.
 pub fn is_fact(remark: &str) -> bool {
-    let facts = [AS_RATE, OF_ITS_LENGTH, KNOWN_TO, ONE_NUMBER, ONE_TEXT, RATE_FROM, HEADER_SAYS];
+    let facts = [AS_RATE, OF_ITS_LENGTH, KNOWN_TO, ONE_NUMBER, ONE_TEXT, RATE_FROM, HEADER_SAYS, BEGINS_LATER];
     facts.iter().any(|fact| remark.contains(fact)) && !remark.contains(TAKEN_AS_SECONDS)
 }

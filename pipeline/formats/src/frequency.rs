@@ -22,6 +22,20 @@ pub fn hertz(unit: &str) -> Option<f64> {
     })
 }
 
+/// Hertz in the unit of a rate; none if it is no unit of a rate. `Sa/s` is what oscilloscopes call samples per second.
+pub(crate) fn rate_unit(unit: &str) -> Option<f64> {
+    let lower = unit.to_lowercase();
+    let base = ["hz", "sa/s", "s/s", "sps", "samples/s", "samples per second"];
+    let prefix = base.iter().find_map(|name| lower.strip_suffix(name))?;
+    Some(match prefix {
+        "" => 1.0,
+        "k" => 1e3,
+        "m" => 1e6,
+        "g" => 1e9,
+        _ => return None,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::hertz;

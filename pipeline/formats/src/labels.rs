@@ -4,7 +4,7 @@
 //! channels; `Test.acc_units` those of `Test.acc`. Where two arrays could be meant none gets them.
 
 use crate::FoundChannel;
-use crate::axes::names_times;
+use crate::time_units::names_times;
 use std::collections::BTreeMap;
 
 /// Names of units, in lower case, also at the end of an array's name.

@@ -8,11 +8,13 @@ mod archive;
 mod axes;
 mod budget;
 mod calendar;
+mod evenness;
 mod facts;
 mod fail;
 mod fields;
 mod frequency;
 mod grid;
+mod guess;
 mod half;
 mod inflating;
 mod joined;
@@ -23,6 +25,7 @@ mod number;
 mod opened;
 mod packed;
 mod pinned;
+mod printed;
 mod rate;
 mod raw;
 pub mod readers;
@@ -30,27 +33,33 @@ mod regular;
 mod responses;
 mod straight;
 mod text;
+mod time_units;
+mod together;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use axes::{contradiction, mean_rate, names_times, settle as settle_axes};
+pub use axes::{contradiction, mean_rate, settle as settle_axes};
 pub use budget::most_inflated;
+pub use evenness::even_step;
 pub use facts::is_fact;
 pub use frequency::hertz;
 pub use grid::numbers_in_file;
 pub use labels::{Labels, lane_names};
 pub use lanes::Lanes;
 pub use number::Number;
-pub use rate::{Clue, LEAST_RATE_HZ, MOST_RATE_HZ, WANTED_RATE, agreed_rate, brief_number, is_rate, rate_in};
+pub use rate::{
+    Clue, LEAST_RATE_HZ, MOST_RATE_HZ, WANTED_RATE, agreed_rate, brief_number, is_rate, rate_in, unit_names,
+};
 pub use raw::Raw;
 pub use readers::raw_binary::{RawBinary, SampleType};
-pub use readers::text_table::even_step;
 pub use readers::{HEAD_BYTES, Known, formats, head_of, recognise};
 pub use regular::{append_regular, open_regular, read_regular};
 pub use responses::{
     Degree, FoundResponse, Frequencies, Parts, gains_without_phase, responses, says_frequencies, unit_ratio,
 };
+pub use time_units::names_times;
+pub use together::{begun_together, one_rate};
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.
 ///
@@ -90,6 +99,13 @@ pub struct FoundChannel {
     pub long_name: String,
     /// Samples per second; none if the file does not say.
     pub sample_rate_hz: Option<f64>,
+    /// Standard error of that rate, relative: of times and intervals that are rounded or that jitter; 0 where it is stated.
+    pub rate_relative_std: f64,
+    /// Whether the rate follows from times without a unit, which were taken as seconds.
+    pub rate_is_guess: bool,
+    /// When the first sample was taken, in seconds on the clock of the file's other channels; none if the file does not
+    /// say.
+    pub start_s: Option<f64>,
     /// value = stored * scale_factor + add_offset. Scalings that are no straight line are applied by the source, which
     /// then gives `Float64`, and these are 1 and 0.
     pub scale_factor: f64,
@@ -116,6 +132,9 @@ impl FoundChannel {
             unit: String::new(),
             long_name: String::new(),
             sample_rate_hz: None,
+            rate_relative_std: 0.0,
+            rate_is_guess: false,
+            start_s: None,
             scale_factor: 1.0,
             add_offset: 0.0,
             fill_code: None,
@@ -170,7 +189,7 @@ impl FormatError {
     }
 }
 
-/// What is told of a format, to people and to programs: its only description, from which the registry, the fuzz
+/// The description of a format, to people and to programs: its only description, from which the registry, the fuzz
 /// targets and the table in docs/archives.md are made.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
@@ -192,7 +211,7 @@ pub struct Row {
 
 /// What every format's module offers.
 pub trait Format {
-    /// What is told of it.
+    /// Its description.
     const ROW: Row;
     /// Whether a file's first bytes (up to [`HEAD_BYTES`]) and its name say that it is of this format.
     fn recognises(head: &[u8], path: &Path) -> bool;

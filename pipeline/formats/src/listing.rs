@@ -5,7 +5,7 @@ use crate::grid::{Grid, Store};
 use crate::labels::Labels;
 use crate::lanes::Lanes;
 use crate::number::Number;
-use crate::rate::{Clue, rate_in};
+use crate::rate::{Clue, is_unit_of_clue, rate_in, unit_names};
 use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
@@ -57,6 +57,8 @@ pub(crate) struct Listing {
     /// Each location with the number of times it was wanted.
     locations: HashMap<String, usize>,
     clues: HashMap<String, Vec<Clue>>,
+    /// Texts that state the unit of a clue, by their location.
+    units: HashMap<String, String>,
     responses: Vec<FoundResponse>,
     labels: Labels,
     remarks: Vec<String>,
@@ -77,6 +79,9 @@ impl Listing {
 
     /// A text: no channel, but it may be a channel's name or unit.
     pub(crate) fn text(&mut self, location: &str, text: &str, remark: String) {
+        if is_unit_of_clue(location.rsplit(['/', '.']).next().unwrap_or_default()) && self.units.len() < MOST_CLUES {
+            self.units.insert(location.to_owned(), text.trim().to_owned());
+        }
         self.labels.add(location, text);
         self.remark(remark);
     }
@@ -173,19 +178,10 @@ impl Listing {
         if location != asked {
             self.remark(format!("{asked} occurs again, the later one is called {location}"));
         }
+        let (samples, stored_as) = (grid.samples, grid.number.name());
         let channel = FoundChannel {
-            location,
-            samples: grid.samples,
-            unit: String::new(),
             long_name: array.long_name.clone(),
-            sample_rate_hz: None,
-            scale_factor: 1.0,
-            add_offset: 0.0,
-            fill_code: None,
-            gaps: Vec::new(),
-            is_axis: false,
-            stored_as: grid.number.name(),
-            source: Arc::new(grid),
+            ..FoundChannel::new(location, samples, stored_as, Arc::new(grid))
         };
         self.channels.push((array.scope.clone(), channel));
     }
@@ -210,6 +206,12 @@ impl Listing {
 
     /// Everything, with the sampling rates that follow from the clues.
     pub(crate) fn finish(mut self, format: String) -> Contents {
+        for clue in self.clues.values_mut().flatten() {
+            let unit = unit_names(clue.location()).into_iter().find_map(|name| self.units.get(&name));
+            if let Some(unit) = unit {
+                *clue = clue.clone().in_unit(unit);
+            }
+        }
         let mut rates = BTreeMap::new();
         for (scope, channel) in &mut self.channels {
             if !rates.contains_key(scope) {

@@ -2,47 +2,55 @@
 
 use crate::Contents;
 use crate::facts::RATE_FROM;
+use crate::frequency::rate_unit;
+use crate::printed::Printed;
+use crate::time_units::seconds;
 use std::collections::HashMap;
 
-/// Names whose value is a rate in hertz. `IO_rate_[Hz]` and `IO_samp_rate_[Hz]` are those of general-mode AFM files.
-const RATES: [&str; 22] = [
+/// Names whose value is a rate, in hertz unless a unit is stated, in lower case and without blanks, `-` and `_`.
+/// `IO_rate_[Hz]` and `IO_samp_rate_[Hz]` are those of general-mode AFM files.
+const RATES: [&str; 11] = [
     "fs",
-    "Fs",
-    "f_s",
-    "fs_hz",
-    "Fs_Hz",
     "samplerate",
-    "sample_rate",
-    "sampleRate",
-    "SampleRate",
-    "sample_rate_hz",
-    "sampling_rate",
-    "samplingRate",
-    "SamplingRate",
-    "sampling_frequency",
-    "SamplingFrequency",
-    "Sampling Frequency",
-    "Sampling Rate",
-    "Sample Rate",
-    "sampling_rate_hz",
-    "samplerate_hz",
-    "IO_samp_rate_[Hz]",
-    "IO_rate_[Hz]",
+    "samplingrate",
+    "samplefrequency",
+    "samplingfrequency",
+    "samplingfreq",
+    "samplefreq",
+    "iosamprate",
+    "iorate",
+    "framerate",
+    "samplespersecond",
 ];
 
-/// Names whose value is the time between two samples in seconds. `Tinterval` is PicoScope's.
+/// Names whose value is the time between two samples, in seconds unless a unit is stated, likewise. `Tinterval` is
+/// PicoScope's.
 const INTERVALS: [&str; 10] = [
     "dt",
-    "dt_s",
-    "Ts",
-    "delta_t",
-    "Tinterval",
-    "sample_interval",
-    "sampleInterval",
-    "SampleInterval",
-    "sampling_interval",
-    "SamplingInterval",
+    "deltat",
+    "tinterval",
+    "sampleinterval",
+    "samplinginterval",
+    "sampleperiod",
+    "samplingperiod",
+    "sampletime",
+    "samplingtime",
+    "timeincrement",
 ];
+/// In this way of writing alone: other `ts` are stamps.
+const SAMPLING_TIME: &str = "Ts";
+/// Ends of the names of units: `sampling_rate_units`.
+const UNIT_ENDS: [&str; 6] = ["_units", "_unit", "Units", "Unit", ".units", ".unit"];
+
+/// The names that a text with the unit of a number of this name may have.
+pub fn unit_names(name: &str) -> Vec<String> {
+    UNIT_ENDS.iter().map(|end| format!("{name}{end}")).collect()
+}
+
+/// Whether a name is that of the unit of a rate or an interval.
+pub(crate) fn is_unit_of_clue(name: &str) -> bool {
+    UNIT_ENDS.iter().filter_map(|end| name.strip_suffix(end)).any(|name| Clue::of(name, "", 1.0).is_some())
+}
 
 /// The least rate that is one: a sample every thirty years. Slower series are no recordings.
 pub const LEAST_RATE_HZ: f64 = 1e-9;
@@ -97,6 +105,15 @@ const NO_RATE: &str = "no sample rate";
 /// In remarks on clues that give no rate.
 const UNKNOWN_RATE: &str = "the sampling rate is left unknown";
 
+/// Digits of intervals that instruments are set to: 1, 2, 5, 1.25, 2.5.
+const ROUND_DIGITS: usize = 2;
+/// A number exactly between two that can be printed counts for both, whatever the arithmetic's last bits are.
+const TIE: f64 = 1.001;
+/// Digits of an interval that was computed and not cut.
+const ALL_DIGITS: usize = 12;
+/// Rates that clocks are set to have fewer digits than this.
+const ROUND_RATE_DIGITS: usize = 7;
+
 /// Two statements of a rate agree if they differ by less: rates are often written with six digits.
 const AGREE: f64 = 1e-5;
 
@@ -118,9 +135,36 @@ pub(crate) fn fewest_digits(number: f64, uncertainty: f64) -> f64 {
 /// fewer itself: clocks are set to round rates, some to round steps.
 pub(crate) fn roundest_step(step: f64, uncertainty: f64) -> f64 {
     let (rate, round) = (fewest_digits(of_step(step), uncertainty), fewest_digits(step, uncertainty));
-    let digits =
-        |number: f64| format!("{number:e}").chars().take_while(|c| *c != 'e').filter(char::is_ascii_digit).count();
-    if digits(round) + 1 < digits(rate) { round } else { rate.recip() }
+    if digits_of(round) + 1 < digits_of(rate) { round } else { rate.recip() }
+}
+
+/// The rate of an interval that a file states to one unit of its last place, and its standard error, relative. An interval that was cut to few digits
+/// (0.000977 s of 1024 Hz) allows several rates: of these that with the fewest digits.
+///
+/// An interval is taken for exact where it has at most [`ROUND_DIGITS`] digits, as instruments are set, where it has all
+/// digits of its type, or where its rate has few.
+pub(crate) fn rate_of_interval(step_s: f64, unit_s: f64) -> (f64, f64) {
+    let (rate, digits) = (of_step(step_s), digits_of(step_s));
+    if digits <= ROUND_DIGITS || digits >= ALL_DIGITS || digits_of(rate) < ROUND_RATE_DIGITS {
+        return (rate, 0.0);
+    }
+    // half a unit on either side, all of it equally likely; a digit 5 behind the last one is rounded to it, too
+    let half = 0.5 * unit_s / step_s;
+    let round = fewest_digits(rate, TIE * half);
+    (if digits_of(round) < ROUND_RATE_DIGITS { round } else { rate }, half / 3_f64.sqrt())
+}
+
+/// One unit of the last digit of the shortest number that is read as this one.
+pub(crate) fn unit_of_shortest(number: f64) -> f64 {
+    let mut printed = Printed::default();
+    printed.see(&number.to_string());
+    printed.unit_of(number)
+}
+
+/// Significant digits of the shortest number that is read as this one.
+fn digits_of(number: f64) -> usize {
+    let shown = format!("{number:e}");
+    shown.chars().take_while(|c| *c != 'e').filter(char::is_ascii_digit).count()
 }
 
 /// A step that is kept in single precision is the shortest decimal number that is rounded to it: instruments have steps
@@ -136,20 +180,65 @@ pub struct Clue {
     location: String,
     value: f64,
     interval: bool,
+    /// Hertz or seconds in its unit; none if that is none of a rate or an interval.
+    scale: Option<f64>,
+    unit: String,
 }
 
 impl Clue {
-    /// Whether a number called `name` (at `location`, for messages) is one.
+    /// Whether a number called `name` (at `location`, for messages) is one. The name may end with its unit: `rate_khz`,
+    /// `dt [ms]`.
     pub fn of(name: &str, location: &str, value: f64) -> Option<Self> {
-        let interval = INTERVALS.contains(&name);
-        let wanted = interval || RATES.contains(&name);
-        wanted.then(|| Self { location: location.to_owned(), value, interval })
+        let (bare, unit) = split_unit(name);
+        [(name, ""), (bare, unit)].into_iter().find_map(|(name, unit)| {
+            let letters: String = name.chars().filter(|c| c.is_alphanumeric()).collect();
+            let lower = letters.to_lowercase();
+            let interval = INTERVALS.contains(&lower.as_str()) || letters == SAMPLING_TIME;
+            let found = interval || RATES.contains(&lower.as_str());
+            let clue = Self { location: location.to_owned(), value, interval, scale: Some(1.0), unit: String::new() };
+            // the name says its unit, no message needs to
+            found.then(|| Self { unit: String::new(), ..clue.in_unit(unit) })
+        })
+    }
+
+    /// The same in a unit that the file states beside it; an empty one says nothing.
+    #[must_use]
+    pub fn in_unit(self, unit: &str) -> Self {
+        if unit.is_empty() {
+            return self;
+        }
+        let scale = if self.interval { seconds(unit) } else { rate_unit(unit) };
+        Self { scale, unit: unit.to_owned(), ..self }
+    }
+
+    /// Where it is.
+    pub(crate) fn location(&self) -> &str {
+        &self.location
+    }
+
+    /// It and its value, for messages.
+    fn shown(&self) -> String {
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
+        format!("{} = {}{unit}", self.location, brief_number(self.value))
     }
 
     fn rate_hz(&self) -> Option<f64> {
-        let rate = if self.interval { 1.0 / self.value } else { self.value };
+        let value = self.value * self.scale?;
+        let rate = if self.interval {
+            rate_of_interval(value, unit_of_shortest(self.value) * self.scale.unwrap_or(1.0)).0
+        } else {
+            value
+        };
         (self.value.is_finite() && is_rate(rate)).then_some(rate)
     }
+}
+
+/// A name without the unit that it ends with, and that unit: `rate_khz`, `dt [ms]`, `Sampling Rate (Hz)`.
+fn split_unit(name: &str) -> (&str, &str) {
+    let bracketed = name.strip_suffix([')', ']']).and_then(|name| name.rsplit_once(['(', '[']));
+    let parts = bracketed.or_else(|| name.rsplit_once(['_', ' ', '/']));
+    let is_unit = |unit: &str| seconds(unit).is_some() || rate_unit(unit).is_some();
+    parts.filter(|(_, unit)| is_unit(unit)).unwrap_or((name, ""))
 }
 
 /// What the clues of each scope (a struct, or the file: empty) say about the arrays of one. The nearest scope with a
@@ -169,9 +258,7 @@ pub fn rate_in(scope: &str, clues: &HashMap<String, Vec<Clue>>) -> (Option<f64>,
 
 /// The rate that clues give, and what to say of it; none if they disagree or give none.
 pub fn agreed_rate(clues: &[Clue]) -> (Option<f64>, Option<String>) {
-    let named: Vec<String> =
-        clues.iter().map(|clue| format!("{} = {}", clue.location, brief_number(clue.value))).collect();
-    let named = named.join(", ");
+    let named = clues.iter().map(Clue::shown).collect::<Vec<String>>().join(", ");
     let Some(rates) = clues.iter().map(Clue::rate_hz).collect::<Option<Vec<f64>>>() else {
         return (None, Some(format!("{UNKNOWN_RATE}: no rate follows from {named}, wanted {WANTED_RATE}")));
     };
@@ -203,6 +290,24 @@ mod tests {
             (brief_number(1e300), brief_number(-1.0), brief_number(5e6)),
             ("1e300".into(), "-1".into(), "5000000".into())
         );
+    }
+
+    #[test]
+    fn intervals_in_few_digits_have_the_round_rate_that_they_allow_and_an_error() {
+        for (interval, rate) in
+            [(0.000_977, 1024.0), (1.953_13e-5, 51_200.0), (0.000_333, 3000.0), (2.267_57e-5, 44_100.0)]
+        {
+            let (found, std) = rate_of_interval(interval, unit_of_shortest(interval));
+            assert_eq!(found, rate);
+            assert!((interval.recip() / rate - 1.0).abs() <= TIE * 3_f64.sqrt() * std, "{interval} {std}");
+        }
+        for (interval, rate) in [(1e-3, 1e3), (2.5e-6, 4e5), (0.00125, 800.0), (1.0 / 44_100.0, 44_100.0)] {
+            assert_eq!(rate_of_interval(interval, unit_of_shortest(interval)), (rate, 0.0));
+        }
+        // 0.003 s is set, not 1/333.33
+        assert_eq!(rate_of_interval(0.003, 1e-3), (of_step(0.003), 0.0));
+        // zeros behind the last digit are digits, too
+        assert_eq!(rate_of_interval(1.65e-6, 1e-12).0, of_step(1.65e-6));
     }
 
     #[test]

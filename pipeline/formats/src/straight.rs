@@ -11,26 +11,26 @@ pub(crate) struct Slopes {
 /// Steps of the search at most: each is a slope between two of the values, far fewer are needed.
 const STEPS: usize = 200;
 
-/// The slopes of all lines from which value k is off by at most `half[k]`. None: there is no such line.
+/// The slopes of all lines from which value k is off by at most `half(k)`. None: there is no such line.
 ///
 /// With y the values and h their rounding, a line of slope s exists if
 /// g(s) = max(y_k - h_k - k s) - min(y_k + h_k - k s) is not positive. g is convex and piecewise linear, so that Newton's
 /// method from outside ends in its zero after finitely many steps, each O(values).
-pub(crate) fn slopes(values: &[f64], half: &[f64]) -> Option<Slopes> {
+pub(crate) fn slopes(values: &[f64], half: impl Fn(usize) -> f64) -> Option<Slopes> {
     let last = values.len().checked_sub(1).filter(|last| *last > 0)?;
     let rise = values.get(last)? - values.first()?;
-    let both = half.get(last)? + half.first()?;
-    let least = zero(values, half, (rise - both) / last as f64, -1.0)?;
-    let largest = zero(values, half, (rise + both) / last as f64, 1.0)?;
+    let both = half(last) + half(0);
+    let least = zero(values, &half, (rise - both) / last as f64, -1.0)?;
+    let largest = zero(values, &half, (rise + both) / last as f64, 1.0)?;
     Some(Slopes { least: least.min(largest), largest: largest.max(least) })
 }
 
 /// The zero of g next to `slope`, which lies outside of the zeros in the direction of `side`.
-fn zero(values: &[f64], half: &[f64], mut slope: f64, side: f64) -> Option<f64> {
+fn zero(values: &[f64], half: &impl Fn(usize) -> f64, mut slope: f64, side: f64) -> Option<f64> {
     for _ in 0..STEPS {
         let (mut above, mut below) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
-        for (row, (value, half)) in values.iter().zip(half).enumerate() {
-            let rest = value - row as f64 * slope;
+        for (row, value) in values.iter().enumerate() {
+            let (rest, half) = (value - row as f64 * slope, half(row));
             if rest.is_nan() {
                 return None;
             }
@@ -72,16 +72,16 @@ mod tests {
     fn rounded_lines_have_slopes_around_the_true_one_and_others_none() {
         for (step, unit) in [(1.0 / 2560.0, 1e-4), (1.0 / 51_200.0, 1e-6), (0.0123, 1e-3)] {
             let (times, half) = rounded(step, unit, 3000);
-            let found = slopes(&times, &half).unwrap();
+            let found = slopes(&times, |k| half[k]).unwrap();
             assert!(found.least <= step && step <= found.largest, "{found:?} {step}");
             // both ends may be off by half a unit
             assert!(found.largest - found.least <= 2.0 * unit / 2999.0);
             let mut lost = times.clone();
             lost.remove(1700);
-            assert_eq!(slopes(&lost, &half), None);
+            assert_eq!(slopes(&lost, |k| half[k]), None);
             let mut late = times;
             late[1200] += 1.1 * unit;
-            assert_eq!(slopes(&late, &half), None);
+            assert_eq!(slopes(&late, |k| half[k]), None);
         }
     }
 
@@ -96,14 +96,14 @@ mod tests {
                 largest = largest.min((rise + both) / (j - i) as f64);
             }
         }
-        let found = slopes(&times, &half).unwrap();
+        let found = slopes(&times, |k| half[k]).unwrap();
         assert!((found.least - least).abs() < 1e-12 && (found.largest - largest).abs() < 1e-12, "{found:?}");
     }
 
     #[test]
     fn too_few_values_and_missing_ones_are_no_line() {
-        assert_eq!(slopes(&[], &[]), None);
-        assert_eq!(slopes(&[1.0], &[0.1]), None);
-        assert_eq!(slopes(&[1.0, f64::NAN, 3.0], &[0.1; 3]), None);
+        assert_eq!(slopes(&[], |_| 0.1), None);
+        assert_eq!(slopes(&[1.0], |_| 0.1), None);
+        assert_eq!(slopes(&[1.0, f64::NAN, 3.0], |_| 0.1), None);
     }
 }

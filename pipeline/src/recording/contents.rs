@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use afmid_formats::{Contents, formats, head_of, recognise};
+use afmid_formats::{Contents, FormatError, FoundChannel, begun_together, formats, head_of, recognise};
 
 use super::foreign_hdf5;
 use super::how::{AUTO, HDF5, NATIVE, RAW, Reading};
@@ -33,7 +33,21 @@ pub fn open_contents(
         },
     };
     contents.refuse_odd_rates();
+    begin_together(&mut contents, &reading.together).map_err(|error| error.in_file(path))?;
     Ok((name, contents))
+}
+
+/// Lets the named channels begin with the last of them. Errors: as [`begun_together`].
+fn begin_together(contents: &mut Contents, named: &[String]) -> Result<(), FormatError> {
+    let channels: Vec<&FoundChannel> =
+        contents.channels.iter().filter(|channel| named.contains(&channel.location)).collect();
+    let Some((moved, _)) = begun_together(&channels)? else { return Ok(()) };
+    for moved in moved {
+        if let Some(channel) = contents.channels.iter_mut().find(|channel| channel.location == moved.location) {
+            *channel = moved;
+        }
+    }
+    Ok(())
 }
 
 /// What a file holds, also one that is packed with gzip, as long as its channels may be read.
@@ -55,9 +69,10 @@ pub fn open_unpacked(files: &InputFiles, path: &Path, reading: &Reading) -> Resu
         let (format, contents) = open_contents(files, path, reading)?;
         return Ok(UnpackedContents { format, contents, _inflated: None });
     };
-    contents
-        .remarks
-        .push("packed with gzip: `io.columns` and `io.frf` read it, `io.records` once it is unpacked".to_owned());
+    if recognise(&head_of(path)?, path).is_none() {
+        let said = "packed with gzip: `io.columns` and `io.frf` read it, `io.records` once it is unpacked";
+        contents.remarks.push(said.to_owned());
+    }
     Ok(UnpackedContents { format, contents, _inflated: Some(inflated) })
 }
 

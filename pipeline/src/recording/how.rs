@@ -19,7 +19,7 @@ pub(super) const AUTO: &str = "auto";
 pub struct How {
     /// Which reader.
     pub reading: Reading,
-    /// Samples per second, where the file states none.
+    /// Samples per second, where the file states none, or another one.
     pub sample_rate_hz: Option<f64>,
     /// Unit of the channel, where the file states none.
     pub unit: Option<String>,
@@ -34,11 +34,14 @@ pub struct Reading {
     /// What is in a file without a header.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub raw: Option<RawBinary>,
+    /// Channels that the file begins at different instants and that are put together: each begins with the last of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub together: Vec<String>,
 }
 
 impl Default for Reading {
     fn default() -> Self {
-        Self { format: NATIVE.to_owned(), raw: None }
+        Self { format: NATIVE.to_owned(), raw: None, together: Vec::new() }
     }
 }
 
@@ -46,7 +49,7 @@ impl Reading {
     /// Whatever recognises a file; raw binary if that is described.
     pub fn of(format: &str, raw: Option<RawBinary>) -> Self {
         let format = if raw.is_some() && format == AUTO { RAW } else { format };
-        Self { format: format.to_owned(), raw }
+        Self { format: format.to_owned(), raw, together: Vec::new() }
     }
 
     /// All names of formats.

@@ -13,6 +13,7 @@ mod lazy_source;
 mod native;
 mod open;
 mod opened_files;
+mod rate;
 mod responses;
 mod rows;
 mod series;
@@ -41,13 +42,14 @@ pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native,
 
 pub use afmid_formats::{
     Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Row, Source, WANTED_RATE,
-    brief_number, contradiction, even_step, formats, gains_without_phase, hertz, is_fact, is_rate, lane_names,
-    mean_rate, most_inflated, responses, says_frequencies, unit_ratio,
+    begun_together, brief_number, contradiction, even_step, formats, gains_without_phase, hertz, is_fact, is_rate,
+    lane_names, mean_rate, most_inflated, one_rate, responses, says_frequencies, unit_ratio,
 };
 pub use contents::{UnpackedContents, is_hdf5_file, open_contents, open_unpacked};
 pub use equal::{SamplePrint, equal_samples};
 pub use how::{How, Reading};
-pub use open::{Opened, agreed_rate, open_records, recognised};
+pub use open::{Opened, open_records, recognised};
+pub use rate::{AgreedRate, agreed_rate};
 pub use responses::{FileResponse, read_responses};
 pub use rows::rows;
 pub use whole::WholeFile;
@@ -75,6 +77,8 @@ pub struct Record {
     pub blake3: String,
     /// Samples per second.
     pub sample_rate_hz: f64,
+    /// Standard error of that rate, relative: of times and intervals that are rounded or jitter; 0 where it is stated.
+    pub rate_relative_std: f64,
     /// When the acquisition began, ISO 8601; empty if unknown.
     pub started_at: String,
     /// Sample of the file's channels that is the record's first: a file whose recording was interrupted is one record

@@ -92,6 +92,7 @@ fn read_record(
         size: inspected.state.size(),
         blake3: inspected.blake3.clone(),
         sample_rate_hz,
+        rate_relative_std: 0.0,
         started_at: text_attribute(file, "started_at", file.allowance()).unwrap_or_default(),
         first_sample: 0,
         reading: Reading::default(),

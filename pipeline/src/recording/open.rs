@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use afmid_formats::{WANTED_RATE, brief_number, is_rate};
+use afmid_formats::{begun_together, one_rate};
 
 use super::contents::{format_of, is_hdf5_file, is_recognised};
 use super::how::{AUTO, HDF5, How, NATIVE, Reading};
@@ -12,15 +12,13 @@ use super::input_files::InputFiles;
 use super::lazy_source::LazySource;
 use super::native::{Wanted, open_if_native, open_native};
 use super::opened_files::contents;
+use super::rate::{AgreedRate, agreed_rate, checked, differ, overruled};
 use super::stretches::uninterrupted;
 use super::{Channel, Contents, FoundChannel, Record, contradiction};
 use crate::error::StageError;
 
 /// Channels named in a message.
 const MOST_NAMED: usize = 20;
-
-/// What two statements of a rate may differ by, relative: what is printed to seven digits.
-const SAME_RATE: f64 = 1e-6;
 
 /// A file's records, and what its reader says about it.
 #[derive(Debug, Clone)]
@@ -49,27 +47,49 @@ pub fn open_records(files: &InputFiles, path: &Path, wanted: &[Wanted], how: &Ho
         AUTO if is_hdf5_file(path)? => (open_if_native(files, path, wanted)?, HDF5),
         _ => (None, format_of(files, path, &how.reading)?),
     };
-    if let Some(record) = native {
-        agreed_rate(Some(record.sample_rate_hz), how.sample_rate_hz, ("the file", None))
-            .map_err(|error| error.at(path))?;
+    if let Some(mut record) = native {
+        let stated = record.sample_rate_hz;
+        let given = checked(how.sample_rate_hz).map_err(|error| error.at(path))?;
+        let given = given.filter(|given| differ(stated, *given));
+        let remarks = given.map(|given| overruled("the record", stated, given, false)).into_iter().collect();
+        record.sample_rate_hz = given.unwrap_or(stated);
         for wanted in wanted {
             if let Ok(channel) = record.channel(wanted.role) {
                 agreed_unit(&channel.unit, how, wanted).map_err(|error| error.at(path))?;
             }
         }
-        return Ok(Opened { format: NATIVE, records: vec![record], remarks: Vec::new() });
+        return Ok(Opened { format: NATIVE, records: vec![record], remarks });
     }
-    let reading = Reading { format: format.to_owned(), raw: how.reading.raw.clone() };
+    let mut reading = Reading::of(format, how.reading.raw.clone());
     let (state, inspected) = files.inspect(path)?;
-    let contents = contents(files, path, state, &reading)?;
-    let file = File { files, path, size: state.size(), blake3: &inspected.blake3, reading, contents: &contents };
-    let records = file.records(wanted, how).map_err(|error| error.at(path))?;
-    let mut remarks = contents.remarks.clone();
+    let mut held = contents(files, path, state, &reading)?;
+    let moved = apart(&held, wanted).map_err(|error| error.at(path))?;
+    if let Some((together, _)) = &moved {
+        reading.together.clone_from(together);
+        held = contents(files, path, state, &reading)?;
+    }
+    let file = File { files, path, size: state.size(), blake3: &inspected.blake3, reading, contents: &held };
+    let rate = file.rate(wanted, how).map_err(|error| error.at(path))?;
+    let records = file.records(wanted, how, &rate).map_err(|error| error.at(path))?;
+    let mut remarks = held.remarks.clone();
+    remarks.extend(moved.map(|(_, said)| said));
+    remarks.extend(rate.overruled);
     remarks.extend(file.contradicted_rate(wanted, how));
     if records.len() > 1 {
         remarks.insert(0, format!("the recording has gaps: {} uninterrupted stretches, a record each", records.len()));
     }
     Ok(Opened { format, records, remarks })
+}
+
+/// The wanted channels that begin at different instants, and what to say of them; none where they begin together.
+/// Errors: as [`begun_together`]; a required channel is missing.
+fn apart(contents: &Contents, wanted: &[Wanted]) -> Result<Option<(Vec<String>, String)>, StageError> {
+    let mut found: Vec<&FoundChannel> = Vec::new();
+    for wanted in wanted {
+        found.extend(find(contents, wanted)?);
+    }
+    let moved = begun_together(&found)?;
+    Ok(moved.map(|(channels, said)| (channels.into_iter().map(|channel| channel.location).collect(), said)))
 }
 
 /// A file that is open.
@@ -83,27 +103,23 @@ struct File<'a> {
 }
 
 impl File<'_> {
-    fn records(&self, wanted: &[Wanted], how: &How) -> Result<Vec<Record>, StageError> {
+    /// The one rate of the channels. Errors: none, or several.
+    fn rate(&self, wanted: &[Wanted], how: &How) -> Result<AgreedRate, StageError> {
+        let mut found: Vec<&FoundChannel> = Vec::new();
+        for wanted in wanted {
+            found.extend(find(self.contents, wanted)?);
+        }
+        one_rate(&found)?;
+        let rated = found.iter().find(|channel| channel.sample_rate_hz.is_some()).or(found.first());
+        let rated = rated.ok_or_else(|| StageError::new("no channel is asked for"))?;
+        agreed_rate(rated, how.sample_rate_hz, self.contents.why_no_rate(&rated.location))
+    }
+
+    fn records(&self, wanted: &[Wanted], how: &How, rate: &AgreedRate) -> Result<Vec<Record>, StageError> {
         let mut found: Vec<(&Wanted, &FoundChannel)> = Vec::new();
         for wanted in wanted {
-            if let Some(channel) = self.find(wanted)? {
-                found.push((wanted, channel));
-            }
+            found.extend(find(self.contents, wanted)?.map(|channel| (wanted, channel)));
         }
-        let mut rate = None;
-        for (_, channel) in &found {
-            let said = self.contents.why_no_rate(&channel.location);
-            let own = agreed_rate(channel.sample_rate_hz, how.sample_rate_hz, (&channel.location, said))?;
-            if let Some((first, other)) = rate.filter(|(_, rate)| differ(*rate, own)) {
-                return Err(StageError::new(format!(
-                    "{} has {own} samples per second, {first} has {other}: one record wants one rate",
-                    channel.location
-                ))
-                .help("leave the second channel out: piezo_channel = \"\""));
-            }
-            rate.get_or_insert((&channel.location, own));
-        }
-        let sample_rate_hz = rate.map(|(_, rate)| rate).or(how.sample_rate_hz).unwrap_or(f64::NAN);
         let samples = found.iter().map(|(_, channel)| channel.samples).max().unwrap_or(0);
         let stretches = uninterrupted(samples, found.iter().map(|(_, channel)| channel.gaps.as_slice()));
         let several = stretches.len() > 1;
@@ -118,7 +134,8 @@ impl File<'_> {
                 path: self.path.to_owned(),
                 size: self.size,
                 blake3: self.blake3.to_owned(),
-                sample_rate_hz,
+                sample_rate_hz: rate.rate_hz,
+                rate_relative_std: rate.relative_std,
                 // how long an interruption lasted is not known
                 started_at: if number == 0 { self.contents.started_at.clone() } else { String::new() },
                 first_sample: stretch.start,
@@ -132,31 +149,8 @@ impl File<'_> {
     /// That the rate which is given is not that of the file's times.
     fn contradicted_rate(&self, wanted: &[Wanted], how: &How) -> Option<String> {
         let given = how.sample_rate_hz?;
-        let mut found = wanted.iter().filter_map(|wanted| self.find(wanted).ok()?);
+        let mut found = wanted.iter().filter_map(|wanted| find(self.contents, wanted).ok()?);
         found.find_map(|channel| contradiction(&self.contents.channels, channel, given))
-    }
-
-    /// A channel by its location, with or without the slash before it.
-    fn find(&self, wanted: &Wanted) -> Result<Option<&FoundChannel>, StageError> {
-        let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
-        let channels = &self.contents.channels;
-        let exact = channels.iter().find(|channel| channel.location == wanted.location);
-        let found = exact.or_else(|| channels.iter().find(|channel| bare(&channel.location) == bare(wanted.location)));
-        if found.is_some() || !wanted.required {
-            return Ok(found);
-        }
-        let named: Vec<&str> = channels.iter().take(MOST_NAMED).map(|channel| channel.location.as_str()).collect();
-        let more = channels.len().saturating_sub(MOST_NAMED);
-        let listed = match (named.is_empty(), more) {
-            (true, _) => "no channel at all".to_owned(),
-            (_, 0) => named.join(", "),
-            _ => format!("{} and {more} more", named.join(", ")),
-        };
-        let problem = format!(
-            "there is no channel `{}` in this {}; the file has: {listed}",
-            wanted.location, self.contents.format
-        );
-        Err(StageError::new(problem).help("set `channel` to one of them; `afmid inspect` tells more of each"))
     }
 
     fn channel(
@@ -183,33 +177,25 @@ impl File<'_> {
     }
 }
 
-fn differ(a: f64, b: f64) -> bool {
-    (a / b - 1.0).abs() > SAME_RATE
-}
-
-/// The rate that the part of a file called `what` states, or that is given; `said` is what its reader said of a rate
-/// that it does not take. Errors: neither, or both and they differ; the one that is given can be none.
-pub fn agreed_rate(
-    stated: Option<f64>,
-    given: Option<f64>,
-    (what, said): (&str, Option<&str>),
-) -> Result<f64, StageError> {
-    if let Some(odd) = given.filter(|rate| !is_rate(*rate)) {
-        let problem = format!("`sample_rate_hz` is given as {}, wanted {WANTED_RATE}", brief_number(odd));
-        return Err(StageError::new(problem));
+/// A channel by its location, with or without the slash before it.
+fn find<'a>(contents: &'a Contents, wanted: &Wanted) -> Result<Option<&'a FoundChannel>, StageError> {
+    let bare = |location: &str| location.strip_prefix('/').unwrap_or(location).to_owned();
+    let channels = &contents.channels;
+    let exact = channels.iter().find(|channel| channel.location == wanted.location);
+    let found = exact.or_else(|| channels.iter().find(|channel| bare(&channel.location) == bare(wanted.location)));
+    if found.is_some() || !wanted.required {
+        return Ok(found);
     }
-    match (stated, given) {
-        (Some(stated), Some(given)) if differ(stated, given) => {
-            Err(StageError::new(format!("`sample_rate_hz` is given as {given}, {what} states {stated}"))
-                .help("leave `sample_rate_hz` out: it is for files that state no rate"))
-        }
-        (Some(rate), _) | (None, Some(rate)) => Ok(rate),
-        (None, None) => Err(StageError::new(match said {
-            Some(said) => format!("{what} has no sample rate: {said}"),
-            None => format!("{what}: the file states no sample rate"),
-        })
-        .help("give it, in Hz: sample_rate_hz = 5e6")),
-    }
+    let named: Vec<&str> = channels.iter().take(MOST_NAMED).map(|channel| channel.location.as_str()).collect();
+    let more = channels.len().saturating_sub(MOST_NAMED);
+    let listed = match (named.is_empty(), more) {
+        (true, _) => "no channel at all".to_owned(),
+        (_, 0) => named.join(", "),
+        _ => format!("{} and {more} more", named.join(", ")),
+    };
+    let problem =
+        format!("there is no channel `{}` in this {}; the file has: {listed}", wanted.location, contents.format);
+    Err(StageError::new(problem).help("set `channel` to one of them; `afmid inspect` tells more of each"))
 }
 
 /// The unit that is stated or given; `unit` is that of the required channels, others may go without. Errors: neither,

@@ -32,7 +32,7 @@ fn refused(path: &Path, location: &str, how: &How) -> String {
 }
 
 #[test]
-fn missing_metadata_is_asked_for_by_name_and_stated_metadata_is_not_overruled() {
+fn missing_metadata_is_asked_for_by_name_and_a_given_rate_overrules_the_stated_one() {
     let folder = Folder::new("metadata");
     let bare = written(&folder, "bare.csv", b"deflection,piezo\n1.5,7\n-2,8\n3,9\n");
     assert!(refused(&bare, "deflection", &auto()).contains("sample_rate_hz = "));
@@ -54,7 +54,14 @@ fn missing_metadata_is_asked_for_by_name_and_stated_metadata_is_not_overruled() 
         10.0
     );
     let other = How { sample_rate_hz: Some(11.0), ..auto() };
-    assert!(refused(&stated, "deflection", &other).contains("given as 11, deflection states 10"));
+    let opened =
+        open_records(&InputFiles::new(), &stated, &wanted("deflection"), &How { unit: None, ..other }).unwrap();
+    assert_eq!(opened.records[0].sample_rate_hz, 11.0);
+    assert!(
+        opened.remarks.iter().any(|remark| remark.contains("holds, though the file states 10")),
+        "{:?}",
+        opened.remarks
+    );
     let other = How { unit: Some("mV".to_owned()), ..auto() };
     assert!(refused(&stated, "deflection", &other).contains("given as mV"));
 }

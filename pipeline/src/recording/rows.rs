@@ -1,4 +1,4 @@
-//! What is told of every format that a recording may have.
+//! The description of every format that a recording may have.
 
 use afmid_formats::{Row, formats};
 
@@ -41,7 +41,7 @@ const RAW_ROW: Row = Row {
     unit: "",
 };
 
-/// What is told of each format, in the order in which they are asked: HDF5, those of [`formats`], files without a header.
+/// The description of each format, in the order in which they are asked: HDF5, those of [`formats`], files without a header.
 pub fn rows() -> impl Iterator<Item = Row> {
     [NATIVE_ROW, HDF5_ROW].into_iter().chain(formats().iter().map(|known| known.row)).chain([RAW_ROW])
 }

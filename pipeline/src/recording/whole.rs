@@ -28,7 +28,7 @@ impl WholeFile {
         if let Some((inflated, _, contents)) = open_packed(files, path, reading)? {
             return Ok(Self { hashed, contents: Arc::new(contents), _inflated: Some(inflated) });
         }
-        let reading = Reading { format: format_of(files, path, reading)?.to_owned(), raw: reading.raw.clone() };
+        let reading = Reading { format: format_of(files, path, reading)?.to_owned(), ..reading.clone() };
         let contents = contents(files, path, hashed.state(), &reading)?;
         Ok(Self { hashed, contents, _inflated: None })
     }

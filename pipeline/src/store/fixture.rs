@@ -92,6 +92,7 @@ pub(crate) fn recording() -> Recording {
         blake3: "ab".repeat(32),
         sample_rate_hz: 5e6,
         started_at: "2005-03-01T10:00:00Z".to_owned(),
+        rate_relative_std: 0.0,
         first_sample: part(index).0,
         reading: part(index).1,
         channels: vec![

@@ -36,6 +36,10 @@ pub(super) fn write_recording(parent: &Group, name: &str, recording: &Recording)
             records.iter().map(|record| record.first_sample as i64).collect::<Vec<_>>(),
         )
         .with("reading", "", "which reader opens the file, JSON", readings(records)?);
+    let files = match records.iter().any(|record| record.rate_relative_std > 0.0) {
+        false => files,
+        true => files.with(RATE_STD, "1", "standard error of the sample rate, relative", rate_stds(records)),
+    };
     write_table(&group, "records", &files)?;
     let rows: Vec<(i64, &Channel)> = (0..)
         .zip(records)
@@ -66,6 +70,13 @@ pub(super) fn write_recording(parent: &Group, name: &str, recording: &Recording)
         );
     write_table(&group, "channels", &channels)?;
     Ok(group)
+}
+
+/// The column with the standard errors of rates, in recordings where one is not 0.
+const RATE_STD: &str = "sample_rate_relative_std";
+
+fn rate_stds(records: &[Record]) -> Vec<f64> {
+    records.iter().map(|record| record.rate_relative_std).collect()
 }
 
 /// Which reader opens each file, in JSON.
@@ -101,6 +112,7 @@ pub(super) fn read_recording(group: &Node, input_files: &InputFiles) -> Result<R
             blake3: blake3.clone(),
             sample_rate_hz,
             started_at: started_at.clone(),
+            rate_relative_std: 0.0,
             first_sample: 0,
             reading: Reading::default(),
             channels: Vec::new(),
@@ -111,6 +123,10 @@ pub(super) fn read_recording(group: &Node, input_files: &InputFiles) -> Result<R
         let negative = |_| StoreError::new(format!("found {first} as `first_sample`")).at(group.name());
         record.first_sample = usize::try_from(first).map_err(negative)?;
         record.reading = reading(json).map_err(wrap)?;
+    }
+    if files.columns.iter().any(|column| column.name == RATE_STD) {
+        let stds = files.real(RATE_STD).map_err(wrap)?;
+        records.iter_mut().zip(stds).for_each(|(record, std)| record.rate_relative_std = *std);
     }
     for row in 0..channels.rows() {
         let (index, channel) = read_channel(input_files, &channels, row, &records).map_err(wrap)?;

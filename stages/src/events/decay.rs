@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::artifacts::{PIEZO, Sensor, decay_array};
+use crate::artifacts::{PIEZO, Sensor, decay_array, with_rate_std};
 use crate::io::{CopyOf, warn_of_copies};
 use afmid_kernels::events::decay::{DecayEnd, DecaySearch, DecaySearchOptions, DismissedReason, FreeDecay};
 use afmid_kernels::harmonics::find_decays_beside_lines;
@@ -76,7 +76,7 @@ impl Stage for Decay {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.decay",
-        version: 7,
+        version: 8,
         summary: "finds free decays in records: where they begin, where they drown in the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -114,9 +114,10 @@ impl Stage for Decay {
             cx.warn(format!("{}: {}", row.record, row.rejected));
         }
         let quiet: Vec<Vec<Vec<f64>>> = searched.iter().flat_map(Searched::quiet).collect();
+        let rate_std = records.iter().map(|record| record.rate_relative_std).fold(0.0, f64::max);
         let summary = summary(&rows, hits.len(), &sensors, rate)?;
         Ok(Ports::new()
-            .with(&DECAYS, decay_array(&hits, &quiet, &sensors, rate)?)
+            .with(&DECAYS, with_rate_std(decay_array(&hits, &quiet, &sensors, rate)?, rate_std))
             .with(&EVENTS, table(&rows, rate))
             .with(&SUMMARY, summary))
     }

@@ -49,6 +49,7 @@ pub fn memory_record(name: &str, sample_rate_hz: f64, channels: Vec<Channel>) ->
         blake3: String::new(),
         sample_rate_hz,
         started_at: String::new(),
+        rate_relative_std: 0.0,
         first_sample: 0,
         reading: Reading::default(),
         channels,

@@ -99,7 +99,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "how many record
 impl Stage for Records {
     const SPEC: Spec = Spec {
         name: "io.records",
-        version: 5,
+        version: 6,
         summary: "opens records of any format by pattern and checks that they belong together",
         inputs: &[],
         outputs: &[RECORDS.spec(), SUMMARY.spec()],

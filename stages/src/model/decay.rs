@@ -104,7 +104,7 @@ impl Stage for DecayFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.decay",
-        version: 7,
+        version: 8,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), SYSTEMS.spec(), FIT.spec(), SUMMARY.spec()],
@@ -120,8 +120,9 @@ impl Stage for DecayFit {
         let decays = decays;
         let whole = self.part == FittedPart::Whole;
         let options = ChannelOptions { missing: decays.missing(), ..self.options() };
-        let followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, whole)
+        let mut followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, whole)
             .map_err(StageError::from_error)?;
+        followed.fit.add_error_of_rate(decays.rate_relative_std);
         let parts = Parts::new(&followed, &decays);
         let fit = &followed.fit;
         self.warn(fit, followed.fitted.poles.len(), &decays, cx);

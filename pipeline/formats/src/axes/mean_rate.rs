@@ -1,8 +1,8 @@
 //! The mean rate of times that give no rate: uneven ones, and such as are printed too coarsely.
 
-use super::{names_times, seconds};
 use crate::FoundChannel;
 use crate::rate::fewest_digits;
+use crate::time_units::{names_times, seconds};
 
 /// Rates that differ by more, relative, are not of one recording: jitter and rounding of times make less.
 const CONTRADICTS: f64 = 1e-2;

@@ -99,14 +99,24 @@ fn cells_of_times_are_axes_of_the_cells_beside_them() {
 }
 
 #[test]
-fn rounded_times_are_even_and_a_lost_sample_is_not() {
+fn rounded_times_are_even_and_a_lost_sample_is_a_gap() {
     let rounded: Vec<f64> = times(1000, 1.953125e-4).iter().map(|t| (t * 1e7).round() / 1e7).collect();
     let found = settled(vec![channel("/t", rounded.clone()), channel("/y", noise(1000))]);
     // of the rates that the rounding allows the one with the fewest digits
     assert_eq!(found, [is("/y", Some(5120.0))]);
     let mut lost = rounded;
     lost.iter_mut().skip(500).for_each(|time| *time += 1.953125e-4);
-    assert!(settled(vec![channel("/t", lost), channel("/y", noise(1000))])[0].2);
+    let mut contents = Contents {
+        format: String::new(),
+        started_at: String::new(),
+        channels: vec![channel("/t", lost), channel("/y", noise(1000))],
+        responses: Vec::new(),
+        remarks: Vec::new(),
+    };
+    settle(&mut contents);
+    let found = &contents.channels[0];
+    assert_eq!((found.sample_rate_hz, &found.gaps[..]), (Some(5120.0), &[500][..]));
+    assert!(contents.remarks.iter().any(|remark| remark.contains("a gap")), "{:?}", contents.remarks);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The readers: a folder each, and the list of them in the order in which they are asked.
 //!
-//! A new format is a folder here, a line among the modules and one in [`FORMATS`]; what people and programs are told of
-//! it ([`Row`]) stands in its folder. A fuzz corpus (`fuzz/corpus/NAME`) is asked for by a test.
+//! A new format is a folder here, a line among the modules and one in the list `FORMATS`; its description for people and
+//! programs ([`Row`]) stands in its folder. A fuzz corpus (`fuzz/corpus/NAME`) is asked for by a test.
 
 use std::fs::File;
 use std::io::Read;
@@ -31,7 +31,7 @@ pub const HEAD_BYTES: usize = 4096;
 /// A format as the registry knows it.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
-    /// What is told of it.
+    /// Its description.
     pub row: Row,
     recognises: fn(&[u8], &Path) -> bool,
     open: fn(&Path) -> Result<Contents, FormatError>,

@@ -15,7 +15,7 @@ fn number(times: f64, plus: f64) -> Vec<f64> {
 }
 
 #[test]
-fn records_of_several_variables_are_told_apart() {
+fn records_of_several_variables_are_kept_apart() {
     let contents = opened("records.netcdf");
     assert_eq!(contents.format, "netCDF classic, CDF-2 (offsets of 64 bits)");
     assert_eq!(locations(&contents), ["/volts", "/small", "/both[0]", "/both[1]"], "{:?}", contents.remarks);

@@ -116,7 +116,7 @@ fn damaged_files_do_no_harm() {
 }
 
 #[test]
-fn a_changed_page_is_told_by_its_checksum() {
+fn a_changed_page_is_found_by_its_checksum() {
     let mut bytes = std::fs::read(written("types_plain.parquet")).unwrap();
     // a value in the first column's only page
     bytes[4 + 60] ^= 1;

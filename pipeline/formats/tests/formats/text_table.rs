@@ -182,7 +182,7 @@ fn times_that_are_not_even_or_in_another_unit() {
     let lost = table("lost.csv", "Time (s),a\n0.000,1\n0.100,2\n0.200,3\n0.400,4\n");
     assert_eq!(locations(&lost), ["Time", "a"]);
     assert_eq!(channel(&lost, "a").sample_rate_hz, None);
-    assert!(remarked(&lost, "gives no sample rate: row 2 is"), "{:?}", lost.remarks);
+    assert!(remarked(&lost, "gives no sample rate: it wanders: row 3 is furthest"), "{:?}", lost.remarks);
     let micro = table("micro.csv", "time (us),a\n0,1\n2,2\n4,3\n6,4\n");
     assert_eq!(channel(&micro, "a").sample_rate_hz, Some(500_000.0));
     let odd = table("odd.csv", "t (weeks),a\n0,1\n2,2\n4,3\n");

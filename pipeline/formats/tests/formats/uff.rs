@@ -261,7 +261,7 @@ fn the_rate_is_the_round_one_that_a_printed_step_allows() {
         );
     }
     // a step that is round itself, and a rate that is not round beyond its six digits
-    assert_eq!(rate_of(&Dataset { step: 3e-4, ..time(b"  1.00000E+00\n", 2, 1) }).0, Some(3333.333_333_33));
+    assert_eq!(rate_of(&Dataset { step: 3e-4, ..time(b"  1.00000E+00\n", 2, 1) }).0, Some(3_333.333_333_33));
     let odd = rate_of(&Dataset { step: 1.234_57e-5, ..time(b"  1.00000E+00\n", 2, 1) }).0.unwrap();
     assert!((odd * 1.234_57e-5 - 1.0).abs() <= 0.5e-5 / 1.234_57, "{odd}");
     // frequency responses have the step that was meant, too
@@ -295,7 +295,7 @@ fn stored_times_that_run_evenly_to_within_their_printing_are_a_rate() {
     let line = lost.data.iter().skip(at + 1).position(|byte| *byte == b'\n').unwrap() + 1;
     lost.data.drain(at + 1..at + 1 + line);
     let (found, contents) = rate_of(&Dataset { points: 199, ..lost });
-    assert!(found.is_none() && remarked(&contents, "steps off") && contents.channels.len() == 2);
+    assert!(found.is_none() && remarked(&contents, "even grid") && contents.channels.len() == 2);
     // times that repeat: neighbours 0 or 1e-5 s apart, at 51.2 kHz behind the first second
     let (found, contents) = rate_of(&printed_times(102_400.0, 110_000));
     if let Some(rate) = found {

@@ -182,7 +182,8 @@ fn bits_at_the_lower_end_of_a_word_are_recognised_by_what_is_stated_and_by_the_p
     const FULL: i32 = 1 << 23;
     let (lower, upper) = ("full scale is that of 24 bits", "the scale is uncertain");
     // valid bits, codes, bits of full scale, words of the remark
-    let cases: [(Option<u16>, &[i32], i32, Option<&str>); 13] = [
+    type Case<'a> = (Option<u16>, &'a [i32], i32, Option<&'static str>);
+    let cases: [Case<'_>; 13] = [
         (None, &[FULL - 1, -FULL, 3], 24, Some(lower)),
         (None, &[FULL / 2, 1], 24, Some(lower)),
         (Some(32), &[FULL / 2 + 5, 1], 24, Some(lower)),

@@ -75,7 +75,7 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
     for found in found {
         let series = match Variable::of(&found, matlab, allowance, &times) {
             Ok(Variable::Single(value)) => {
-                scopes.number(&found.group, &found.name, &found.location, value);
+                scopes.number(&found, value, allowance);
                 remarks.push(format!("{} is the single number {value}, no channel", found.location));
                 continue;
             }
@@ -110,7 +110,7 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
     for (found, series) in &variables {
         let (rate, remark) = match found.stated.as_ref().and_then(|stated| stated.sample_rate_hz) {
             Some(rate) => (Some(rate), None),
-            None => scopes.rate_of(found),
+            None => scopes.rate_of(found, allowance),
         };
         remarks.extend(found.stated.iter().flat_map(|stated| stated.remarks.clone()));
         remarks.extend(remark.filter(|remark| !remarks.contains(remark)));

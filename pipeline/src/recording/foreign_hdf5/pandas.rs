@@ -34,10 +34,10 @@ pub(super) fn field_names(found: &Found, field: &str, allowance: &Allowance) -> 
     distinct(kind.lines().filter_map(text).take(MOST_NAMES).collect())
 }
 
-/// The unit of an index of moments, which count from 1970: `datetime64[ns]`.
+/// The unit of an index of moments, which count from 1970 or from its first: `datetime64[ns]`, `timedelta64[ns]`.
 pub(super) fn moments_unit(found: &Found, attribute: &str, allowance: &Allowance) -> Option<String> {
     let kind = text_attribute(&found.dataset, attribute, allowance)?;
-    let rest = kind.strip_prefix("datetime64")?;
+    let rest = kind.strip_prefix("datetime64").or_else(|| kind.strip_prefix("timedelta64"))?;
     let unit = rest.strip_prefix('[').and_then(|rest| rest.split([']', ',']).next()).unwrap_or_default();
     Some(if unit.is_empty() { "ns".to_owned() } else { unit.to_owned() })
 }

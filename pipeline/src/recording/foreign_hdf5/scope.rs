@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use afmid_formats::{Clue, agreed_rate, rate_in};
+use afmid_formats::{Clue, agreed_rate, rate_in, unit_names};
 use hdf5::Location;
 
 use super::walk::Found;
@@ -45,15 +45,16 @@ impl Scopes {
             let unit = text_attribute(group, "encoder.scaling.unit.unit", allowance).unwrap_or_default();
             self.encoders.insert(path.to_owned(), Encoder { multiplier, offset, unit });
         }
-        for clue in clues(group, path) {
+        for clue in clues(group, path, allowance) {
             self.add(path, clue);
         }
     }
 
     /// Takes a dataset of one number.
-    pub(super) fn number(&mut self, group: &str, name: &str, location: &str, value: f64) {
-        if let Some(clue) = Clue::of(name, location, value) {
-            self.add(group, clue);
+    pub(super) fn number(&mut self, found: &Found, value: f64, allowance: &Allowance) {
+        if let Some(clue) = Clue::of(&found.name, &found.location, value) {
+            let unit = ["units", "unit"].into_iter().find_map(|name| text_attribute(&found.dataset, name, allowance));
+            self.add(&found.group, clue.in_unit(&unit.unwrap_or_default()));
         }
     }
 
@@ -75,20 +76,21 @@ impl Scopes {
     }
 
     /// The rate of a dataset, and what to say of it.
-    pub(super) fn rate_of(&self, found: &Found) -> (Option<f64>, Option<String>) {
-        let own: Vec<Clue> = clues(&found.dataset, &found.location);
+    pub(super) fn rate_of(&self, found: &Found, allowance: &Allowance) -> (Option<f64>, Option<String>) {
+        let own: Vec<Clue> = clues(&found.dataset, &found.location, allowance);
         if own.is_empty() { rate_in(&found.group, &self.clues) } else { agreed_rate(&own) }
     }
 }
 
-/// What the attributes of an object say of a rate.
-fn clues(object: &Location, path: &str) -> Vec<Clue> {
+/// What the attributes of an object say of a rate, each in the unit that an attribute beside it states.
+fn clues(object: &Location, path: &str, allowance: &Allowance) -> Vec<Clue> {
     let names = attribute_names(object);
     let clue = |name: &String| {
         // only attributes that are named like a rate are read
         Clue::of(name, "", 0.0)?;
         let value = number_attribute(object, path, name).ok()?;
-        Clue::of(name, &format!("{path}@{name}"), value)
+        let unit = unit_names(name).into_iter().find_map(|name| text_attribute(object, &name, allowance));
+        Some(Clue::of(name, &format!("{path}@{name}"), value)?.in_unit(&unit.unwrap_or_default()))
     };
     names.iter().filter_map(clue).collect()
 }

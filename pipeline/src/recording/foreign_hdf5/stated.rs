@@ -25,7 +25,6 @@ pub(super) struct Stated {
     /// Samples per second.
     pub(super) sample_rate_hz: Option<f64>,
     /// Time of the first sample on the file's own clock (a trigger, the beginning of a session).
-    #[allow(dead_code, reason = "channels have no start yet: FoundChannel { start_s, .. }")]
     pub(super) start_s: Option<f64>,
     /// Factor and offset of codes: value = stored * factor + offset.
     pub(super) scale: Option<(f64, f64)>,

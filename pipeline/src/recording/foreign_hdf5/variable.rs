@@ -188,6 +188,7 @@ impl Series {
             unit: described.unit.clone(),
             long_name: described.long_name.clone(),
             sample_rate_hz: about.sample_rate_hz,
+            start_s: found.stated.as_ref().and_then(|stated| stated.start_s),
             scale_factor: described.scale_factor * found.stated.as_ref().map_or(1.0, |stated| stated.factor(lane)),
             add_offset: described.add_offset,
             fill_code: described.fill_code,

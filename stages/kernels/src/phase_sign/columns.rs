@@ -37,7 +37,7 @@ pub(super) fn least_squares(columns: &[Vec<c64>], rhs: &[c64]) -> Option<(Vec<c6
         }
         let rest = power(&left).sqrt();
         // not a number either
-        if !(rest > LEAST_SHARE * norm) {
+        if rest.is_nan() || rest <= LEAST_SHARE * norm {
             return None;
         }
         triangle[j][j] = c64::new(rest, 0.0);

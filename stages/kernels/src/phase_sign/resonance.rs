@@ -22,6 +22,8 @@ pub(super) struct Stretch {
     pub half_width: f64,
     /// Where the peak is.
     pub peak: f64,
+    /// Its squared height, in median ones of the response.
+    pub prominence: f64,
 }
 
 /// A peak, and where the response has fallen to half of it on either side.
@@ -39,7 +41,15 @@ pub(super) fn resonances(frequency: &[f64], response: &[c64]) -> Vec<Stretch> {
     let mut found = peaks(&height);
     found.sort_by(|a, b| height[b.at].total_cmp(&height[a.at]));
     found.truncate(MOST_RESONANCES);
-    found.iter().filter_map(|peak| stretch(peak, &frequency, &response)).collect()
+    let median = median(&height);
+    let found = found.iter().filter_map(|peak| Some((height[peak.at], stretch(peak, &frequency, &response)?)));
+    found.map(|(top, stretch)| Stretch { prominence: (top / median).powi(2), ..stretch }).collect()
+}
+
+fn median(height: &[f64]) -> f64 {
+    let mut sorted = height.to_vec();
+    let middle = sorted.len() / 2;
+    if sorted.is_empty() { 0.0 } else { *sorted.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// The maxima that fall to half on both sides before anything higher, or to the end of the band on one of them.
@@ -79,5 +89,11 @@ fn stretch(peak: &Peak, frequency: &[f64], response: &[c64]) -> Option<Stretch> 
         frequency[first..end].chunks(group).map(|f| scaled(f.iter().sum::<f64>() / f.len() as f64)).collect();
     let values = response[first..end].chunks(group).map(mean).collect();
     let peak = scaled(centre);
-    (x.len() > 2 * LEAST_POINTS - 2).then(|| Stretch { x, values, half_width: 2.0 * half_width / (high - low), peak })
+    (x.len() > 2 * LEAST_POINTS - 2).then(|| Stretch {
+        x,
+        values,
+        half_width: 2.0 * half_width / (high - low),
+        peak,
+        prominence: 0.0,
+    })
 }

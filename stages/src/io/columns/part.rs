@@ -2,7 +2,8 @@
 
 use afmid_pipeline::StageError;
 use afmid_pipeline::recording::{
-    FoundChannel, WANTED_RATE, WholeFile, agreed_rate, brief_number, contradiction, even_step, is_rate, lane_names,
+    AgreedRate, FoundChannel, WANTED_RATE, WholeFile, agreed_rate, begun_together, brief_number, contradiction,
+    even_step, is_rate, lane_names, one_rate,
 };
 
 use super::selection::Column;
@@ -20,22 +21,25 @@ pub(super) struct Part {
     pub input_names: Vec<String>,
     pub output_names: Vec<String>,
     pub rate: f64,
-    /// That the rate which is given is not that of the file's times.
-    pub contradicted_rate: Option<String>,
+    /// Standard error of the rate, relative.
+    pub rate_relative_std: f64,
+    /// What the user should know of rate and starts.
+    pub remarks: Vec<String>,
     /// Samples before which a channel was interrupted.
     pub gaps: Vec<usize>,
 }
 
-/// Largest departure of a channel of times from equal spacing, in intervals.
-const UNEQUAL: f64 = 0.01;
 /// What rates of two files may differ by, relative: `io.records` takes them for the same.
 const SAME_RATE: f64 = 1e-6;
 
 impl Part {
     /// Reads the channels. Errors: see the stage.
     pub fn read(wanted: &Columns, file: &WholeFile) -> Result<Self, StageError> {
-        let channels = Channels::find(wanted, file)?;
-        let rate = channels.rate(wanted, file)?;
+        let found = Channels::find(wanted, file)?;
+        let AgreedRate { rate_hz, relative_std, overruled } = found.rate(wanted, file)?;
+        let mut remarks: Vec<String> = overruled.into_iter().collect();
+        let (channels, apart) = found.begun_together()?;
+        remarks.extend(apart);
         let values = |channel: &FoundChannel, scale: f64| -> Result<Vec<f64>, StageError> {
             let value = |value: f64| if wanted.missing.contains(&value) { f64::NAN } else { value * scale };
             Ok(file.read(channel)?.into_iter().map(value).collect())
@@ -74,10 +78,9 @@ impl Part {
             input_names: names(&channels.inputs),
             output_names: names(&channels.outputs),
             gaps: channels.all().flat_map(|channel| channel.gaps.clone()).collect(),
-            contradicted_rate: wanted.sample_rate_hz.and_then(|given| {
-                channels.all().find_map(|channel| contradiction(&file.contents().channels, channel, given))
-            }),
-            rate,
+            remarks,
+            rate: rate_hz,
+            rate_relative_std: relative_std,
             inputs,
             outputs,
             samples,
@@ -114,52 +117,67 @@ impl Part {
 }
 
 /// The channels that are meant.
-struct Channels<'a> {
-    inputs: Vec<&'a FoundChannel>,
-    outputs: Vec<&'a FoundChannel>,
+struct Channels {
+    inputs: Vec<FoundChannel>,
+    outputs: Vec<FoundChannel>,
 }
 
-impl<'a> Channels<'a> {
-    fn find(wanted: &Columns, file: &'a WholeFile) -> Result<Self, StageError> {
+impl Channels {
+    fn find(wanted: &Columns, file: &WholeFile) -> Result<Self, StageError> {
         let contents = file.contents();
         let found = |columns: &[Column]| {
-            columns.iter().map(|column| column.of(contents)).collect::<Result<Vec<_>, StageError>>()
+            columns.iter().map(|column| column.of(contents).cloned()).collect::<Result<Vec<_>, StageError>>()
         };
         Ok(Self { inputs: found(&wanted.inputs)?, outputs: found(wanted.all_outputs())? })
     }
 
-    fn all(&self) -> impl Iterator<Item = &'a FoundChannel> {
-        self.inputs.iter().chain(&self.outputs).copied()
+    fn all(&self) -> impl Iterator<Item = &FoundChannel> {
+        self.inputs.iter().chain(&self.outputs)
     }
 
     /// Its place in the file.
-    fn first_output(&self) -> &'a str {
+    fn first_output(&self) -> &str {
         self.outputs.first().map_or("", |channel| &channel.location)
     }
 
+    /// The same from the instant on at which the last of them begins, and what to say of it. Errors: as
+    /// [`begun_together`].
+    fn begun_together(self) -> Result<(Self, Option<String>), StageError> {
+        let moved = begun_together(&self.all().collect::<Vec<_>>())?;
+        let Some((mut inputs, said)) = moved else { return Ok((self, None)) };
+        let outputs = inputs.split_off(self.inputs.len());
+        Ok((Self { inputs, outputs }, Some(said)))
+    }
+
     /// The one rate that all state, or that the user gives. Errors: none, or several.
-    fn rate(&self, wanted: &Columns, file: &WholeFile) -> Result<f64, StageError> {
-        let stated = self.all().map(|channel| (channel, channel.sample_rate_hz));
-        let stated: Vec<(&FoundChannel, f64)> =
-            stated.filter_map(|(channel, rate)| rate.map(|rate| (channel, rate))).collect();
-        let first = stated.first().map(|(_, rate)| *rate);
-        for (channel, rate) in &stated {
-            agreed_rate(Some(*rate), first, (&channel.location, None))?;
+    fn rate(&self, wanted: &Columns, file: &WholeFile) -> Result<AgreedRate, StageError> {
+        one_rate(&self.all().collect::<Vec<_>>())?;
+        let stated = self.all().find(|channel| channel.sample_rate_hz.is_some());
+        if let (None, None, Some(column)) = (stated, wanted.sample_rate_hz, &wanted.time) {
+            return spaced_equally(column, file).map(AgreedRate::known);
         }
-        if let (None, None, Some(column)) = (first, wanted.sample_rate_hz, &wanted.time) {
-            return spaced_equally(column, file);
-        }
+        let rated = stated.or(self.outputs.first()).ok_or_else(|| StageError::new("there is no output"))?;
         let said = file.contents().why_no_rate(self.first_output());
-        agreed_rate(first, wanted.sample_rate_hz, (self.first_output(), said)).map_err(|error| match first {
+        let mut agreed = agreed_rate(rated, wanted.sample_rate_hz, said).map_err(|error| match stated {
             Some(_) => error,
             None => error.help("give `sample_rate_hz` (1 for cycles per sample) or the channel `time`"),
-        })
+        })?;
+        let times = || contradiction(&file.contents().channels, rated, wanted.sample_rate_hz?);
+        agreed.overruled = agreed.overruled.or_else(times);
+        if rated.rate_is_guess && wanted.sample_rate_hz.is_none() {
+            let rate = agreed.rate_hz;
+            let said = format!(
+                "the times have no unit and are taken as seconds, {rate} samples a second: `sample_rate_hz` says another rate"
+            );
+            agreed.overruled.get_or_insert(said);
+        }
+        Ok(agreed)
     }
 }
 
 /// The unit of channels, with what the user says of it. Errors: they state several; the user states another; they are
 /// scaled to nobody knows what.
-fn unit(channels: &[&FoundChannel], given: Option<&str>, scale: f64, what: &str) -> Result<String, StageError> {
+fn unit(channels: &[FoundChannel], given: Option<&str>, scale: f64, what: &str) -> Result<String, StageError> {
     let scaled = scale != 1.0;
     match (given, channels.first().map_or("", |channel| &channel.unit)) {
         (Some(given), _) if scaled => Ok(given.to_owned()),
@@ -177,8 +195,8 @@ fn unit(channels: &[&FoundChannel], given: Option<&str>, scale: f64, what: &str)
 }
 
 /// As the file names channels.
-fn names(channels: &[&FoundChannel]) -> Vec<String> {
-    let of = |channel: &&FoundChannel| channel.location.trim_start_matches('/').to_owned();
+fn names(channels: &[FoundChannel]) -> Vec<String> {
+    let of = |channel: &FoundChannel| channel.location.trim_start_matches('/').to_owned();
     let lanes = lane_names(channels.iter().map(|channel| (channel.location.as_str(), channel.long_name.as_str())));
     lanes.unwrap_or_else(|| channels.iter().map(of).collect())
 }
@@ -186,24 +204,15 @@ fn names(channels: &[&FoundChannel]) -> Vec<String> {
 /// The rate of a channel of times. Errors: there is none; they are not equally spaced.
 fn spaced_equally(column: &Column, file: &WholeFile) -> Result<f64, StageError> {
     let times = file.read(column.of(file.contents())?)?;
-    let uneven = || {
-        let problem = "are not equally spaced, ascending and complete to 1 % or to their last digit";
-        StageError::new(format!("the times in channel {column} {problem}"))
+    let uneven = |why: String| {
+        StageError::new(format!("the times in channel {column} are not equally spaced: {why}"))
             .help("resample the record, or give `sample_rate_hz` if they are only a coarse clock")
     };
-    let rate = equal_spacing(&times).or_else(|| even_step(&times).ok().map(f64::recip)).ok_or_else(uneven)?;
+    let rate = even_step(&times).map(f64::recip).map_err(uneven)?;
     if is_rate(rate) {
         return Ok(rate);
     }
     let found = brief_number(rate);
     Err(StageError::new(format!("the times in channel {column} give {found} Hz, wanted {WANTED_RATE}"))
         .help("give `sample_rate_hz`, or times in seconds"))
-}
-
-/// Samples per unit of an equally spaced series.
-fn equal_spacing(times: &[f64]) -> Option<f64> {
-    let (first, last) = (times.first()?, times.last()?);
-    let interval = (last - first) / (times.len() - 1).max(1) as f64;
-    let even = times.windows(2).all(|pair| (pair[1] - pair[0] - interval).abs() <= UNEQUAL * interval);
-    (interval > 0.0 && interval.is_finite() && even).then(|| 1.0 / interval)
 }

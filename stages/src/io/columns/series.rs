@@ -6,7 +6,9 @@ use serde_json::{Value, json};
 use super::part::Part;
 use super::stage::Columns;
 use super::stretch::{Removal, Stretch, Trend, halves};
-use crate::artifacts::{DataSet, NewPair, PairSet, with_channel_names, with_record_starts, with_taken_off};
+use crate::artifacts::{
+    DataSet, NewPair, PairSet, with_channel_names, with_rate_std, with_record_starts, with_taken_off,
+};
 
 /// Inputs and outputs of all files in a row, NaN where missing.
 pub(super) struct Series {
@@ -101,6 +103,7 @@ impl Series {
             };
             pair = of_set.add(pair);
         }
+        let pair = with_rate_std(pair, self.all.rate_relative_std);
         let mut pair = with_channel_names(pair, &self.all.input_names, &self.all.output_names);
         if !self.records.is_empty() {
             let starts: Vec<usize> = self.records.iter().map(|record| record.first).collect();

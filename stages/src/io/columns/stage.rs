@@ -125,7 +125,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Columns {
     const SPEC: Spec = Spec {
         name: "io.columns",
-        version: 7,
+        version: 8,
         summary: "reads measured input and output from the channels of a file of any format",
         inputs: &[],
         outputs: &[PAIR.spec(), SUMMARY.spec()],
@@ -205,7 +205,7 @@ impl Columns {
                 copies.push((name_beside(&path, of), name_beside(of, &path)));
                 continue;
             }
-            part.contradicted_rate.iter().for_each(|problem| cx.warn(problem.clone()));
+            part.remarks.iter().for_each(|remark| cx.warn(remark.clone()));
             parts.push((path, part));
         }
         warn_of_copies(cx, &copies, "all samples of their channels are equal");

@@ -204,6 +204,8 @@ fn scales_want_their_unit_and_units_that_differ_are_refused() {
     let error = |change| stage(change).map(|_| ()).unwrap_err().to_string();
     assert!(error(|s| s.input_scale = 3.0).contains("`input_unit` is missing"));
     assert!(error(|s| s.input_unit = Some("V".to_owned())).contains("is in N, wanted V"));
-    assert!(error(|s| s.sample_rate_hz = Some(41.0)).contains("states 40"));
+    // the user's rate takes the place of the file's
+    let overruled = stage(|s| s.sample_rate_hz = Some(41.0)).unwrap();
+    assert_eq!(overruled.number("sample_rate_hz").unwrap(), 41.0);
     assert!(error(|s| s.inputs = vec![Column::Name("time".to_owned())]).contains("1 `force`, 2 `response`"));
 }

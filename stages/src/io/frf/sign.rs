@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::stage::PhaseSign;
 
-/// Resonances of one sign to one of the other, at least, for a response to be of that sign.
+/// Resonances of one sign to one of the other, at least, for a file to be of that sign.
 const LEAST_RATIO: usize = 4;
 /// Names that are listed; more are counted.
 const MOST_NAMES: usize = 5;
@@ -55,16 +55,22 @@ fn by_resonances(path: &Path, responses: &mut [FileResponse]) -> Result<Option<O
         let of = responses.iter().zip(&counts).filter(|(_, counts)| is(counts));
         of.map(|(response, _)| response.location.clone()).collect()
     };
-    let negative = named(|of| of.negative > 0 && of.negative >= LEAST_RATIO * of.positive);
-    let positive = named(|of| of.positive > 0 && of.positive >= LEAST_RATIO * of.negative);
-    if negative.is_empty() {
+    // noise that is smoothed shows the other sign now and then: the file as a whole decides
+    let total = |of: fn(&SignCounts) -> usize| counts.iter().map(of).sum::<usize>();
+    let (all_positive, all_negative) = (total(|of| of.positive), total(|of| of.negative));
+    if all_negative == 0 || all_positive >= LEAST_RATIO * all_negative {
         return Ok(None);
     }
+    let negative = named(|of| of.negative > of.positive);
+    let positive = named(|of| of.positive > of.negative);
     if responses.iter().any(|response| is_ratio(&response.unit)) {
         return Ok(Some(OtherSign::Ratio));
     }
-    if !positive.is_empty() {
+    if all_negative < LEAST_RATIO * all_positive && !positive.is_empty() && !negative.is_empty() {
         return Err(both(&negative, &positive, path));
+    }
+    if all_negative < LEAST_RATIO * all_positive {
+        return Ok(None);
     }
     turn(responses);
     Ok(Some(OtherSign::Turned))

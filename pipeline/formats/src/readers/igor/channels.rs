@@ -54,26 +54,19 @@ pub(super) fn of(
     let labels = labels(file, header.column_labels, columns, remarks);
     let channel = |column: u64| {
         let label = labels.get(column as usize).filter(|label| is_unique(label, &labels));
-        FoundChannel {
-            location: location(header, label, column, columns),
+        let grid = Grid {
+            store: Store::File(file.pinned().clone()),
+            first: header.data.at + column * rows * code.bytes(),
+            step: code.bytes(),
             samples: rows as usize,
+            number: code,
+            big_endian: header.order == Order::Big,
+        };
+        FoundChannel {
             unit: unit_of(&unit, label, note),
             long_name: label.map_or_else(|| header.name.clone(), |label| format!("{}, {label}", header.name)),
             sample_rate_hz,
-            scale_factor: 1.0,
-            add_offset: 0.0,
-            fill_code: None,
-            gaps: Vec::new(),
-            is_axis: false,
-            stored_as: code.name(),
-            source: Arc::new(Grid {
-                store: Store::File(file.pinned().clone()),
-                first: header.data.at + column * rows * code.bytes(),
-                step: code.bytes(),
-                samples: rows as usize,
-                number: code,
-                big_endian: header.order == Order::Big,
-            }),
+            ..FoundChannel::new(location(header, label, column, columns), rows as usize, code.name(), Arc::new(grid))
         }
     };
     let channels: Vec<_> = (0..columns).map(channel).collect();

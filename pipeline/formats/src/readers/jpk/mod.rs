@@ -42,7 +42,8 @@ impl Format for JpkForce {
     const ROW: Row = Row {
         name: "jpk",
         title: "JPK force curves and maps",
-        reads: "`.jpk-force`, `.jpk-qi-series`: segments, encoders, calibrations as channels of their own; `.jpk-force-map`, `.jpk-qi-data`: the same for each curve, `/index/3/segments/0/vDeflection`",
+        reads: "`.jpk-force`, `.jpk-qi-series`: segments, encoders, calibrations as channels of their own; \
+                `.jpk-force-map`, `.jpk-qi-data`: the same for each curve, `/index/3/segments/0/vDeflection`",
         leaves_out: "images beside the curves; of a map with very many curves all but the first",
         described_by: "no public description: as afmformats, Gwyddion and Hooke read it",
         clock: "duration and number of points of each segment",

@@ -115,18 +115,12 @@ pub(super) fn channels(
         let source = archive::source(archive, &entry, code)?;
         let long_name = format!("{name}{style}");
         let make = |location: String, long_name: String, line: Line, unit: String| FoundChannel {
-            location,
-            samples: samples as usize,
             unit,
             long_name,
             sample_rate_hz,
             scale_factor: line.factor,
             add_offset: line.offset,
-            fill_code: None,
-            gaps: Vec::new(),
-            is_axis: false,
-            stored_as: code.name(),
-            source: Arc::clone(&source),
+            ..FoundChannel::new(location, samples as usize, code.name(), Arc::clone(&source))
         };
         let calibrated = slots(properties, &name, line, &whose, remarks);
         found.push(make(whose.clone(), long_name.clone(), line, unit));

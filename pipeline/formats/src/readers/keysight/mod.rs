@@ -35,7 +35,8 @@ impl Format for Keysight {
     const ROW: Row = Row {
         name: "keysight",
         title: "Keysight or Rigol binary waveform",
-        reads: "`.bin` (`AG10`, `RG01`, `RG03`): float32 and logic; segments of one label are one channel with gaps; peak detection is two",
+        reads: "`.bin` (`AG10`, `RG01`, `RG03`): float32 and logic; segments of one label are one channel with \
+                gaps; peak detection is two",
         leaves_out: "counts, times, histograms: left out",
         described_by: "Agilent, \"InfiniiVision 3000 X-Series User's Guide\"",
         clock: "x increment",

@@ -31,7 +31,8 @@ impl Format for LeCroy {
     const ROW: Row = Row {
         name: "lecroy",
         title: "LeCroy waveform",
-        reads: "`.trc` of templates LECROY_2_x, bytes and words, either byte order; a sequence has a gap in front of each segment",
+        reads: "`.trc` of templates LECROY_2_x, bytes and words, either byte order; a sequence has a gap in front \
+                of each segment",
         leaves_out: "complex and histogram records: refused; second arrays: left out",
         described_by: "LeCroy, \"Remote Control Manual\", waveform template",
         clock: "`HORIZ_INTERVAL`",

@@ -42,7 +42,8 @@ impl Format for Mat {
     const ROW: Row = Row {
         name: "mat",
         title: "MATLAB 4 to 7",
-        reads: "vectors, columns of arrays, inside structs and cells, compressed or not, both byte orders; complex arrays for `io.frf`",
+        reads: "vectors, columns of arrays, inside structs and cells, compressed or not, both byte orders; complex \
+                arrays for `io.frf`",
         leaves_out: "sparse, text, objects: left out; damaged or mangled files: refused",
         described_by: "MathWorks, \"MAT-File Format\"",
         clock: "arrays of times; numbers named `fs`, `dt`, `Tinterval`, ...",

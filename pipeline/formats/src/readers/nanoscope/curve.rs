@@ -61,19 +61,14 @@ pub(super) fn channels(
             number: code,
             big_endian: false,
         };
+        let source: Arc<dyn crate::Source> = if part.backwards { Arc::new(Backwards(grid)) } else { Arc::new(grid) };
+        let location = format!("/{name}/{}", part.name);
         found.push(FoundChannel {
-            location: format!("/{name}/{}", part.name),
-            samples: part.samples as usize,
             unit: unit.clone(),
             long_name: format!("{}, {}", shown.unwrap_or(&name), part.name),
             sample_rate_hz: part.sample_rate_hz,
             scale_factor,
-            add_offset: 0.0,
-            fill_code: None,
-            gaps: Vec::new(),
-            is_axis: false,
-            stored_as: code.name(),
-            source: if part.backwards { Arc::new(Backwards(grid)) } else { Arc::new(grid) },
+            ..FoundChannel::new(location, part.samples as usize, code.name(), source)
         });
     }
     Ok(())

@@ -7,7 +7,7 @@ use super::attributes::{Attribute, Value, find, number, text};
 use super::header::{Header, Variable};
 use super::kind::{Kind, never_written, unsigned};
 use super::layout::{Axis, Records};
-use crate::axes::{names_times, settle};
+use crate::axes::settle;
 use crate::facts::ONE_NUMBER;
 use crate::grid::{Grid, Store};
 use crate::lanes::Lanes;
@@ -15,6 +15,7 @@ use crate::number::Number;
 use crate::opened::Opened;
 use crate::rate::{Clue, rate_in};
 use crate::text::brief;
+use crate::time_units::names_times;
 use crate::{Contents, FormatError, FoundChannel, Source, fail, hertz};
 
 /// More channels are maps or models, no recordings.
@@ -268,7 +269,7 @@ fn sample_axis(header: &Header, axes: &[Axis], times: &HashSet<usize>) -> usize 
     let shape: Vec<usize> = axes.iter().map(|axis| axis.size).collect();
     let wide = Lanes::of(&shape, false).is_some_and(|lanes| lanes.wide);
     let longer_than_one = || axes.iter().enumerate().filter(|(_, axis)| axis.size > 1).map(|(at, _)| at);
-    if wide { longer_than_one().last() } else { longer_than_one().next() }.unwrap_or(0)
+    if wide { longer_than_one().next_back() } else { longer_than_one().next() }.unwrap_or(0)
 }
 
 /// Whether the values of a variable are times, by its units or its name.

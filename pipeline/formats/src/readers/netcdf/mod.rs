@@ -35,7 +35,8 @@ impl Format for NetCdf {
     const ROW: Row = Row {
         name: "netcdf",
         title: "netCDF, classic",
-        reads: "CDF-1, CDF-2, CDF-5: variables of numbers, records, lanes of more dimensions; scale, offset, fill value, `_Unsigned`; coordinate variables are axes",
+        reads: "CDF-1, CDF-2, CDF-5: variables of numbers, records, lanes of more dimensions; scale, offset, fill \
+                value, `_Unsigned`; coordinate variables are axes",
         leaves_out: "characters: left out; netCDF-4 is HDF5",
         described_by: "Unidata, \"NetCDF Classic Format Specification\"",
         clock: "coordinate variables of times; numbers named `fs`, `dt`, ...",

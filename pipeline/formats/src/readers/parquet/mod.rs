@@ -12,7 +12,7 @@
 //!
 //! The crate `parquet`, with which tables are written, is not used to read: it reserves memory for as many items as a
 //! damaged description claims, which ends the program, and it stops by panics where pages are not as described.
-//! Everything here is bounded by the bytes that are there and by [`crate::budget`].
+//! Everything here is bounded by the bytes that are there and by the budget of inflated data.
 //!
 //! Source: Apache Parquet, "File format" (<https://parquet.apache.org/docs/file-format>) and "parquet.thrift".
 

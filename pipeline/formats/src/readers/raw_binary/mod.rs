@@ -178,19 +178,12 @@ impl RawBinary {
     }
 
     fn channel(&self, number: usize, grid: Grid) -> FoundChannel {
+        let (samples, stored_as) = (grid.samples, grid.number.name());
         FoundChannel {
-            location: format!("/channel[{number}]"),
-            samples: grid.samples,
-            unit: String::new(),
             long_name: format!("channel {number} of {}", self.channels),
-            sample_rate_hz: None,
             scale_factor: self.scale_factor,
             add_offset: self.add_offset,
-            fill_code: None,
-            gaps: Vec::new(),
-            is_axis: false,
-            stored_as: grid.number.name(),
-            source: Arc::new(grid),
+            ..FoundChannel::new(format!("/channel[{number}]"), samples, stored_as, Arc::new(grid))
         }
     }
 }

@@ -5,6 +5,7 @@ use super::scale::{self, Scaling};
 use super::source::Samples;
 use super::timing;
 use super::walk::Recorded;
+use crate::facts::BEGINS_LATER;
 use crate::number::Order;
 use crate::pinned::Pinned;
 use crate::rate::agreed_rate;
@@ -38,14 +39,18 @@ pub(super) fn contents(recorded: Recorded, pinned: &Pinned) -> Contents {
                     channel.sample_rate_hz = named.0;
                     remarks.extend(named.1.filter(|remark| !remarks.contains(remark)));
                 }
+                channel.start_s = match (object.timing.began, began) {
+                    (Some(own), Some(first)) => Some(own.seconds_since(first)),
+                    // of channels without stamps the offsets alone tell
+                    (None, None) => Some(object.timing.offset_s),
+                    _ => None,
+                };
+                if let Some(later) = channel.start_s.filter(|start| *start != 0.0) {
+                    remarks.push(format!("{location} begins {later} {BEGINS_LATER}"));
+                }
                 channels.push(channel);
             }
             Err(why) => remarks.push(format!("{location} is left out: {why}")),
-        }
-        if let (Some(own), Some(first)) = (object.timing.began, began)
-            && own != first
-        {
-            remarks.push(format!("{location} begins {} s after the first channel", own.seconds_since(first)));
         }
     }
     let lengths: HashSet<usize> = channels.iter().map(|c| c.samples).collect();
@@ -84,6 +89,9 @@ fn channel(
     if let Some(odd) = timing::odd_increment(&object.properties) {
         remarks.push(format!("{location}: no sample rate: wf_increment is {odd}, wanted a number above 0"));
     }
+    if let Some(unit) = timing::other_unit(&object.properties) {
+        remarks.push(format!("{location}: no sample rate: its x axis is in «{unit}», no unit of time"));
+    }
     let rate = timing::increment_s(&object.properties).map(f64::recip).filter(|_| !object.timing.uneven);
     let (scale_factor, add_offset) = scaling.line().unwrap_or((1.0, 0.0));
     let curve = scaling.line().is_none().then_some(scaling);
@@ -92,19 +100,16 @@ fn channel(
     let name = group_and_channel(&object.path).map_or_else(|| object.path.clone(), |(_, channel)| channel);
     let long_name = text("description").or_else(|| text("NI_ChannelName")).unwrap_or(&name).to_owned();
     let samples = extents.samples();
+    let gaps = std::mem::take(&mut object.gaps);
+    let source = Arc::new(Samples { pinned: pinned.clone(), extents, kind, digital, curve });
     Ok(FoundChannel {
-        location: location.to_owned(),
-        samples,
         unit,
         long_name,
         sample_rate_hz: rate,
         scale_factor,
         add_offset,
-        fill_code: None,
-        gaps: std::mem::take(&mut object.gaps),
-        is_axis: false,
-        stored_as: kind.name(),
-        source: Arc::new(Samples { pinned: pinned.clone(), extents, kind, digital, curve }),
+        gaps,
+        ..FoundChannel::new(location, samples, kind.name(), source)
     })
 }
 

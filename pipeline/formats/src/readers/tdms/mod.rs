@@ -51,7 +51,10 @@ impl Format for Tdms {
     const ROW: Row = Row {
         name: "tdms",
         title: "NI TDMS",
-        reads: "versions 4712 and 4713, both byte orders, contiguous, interleaved and DAQmx data, linear and polynomial `NI_Scale`, a last segment that is cut off; without a waveform the rate from a property named like one (`SamplingFrequency`); a segment that starts elsewhere than the one before it ends is a gap",
+        reads: "versions 4712 and 4713, both byte orders, contiguous, interleaved and DAQmx data, linear and \
+                polynomial `NI_Scale`, a last segment that is cut off; without a waveform the rate from a property \
+                named like one (`SamplingFrequency`); a segment that starts elsewhere than the one before it ends \
+                is a gap",
         leaves_out: "other scalings, text, time stamps, complex numbers: left out; extended and fixed point: refused",
         described_by: "NI, \"TDMS File Format Internal Structure\"",
         clock: "`wf_increment`",

@@ -6,7 +6,7 @@ use super::stamp::Stamp;
 use crate::FormatError;
 use crate::fail;
 use crate::number::Order;
-use crate::rate::Clue;
+use crate::rate::{Clue, is_unit_of_clue, unit_names};
 use std::collections::BTreeMap;
 
 /// A property's value.
@@ -27,7 +27,7 @@ impl Properties {
     /// Keeps a property if it is one of those read here: a file may state thousands of others with every segment.
     pub(super) fn keep(&mut self, name: String, value: Value) {
         let wanted = ["wf_", "NI_", "unit_string", "DateTime", "description"].iter().any(|w| name.starts_with(w));
-        if wanted || Clue::of(&name, "", 1.0).is_some() {
+        if wanted || Clue::of(&name, "", 1.0).is_some() || is_unit_of_clue(&name) {
             self.0.insert(name, value);
         }
     }
@@ -62,7 +62,10 @@ impl Properties {
             Value::Text(text) => crate::text::number(text),
             _ => None,
         };
-        let clue = |(name, found): (&String, &Value)| Clue::of(name, &format!("{location}@{name}"), value(found)?);
+        let unit = |name: &str| unit_names(name).into_iter().find_map(|name| self.text(&name)).unwrap_or_default();
+        let clue = |(name, found): (&String, &Value)| {
+            Some(Clue::of(name, &format!("{location}@{name}"), value(found)?)?.in_unit(unit(name)))
+        };
         self.0.iter().filter_map(clue).collect()
     }
 

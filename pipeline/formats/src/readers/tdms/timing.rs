@@ -2,6 +2,7 @@
 
 use super::property::Properties;
 use super::stamp::Stamp;
+use crate::time_units::seconds;
 
 /// What the latest segments said about a channel's time axis.
 #[derive(Debug, Clone, Default)]
@@ -11,6 +12,8 @@ pub(super) struct Timing {
     pub(super) uneven: bool,
     /// When the first sample was taken.
     pub(super) began: Option<Stamp>,
+    /// Where it lies on the waveform's own axis, if no stamp says when that begins.
+    pub(super) offset_s: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,11 +32,12 @@ impl Timing {
         let now = Anchor {
             sample,
             start: start(properties),
-            offset_s: properties.number("wf_start_offset").unwrap_or(0.0),
+            offset_s: offset_s(properties),
             increment_s: increment_s(properties),
         };
         let Some(before) = self.anchor.filter(|_| sample > 0) else {
             self.began = now.start.map(|s| s.later_by(now.offset_s));
+            self.offset_s = now.offset_s;
             self.anchor = Some(now);
             return false;
         };
@@ -53,7 +57,7 @@ impl Timing {
 
     /// Takes in a start that was stated behind the last samples.
     pub(super) fn finish(&mut self, properties: &Properties) {
-        let offset_s = properties.number("wf_start_offset").unwrap_or(0.0);
+        let offset_s = offset_s(properties);
         self.began = self.began.or_else(|| start(properties).map(|s| s.later_by(offset_s)));
     }
 }
@@ -78,9 +82,25 @@ impl Anchor {
     }
 }
 
-/// Seconds between samples, if stated.
+/// Seconds between samples, if stated; none where the x axis is of something else than time.
 pub(super) fn increment_s(properties: &Properties) -> Option<f64> {
-    properties.number("wf_increment").filter(|i| i.is_finite() && *i > 0.0)
+    let unit_s = unit_s(properties)?;
+    properties.number("wf_increment").map(|increment| increment * unit_s).filter(|i| i.is_finite() && *i > 0.0)
+}
+
+/// Seconds in the unit of the x axis, those of a waveform where none is stated; none if it is no unit of time.
+fn unit_s(properties: &Properties) -> Option<f64> {
+    properties.text("wf_xunit_string").map_or(Some(1.0), seconds)
+}
+
+/// The unit of the x axis, if that is none of time.
+pub(super) fn other_unit(properties: &Properties) -> Option<&str> {
+    properties.text("wf_xunit_string").filter(|unit| seconds(unit).is_none())
+}
+
+/// Where the first sample lies on the waveform's own axis, in seconds.
+fn offset_s(properties: &Properties) -> f64 {
+    properties.number("wf_start_offset").unwrap_or(0.0) * unit_s(properties).unwrap_or(0.0)
 }
 
 /// What is stated as seconds between samples and is no interval.

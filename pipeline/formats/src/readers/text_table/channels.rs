@@ -1,36 +1,40 @@
 //! From the columns of a plain table to channels.
 
 use super::Parsed;
-use super::axis;
+use super::clocks::{Clock, clocks, copies};
 use super::column::Column;
 use super::plain::Rows;
 use super::titles::{self, Title};
 use super::units;
 use crate::FoundChannel;
-use crate::facts::{AS_RATE, KNOWN_TO, TAKEN_AS_SECONDS};
-use crate::rate::of_step;
 use std::sync::Arc;
 
-/// Channels of the columns, with the rate of the time column among them, or the rate that the header states.
+/// Channels of the columns, each with rate and start of its column of times, or with the rate that the header states.
 pub(super) fn of(mut rows: Rows, mut titles: Vec<Title>, remarks: &mut Vec<String>) -> Vec<FoundChannel> {
-    let time = time_column(&rows, &titles).or_else(|| stamped(&mut rows, &mut titles));
-    name_of_source(&rows, &mut titles, time);
+    let mut times = time_columns(&rows, &titles);
+    if times.is_empty() {
+        times.extend(stamped(&mut rows, &mut titles));
+    }
+    name_of_source(&rows, &mut titles, &times);
     let names: Vec<&str> = titles.iter().map(|t| t.name.as_str()).collect();
     let locations = titles::locations(&names);
-    if let Some(title) = time.and_then(|at| titles.get_mut(at)).filter(|title| title.unit.is_empty()) {
-        title.unit.clone_from(&rows.stated.time_unit);
+    for &at in &times {
+        if let Some(title) = titles.get_mut(at).filter(|title| title.unit.is_empty()) {
+            title.unit.clone_from(&rows.stated.time_unit);
+        }
     }
-    state_units(&rows, &mut titles, time);
-    let clock = clock(&mut rows, &titles, &locations, time, remarks);
-    let copies = copies(&rows, &titles, time);
+    state_units(&rows, &mut titles, &times);
+    let copies = copies(&rows, &times);
+    let clocks = clocks(&mut rows, &titles, &locations, &times, remarks);
     let count = rows.count;
     let mut channels = Vec::new();
     for (number, ((column, title), location)) in rows.columns.into_iter().zip(&titles).zip(locations).enumerate() {
-        if clock.axis == Some(number) && clock.rate_hz.is_some() {
+        let clock = clocks.of_column(number);
+        if clocks.is_said(number) {
             continue;
         }
-        if copies.contains(&number) {
-            let first = time.and_then(|at| titles.get(at)).map_or("", |title| title.name.as_str());
+        if let Some(first) = copies.get(&number) {
+            let first = titles.get(*first).map_or("", |title| title.name.as_str());
             remarks.push(format!("{location} has the same times as {first}: it is left out"));
             continue;
         }
@@ -48,22 +52,35 @@ pub(super) fn of(mut rows: Rows, mut titles: Vec<Title>, remarks: &mut Vec<Strin
             continue;
         }
         remarks.extend(column.remark(&location));
-        channels.push(FoundChannel {
-            location,
-            samples: column.values.len(),
-            unit: title.unit.clone(),
-            long_name: title.name.clone(),
-            sample_rate_hz: clock.rate_hz,
-            scale_factor: 1.0,
-            add_offset: 0.0,
-            fill_code: None,
-            gaps: rows.starts.iter().copied().filter(|start| *start < column.values.len()).collect(),
-            is_axis: clock.axis == Some(number),
-            stored_as: "text",
-            source: Arc::new(Parsed(column.values)),
-        });
+        channels.push(channel(column, title, location, clock, clocks.is_axis(number), &rows.starts));
     }
     channels
+}
+
+fn channel(
+    column: Column,
+    title: &Title,
+    location: String,
+    clock: &Clock,
+    is_axis: bool,
+    starts: &[usize],
+) -> FoundChannel {
+    let samples = column.values.len();
+    let again = if clock.goes_on { &[] } else { starts };
+    let mut gaps: Vec<usize> = again.iter().chain(&clock.gaps).copied().filter(|start| *start < samples).collect();
+    gaps.sort_unstable();
+    gaps.dedup();
+    FoundChannel {
+        unit: title.unit.clone(),
+        long_name: title.name.clone(),
+        sample_rate_hz: clock.rate_hz.filter(|_| !is_axis),
+        rate_relative_std: clock.relative_std,
+        rate_is_guess: clock.guessed,
+        start_s: clock.start_s,
+        gaps,
+        is_axis,
+        ..FoundChannel::new(location, samples, "text", Arc::new(Parsed(column.values)))
+    }
 }
 
 /// Why a column has no samples although it has numbers: one alone, or values of a header beside the rows.
@@ -76,35 +93,60 @@ fn no_samples(column: &Column, rows: usize) -> Option<String> {
     Some(format!("is the single number {single}"))
 }
 
-/// Columns that are titled as times and have those of the first such column: each channel of an oscilloscope has some.
-fn copies(rows: &Rows, titles: &[Title], time: Option<usize>) -> Vec<usize> {
-    let Some((at, first)) = time.and_then(|at| Some((at, rows.columns.get(at)?))) else { return Vec::new() };
-    let columns = rows.columns.iter().zip(titles).enumerate().skip(at + 1);
-    let same = |(_, (column, title)): &(usize, (&Column, &Title))| {
-        titles::is_time(title) && column.values.len() <= first.values.len() && first.values.starts_with(&column.values)
+/// The columns of times: those that are titled so, or else a first column in a unit of time, or a first column of
+/// numbers without a title that steps by the interval which the header states.
+fn time_columns(rows: &Rows, titles: &[Title]) -> Vec<usize> {
+    if rows.columns.len() < 2 {
+        return Vec::new();
+    }
+    let column = |at: usize| rows.columns.get(at).filter(|column| column.numbers() > 1);
+    let is_titled = |(at, title): &(usize, &Title)| match titles::time_of(title) {
+        // a word beside `time`: others may be titled so
+        Some(Some(_)) => column(*at).is_some_and(|column| rises(&column.values)),
+        Some(None) => column(*at).is_some(),
+        // whatever its name, what runs evenly in a unit of time is a clock
+        None => {
+            units::seconds(&title.unit).is_some()
+                && column(*at).is_some_and(|column| column.times().stretches(None).is_ok())
+        }
     };
-    columns.filter(same).map(|(number, _)| number).collect()
+    let mut found: Vec<usize> = titles.iter().enumerate().filter(is_titled).map(|(at, _)| at).collect();
+    // a capital T may be a temperature, and what is in another unit another quantity
+    let doubtful = |at: &usize| {
+        let other_unit = |title: &Title| !title.unit.is_empty() && units::seconds(&title.unit).is_none();
+        titles.get(*at).is_some_and(|title| title.name == "T" || other_unit(title))
+    };
+    if found.iter().any(|at| !doubtful(at)) {
+        found.retain(|at| !doubtful(at));
+    } else {
+        found.truncate(1);
+    }
+    // of nothing but times one is a signal
+    if found.len() == titles.iter().enumerate().filter(|(at, _)| column(*at).is_some()).count() {
+        found.truncate(1);
+    }
+    if found.is_empty() {
+        let first = titles.first().filter(|title| units::seconds(&title.unit).is_some()).map(|_| 0);
+        found.extend(first.filter(|at| column(*at).is_some()).or_else(|| stepping_as_stated(rows, titles)));
+    }
+    found
 }
 
-/// The column of times: one that is titled so, or else a first column in a unit of time, or a first column of numbers
-/// without a title that steps by the interval which the header states.
-fn time_column(rows: &Rows, titles: &[Title]) -> Option<usize> {
-    let has_numbers = |at: &usize| rows.columns.get(*at).is_some_and(|column| column.numbers() > 1);
-    let titled = titles.iter().position(titles::is_time);
-    let first = titles.first().filter(|title| units::seconds(&title.unit).is_some()).map(|_| 0);
-    let named = titled.filter(has_numbers).or(first.filter(has_numbers));
-    named.or_else(|| stepping_as_stated(rows, titles)).filter(|_| rows.columns.len() > 1)
+/// Whether values rise throughout, but for a recording that begins again now and then.
+fn rises(values: &[f64]) -> bool {
+    let falls = values.windows(2).filter(|pair| pair.first() >= pair.last()).count();
+    values.len() > 2 && 16 * falls < values.len()
 }
 
 /// The first column of numbers, if it has no title and steps by the interval that the header states (Tektronix TDS:
 /// behind three columns of the header).
 fn stepping_as_stated(rows: &Rows, titles: &[Title]) -> Option<usize> {
-    let (step, _) = rows.stated.step().ok()??;
+    let step = rows.stated.step().ok()??.seconds;
     let is_value = |column: &&Column| column.numbers() > 1 && no_samples(column, rows.count).is_none();
     let at = rows.columns.iter().position(|column| is_value(&column))?;
     let untitled = titles.get(at).is_some_and(|title| title.name.is_empty() && title.unit.is_empty());
     let others = rows.columns.iter().filter(is_value).count() > 1;
-    let even = || axis::even_between(rows.columns.get(at)?, &rows.starts, Some(step)).ok();
+    let even = || rows.columns.get(at)?.times().even_between(&rows.starts, Some(step)).ok();
     (untitled && others && even().is_some()).then_some(at)
 }
 
@@ -112,7 +154,7 @@ fn stepping_as_stated(rows: &Rows, titles: &[Title]) -> Option<usize> {
 /// the header states an interval.
 fn stamped(rows: &mut Rows, titles: &mut [Title]) -> Option<usize> {
     let (count, several) = (rows.count, rows.columns.len() > 1);
-    let first = |at: usize, title: &Title| at == 0 || titles::is_time(title);
+    let first = |at: usize, title: &Title| at == 0 || titles::time_of(title).is_some();
     let tells =
         |(at, (column, title)): &(usize, (&Column, &Title))| column.stamps.tell_time(count) && first(*at, title);
     let (at, _) = rows.columns.iter().zip(titles.iter()).enumerate().find(tells)?;
@@ -127,11 +169,11 @@ fn stamped(rows: &mut Rows, titles: &mut [Title]) -> Option<usize> {
 }
 
 /// The name of the channel that a header beside the rows states, for the only column of values without a title.
-fn name_of_source(rows: &Rows, titles: &mut [Title], time: Option<usize>) {
+fn name_of_source(rows: &Rows, titles: &mut [Title], times: &[usize]) {
     let [source] = &rows.stated.sources[..] else { return };
     let mut others = titles.iter_mut().zip(&rows.columns).enumerate().filter(|(number, (title, column))| {
         let is_value = column.numbers() > 1 && no_samples(column, rows.count).is_none();
-        time != Some(*number) && title.name.is_empty() && is_value
+        !times.contains(number) && title.name.is_empty() && is_value
     });
     if let (Some((_, (title, _))), None) = (others.next(), others.next()) {
         title.name.clone_from(source);
@@ -139,127 +181,16 @@ fn name_of_source(rows: &Rows, titles: &mut [Title], time: Option<usize>) {
 }
 
 /// Units that the header states by a key: one for all columns of values, or one for each.
-fn state_units(rows: &Rows, titles: &mut [Title], time: Option<usize>) {
+fn state_units(rows: &Rows, titles: &mut [Title], times: &[usize]) {
     let stated = &rows.stated.value_units;
     for (number, title) in titles.iter_mut().enumerate() {
-        if !title.unit.is_empty() || time == Some(number) {
+        if !title.unit.is_empty() || times.contains(&number) {
             continue;
         }
         let own = stated.iter().find(|(column, _)| *column == number).map(|(_, unit)| unit);
         let only = stated.first().filter(|(_, first)| stated.iter().all(|(_, unit)| unit == first));
         if let Some(unit) = own.or(only.map(|(_, unit)| unit)) {
             title.unit = units::symbol(unit).unwrap_or_else(|| unit.clone());
-        }
-    }
-}
-
-/// The sample rate, and the column of times or of a counter: superfluous where there is a rate.
-#[derive(Debug, Default)]
-struct Clock {
-    rate_hz: Option<f64>,
-    axis: Option<usize>,
-}
-
-fn clock(
-    rows: &mut Rows,
-    titles: &[Title],
-    locations: &[String],
-    time: Option<usize>,
-    remarks: &mut Vec<String>,
-) -> Clock {
-    let stated = rows.stated.step().map(|step| step.map(|(step, words)| (step, words.to_owned())));
-    let stated = stated.unwrap_or_else(|disagree| {
-        remarks.push(disagree);
-        None
-    });
-    let timed = time.and_then(|at| Some((at, rows.columns.get(at)?, titles.get(at)?, locations.get(at)?)));
-    if let Some((at, column, title, location)) = timed {
-        let (rate_hz, goes_on) = rate(column, title, location, &rows.starts, stated.as_ref(), remarks);
-        if goes_on {
-            rows.starts.clear();
-        }
-        return Clock { rate_hz, axis: Some(at) };
-    }
-    if let (Some(title), Some(column)) = (titles.first(), rows.columns.first())
-        && titles::is_frequency(title)
-        && rows.columns.len() > 1
-        && column.values.is_sorted()
-    {
-        return Clock { rate_hz: None, axis: Some(0) };
-    }
-    if let Some(words) = rows.stated.odd() {
-        remarks.push(format!("no sample rate: the header says «{words}», wanted a number above 0"));
-    }
-    let without_unit = titles.first().is_some_and(|title| title.unit.is_empty());
-    let counter = rows.columns.first().filter(|_| rows.columns.len() > 1 && without_unit);
-    let even = counter.and_then(|column| axis::even_between(column, &rows.starts, None).ok());
-    let first = locations.first().map_or("", String::as_str);
-    match (stated, even) {
-        (Some((step, words)), even) => {
-            let counts = even.is_some_and(|even| even.step == 1.0);
-            let counter =
-                if counts { format!("; {first} counts the samples and is no channel") } else { String::new() };
-            remarks.push(format!("the sample rate is taken from the header: «{words}»{counter}"));
-            Clock { rate_hz: Some(of_step(step)), axis: counts.then_some(0) }
-        }
-        (None, Some(even)) => {
-            let rate = of_step(even.step);
-            remarks.push(format!(
-                "{first} rises evenly: if it is time in seconds, there are {rate} samples per second; title it «Time (s)»"
-            ));
-            Clock { rate_hz: None, axis: Some(0) }
-        }
-        (None, None) => Clock::default(),
-    }
-}
-
-/// The rate a column of times gives, and whether the times go on evenly over all headers among the rows.
-fn rate(
-    column: &Column,
-    title: &Title,
-    location: &str,
-    starts: &[usize],
-    stated: Option<&(f64, String)>,
-    remarks: &mut Vec<String>,
-) -> (Option<f64>, bool) {
-    let unit_s = match title.unit.as_str() {
-        "" => Some(1.0),
-        unit => units::seconds(unit),
-    };
-    let Some(unit_s) = unit_s else {
-        remarks.push(format!("{location} is in «{}», no unit of time that is known: no sample rate", title.unit));
-        return (None, false);
-    };
-    let unit = if title.unit.is_empty() { format!(" {TAKEN_AS_SECONDS}") } else { String::new() };
-    let first = column.values.first().copied().unwrap_or(0.0);
-    let runs = format!("{location}{unit} runs evenly from {first}: {AS_RATE}");
-    if let Some((step, words)) = stated {
-        let step_there = step / unit_s;
-        let even = axis::even_between(column, starts, Some(step_there)).is_ok() || axis::agrees(column, step_there);
-        if even {
-            remarks.push(format!("{runs}; the header says «{words}»"));
-            return (Some(of_step(*step)), axis::even(column, Some(step_there)).is_ok());
-        }
-    }
-    let whole = axis::even(column, None);
-    let goes_on = whole.is_ok();
-    match whole.or_else(|why| if starts.is_empty() { Err(why) } else { axis::even_between(column, starts, None) }) {
-        Ok(even) if stated.is_some() => {
-            let (words, step) = (stated.map_or("", |(_, words)| words), even.step);
-            remarks.push(format!("no sample rate: {location} steps by {step:e}, the header says «{words}»"));
-            (None, false)
-        }
-        Ok(even) => {
-            remarks.push(runs);
-            if even.rounded {
-                let relative = even.uncertainty;
-                remarks.push(format!("{location} {KNOWN_TO} {relative:.1e} of itself"));
-            }
-            (Some(of_step(even.step * unit_s)), goes_on)
-        }
-        Err(why) => {
-            remarks.push(format!("{location} gives no sample rate: {why}"));
-            (None, false)
         }
     }
 }

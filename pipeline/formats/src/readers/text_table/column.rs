@@ -1,10 +1,12 @@
 //! A column while it is parsed.
 
 use super::lines::Line;
-use super::number::{self, Printed};
+use super::number;
 use super::stamps::Stamps;
 use crate::FormatError;
+use crate::evenness::Times;
 use crate::fail;
+use crate::printed::Printed;
 
 /// Values of a column and what is not one.
 #[derive(Debug, Clone, Default)]
@@ -56,6 +58,11 @@ impl Column {
         self.values.push(value);
         self.printed.see(field);
         Ok(())
+    }
+
+    /// Its numbers as times.
+    pub(super) fn times(&self) -> Times<'_> {
+        Times { values: &self.values, printed: Some(&self.printed), row: 0, epsilon: f64::EPSILON }
     }
 
     /// How many numbers it holds.

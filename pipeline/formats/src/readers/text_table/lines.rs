@@ -1,5 +1,6 @@
 //! Lines of a text file, with their number and byte, one at a time.
 
+use super::packed;
 use crate::FormatError;
 use crate::fail;
 use crate::text::{decoded, is_utf16, utf16};
@@ -34,7 +35,18 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    pub(super) fn new(file: File, file_bytes: u64) -> Result<Self, FormatError> {
+    /// The lines of a file, packed with gzip or not. Errors: it cannot be read.
+    pub(super) fn open(file: File, file_bytes: u64) -> Result<Self, FormatError> {
+        let mut file = BufReader::with_capacity(1 << 16, file);
+        let first = file.fill_buf().map_err(|error| packed::unreadable(&error))?;
+        if packed::is_packed(first) {
+            let (inside, most) = packed::inside(file, file_bytes);
+            return Self::new(inside, most);
+        }
+        Self::new(Box::new(file), file_bytes)
+    }
+
+    fn new(file: Box<dyn Read>, file_bytes: u64) -> Result<Self, FormatError> {
         let mut lines = Self {
             reader: Box::new(BufReader::with_capacity(1 << 16, file)),
             file_bytes,

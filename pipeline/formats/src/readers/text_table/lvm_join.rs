@@ -1,12 +1,12 @@
 //! Joins the sections of an LVM file to channels.
 
-use super::axis;
 use super::column::Column;
 use super::lvm::{Section, X};
 use super::lvm_header::{FileHeader, moment};
 use super::{Parsed, titles};
 use crate::FoundChannel;
-use crate::rate::of_step;
+use crate::printed::Printed;
+use crate::rate::rate_of_interval;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -30,9 +30,12 @@ pub(super) struct Joined {
 struct Channel {
     title: String,
     unit: String,
-    step: Option<f64>,
+    /// Seconds between samples, and one unit of their last place.
+    step: Option<(f64, f64)>,
     values: Vec<f64>,
     gaps: Vec<usize>,
+    /// When the first and the sample behind the last were taken.
+    start: Option<Instant>,
     end: Option<Instant>,
 }
 
@@ -70,7 +73,7 @@ impl Joined {
             let unit = section.tags.field("Y_Unit_Label", at).map(str::to_owned);
             let unit = unit.unwrap_or_else(|| titles::split_unit(title).unit);
             let start = start(&section, at, axis_column, file);
-            let key = (title.clone(), *number, unit, step.map(|s| format!("{s:.6e}")));
+            let key = (title.clone(), *number, unit, step.map(|(s, _)| format!("{s:.6e}")));
             self.append(key, step, column, start, section.continued);
             // Channels share an X column: it is given once.
             let uneven = x.zip(axis_column).filter(|(x, _)| step.is_none() && given.insert(*x));
@@ -83,17 +86,17 @@ impl Joined {
         }
     }
 
-    fn append(&mut self, key: Key, step: Option<f64>, column: &Column, start: Option<Instant>, continued: bool) {
+    fn append(&mut self, key: Key, step: Option<(f64, f64)>, column: &Column, start: Option<Instant>, continued: bool) {
         let next = self.channels.len();
         let number = *self.numbers.entry(key.clone()).or_insert(next);
         if number == next {
             let (title, _, unit, _) = key;
-            self.channels.push(Channel { title, unit, step, values: Vec::new(), gaps: Vec::new(), end: None });
+            self.channels.push(Channel { title, unit, step, values: Vec::new(), gaps: Vec::new(), start, end: None });
         }
         let Some(channel) = self.channels.get_mut(number) else { return };
         let goes_on = match (channel.end, start, channel.step) {
             // Half a step: less is no sample, and stamps are rounded.
-            (Some(end), Some(start), Some(step)) => start.since(end).abs() <= 0.5 * step,
+            (Some(end), Some(start), Some((step, _))) => start.since(end).abs() <= 0.5 * step,
             // A row behind a blank line, of which nothing tells when it was taken.
             _ => continued,
         };
@@ -101,7 +104,7 @@ impl Joined {
             channel.gaps.push(channel.values.len());
         }
         channel.values.extend_from_slice(&column.values);
-        let lasted = channel.step.map(|step| step * column.values.len() as f64);
+        let lasted = channel.step.map(|(step, _)| step * column.values.len() as f64);
         channel.end = start.zip(lasted).map(|(start, lasted)| Instant(start.0, start.1 + lasted));
     }
 
@@ -112,19 +115,20 @@ impl Joined {
         }
         let names: Vec<&str> = self.channels.iter().map(|c| c.title.as_str()).collect();
         let locations = titles::locations(&names);
-        let found = |(channel, location): (Channel, String)| FoundChannel {
-            location,
-            samples: channel.values.len(),
-            unit: channel.unit,
-            long_name: channel.title.clone(),
-            sample_rate_hz: channel.step.map(of_step),
-            scale_factor: 1.0,
-            add_offset: 0.0,
-            fill_code: None,
-            gaps: channel.gaps,
-            is_axis: channel.title == X,
-            stored_as: "text",
-            source: Arc::new(Parsed(channel.values)),
+        // stamps count from 1970: the seconds of the first are left out, so that the rest keeps its digits
+        let epoch = self.channels.iter().filter_map(|channel| channel.start.map(|start| start.0)).min().unwrap_or(0);
+        let found = |(channel, location): (Channel, String)| {
+            let rate = channel.step.map(|(step, unit)| rate_of_interval(step, unit));
+            FoundChannel {
+                unit: channel.unit,
+                long_name: channel.title.clone(),
+                sample_rate_hz: rate.map(|(rate, _)| rate),
+                rate_relative_std: rate.map_or(0.0, |(_, std)| std),
+                start_s: channel.start.map(|start| start.since(Instant(epoch, 0.0))),
+                gaps: channel.gaps,
+                is_axis: channel.title == X,
+                ..FoundChannel::new(location, channel.values.len(), "text", Arc::new(Parsed(channel.values)))
+            }
         };
         self.channels.into_iter().zip(locations).map(found).collect()
     }
@@ -163,7 +167,7 @@ fn step(
     x: Option<&Column>,
     file: &FileHeader,
     remark: &mut impl FnMut(String),
-) -> Option<f64> {
+) -> Option<(f64, f64)> {
     let title = section.titles.get(at).map_or("", String::as_str);
     if !is_time(section, at) {
         let dimension = section.tags.field("X_Dimension", at).unwrap_or_default();
@@ -172,31 +176,36 @@ fn step(
     }
     let delta = section.tags.number("Delta_X", at, file.decimal);
     let stated = delta.filter(|step| *step > 0.0);
+    let printed = || {
+        let mut printed = Printed::default();
+        printed.see(section.tags.field("Delta_X", at).unwrap_or_default());
+        stated.map(|step| (step, printed.unit_of(step)))
+    };
     let Some(x) = x else {
         if let (Some(odd), None) = (delta, stated) {
             remark(format!("{title}: no sample rate: Delta_X is {odd}, wanted a number above 0"));
         }
-        return stated;
+        return printed();
     };
     let coarse = |step: f64| x.values.last().is_some_and(|last| x.printed.unit_of(*last) > 0.25 * step);
     if let Some(step) = stated {
-        if axis::even(x, stated).is_ok() {
-            return stated;
+        if x.times().even(stated).is_ok() {
+            return printed();
         }
         if coarse(step) {
             remark(format!("{title}: its X column is printed too coarsely to check Delta_X = {step} s, which is used"));
-            return stated;
+            return printed();
         }
     }
     let line = section.line;
-    match (axis::even(x, None), stated) {
-        (Ok(even), None) => Some(even.step),
+    match (x.times().even(None), stated) {
+        (Ok(even), None) => Some((even.step, 0.0)),
         (Ok(even), Some(stated)) => {
             remark(format!(
                 "{title}: Delta_X is {stated} s, its X column has steps of {} s, which are used",
                 even.step
             ));
-            Some(even.step)
+            Some((even.step, 0.0))
         }
         (Err(why), _) => {
             remark(format!("{title} has no sample rate: its X column (from line {line}) is not even, {why}"));

@@ -6,6 +6,8 @@
 //! Empty fields and fields that are no number are NaN where a number follows in their column, with a remark that counts
 //! them; at a column's end they are no samples.
 //!
+//! Tables that are packed with gzip are inflated while they are parsed.
+//!
 //! **LVM**: sections begin with a header that ends in `***End_of_Header***`. Columns of the same title, unit and
 //! `Delta_X` are joined over the sections; a section begins behind a gap unless its start (`Date`, `Time`, `X0`)
 //! follows from the one before. The rate is 1 / `Delta_X` as long as the X column, if there is one, agrees. An X column
@@ -22,9 +24,11 @@
 //! channel; otherwise it is one and there is no rate. An interval or a rate that the header states by a key (`Sample
 //! Interval`, `Increment`, `delta t`, `tInc`, `Sampling Frequency`) is taken where the times agree with it or there
 //! are none; a first column that counts by 1 is no channel then. If times and header disagree there is no rate.
-//! Evenly: there is a straight line from which no time deviates by more than 1e-6 of a step, or by more than half a unit of
+//! Evenly: there is a straight line from which no time deviates by more than a hundredth of a step and half a unit of
 //! the last place it is printed to (or of single precision, if all are numbers of it), where that unit is at most half a
-//! step. Of the rates of such lines that with the fewest digits is given.
+//! step. Of the rates of such lines that with the fewest digits is given. Where times jump is a gap.
+//! Of several columns of times each gives rate and start to the columns that its name says (`Time A` to `A`), else to
+//! those between it and the next one. Whole numbers without a unit count and give no rate.
 //! Where no column of times in numbers and no header gives a rate, a column of times of day does (`12:00:01.250`,
 //! `2020-01-01T12:00:01Z`): seconds since its first.
 //! A column of one number beside columns of more, and numbers behind words in front of the rows (a header beside them,
@@ -32,8 +36,8 @@
 //!
 //! Source: National Instruments, "Specification for the LabVIEW Measurement File (.lvm)", ni.com/tutorial/4139/en.
 
-mod axis;
 mod channels;
+mod clocks;
 mod column;
 mod header;
 mod kind;
@@ -42,14 +46,13 @@ mod lvm;
 mod lvm_header;
 mod lvm_join;
 mod number;
+mod packed;
 mod plain;
 mod sniff;
 mod stamps;
 mod stated;
 mod titles;
 mod units;
-
-pub use axis::even_step;
 
 use crate::pinned::{Pinned, stretch_of};
 use crate::{Contents, Format, FormatError, Raw, Row, Source};
@@ -67,7 +70,11 @@ impl Format for TextTable {
     const ROW: Row = Row {
         name: "text",
         title: "LabVIEW LVM or a table of text",
-        reads: "LVM sections; tables with tabs, commas, semicolons or blanks, either decimal sign, UTF-8, Latin-1 or UTF-16, titles and units above the numbers, headers of oscilloscopes (Keysight, Rigol, Rohde & Schwarz, Siglent, Tektronix), of CASSY and of LabVIEW; an even column of times or an interval in the header gives the rate; a header among the rows is a gap unless the times go on; empty fields are NaN",
+        reads: "LVM sections; tables with tabs, commas, semicolons or blanks, either decimal sign, UTF-8, Latin-1 \
+                or UTF-16, titles and units above the numbers, headers of oscilloscopes (Keysight, Rigol, Rohde & \
+                Schwarz, Siglent, Tektronix), of CASSY and of LabVIEW; an even column of times or an interval in \
+                the header gives the rate; a header among the rows is a gap unless the times go on; empty fields \
+                are NaN",
         leaves_out: "rows of unequal length; binary",
         described_by: "NI, \"Specification for the LabVIEW Measurement File\"",
         clock: "columns of times; interval or rate in the header",
@@ -78,6 +85,9 @@ impl Format for TextTable {
         if head.strip_prefix(lines::BYTE_ORDER_MARK).unwrap_or(head).starts_with(LVM_BEGINS) {
             return true;
         }
+        if let Some((head, path)) = packed::head(head, path) {
+            return Self::recognises(&head, &path);
+        }
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         // Universal files are tables of numbers too, between lines of their own.
         let universal = head.trim_ascii_start().starts_with(b"-1\n") || head.trim_ascii_start().starts_with(b"-1\r");
@@ -86,7 +96,7 @@ impl Format for TextTable {
 
     fn open(path: &Path) -> Result<Contents, FormatError> {
         let (pinned, file) = Pinned::open(path)?;
-        let mut lines = lines::Lines::new(file, pinned.bytes())?;
+        let mut lines = lines::Lines::open(file, pinned.bytes())?;
         let is_lvm = lines.peek()?.is_some_and(|line| line.text.as_bytes().starts_with(LVM_BEGINS));
         if is_lvm { lvm::open(&mut lines) } else { plain::open(&mut lines) }
     }

@@ -1,6 +1,7 @@
 //! Times of day in a column.
 
-use super::number::{Printed, bare};
+use super::number::bare;
+use crate::printed::Printed;
 
 const DAY_NS: i64 = 86_400_000_000_000;
 

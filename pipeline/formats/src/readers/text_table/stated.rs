@@ -5,6 +5,7 @@
 
 use super::number;
 use super::units::{hertz, seconds};
+use crate::printed::Printed;
 use crate::text::brief;
 
 /// Keys whose value is the time between two samples: Tektronix and Siglent, Rigol, LabVIEW, Yokogawa, and plain words.
@@ -49,11 +50,21 @@ enum Key {
     Other,
 }
 
+/// An interval that is stated.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Step {
+    pub(super) seconds: f64,
+    /// One unit of its last place; 0 where a rate is stated instead.
+    pub(super) unit_s: f64,
+    /// The words that say so.
+    pub(super) words: String,
+}
+
 /// What was stated so far.
 #[derive(Debug, Default)]
 pub(super) struct Stated {
-    /// Seconds between samples, and the words that say so.
-    steps: Vec<(f64, String)>,
+    /// Seconds between samples, one unit of their last place, and the words that say so.
+    steps: Vec<Step>,
     /// Words that state an interval or a rate which is none.
     odd: Option<String>,
     /// The unit of the axis of time; empty if none is stated.
@@ -98,15 +109,20 @@ impl Stated {
                 Key::Interval | Key::Rate => {
                     let Some((number, unit)) = quantity(value, decimal) else { continue };
                     let unit = if unit.is_empty() { own_unit } else { unit };
+                    let mut printed = Printed::default();
+                    printed.see(value);
+                    let last_place = printed.unit_of(number);
                     let step = match (key, unit) {
-                        (Key::Rate, "") => Some(number.recip()),
-                        (Key::Rate, unit) => hertz(unit).map(|hertz| (number * hertz).recip()),
-                        (_, "") => Some(number),
-                        (_, unit) => seconds(unit).map(|seconds| number * seconds),
+                        (Key::Rate, "") => Some((number.recip(), 0.0)),
+                        (Key::Rate, unit) => hertz(unit).map(|hertz| ((number * hertz).recip(), 0.0)),
+                        (_, "") => Some((number, last_place)),
+                        (_, unit) => seconds(unit).map(|seconds| (number * seconds, last_place * seconds)),
                     };
                     let words = || format!("{} {}", brief(bare_key(name), 40), brief(value.trim(), 40));
-                    match step.filter(|step| step.is_finite() && *step > 0.0) {
-                        Some(step) if self.steps.len() < MOST => self.steps.push((step, words())),
+                    match step.filter(|(step, _)| step.is_finite() && *step > 0.0) {
+                        Some((seconds, unit_s)) if self.steps.len() < MOST => {
+                            self.steps.push(Step { seconds, unit_s, words: words() });
+                        }
                         None if step.is_some() && self.odd.is_none() => self.odd = Some(words()),
                         _ => {}
                     }
@@ -122,11 +138,11 @@ impl Stated {
 
     /// The interval all statements agree on, in seconds, and the words of the first. Errors: what to say of
     /// statements that disagree.
-    pub(super) fn step(&self) -> Result<Option<(f64, &str)>, String> {
-        let Some((first, words)) = self.steps.first() else { return Ok(None) };
-        match self.steps.iter().find(|(step, _)| (step - first).abs() > AGREE * first) {
-            Some((_, other)) => Err(format!("no sample rate: the header says «{words}» and «{other}»")),
-            None => Ok(Some((*first, words))),
+    pub(super) fn step(&self) -> Result<Option<&Step>, String> {
+        let Some(first) = self.steps.first() else { return Ok(None) };
+        match self.steps.iter().find(|step| (step.seconds - first.seconds).abs() > AGREE * first.seconds) {
+            Some(other) => Err(format!("no sample rate: the header says «{}» and «{}»", first.words, other.words)),
+            None => Ok(Some(first)),
         }
     }
 }
@@ -193,7 +209,7 @@ mod tests {
         for (number, line) in lines.iter().enumerate() {
             stated.read(line, lines.get(number + 1).copied().unwrap_or_default(), '.');
         }
-        stated.step().map(|step| step.map(|(step, _)| step))
+        stated.step().map(|step| step.map(|step| step.seconds))
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::number::bare;
 use super::units;
+use crate::time_units::time_name;
 use std::collections::HashMap;
 
 /// A column's title and unit.
@@ -74,12 +75,24 @@ pub(super) fn unit_of(field: &str) -> String {
     units::symbol(text).unwrap_or_else(|| text.to_owned())
 }
 
-/// Whether a title is that of time.
-pub(super) fn is_time(title: &Title) -> bool {
-    let name = title.name.to_lowercase();
-    let words =
-        ["time", "t", "zeit", "temps", "elapsed time", "x_value", "timestamp", "relative time", "second", "seconds"];
-    words.contains(&name.as_str()) || (name.starts_with("time") && units::seconds(&title.unit).is_some())
+/// Whether a title is that of time; with a word beside that may say which columns the times are for (`Time A`, `t_in`).
+pub(super) fn time_of(title: &Title) -> Option<Option<String>> {
+    if title.name.eq_ignore_ascii_case("x_value") {
+        return Some(None);
+    }
+    let found = time_name(&title.name, true)?;
+    // without a unit of time a word more makes it another quantity (`Time constant`, `T room`)
+    let stated = found.seconds.is_some() || units::seconds(&title.unit).is_some() || title.unit.is_empty();
+    (stated || found.label.is_none()).then_some(found.label)
+}
+
+/// Seconds in the unit that a title's name states: `time_ms`, `seconds_elapsed`.
+pub(super) fn seconds_in_name(title: &Title) -> Option<f64> {
+    time_name(&title.name, true)?.seconds
+}
+
+fn is_time(title: &Title) -> bool {
+    time_of(title).is_some()
 }
 
 /// Whether a title is that of frequency.

@@ -1,5 +1,8 @@
 //! Units as titles name them.
 
+pub(super) use crate::frequency::rate_unit as hertz;
+pub(super) use crate::time_units::seconds;
+
 /// Names of units and their symbols. Oscilloscopes write `Second,Volt`.
 const NAMES: [(&str, &str); 12] = [
     ("volt", "V"),
@@ -41,34 +44,6 @@ fn is_power(c: char) -> bool {
 fn is_symbol(text: &str) -> bool {
     let prefixed = |prefix: &str| text.strip_prefix(prefix).is_some_and(|rest| PREFIXED.contains(&rest));
     PREFIXED.contains(&text) || PLAIN.contains(&text) || PREFIXES.iter().any(|prefix| prefixed(prefix))
-}
-
-/// Seconds in the unit of a time; none if it is no unit of time.
-pub(super) fn seconds(unit: &str) -> Option<f64> {
-    Some(match unit.to_lowercase().trim_end_matches('.') {
-        "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
-        "ms" | "msec" | "milliseconds" => 1e-3,
-        "us" | "µs" | "μs" | "usec" | "microseconds" => 1e-6,
-        "ns" | "nsec" | "nanoseconds" => 1e-9,
-        "ps" => 1e-12,
-        "min" | "minutes" => 60.0,
-        "h" | "hours" => 3600.0,
-        _ => return None,
-    })
-}
-
-/// Hertz in the unit of a rate; none if it is no unit of a rate. `Sa/s` is what oscilloscopes call samples per second.
-pub(super) fn hertz(unit: &str) -> Option<f64> {
-    let lower = unit.to_lowercase();
-    let base = ["hz", "sa/s", "s/s", "sps", "samples/s", "samples per second"];
-    let prefix = base.iter().find_map(|name| lower.strip_suffix(name))?;
-    Some(match prefix {
-        "" => 1.0,
-        "k" => 1e3,
-        "m" => 1e6,
-        "g" => 1e9,
-        _ => return None,
-    })
 }
 
 #[cfg(test)]

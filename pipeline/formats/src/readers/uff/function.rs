@@ -80,6 +80,8 @@ fn function(
     let ordinate = ordinates.pop().ok_or("it has no values")?;
     let times = abscissa.as_ref().and_then(|(source, _)| stored_rate(header, source.as_ref(), location, remarks));
     let rate = if header.even { even_rate(header, location, remarks) } else { times };
+    let start_s =
+        header.seconds().filter(|_| rate.is_some() && header.even).map(|seconds| header.abscissa_start * seconds);
     let abscissa = abscissa.filter(|_| times.is_none());
     let mut long_name = header.identification.join(", ");
     if long_name.is_empty() {
@@ -89,6 +91,7 @@ fn function(
         unit: unit.to_owned(),
         long_name,
         sample_rate_hz: rate,
+        start_s,
         ..FoundChannel::new(location, header.points as usize, stored_as, source)
     };
     let stored_as = stored_as(dataset);

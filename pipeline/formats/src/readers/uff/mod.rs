@@ -38,7 +38,8 @@ impl Format for Uff {
     const ROW: Row = Row {
         name: "uff",
         title: "Universal File Format 58",
-        reads: "58 and 58b: real functions, single and double precision, text and binary; texts in UTF-8 or Latin-1; complex frequency responses and transmissibilities for `io.frf`",
+        reads: "58 and 58b: real functions, single and double precision, text and binary; texts in UTF-8 or \
+                Latin-1; complex frequency responses and transmissibilities for `io.frf`",
         leaves_out: "other complex functions and other datasets: left out",
         described_by: "University of Cincinnati SDRL, \"Universal File Formats\"",
         clock: "abscissa spacing; stored times",

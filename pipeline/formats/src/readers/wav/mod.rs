@@ -37,9 +37,11 @@ impl Format for Wav {
     const ROW: Row = Row {
         name: "wav",
         title: "Waveform audio",
-        reads: "RIFF, RIFX, RF64, BW64; 8 to 64-bit integers as fractions of full scale, float32, float64, the extensible form; 24 bits at either end of 32; files that end early",
+        reads: "RIFF, RIFX, RF64, BW64; 8 to 64-bit integers as fractions of full scale, float32, float64, the \
+                extensible form; 24 bits at either end of 32; files that end early",
         leaves_out: "compressed samples (A-law, ADPCM, MPEG)",
-        described_by: "Microsoft and IBM, \"Multimedia Programming Interface and Data Specifications 1.0\"; EBU Tech 3306",
+        described_by: "Microsoft and IBM, \"Multimedia Programming Interface and Data Specifications 1.0\"; EBU \
+                       Tech 3306",
         clock: "samples per second",
         unit: "",
     };

@@ -152,6 +152,18 @@ impl ChannelRingdown {
         self.poles.iter().enumerate().map(|(j, &pole)| mode(pole, &self.covariance, 2 * j)).collect()
     }
 
+    /// Adds what the sample rate's standard error (relative) adds to the poles: all scale with it, together. Frequencies
+    /// are less well known then, quality factors as before.
+    pub fn add_error_of_rate(&mut self, relative_std: f64) {
+        let variance = relative_std * relative_std;
+        let parts: Vec<f64> = self.poles.iter().flat_map(|pole| [pole.re, pole.im]).collect();
+        for (i, a) in parts.iter().enumerate() {
+            for (j, b) in parts.iter().enumerate() {
+                self.covariance[(i, j)] += variance * a * b;
+            }
+        }
+    }
+
     /// Modes, by number, whose shape is not the same in all events, at the 0.1 % level: a nonlinear system, a sensor
     /// that moved, or hits in another direction that excite a second mode of that frequency.
     pub fn shapes_that_differ(&self) -> Vec<usize> {
