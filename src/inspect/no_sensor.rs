@@ -71,16 +71,20 @@ fn function(at: usize, channels: &[Channel], samples: &[Option<Vec<f64>>]) -> Op
         return Some(format!("{} in another unit", name(other)));
     }
     let in_unit: Vec<usize> = others.into_iter().filter(|other| channels[*other].unit == own.unit).collect();
+    // sensors that see the same are no functions of one another
+    let in_unit: Vec<usize> = in_unit.into_iter().filter(|&other| !same(values, &|k| of(other)[k])).collect();
     for parts in subsets(&in_unit) {
         let parts_of = |k: usize| parts.iter().map(move |&other| of(other)[k]);
         let count = parts.len() as f64;
         let is = |what: &dyn Fn(usize) -> f64| same(values, what);
+        // of a sum and its parts the later one was computed
+        let is_last = parts.iter().all(|&part| part < at);
         let what =
             if values.iter().all(|value| *value >= 0.0) && is(&|k| parts_of(k).map(|v| v * v).sum::<f64>().sqrt()) {
                 "the length of the vector of"
-            } else if is(&|k| parts_of(k).sum()) {
+            } else if is_last && is(&|k| parts_of(k).sum()) {
                 "the sum of"
-            } else if is(&|k| parts_of(k).sum::<f64>() / count) {
+            } else if is_last && is(&|k| parts_of(k).sum::<f64>() / count) {
                 "the mean of"
             } else {
                 continue;
@@ -205,5 +209,9 @@ mod tests {
     fn sensors_of_one_motion_are_sensors_however_alike() {
         let (x, half) = (|k: f64| (0.3 * k).sin(), |k: f64| 0.5 * (0.3 * k).sin());
         assert_eq!(reasons(&[("a", "g", &x), ("b", "g", &half), ("c", "", &x)]), [None, None, None]);
+        // three alike; a difference behind its parts
+        assert_eq!(reasons(&[("a", "V", &x), ("b", "V", &x), ("c", "V", &x)]), [None, None, None]);
+        let (y, torsion) = (|k: f64| (0.7 * k).cos(), |k: f64| (0.3 * k).sin() - (0.7 * k).cos());
+        assert_eq!(reasons(&[("left", "V", &x), ("right", "V", &y), ("torsion", "V", &torsion)]), [None, None, None]);
     }
 }

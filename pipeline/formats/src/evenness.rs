@@ -117,6 +117,11 @@ impl<'a> Times<'a> {
         if !(step.is_finite() && step > 0.0) {
             return Err("it does not rise".to_owned());
         }
+        let coarse = |unit: f64| format!("it is given too coarsely, to {unit:.1e} at steps of {step:.1e}, to tell");
+        let type_unit = self.own(first).max(self.own(last));
+        if type_unit > COARSEST_STEPS * step {
+            return Err(coarse(type_unit));
+        }
         let off = |row: usize, time: f64| (time - (first + row as f64 * step)).abs();
         let worst = || times.iter().enumerate().map(|(row, &time)| off(row, time)).fold(0.0, f64::max) / step;
         let exact = times.iter().enumerate().all(|(row, &time)| off(row, time) <= EXACT_STEPS * step + self.own(time));
@@ -127,7 +132,7 @@ impl<'a> Times<'a> {
             return Ok(Even { first, step, rounded: false, off_steps, uncertainty: 0.0 });
         }
         if coarsest > COARSEST_STEPS * step {
-            return Err(format!("it is given too coarsely, to {coarsest:.1e} at steps of {step:.1e}, to tell"));
+            return Err(coarse(coarsest));
         }
         let stated = |found: &Slopes| {
             let slack = EXACT_STEPS * step / steps;

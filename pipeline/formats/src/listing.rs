@@ -86,6 +86,13 @@ impl Listing {
         self.remark(remark);
     }
 
+    /// A text that is not read. As the unit of a rate it leaves the rate unknown.
+    pub(crate) fn unread_text(&mut self, location: &str) {
+        if is_unit_of_clue(location.rsplit(['/', '.']).next().unwrap_or_default()) && self.units.len() < MOST_CLUES {
+            self.units.insert(location.to_owned(), "in a text that is not read".to_owned());
+        }
+    }
+
     /// A single number: no channel, but it may be the sampling rate.
     pub(crate) fn scalar(&mut self, scope: &str, name: &str, location: &str, value: f64) {
         if let Some(clue) = Clue::of(name, location, value).filter(|_| self.clue_count < MOST_CLUES) {

@@ -99,6 +99,27 @@ fn cells_of_times_are_axes_of_the_cells_beside_them() {
 }
 
 #[test]
+fn times_in_single_precision_far_from_zero_are_refused_or_have_an_error() {
+    for (offset, given) in [(0.0, true), (10.0, true), (100.0, true), (300.0, false), (1000.0, false)] {
+        let single: Vec<f64> = (0..8000).map(|k| f64::from((offset + f64::from(k) * 1e-4) as f32)).collect();
+        let mut time = channel("/time", single);
+        (time.stored_as, time.unit) = ("float32", "s".to_owned());
+        let mut contents = Contents {
+            format: String::new(),
+            started_at: String::new(),
+            channels: vec![time, channel("/y", noise(8000))],
+            responses: Vec::new(),
+            remarks: Vec::new(),
+        };
+        settle(&mut contents);
+        let found = contents.channels.iter().find(|channel| channel.location == "/y").unwrap();
+        assert_eq!(found.sample_rate_hz.is_some(), given, "{offset}: {:?}", contents.remarks);
+        let far = found.sample_rate_hz.map_or(0.0, |rate| (rate / 1e4 - 1.0).abs());
+        assert!(far <= 4.0 * found.rate_relative_std + 1e-9, "{offset}: {far} {}", found.rate_relative_std);
+    }
+}
+
+#[test]
 fn rounded_times_are_even_and_a_lost_sample_is_a_gap() {
     let rounded: Vec<f64> = times(1000, 1.953125e-4).iter().map(|t| (t * 1e7).round() / 1e7).collect();
     let found = settled(vec![channel("/t", rounded.clone()), channel("/y", noise(1000))]);

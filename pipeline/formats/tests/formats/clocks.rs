@@ -98,6 +98,17 @@ fn whole_numbers_epochs_and_days_give_no_rate() {
 }
 
 #[test]
+fn what_has_a_unit_of_time_is_a_clock_only_in_front_of_others_and_beside_times() {
+    let lag = table("a (V),b (V),lag (s)", 50, |k| format!("{:.4},{:.4},{}", y(k), y(k + 2), 3 * k + 5));
+    assert_eq!((clock(&lag, "a").0, clock(&lag, "b").0), (None, None), "{:?}", lag.remarks);
+    let second = table("X (ms),a (V),Y (ms),b (V)", 50, |k| format!("{},{:.4},{},{:.4}", k, y(k), 4 * k, y(k)));
+    assert_eq!((clock(&second, "a").0, clock(&second, "b").0), (Some(1000.0), Some(250.0)), "{:?}", second.remarks);
+    let header = "# Sampling frequency [Hz]: 500\nTime (s),y (V)";
+    let contradicted = table(header, 50, |k| format!("{:.3},{:.4}", 1e-3 * k as f64, y(k)));
+    assert_eq!(clock(&contradicted, "y").0, None, "{:?}", contradicted.remarks);
+}
+
+#[test]
 fn times_that_jump_are_gaps_and_times_that_wander_are_refused_with_the_place() {
     type Jump = (&'static str, fn(usize) -> f64, &'static [usize]);
     let jumps: [Jump; 4] = [

@@ -36,7 +36,10 @@ impl Named<'_> {
             match &field.what {
                 Part::Number(number, big_endian) => self.part(listing, &location, field, *number, *big_endian)?,
                 Part::Complex(part, big_endian) => self.complex(listing, &location, field, *part, *big_endian),
-                Part::Other(what) => listing.remark(format!("{location}{} holds {what}, no channel", field.suffix)),
+                Part::Other(what) => {
+                    listing.unread_text(&format!("{location}{}", field.suffix));
+                    listing.remark(format!("{location}{} holds {what}, no channel", field.suffix));
+                }
             }
         }
         Ok(())

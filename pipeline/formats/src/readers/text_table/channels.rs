@@ -104,11 +104,7 @@ fn time_columns(rows: &Rows, titles: &[Title]) -> Vec<usize> {
         // a word beside `time`: others may be titled so
         Some(Some(_)) => column(*at).is_some_and(|column| rises(&column.values)),
         Some(None) => column(*at).is_some(),
-        // whatever its name, what runs evenly in a unit of time is a clock
-        None => {
-            units::seconds(&title.unit).is_some()
-                && column(*at).is_some_and(|column| column.times().stretches(None).is_ok())
-        }
+        None => false,
     };
     let mut found: Vec<usize> = titles.iter().enumerate().filter(is_titled).map(|(at, _)| at).collect();
     // a capital T may be a temperature, and what is in another unit another quantity
@@ -129,6 +125,14 @@ fn time_columns(rows: &Rows, titles: &[Title]) -> Vec<usize> {
         let first = titles.first().filter(|title| units::seconds(&title.unit).is_some()).map(|_| 0);
         found.extend(first.filter(|at| column(*at).is_some()).or_else(|| stepping_as_stated(rows, titles)));
     }
+    // beside a column of times, what runs evenly in a unit of time in front of others is another one, whatever its name
+    let others: Vec<usize> = (0..titles.len())
+        .filter(|at| !found.contains(at) && found.iter().any(|first| first < at) && column(at + 1).is_some())
+        .filter(|at| titles.get(*at).is_some_and(|title| units::seconds(&title.unit).is_some()))
+        .filter(|at| column(*at).is_some_and(|column| column.times().stretches(None).is_ok()))
+        .collect();
+    found.extend(others);
+    found.sort_unstable();
     found
 }
 

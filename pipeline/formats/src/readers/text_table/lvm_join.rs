@@ -146,12 +146,12 @@ fn start(section: &Section, at: usize, x: Option<&Column>, file: &FileHeader) ->
     if section.continued && first_x.is_none() {
         return None;
     }
-    let offset = first_x.or_else(|| section.tags.number("X0", at, file.decimal)).unwrap_or(0.0);
+    let own = first_x.or_else(|| section.tags.number("X0", at, file.decimal));
+    let offset = own.unwrap_or(0.0);
     let stamp = section.tags.field("Date", at).zip(section.tags.field("Time", at));
     let stamp = stamp.and_then(|(date, time)| moment(date, time));
-    // Without a stamp the X values alone tell, if there are any.
-    let (seconds, rest) =
-        stamp.map_or_else(|| first_x.map(|_| (0, 0.0)), |(_, seconds, rest)| Some((seconds, rest)))?;
+    // Without a stamp the X values or X0 alone tell, if there are any.
+    let (seconds, rest) = stamp.map_or_else(|| own.map(|_| (0, 0.0)), |(_, seconds, rest)| Some((seconds, rest)))?;
     Some(Instant(seconds, rest + offset))
 }
 

@@ -96,8 +96,10 @@ impl Stated {
     }
 
     fn take(&mut self, key: Key, name: &str, values: &[(usize, &str)], decimal: char) {
-        let own_unit =
-            name.rsplit_once('(').map(|(_, unit)| unit.trim_matches([')', ' ', '=', ':'])).unwrap_or_default();
+        let own_unit = name
+            .rsplit_once(['(', '['])
+            .map(|(_, unit)| unit.trim_matches([')', ']', ' ', '=', ':']))
+            .unwrap_or_default();
         for (at, value) in values {
             match key {
                 Key::Source if self.sources.len() < MOST => self.sources.push(number::bare(value).to_owned()),
@@ -169,7 +171,7 @@ fn key(name: &str) -> Option<Key> {
 /// A key without a unit in brackets and without `=` or `:` behind it.
 fn bare_key(name: &str) -> &str {
     let name = number::bare(name).trim_end_matches(['=', ':', ' ']);
-    name.split_once('(').map_or(name, |(name, _)| name).trim()
+    name.split_once(['(', '[']).map_or(name, |(name, _)| name).trim()
 }
 
 /// `tInc = 2e-7`: the key and its value; a key alone has none.
