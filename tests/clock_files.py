@@ -110,15 +110,17 @@ def hdf5(path, rule, a, b, unit, shared):
     with h5py.File(path, "w") as file:
         for name, (t, y) in (("A", a), ("B", b)):
             group = file if shared else file.create_group(name)
-            if rule != "wrong rate" and "time" not in group:
+            if rule not in ("wrong rate", "start") and "time" not in group:
                 group["time"] = t
                 if unit:
                     group["time"].attrs["units"] = unit
             place = name if shared else "y"
             group[place] = y
             group[place].attrs["units"] = "g"
-            if rule == "wrong rate":
-                group[place].attrs["sampling_rate"] = 8000.0
+            if rule in ("wrong rate", "start"):
+                group[place].attrs["sampling_rate"] = stated(rule)
+            if rule == "start":
+                group[place].attrs["t0"], group[place].attrs["t0_units"] = 1e3 * t[0], "ms"
 
 
 def netcdf(path, rule, a, b, unit, shared):

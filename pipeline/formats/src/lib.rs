@@ -58,7 +58,7 @@ pub use regular::{append_regular, open_regular, read_regular};
 pub use responses::{
     Degree, FoundResponse, Frequencies, Parts, gains_without_phase, responses, says_frequencies, unit_ratio,
 };
-pub use time_units::names_times;
+pub use time_units::{names_times, seconds};
 pub use together::{begun_together, one_rate};
 
 /// Where a channel's samples come from: any stretch can be read, again and again, from several threads.

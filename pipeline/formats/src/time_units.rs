@@ -71,7 +71,7 @@ pub(crate) struct TimeName {
 }
 
 /// Seconds in the unit of a time; none if it is no unit of time. `milliseconds since 2020-01-01` is the CF conventions'.
-pub(crate) fn seconds(unit: &str) -> Option<f64> {
+pub fn seconds(unit: &str) -> Option<f64> {
     let lower = unit.trim().trim_matches(['(', ')', '[', ']', '.', ' ']).to_lowercase();
     let bare = lower.split_once(" since ").map_or(lower.as_str(), |(bare, _)| bare).trim();
     SECONDS.iter().find(|(name, _)| *name == bare).map(|(_, seconds)| *seconds)

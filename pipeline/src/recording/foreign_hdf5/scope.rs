@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use afmid_formats::{Clue, agreed_rate, rate_in, unit_names};
+use afmid_formats::{Clue, agreed_rate, rate_in, seconds, unit_names};
 use hdf5::Location;
 
 use super::walk::Found;
@@ -80,6 +80,19 @@ impl Scopes {
         let own: Vec<Clue> = clues(&found.dataset, &found.location, allowance);
         if own.is_empty() { rate_in(&found.group, &self.clues) } else { agreed_rate(&own) }
     }
+}
+
+/// Names of attributes that state when the first sample of a dataset was taken, in seconds unless a unit is stated
+/// beside them.
+const STARTS: [&str; 6] = ["t0", "t_start", "start_s", "start_time", "start_offset", "wf_start_offset"];
+
+/// When the first sample of a dataset was taken, in seconds; none where no number says so, or one in an unknown unit.
+pub(super) fn start_of(dataset: &Location, path: &str, allowance: &Allowance) -> Option<f64> {
+    let names = attribute_names(dataset);
+    let name = STARTS.into_iter().find(|start| names.iter().any(|name| name == start))?;
+    let value = number_attribute(dataset, path, name).ok().filter(|value| value.is_finite())?;
+    let unit = unit_names(name).into_iter().find_map(|name| text_attribute(dataset, &name, allowance));
+    Some(value * unit.map_or(Some(1.0), |unit| seconds(&unit))?)
 }
 
 /// What the attributes of an object say of a rate, each in the unit that an attribute beside it states.
