@@ -138,7 +138,8 @@ pub(crate) fn roundest_step(step: f64, uncertainty: f64) -> f64 {
     if digits_of(round) + 1 < digits_of(rate) { round } else { rate.recip() }
 }
 
-/// The rate of an interval that a file states to one unit of its last place, and its standard error, relative. An interval that was cut to few digits
+/// The rate of an interval that a file states to one unit of its last place, and its standard error, relative. An
+/// interval that was cut to few digits
 /// (0.000977 s of 1024 Hz) allows several rates: of these that with the fewest digits.
 ///
 /// An interval is taken for exact where it has at most [`ROUND_DIGITS`] digits, as instruments are set, where it has all

@@ -61,8 +61,9 @@ pub struct SignCounts {
 /// # Accuracy
 /// Over 750 simulated responses of one to five modes (damping 0.2 to 5 %, noise 20 to 80 dB below the peak, delays up to
 /// 5 ms) no resonance is counted on the wrong side (tests). Resonances that are narrower than the step of the
-/// frequencies, or hidden in noise, are not counted. Noise alone, smoothed over ten lines, shows the other sign in one of
-/// some 240 responses. A system that is unstable without its controller, and the ratio of
+/// frequencies, or hidden in noise, are not counted. Noise alone, white or
+/// smoothed, shows the other sign in at most 8 of 240 responses (tests). A system that is unstable without its
+/// controller, and the ratio of
 /// two motions whose force acts elsewhere, may have poles that do not decay.
 /// # Errors
 /// None: what does not decide is not counted.
