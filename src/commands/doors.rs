@@ -41,7 +41,7 @@ pub fn say_of_config(text: &str, set: &[String], registry: &Registry) -> String 
 
 /// All that `inspect` says of a file, for people and for scripts.
 pub fn say_of_recording(path: &Path) -> String {
-    let inspected = inspect(path);
+    let inspected = inspect(path, &InputFiles::new());
     let json = inspected_json(&inspected).to_string();
     file_text(&inspected) + &folder_text(path, &[inspected]) + &json
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::InputFiles;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
@@ -19,7 +20,7 @@ pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
             |error: std::io::Error| Failure::failed(format!("{} cannot be listed: {error}", path.display()), None);
         let files = if path.is_dir() { files_of(path).map_err(cannot)? } else { vec![path.clone()] };
         // in parallel, printed in their order
-        let inspected: Vec<Inspected> = files.par_iter().map(|file| inspect(file)).collect();
+        let inspected: Vec<Inspected> = files.par_iter().map(|file| inspect(file, &InputFiles::new())).collect();
         if !as_json {
             print(&text(path, &inspected))?;
         }

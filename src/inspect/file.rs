@@ -55,12 +55,12 @@ pub enum Outcome {
     },
 }
 
-/// Looks at a file: what it holds, and every sample of it once.
-pub fn inspect(path: &Path) -> Inspected {
+/// Looks at a file: what it holds, and every sample of it once. `files` keeps what was parsed.
+pub fn inspect(path: &Path, files: &InputFiles) -> Inspected {
     let size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
-    let outcome = match InputFiles::new().is_result(path) {
+    let outcome = match files.is_result(path) {
         Ok(true) => Outcome::Own,
-        _ => read(path).map_or_else(|error| refused(path, error), |holdings| Outcome::Read(Box::new(holdings))),
+        _ => read(path, files).map_or_else(|error| refused(path, error), |holdings| Outcome::Read(Box::new(holdings))),
     };
     Inspected { file: path.to_owned(), size_bytes, outcome }
 }
@@ -78,8 +78,8 @@ fn is_no_recording(path: &Path) -> bool {
     read.is_ok() && !head.is_empty() && head != GZIP && !recognised(path)
 }
 
-fn read(path: &Path) -> Result<Holdings, StageError> {
-    let opened = open_unpacked(&InputFiles::new(), path, &Reading::of("auto", None))?;
+fn read(path: &Path, files: &InputFiles) -> Result<Holdings, StageError> {
+    let opened = open_unpacked(files, path, &Reading::of("auto", None))?;
     let contents = &opened.contents;
     let channels = contents.channels.iter().enumerate();
     let mut channels: Vec<Channel> =

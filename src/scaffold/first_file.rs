@@ -6,8 +6,8 @@ use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, find_decays}
 use afmid_kernels::harmonics::find_decays_beside_lines;
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
 use afmid_pipeline::recording::{
-    Contents, FoundChannel, FoundResponse, InputFiles, Reading, UnpackedContents, contradiction, gains_without_phase,
-    mean_rate, open_unpacked, responses, says_frequencies,
+    Contents, FoundChannel, FoundResponse, Reading, UnpackedContents, contradiction, gains_without_phase, mean_rate,
+    open_unpacked, responses, says_frequencies,
 };
 
 use super::channels::{some_of, usable};
@@ -36,7 +36,7 @@ impl<'a> FirstFile<'a> {
 
     fn opened(&self) -> Result<&UnpackedContents, String> {
         let open = || {
-            open_unpacked(&InputFiles::new(), &self.source.file, &Reading::of("auto", None))
+            open_unpacked(&self.source.opened, &self.source.file, &Reading::of("auto", None))
                 .map_err(|error| error.to_string())
         };
         self.opened.get_or_init(open).as_ref().map_err(Clone::clone)

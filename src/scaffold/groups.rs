@@ -74,8 +74,8 @@ pub type Listed = (PathBuf, bool);
 
 impl Groups {
     /// Opens all files. Errors: one that was given by its own name cannot be read.
-    pub fn of(files: &[Listed], wanted: &Wanted<'_>) -> Result<Self, Question> {
-        let kinds: Vec<Result<Kind, Question>> = files.par_iter().map(|file| kind(file, wanted)).collect();
+    pub fn of(files: &[Listed], wanted: &Wanted<'_>, opened: &InputFiles) -> Result<Self, Question> {
+        let kinds: Vec<Result<Kind, Question>> = files.par_iter().map(|file| kind(file, wanted, opened)).collect();
         let mut groups = Self::default();
         for ((path, _), kind) in files.iter().zip(kinds) {
             match kind? {
@@ -196,12 +196,11 @@ fn numbers_aside(location: &str) -> String {
 }
 
 /// What a file is. Errors: it was given by its own name and cannot be read.
-fn kind((path, given): &Listed, wanted: &Wanted<'_>) -> Result<Kind, Question> {
-    let files = InputFiles::new();
+fn kind((path, given): &Listed, wanted: &Wanted<'_>, files: &InputFiles) -> Result<Kind, Question> {
     if matches!(files.is_result(path), Ok(true)) {
         return Ok(Kind::Own);
     }
-    let opened = match open_unpacked(&files, path, &Reading::of("auto", None)) {
+    let opened = match open_unpacked(files, path, &Reading::of("auto", None)) {
         Ok(opened) => opened,
         Err(error) if *given => return Err((format!("{}: {}", path.display(), error.problem), error.help)),
         Err(error) if recognised(path) => return Ok(Kind::None(error.problem)),

@@ -45,8 +45,11 @@ pub fn force_curve(file: &FirstFile<'_>, wanted: &Wanted<'_>) -> Option<String> 
     if let Some(distance) = distance(source, best) {
         return Some(format!("snap-offs: {} has the distance {distance}, too", source.name()));
     }
-    let ruptures =
-        source.files.iter().take(SEARCHED).find_map(|path| rupture(path, &best.location).map(|at| (path, at)));
+    let ruptures = source
+        .files
+        .iter()
+        .take(SEARCHED)
+        .find_map(|path| rupture(&source.opened, path, &best.location).map(|at| (path, at)));
     let (path, sample) = ruptures.filter(|_| !rings_without_a_step(file, best, wanted))?;
     let rate = file.rate(best, wanted).ok();
     let at = rate.map_or_else(|| format!("sample {sample}"), |rate| format!("{} s", number(sample as f64 / rate)));
@@ -66,8 +69,8 @@ fn distance<'a>(source: &'a Source, signal: &Channel) -> Option<&'a str> {
 }
 
 /// The sample at which a contact ruptures in a file; none where none does, or it cannot be read.
-fn rupture(path: &Path, location: &str) -> Option<usize> {
-    let opened = open_unpacked(&InputFiles::new(), path, &Reading::of("auto", None)).ok()?;
+fn rupture(files: &InputFiles, path: &Path, location: &str) -> Option<usize> {
+    let opened = open_unpacked(files, path, &Reading::of("auto", None)).ok()?;
     let found = opened.contents.channels.iter().find(|channel| channel.location == location)?;
     let mut means = BlockMeans::new(BLOCK_SAMPLES, 1.0, None);
     means.push(&first_samples(found).ok()?);

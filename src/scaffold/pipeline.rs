@@ -238,6 +238,8 @@ pub fn columns(
 mod tests {
     use std::path::PathBuf;
 
+    use afmid_pipeline::InputFiles;
+
     use super::super::choice::choose;
     use super::*;
 
@@ -267,6 +269,7 @@ mod tests {
             rate_hz: rate,
             others: Vec::new(),
             skipped: Vec::new(),
+            opened: InputFiles::new(),
         }
     }
 

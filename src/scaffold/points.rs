@@ -68,7 +68,8 @@ impl Blocks {
     fn of(source: &Source, choice: &Choice<'_>) -> Result<Self, Question> {
         let mut blocks = Self { samples: usize::MAX, before: BEFORE };
         let force = choice.inputs.first().map(|input| input.location.as_str()).unwrap_or_default();
-        let forces: Vec<Vec<f64>> = source.files.iter().map(|file| series(file, force)).collect::<Result<_, _>>()?;
+        let forces: Vec<Vec<f64>> =
+            source.files.iter().map(|file| series(&source.opened, file, force)).collect::<Result<_, _>>()?;
         if choice.struck {
             blocks.before = forces.iter().map(|force| hit_begins(force, HIT)).fold(BEFORE, usize::min);
         }
@@ -98,9 +99,9 @@ impl Blocks {
 }
 
 /// A channel of a file. Errors: it is not there or cannot be read.
-fn series(file: &Path, location: &str) -> Result<Vec<f64>, Question> {
+fn series(files: &InputFiles, file: &Path, location: &str) -> Result<Vec<f64>, Question> {
     let plain = |problem: String| (format!("{}: {problem}", file.display()), None);
-    let opened = open_unpacked(&InputFiles::new(), file, &Reading::of("auto", None));
+    let opened = open_unpacked(files, file, &Reading::of("auto", None));
     let opened = opened.map_err(|error| plain(error.problem))?;
     let found = opened.contents.channels.iter().find(|channel| channel.location == location);
     let found = found.ok_or_else(|| plain(format!("there is no channel {location}")))?;

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::recording::InputFiles;
+
 use super::choice::Question;
 use super::groups::{Group, Groups, Listed};
 use super::pipeline::Wanted;
@@ -31,6 +33,8 @@ pub struct Source {
     pub others: Vec<Group>,
     /// What is no recording, and why.
     pub skipped: Vec<(PathBuf, String)>,
+    /// What was opened: a file is parsed once.
+    pub opened: InputFiles,
 }
 
 impl Source {
@@ -46,15 +50,16 @@ impl Source {
 pub fn look(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<Source, Question> {
     let listed = listed(paths)?;
     if let [(only, true)] = &listed[..] {
-        return source(Groups::default(), vec![only.clone()], vec![only.clone()], None);
+        return source(InputFiles::new(), Groups::default(), vec![only.clone()], vec![only.clone()], None);
     }
-    let mut groups = Groups::of(&listed, wanted)?;
+    let opened = InputFiles::new();
+    let mut groups = Groups::of(&listed, wanted, &opened)?;
     let Some(number) = groups.best(wanted.rate_hz) else { return Err(none(paths, &groups)) };
     let chosen = groups.all.remove(number);
     groups.all.sort_by_key(|group| std::cmp::Reverse(group.files.len()));
     let (rate_hz, files) = (chosen.rate_hz(), chosen.files);
     let patterns = paths.iter().flat_map(|path| patterns(path, &files, &groups.own)).collect();
-    source(groups, files, patterns, rate_hz)
+    source(opened, groups, files, patterns, rate_hz)
 }
 
 /// All files. Errors: a path that is not there, a folder without files.
@@ -87,7 +92,7 @@ fn none(paths: &[PathBuf], groups: &Groups) -> Question {
     let own = (!groups.own.is_empty()).then(|| format!("{} are results of afmid's", groups.own.len()));
     let reasons: Vec<String> = groups.skipped.iter().take(MOST).map(reason).chain(own).collect();
     let names: Vec<String> = paths.iter().take(MOST).map(|path| path.display().to_string()).collect();
-    let known = groups.skipped.first().and_then(|(path, _)| match inspect(path).outcome {
+    let known = groups.skipped.first().and_then(|(path, _)| match inspect(path, &InputFiles::new()).outcome {
         Outcome::Refused { help, .. } => help,
         _ => None,
     });
@@ -111,13 +116,14 @@ fn patterns(path: &Path, files: &[PathBuf], own: &[PathBuf]) -> Vec<PathBuf> {
 }
 
 fn source(
+    opened: InputFiles,
     groups: Groups,
     files: Vec<PathBuf>,
     patterns: Vec<PathBuf>,
     rate_hz: Option<f64>,
 ) -> Result<Source, Question> {
     let first = files.first().cloned().ok_or_else(|| ("there are no recordings".to_owned(), None))?;
-    let inspected = inspect(&first);
+    let inspected = inspect(&first, &opened);
     match inspected.outcome {
         Outcome::Read(holdings) => Ok(Source {
             patterns,
@@ -130,6 +136,7 @@ fn source(
             rate_hz,
             others: groups.all,
             skipped: groups.skipped,
+            opened,
             file: first,
         }),
         Outcome::Own => Err((

@@ -1,6 +1,7 @@
 //! What a file of any format holds.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use afmid_formats::{Contents, FormatError, FoundChannel, begun_together, formats, head_of, recognise};
 
@@ -9,7 +10,9 @@ use super::how::{AUTO, HDF5, NATIVE, RAW, Reading};
 use super::inflated::Inflated;
 use super::input_files::InputFiles;
 use super::native::is_native;
+use super::opened_files::contents;
 use crate::error::StageError;
+use crate::files::FileState;
 
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
@@ -56,24 +59,28 @@ pub struct UnpackedContents {
     /// Name of the format that opened it.
     pub format: &'static str,
     /// Everything but the samples.
-    pub contents: Contents,
+    pub contents: Arc<Contents>,
     _inflated: Option<Inflated>,
 }
 
-/// As [`open_contents`], also of files that are packed with gzip.
+/// As [`open_contents`], also of files that are packed with gzip. What is not packed is parsed once, as long as `files`
+/// keeps it.
 ///
 /// Errors: as [`open_contents`]; it cannot be unpacked.
 pub fn open_unpacked(files: &InputFiles, path: &Path, reading: &Reading) -> Result<UnpackedContents, StageError> {
     reading.check()?;
     let Some((inflated, format, mut contents)) = open_packed(files, path, reading)? else {
-        let (format, contents) = open_contents(files, path, reading)?;
+        let format = format_of(files, path, reading)?;
+        let state =
+            FileState::at(path).map_err(|error| StageError::new(format!("cannot be read: {error}")).at(path))?;
+        let contents = contents(files, path, state, &Reading { format: format.to_owned(), ..reading.clone() })?;
         return Ok(UnpackedContents { format, contents, _inflated: None });
     };
     if recognise(&head_of(path)?, path).is_none() {
         let said = "packed with gzip: `io.columns` and `io.frf` read it, `io.records` once it is unpacked";
         contents.remarks.push(said.to_owned());
     }
-    Ok(UnpackedContents { format, contents, _inflated: Some(inflated) })
+    Ok(UnpackedContents { format, contents: Arc::new(contents), _inflated: Some(inflated) })
 }
 
 /// Unpacks and opens a file; none if it is not packed. Errors: as [`open_unpacked`].
